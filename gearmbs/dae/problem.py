@@ -1,0 +1,77 @@
+"""The DAE as integrators see it: four compiled functions over flat tables.
+
+Every problem, a mechanism's or a user's own, has the same signatures, so that one compiled
+integrator serves all of them through typed function pointers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import types
+
+F8 = types.float64
+I8 = types.int64
+VEC = types.float64[::1]
+MAT = types.float64[:, ::1]
+IVEC = types.int64[::1]
+
+RESIDUAL_SIG = types.void(F8, VEC, VEC, VEC, IVEC, VEC, VEC)
+JACOBIAN_SIG = types.void(F8, VEC, VEC, F8, VEC, IVEC, VEC, VEC)
+HOOK_SIG = types.int64(F8, MAT, I8, IVEC, VEC, VEC)
+EVENTS_SIG = types.void(F8, VEC, VEC, VEC, IVEC, VEC, VEC)
+
+
+@dataclass
+class DAEProblem:
+    """A DAE G(t, y, y') = 0 with everything an integrator needs to know about it.
+
+    Parameters
+    ----------
+    n : int
+        Number of unknowns.
+    residual, jacobian, hook, events : compiled functions
+        Numba functions of the signatures in this module; ``hook`` and ``events`` may be None.
+    indptr, indices : ndarray of int64
+        CSC pattern of the Jacobian dG/dy + cj dG/dy'.
+    idata, rdata : ndarray
+        Flat tables handed to every call; an integrator works on copies.
+    work_size : int
+        Length of the scratch array handed to every call.
+    y0, yp0 : ndarray, shape (n,)
+        Consistent initial values at ``t0``.
+    error_mask : ndarray of bool, shape (n,)
+        Unknowns under local error control.
+    atol_scale : ndarray, shape (n,)
+        Weight of each unknown: the absolute tolerance is ``tol * atol_scale``.
+    scale : ndarray, shape (n,)
+        Typical magnitude of each unknown, for scaling the Newton matrix.
+    differential : ndarray of bool, shape (n,)
+        Unknowns whose derivative appears in G.
+    names : list of str
+        Names of the unknowns, for messages.
+    n_events : int
+        Number of event functions.
+    """
+
+    n: int
+    residual: Callable
+    jacobian: Callable
+    indptr: np.ndarray
+    indices: np.ndarray
+    idata: np.ndarray
+    rdata: np.ndarray
+    work_size: int
+    y0: np.ndarray
+    yp0: np.ndarray
+    error_mask: np.ndarray
+    atol_scale: np.ndarray
+    scale: np.ndarray
+    differential: np.ndarray
+    t0: float = 0.0
+    names: list[str] = field(default_factory=list)
+    hook: Callable | None = None
+    events: Callable | None = None
+    n_events: int = 0
