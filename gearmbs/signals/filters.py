@@ -1,0 +1,250 @@
+"""Zero-phase FIR filters: design by the Kaiser formula, application with the delay taken out, edges stated.
+
+A symmetric filter of odd length 2h + 1 delays by exactly h samples; shifting its output back leaves no phase at
+all. Only samples at least h from either end are computed from the record alone; `edges` says what to do about
+the rest.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+import scipy.signal as ss
+import xarray as xr
+
+from .errors import SignalError
+from .signal import check_rate, like, rate_of
+
+Edges = Literal["trim", "extend"]
+ATTENUATION_DB = 100.0
+DECIMATE_PASS = 0.4
+DECIMATE_STOP = 0.5
+BLOCK = 1 << 16
+
+
+def kaiser_taps(
+    cutoffs: float | tuple[float, float], width: float, rate: float, kind: str, attenuation: float
+) -> np.ndarray:
+    """Symmetric FIR filter of odd length.
+
+    Parameters
+    ----------
+    cutoffs : float or pair
+        Middle of the transition band or bands in Hz.
+    width : float
+        Width of the transition in Hz.
+    rate : float
+        Sampling rate in Hz.
+    kind : {"lowpass", "highpass", "bandpass", "bandstop"}
+    attenuation : float
+        Stop-band attenuation in dB; the pass-band ripple is 10^(-attenuation/20) as well.
+
+    Returns
+    -------
+    ndarray of shape (2 h + 1,)
+
+    References
+    ----------
+    .. [1] J. F. Kaiser, Nonrecursive digital filter design using the I0-sinh window function, ISCAS 1974.
+    """
+    count, beta = ss.kaiserord(attenuation, width / (0.5 * rate))
+    return ss.firwin(count | 1, cutoffs, window=("kaiser", beta), pass_zero=kind, fs=rate)
+
+
+def apply_zero_phase(values: np.ndarray, taps: np.ndarray, edges: Edges, step: int = 1) -> tuple[np.ndarray, int]:
+    """Filter along axis 0 without delay and keep every `step`-th sample.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n, channels)
+    taps : ndarray of shape (2 h + 1,), symmetric
+    edges : {"trim", "extend"}
+        "trim": drop the h samples at either end that reach outside the record.
+        "extend": continue the record by point reflection in its end samples; as many samples come out as went in.
+
+    Returns
+    -------
+    filtered : ndarray of shape (m, channels)
+    first : int
+        Index in `values` of the first sample that came out.
+
+    Raises
+    ------
+    SignalError
+        If the record is shorter than the filter ("trim") or than half of it ("extend").
+    """
+    half = taps.size // 2
+    n = values.shape[0]
+    need = taps.size if edges == "trim" else half + 1
+    if edges not in ("trim", "extend"):
+        raise SignalError(f"edges: must be 'trim' or 'extend', got {edges!r}")
+    if n < need:
+        raise SignalError(
+            f"signal: has {n} samples, the filter needs at least {need} (edges={edges!r}); "
+            "give a longer record or a wider transition band"
+        )
+    columns = []
+    for column in values.T:
+        source = np.ascontiguousarray(column, dtype=float)
+        if edges == "extend":
+            source = np.concatenate(
+                (2 * source[0] - source[half:0:-1], source, 2 * source[-1] - source[-2 : -half - 2 : -1])
+            )
+        columns.append(_valid(source, taps, step))
+    return np.stack(columns, axis=1), half if edges == "trim" else 0
+
+
+def _valid(source: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:
+    """Every `step`-th fully supported sample of the convolution, in blocks so that scratch memory stays bounded."""
+    count = source.size - taps.size + 1
+    out = np.empty((count + step - 1) // step)
+    block = max(1, BLOCK // step) * step
+    for start in range(0, count, block):
+        stop = min(start + block, count)
+        piece = ss.oaconvolve(source[start : stop + taps.size - 1], taps, mode="valid")[::step]
+        out[start // step : start // step + piece.size] = piece
+    return out
+
+
+def bandpass(
+    signal: xr.DataArray,
+    low: float,
+    high: float,
+    *,
+    transition: float,
+    edges: Edges = "trim",
+    attenuation: float = ATTENUATION_DB,
+) -> xr.DataArray:
+    """Zero-phase band-pass, flat from `low` to `high` and down by `attenuation` beyond the transition bands.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel).
+    low, high : float
+        Pass band in Hz.
+    transition : float
+        Width of each transition band in Hz.
+    edges : {"trim", "extend"}
+        See `apply_zero_phase`.
+    attenuation : float
+        Stop-band attenuation in dB.
+
+    Returns
+    -------
+    xarray.DataArray
+        Same rate; shorter by the filter's length less one if edges are trimmed.
+
+    Raises
+    ------
+    SignalError
+        If the band does not fit between 0 and half the sampling rate, or the record is too short.
+    """
+    rate = rate_of(signal)
+    if not (0.0 < transition and 0.0 < low - transition / 2 and low < high and high + transition / 2 < rate / 2):
+        raise SignalError(
+            f"band: {low:g} to {high:g} Hz with transitions of {transition:g} Hz must lie between 0 and "
+            f"{rate / 2:g} Hz (half the sampling rate)"
+        )
+    taps = kaiser_taps((low - transition / 2, high + transition / 2), transition, rate, "bandpass", attenuation)
+    # A static load can be thousands of times the vibration; taking it out first spares the stop band.
+    values, first = apply_zero_phase(signal.values - signal.values.mean(axis=0), taps, edges)
+    return like(signal, values, t0=float(signal["time"].values[first]))
+
+
+def decimation_taps(ratio: int, rate: float, attenuation: float = ATTENUATION_DB) -> np.ndarray:
+    """The anti-alias filter of `decimate`: flat to 0.4 of the new rate, down by `attenuation` from 0.5 of it."""
+    new_rate = rate / ratio
+    middle = 0.5 * (DECIMATE_PASS + DECIMATE_STOP) * new_rate
+    return kaiser_taps(middle, (DECIMATE_STOP - DECIMATE_PASS) * new_rate, rate, "lowpass", attenuation)
+
+
+def decimate(
+    signal: xr.DataArray, rate: float, *, edges: Edges = "trim", attenuation: float = ATTENUATION_DB
+) -> xr.DataArray:
+    """Lower the sampling rate by a whole number, with a zero-phase FIR anti-alias filter.
+
+    The filter is flat to 10^(-attenuation/20) up to 0.4 of the new rate and at least `attenuation` down from half
+    the new rate on, so that nothing aliases anywhere in the new band: for 51.2 kHz to 12.8 kHz the pass band ends
+    at 5120 Hz and the stop band begins at 6400 Hz.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel).
+    rate : float
+        New rate in Hz; the old one must be a whole multiple of it.
+    edges : {"trim", "extend"}
+        "trim" (default) gives only samples whose filter lies inside the record (2.5 ms are lost at either end
+        for 51.2 kHz to 12.8 kHz); "extend" keeps the length by point reflection, approximate over that distance.
+    attenuation : float
+        Stop-band attenuation in dB.
+
+    Returns
+    -------
+    xarray.DataArray
+
+    Raises
+    ------
+    SignalError
+        If the ratio of the rates is not a whole number or the record is too short.
+    """
+    old = rate_of(signal)
+    new = check_rate(rate)
+    ratio = round(old / new)
+    if ratio < 1 or abs(old / new - ratio) > 1e-9 * ratio:
+        raise SignalError(
+            f"rate: {old:g} Hz is not a whole multiple of {new:g} Hz; use resample(signal, rate={new:g}) instead"
+        )
+    if ratio == 1:
+        return signal.copy(deep=False)
+    taps = decimation_taps(ratio, old, attenuation)
+    values, first = apply_zero_phase(signal.values, taps, edges, step=ratio)
+    return like(signal, values, t0=float(signal["time"].values[first]), rate=new)
+
+
+def resample(signal: xr.DataArray, rate: float, *, attenuation: float = ATTENUATION_DB) -> xr.DataArray:
+    """Change the sampling rate by a ratio of whole numbers, with a zero-phase polyphase FIR filter.
+
+    The filter is flat to 0.4 and down from 0.5 of the lower of the two rates. The record is continued by a
+    straight line at its ends, so the first and last filter lengths are approximate.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel).
+    rate : float
+        New rate in Hz.
+    attenuation : float
+        Stop-band attenuation in dB.
+
+    Raises
+    ------
+    SignalError
+        If no ratio with terms up to 1000 matches the two rates.
+    """
+    old = rate_of(signal)
+    new = check_rate(rate)
+    ratio = Fraction(new / old).limit_denominator(1000)
+    if ratio.numerator == 0 or ratio.numerator > 1000 or abs(float(ratio) - new / old) > 1e-9 * new / old:
+        raise SignalError(
+            f"rate: {old:g} Hz to {new:g} Hz is not a ratio of whole numbers up to 1000; pick a nearby rate"
+        )
+    up, down = ratio.numerator, ratio.denominator
+    if up == down:
+        return signal.copy(deep=False)
+    fine = old * up
+    lower = min(old, new)
+    taps = kaiser_taps(
+        0.5 * (DECIMATE_PASS + DECIMATE_STOP) * lower,
+        (DECIMATE_STOP - DECIMATE_PASS) * lower,
+        fine,
+        "lowpass",
+        attenuation,
+    )
+    columns = [ss.resample_poly(column, up, down, window=taps, padtype="line") for column in signal.values.T]
+    count = math.ceil(signal.sizes["time"] * up / down)
+    return like(signal, np.stack(columns, axis=1)[:count], rate=new)
