@@ -1,0 +1,241 @@
+"""Sparse LU for a fixed pattern: pivots and fill found once, numeric factorisations replayed without search.
+
+`analyse` chooses pivots on values and lays down a plan. `factor` replays the plan column by column (left-looking),
+`solve` applies it. Pivots stay frozen until a multiplier grows beyond `GROWTH_LIMIT` or a pivot vanishes; then the
+caller analyses again with the current values.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import float64, int64, njit, types, uint32
+
+from gearmbs.dae.ordering import choose_pivots, equilibrate
+
+GROWTH_LIMIT = 1e5
+
+_VEC = float64[::1]
+_IVEC = int64[::1]
+_UVEC = uint32[::1]
+
+
+class LUPlan(NamedTuple):
+    """Frozen pivots and index lists of one pattern, in pivot order.
+
+    Attributes
+    ----------
+    a_ptr, a_pos, a_src : ndarray
+        For each pivot column the entries of the matrix: their place among the rows in pivot order and their
+        index in the CSC values.
+    a_scale : ndarray
+        Scale of each of these entries (row times column scale).
+    u_ptr, u_pos : ndarray
+        For each column the earlier pivots that act on it, ascending.
+    l_ptr, l_pos : ndarray
+        For each column the rows below the pivot.
+    row_from, col_to : ndarray
+        Original row and column of each pivot.
+    row_scale, col_scale : ndarray
+        Scales, in pivot order.
+    """
+
+    a_ptr: np.ndarray
+    a_pos: np.ndarray
+    a_src: np.ndarray
+    a_scale: np.ndarray
+    u_ptr: np.ndarray
+    u_pos: np.ndarray
+    l_ptr: np.ndarray
+    l_pos: np.ndarray
+    row_from: np.ndarray
+    col_to: np.ndarray
+    row_scale: np.ndarray
+    col_scale: np.ndarray
+
+
+class LUFactors(NamedTuple):
+    """Numbers of one factorisation: L below its unit diagonal, U above its diagonal, inverse pivots, scratch."""
+
+    l_vals: np.ndarray
+    u_vals: np.ndarray
+    pivot_inv: np.ndarray
+    x: np.ndarray
+
+
+PLAN_TYPE = types.NamedTuple((_IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _VEC, _VEC), LUPlan)
+FACTORS_TYPE = types.NamedUniTuple(_VEC, 4, LUFactors)
+
+
+class SingularMatrixError(ValueError):
+    """No pivot is left.
+
+    Attributes
+    ----------
+    rows, cols : ndarray of int
+        Equations and unknowns that could not be paired.
+    """
+
+    def __init__(self, rows: np.ndarray, cols: np.ndarray):
+        super().__init__(f"the matrix is singular: no pivot left for columns {cols.tolist()}, rows {rows.tolist()}")
+        self.rows = rows
+        self.cols = cols
+
+
+def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np.ndarray) -> LUPlan:
+    """Choose pivots for a matrix and lay down the plan to factor every matrix of its pattern.
+
+    Parameters
+    ----------
+    indptr, indices : ndarray of int64
+        CSC pattern, n columns.
+    vals : ndarray
+        Values on which pivots are chosen.
+    scale : ndarray, shape (n,)
+        Typical magnitude of each unknown.
+
+    Returns
+    -------
+    LUPlan
+
+    Raises
+    ------
+    SingularMatrixError
+        If the matrix is singular to working precision, with the rows and columns left over.
+    ValueError
+        If a value is not finite.
+    """
+    if not np.isfinite(vals).all():
+        raise ValueError("the matrix has entries that are not finite")
+    n = len(indptr) - 1
+    row_scale = np.ones(n)
+    col_scale = np.array(scale, dtype=float)
+    equilibrate(indptr, indices, vals, row_scale, col_scale)
+    column = np.repeat(np.arange(n), np.diff(indptr))
+    entry_scale = row_scale[indices] * col_scale[column]
+    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(indptr, indices, vals * entry_scale)
+    if rank < n:
+        raise SingularMatrixError(rows[rank:], cols[rank:])
+
+    row_place = np.empty(n, dtype=np.int64)
+    row_place[rows] = np.arange(n)
+    col_place = np.empty(n, dtype=np.int64)
+    col_place[cols] = np.arange(n)
+
+    a_count = np.diff(indptr)[cols]
+    a_ptr = np.concatenate(([0], np.cumsum(a_count))).astype(np.int64)
+    a_src = np.lexsort((row_place[indices], col_place[column]))
+    # rows of U come out pivot by pivot; a stable sort by column leaves each column's pivots ascending
+    u_row = np.repeat(np.arange(n), np.diff(u_ptr))
+    u_col = col_place[u_cols]
+    by_column = np.argsort(u_col, kind="stable")
+    u_by_col = np.concatenate(([0], np.cumsum(np.bincount(u_col, minlength=n)))).astype(np.int64)
+    l_pos = row_place[l_rows]
+    l_pos = l_pos[np.lexsort((l_pos, np.repeat(np.arange(n), np.diff(l_ptr))))]
+    return LUPlan(
+        a_ptr,
+        row_place[indices[a_src]].astype(np.uint32),
+        a_src.astype(np.uint32),
+        entry_scale[a_src],
+        u_by_col,
+        u_row[by_column].astype(np.uint32),
+        l_ptr,
+        l_pos.astype(np.uint32),
+        rows.astype(np.uint32),
+        cols.astype(np.uint32),
+        row_scale[rows],
+        col_scale[cols],
+    )
+
+
+def new_factors(plan: LUPlan) -> LUFactors:
+    """Return empty factors for a plan."""
+    n = len(plan.row_from)
+    return LUFactors(np.zeros(len(plan.l_pos)), np.zeros(len(plan.u_pos)), np.zeros(n), np.zeros(n))
+
+
+@njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True)
+def factor(plan, factors, vals):
+    """Factor the matrix with values ``vals`` along the plan.
+
+    Parameters
+    ----------
+    plan : LUPlan
+    factors : LUFactors
+        Overwritten.
+    vals : ndarray
+        Values in CSC order.
+
+    Returns
+    -------
+    growth : float
+        Largest multiplier in L. Above `GROWTH_LIMIT`, infinite or NaN the pivots no longer fit: analyse again.
+    """
+    x = factors.x
+    l_vals = factors.l_vals
+    u_vals = factors.u_vals
+    l_pos = plan.l_pos
+    l_ptr = plan.l_ptr
+    u_pos = plan.u_pos
+    growth = 0.0
+    n = x.shape[0]
+    for k in range(n):
+        for p in range(np.uint64(plan.a_ptr[k]), np.uint64(plan.a_ptr[k + 1])):
+            x[plan.a_pos[p]] = vals[plan.a_src[p]] * plan.a_scale[p]
+        for p in range(np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])):
+            j = np.uint64(u_pos[p])
+            u = x[j]
+            x[j] = 0.0
+            u_vals[p] = u
+            if u != 0.0:
+                for q in range(np.uint64(l_ptr[j]), np.uint64(l_ptr[j + np.uint64(1)])):
+                    x[l_pos[q]] -= l_vals[q] * u
+        pivot = x[k]
+        x[k] = 0.0
+        if pivot == 0.0:
+            return np.inf
+        inv = 1.0 / pivot
+        factors.pivot_inv[k] = inv
+        for q in range(np.uint64(l_ptr[k]), np.uint64(l_ptr[k + 1])):
+            i = l_pos[q]
+            l = x[i] * inv
+            x[i] = 0.0
+            l_vals[q] = l
+            if not abs(l) <= growth:
+                growth = abs(l)
+    return growth
+
+
+@njit(types.void(PLAN_TYPE, FACTORS_TYPE, _VEC, _VEC), cache=True, nogil=True)
+def solve(plan, factors, b, out):
+    """Write the solution of A out = b; ``out`` may be ``b`` itself.
+
+    Parameters
+    ----------
+    plan : LUPlan
+    factors : LUFactors
+        From `factor`.
+    b, out : ndarray, shape (n,)
+    """
+    x = factors.x
+    l_vals = factors.l_vals
+    u_vals = factors.u_vals
+    l_pos = plan.l_pos
+    u_pos = plan.u_pos
+    n = x.shape[0]
+    for k in range(n):
+        x[k] = b[plan.row_from[k]] * plan.row_scale[k]
+    for k in range(n):
+        v = x[k]
+        if v != 0.0:
+            for q in range(np.uint64(plan.l_ptr[k]), np.uint64(plan.l_ptr[k + 1])):
+                x[l_pos[q]] -= l_vals[q] * v
+    for m in range(n):
+        k = n - 1 - m
+        v = x[k] * factors.pivot_inv[k]
+        out[plan.col_to[k]] = v * plan.col_scale[k]
+        x[k] = 0.0
+        if v != 0.0:
+            for p in range(np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])):
+                x[u_pos[p]] -= u_vals[p] * v
