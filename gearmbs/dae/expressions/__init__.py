@@ -1,0 +1,25 @@
+"""Function expressions as flat tapes evaluated by one compiled, data-driven kernel."""
+
+from gearmbs.dae.expressions.evaluate import (
+    eval_gradient,
+    eval_request,
+    eval_second,
+    eval_time,
+    eval_value,
+    update_angles,
+)
+from gearmbs.dae.expressions.splines import SplineData
+from gearmbs.dae.expressions.tape import ExpressionError, Tape, TapeBuilder
+
+__all__ = [
+    "ExpressionError",
+    "SplineData",
+    "Tape",
+    "TapeBuilder",
+    "eval_gradient",
+    "eval_request",
+    "eval_second",
+    "eval_time",
+    "eval_value",
+    "update_angles",
+]

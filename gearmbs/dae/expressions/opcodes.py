@@ -1,0 +1,96 @@
+"""Instruction codes and layout of an expression tape.
+
+A tape is two flat arrays.  ``ints`` holds a header, the lists of bodies and algebraic unknowns the
+expression depends on, and the instructions; ``floats`` holds constants and spline tables.
+Instruction ``k`` writes register ``k`` (static single assignment), so operands are register numbers.
+"""
+
+HEAD_COUNT = 0
+"""Number of instructions."""
+HEAD_RESULT = 1
+"""Register of the value."""
+HEAD_BODIES = 2
+"""Number of bodies in the gradient."""
+HEAD_ALGEBRAIC = 3
+"""Number of algebraic unknowns in the gradient."""
+HEAD_BODY_LIST = 4
+"""Offset of the list of bodies (rows of the kinematics table)."""
+HEAD_ALGEBRAIC_LIST = 5
+"""Offset of the list of indices into y."""
+HEAD_CODE = 6
+"""Offset of the first instruction."""
+HEAD_ANGLES = 7
+"""Number of reference angles (entries of ``ref``)."""
+HEAD_SIZE = 8
+
+WIDTH = 10
+"""Integers an instruction takes: code, operands a b c d e, gradient slots of up to four bodies."""
+
+# leaves
+CONST = 0
+TIME = 1
+ALGEBRAIC = 2
+DISPLACEMENT = 3
+VELOCITY = 4
+ANGULAR_VELOCITY = 5
+ACCELERATION = 6
+ANGULAR_ACCELERATION = 7
+FORCE = 8
+COSINE = 9
+RADIAL_VELOCITY = 10
+EULER_PARAMETER = 11
+LAST_LEAF = 11
+
+# one operand
+FIRST_UNARY = 20
+NEG = 20
+ABS = 21
+SQRT = 22
+EXP = 23
+LOG = 24
+LOG10 = 25
+SIN = 26
+COS = 27
+TAN = 28
+ASIN = 29
+ACOS = 30
+ATAN = 31
+SINH = 32
+COSH = 33
+TANH = 34
+AINT = 35
+ANINT = 36
+STEP01 = 37
+STEP5_01 = 38
+HAVERSINE01 = 39
+POSITIVE_PART = 40
+UNIT_STEP = 41
+POWER_INT = 42
+UNWRAP = 43
+LAST_UNARY = 43
+
+# two operands
+FIRST_BINARY = 60
+ADD = 60
+SUB = 61
+MUL = 62
+DIV = 63
+POW = 64
+ATAN2 = 65
+HYPOT = 66
+MIN = 67
+MAX = 68
+MOD = 69
+SIGN = 70
+DIM = 71
+POSITIVE_POWER = 72
+SPLINE = 73
+LAST_BINARY = 73
+
+# condition and three branches
+SELECT = 90
+
+MAGNITUDE = 3
+"""Axis operand of a vector leaf that asks for the vector's length."""
+GLOBAL = -1
+"""Marker operand that stands for the global frame at the ground's origin."""
