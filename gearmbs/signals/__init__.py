@@ -6,6 +6,7 @@ A signal is an `xarray.DataArray` with dimensions (time, channel); see `gearmbs.
 from .bands import band_rms, gmf_rms, order_rms, rms
 from .errors import MissingMetadataError, SignalError, SignalFileError
 from .filters import bandpass, decimate, resample
+from .io import FORMATS, read_signal, write_signal
 from .newton import COMPONENTS, force_components, force_to_acceleration
 from .orders import harmonic_amplitudes
 from .scaling import dynamic_rms, remove_mean, rms_factor, scale, scale_states
@@ -24,6 +25,7 @@ from .spectra import spectrum
 
 __all__ = [
     "COMPONENTS",
+    "FORMATS",
     "MissingMetadataError",
     "SignalError",
     "SignalFileError",
@@ -41,6 +43,7 @@ __all__ = [
     "mesh_frequency",
     "order_rms",
     "rate_of",
+    "read_signal",
     "remove_mean",
     "require",
     "resample",
@@ -52,4 +55,5 @@ __all__ = [
     "trim",
     "units_of",
     "with_metadata",
+    "write_signal",
 ]
