@@ -54,6 +54,11 @@ class DAEProblem:
         Names of the unknowns, for messages.
     n_events : int
         Number of event functions.
+    hook_interval : callable, optional
+        Longest time that may pass, from the unknowns y, until ``hook`` is called again. For integrators that do not
+        call it after each step.
+    restart_rates : callable, optional
+        ``restart_rates(t, y, yp, idata, rdata)`` returns y' consistent with y after ``hook`` has rewritten y.
     """
 
     n: int
@@ -75,3 +80,5 @@ class DAEProblem:
     hook: Callable | None = None
     events: Callable | None = None
     n_events: int = 0
+    hook_interval: Callable[[np.ndarray], float] | None = None
+    restart_rates: Callable | None = None

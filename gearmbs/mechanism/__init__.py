@@ -1,0 +1,28 @@
+"""What a person builds: bodies, markers, joints, motions, forces."""
+
+from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
+from gearmbs.mechanism.elements import GearContact, Torque
+from gearmbs.mechanism.functions import TimeFunction, constant, harmonic, polynomial, ramp, step
+from gearmbs.mechanism.joints import Joint
+from gearmbs.mechanism.mechanism import Mechanism
+from gearmbs.mechanism.parts import Body, Marker
+from gearmbs.mechanism.simulate import simulate
+
+__all__ = [
+    "AssemblyError",
+    "Body",
+    "GearContact",
+    "Joint",
+    "Marker",
+    "Mechanism",
+    "ModelError",
+    "SingularModelError",
+    "TimeFunction",
+    "Torque",
+    "constant",
+    "harmonic",
+    "polynomial",
+    "ramp",
+    "simulate",
+    "step",
+]

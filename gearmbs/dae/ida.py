@@ -1,0 +1,206 @@
+"""IDA from SUNDIALS through scikit-sundae, set up for constrained mechanical systems.
+
+The binding cannot take unknowns out of the error test, so those without error control get an absolute
+tolerance of `UNCONTROLLED`.  ``rtol`` acts on |y| of all unknowns, and angles wind up, so it is kept
+at the smallest sensible value and the vector of absolute tolerances does the work.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from scipy.sparse import csc_array
+from sksundae.ida import IDA
+
+from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.result import DAEResult, SolverStats, Status
+
+UNCONTROLLED = 1e10
+SMALLEST_RTOL = 1e-14
+DENSE_LIMIT = 40
+"""Unknowns up to which the dense factorisation is the cheaper one."""
+HISTORY_GROWTH = 1024
+
+
+class _Callbacks:
+    """The residual and Jacobian as scikit-sundae calls them: read-only arrays in, values written in place."""
+
+    def __init__(self, problem: DAEProblem, idata: np.ndarray, rdata: np.ndarray) -> None:
+        self.problem = problem
+        self.idata, self.rdata = idata, rdata
+        self.work = np.zeros(problem.work_size)
+        self.y, self.yp = np.zeros(problem.n), np.zeros(problem.n)
+        self.dense = problem.n <= DENSE_LIMIT
+        self.columns = np.repeat(np.arange(problem.n), np.diff(problem.indptr))
+        self.vals = np.zeros(problem.indices.size)
+        self.last_t = np.nan
+        self.steps = self.residuals = self.jacobians = 0
+        self.residual_time = self.jacobian_time = 0.0
+        self.bad: str | None = None
+
+    def residual(self, t, y, yp, out):
+        start = time.perf_counter()
+        self.y[:] = y
+        self.yp[:] = yp
+        self.problem.residual(t, self.y, self.yp, out, self.idata, self.rdata, self.work)
+        if t != self.last_t:
+            self.steps += 1
+            self.last_t = t
+        self.residuals += 1
+        self.residual_time += time.perf_counter() - start
+
+    def jacobian(self, t, y, yp, res, cj, out):
+        start = time.perf_counter()
+        self.y[:] = y
+        self.yp[:] = yp
+        self.problem.jacobian(t, self.y, self.yp, cj, self.vals, self.idata, self.rdata, self.work)
+        if self.dense:
+            out[self.problem.indices, self.columns] = self.vals
+        else:
+            out[:] = self.vals
+        self.jacobians += 1
+        self.jacobian_time += time.perf_counter() - start
+
+
+def _solver(problem: DAEProblem, calls: _Callbacks, atol: np.ndarray, rtol: float, options: dict) -> IDA:
+    pattern = csc_array((np.ones(problem.indices.size), problem.indices, problem.indptr), shape=(problem.n,) * 2)
+    linear = {"linsolver": "dense"} if calls.dense else {"linsolver": "sparse", "sparsity": pattern}
+    return IDA(
+        calls.residual,
+        jacfn=calls.jacobian,
+        rtol=max(rtol, SMALLEST_RTOL),
+        atol=atol,
+        algebraic_idx=np.flatnonzero(~problem.differential),
+        max_num_steps=1_000_000,
+        **linear,
+        **options,
+    )
+
+
+def solve_ida(
+    problem: DAEProblem,
+    t_eval: np.ndarray,
+    *,
+    tol: float = 1e-6,
+    rtol: float = 0.0,
+    max_order: int = 5,
+    max_step: float = 0.0,
+    first_step: float = 0.0,
+    min_step: float = 0.0,
+    max_iterations: int = 4,
+    progress: Callable[[float], None] | None = None,
+) -> DAEResult:
+    """Integrate a DAE with IDA and return it at the times ``t_eval``.
+
+    Parameters
+    ----------
+    problem : DAEProblem
+        With consistent initial values at ``t_eval[0]``.
+    t_eval : array_like, shape (m,)
+        Increasing output times, s; the first is the start.
+    tol : float
+        Absolute tolerance of unknown i is ``tol * problem.atol_scale[i]`` where the error mask is set.
+    rtol : float
+        Relative tolerance of all unknowns; 0 gives the smallest IDA accepts (see the module's text).
+    max_order, max_step, first_step, min_step, max_iterations
+        Handed to IDA; 0 leaves a size to IDA.
+    progress : callable, optional
+        Called with the time reached, at most a few hundred times a run.
+
+    Returns
+    -------
+    DAEResult
+        With ``status`` `SOLVER_FAILURE` or `INTERRUPTED` and what was computed so far if the run did not finish.
+    """
+    t_eval = np.asarray(t_eval, dtype=float)
+    if t_eval.ndim != 1 or t_eval.size < 2 or np.any(np.diff(t_eval) <= 0.0):
+        raise ValueError("t_eval: give at least two strictly increasing times")
+    idata, rdata = problem.idata.copy(), problem.rdata.copy()
+    calls = _Callbacks(problem, idata, rdata)
+    atol = np.where(problem.error_mask, tol * problem.atol_scale, UNCONTROLLED)
+    options = {
+        "max_order": max_order,
+        "max_step": max_step,
+        "first_step": first_step,
+        "min_step": min_step,
+        "max_nonlin_iters": max_iterations,
+    }
+    out_y, out_yp = np.zeros((t_eval.size, problem.n)), np.zeros((t_eval.size, problem.n))
+    out_y[0], out_yp[0] = problem.y0, problem.yp0
+    epochs = [(0, idata.copy())]
+    hist = np.zeros((1, problem.n))
+    status, message, done = Status.SUCCESS, Status.SUCCESS.sentence, 1
+    every = max(1, t_eval.size // 200)
+    start = time.perf_counter()
+    t = float(t_eval[0])
+    try:
+        solver = _solver(problem, calls, atol, rtol, options)
+        solver.init_step(t, problem.y0, problem.yp0)
+        y = problem.y0
+        while done < t_eval.size:
+            target = float(t_eval[done])
+            if problem.hook_interval is not None:
+                target = min(target, t + problem.hook_interval(y))
+            answer = solver.step(target, tstop=float(t_eval[-1]))
+            if not answer.success:
+                status = Status.SOLVER_FAILURE
+                message = _failure(problem, calls, float(answer.t), answer.message, atol)
+                break
+            t, y, yp = target, answer.y, answer.yp
+            if target == t_eval[done]:
+                out_y[done], out_yp[done] = y, yp
+                done += 1
+                if progress is not None and done % every == 0:
+                    progress(t)
+            if problem.hook is not None:
+                hist[0] = y
+                if problem.hook(t, hist, 1, idata, rdata, calls.work):
+                    epochs.append((done, idata.copy()))
+                    y = hist[0].copy()
+                    yp = problem.restart_rates(t, y, np.array(yp), idata, rdata)
+                    solver = _solver(problem, calls, atol, rtol, options)
+                    solver.init_step(t, y, yp)
+    except KeyboardInterrupt:
+        status, message = Status.INTERRUPTED, f"{Status.INTERRUPTED.sentence} Reached t = {t:.6g} s."
+    except RuntimeError as error:
+        status, message = Status.SOLVER_FAILURE, _failure(problem, calls, t, str(error), atol)
+    stats = SolverStats(
+        steps=calls.steps,
+        residuals=calls.residuals,
+        jacobians=calls.jacobians,
+        factorizations=calls.jacobians,
+        wall_time=time.perf_counter() - start,
+    )
+    stats.residual_time, stats.jacobian_time = calls.residual_time, calls.jacobian_time
+    return DAEResult(
+        t=t_eval[:done],
+        y=out_y[:done],
+        yp=out_yp[:done],
+        status=status,
+        message=message,
+        stats=stats,
+        epochs=epochs,
+        t_last=t,
+    )
+
+
+def _failure(problem: DAEProblem, calls: _Callbacks, t: float, why: str, atol: np.ndarray) -> str:
+    """Say when the run failed, which unknown is the least satisfied, and what to try."""
+    out = np.zeros(problem.n)
+    problem.residual(t, calls.y, calls.yp, out, calls.idata, calls.rdata, calls.work)
+    if not np.all(np.isfinite(out)):
+        worst = int(np.flatnonzero(~np.isfinite(out))[0])
+        return (
+            f"IDA stopped at t = {t:.6g} s: the equation of {problem.names[worst]} is not a finite number. "
+            "Check the forces and functions of time acting there for NaN or division by zero."
+        )
+    moving = np.where(problem.error_mask, np.abs(calls.yp) / np.maximum(atol, 1e-300), 0.0)
+    worst = int(np.argmax(moving))
+    name = problem.names[worst] if problem.names else f"y[{worst}]"
+    return (
+        f"IDA stopped at t = {t:.6g} s ({why}). The unknown that changes fastest for its tolerance is {name}. "
+        "Try a looser tolerance, a smaller maximum step, a smoother start of motions and torques, "
+        "or the WSTIFF integrator."
+    )

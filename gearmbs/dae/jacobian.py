@@ -1,0 +1,340 @@
+"""The exact sparse Jacobian dG/dy + cj dG/dy' of the residual, and its pattern.
+
+One routine walks through the entries in a fixed order.  Asked for the pattern it records their places;
+asked for numbers it adds each entry to its slot of the CSC values, so both can never disagree.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from gearmbs.dae import tables as T
+from gearmbs.dae import terms
+from gearmbs.dae.forces import element_wrench
+from gearmbs.dae.kinematics import euler_component, inertia_times, update_bodies, update_markers
+from gearmbs.dae.problem import JACOBIAN_SIG
+from gearmbs.dae.residual import (
+    S_DIAG,
+    S_GRADIENT,
+    S_GRADIENT_T,
+    S_HESSIAN,
+    S_PRODUCT,
+    S_TERM,
+    S_VECTOR,
+    S_WRENCH,
+    arm_to,
+)
+from gearmbs.dae.rotation import KIN_ADOT, KIN_AXES, KIN_DW, KIN_H
+
+NUMBERS, PLACES, COUNT = 0, 1, 2
+
+HESSIAN_BLOCKS = terms.HESSIAN_BLOCKS
+
+
+@njit(cache=True, inline="always")
+def put(mode, places, slot, vals, k, row, col, value):
+    """Hand over entry k; return the number of the next."""
+    if mode == NUMBERS:
+        vals[slot[k]] += value
+    elif mode == PLACES:
+        places[k, 0] = row
+        places[k, 1] = col
+    return k + 1
+
+
+@njit(cache=True)
+def body_entries(mode, b, cj, idata, tab, places, slot, vals, k):
+    """Entries of one body's inertia terms in eq. (5) and (6)."""
+    i = 3 * (b - 1)
+    u, p, e, r, th = (
+        idata[T.H_U] + i,
+        idata[T.H_P] + i,
+        idata[T.H_EPS] + i,
+        idata[T.H_R] + i,
+        idata[T.H_THETA] + i,
+    )
+    kin = tab.kin[b]
+    s = tab.scratch[S_TERM : S_TERM + 100]
+    mass = tab.body[b, T.BODY_MASS]
+    # J a_k in s[0:9], J adot_k in s[9:18], dh/dtheta_m = a_m x h + J adot_m in s[18:27]
+    for m in range(3):
+        inertia_times(kin, tab.body[b], kin, KIN_AXES + 3 * m, s, 3 * m, s[30:33])
+        inertia_times(kin, tab.body[b], kin, KIN_ADOT + 3 * m, s, 9 + 3 * m, s[30:33])
+        terms.cross3(kin, KIN_AXES + 3 * m, kin, KIN_H, s, 18 + 3 * m)
+        for c in range(3):
+            s[18 + 3 * m + c] += s[9 + 3 * m + c]
+    for m in range(3):
+        k = put(mode, places, slot, vals, k, u + m, u + m, mass * cj)
+        k = put(mode, places, slot, vals, k, p + m, p + m, cj)
+        k = put(mode, places, slot, vals, k, e + m, p + m, 1.0)
+        k = put(mode, places, slot, vals, k, r + m, u + m, 1.0)
+        k = put(mode, places, slot, vals, k, r + m, r + m, -cj)
+        k = put(mode, places, slot, vals, k, th + m, e + m, 1.0)
+        k = put(mode, places, slot, vals, k, th + m, th + m, -cj)
+        for n in range(3):
+            # L_eps_m = a_m . h
+            k = put(mode, places, slot, vals, k, e + m, e + n, -terms.dot3(kin, KIN_AXES + 3 * m, s, 3 * n))
+            mixed_mn = terms.dot3(kin, KIN_ADOT + 3 * n, s, 3 * m)
+            if m < n:
+                terms.cross3(kin, KIN_AXES + 3 * m, kin, KIN_AXES + 3 * n, s, 30)
+                mixed_mn += terms.dot3(s, 30, kin, KIN_H)
+            # d2T/d(eps_m)d(theta_n) serves p - L_eps and p' - L_theta
+            k = put(mode, places, slot, vals, k, e + m, th + n, -mixed_mn)
+            k = put(mode, places, slot, vals, k, p + n, e + m, -mixed_mn)
+    for m in range(3):
+        for n in range(3):
+            value = terms.dot3(kin, KIN_ADOT + 3 * m, s, 18 + 3 * n)
+            if n < m:
+                # d(adot_m)/d(theta_n) . h, with adot_m = sum_{l<m} eps_l a_l x a_m
+                for l in range(m):
+                    lo, hi = min(n, l), max(n, l)
+                    terms.cross3(kin, KIN_AXES + 3 * hi, kin, KIN_AXES + 3 * m, s, 30)
+                    terms.cross3(kin, KIN_AXES + 3 * lo, s, 30, s, 33)
+                    value += tab.scratch[S_PRODUCT + l] * terms.dot3(s, 33, kin, KIN_H)
+            k = put(mode, places, slot, vals, k, p + m, th + n, -value)
+    return k
+
+
+@njit(cache=True)
+def row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
+    """Entries of one constraint row, its derivative, and the forces of its multipliers."""
+    form = idata[T.H_FORMULATION]
+    e0, t0 = idata[T.H_EPS], idata[T.H_THETA]
+    u0, p0, r0 = idata[T.H_U], idata[T.H_P], idata[T.H_R]
+    lam, mu = idata[T.H_LAMBDA] + r, idata[T.H_MU] + r
+    lam_value = yp[lam] if form == T.SI1 else y[lam]
+    factor = cj if form == T.SI1 else 1.0
+    mu_value = 0.0
+    if form == T.SI2:
+        mu_value = y[mu]
+    elif form == T.SI1:
+        mu_value = yp[mu]
+    g = tab.scratch[S_GRADIENT : S_GRADIENT + 12]
+    gt = tab.scratch[S_GRADIENT_T : S_GRADIENT_T + 12]
+    s = tab.scratch[S_TERM : S_TERM + 100]
+    hess = tab.scratch[S_HESSIAN : S_HESSIAN + 144].reshape(12, 12)
+    w = tab.scratch[S_VECTOR : S_VECTOR + 12]
+    for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
+        coef = tab.coef[j]
+        terms.gradient(
+            j, t, tab.term, tab.function, tab.function_r, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt
+        )
+        terms.hessian(j, t, tab.term, tab.function, tab.function_r, tab.marker_body, tab.kin, tab.frame, hess, s)
+        kind = tab.term[j, T.TERM_TYPE]
+        for side in range(2):
+            b = tab.marker_body[tab.term[j, T.TERM_I + side]]
+            h, q = 6 * side, 3 * (b - 1)
+            for c in range(3):
+                w[h + c] = y[u0 + q + c] if b > 0 else 0.0
+                w[h + 3 + c] = y[e0 + q + c] if b > 0 else 0.0
+        for side in range(2):
+            b = tab.marker_body[tab.term[j, T.TERM_I + side]]
+            if b == 0:
+                continue
+            h, q = 6 * side, 3 * (b - 1)
+            for c in range(3):
+                along = coef * g[h + c]
+                about = coef * euler_component(tab.kin[b], c, g, h + 3)
+                if kind == terms.POINT and c != tab.term[j, T.TERM_AXES]:
+                    pass
+                elif kind != terms.DOT1 and kind != terms.ANGLE and kind != terms.ROTATION:
+                    k = put(mode, places, slot, vals, k, u0 + q + c, lam, factor * along)
+                    k = put(mode, places, slot, vals, k, lam, r0 + q + c, along)
+                    if form != T.I3:
+                        k = put(mode, places, slot, vals, k, r0 + q + c, mu, -factor * along)
+                        k = put(mode, places, slot, vals, k, mu, u0 + q + c, along)
+                k = put(mode, places, slot, vals, k, p0 + q + c, lam, factor * about)
+                k = put(mode, places, slot, vals, k, lam, t0 + q + c, about)
+                if form != T.I3:
+                    k = put(mode, places, slot, vals, k, t0 + q + c, mu, -factor * about)
+                    k = put(mode, places, slot, vals, k, mu, e0 + q + c, about)
+        for bm in range(4):
+            b = tab.marker_body[tab.term[j, T.TERM_I + bm // 2]]
+            if b == 0:
+                continue
+            q = 3 * (b - 1)
+            force_row = (p0 if bm % 2 == 1 else u0) + q
+            position = (t0 if bm % 2 == 1 else r0) + q
+            any_block = False
+            for bn in range(4):
+                b2 = tab.marker_body[tab.term[j, T.TERM_I + bn // 2]]
+                if b2 == 0 or not HESSIAN_BLOCKS[kind, bm, bn]:
+                    continue
+                any_block = True
+                other = (t0 if bn % 2 == 1 else r0) + 3 * (b2 - 1)
+                for m in range(3):
+                    for n in range(3):
+                        value = coef * hess[3 * bm + m, 3 * bn + n]
+                        k = put(mode, places, slot, vals, k, force_row + m, other + n, lam_value * value)
+                        if form != T.I3:
+                            k = put(mode, places, slot, vals, k, position + m, other + n, -mu_value * value)
+            if form != T.I3 and any_block:
+                # the derivative of Phi_q q' + Phi_t with respect to q
+                for m in range(3):
+                    value = 0.0
+                    for n in range(12):
+                        value += hess[3 * bm + m, n] * w[n]
+                    if bm % 2 == 1:
+                        value += euler_component(tab.kin[b], m, gt, 6 * (bm // 2) + 3)
+                    k = put(mode, places, slot, vals, k, mu, position + m, coef * value)
+    return k
+
+
+@njit(cache=True)
+def load_entries(mode, b, sign, row, y, idata, tab, places, slot, vals, k):
+    """Entries of one force element's loads on body b in the rows of eq. (5)."""
+    if b == 0:
+        return k
+    i = 3 * (b - 1)
+    u, p, th = idata[T.H_U] + i, idata[T.H_P] + i, idata[T.H_THETA] + i
+    f, n = row[T.FORCE_F], row[T.FORCE_N]
+    kin = tab.kin[b]
+    point = row[T.FORCE_I]
+    owner = tab.marker_body[point]
+    s = tab.scratch[S_VECTOR : S_VECTOR + 30]
+    for c in range(3):
+        s[3 + c] = 0.0
+        s[6 + c] = 0.0
+    if f >= 0:
+        arm_to(b, point, tab.marker_body, tab.kin, tab.frame, s, 0)
+        for c in range(3):
+            s[3 + c] = sign * y[f + c]
+        terms.cross3(s, 0, s, 3, s, 6)
+    if n >= 0:
+        for c in range(3):
+            s[6 + c] += sign * y[n + c]
+    for m in range(3):
+        a = KIN_AXES + 3 * m
+        for c in range(3):
+            if f >= 0:
+                if m == 0:
+                    k = put(mode, places, slot, vals, k, u + c, f + c, -sign)
+                # a . (s x e_c) = (a x s)_c
+                terms.cross3(kin, a, s, 0, s, 9)
+                k = put(mode, places, slot, vals, k, p + m, f + c, -sign * s[9 + c])
+            if n >= 0:
+                k = put(mode, places, slot, vals, k, p + m, n + c, -sign * kin[a + c])
+        for l in range(3):
+            value = 0.0
+            if l < m:
+                terms.cross3(kin, KIN_AXES + 3 * l, kin, a, s, 9)
+                value = terms.dot3(s, 9, s, 6)
+            if f >= 0 and owner == b:
+                # the arm turns with the body
+                terms.cross3(kin, KIN_AXES + 3 * l, s, 0, s, 9)
+                terms.cross3(s, 9, s, 3, s, 12)
+                value += terms.dot3(kin, a, s, 12)
+            k = put(mode, places, slot, vals, k, p + m, th + l, -value)
+        if f >= 0 and owner != b:
+            # a . (ds x F) = ds . (F x a)
+            terms.cross3(s, 3, kin, a, s, 9)
+            for l in range(3):
+                k = put(mode, places, slot, vals, k, p + m, idata[T.H_R] + i + l, s[9 + l])
+            if owner > 0:
+                o = 3 * (owner - 1)
+                for l in range(3):
+                    terms.cross3(tab.kin[owner], KIN_AXES + 3 * l, tab.frame[point], 0, s, 12)
+                    k = put(mode, places, slot, vals, k, p + m, idata[T.H_R] + o + l, -s[9 + l])
+                    k = put(mode, places, slot, vals, k, p + m, idata[T.H_THETA] + o + l, -terms.dot3(s, 9, s, 12))
+    return k
+
+
+@njit(cache=True)
+def element_entries(mode, t, row, y, idata, tab, places, slot, vals, k):
+    """Entries of the rows F - F(q, q', t) and N - N(q, q', t) of one force element."""
+    wrench = tab.scratch[S_WRENCH : S_WRENCH + 6]
+    diag = tab.scratch[S_DIAG : S_DIAG + 8]
+    width = row[T.FORCE_WIDTH]
+    jac = tab.scratch[T.SCRATCH_FIXED : T.SCRATCH_FIXED + 6 * width].reshape(6, width)
+    element_wrench(row, t, y, tab, wrench, jac, diag, 1)
+    depends = row[T.FORCE_DEPENDS]
+    bodies = tab.extra_i[depends]
+    unknowns = tab.extra_i[depends + 1 + bodies]
+    for block in range(2):
+        base = row[T.FORCE_F + block]
+        if base < 0:
+            continue
+        for c in range(3):
+            k = put(mode, places, slot, vals, k, base + c, base + c, 1.0)
+            d = jac[3 * block + c]
+            for q in range(bodies):
+                b = tab.extra_i[depends + 1 + q]
+                if b == 0:
+                    continue
+                kin = tab.kin[b]
+                i, col = 3 * (b - 1), 12 * q
+                for m in range(3):
+                    turn = euler_component(kin, m, d, col + 3) + terms.dot3(kin, KIN_DW + 3 * m, d, col + 9)
+                    k = put(mode, places, slot, vals, k, base + c, idata[T.H_R] + i + m, -d[col + m])
+                    k = put(mode, places, slot, vals, k, base + c, idata[T.H_THETA] + i + m, -turn)
+                    k = put(mode, places, slot, vals, k, base + c, idata[T.H_U] + i + m, -d[col + 6 + m])
+                    k = put(
+                        mode,
+                        places,
+                        slot,
+                        vals,
+                        k,
+                        base + c,
+                        idata[T.H_EPS] + i + m,
+                        -euler_component(kin, m, d, col + 9),
+                    )
+            for q in range(unknowns):
+                col = tab.extra_i[depends + 2 + bodies + q]
+                k = put(mode, places, slot, vals, k, base + c, col, -d[12 * bodies + q])
+    return k
+
+
+@njit(
+    "int64(int64, float64, float64[::1], float64[::1], float64, int64[:, ::1], float64[::1], "
+    "int64[::1], float64[::1], float64[::1])",
+    cache=True,
+)
+def walk(mode, t, y, yp, cj, places, vals, idata, rdata, work):
+    """Go through all entries; return their number."""
+    tab = T.unpack(idata, rdata, work)
+    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
+    update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+    slot = tab.slot
+    k = 0
+    for b in range(1, idata[T.H_BODIES]):
+        for l in range(3):
+            tab.scratch[S_PRODUCT + l] = y[idata[T.H_EPS] + 3 * (b - 1) + l]
+        k = body_entries(mode, b, cj, idata, tab, places, slot, vals, k)
+    for r in range(idata[T.H_ROWS]):
+        k = row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k)
+    for f in range(idata[T.H_FORCES]):
+        row = tab.force[f]
+        k = load_entries(mode, tab.marker_body[row[T.FORCE_I]], 1.0, row, y, idata, tab, places, slot, vals, k)
+        k = load_entries(mode, tab.marker_body[row[T.FORCE_J]], -1.0, row, y, idata, tab, places, slot, vals, k)
+        k = element_entries(mode, t, row, y, idata, tab, places, slot, vals, k)
+    return k
+
+
+NO_PLACES = np.zeros((1, 2), dtype=np.int64)
+
+
+@njit(JACOBIAN_SIG, cache=True)
+def jacobian(t, y, yp, cj, vals, idata, rdata, work):
+    """Evaluate dG/dy + cj dG/dy' into ``vals``, CSC order."""
+    for k in range(vals.size):
+        vals[k] = 0.0
+    walk(NUMBERS, t, y, yp, cj, idata[0:2].reshape(1, 2), vals, idata, rdata, work)
+
+
+def pattern(idata: np.ndarray, rdata: np.ndarray, work_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (indptr, indices, slots): the CSC pattern and, for each entry in walking order, its place in it."""
+    from gearmbs.dae.tables import H_UNKNOWNS
+
+    n = int(idata[H_UNKNOWNS])
+    y = np.zeros(n)
+    work = np.zeros(work_size)
+    vals = np.zeros(1)
+    count = walk(COUNT, 0.0, y, y, 1.0, NO_PLACES, vals, idata, rdata, work)
+    places = np.zeros((count, 2), dtype=np.int64)
+    walk(PLACES, 0.0, y, y, 1.0, places, vals, idata, rdata, work)
+    key = places[:, 1] * n + places[:, 0]
+    unique, slots = np.unique(key, return_inverse=True)
+    columns, rows = np.divmod(unique, n)
+    indptr = np.searchsorted(columns, np.arange(n + 1)).astype(np.int64)
+    return indptr, rows.astype(np.int64), slots.astype(np.int64)

@@ -1,0 +1,92 @@
+"""The hook that keeps Euler angles away from their singularity and counts full turns.
+
+When sin(theta) of a body falls below the limit, the other body reference is taken, and every stored
+point of the integrator's history is rewritten in it.  Orientation, angular velocity and angular
+momentum are the same before and after, so this is a change of coordinates and not a perturbation.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from gearmbs.dae import tables as T
+from gearmbs.dae.kinematics import update_bodies, update_markers
+from gearmbs.dae.problem import HOOK_SIG
+from gearmbs.dae.rotation import (
+    KIN_A,
+    KIN_W,
+    SWITCH_SINE,
+    axes_and_velocity,
+    best_reference,
+    euler_angles,
+    euler_rates,
+    momentum_from_conjugate,
+    rotation_matrix,
+)
+from gearmbs.dae.terms import ANGLE, dot3
+
+
+@njit(cache=True)
+def rewrite_point(y, b, old, new, idata, kin, s):
+    """Turn angles, rates and conjugate momenta of body b from one reference to the other."""
+    k = 3 * (b - 1)
+    e, th, p = idata[T.H_EPS] + k, idata[T.H_THETA] + k, idata[T.H_P] + k
+    row = kin[b]
+    rotation_matrix(y[th], y[th + 1], y[th + 2], old, row, KIN_A)
+    axes_and_velocity(y[th], y[th + 1], y[e], y[e + 1], y[e + 2], kin, b)
+    for c in range(3):
+        s[c] = row[KIN_W + c]
+    momentum_from_conjugate(kin, b, y, p, s, 3)
+    euler_angles(row, KIN_A, new, y, th)
+    axes_and_velocity(y[th], y[th + 1], 0.0, 0.0, 0.0, kin, b)
+    euler_rates(kin, b, s, 0, y, e)
+    for m in range(3):
+        y[p + m] = dot3(row, 18 + 3 * m, s, 3)
+
+
+@njit(cache=True)
+def track_angles(y, idata, tab):
+    """Move the reference of each counted angle to its present value."""
+    any_angle = False
+    for k in range(tab.term.shape[0]):
+        if tab.term[k, T.TERM_TYPE] == ANGLE:
+            any_angle = True
+    if not any_angle:
+        return
+    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
+    update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+    for k in range(tab.term.shape[0]):
+        if tab.term[k, T.TERM_TYPE] == ANGLE:
+            fi, fj = tab.frame[tab.term[k, T.TERM_I]], tab.frame[tab.term[k, T.TERM_J]]
+            x = T.MK_AXES
+            turn = np.arctan2(dot3(fi, x, fj, x + 3), dot3(fi, x, fj, x)) - tab.reference[k]
+            tab.reference[k] += turn - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
+
+
+@njit(HOOK_SIG, cache=True)
+def hook(t, hist, npast, idata, rdata, work):
+    """Switch references where due; update the reference of each counted angle. Return 1 if hist changed."""
+    tab = T.unpack(idata, rdata, work)
+    th = idata[T.H_THETA]
+    s = tab.scratch[0:24]
+    changed = 0
+    for b in range(1, idata[T.H_BODIES]):
+        k = 3 * (b - 1)
+        if abs(np.sin(hist[0, th + k + 1])) >= SWITCH_SINE:
+            continue
+        old = tab.code[b]
+        rotation_matrix(hist[0, th + k], hist[0, th + k + 1], hist[0, th + k + 2], old, tab.kin[b], KIN_A)
+        new = best_reference(tab.kin[b], KIN_A)
+        if new == old:
+            continue
+        changed = 1
+        for row in range(npast):
+            rewrite_point(hist[row], b, old, new, idata, tab.kin, s)
+            if row > 0:
+                for c in range(3):
+                    turns = np.round((hist[row, th + k + c] - hist[row - 1, th + k + c]) / (2.0 * np.pi))
+                    hist[row, th + k + c] -= 2.0 * np.pi * turns
+        tab.code[b] = new
+    track_angles(hist[0], idata, tab)
+    return changed

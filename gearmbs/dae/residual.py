@@ -1,0 +1,165 @@
+"""The residual G(t, y, y') of eq. (5)-(9), for the formulations I3, SI2 and SI1.
+
+With y = [u, p, eps, R, theta, lambda, F, N, mu] the rows are, in the same order as the unknowns,
+
+    M u' - m g + Phi_R^T lambda - H_F^T F                     (5), first
+    p' - L_theta^T + Phi_theta^T lambda - H_N^T N             (5), second
+    p - L_eps^T                                               (5), third
+    u - R' - Phi_R^T mu                                       (6), first, stabilised
+    eps - theta' - Phi_theta^T mu                             (6), second, stabilised
+    Phi(q, t)                                                 (7)
+    F - F(q, q', t),  N - N(q, q', t)                         definitions of the applied loads
+    Phi_q q' + Phi_t   (with q' = [u, eps])                   the derivative of (7)
+
+I3 drops the last block and mu; SI1 puts the derivatives of the unknowns Lambda and Gamma in place of
+lambda and mu.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from gearmbs.dae import tables as T
+from gearmbs.dae import terms, timefunctions
+from gearmbs.dae.forces import element_wrench
+from gearmbs.dae.kinematics import euler_component, update_bodies, update_markers
+from gearmbs.dae.problem import RESIDUAL_SIG
+from gearmbs.dae.rotation import KIN_ADOT, KIN_AXES, KIN_H, KIN_R, KIN_V, KIN_W
+
+S_GRADIENT = 0
+S_GRADIENT_T = 12
+S_TERM = 24
+S_HESSIAN = 128
+S_WRENCH = 280
+S_DIAG = 288
+S_PRODUCT = 300
+S_VECTOR = 320
+
+
+@njit("void(float64, float64[::1], float64[::1], int64[::1], float64[::1], float64[::1])", cache=True)
+def update(t, y, yp, idata, rdata, work):
+    """Bring the kinematics and marker tables up to date with y."""
+    tab = T.unpack(idata, rdata, work)
+    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
+    update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+
+
+@njit(cache=True)
+def arm_to(b, point_marker, marker_body, kin, frame, out, k):
+    """Write the vector from body b's centre of mass to the origin of a marker, global components."""
+    owner = marker_body[point_marker]
+    for c in range(3):
+        out[k + c] = kin[owner, KIN_R + c] + frame[point_marker, c] - kin[b, KIN_R + c]
+
+
+@njit(cache=True)
+def add_load(b, sign, row, y, idata, tab, out):
+    """Subtract the generalised loads of one force element on body b (eq. (5), H_F^T F and H_N^T N)."""
+    if b == 0:
+        return
+    s = tab.scratch[S_VECTOR : S_VECTOR + 12]
+    for c in range(6):
+        s[3 + c] = 0.0
+    k = 3 * (b - 1)
+    if row[T.FORCE_F] >= 0:
+        arm_to(b, row[T.FORCE_I], tab.marker_body, tab.kin, tab.frame, s, 0)
+        for c in range(3):
+            s[3 + c] = sign * y[row[T.FORCE_F] + c]
+            out[idata[T.H_U] + k + c] -= s[3 + c]
+        terms.cross3(s, 0, s, 3, s, 6)
+    if row[T.FORCE_N] >= 0:
+        for c in range(3):
+            s[6 + c] += sign * y[row[T.FORCE_N] + c]
+    for m in range(3):
+        out[idata[T.H_P] + k + m] -= euler_component(tab.kin[b], m, s, 6)
+
+
+@njit(cache=True)
+def add_constraints(t, y, yp, idata, tab, out):
+    """Constraint rows, their derivatives, and the constraint forces of lambda and mu."""
+    form = idata[T.H_FORMULATION]
+    u0, p0, r0, t0 = idata[T.H_U], idata[T.H_P], idata[T.H_R], idata[T.H_THETA]
+    lam0, mu0 = idata[T.H_LAMBDA], idata[T.H_MU]
+    g = tab.scratch[S_GRADIENT : S_GRADIENT + 12]
+    gt = tab.scratch[S_GRADIENT_T : S_GRADIENT_T + 12]
+    s = tab.scratch[S_TERM : S_TERM + 100]
+    for r in range(idata[T.H_ROWS]):
+        value, rate = 0.0, 0.0
+        if tab.row[r, T.ROW_FUNCTION] >= 0:
+            fun = tab.row[r, T.ROW_FUNCTION]
+            f, f1, _ = timefunctions.evaluate(tab.function[fun, 0], tab.function_r, tab.function[fun, 1], t)
+            value, rate = -f, -f1
+        lam = yp[lam0 + r] if form == T.SI1 else y[lam0 + r]
+        mu = 0.0
+        if form == T.SI2:
+            mu = y[mu0 + r]
+        elif form == T.SI1:
+            mu = yp[mu0 + r]
+        for k in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
+            coef = tab.coef[k]
+            phi, phi_t = terms.gradient(
+                k,
+                t,
+                tab.term,
+                tab.function,
+                tab.function_r,
+                tab.reference,
+                tab.marker_body,
+                tab.kin,
+                tab.frame,
+                s,
+                g,
+                gt,
+            )
+            value += coef * phi
+            rate += coef * phi_t
+            for side in range(2):
+                b = tab.marker_body[tab.term[k, T.TERM_I + side]]
+                if b == 0:
+                    continue
+                kin = tab.kin[b]
+                h, q = 6 * side, 3 * (b - 1)
+                rate += coef * (terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W))
+                for c in range(3):
+                    angle = coef * euler_component(kin, c, g, h + 3)
+                    out[u0 + q + c] += coef * lam * g[h + c]
+                    out[p0 + q + c] += lam * angle
+                    out[r0 + q + c] -= coef * mu * g[h + c]
+                    out[t0 + q + c] -= mu * angle
+        out[lam0 + r] = value
+        if form != T.I3:
+            out[mu0 + r] = rate
+
+
+@njit(RESIDUAL_SIG, cache=True)
+def residual(t, y, yp, out, idata, rdata, work):
+    """Evaluate G(t, y, y') of eq. (8) into ``out``."""
+    tab = T.unpack(idata, rdata, work)
+    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
+    update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+    u0, p0, e0, r0, t0 = idata[T.H_U], idata[T.H_P], idata[T.H_EPS], idata[T.H_R], idata[T.H_THETA]
+    for b in range(1, idata[T.H_BODIES]):
+        k = 3 * (b - 1)
+        kin = tab.kin[b]
+        mass = tab.body[b, T.BODY_MASS]
+        for c in range(3):
+            out[u0 + k + c] = mass * (yp[u0 + k + c] - tab.gravity[c])
+            out[p0 + k + c] = yp[p0 + k + c] - terms.dot3(kin, KIN_ADOT + 3 * c, kin, KIN_H)
+            out[e0 + k + c] = y[p0 + k + c] - terms.dot3(kin, KIN_AXES + 3 * c, kin, KIN_H)
+            out[r0 + k + c] = y[u0 + k + c] - yp[r0 + k + c]
+            out[t0 + k + c] = y[e0 + k + c] - yp[t0 + k + c]
+    add_constraints(t, y, yp, idata, tab, out)
+    wrench = tab.scratch[S_WRENCH : S_WRENCH + 6]
+    diag = tab.scratch[S_DIAG : S_DIAG + 8]
+    for f in range(idata[T.H_FORCES]):
+        row = tab.force[f]
+        width = row[T.FORCE_WIDTH]
+        jac = tab.scratch[T.SCRATCH_FIXED : T.SCRATCH_FIXED + 6 * width].reshape(6, width)
+        element_wrench(row, t, y, tab, wrench, jac, diag, 0)
+        for c in range(3):
+            if row[T.FORCE_F] >= 0:
+                out[row[T.FORCE_F] + c] = y[row[T.FORCE_F] + c] - wrench[c]
+            if row[T.FORCE_N] >= 0:
+                out[row[T.FORCE_N] + c] = y[row[T.FORCE_N] + c] - wrench[3 + c]
+        add_load(tab.marker_body[row[T.FORCE_I]], 1.0, row, y, idata, tab, out)
+        add_load(tab.marker_body[row[T.FORCE_J]], -1.0, row, y, idata, tab, out)

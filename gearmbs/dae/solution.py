@@ -1,0 +1,264 @@
+"""The solution of a mechanism: poses, velocities, accelerations, reactions, loads, energies, by name.
+
+Accelerations and reactions come from the index-1 system solved at each output time, so they carry none
+of the integrator's noise.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
+
+from gearmbs.dae import index1
+from gearmbs.dae import tables as T
+from gearmbs.dae.result import DAEResult, Status
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from gearmbs.dae.problem import DAEProblem
+    from gearmbs.dae.system import System
+
+CONTACT_DIAGNOSTICS = (
+    "elastic_energy",
+    "damping_power",
+    "friction_power",
+    "penetration_drive",
+    "penetration_back",
+    "pairs_drive",
+    "pairs_back",
+    "normal_force",
+)
+
+
+class Solution:
+    """Motion and forces of a mechanism over the output times.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+        Output times, s.
+    result : DAEResult
+        The integrator's own account: y, y', status, message, statistics.
+    system : System
+        Names and tables.
+    """
+
+    def __init__(self, system: System, problem: DAEProblem, result: DAEResult) -> None:
+        self.system = system
+        self.problem = problem
+        self.result = result
+        self.t = result.t
+        self._evaluate()
+
+    @property
+    def success(self) -> bool:
+        """True when the run reached its end."""
+        return self.result.success
+
+    @property
+    def status(self) -> Status:
+        """How the run ended."""
+        return self.result.status
+
+    @property
+    def message(self) -> str:
+        """What happened, when, which unknown, what to try."""
+        return self.result.message
+
+    @property
+    def stats(self):
+        """Counts of steps, evaluations and times."""
+        return self.result.stats
+
+    def _evaluate(self) -> None:
+        """Solve the index-1 system at every output time."""
+        m = self.t.size
+        bodies = len(self.system.body_names)
+        rows = len(self.system.row_names)
+        elements = len(self.system.force_names)
+        idata, rdata = self.problem.idata.copy(), self.problem.rdata.copy()
+        indptr, indices, slots = index1.pattern(idata, rdata, self.problem.work_size)
+        n = indptr.size - 1
+        self._pose = np.zeros((m, bodies, 18))
+        self._acc = np.zeros((m, bodies, 6))
+        self._lam = np.zeros((m, rows))
+        self._loads = np.zeros((m, max(elements, 1), index1.FORCE_RECORD))
+        self._phi = np.zeros((m, rows, 3))
+        self._force = np.zeros((m, rows, 3))
+        self._moment = np.zeros((m, rows, 3))
+        bounds = [row for row, _ in self.result.epochs] + [m]
+        for (first, table), last in zip(self.result.epochs, bounds[1:]):
+            if first >= last:
+                continue
+            _evaluate_span(self, slice(first, last), np.ascontiguousarray(table), rdata, indptr, indices, slots, n)
+
+    # --- access by name -----------------------------------------------------------------------------
+
+    def _body(self, name: str) -> int:
+        try:
+            return self.system.body_names.index(name)
+        except ValueError:
+            raise KeyError(f"body {name!r}; the bodies are {', '.join(self.system.body_names)}") from None
+
+    def position(self, body: str) -> np.ndarray:
+        """Return the centre of mass over time, shape (m, 3), m."""
+        return self._pose[:, self._body(body), 0:3]
+
+    def orientation(self, body: str) -> np.ndarray:
+        """Return the rotation matrices over time, shape (m, 3, 3)."""
+        return self._pose[:, self._body(body), 3:12].reshape(-1, 3, 3)
+
+    def velocity(self, body: str) -> np.ndarray:
+        """Return the velocity of the centre of mass, shape (m, 3), m/s."""
+        return self._pose[:, self._body(body), 12:15]
+
+    def angular_velocity(self, body: str) -> np.ndarray:
+        """Return the angular velocity, global components, shape (m, 3), rad/s."""
+        return self._pose[:, self._body(body), 15:18]
+
+    def acceleration(self, body: str) -> np.ndarray:
+        """Return the acceleration of the centre of mass, shape (m, 3), m/s^2."""
+        return self._acc[:, self._body(body), 0:3]
+
+    def angular_acceleration(self, body: str) -> np.ndarray:
+        """Return the angular acceleration, global components, shape (m, 3), rad/s^2."""
+        return self._acc[:, self._body(body), 3:6]
+
+    def reaction(self, joint: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return force (N) and moment about marker I's origin (N m) of a joint on I's body, each (m, 3), global."""
+        rows = [k for k, name in enumerate(self.system.row_names) if name.rsplit(": ", 1)[0] == joint]
+        if not rows:
+            known = sorted({name.rsplit(": ", 1)[0] for name in self.system.row_names})
+            raise KeyError(f"joint {joint!r}; the joints are {', '.join(known)}")
+        return self._force[:, rows].sum(axis=1), self._moment[:, rows].sum(axis=1)
+
+    def load(self, element: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return force F (N) and torque N (N m) of a force element on I's body at marker I, each (m, 3), global."""
+        k = self._element(element)
+        return self._loads[:, k, 0:3], self._loads[:, k, 3:6]
+
+    def contact(self, element: str) -> dict[str, np.ndarray]:
+        """Return the diagnostics of a gear contact over time: energy, powers, penetrations, pairs, normal force."""
+        k = self._element(element)
+        return {name: self._loads[:, k, 6 + c] for c, name in enumerate(CONTACT_DIAGNOSTICS)}
+
+    def _element(self, name: str) -> int:
+        try:
+            return self.system.force_names.index(name)
+        except ValueError:
+            raise KeyError(f"force element {name!r}; there are {', '.join(self.system.force_names)}") from None
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """Lagrange multipliers of the constraint rows, shape (m, rows)."""
+        return self._lam
+
+    @property
+    def constraint_violation(self) -> np.ndarray:
+        """Largest |Phi| over the rows at each output time, shape (m,), m or 1."""
+        return np.abs(self._phi[:, :, 0]).max(axis=1, initial=0.0)
+
+    # --- energy -------------------------------------------------------------------------------------
+
+    @cached_property
+    def kinetic_energy(self) -> np.ndarray:
+        """Kinetic energy, shape (m,), J."""
+        total = np.zeros(self.t.size)
+        for b, row in enumerate(self.system.builder.bodies[1:]):
+            v, w = self._pose[:, b, 12:15], self._pose[:, b, 15:18]
+            a = self._pose[:, b, 3:12].reshape(-1, 3, 3)
+            local = np.einsum("tji,tj->ti", a, w)
+            total += 0.5 * row[0] * np.sum(v * v, axis=1)
+            total += 0.5 * np.einsum("ti,ij,tj->t", local, row[1:].reshape(3, 3), local)
+        return total
+
+    def __len__(self) -> int:
+        return self.t.size
+
+    def __repr__(self) -> str:
+        mechanism = getattr(self.system, "mechanism", None)
+        name = mechanism.name if mechanism is not None else "mechanism"
+        return (
+            f"Solution({name!r}: {self.t.size} times from {self.t[0]:g} to {self.t[-1]:g} s, "
+            f"{self.status.name}; {self.stats})"
+        )
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return everything as an :class:`xarray.Dataset` with units in the attributes."""
+        import xarray as xr
+
+        xyz = ["x", "y", "z"]
+        joints = list(dict.fromkeys(name.rsplit(": ", 1)[0] for name in self.system.row_names))
+        reactions = [self.reaction(j) for j in joints]
+
+        def var(dims, data, unit, title):
+            return (dims, data, {"units": unit, "long_name": title})
+
+        body = ("time", "body", "xyz")
+        data = {
+            "position": var(body, self._pose[:, :, 0:3], "m", "position of the centre of mass"),
+            "orientation": var(
+                ("time", "body", "xyz", "axis"),
+                self._pose[:, :, 3:12].reshape(self.t.size, -1, 3, 3),
+                "1",
+                "rotation matrix, columns are the body's axes",
+            ),
+            "velocity": var(body, self._pose[:, :, 12:15], "m/s", "velocity of the centre of mass"),
+            "angular_velocity": var(body, self._pose[:, :, 15:18], "rad/s", "angular velocity"),
+            "acceleration": var(body, self._acc[:, :, 0:3], "m/s^2", "acceleration of the centre of mass"),
+            "angular_acceleration": var(body, self._acc[:, :, 3:6], "rad/s^2", "angular acceleration"),
+        }
+        if joints:
+            joint = ("time", "joint", "xyz")
+            data["reaction_force"] = var(joint, np.stack([r[0] for r in reactions], 1), "N", "joint force on I's body")
+            data["reaction_moment"] = var(
+                joint, np.stack([r[1] for r in reactions], 1), "N m", "joint moment on I's body about marker I"
+            )
+            data["constraint_violation"] = var(("time",), self.constraint_violation, "1", "largest |Phi|")
+        if self.system.force_names:
+            element = ("time", "element", "xyz")
+            data["load_force"] = var(element, self._loads[:, :, 0:3], "N", "applied force on I's body")
+            data["load_torque"] = var(element, self._loads[:, :, 3:6], "N m", "applied torque on I's body at marker I")
+            units = ("J", "W", "W", "m", "m", "1", "1", "N")
+            for c, (name, unit) in enumerate(zip(CONTACT_DIAGNOSTICS, units)):
+                data[name] = var(("time", "element"), self._loads[:, :, 6 + c], unit, name.replace("_", " "))
+        coords = {
+            "time": ("time", self.t, {"units": "s"}),
+            "body": self.system.body_names,
+            "xyz": xyz,
+            "axis": xyz,
+            "joint": joints,
+            "element": self.system.force_names,
+        }
+        used = {d for v in data.values() for d in v[0]}
+        out = xr.Dataset(data, coords={k: v for k, v in coords.items() if k in used})
+        out.attrs["status"] = self.status.name
+        out.attrs["message"] = self.message
+        out.attrs.update({f"solver_{k}": v for k, v in self.stats.as_dict().items()})
+        return out
+
+
+def _evaluate_span(solution: Solution, span: slice, idata, rdata, indptr, indices, slots, n) -> None:
+    """Fill poses, accelerations, multipliers, loads and reactions for the outputs of one epoch."""
+    work = np.zeros(solution.problem.work_size)
+    none = np.zeros((1, 2), dtype=np.int64)
+    rhs, vals = np.zeros(n), np.zeros(indices.size)
+    bodies, rows = solution._acc.shape[1], solution._lam.shape[1]
+    phi = np.zeros(3 * rows)
+    multipliers = np.zeros((2, max(rows, 1)))
+    for k in range(span.start, span.stop):
+        t, y = float(solution.t[k]), solution.result.y[k]
+        vals[:] = 0.0
+        index1.saddle(index1.NUMBERS, t, y, none, slots, vals, rhs, phi, solution._loads[k], idata, rdata, work)
+        z = splu(csc_array((vals, indices, indptr), shape=(n, n))).solve(rhs)
+        solution._acc[k] = z[: 6 * bodies].reshape(bodies, 6)
+        solution._lam[k] = z[6 * bodies :]
+        solution._phi[k] = phi.reshape(-1, 3)
+        multipliers[0, :rows], multipliers[1, 0] = z[6 * bodies :], t
+        index1.joint_loads(y, idata, rdata, work, multipliers, solution._force[k], solution._moment[k])
+        index1.pose_record(y, idata, rdata, work, solution._pose[k].reshape(-1))

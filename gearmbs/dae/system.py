@@ -1,0 +1,393 @@
+"""A mechanism as a DAE: tables, names, consistent initial values, and the problem an integrator solves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
+
+from gearmbs.dae import index1, initial, jacobian, residual
+from gearmbs.dae import tables as T
+from gearmbs.dae.errors import ModelError, SingularModelError
+from gearmbs.dae.kinematics import inertia_times
+from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.rereference import hook
+from gearmbs.dae.rotation import (
+    KIN_A,
+    KIN_ADOT,
+    KIN_H,
+    axes_and_velocity,
+    best_reference,
+    euler_angles,
+    euler_rates,
+)
+from gearmbs.dae.tables import TableBuilder
+from gearmbs.dae.terms import dot3
+
+FORMULATIONS = {"I3": T.I3, "SI2": T.SI2, "SI1": T.SI1}
+
+BLOCKS = {
+    "u": ("velocity of the centre of mass", "(6)", "m/s"),
+    "p": ("generalised momentum", "(5)", "kg m^2/s"),
+    "eps": ("rate of the Euler angle", "(6)", "rad/s"),
+    "R": ("position of the centre of mass", "(1)", "m"),
+    "theta": ("Euler angle", "(1)", "rad"),
+    "lambda": ("multiplier of the constraint", "(5), (7)", "N or N m"),
+    "F": ("applied force", "(5)", "N"),
+    "N": ("applied torque", "(5)", "N m"),
+    "mu": ("multiplier of the stabilisation", "(6), stabilised", "-"),
+}
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One entry of y: its index, block of eq. (9), name, meaning, equation number and unit."""
+
+    index: int
+    block: str
+    name: str
+    meaning: str
+    equation: str
+    unit: str
+
+
+@njit("void(float64[:, ::1], int64[::1], float64[::1], float64[::1], float64[::1])", cache=True)
+def state_from_pose(pose, idata, rdata, work, y):
+    """Fill u, p, eps, R, theta of y from R, A, v, omega of each moving body."""
+    tab = T.unpack(idata, rdata, work)
+    kin = tab.kin
+    s = tab.scratch
+    for b in range(1, idata[T.H_BODIES]):
+        k = 3 * (b - 1)
+        row = pose[b - 1]
+        th, e, p = idata[T.H_THETA] + k, idata[T.H_EPS] + k, idata[T.H_P] + k
+        for c in range(3):
+            y[idata[T.H_R] + k + c] = row[c]
+            y[idata[T.H_U] + k + c] = row[12 + c]
+        for c in range(9):
+            kin[b, KIN_A + c] = row[3 + c]
+        euler_angles(row, 3, tab.code[b], y, th)
+        axes_and_velocity(y[th], y[th + 1], 0.0, 0.0, 0.0, kin, b)
+        euler_rates(kin, b, row, 15, y, e)
+        inertia_times(kin[b], tab.body[b], row, 15, kin[b], KIN_H, s)
+        for m in range(3):
+            y[p + m] = dot3(kin[b], 18 + 3 * m, kin[b], KIN_H)
+
+
+def _restart_rates(t, y, yp, idata, rdata) -> np.ndarray:
+    """Return y' after a change of reference: angles' rates are eps, p' makes its residual vanish."""
+    yp = yp.copy()
+    out, work = np.zeros(y.size), np.zeros(int(idata[T.H_WORK]))
+    e, r, th, p = (int(idata[k]) for k in (T.H_EPS, T.H_R, T.H_THETA, T.H_P))
+    n3 = r - e
+    yp[th : th + n3] = y[e : e + n3]
+    residual.residual(t, y, yp, out, idata, rdata, work)
+    yp[p : p + n3] -= out[p : p + n3]
+    return yp
+
+
+class System:
+    """The tables of a mechanism with names, and what is computed from them before an integration.
+
+    Built by :meth:`gearmbs.mechanism.Mechanism.compile`; users rarely make one themselves.
+
+    Parameters
+    ----------
+    builder : TableBuilder
+        Bodies, markers, constraint rows, force elements.
+    pose : ndarray, shape (bodies, 18)
+        Position R, orientation A (row-major), velocity v and angular velocity omega of each moving body, global
+        components; a guess that :meth:`initialise` makes consistent.
+    body_names, row_names, force_names : list of str
+        Names for tables and messages; a row's name is ``joint: what it enforces``.
+    """
+
+    def __init__(
+        self,
+        builder: TableBuilder,
+        pose: np.ndarray,
+        body_names: list[str],
+        row_names: list[str],
+        force_names: list[str],
+        t0: float = 0.0,
+    ) -> None:
+        self.builder = builder
+        self.pose = np.array(pose, dtype=float).reshape(-1, 18)
+        self.body_names = body_names
+        self.row_names = row_names
+        self.force_names = force_names
+        self.row_index = list(range(len(row_names)))
+        self.t0 = t0
+        self.report: initial.InitialReport | None = None
+
+    # --- before the integration -------------------------------------------------------------------
+
+    @property
+    def length(self) -> float:
+        """A typical length in m: the largest marker arm or distance between bodies, at least 1 mm."""
+        arms = [np.abs(m[:3]).max() for m in self.builder.marker_frame] or [0.0]
+        spread = np.ptp(self.pose[:, :3], axis=0).max(initial=0.0)
+        return float(max(max(arms), spread, 1e-3))
+
+    def coordinate_weights(self) -> np.ndarray:
+        """Weights of the six spatial displacements of each body: 1 for metres, L^2 for radians."""
+        one = np.concatenate([np.ones(3), np.full(3, min(self.length, 1.0) ** 2)])
+        return np.tile(one, self.pose.shape[0])
+
+    def choose_references(self, pose: np.ndarray) -> None:
+        """Give each body the reference that is farther from its Euler singularity."""
+        for b, row in enumerate(pose):
+            self.builder.codes[b + 1] = best_reference(np.ascontiguousarray(row[3:12]), 0)
+
+    def displaced(self, pose: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Return the pose after displacements dR and rotations dpi (exponential map)."""
+        from scipy.spatial.transform import Rotation
+
+        pose = pose.copy()
+        step = step.reshape(-1, 6)
+        pose[:, 0:3] += step[:, 0:3]
+        turned = Rotation.from_rotvec(step[:, 3:6]).as_matrix() @ pose[:, 3:12].reshape(-1, 3, 3)
+        pose[:, 3:12] = turned.reshape(-1, 9)
+        return pose
+
+    def _evaluate(self, pose: np.ndarray, t: float):
+        """Assemble the index-1 system at a pose; return (matrix, rhs, phi, loads, y, idata, rdata, work)."""
+        self.choose_references(pose)
+        idata, rdata, size = self.builder.pack(T.I3)
+        work = np.zeros(size)
+        y = np.zeros(int(idata[T.H_UNKNOWNS]))
+        state_from_pose(np.ascontiguousarray(pose), idata, rdata, work, y)
+        plan = self._index1_plan(idata, rdata, size)
+        indptr, indices, slots = plan
+        n = indptr.size - 1
+        vals, rhs = np.zeros(indices.size), np.zeros(n)
+        phi = np.zeros(3 * len(self.builder.rows))
+        loads = np.zeros((max(1, len(self.builder.forces)), index1.FORCE_RECORD))
+        none = np.zeros((1, 2), dtype=np.int64)
+        index1.saddle(index1.NUMBERS, t, y, none, slots, vals, rhs, phi, loads, idata, rdata, work)
+        return csc_array((vals, indices, indptr), shape=(n, n)), rhs, phi, loads, y, idata, rdata, work
+
+    def _index1_plan(self, idata, rdata, size):
+        key = len(self.builder.rows)
+        if getattr(self, "_plan", (None, None))[0] != key:
+            self._plan = (key, index1.pattern(idata, rdata, size))
+        return self._plan[1]
+
+    def constraint_jacobian(self, pose: np.ndarray, t: float) -> tuple[csc_array, np.ndarray, np.ndarray]:
+        """Return Phi_q in spatial displacements, Phi, and Phi_q v + Phi_t at a pose."""
+        matrix, _, phi, *_ = self._evaluate(pose, t)
+        base = 6 * pose.shape[0]
+        return csc_array(matrix[base:, :base]), phi[0::3].copy(), phi[1::3].copy()
+
+    def keep_rows(self, kept: np.ndarray) -> None:
+        """Drop all constraint rows but ``kept``."""
+        if kept.size == len(self.builder.rows):
+            return
+        old = self.builder
+        bounds = [first for first, _ in old.rows] + [len(old.terms)]
+        rows, terms, coef, reference = [], [], [], []
+        for i in kept:
+            rows.append((len(terms), old.rows[i][1]))
+            span = slice(bounds[i], bounds[i + 1])
+            terms.extend(old.terms[span])
+            coef.extend(old.coef[span])
+            reference.extend(old.reference[span])
+        old.rows, old.terms, old.coef, old.reference = rows, terms, coef, reference
+        self.row_names = [self.row_names[i] for i in kept]
+        self.row_index = [self.row_index[i] for i in kept]
+
+    def initialise(self) -> initial.InitialReport:
+        """Make positions and velocities consistent; set redundant constraint rows aside.
+
+        Raises
+        ------
+        AssemblyError
+            If the joints contradict each other or cannot be satisfied.
+        SingularModelError
+            If a body can move without inertia.
+        """
+        if not np.all(np.isfinite(self.pose)):
+            bad = self.body_names[int(np.argwhere(~np.isfinite(self.pose))[0, 0])]
+            raise ModelError(f"body '{bad}': initial position, orientation or velocity is not finite")
+        initial.check_inertia(self)
+        pose, self.report = initial.assemble_position(self, self.pose, self.t0)
+        self.pose = initial.consistent_velocity(self, pose, self.t0)
+        return self.report
+
+    def accelerations(self, pose: np.ndarray, t: float):
+        """Return (a, alpha) a row per body, lambda, force records, and the evaluated state at a pose."""
+        matrix, rhs, _, loads, y, idata, rdata, work = self._evaluate(pose, t)
+        try:
+            solution = splu(matrix).solve(rhs)
+        except RuntimeError:
+            solution = np.full(rhs.size, np.nan)
+        base = 6 * pose.shape[0]
+        if not np.all(np.isfinite(solution)) or self._massless(matrix, base):
+            raise SingularModelError(self._singular_message(matrix, base))
+        return solution[:base].reshape(-1, 6), solution[base:], loads, y, idata, rdata, work
+
+    def _massless(self, matrix: csc_array, base: int) -> bool:
+        """True when some motion allowed by the constraints has no inertia."""
+        if all(row[0] > 0 and np.linalg.eigvalsh(row[1:].reshape(3, 3))[0] > 0 for row in self.builder.bodies[1:]):
+            return False
+        return self._free_massless_body(matrix, base) is not None
+
+    def _free_massless_body(self, matrix: csc_array, base: int) -> str | None:
+        from scipy.linalg import null_space
+
+        constraint = matrix[base:, :base].toarray()
+        free = null_space(constraint) if constraint.shape[0] else np.eye(base)
+        mass = matrix[:base, :base].toarray()
+        values, vectors = np.linalg.eigh(free.T @ mass @ free)
+        if values.size and values[0] <= 1e-14 * max(values[-1], 1e-300):
+            motion = np.abs(free @ vectors[:, 0])
+            return self.body_names[int(np.argmax(motion)) // 6]
+        return None
+
+    def _singular_message(self, matrix: csc_array, base: int) -> str:
+        name = self._free_massless_body(matrix, base)
+        if name is not None:
+            return (
+                f"body '{name}' can move without any inertia resisting it: check whether a massless part is "
+                "under-constrained, give it mass and inertia, or fix it with a joint"
+            )
+        return "the equations of motion have no unique solution: check for bodies without inertia and locked joints"
+
+    # --- the problem ------------------------------------------------------------------------------
+
+    def problem(self, formulation: str = "SI2") -> DAEProblem:
+        """Return the DAE in one of the formulations ``I3``, ``SI2``, ``SI1`` with consistent initial values."""
+        if formulation not in FORMULATIONS:
+            raise ModelError(f"formulation: {formulation!r} is unknown; choose one of {', '.join(FORMULATIONS)}")
+        if self.report is None:
+            self.initialise()
+        form = FORMULATIONS[formulation]
+        acc, lam, loads, y_small, *_ = self.accelerations(self.pose, self.t0)
+        idata, rdata, size = self.builder.pack(form)
+        indptr, indices, slots = jacobian.pattern(idata, rdata, size)
+        idata, rdata, size = self.builder.pack(form, slots)
+        n = int(idata[T.H_UNKNOWNS])
+        y, yp = np.zeros(n), np.zeros(n)
+        y[: int(idata[T.H_LAMBDA])] = y_small[: int(idata[T.H_LAMBDA])]
+        rows = slice(int(idata[T.H_LAMBDA]), int(idata[T.H_LAMBDA]) + len(lam))
+        (yp if form == T.SI1 else y)[rows] = lam
+        forces = idata[int(idata[T.H_I_FORCE]) : int(idata[T.H_I_FUNCTION])].reshape(-1, T.FORCE_COLUMNS)
+        for f, row in enumerate(forces):
+            if row[T.FORCE_F] >= 0:
+                y[row[T.FORCE_F] : row[T.FORCE_F] + 3] = loads[f, 0:3]
+            if row[T.FORCE_N] >= 0:
+                y[row[T.FORCE_N] : row[T.FORCE_N] + 3] = loads[f, 3:6]
+        work = np.zeros(size)
+        self._rates(y, yp, acc, idata, rdata, work)
+        at = self.builder.layout(form)
+        differential = np.zeros(n, dtype=bool)
+        differential[: at["eps"]] = True
+        differential[at["R"] : at["lambda"]] = True
+        error_mask = np.zeros(n, dtype=bool)
+        error_mask[at["R"] : at["lambda"]] = True
+        if form != T.I3:
+            error_mask[at["u"] : at["p"]] = True
+            error_mask[at["eps"] : at["R"]] = True
+        if form == T.SI1:
+            differential[at["lambda"] : at["F"]] = True
+            differential[at["mu"] :] = True
+        scale = self._scales(form, loads)
+        return DAEProblem(
+            n=n,
+            residual=residual.residual,
+            jacobian=jacobian.jacobian,
+            indptr=indptr,
+            indices=indices,
+            idata=idata,
+            rdata=rdata,
+            work_size=size,
+            y0=y,
+            yp0=yp,
+            error_mask=error_mask,
+            atol_scale=scale,
+            scale=scale,
+            differential=differential,
+            t0=self.t0,
+            names=[unknown.name for unknown in self.unknowns(formulation)],
+            hook=hook,
+            hook_interval=self._hook_interval(at),
+            restart_rates=_restart_rates,
+        )
+
+    @staticmethod
+    def _hook_interval(at: dict[str, int]):
+        """Time in which no Euler angle turns far enough to reach its singularity from the switching limit."""
+        rates = slice(at["eps"], at["R"])
+
+        def interval(y: np.ndarray) -> float:
+            return 0.2 / max(float(np.abs(y[rates][1::3]).max(initial=0.0)), 1e-12)
+
+        return interval
+
+    def _rates(self, y, yp, acc, idata, rdata, work) -> None:
+        """Fill y' from the accelerations; p' is what makes its own residual vanish."""
+        out = np.zeros(y.size)
+        n3 = 3 * self.pose.shape[0]
+        u, p, e, r, th = (int(idata[k]) for k in (T.H_U, T.H_P, T.H_EPS, T.H_R, T.H_THETA))
+        yp[u : u + n3] = acc[:, :3].ravel()
+        yp[r : r + n3] = y[u : u + n3]
+        yp[th : th + n3] = y[e : e + n3]
+        residual.residual(self.t0, y, yp, out, idata, rdata, work)
+        yp[p : p + n3] -= out[p : p + n3]
+        kin = T.unpack(idata, rdata, work).kin
+        for b in range(1, kin.shape[0]):
+            k = e + 3 * (b - 1)
+            rest = acc[b - 1, 3:] - y[k : k + 3] @ kin[b, KIN_ADOT : KIN_ADOT + 9].reshape(3, 3)
+            euler_rates(kin, b, np.ascontiguousarray(rest), 0, yp, k)
+
+    def _scales(self, form: int, loads: np.ndarray) -> np.ndarray:
+        """Typical magnitudes by kind of unknown: metres, radians, their rates, momenta, forces."""
+        at = self.builder.layout(form)
+        length = min(self.length, 1.0)
+        scale = np.ones(at["n"])
+        scale[at["u"] : at["p"]] = length
+        scale[at["R"] : at["theta"]] = length
+        for b, row in enumerate(self.builder.bodies[1:]):
+            inertia = max(np.abs(row[1:]).max(), row[0] * 1e-8, 1e-12)
+            scale[at["p"] + 3 * b : at["p"] + 3 * b + 3] = inertia
+        weight = max((row[0] for row in self.builder.bodies[1:]), default=1.0) * 9.81
+        force = max(weight, float(np.abs(loads[:, :3]).max(initial=0.0)), 1e-3)
+        scale[at["lambda"] : at["N"]] = force
+        scale[at["N"] : at["mu"]] = force * length
+        scale[at["mu"] :] = length
+        return scale
+
+    def unknowns(self, formulation: str = "SI2") -> list[Unknown]:
+        """Return the table of the unknowns of eq. (9) in their order."""
+        out: list[Unknown] = []
+
+        def add(block: str, name: str) -> None:
+            meaning, equation, unit = BLOCKS[block]
+            out.append(Unknown(len(out), block, name, meaning, equation, unit))
+
+        for block, parts in (("u", "xyz"), ("p", "123"), ("eps", "123"), ("R", "xyz"), ("theta", "123")):
+            angle = {"1": "psi", "2": "theta", "3": "phi"}
+            for body in self.body_names:
+                for part in parts:
+                    add(block, f"{block}_{angle.get(part, part)}({body})")
+        for row in self.row_names:
+            add("lambda", f"lambda({row})")
+        for block, column in (("F", T.FORCE_F), ("N", T.FORCE_N)):
+            for name, force in zip(self.force_names, self.builder.forces):
+                if force[column]:
+                    for part in "xyz":
+                        add(block, f"{block}_{part}({name})")
+        if formulation != "I3":
+            for row in self.row_names:
+                add("mu", f"mu({row})")
+        return out
+
+    def unknowns_table(self, formulation: str = "SI2") -> str:
+        """Return the table of the unknowns as text: index, name, meaning, equation, unit."""
+        lines = [f"{'#':>4}  {'unknown':<48} {'eq.':<16} {'unit':<10} meaning"]
+        for u in self.unknowns(formulation):
+            lines.append(f"{u.index:>4}  {u.name:<48} {u.equation:<16} {u.unit:<10} {u.meaning}")
+        return "\n".join(lines)

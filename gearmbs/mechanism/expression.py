@@ -1,0 +1,338 @@
+"""ADAMS's function language: from text to a compiled tape.
+
+``parse`` reads the text into a syntax tree (and finds every syntax error without a model);
+``compile_expression`` resolves names in a ``Scope`` and writes the tape of
+``gearmbs.dae.expressions``.  Case does not matter; angles are radians, ``90D`` is ninety degrees.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from gearmbs.dae.expressions import opcodes as op
+from gearmbs.dae.expressions.splines import SplineData
+from gearmbs.dae.expressions.tape import ExpressionError, Tape, TapeBuilder
+
+MAX_DEPTH = 100
+"""Deepest nesting of brackets, functions and signs."""
+
+Ref = int | str
+"""An ADAMS id or a name."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A literal; ``integer`` when it can stand for an id."""
+
+    value: float
+    at: int
+    integer: int | None = None
+
+
+@dataclass(frozen=True)
+class Name:
+    """A constant or the name of a model element."""
+
+    text: str
+    at: int
+
+
+@dataclass(frozen=True)
+class Call:
+    """A function with its arguments."""
+
+    name: str
+    args: tuple[Node, ...]
+    at: int
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Terms joined by operators of one precedence, from left to right."""
+
+    first: Node
+    rest: tuple[tuple[str, Node], ...]
+    at: int
+
+
+@dataclass(frozen=True)
+class Negative:
+    """A sign change."""
+
+    operand: Node
+    at: int
+
+
+@dataclass(frozen=True)
+class Power:
+    """A power; it binds to the right."""
+
+    base: Node
+    exponent: Node
+    at: int
+
+
+Node = Number | Name | Call | Chain | Negative | Power
+
+
+@dataclass(frozen=True)
+class Units:
+    """SI values of the units an expression is written in."""
+
+    length: float = 1.0
+    time: float = 1.0
+    force: float = 1.0
+    mass: float = 1.0
+
+    def factor(self, dimension: str) -> float:
+        """Return the SI value of one unit of ``dimension``."""
+        factors = {
+            "number": 1.0,
+            "angle": 1.0,
+            "time": self.time,
+            "length": self.length,
+            "velocity": self.length / self.time,
+            "acceleration": self.length / self.time**2,
+            "rate": 1.0 / self.time,
+            "angular_velocity": 1.0 / self.time,
+            "angular_acceleration": 1.0 / self.time**2,
+            "force": self.force,
+            "torque": self.force * self.length,
+        }
+        if dimension not in factors:
+            raise ValueError(f"dimension {dimension!r} is not one of {', '.join(factors)}")
+        return factors[dimension]
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What the names and ids in an expression stand for.
+
+    Parameters
+    ----------
+    markers : mapping of int or str to int
+        Marker table index of every id and (upper-case) name.
+    marker_body : sequence of int
+        Row of the kinematics table of every marker.
+    variables : mapping
+        Expression of every VARIABLE; VARVAL writes it in place.
+    states : set
+        VARIABLEs that are unknowns of their own: VARVAL becomes ``("variable", ref)``.
+    diffs : mapping
+        Expression of every DIFF; None for an implicit one.  DIF becomes ``("diff", ref)``.
+    splines : mapping to SplineData
+    arrays : mapping to sequences of float
+    plants : mapping of ("pinput" | "poutput", ref) to VARIABLE refs
+    forces : mapping of (kind, ref) to (I marker ref, J marker ref or None)
+        Elements whose forces JOINT, SFORCE, FX ... can ask for.
+    units : Units
+    """
+
+    markers: Mapping[Ref, int] = field(default_factory=dict)
+    marker_body: Sequence[int] = ()
+    variables: Mapping[Ref, str] = field(default_factory=dict)
+    states: frozenset[Ref] = frozenset()
+    diffs: Mapping[Ref, str | None] = field(default_factory=dict)
+    splines: Mapping[Ref, SplineData] = field(default_factory=dict)
+    arrays: Mapping[Ref, Sequence[float]] = field(default_factory=dict)
+    plants: Mapping[tuple[str, Ref], Sequence[Ref]] = field(default_factory=dict)
+    forces: Mapping[tuple[str, Ref], tuple[Ref, Ref | None]] = field(default_factory=dict)
+    units: Units = Units()
+
+
+_TOKEN = re.compile(
+    r"""\s*(?:
+      (?P<number>(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?)(?P<degree>[Dd](?![A-Za-z0-9_]))?
+    | (?P<name>[A-Za-z_.$][A-Za-z0-9_.$]*|"[^"]*"|'[^']*')
+    | (?P<op>\*\*|[-+*/(),:])
+    )""",
+    re.VERBOSE,
+)
+
+
+class _Parser:
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.tokens: list[tuple[str, str, int, bool]] = []
+        at = 0
+        while at < len(text):
+            match = _TOKEN.match(text, at)
+            if match is None:
+                if not text[at:].strip():
+                    break
+                at += len(text[at:]) - len(text[at:].lstrip())
+                self.fail(f"unexpected character {text[at]!r}", at)
+            kind = match.lastgroup if match.lastgroup != "degree" else "number"
+            self.tokens.append((str(kind), match.group(str(kind)), match.start(str(kind)), bool(match.group("degree"))))
+            at = match.end()
+        self.tokens.append(("end", "", len(text), False))
+        self.next = 0
+        self.depth = 0
+
+    def fail(self, message: str, at: int) -> None:
+        raise ExpressionError(f"{message} at column {at + 1} of {shown(self.text)}")
+
+    def accept(self, *symbols: str) -> str | None:
+        kind, value, _, _ = self.tokens[self.next]
+        if kind == "op" and value in symbols:
+            self.next += 1
+            return value
+        return None
+
+    def expect(self, symbol: str, where: str) -> None:
+        if self.accept(symbol) is None:
+            kind, value, at, _ = self.tokens[self.next]
+            found = "the end" if kind == "end" else repr(value)
+            self.fail(f"expected {symbol!r} {where}, found {found}", at)
+
+    def enter(self, at: int) -> None:
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            self.fail(f"nested deeper than {MAX_DEPTH}", at)
+
+    def whole(self) -> Node:
+        node = self.sum()
+        kind, value, at, _ = self.tokens[self.next]
+        if kind != "end":
+            self.fail(f"unexpected {value!r} after the expression", at)
+        return node
+
+    def sum(self) -> Node:
+        return self.chain(("+", "-"), self.product)
+
+    def product(self) -> Node:
+        return self.chain(("*", "/"), self.signed)
+
+    def chain(self, symbols: tuple[str, ...], operand) -> Node:
+        at = self.tokens[self.next][2]
+        first = operand()
+        rest = []
+        while symbol := self.accept(*symbols):
+            rest.append((symbol, operand()))
+        return Chain(first, tuple(rest), at) if rest else first
+
+    def signed(self) -> Node:
+        at = self.tokens[self.next][2]
+        sign = self.accept("+", "-")
+        if sign is None:
+            return self.power()
+        self.enter(at)
+        operand = self.signed()
+        self.depth -= 1
+        return Negative(operand, at) if sign == "-" else operand
+
+    def power(self) -> Node:
+        base = self.atom()
+        at = self.tokens[self.next][2]
+        if self.accept("**") is None:
+            return base
+        self.enter(at)
+        exponent = self.signed()
+        self.depth -= 1
+        return Power(base, exponent, at)
+
+    def atom(self) -> Node:
+        kind, value, at, degree = self.tokens[self.next]
+        if kind == "number":
+            self.next += 1
+            return self.number(value, at, degree)
+        if kind == "name":
+            self.next += 1
+            if value[0] not in "\"'" and self.accept("(") is not None:
+                return self.call(value.upper(), at)
+            return Name(value.strip("\"'").upper(), at)
+        if self.accept("(") is not None:
+            self.enter(at)
+            node = self.sum()
+            self.depth -= 1
+            self.expect(")", "to close the bracket")
+            return node
+        found = "the end" if kind == "end" else repr(value)
+        self.fail(f"expected a number, a function or a bracket, found {found}", at)
+        raise AssertionError
+
+    def number(self, text: str, at: int, degree: bool) -> Number:
+        value = float(re.sub("[dD]", "E", text))
+        if abs(value) > 1e300:
+            self.fail(f"the number {text} is too large", at)
+        if degree:
+            return Number(value * 0.017453292519943295, at)
+        return Number(value, at, int(text) if text.isdigit() and len(text) < 19 else None)
+
+    def call(self, name: str, at: int) -> Node:
+        self.enter(at)
+        args: list[Node] = []
+        if self.accept(")") is None:
+            args.append(self.sum())
+            while self.accept(",", ":") is not None:
+                args.append(self.sum())
+            self.expect(")", f"to close {name}")
+        self.depth -= 1
+        return Call(name, tuple(args), at)
+
+
+def shown(text: str) -> str:
+    """Return an expression for a message, shortened when it is long."""
+    flat = " ".join(text.split())
+    return repr(flat if len(flat) <= 90 else flat[:87] + "...")
+
+
+def parse(text: str) -> Node:
+    """Read a function expression into its syntax tree.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    Node
+
+    Raises
+    ------
+    ExpressionError
+        With the column and what was expected there.
+    """
+    if not text.strip():
+        raise ExpressionError("the expression is empty; give at least a number")
+    return _Parser(text).whole()
+
+
+def compile_expression(text: str, scope: Scope, dimension: str = "number", accelerations: bool = False) -> Tape:
+    """Compile a function expression to a tape that returns SI values.
+
+    Parameters
+    ----------
+    text : str
+        The expression, in the units of ``scope.units``.
+    scope : Scope
+    dimension : str
+        What the value is ("force", "torque", "length", "angle", ...): its unit is converted to SI.
+    accelerations : bool
+        Allow ACCX, WDTX and their kin: only requests know accelerations.
+
+    Returns
+    -------
+    Tape
+
+    Raises
+    ------
+    ExpressionError
+        When the text is malformed or names something the scope does not hold.
+    """
+    from gearmbs.dae.expressions.tape import LEVEL_ACCELERATION
+    from gearmbs.mechanism.expression_functions import Lowering
+
+    builder = TapeBuilder(scope.marker_body)
+    lowering = Lowering(builder, scope, text)
+    result = lowering.node(parse(text))
+    result = builder.binary(op.MUL, builder.constant(scope.units.factor(dimension)), result)
+    tape = builder.finish(result, text)
+    if tape.level == LEVEL_ACCELERATION and not accelerations:
+        raise ExpressionError(f"accelerations can only be asked for in a REQUEST, not in {shown(text)}")
+    return tape
+
+
+__all__ = ["ExpressionError", "Scope", "SplineData", "Units", "compile_expression", "parse"]

@@ -1,0 +1,246 @@
+"""The functions of ADAMS's function language, written as operations of the tape."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable
+from typing import NoReturn
+
+from gearmbs.dae.expressions import opcodes as op
+from gearmbs.dae.expressions.tape import ExpressionError, TapeBuilder
+from gearmbs.mechanism.expression import (
+    Call,
+    Chain,
+    Name,
+    Negative,
+    Node,
+    Number,
+    Power,
+    Ref,
+    Scope,
+    parse,
+    shown,
+)
+
+CONSTANTS = {"PI": math.pi, "DTOR": math.pi / 180.0, "RTOD": 180.0 / math.pi}
+
+UNARY = {
+    "ABS": op.ABS, "SQRT": op.SQRT, "EXP": op.EXP, "LOG": op.LOG, "LOG10": op.LOG10, "SIN": op.SIN, "COS": op.COS,
+    "TAN": op.TAN, "ASIN": op.ASIN, "ACOS": op.ACOS, "ATAN": op.ATAN, "SINH": op.SINH, "COSH": op.COSH,
+    "TANH": op.TANH, "AINT": op.AINT, "INT": op.AINT, "ANINT": op.ANINT, "NINT": op.ANINT,
+}  # fmt: skip
+BINARY = {"ATAN2": op.ATAN2, "MOD": op.MOD, "SIGN": op.SIGN, "DIM": op.DIM}
+ELEMENT_FORCES = {
+    "JOINT": "joint", "JPRIM": "jprim", "MOTION": "motion", "SFORCE": "sforce", "VFORCE": "vforce",
+    "VTORQ": "vtorque", "GFORCE": "gforce", "BUSH": "bushing", "FIELD": "field", "SPDP": "springdamper",
+    "GCON": "gcon", "COUPLER": "coupler", "GEAR": "gear",
+}  # fmt: skip
+EULER_SEQUENCES = ("123", "231", "312", "132", "213", "321", "121", "131", "212", "232", "313", "323")
+"""Body-fixed sequences of ORIENT's systems 1 to 12."""
+UNSUPPORTED = frozenset(
+    "BEAM NFORCE CONTACT CVCV PTCV CURVE INTERP INVPSD DELAY USER SENVAL MODE INCANG FXFREQ FXMODE FRICTION "
+    "UVX UVY UVZ DXYZ VXYZ WXYZ FXYZ TXYZ TRANS ARYSUM RANDOM".split()
+)
+"""Functions of ADAMS that exist but are not evaluated here."""
+
+
+class Lowering:
+    """Writes the syntax tree of one expression to a tape.
+
+    Parameters
+    ----------
+    builder : TapeBuilder
+    scope : Scope
+    text : str
+        The source, for messages.
+    """
+
+    def __init__(self, builder: TapeBuilder, scope: Scope, text: str) -> None:
+        self.builder = builder
+        self.scope = scope
+        self.text = text
+        self._open: list[tuple[str, Ref]] = []
+        self._inlined: dict[tuple[str, Ref], int] = {}
+
+    def fail(self, message: str, at: int) -> NoReturn:
+        """Raise an ExpressionError that shows the place."""
+        raise ExpressionError(f"{message} at column {at + 1} of {shown(self.text)}")
+
+    # syntax tree -> registers
+
+    def node(self, node: Node) -> int:
+        """Return the register of a subtree."""
+        if isinstance(node, Number):
+            return self.builder.constant(node.value)
+        if isinstance(node, Name):
+            return self._name(node)
+        if isinstance(node, Negative):
+            return self.builder.unary(op.NEG, self.node(node.operand))
+        if isinstance(node, Power):
+            return self.guarded(node.at, lambda: self.builder.binary(op.POW, *self._both(node.base, node.exponent)))
+        if isinstance(node, Chain):
+            total = self.node(node.first)
+            codes = {"+": op.ADD, "-": op.SUB, "*": op.MUL, "/": op.DIV}
+            for symbol, operand in node.rest:
+                right = self.node(operand)
+                if symbol == "/" and self.builder.value_of(right) == 0.0:
+                    self.fail("division by zero", node.at)
+                total = self.guarded(node.at, self.builder.binary, codes[symbol], total, right)
+            return total
+        return self._call(node)
+
+    def guarded(self, at: int, function: Callable[..., int], *args: int) -> int:
+        """Call a builder method; an error gets the place of the failing part."""
+        try:
+            return function(*args)
+        except ExpressionError as error:
+            if "column" in str(error):
+                raise
+            self.fail(str(error), at)
+
+    def _both(self, a: Node, b: Node) -> tuple[int, int]:
+        return self.node(a), self.node(b)
+
+    def _name(self, node: Name) -> int:
+        if node.text == "TIME":
+            return self.scaled(self.builder.time(), "time")
+        if node.text in CONSTANTS:
+            return self.builder.constant(CONSTANTS[node.text])
+        self.fail(f"{node.text} is not TIME, PI, DTOR or RTOD and stands where a value is expected", node.at)
+
+    def _call(self, node: Call) -> int:
+        from gearmbs.mechanism.expression_library import FUNCTIONS
+
+        name = node.name
+        if name in UNARY:
+            self.count(node, 1, 1)
+            return self.guarded(node.at, self.builder.unary, UNARY[name], self.node(node.args[0]))
+        if name in BINARY:
+            self.count(node, 2, 2)
+            return self.guarded(node.at, self.builder.binary, BINARY[name], *self._both(*node.args))
+        if name in ELEMENT_FORCES:
+            return self._element_force(node)
+        if name in FUNCTIONS:
+            function, low, high = FUNCTIONS[name]
+            self.count(node, low, high)
+            return self.guarded(node.at, lambda: function(self, node))
+        if name in UNSUPPORTED:
+            self.fail(f"the function {name} is not supported", node.at)
+        known = [*UNARY, *BINARY, *ELEMENT_FORCES, *FUNCTIONS]
+        near = difflib.get_close_matches(name, known, 1)
+        self.fail(f"unknown function {name}" + (f"; did you mean {near[0]}?" if near else ""), node.at)
+
+    def count(self, node: Call, low: int, high: int) -> None:
+        """Check the number of arguments."""
+        n = len(node.args)
+        if not low <= n <= high:
+            wanted = str(low) if low == high else f"{low} to {high}"
+            self.fail(f"{node.name} takes {wanted} arguments, got {n}", node.at)
+
+    # arguments
+
+    def scaled(self, register: int, dimension: str) -> int:
+        """Return an SI value in the expression's own units."""
+        factor = 1.0 / self.scope.units.factor(dimension)
+        return self.builder.binary(op.MUL, self.builder.constant(factor), register)
+
+    def ref(self, node: Node) -> Ref:
+        """Return the id or name an argument stands for."""
+        if isinstance(node, Number) and node.integer is not None:
+            return node.integer
+        if isinstance(node, Name):
+            return node.text
+        self.fail("expected the id or name of an element", node.at)
+
+    def marker(self, call: Call, position: int) -> int:
+        """Return the table index of a marker argument; absent or 0 is the global frame."""
+        if position >= len(call.args):
+            return op.GLOBAL
+        node = call.args[position]
+        ref = self.ref(node)
+        if ref == 0:
+            return op.GLOBAL
+        if ref not in self.scope.markers:
+            self.fail(f"there is no MARKER {ref}", node.at)
+        return int(self.scope.markers[ref])
+
+    def literal(self, call: Call, position: int, low: int, high: int, default: int | None = None) -> int:
+        """Return an integer argument within its range."""
+        if position >= len(call.args) and default is not None:
+            return default
+        node = call.args[position]
+        value = node.integer if isinstance(node, Number) else None
+        if value is None or not low <= value <= high:
+            self.fail(f"argument {position + 1} of {call.name} must be an integer from {low} to {high}", node.at)
+        return value
+
+    def values(self, call: Call) -> list[int]:
+        """Return the registers of all arguments."""
+        return [self.node(a) for a in call.args]
+
+    def inline(self, kind: str, ref: Ref, text: str, at: int) -> int:
+        """Write another element's expression in place, once."""
+        key = (kind, ref)
+        if key in self._inlined:
+            return self._inlined[key]
+        if key in self._open:
+            ring = " -> ".join(f"{k.upper()}/{r}" for k, r in [*self._open[self._open.index(key) :], key])
+            self.fail(f"{ring} depends on itself", at)
+        if len(self._open) > 50:
+            self.fail(f"{kind.upper()} expressions refer to each other more than 50 deep", at)
+        self._open.append(key)
+        outer, self.text = self.text, text
+        self._inlined[key] = self.node(parse(text))
+        self.text = outer
+        self._open.pop()
+        return self._inlined[key]
+
+    # forces of elements
+
+    def force(self, kind: str, ref: Ref, base: int, rm: int, axis: int) -> int:
+        """Return a component of an element's force (base 0 or 6) or torque (base 3 or 9)."""
+        keys = [(kind, ref, base + c) for c in range(3)]
+        register = self.builder.force(keys, rm, axis)
+        return self.scaled(register, "torque" if base % 6 else "force")
+
+    def _element_force(self, node: Call) -> int:
+        self.count(node, 3, 4)
+        kind = ELEMENT_FORCES[node.name]
+        ref = self.ref(node.args[0])
+        if (kind, ref) not in self.scope.forces:
+            self.fail(f"there is no {kind.upper()} {ref} whose force could be measured", node.args[0].at)
+        side = self.literal(node, 1, 0, 1)
+        component = self.literal(node, 2, 1, 8)
+        rm = self.marker(node, 3)
+        base = 6 * side + (3 if component > 4 else 0)
+        axis = op.MAGNITUDE if component in (1, 5) else (component - 2) % 4
+        return self.force(kind, ref, base, rm, axis)
+
+    def force_between(self, node: Call, torque: bool, axis: int) -> int:
+        """Return FX ... TM: all forces on marker i from elements between markers i and j."""
+        self.marker(node, 0)
+        i = self.ref(node.args[0])
+        j = self.ref(node.args[1]) if len(node.args) > 1 else 0
+        self.marker(node, 1)
+        rm = self.marker(node, 2)
+        shift = 3 if torque else 0
+        found = []
+        for (kind, ref), (first, second) in self.scope.forces.items():
+            if first == i and (second or 0) == j:
+                found.append((kind, ref, shift))
+            elif first == j and second == i:
+                found.append((kind, ref, shift + 6))
+        if not found:
+            self.fail(f"no force or joint acts between MARKER {i} and MARKER {j}", node.at)
+        axes = (0, 1, 2) if axis == op.MAGNITUDE and len(found) > 1 else (axis,)
+        sums = []
+        for a in axes:
+            total = self.builder.constant(0.0)
+            for kind, ref, base in found:
+                total = self.builder.binary(op.ADD, total, self.force(kind, ref, base, rm, a))
+            sums.append(total)
+        result = sums[0]
+        for other in sums[1:]:
+            result = self.builder.binary(op.HYPOT, result, other)
+        return result

@@ -1,0 +1,86 @@
+"""Functions of time that drive motions and torques."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearmbs.dae import timefunctions as tf
+from gearmbs.dae.errors import ModelError
+
+
+@dataclass(frozen=True)
+class TimeFunction:
+    """A function of time in one of the closed forms of :mod:`gearmbs.dae.timefunctions`.
+
+    Make one with :func:`constant`, :func:`step`, :func:`ramp`, :func:`harmonic` or :func:`polynomial`.
+    """
+
+    kind: int
+    parameters: tuple[float, ...]
+    text: str
+
+    def __post_init__(self) -> None:
+        if not np.all(np.isfinite(self.parameters)):
+            raise ModelError(f"function {self.text}: its parameters must be finite")
+
+    def __call__(self, t: float) -> float:
+        """Return f(t)."""
+        return tf.evaluate(self.kind, np.array(self.parameters), 0, float(t))[0]
+
+    def derivatives(self, t: float) -> tuple[float, float, float]:
+        """Return f, f' and f'' at t."""
+        return tf.evaluate(self.kind, np.array(self.parameters), 0, float(t))
+
+    def __repr__(self) -> str:
+        return self.text
+
+
+def constant(value: float) -> TimeFunction:
+    """Return the constant function."""
+    return TimeFunction(tf.CONSTANT, (float(value),), f"{value:g}")
+
+
+def step(t0: float, f0: float, t1: float, f1: float, quintic: bool = False) -> TimeFunction:
+    """Return ADAMS's STEP (cubic) or STEP5 (quintic) from f0 before t0 to f1 after t1."""
+    if not t1 > t0:
+        raise ModelError(f"step: its end {t1} s must be later than its start {t0} s")
+    name = "STEP5" if quintic else "STEP"
+    kind = tf.STEP5 if quintic else tf.STEP
+    return TimeFunction(
+        kind, (float(t0), float(f0), float(t1), float(f1)), f"{name}(TIME, {t0:g}, {f0:g}, {t1:g}, {f1:g})"
+    )
+
+
+def ramp(rate: float, over: float = 0.0, start: float = 0.0, quintic: bool = False) -> TimeFunction:
+    """Return the angle (or displacement) whose rate rises smoothly from 0 to ``rate`` during ``over`` seconds.
+
+    The rate is STEP(TIME, 0, 0, over, rate), so the function is its integral, in closed form.
+    """
+    if over < 0.0:
+        raise ModelError(f"ramp: over = {over} s; the run-up time cannot be negative")
+    if over == 0.0:
+        return polynomial([start, rate])
+    kind = tf.STEP5_INTEGRAL if quintic else tf.STEP_INTEGRAL
+    text = f"integral of STEP{5 if quintic else ''}(TIME, 0, 0, {over:g}, {rate:g})"
+    return TimeFunction(kind, (0.0, 0.0, float(over), float(rate), float(start)), text)
+
+
+def harmonic(amplitude: float, omega: float, phase: float = 0.0, offset: float = 0.0) -> TimeFunction:
+    """Return offset + amplitude sin(omega t + phase)."""
+    parameters = (float(amplitude), float(omega), float(phase), float(offset))
+    return TimeFunction(tf.HARMONIC, parameters, f"{offset:g} + {amplitude:g} SIN({omega:g} TIME + {phase:g})")
+
+
+def polynomial(coefficients: list[float]) -> TimeFunction:
+    """Return c0 + c1 t + c2 t^2 + ..."""
+    if not len(coefficients):
+        raise ModelError("polynomial: give at least one coefficient")
+    text = " + ".join(f"{c:g} t^{k}" for k, c in enumerate(coefficients))
+    return TimeFunction(tf.POLYNOMIAL, (len(coefficients) - 1, *map(float, coefficients)), text)
+
+
+def as_function(value: float | TimeFunction) -> TimeFunction:
+    """Return ``value`` as a function of time; a number becomes a constant."""
+    return value if isinstance(value, TimeFunction) else constant(value)

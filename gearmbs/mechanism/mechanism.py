@@ -1,0 +1,400 @@
+"""The Mechanism: bodies, joints, motions and forces by name, and its translation into tables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gearmbs.dae import forces as force_kinds
+from gearmbs.dae import terms
+from gearmbs.dae.errors import ModelError
+from gearmbs.dae.system import System
+from gearmbs.dae.tables import TableBuilder
+from gearmbs.mechanism import joints as jt
+from gearmbs.mechanism.elements import ContactTables, GearContact, Torque
+from gearmbs.mechanism.functions import TimeFunction, as_function, constant
+from gearmbs.mechanism.geometry import Vector, frame_along, vector
+from gearmbs.mechanism.parts import Body, Marker, make_body
+
+
+class Mechanism:
+    """A system of rigid bodies, joints, motions and forces.
+
+    Every part has a name. Joints take two bodies with a point and an axis in global components at the
+    initial position, or two markers::
+
+        m = Mechanism("pendulum", gravity=(0, 0, -9.81))
+        rod = m.body("rod", mass=1.0, inertia=(0.1, 0.1, 0.01), position=(0.5, 0, 0))
+        m.revolute("pin", rod, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+        solution = m.simulate(2.0)
+
+    Parameters
+    ----------
+    name : str
+        Title used in messages and results.
+    gravity : array_like of 3 floats
+        Acceleration of gravity, m/s^2.
+    """
+
+    def __init__(self, name: str = "mechanism", gravity: Vector = (0.0, 0.0, 0.0)) -> None:
+        self.name = name
+        self.gravity = vector(gravity, "gravity")
+        self.ground = Body("ground", is_ground=True)
+        self.bodies: dict[str, Body] = {}
+        self.joints: dict[str, jt.Joint] = {}
+        self.elements: dict[str, Any] = {}
+
+    # --- bodies -----------------------------------------------------------------------------------
+
+    def body(
+        self,
+        name: str,
+        mass: float = 0.0,
+        inertia: npt.ArrayLike = (0.0, 0.0, 0.0),
+        *,
+        com: Vector = (0.0, 0.0, 0.0),
+        position: Vector = (0.0, 0.0, 0.0),
+        orientation: npt.ArrayLike | None = None,
+        velocity: Vector = (0.0, 0.0, 0.0),
+        angular_velocity: Vector = (0.0, 0.0, 0.0),
+    ) -> Body:
+        """Add a rigid body.
+
+        Parameters
+        ----------
+        name : str
+            Unique in the mechanism.
+        mass : float
+            kg.
+        inertia : array_like
+            About the centre of mass in the body's axes, kg m^2: 3 moments, 6 entries (xx, yy, zz, xy, xz, yz) or 3x3.
+        com : array_like
+            Centre of mass in the body's frame, m.
+        position, orientation : array_like
+            The body's frame at the start (m; 3x3 matrix or 3-1-3 Euler angles in rad).
+        velocity, angular_velocity : array_like
+            At the start, global components (m/s of the frame's origin, rad/s).
+
+        Raises
+        ------
+        ModelError
+            For a name in use, a negative mass, an impossible inertia or a malformed vector.
+        """
+        if name in self.bodies or name == "ground":
+            raise ModelError(f"body '{name}': the name is in use; choose another")
+        body = make_body(name, mass, inertia, com, position, orientation, velocity, angular_velocity)
+        self.bodies[name] = body
+        return body
+
+    # --- joints -----------------------------------------------------------------------------------
+
+    def joint(
+        self,
+        kind: str,
+        name: str,
+        i: Body | Marker,
+        j: Body | Marker,
+        *,
+        at: Vector | None = None,
+        axis: Vector | None = None,
+    ) -> jt.Joint:
+        """Add a joint of one of the kinds in :data:`gearmbs.mechanism.joints.JOINTS`.
+
+        Parameters
+        ----------
+        i, j : Body or Marker
+            What the joint connects. With bodies, ``at`` (default: the origin of ``i``) and ``axis`` (default: z)
+            place a marker on each, in global components at the initial position.
+
+        Raises
+        ------
+        ModelError
+            For an unknown kind, a name in use, foreign bodies, or a joint of a body with itself.
+        """
+        if kind not in jt.JOINTS:
+            raise ModelError(f"joint '{name}': kind {kind!r} is unknown; choose one of {', '.join(jt.JOINTS)}")
+        mi, mj = self._markers(f"joint '{name}'", name, i, j, at, axis)
+        return self._add_joint(jt.Joint(name, kind, mi, mj, jt.JOINTS[kind](mi, mj)))
+
+    def fixed(self, name, i, j, **where) -> jt.Joint:
+        """Add a fixed joint: no relative motion. See :meth:`joint`."""
+        return self.joint("fixed", name, i, j, **where)
+
+    def revolute(self, name, i, j, **where) -> jt.Joint:
+        """Add a revolute joint: rotation about the common z axis. See :meth:`joint`."""
+        return self.joint("revolute", name, i, j, **where)
+
+    def spherical(self, name, i, j, **where) -> jt.Joint:
+        """Add a spherical joint: a common point. See :meth:`joint`."""
+        return self.joint("spherical", name, i, j, **where)
+
+    def cylindrical(self, name, i, j, **where) -> jt.Joint:
+        """Add a cylindrical joint: rotation about and translation along z_J. See :meth:`joint`."""
+        return self.joint("cylindrical", name, i, j, **where)
+
+    def translational(self, name, i, j, **where) -> jt.Joint:
+        """Add a translational joint along z_J. See :meth:`joint`."""
+        return self.joint("translational", name, i, j, **where)
+
+    def universal(self, name, i, j, **where) -> jt.Joint:
+        """Add a universal joint whose cross arms are z_I and z_J (give markers). See :meth:`joint`."""
+        return self.joint("universal", name, i, j, **where)
+
+    def planar(self, name, i, j, **where) -> jt.Joint:
+        """Add a planar joint: motion in the xy plane of J. See :meth:`joint`."""
+        return self.joint("planar", name, i, j, **where)
+
+    def screw(self, name, i, j, *, pitch: float, at: Vector | None = None, axis: Vector | None = None) -> jt.Joint:
+        """Add a screw joint: I advances ``pitch`` metres along z_J a turn."""
+        mi, mj = self._markers(f"joint '{name}'", name, i, j, at, axis)
+        return self._add_joint(jt.Joint(name, "screw", mi, mj, jt.screw_rows(mi, mj, pitch)))
+
+    def distance(self, name: str, i: Marker, j: Marker, length: float | None = None) -> jt.Joint:
+        """Keep the origins of two markers ``length`` metres apart (default: as they are)."""
+        self._check_name(name)
+        if length is None:
+            length = float(np.linalg.norm(i.global_position() - j.global_position()))
+        if not length > 0.0:
+            raise ModelError(f"joint '{name}': length = {length} m; a distance joint needs a positive length")
+        row = jt.Row(f"distance {length:g} m", (jt.Term(terms.DISTANCE, i, j),), constant(length))
+        return self._add_joint(jt.Joint(name, "distance", i, j, [row]))
+
+    def coupler(self, name: str, parts: list[tuple[jt.Joint, float]], offset: float | None = None) -> jt.Joint:
+        """Couple joint coordinates linearly: sum of coefficient x coordinate stays at its initial value.
+
+        A coordinate is the angle (rad) of a revolute or cylindrical joint or the displacement (m) of a
+        translational one. Gears are couplers of two angles; a rack and pinion couples an angle (coefficient: pitch
+        radius) and a displacement.
+
+        Parameters
+        ----------
+        parts : list of (Joint, float)
+            Two or more joints with their coefficients.
+        offset : float, optional
+            Value of the sum; default: the one at the initial position.
+        """
+        if len(parts) < 2:
+            raise ModelError(f"coupler '{name}': it needs at least two joints")
+        row_terms = tuple(jt.coordinate_term(joint, coefficient) for joint, coefficient in parts)
+        if offset is None:
+            offset = sum(t.coefficient * _initial_coordinate(t) for t in row_terms)
+        row = jt.Row("coupled coordinates", row_terms, constant(offset))
+        return self._add_joint(jt.Joint(name, "coupler", parts[0][0].i, parts[0][0].j, [row]))
+
+    def rotation(self, name: str, joint: jt.Joint, function: float | TimeFunction) -> jt.Joint:
+        """Prescribe the rotation of I about z_J of a joint as a function of time, rad."""
+        self._check_joint(name, joint, ("revolute", "cylindrical"))
+        row = jt.Row("angle", (jt.Term(terms.ROTATION, joint.i, joint.j),), None, as_function(function))
+        return self._add_joint(jt.Joint(name, "rotation", joint.i, joint.j, [row]))
+
+    def translation(self, name: str, joint: jt.Joint, function: float | TimeFunction) -> jt.Joint:
+        """Prescribe the displacement of I along z_J of a joint as a function of time, m."""
+        self._check_joint(name, joint, ("translational", "cylindrical"))
+        row = jt.Row("displacement", (jt.Term(terms.DOT2, joint.i, joint.j, jt.Z),), as_function(function))
+        return self._add_joint(jt.Joint(name, "translation", joint.i, joint.j, [row]))
+
+    # --- forces -----------------------------------------------------------------------------------
+
+    def torque(
+        self, name: str, on: Body | Marker, function: float | TimeFunction, *, axis: Vector = (0, 0, 1), reaction=None
+    ) -> Torque:
+        """Apply a torque f(t) in N m about an axis fixed in the reacting body (default: ground).
+
+        Parameters
+        ----------
+        on : Body or Marker
+            Body that feels the torque.
+        function : float or TimeFunction
+            Value in N m; a number is a constant.
+        axis : array_like
+            Direction at the initial position, global components.
+        reaction : Body, optional
+            Body that feels the opposite torque.
+        """
+        self._check_name(name)
+        marker = on if isinstance(on, Marker) else on.marker(name=f"{name}.I")
+        self._check_body(f"torque '{name}'", marker.body)
+        against = reaction or self.ground
+        self._check_body(f"torque '{name}'", against)
+        frame = frame_along(axis, f"torque '{name}': axis")
+        other = against.marker_at(marker.global_position(), frame, name=f"{name}.J")
+        element = Torque(name, marker, other, other, as_function(function))
+        self.elements[name] = element
+        return element
+
+    def gear_contact(self, name: str, wheel_1: Body | Marker, wheel_2: Body | Marker, pair: ContactTables):
+        """Let the teeth of two wheels touch.
+
+        Parameters
+        ----------
+        wheel_1, wheel_2 : Body or Marker
+            Wheel frames: origin at mid-face on the axis, z the axis, x through the middle of tooth 0. A body stands
+            for its own frame.
+        pair : ContactTables
+            Usually a :class:`gearmbs.gears.GearPair`.
+        """
+        self._check_name(name)
+        i = wheel_1 if isinstance(wheel_1, Marker) else wheel_1.marker(name=f"{name}.I")
+        j = wheel_2 if isinstance(wheel_2, Marker) else wheel_2.marker(name=f"{name}.J")
+        for marker in (i, j):
+            self._check_body(f"gear contact '{name}'", marker.body)
+        element = GearContact(name, i, j, pair)
+        self.elements[name] = element
+        return element
+
+    # --- translation into tables ------------------------------------------------------------------
+
+    def compile(self, t0: float = 0.0) -> System:
+        """Return the mechanism as flat tables with names.
+
+        Raises
+        ------
+        ModelError
+            If the mechanism has no bodies, or a body without mass is not held.
+        """
+        if not self.bodies:
+            raise ModelError(f"mechanism '{self.name}': it has no bodies; add one with .body(...)")
+        builder = TableBuilder()
+        builder.gravity = self.gravity
+        body_index: dict[int, int] = {id(self.ground): 0}
+        pose = np.zeros((len(self.bodies), 18))
+        for k, body in enumerate(self.bodies.values()):
+            body_index[id(body)] = builder.add_body(body.mass, body.inertia)
+            arm = body.orientation @ body.com
+            pose[k, 0:3] = body.position + arm
+            pose[k, 3:12] = body.orientation.ravel()
+            pose[k, 12:15] = body.velocity + np.cross(body.angular_velocity, arm)
+            pose[k, 15:18] = body.angular_velocity
+        marker_index: dict[int, int] = {}
+
+        def index(marker: Marker) -> int:
+            if id(marker) not in marker_index:
+                position = marker.position - marker.body.com
+                marker_index[id(marker)] = builder.add_marker(body_index[id(marker.body)], position, marker.orientation)
+            return marker_index[id(marker)]
+
+        row_names: list[str] = []
+        for joint in self.joints.values():
+            for row in joint.rows:
+                self._add_row(builder, row, index)
+                row_names.append(f"{joint.name}: {row.label}")
+        for element in self.elements.values():
+            self._add_element(builder, element, index, body_index)
+        system = System(builder, pose, list(self.bodies), row_names, list(self.elements), t0)
+        system.mechanism = self
+        system.marker_index = marker_index
+        return system
+
+    @staticmethod
+    def _add_row(builder: TableBuilder, row: jt.Row, index) -> None:
+        function = -1
+        if row.function is not None:
+            function = builder.add_function(row.function.kind, list(row.function.parameters))
+        rotation = -1
+        if row.rotation is not None:
+            rotation = builder.add_function(row.rotation.kind, list(row.rotation.parameters))
+        packed = [(t.kind, index(t.i), index(t.j), t.axes, rotation, t.coefficient) for t in row.terms]
+        builder.add_row(packed, function)
+        for k, term in enumerate(row.terms):
+            if term.kind == terms.ANGLE:
+                builder.reference[len(builder.terms) - len(row.terms) + k] = _initial_coordinate(term)
+
+    @staticmethod
+    def _add_element(builder: TableBuilder, element, index, body_index) -> None:
+        i, j = index(element.i), index(element.j)
+        bi, bj = body_index[id(element.i.body)], body_index[id(element.j.body)]
+        if isinstance(element, Torque):
+            function = builder.add_function(element.function.kind, list(element.function.parameters))
+            axis = index(element.axis)
+            builder.add_force(
+                force_kinds.TORQUE,
+                i,
+                j,
+                force=False,
+                torque=True,
+                rm=axis,
+                function=function,
+                bodies=[body_index[id(element.axis.body)]],
+            )
+        elif isinstance(element, GearContact):
+            integers, reals, work = element.pair.contact_tables()
+            extra = builder.add_extra(integers, reals)
+            builder.add_force(
+                force_kinds.GEAR_CONTACT,
+                i,
+                j,
+                force=True,
+                torque=True,
+                extra=extra,
+                work=36 + work,
+                bodies=[bi, bj],
+            )
+        else:
+            raise ModelError(f"force element {element!r}: its type is unknown to the mechanism")
+
+    def simulate(self, t_end: float, **options):
+        """Integrate from 0 to ``t_end`` seconds; see :func:`gearmbs.mechanism.simulate`."""
+        from gearmbs.mechanism.simulate import simulate
+
+        return simulate(self, t_end, **options)
+
+    # --- checks -----------------------------------------------------------------------------------
+
+    def _markers(self, label, name, i, j, at, axis) -> tuple[Marker, Marker]:
+        self._check_name(name)
+        for part in (i, j):
+            self._check_body(label, part.body if isinstance(part, Marker) else part)
+        if isinstance(i, Marker) and isinstance(j, Marker):
+            if at is not None or axis is not None:
+                raise ModelError(f"{label}: give either markers or bodies with `at` and `axis`, not both")
+            mi, mj = i, j
+        else:
+            body_i = i.body if isinstance(i, Marker) else i
+            if at is None:
+                at = i.global_position() if isinstance(i, Marker) else (j if body_i.is_ground else body_i).position
+            frame = frame_along((0.0, 0.0, 1.0) if axis is None else axis, f"{label}: axis")
+            mi = i if isinstance(i, Marker) else i.marker_at(at, frame, name=f"{name}.I")
+            mj = j if isinstance(j, Marker) else j.marker_at(at, frame, name=f"{name}.J")
+        if mi.body is mj.body:
+            raise ModelError(f"{label}: both markers are on body '{mi.body.name}'; a joint connects two bodies")
+        return mi, mj
+
+    def _check_body(self, label: str, body: Body) -> None:
+        if not isinstance(body, Body):
+            raise ModelError(f"{label}: {body!r} is not a body or a marker")
+        if body is not self.ground and self.bodies.get(body.name) is not body:
+            raise ModelError(f"{label}: body '{body.name}' does not belong to mechanism '{self.name}'")
+
+    def _check_name(self, name: str) -> None:
+        if not name or name in self.joints or name in self.elements:
+            raise ModelError(f"name {name!r}: empty or in use; choose another")
+
+    def _check_joint(self, name: str, joint: jt.Joint, kinds: tuple[str, ...]) -> None:
+        self._check_name(name)
+        if self.joints.get(getattr(joint, "name", "")) is not joint:
+            raise ModelError(f"motion '{name}': {joint!r} is not a joint of mechanism '{self.name}'")
+        if joint.kind not in kinds:
+            raise ModelError(f"motion '{name}': joint '{joint.name}' is {joint.kind}; it must be {' or '.join(kinds)}")
+
+    def _add_joint(self, joint: jt.Joint) -> jt.Joint:
+        self._check_name(joint.name)
+        for marker in (joint.i, joint.j):
+            self._check_body(f"joint '{joint.name}'", marker.body)
+        self.joints[joint.name] = joint
+        return joint
+
+    def __repr__(self) -> str:
+        rows = sum(len(joint.rows) for joint in self.joints.values())
+        lines = [f"Mechanism({self.name!r}: {6 * len(self.bodies)} coordinates, {rows} constraint rows)"]
+        for part in (*self.bodies.values(), *self.joints.values(), *self.elements.values()):
+            lines.append(f"  {part!r}")
+        return "\n".join(lines)
+
+
+def _initial_coordinate(term: jt.Term) -> float:
+    ai, aj = term.i.global_orientation(), term.j.global_orientation()
+    if term.kind == terms.ANGLE:
+        return float(np.arctan2(ai[:, 0] @ aj[:, 1], ai[:, 0] @ aj[:, 0]))
+    return float(aj[:, 2] @ (term.i.global_position() - term.j.global_position()))

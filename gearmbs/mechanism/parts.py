@@ -1,0 +1,151 @@
+"""Bodies and markers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from gearmbs.dae.errors import ModelError
+from gearmbs.mechanism.geometry import Vector, frame_along, inertia_matrix, orientation, vector
+
+
+@dataclass(eq=False)
+class Marker:
+    """A frame fixed in a body.
+
+    Attributes
+    ----------
+    name : str
+    body : Body
+    position : ndarray, shape (3,)
+        Origin in the body's frame, m.
+    orientation : ndarray, shape (3, 3)
+        Columns are the marker's axes in the body's frame.
+    """
+
+    name: str
+    body: Body
+    position: np.ndarray
+    orientation: np.ndarray
+
+    def global_position(self) -> np.ndarray:
+        """Return the origin at the initial position, global components, m."""
+        return self.body.position + self.body.orientation @ self.position
+
+    def global_orientation(self) -> np.ndarray:
+        """Return the axes (columns) at the initial position, global components."""
+        return self.body.orientation @ self.orientation
+
+    def __repr__(self) -> str:
+        return f"Marker({self.name!r} on {self.body.name!r} at {np.array2string(self.position, precision=6)})"
+
+
+@dataclass(eq=False)
+class Body:
+    """A rigid body. Made by :meth:`gearmbs.mechanism.Mechanism.body`.
+
+    Attributes
+    ----------
+    name : str
+    mass : float
+        kg.
+    inertia : ndarray, shape (3, 3)
+        About the centre of mass, in the body's axes, kg m^2.
+    com : ndarray, shape (3,)
+        Centre of mass in the body's frame, m.
+    position, orientation : ndarray
+        The body's frame at the start: origin (m) and axes as columns, global components.
+    velocity, angular_velocity : ndarray, shape (3,)
+        Of the frame's origin (m/s) and of the body (rad/s), global components.
+    """
+
+    name: str
+    mass: float = 0.0
+    inertia: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
+    com: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    position: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    orientation: np.ndarray = field(default_factory=lambda: np.eye(3))
+    velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    angular_velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    is_ground: bool = False
+    markers: list[Marker] = field(default_factory=list)
+
+    def marker(
+        self,
+        position: Vector = (0.0, 0.0, 0.0),
+        orientation: npt.ArrayLike | None = None,
+        *,
+        axis: Vector | None = None,
+        name: str | None = None,
+    ) -> Marker:
+        """Add a marker given in the body's own frame.
+
+        Parameters
+        ----------
+        position : array_like of 3 floats
+            Origin, m.
+        orientation : array_like, optional
+            3x3 matrix or 3-1-3 Euler angles in rad; or give
+        axis : array_like of 3 floats, optional
+            Direction of the marker's z axis.
+        """
+        label = name or f"{self.name}.marker{len(self.markers) + 1}"
+        if any(m.name == label for m in self.markers):
+            raise ModelError(f"marker '{label}': body '{self.name}' already has a marker of that name")
+        matrix = (
+            frame_along(axis, f"marker '{label}': axis")
+            if axis is not None
+            else _orientation(orientation, f"marker '{label}': orientation")
+        )
+        marker = Marker(label, self, vector(position, f"marker '{label}': position"), matrix)
+        self.markers.append(marker)
+        return marker
+
+    def marker_at(self, point: Vector, matrix: np.ndarray, name: str | None = None) -> Marker:
+        """Add a marker given in global components at the initial position of the body."""
+        local = self.orientation.T @ (vector(point, f"body '{self.name}': marker position") - self.position)
+        return self.marker(local, self.orientation.T @ matrix, name=name)
+
+    def __repr__(self) -> str:
+        if self.is_ground:
+            return "Body('ground')"
+        moments = np.array2string(np.diag(self.inertia), precision=4)
+        return f"Body({self.name!r}, mass={self.mass:g} kg, inertia={moments} kg m^2, {len(self.markers)} markers)"
+
+
+def _orientation(value: npt.ArrayLike | None, label: str) -> np.ndarray:
+    return orientation(value, label)
+
+
+def make_body(
+    name: str,
+    mass: float,
+    inertia: npt.ArrayLike,
+    com: Vector,
+    position: Vector,
+    matrix: npt.ArrayLike | None,
+    velocity: Vector,
+    angular_velocity: Vector,
+) -> Body:
+    """Return a checked body; see :class:`Body` for the fields.
+
+    Raises
+    ------
+    ModelError
+        If mass or inertia is negative or not finite, or a vector is malformed.
+    """
+    label = f"body '{name}'"
+    if not np.isfinite(mass) or mass < 0.0:
+        raise ModelError(f"{label}: mass = {mass} kg; it must be a positive number")
+    return Body(
+        name=name,
+        mass=float(mass),
+        inertia=inertia_matrix(inertia, f"{label}: inertia"),
+        com=vector(com, f"{label}: com"),
+        position=vector(position, f"{label}: position"),
+        orientation=orientation(matrix, f"{label}: orientation"),
+        velocity=vector(velocity, f"{label}: velocity"),
+        angular_velocity=vector(angular_velocity, f"{label}: angular_velocity"),
+    )

@@ -1,0 +1,107 @@
+"""From a mechanism to a solution in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gearmbs.dae.errors import ModelError
+from gearmbs.dae.ida import solve_ida
+from gearmbs.dae.solution import Solution
+from gearmbs.mechanism.mechanism import Mechanism
+
+INTEGRATORS = ("WSTIFF", "GSTIFF", "IDA")
+
+
+def simulate(
+    mechanism: Mechanism,
+    t_end: float,
+    *,
+    rate: float | None = None,
+    t_eval: np.ndarray | None = None,
+    t_start: float = 0.0,
+    integrator: str = "WSTIFF",
+    formulation: str = "SI2",
+    tol: float = 1e-6,
+    progress: bool | Callable[[float], None] = False,
+    **options,
+) -> Solution:
+    """Integrate a mechanism and return its motion and forces.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The model; it is not changed.
+    t_end : float
+        End of the simulation, s.
+    rate : float, optional
+        Outputs a second; default: 500 outputs over the span.
+    t_eval : ndarray, optional
+        Output times instead of ``rate``; the first is the start.
+    integrator : {"WSTIFF", "GSTIFF", "IDA"}
+    formulation : {"SI2", "SI1", "I3"}
+    tol : float
+        Local error allowed a step: in metres or radians and their rates for lengths of the order of 1 m; lengths are
+        scaled by the size of the mechanism.
+    progress : bool or callable
+        True shows a bar; a callable is given the time reached.
+    **options
+        Handed to the integrator.
+
+    Returns
+    -------
+    Solution
+        Also when the integration failed: see its ``status`` and ``message``; what was computed is kept.
+
+    Raises
+    ------
+    ModelError
+        If the model or an option is wrong, or the mechanism cannot be assembled.
+    """
+    if t_eval is None:
+        if not np.isfinite(t_end) or t_end <= t_start:
+            raise ModelError(f"t_end = {t_end} s; it must be later than the start {t_start} s")
+        if rate is not None and not rate > 0.0:
+            raise ModelError(f"rate = {rate} 1/s; it must be positive")
+        count = 500 if rate is None else max(1, round((t_end - t_start) * rate))
+        t_eval = t_start + (np.arange(count + 1) / rate if rate else np.linspace(0.0, t_end - t_start, count + 1))
+    if not np.isfinite(tol) or tol <= 0.0:
+        raise ModelError(f"tol = {tol}; it must be a positive number")
+    name = integrator.upper()
+    if name not in INTEGRATORS:
+        raise ModelError(f"integrator: {integrator!r} is unknown; choose one of {', '.join(INTEGRATORS)}")
+    system = mechanism.compile(t_start)
+    problem = system.problem(formulation)
+    with _reporter(progress, float(t_eval[0]), float(t_eval[-1])) as report:
+        if name == "IDA":
+            result = solve_ida(problem, t_eval, tol=tol, progress=report, **options)
+        else:
+            from gearmbs.dae.wstiff import solve_wstiff
+
+            result = solve_wstiff(problem, t_eval, tol=tol, method=name, progress=report, **options)
+    return Solution(system, problem, result)
+
+
+class _reporter:
+    """Context that turns ``progress`` into a callable of time, with a bar when asked for."""
+
+    def __init__(self, progress: bool | Callable[[float], None], start: float, end: float) -> None:
+        self.progress, self.start, self.end = progress, start, end
+        self.bar = None
+
+    def __enter__(self) -> Callable[[float], None] | None:
+        if callable(self.progress):
+            return self.progress
+        if not self.progress:
+            return None
+        from rich.progress import Progress
+
+        self.bar = Progress()
+        self.bar.start()
+        task = self.bar.add_task("simulating", total=self.end - self.start)
+        return lambda t: self.bar.update(task, completed=t - self.start)
+
+    def __exit__(self, *exc) -> None:
+        if self.bar is not None:
+            self.bar.stop()
