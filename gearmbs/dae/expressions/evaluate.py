@@ -353,9 +353,7 @@ def eval_second(ints, floats, t, kin, marker_body, marker_frame, y, ref, grad, h
         if weight != 0.0:
             code = ints[at]
             if code == op.DISPLACEMENT or code == op.COSINE:
-                leaf_hessian(
-                    ints, at, weight, kin, marker_body, marker_frame, leaf, JACOBIAN_AT, columns, rows, k, h
-                )
+                leaf_hessian(ints, at, weight, kin, marker_body, marker_frame, leaf, JACOBIAN_AT, columns, rows, k, h)
             elif code > op.LAST_LEAF:
                 _curvature(ints, at, k, weight, work, rows, h)
         at += op.WIDTH

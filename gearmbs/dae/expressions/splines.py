@@ -55,7 +55,7 @@ class SplineData:
         if not self.y or any(len(row) != len(self.x) for row in self.y):
             raise ValueError(f"a spline needs one y for each of its {len(self.x)} x values, in every curve")
         if len(self.y) > 1 and len(self.z) != len(self.y):
-            raise ValueError(f"a family of {len(self.y)} curves needs as many z values, got {len(self.z)}")
+            raise ValueError(f"a spline of {len(self.y)} curves needs as many z values, got {len(self.z)}")
         if any(b <= a for a, b in zip(self.z, self.z[1:])):
             raise ValueError("a spline's z values must increase")
 

@@ -218,7 +218,7 @@ class TapeBuilder:
 
     def cosine(self, i: int, a: int, j: int, b: int) -> int:
         """Return the register of the cosine of axis ``a`` of marker i and axis ``b`` of marker j."""
-        if i == op.GLOBAL and j == op.GLOBAL or i == j:
+        if (i == op.GLOBAL and j == op.GLOBAL) or i == j:
             return self.constant(1.0 if a == b else 0.0)
         return self._emit(op.COSINE, i, a, j, b)
 
