@@ -10,11 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
-from gearmbs.dae import index1
-from gearmbs.dae import tables as T
+from gearmbs.dae import outputs
 from gearmbs.dae.result import DAEResult, Status
 
 if TYPE_CHECKING:
@@ -77,25 +74,18 @@ class Solution:
 
     def _evaluate(self) -> None:
         """Solve the index-1 system at every output time."""
-        m = self.t.size
-        bodies = len(self.system.body_names)
-        rows = len(self.system.row_names)
-        elements = len(self.system.force_names)
-        idata, rdata = self.problem.idata.copy(), self.problem.rdata.copy()
-        indptr, indices, slots = index1.pattern(idata, rdata, self.problem.work_size)
-        n = indptr.size - 1
-        self._pose = np.zeros((m, bodies, 18))
-        self._acc = np.zeros((m, bodies, 6))
-        self._lam = np.zeros((m, rows))
-        self._loads = np.zeros((m, max(elements, 1), index1.FORCE_RECORD))
-        self._phi = np.zeros((m, rows, 3))
-        self._force = np.zeros((m, rows, 3))
-        self._moment = np.zeros((m, rows, 3))
-        bounds = [row for row, _ in self.result.epochs] + [m]
-        for (first, table), last in zip(self.result.epochs, bounds[1:]):
-            if first >= last:
-                continue
-            _evaluate_span(self, slice(first, last), np.ascontiguousarray(table), rdata, indptr, indices, slots, n)
+        m, bodies, rows = self.t.size, len(self.system.body_names), len(self.system.row_names)
+        problem = self.problem
+        records = outputs.new_records(m, bodies, rows, len(self.system.force_names))
+        outputs.evaluate(
+            self.t, self.result.y, self.result.epochs, problem.idata, problem.rdata, problem.work_size, records
+        )
+        self._pose = records.pose.reshape(m, bodies, 18)
+        self._acc = records.solution[:, : 6 * bodies].reshape(m, bodies, 6)
+        self._lam = records.solution[:, 6 * bodies :]
+        self._loads = records.loads
+        self._phi = records.phi.reshape(m, rows, 3)
+        self._force, self._moment = records.force, records.moment
 
     # --- access by name -----------------------------------------------------------------------------
 
@@ -241,24 +231,3 @@ class Solution:
         out.attrs["message"] = self.message
         out.attrs.update({f"solver_{k}": v for k, v in self.stats.as_dict().items()})
         return out
-
-
-def _evaluate_span(solution: Solution, span: slice, idata, rdata, indptr, indices, slots, n) -> None:
-    """Fill poses, accelerations, multipliers, loads and reactions for the outputs of one epoch."""
-    work = np.zeros(solution.problem.work_size)
-    none = np.zeros((1, 2), dtype=np.int64)
-    rhs, vals = np.zeros(n), np.zeros(indices.size)
-    bodies, rows = solution._acc.shape[1], solution._lam.shape[1]
-    phi = np.zeros(3 * rows)
-    multipliers = np.zeros((2, max(rows, 1)))
-    for k in range(span.start, span.stop):
-        t, y = float(solution.t[k]), solution.result.y[k]
-        vals[:] = 0.0
-        index1.saddle(index1.NUMBERS, t, y, none, slots, vals, rhs, phi, solution._loads[k], idata, rdata, work)
-        z = splu(csc_array((vals, indices, indptr), shape=(n, n))).solve(rhs)
-        solution._acc[k] = z[: 6 * bodies].reshape(bodies, 6)
-        solution._lam[k] = z[6 * bodies :]
-        solution._phi[k] = phi.reshape(-1, 3)
-        multipliers[0, :rows], multipliers[1, 0] = z[6 * bodies :], t
-        index1.joint_loads(y, idata, rdata, work, multipliers, solution._force[k], solution._moment[k])
-        index1.pose_record(y, idata, rdata, work, solution._pose[k].reshape(-1))

@@ -1,0 +1,121 @@
+"""Accelerations, multipliers, loads and reactions at all output times, in one compiled pass."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import float64, int64, njit, types
+
+from gearmbs.dae import index1
+from gearmbs.dae.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, PLAN_TYPE, analyse, factor, new_factors, solve
+
+_VEC = float64[::1]
+_MAT = float64[:, ::1]
+_CUBE = float64[:, :, ::1]
+_IVEC = int64[::1]
+
+
+class Records(NamedTuple):
+    """What is evaluated, one row per output time.
+
+    Attributes
+    ----------
+    pose : ndarray, shape (m, 18 bodies)
+        R, A (row-major), v, omega of each moving body.
+    solution : ndarray, shape (m, 6 bodies + rows)
+        Accelerations a, alpha of each body, then the multipliers.
+    loads : ndarray, shape (m, elements, 14)
+        F, N and contact diagnostics.
+    phi : ndarray, shape (m, 3 rows)
+        Phi, its rate and its partial time derivative, row by row.
+    force, moment : ndarray, shape (m, rows, 3)
+        Reaction on I's body at marker I.
+    """
+
+    pose: np.ndarray
+    solution: np.ndarray
+    loads: np.ndarray
+    phi: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+
+
+RECORDS_TYPE = types.NamedTuple((_MAT, _MAT, _CUBE, _MAT, _CUBE, _CUBE), Records)
+
+
+def new_records(m: int, bodies: int, rows: int, elements: int) -> Records:
+    """Return empty records for m output times."""
+    return Records(
+        np.zeros((m, 18 * bodies)),
+        np.zeros((m, 6 * bodies + rows)),
+        np.zeros((m, max(elements, 1), index1.FORCE_RECORD)),
+        np.zeros((m, 3 * rows)),
+        np.zeros((m, rows, 3)),
+        np.zeros((m, rows, 3)),
+    )
+
+
+@njit(
+    int64(int64, int64, _VEC, _MAT, _IVEC, _IVEC, _VEC, _VEC, _VEC, PLAN_TYPE, FACTORS_TYPE, RECORDS_TYPE),
+    cache=True,
+    nogil=True,
+)
+def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, factors, records):
+    """Evaluate output rows from ``first``; return the row where new pivots are needed, or ``last``."""
+    none = np.zeros((1, 2), dtype=np.int64)
+    rows = records.force.shape[1]
+    base = records.solution.shape[1] - rows
+    multipliers = np.zeros((2, max(rows, 1)))
+    rhs = np.zeros(records.solution.shape[1])
+    for k in range(first, last):
+        for c in range(vals.size):
+            vals[c] = 0.0
+        index1.saddle(
+            index1.NUMBERS, t[k], y[k], none, slots, vals, rhs, records.phi[k], records.loads[k], idata, rdata, work
+        )
+        growth = factor(plan, factors, vals)
+        if not growth <= GROWTH_LIMIT:
+            return k
+        solve(plan, factors, rhs, records.solution[k])
+        for r in range(rows):
+            multipliers[0, r] = records.solution[k, base + r]
+        multipliers[1, 0] = t[k]
+        index1.joint_loads(y[k], idata, rdata, work, multipliers, records.force[k], records.moment[k])
+        index1.pose_record(y[k], idata, rdata, work, records.pose[k])
+    return last
+
+
+def evaluate(t, y, epochs, idata, rdata, work_size, records: Records) -> None:
+    """Fill ``records`` for all rows of ``y``; ``epochs`` names the integer tables valid from each row on.
+
+    Raises
+    ------
+    SingularMatrixError
+        If the equations of motion have no unique solution at an output time.
+    """
+    indptr, indices, slots = index1.pattern(idata, rdata, work_size)
+    work, vals = np.zeros(work_size), np.zeros(indices.size)
+    rhs, rows = np.zeros(indptr.size - 1), records.force.shape[1]
+    none = np.zeros((1, 2), dtype=np.int64)
+    bounds = [row for row, _ in epochs] + [t.size]
+    ones = np.ones(indptr.size - 1)
+    y = np.ascontiguousarray(y)
+    plan = factors = None
+    for (first, table), last in zip(epochs, bounds[1:]):
+        table = np.ascontiguousarray(table)
+        stuck = -1
+        while first < last:
+            if plan is None or stuck == first:
+                vals[:] = 0.0
+                scratch = np.zeros(3 * rows)
+                loads = np.zeros_like(records.loads[first])
+                index1.saddle(
+                    index1.NUMBERS, t[first], y[first], none, slots, vals, rhs, scratch, loads, table, rdata, work
+                )
+                plan = analyse(indptr, indices, vals, ones)
+                factors = new_factors(plan)
+            done = evaluate_rows(first, last, t, y, slots, table, rdata, work, vals, plan, factors, records)
+            if done == first and stuck == first:
+                raise ArithmeticError(f"the equations of motion are nearly singular at t = {t[first]:.6g} s")
+            stuck, first = done, done
