@@ -22,6 +22,28 @@ Ref = int | str
 """An ADAMS id or a name."""
 
 
+DIMENSIONS = {
+    "number": (0, 0, 0, 0),
+    "angle": (0, 0, 0, 0),
+    "time": (0, 0, 1, 0),
+    "rate": (0, 0, -1, 0),
+    "mass": (1, 0, 0, 0),
+    "inertia": (1, 2, 0, 0),
+    "length": (0, 1, 0, 0),
+    "velocity": (0, 1, -1, 0),
+    "acceleration": (0, 1, -2, 0),
+    "angular_velocity": (0, 0, -1, 0),
+    "angular_acceleration": (0, 0, -2, 0),
+    "force": (0, 0, 0, 1),
+    "torque": (0, 1, 0, 1),
+    "stiffness": (0, -1, 0, 1),
+    "damping": (0, -1, 1, 1),
+    "rotational_stiffness": (0, 1, 0, 1),
+    "rotational_damping": (0, 1, 1, 1),
+}
+"""Exponents of mass, length, time and force (angles are numbers)."""
+
+
 @dataclass(frozen=True)
 class Number:
     """A literal; ``integer`` when it can stand for an id."""
@@ -87,23 +109,11 @@ class Units:
     mass: float = 1.0
 
     def factor(self, dimension: str) -> float:
-        """Return the SI value of one unit of ``dimension``."""
-        factors = {
-            "number": 1.0,
-            "angle": 1.0,
-            "time": self.time,
-            "length": self.length,
-            "velocity": self.length / self.time,
-            "acceleration": self.length / self.time**2,
-            "rate": 1.0 / self.time,
-            "angular_velocity": 1.0 / self.time,
-            "angular_acceleration": 1.0 / self.time**2,
-            "force": self.force,
-            "torque": self.force * self.length,
-        }
-        if dimension not in factors:
-            raise ValueError(f"dimension {dimension!r} is not one of {', '.join(factors)}")
-        return factors[dimension]
+        """Return the SI value of one unit of ``dimension``, a key of ``DIMENSIONS``."""
+        if dimension not in DIMENSIONS:
+            raise ValueError(f"dimension {dimension!r} is not one of {', '.join(DIMENSIONS)}")
+        mass, length, time, force = DIMENSIONS[dimension]
+        return self.mass**mass * self.length**length * self.time**time * self.force**force
 
 
 @dataclass(frozen=True)
@@ -163,7 +173,7 @@ class _Parser:
                 if not text[at:].strip():
                     break
                 at += len(text[at:]) - len(text[at:].lstrip())
-                self.fail(f"unexpected character {text[at]!r}", at)
+                raise self.error(f"unexpected character {text[at]!r}", at)
             kind = match.lastgroup if match.lastgroup != "degree" else "number"
             self.tokens.append((str(kind), match.group(str(kind)), match.start(str(kind)), bool(match.group("degree"))))
             at = match.end()
@@ -171,8 +181,8 @@ class _Parser:
         self.next = 0
         self.depth = 0
 
-    def fail(self, message: str, at: int) -> None:
-        raise ExpressionError(f"{message} at column {at + 1} of {shown(self.text)}")
+    def error(self, message: str, at: int) -> ExpressionError:
+        return ExpressionError(f"{message} at column {at + 1} of {shown(self.text)}")
 
     def accept(self, *symbols: str) -> str | None:
         kind, value, _, _ = self.tokens[self.next]
@@ -185,18 +195,18 @@ class _Parser:
         if self.accept(symbol) is None:
             kind, value, at, _ = self.tokens[self.next]
             found = "the end" if kind == "end" else repr(value)
-            self.fail(f"expected {symbol!r} {where}, found {found}", at)
+            raise self.error(f"expected {symbol!r} {where}, found {found}", at)
 
     def enter(self, at: int) -> None:
         self.depth += 1
         if self.depth > MAX_DEPTH:
-            self.fail(f"nested deeper than {MAX_DEPTH}", at)
+            raise self.error(f"nested deeper than {MAX_DEPTH}", at)
 
     def whole(self) -> Node:
         node = self.sum()
         kind, value, at, _ = self.tokens[self.next]
         if kind != "end":
-            self.fail(f"unexpected {value!r} after the expression", at)
+            raise self.error(f"unexpected {value!r} after the expression", at)
         return node
 
     def sum(self) -> Node:
@@ -250,13 +260,12 @@ class _Parser:
             self.expect(")", "to close the bracket")
             return node
         found = "the end" if kind == "end" else repr(value)
-        self.fail(f"expected a number, a function or a bracket, found {found}", at)
-        raise AssertionError
+        raise self.error(f"expected a number, a function or a bracket, found {found}", at)
 
     def number(self, text: str, at: int, degree: bool) -> Number:
         value = float(re.sub("[dD]", "E", text))
         if abs(value) > 1e300:
-            self.fail(f"the number {text} is too large", at)
+            raise self.error(f"the number {text} is too large", at)
         if degree:
             return Number(value * 0.017453292519943295, at)
         return Number(value, at, int(text) if text.isdigit() and len(text) < 19 else None)

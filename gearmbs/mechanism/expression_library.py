@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 
 from gearmbs.dae.expressions import opcodes as op
-from gearmbs.mechanism.expression import Call
+from gearmbs.mechanism.expression import Call, Ref
 from gearmbs.mechanism.expression_functions import EULER_SEQUENCES, Lowering
 
 Function = Callable[[Lowering, Call], int]
@@ -212,7 +212,7 @@ def _spline(method: str, low: Lowering, call: Call) -> int:
     return low.builder.spline(data, method, order, low.node(call.args[0]), low.node(call.args[1]))
 
 
-def _variable(low: Lowering, call: Call, ref: object = None) -> int:
+def _variable(low: Lowering, call: Call, ref: Ref | None = None) -> int:
     ref = low.ref(call.args[0]) if ref is None else ref
     if ref in low.scope.states:
         return low.builder.algebraic(("variable", ref))

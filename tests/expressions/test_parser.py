@@ -86,7 +86,8 @@ def test_arithmetic_agrees_with_python(text, t):
     assert value == pytest.approx(expected, rel=1e-9, abs=1e-9) or abs(expected) > 1e6
 
 
-WORDS = "DX STEP ( ) , : TIME 1 2.5E3 90D ** * - / + ' .m.p IF IMPACT CUBSPL VARVAL ORIENT JOINT 1E5 \\ é 0 FX D E".split()
+WORDS = """DX STEP ( ) , : TIME 1 2.5E3 90D ** * - / + ' .m.p
+           IF IMPACT CUBSPL VARVAL ORIENT JOINT 1E5 \\ é 0 FX D E""".split()
 
 
 @settings(max_examples=400, deadline=None, derandomize=True)
