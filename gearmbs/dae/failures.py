@@ -1,0 +1,94 @@
+"""Sentences for the modeller about how a run ended."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.result import Status
+
+NAMES_SHOWN = 6
+
+
+def unknown_name(problem: DAEProblem, index: int) -> str:
+    """Return the name of unknown ``index``, or ``y[index]``."""
+    if 0 <= index < len(problem.names):
+        return problem.names[index]
+    return f"y[{index}]"
+
+
+def _list_names(problem: DAEProblem, indices: np.ndarray) -> str:
+    names = [unknown_name(problem, int(i)) for i in indices[:NAMES_SHOWN]]
+    more = len(indices) - len(names)
+    return ", ".join(names) + (f" and {more} more" if more > 0 else "")
+
+
+def singular(problem: DAEProblem, t: float, rows: np.ndarray, cols: np.ndarray) -> str:
+    """Explain a singular Newton matrix by the unknowns that no equation determines."""
+    return (
+        f"{Status.SINGULAR_JACOBIAN.sentence} At t = {t:.9g} nothing determines {_list_names(problem, cols)} "
+        f"(left-over equations: {_list_indices(rows)}). Check for redundant or conflicting constraints, for a part "
+        "without mass or inertia that is free to move, and for an unknown that appears in no equation."
+    )
+
+
+def _list_indices(rows: np.ndarray) -> str:
+    shown = ", ".join(str(int(r)) for r in rows[:NAMES_SHOWN])
+    return shown + (", ..." if len(rows) > NAMES_SHOWN else "")
+
+
+def inconsistent(problem: DAEProblem, t: float, worst: int, row: int, jump: float) -> str:
+    """Explain initial values that do not satisfy the equations."""
+    return (
+        f"{Status.INCONSISTENT_START.sentence} At t = {t:.9g} {unknown_name(problem, worst)} would have to jump by about "
+        f"{jump:.3g} in the first instant; equation {row} is violated most. Make positions and velocities satisfy the "
+        "constraints before the run, or pass check_start=False to let the first step repair them."
+    )
+
+
+def not_finite(problem: DAEProblem, t: float, row: int, what: str = "equation") -> str:
+    """Explain NaN or infinity out of a user's function."""
+    return (
+        f"{Status.NOT_FINITE.sentence} Near t = {t:.9g} {what} {row} is NaN or infinite, and smaller steps did not help. "
+        "Look for a division by zero, the root or logarithm of a negative number, or a table that ends there."
+    )
+
+
+def step_too_small(problem: DAEProblem, t: float, h: float, worst: int, error: float) -> str:
+    """Explain a run that would need steps below HMIN."""
+    return (
+        f"{Status.STEP_TOO_SMALL.sentence} At t = {t:.9g} with h = {h:.3g}; the error is dominated by "
+        f"{unknown_name(problem, worst)} ({error:.3g} times its tolerance). Look for a discontinuity there, loosen its "
+        "tolerance, or lower min_step (HMIN)."
+    )
+
+
+def newton(problem: DAEProblem, t: float, h: float, worst: int) -> str:
+    """Explain a corrector that fails at the smallest step."""
+    return (
+        f"{Status.NEWTON_FAILURE.sentence} At t = {t:.9g} with h = {h:.3g}; the largest correction is in "
+        f"{unknown_name(problem, worst)}. Check the Jacobian if it is your own, look for a discontinuity, or try "
+        "corrector='modified'."
+    )
+
+
+def too_many_rejections(problem: DAEProblem, t: float, h: float, worst: int) -> str:
+    """Explain a step that was refused again and again."""
+    return (
+        f"{Status.TOO_MANY_REJECTIONS.sentence} At t = {t:.9g} with h = {h:.3g}, mostly because of "
+        f"{unknown_name(problem, worst)}. The equations may jump there: use an event or a breakpoint at the jump, or "
+        "loosen the tolerance of that unknown."
+    )
+
+
+def too_many_steps(t: float, steps: int) -> str:
+    """Explain that the limit on steps was reached."""
+    return (
+        f"{Status.TOO_MANY_STEPS.sentence} {steps} steps took the run to t = {t:.9g}. Raise max_steps or loosen the "
+        "tolerance."
+    )
+
+
+def user_error(t: float, error: BaseException) -> str:
+    """Explain an exception out of a user's Python function."""
+    return f"{Status.USER_ERROR.sentence} Near t = {t:.9g}: {type(error).__name__}: {error}"

@@ -1,0 +1,182 @@
+"""The corrector: modified Newton on G(t, y, y'_pred + gamma (y - y_pred)) = 0 with a frozen matrix."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import boolean, float64, int64, njit, types
+
+from gearmbs.dae.problem import RESIDUAL_SIG
+from gearmbs.dae.sparse_lu import FACTORS_TYPE, PLAN_TYPE, solve
+from gearmbs.dae.state import (
+    ATOL,
+    DELTA,
+    GAMMA_J,
+    IS_CONTROLLED,
+    IS_DIFFERENTIAL,
+    IS_TESTED,
+    MAX_ITERATIONS,
+    NEWTON_TOL,
+    RATE,
+    RES,
+    RESIDUALS,
+    RTOL,
+    SOLVES,
+    W_ERROR,
+    W_NEWTON,
+    YP,
+    Y,
+)
+
+CONVERGED = 0
+SLOW = 1
+NOT_FINITE = 2
+
+RATE_LIMIT = 0.9
+RATE_FLOOR = 0.02
+
+_VEC = float64[::1]
+_IVEC = int64[::1]
+_MAT = float64[:, ::1]
+
+
+@njit(float64(_VEC, _VEC), cache=True, nogil=True, fastmath=True)
+def weighted_max(v, weight):
+    """Return max_i |v[i]| weight[i] of finite vectors."""
+    top = 0.0
+    for i in range(v.shape[0]):
+        a = abs(v[i]) * weight[i]
+        top = max(top, a)
+    return top
+
+
+@njit(int64(_VEC, _VEC), cache=True, nogil=True)
+def weighted_argmax(v, weight):
+    """Return the index of the largest |v[i]| weight[i]."""
+    top = -1.0
+    where = 0
+    for i in range(v.shape[0]):
+        a = abs(v[i]) * weight[i]
+        if a > top:
+            top = a
+            where = i
+    return where
+
+
+@njit(boolean(_VEC), cache=True, nogil=True)
+def all_finite(v):
+    """Return whether every entry is finite."""
+    # 0 * x is 0 for finite x and NaN otherwise
+    s0 = 0.0
+    s1 = 0.0
+    s2 = 0.0
+    s3 = 0.0
+    n = v.shape[0]
+    m = n - n % 4
+    for i in range(0, m, 4):
+        s0 += 0.0 * v[i]
+        s1 += 0.0 * v[i + 1]
+        s2 += 0.0 * v[i + 2]
+        s3 += 0.0 * v[i + 3]
+    for i in range(m, n):
+        s0 += 0.0 * v[i]
+    return s0 + s1 + s2 + s3 == 0.0
+
+
+@njit(int64(_VEC), cache=True, nogil=True)
+def first_not_finite(v):
+    """Return the index of the first entry that is not finite, or -1."""
+    for i in range(v.shape[0]):
+        if not np.isfinite(v[i]):
+            return i
+    return -1
+
+
+@njit(types.void(_VEC, _VEC, _MAT), cache=True, nogil=True)
+def set_weights(real, y, vec):
+    """Set the weights of the error test and of the corrector test from tolerances at ``y``."""
+    rtol = real[RTOL]
+    atol = vec[ATOL]
+    w_error = vec[W_ERROR]
+    w_newton = vec[W_NEWTON]
+    controlled = vec[IS_CONTROLLED]
+    tested = vec[IS_TESTED]
+    for i in range(y.shape[0]):
+        w = 1.0 / (atol[i] + rtol * abs(y[i]))
+        w_error[i] = controlled[i] * w
+        w_newton[i] = tested[i] * w
+
+
+@njit(
+    int64(
+        types.FunctionType(RESIDUAL_SIG),
+        float64,
+        float64,
+        _MAT,
+        _VEC,
+        _IVEC,
+        PLAN_TYPE,
+        FACTORS_TYPE,
+        _IVEC,
+        _VEC,
+        _VEC,
+    ),
+    cache=True,
+    nogil=True,
+)
+def correct(residual, t, gamma, vec, real, count, plan, factors, idata, rdata, work):
+    """Iterate from the prediction in rows Y and YP of ``vec`` until the corrector test is passed.
+
+    Differential unknowns are corrected by 2/(1 + gamma/gamma_J) of the Newton step when the matrix was made for
+    another leading coefficient gamma_J; algebraic ones do not depend on gamma and take the whole step.
+
+    Returns
+    -------
+    code : int
+        CONVERGED, SLOW or NOT_FINITE.
+    """
+    y = vec[Y]
+    yp = vec[YP]
+    res = vec[RES]
+    delta = vec[DELTA]
+    weight = vec[W_NEWTON]
+    differential = vec[IS_DIFFERENTIAL]
+    n = y.shape[0]
+    damp = 2.0 / (1.0 + gamma / real[GAMMA_J]) - 1.0
+    limit = real[NEWTON_TOL]
+    previous = 0.0
+    iterations = count[MAX_ITERATIONS]
+    for m in range(iterations):
+        residual(t, y, yp, res, idata, rdata, work)
+        solve(plan, factors, res, delta)
+        count[RESIDUALS] += 1
+        count[SOLVES] += 1
+        if not all_finite(delta):
+            return NOT_FINITE
+        if damp != 0.0:
+            for i in range(n):
+                d = delta[i] * (1.0 + damp * differential[i])
+                delta[i] = d
+                y[i] -= d
+                yp[i] -= gamma * d
+        else:
+            for i in range(n):
+                d = delta[i]
+                y[i] -= d
+                yp[i] -= gamma * d
+        norm = weighted_max(delta, weight)
+        if m > 0:
+            rate = norm / previous if previous > 0.0 else 0.0
+            if rate > RATE_LIMIT:
+                real[RATE] = 1.0
+                return SLOW
+            real[RATE] = max(rate, 0.3 * real[RATE])
+        trust = max(real[RATE], RATE_FLOOR)
+        if trust < 1.0 and norm * trust <= limit * (1.0 - trust):
+            return CONVERGED
+        if m > 0:
+            # would the iterations left suffice at this rate?
+            rest = norm * trust / (1.0 - trust) if trust < 1.0 else norm
+            if rest * trust ** (iterations - 1 - m) > limit:
+                return SLOW
+        previous = norm
+    return SLOW
