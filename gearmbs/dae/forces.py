@@ -10,7 +10,7 @@ from numba import njit
 
 from gearmbs.contact import gear_contact
 from gearmbs.dae import tables as T
-from gearmbs.dae import timefunctions
+from gearmbs.dae import tapes
 from gearmbs.dae.rotation import KIN_R, KIN_V, KIN_W
 from gearmbs.dae.terms import cross3
 
@@ -107,7 +107,7 @@ def element_wrench(row, t, y, tab, wrench, jac, diag, want_jac):
     if kind == TORQUE:
         fun = row[T.FORCE_FUNCTION]
         rm = row[T.FORCE_RM]
-        f, _, _ = timefunctions.evaluate(tab.function[fun, 0], tab.function_r, tab.function[fun, 1], t)
+        f = tab.fval[fun, 0]
         z = T.MK_AXES + 6
         for c in range(3):
             wrench[3 + c] = f * tab.frame[rm, z + c]
@@ -122,3 +122,5 @@ def element_wrench(row, t, y, tab, wrench, jac, diag, want_jac):
         if want_jac != 0:
             shift_to_body(row[T.FORCE_I], tab.marker_body, tab.kin, tab.frame, jac, 0)
             shift_to_body(row[T.FORCE_J], tab.marker_body, tab.kin, tab.frame, jac, 12)
+    else:
+        tapes.load(row, t, y, tab, wrench, jac, want_jac)

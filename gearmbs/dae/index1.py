@@ -13,11 +13,11 @@ import numpy as np
 from numba import njit
 
 from gearmbs.dae import tables as T
-from gearmbs.dae import terms, timefunctions
+from gearmbs.dae import tapes, terms
 from gearmbs.dae.forces import element_wrench
-from gearmbs.dae.kinematics import inertia_times, update_bodies, update_markers
+from gearmbs.dae.kinematics import inertia_times, update_bodies, update_tables
 from gearmbs.dae.residual import S_DIAG, S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR, S_WRENCH, arm_to
-from gearmbs.dae.rotation import KIN_A, KIN_H, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.rotation import KIN_A, KIN_ADOT, KIN_H, KIN_R, KIN_V, KIN_W, momentum_from_conjugate
 
 NUMBERS, PLACES, COUNT = 0, 1, 2
 
@@ -49,6 +49,40 @@ def apply_load(b, sign, row, wrench, tab, rhs):
         rhs[k + 3 + c] += sign * (s[3 + c] + wrench[3 + c])
 
 
+@njit(cache=True)
+def tape_row_rates(k, t, y, idata, tab, room):
+    """Return value, rate, partial time derivative and quadratic part of a row given by tape k.
+
+    ``room`` receives the spatial gradient, six entries a body.
+    """
+    row = tab.tape[k]
+    bodies = row[T.TAPE_N_BODIES]
+    n = 6 * bodies + 1
+    grad, hess = room[0:n], room[n:]
+    value = tapes.second(k, t, y, tab, grad, hess)
+    partial = grad[n - 1]
+    rate, gamma = partial, hess[n * n - 1]
+    for i in range(n - 1):
+        b = tab.extra_i[row[T.TAPE_BODIES] + i // 6]
+        speed = y[(idata[T.H_EPS] if i % 6 >= 3 else idata[T.H_U]) + 3 * (b - 1) + i % 3]
+        rate += grad[i] * speed
+        gamma += 2.0 * hess[i * n + n - 1] * speed
+        for j in range(n - 1):
+            b2 = tab.extra_i[row[T.TAPE_BODIES] + j // 6]
+            gamma += (
+                speed * hess[i * n + j] * y[(idata[T.H_EPS] if j % 6 >= 3 else idata[T.H_U]) + 3 * (b2 - 1) + j % 3]
+            )
+    for p in range(bodies):
+        b = tab.extra_i[row[T.TAPE_BODIES] + p]
+        kin = tab.kin[b]
+        # Phi_pi from Phi_theta_k = a_k . Phi_pi; omega' = sum a_k eps_k' + adot_k eps_k
+        momentum_from_conjugate(tab.kin, b, grad, 6 * p + 3, grad, 6 * p + 3)
+        for m in range(3):
+            eps = y[idata[T.H_EPS] + 3 * (b - 1) + m]
+            gamma -= eps * terms.dot3(kin, KIN_ADOT + 3 * m, grad, 6 * p + 3)
+    return value, rate, partial, gamma
+
+
 @njit(
     "int64(int64, float64, float64[::1], int64[:, ::1], int64[::1], float64[::1], float64[::1], float64[::1], "
     "float64[:, ::1], int64[::1], float64[::1], float64[::1])",
@@ -61,8 +95,7 @@ def saddle(mode, t, y, places, slot, vals, rhs, phi, loads, idata, rdata, work):
     ``loads[f]`` receives F, N and the diagnostics of force element f.
     """
     tab = T.unpack(idata, rdata, work)
-    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
-    update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+    update_tables(t, y, idata, tab)
     bodies, rows = idata[T.H_BODIES], idata[T.H_ROWS]
     base = 6 * (bodies - 1)
     s = tab.scratch[S_TERM : S_TERM + 100]
@@ -88,16 +121,14 @@ def saddle(mode, t, y, places, slot, vals, rhs, phi, loads, idata, rdata, work):
         value, rate, partial, gamma = 0.0, 0.0, 0.0, 0.0
         if tab.row[r, T.ROW_FUNCTION] >= 0:
             fun = tab.row[r, T.ROW_FUNCTION]
-            f, f1, f2 = timefunctions.evaluate(tab.function[fun, 0], tab.function_r, tab.function[fun, 1], t)
+            f, f1, f2 = tab.fval[fun, 0], tab.fval[fun, 1], tab.fval[fun, 2]
             value, rate, partial, gamma = -f, -f1, -f1, -f2
         for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
             coef = tab.coef[j]
             p, p_t = terms.gradient(
                 j,
-                t,
                 tab.term,
-                tab.function,
-                tab.function_r,
+                tab.fval,
                 tab.reference,
                 tab.marker_body,
                 tab.kin,
@@ -109,9 +140,7 @@ def saddle(mode, t, y, places, slot, vals, rhs, phi, loads, idata, rdata, work):
             value += coef * p
             rate += coef * p_t
             partial += coef * p_t
-            gamma += coef * terms.quadratic_part(
-                j, t, tab.term, tab.function, tab.function_r, tab.marker_body, tab.kin, tab.frame, s
-            )
+            gamma += coef * terms.quadratic_part(j, tab.term, tab.fval, tab.marker_body, tab.kin, tab.frame, s)
             for side in range(2):
                 b = tab.marker_body[tab.term[j, T.TERM_I + side]]
                 if b == 0:
@@ -122,6 +151,20 @@ def saddle(mode, t, y, places, slot, vals, rhs, phi, loads, idata, rdata, work):
                 for c in range(6):
                     k = put(mode, places, slot, vals, k, base + r, q + c, coef * g[h + c])
                     k = put(mode, places, slot, vals, k, q + c, base + r, coef * g[h + c])
+        if tab.row[r, T.ROW_TAPE] >= 0:
+            tape = tab.tape[tab.row[r, T.ROW_TAPE]]
+            n = 6 * tape[T.TAPE_N_BODIES] + 1
+            room = tapes.tail(tab, n * (n + 1))
+            v, d, p, q2 = tape_row_rates(tab.row[r, T.ROW_TAPE], t, y, idata, tab, room)
+            value += v
+            rate += d
+            partial += p
+            gamma += q2
+            for b in range(tape[T.TAPE_N_BODIES]):
+                q = 6 * (tab.extra_i[tape[T.TAPE_BODIES] + b] - 1)
+                for c in range(6):
+                    k = put(mode, places, slot, vals, k, base + r, q + c, room[6 * b + c])
+                    k = put(mode, places, slot, vals, k, q + c, base + r, room[6 * b + c])
         rhs[base + r] = -gamma
         phi[3 * r], phi[3 * r + 1], phi[3 * r + 2] = value, rate, partial
     if mode == NUMBERS:
@@ -150,7 +193,8 @@ def saddle(mode, t, y, places, slot, vals, rhs, phi, loads, idata, rdata, work):
 def joint_loads(y, idata, rdata, work, multipliers, force, moment):
     """Reaction of each constraint row on I's body: force, and moment about the origin of marker I, global.
 
-    The kinematics tables must be up to date; ``multipliers[0]`` holds lambda.
+    The kinematics tables must be up to date; ``multipliers[0]`` holds lambda. Of a row that couples several
+    joints, the part that acts through the first one's marker I.
     """
     tab = T.unpack(idata, rdata, work)
     g = tab.scratch[S_GRADIENT : S_GRADIENT + 12]
@@ -161,28 +205,18 @@ def joint_loads(y, idata, rdata, work, multipliers, force, moment):
             force[r, c] = 0.0
             moment[r, c] = 0.0
         lam = multipliers[0, r]
-        j = tab.row[r, T.ROW_FIRST]
-        terms.gradient(
-            j,
-            multipliers[1, 0],
-            tab.term,
-            tab.function,
-            tab.function_r,
-            tab.reference,
-            tab.marker_body,
-            tab.kin,
-            tab.frame,
-            s,
-            g,
-            gt,
-        )
-        coef = tab.coef[j]
-        arm = tab.frame[tab.term[j, T.TERM_I]]
-        for c in range(3):
-            force[r, c] = -lam * coef * g[c]
-        terms.cross3(arm, T.MK_ARM, force[r], 0, s, 0)
-        for c in range(3):
-            moment[r, c] = -lam * coef * g[3 + c] - s[c]
+        first, last = tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]
+        for j in range(first, last):
+            if tab.term[j, T.TERM_I] != tab.term[first, T.TERM_I]:
+                continue
+            terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
+            factor = -lam * tab.coef[j]
+            for c in range(3):
+                s[c] = factor * g[c]
+                force[r, c] += s[c]
+            terms.cross3(tab.frame[tab.term[j, T.TERM_I]], T.MK_ARM, s, 0, s, 3)
+            for c in range(3):
+                moment[r, c] += factor * g[3 + c] - s[3 + c]
 
 
 @njit("void(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1])", cache=True)

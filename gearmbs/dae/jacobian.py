@@ -10,9 +10,9 @@ import numpy as np
 from numba import njit
 
 from gearmbs.dae import tables as T
-from gearmbs.dae import terms
+from gearmbs.dae import tapes, terms
 from gearmbs.dae.forces import element_wrench
-from gearmbs.dae.kinematics import euler_component, inertia_times, update_bodies, update_markers
+from gearmbs.dae.kinematics import euler_component, inertia_times, update_tables
 from gearmbs.dae.problem import JACOBIAN_SIG
 from gearmbs.dae.residual import (
     S_DIAG,
@@ -117,10 +117,8 @@ def row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
     w = tab.scratch[S_VECTOR : S_VECTOR + 12]
     for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
         coef = tab.coef[j]
-        terms.gradient(
-            j, t, tab.term, tab.function, tab.function_r, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt
-        )
-        terms.hessian(j, t, tab.term, tab.function, tab.function_r, tab.marker_body, tab.kin, tab.frame, hess, s)
+        terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
+        terms.hessian(j, tab.term, tab.fval, tab.marker_body, tab.kin, tab.frame, hess, s)
         kind = tab.term[j, T.TERM_TYPE]
         for side in range(2):
             b = tab.marker_body[tab.term[j, T.TERM_I + side]]
@@ -179,6 +177,96 @@ def row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
                         value += euler_component(tab.kin[b], m, gt, 6 * (bm // 2) + 3)
                     k = put(mode, places, slot, vals, k, mu, position + m, coef * value)
     return k
+
+
+@njit(cache=True)
+def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
+    """Entries of a constraint row given by an expression."""
+    form = idata[T.H_FORMULATION]
+    lam, mu = idata[T.H_LAMBDA] + r, idata[T.H_MU] + r
+    lam_value = yp[lam] if form == T.SI1 else y[lam]
+    factor = cj if form == T.SI1 else 1.0
+    mu_value = 0.0
+    if form != T.I3:
+        mu_value = yp[mu] if form == T.SI1 else y[mu]
+    tape = tab.row[r, T.ROW_TAPE]
+    bodies = tab.tape[tape, T.TAPE_N_BODIES]
+    first = tab.tape[tape, T.TAPE_BODIES]
+    n = 6 * bodies + 1
+    room = tapes.tail(tab, n * (n + 1))
+    grad, hess = room[0:n], room[n:]
+    tapes.second(tape, t, y, tab, grad, hess)
+    for i in range(n - 1):
+        q = 3 * (tab.extra_i[first + i // 6] - 1) + i % 3
+        turn = i % 6 >= 3
+        position = (idata[T.H_THETA] if turn else idata[T.H_R]) + q
+        speed = (idata[T.H_EPS] if turn else idata[T.H_U]) + q
+        force = (idata[T.H_P] if turn else idata[T.H_U]) + q
+        k = put(mode, places, slot, vals, k, lam, position, grad[i])
+        k = put(mode, places, slot, vals, k, force, lam, factor * grad[i])
+        rate = hess[i * n + n - 1]
+        for j in range(n - 1):
+            q2 = 3 * (tab.extra_i[first + j // 6] - 1) + j % 3
+            turn2 = j % 6 >= 3
+            other = (idata[T.H_THETA] if turn2 else idata[T.H_R]) + q2
+            rate += hess[i * n + j] * y[(idata[T.H_EPS] if turn2 else idata[T.H_U]) + q2]
+            k = put(mode, places, slot, vals, k, force, other, lam_value * hess[i * n + j])
+            if form != T.I3:
+                k = put(mode, places, slot, vals, k, position, other, -mu_value * hess[i * n + j])
+        if form != T.I3:
+            k = put(mode, places, slot, vals, k, position, mu, -factor * grad[i])
+            k = put(mode, places, slot, vals, k, mu, speed, grad[i])
+            k = put(mode, places, slot, vals, k, mu, position, rate)
+    return k
+
+
+@njit(cache=True)
+def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, idata, tab, places, slot, vals, k):
+    """Entries of one row from the spatial gradient ``d`` over a list of bodies, then of unknowns."""
+    for q in range(bodies):
+        b = tab.extra_i[first + q]
+        if b == 0:
+            continue
+        kin = tab.kin[b]
+        i, col = 3 * (b - 1), 12 * q
+        for m in range(3):
+            turn = euler_component(kin, m, d, col + 3) + terms.dot3(kin, KIN_DW + 3 * m, d, col + 9)
+            spin = euler_component(kin, m, d, col + 9)
+            k = put(mode, places, slot, vals, k, base, idata[T.H_R] + i + m, sign * d[col + m])
+            k = put(mode, places, slot, vals, k, base, idata[T.H_THETA] + i + m, sign * turn)
+            k = put(mode, places, slot, vals, k, base, idata[T.H_U] + i + m, sign * d[col + 6 + m])
+            k = put(mode, places, slot, vals, k, base, idata[T.H_EPS] + i + m, sign * spin)
+    for q in range(unknowns):
+        k = put(mode, places, slot, vals, k, base, tab.extra_i[after + q], sign * d[12 * bodies + q])
+    return k
+
+
+@njit(cache=True)
+def state_entries(mode, t, s, y, cj, idata, tab, places, slot, vals, k):
+    """Entries of the equation of one user-defined state."""
+    z = idata[T.H_Z] + s
+    k = put(mode, places, slot, vals, k, z, z, cj if tab.state[s, T.STATE_KIND] == T.STATE_DIFFERENTIAL else 1.0)
+    tape = tab.state[s, T.STATE_TAPE]
+    row = tab.tape[tape]
+    grad = tapes.tail(tab, tapes.gradient_size(row))
+    tapes.gradient(tape, t, y, tab, grad)
+    bodies, first = row[T.TAPE_N_BODIES], row[T.TAPE_BODIES]
+    return chain_entries(
+        mode,
+        z,
+        grad,
+        -1.0,
+        bodies,
+        first,
+        row[T.TAPE_N_UNKNOWNS],
+        first + bodies,
+        idata,
+        tab,
+        places,
+        slot,
+        vals,
+        k,
+    )
 
 
 @njit(cache=True)
@@ -257,31 +345,22 @@ def element_entries(mode, t, row, y, idata, tab, places, slot, vals, k):
             continue
         for c in range(3):
             k = put(mode, places, slot, vals, k, base + c, base + c, 1.0)
-            d = jac[3 * block + c]
-            for q in range(bodies):
-                b = tab.extra_i[depends + 1 + q]
-                if b == 0:
-                    continue
-                kin = tab.kin[b]
-                i, col = 3 * (b - 1), 12 * q
-                for m in range(3):
-                    turn = euler_component(kin, m, d, col + 3) + terms.dot3(kin, KIN_DW + 3 * m, d, col + 9)
-                    k = put(mode, places, slot, vals, k, base + c, idata[T.H_R] + i + m, -d[col + m])
-                    k = put(mode, places, slot, vals, k, base + c, idata[T.H_THETA] + i + m, -turn)
-                    k = put(mode, places, slot, vals, k, base + c, idata[T.H_U] + i + m, -d[col + 6 + m])
-                    k = put(
-                        mode,
-                        places,
-                        slot,
-                        vals,
-                        k,
-                        base + c,
-                        idata[T.H_EPS] + i + m,
-                        -euler_component(kin, m, d, col + 9),
-                    )
-            for q in range(unknowns):
-                col = tab.extra_i[depends + 2 + bodies + q]
-                k = put(mode, places, slot, vals, k, base + c, col, -d[12 * bodies + q])
+            k = chain_entries(
+                mode,
+                base + c,
+                jac[3 * block + c],
+                -1.0,
+                bodies,
+                depends + 1,
+                unknowns,
+                depends + 2 + bodies,
+                idata,
+                tab,
+                places,
+                slot,
+                vals,
+                k,
+            )
     return k
 
 
@@ -293,8 +372,7 @@ def element_entries(mode, t, row, y, idata, tab, places, slot, vals, k):
 def walk(mode, t, y, yp, cj, places, vals, idata, rdata, work):
     """Go through all entries; return their number."""
     tab = T.unpack(idata, rdata, work)
-    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
-    update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+    update_tables(t, y, idata, tab)
     slot = tab.slot
     k = 0
     for b in range(1, idata[T.H_BODIES]):
@@ -303,11 +381,15 @@ def walk(mode, t, y, yp, cj, places, vals, idata, rdata, work):
         k = body_entries(mode, b, cj, idata, tab, places, slot, vals, k)
     for r in range(idata[T.H_ROWS]):
         k = row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k)
+        if tab.row[r, T.ROW_TAPE] >= 0:
+            k = tape_row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k)
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]
         k = load_entries(mode, tab.marker_body[row[T.FORCE_I]], 1.0, row, y, idata, tab, places, slot, vals, k)
         k = load_entries(mode, tab.marker_body[row[T.FORCE_J]], -1.0, row, y, idata, tab, places, slot, vals, k)
         k = element_entries(mode, t, row, y, idata, tab, places, slot, vals, k)
+    for s in range(idata[T.H_STATES]):
+        k = state_entries(mode, t, s, y, cj, idata, tab, places, slot, vals, k)
     return k
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from numba import njit
 
 from gearmbs.dae import tables as T
+from gearmbs.dae import timefunctions
+from gearmbs.dae.expressions import eval_time
 from gearmbs.dae.rotation import (
     KIN_A,
     KIN_AXES,
@@ -70,6 +72,34 @@ def update_markers(marker_body, marker, kin, frame):
                 frame[m, T.MK_AXES + 3 * axis + c] = (
                     row[a] * marker[m, 3 + axis] + row[a + 1] * marker[m, 6 + axis] + row[a + 2] * marker[m, 9 + axis]
                 )
+
+
+@njit(cache=True)
+def update_functions(t, tab):
+    """Evaluate every function of time with two derivatives into the function table."""
+    for k in range(tab.function.shape[0]):
+        kind, at = tab.function[k, T.FUNCTION_KIND], tab.function[k, T.FUNCTION_OFFSET]
+        if kind == timefunctions.TAPE:
+            row = tab.tape[at]
+            i, r = row[T.TAPE_I], row[T.TAPE_R]
+            eval_time(
+                tab.extra_i[i : i + row[T.TAPE_I_SIZE]],
+                tab.extra_r[r : r + row[T.TAPE_R_SIZE]],
+                t,
+                tab.fval[k],
+                tab.tape_work,
+            )
+        else:
+            f, f1, f2 = timefunctions.evaluate(kind, tab.function_r, at, t)
+            tab.fval[k, 0], tab.fval[k, 1], tab.fval[k, 2] = f, f1, f2
+
+
+@njit(cache=True)
+def update_tables(t, y, idata, tab):
+    """Bring bodies, markers and functions of time up to date with t and y."""
+    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
+    update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+    update_functions(t, tab)
 
 
 @njit(cache=True)

@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from gearmbs.dae import tables as T
+from gearmbs.dae import tapes
 from gearmbs.dae.kinematics import update_bodies, update_markers
 from gearmbs.dae.problem import HOOK_SIG
 from gearmbs.dae.rotation import (
@@ -46,9 +47,12 @@ def rewrite_point(y, b, old, new, idata, kin, s):
 
 
 @njit(cache=True)
-def track_angles(y, idata, tab):
+def track_angles(t, y, idata, tab):
     """Move the reference of each counted angle to its present value."""
     any_angle = False
+    for k in range(tab.tape.shape[0]):
+        if tab.tape[k, T.TAPE_REFERENCE_SIZE] > 0:
+            any_angle = True
     for k in range(tab.term.shape[0]):
         if tab.term[k, T.TERM_TYPE] == ANGLE:
             any_angle = True
@@ -56,6 +60,7 @@ def track_angles(y, idata, tab):
         return
     update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
     update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+    tapes.update_references(t, y, tab)
     for k in range(tab.term.shape[0]):
         if tab.term[k, T.TERM_TYPE] == ANGLE:
             fi, fj = tab.frame[tab.term[k, T.TERM_I]], tab.frame[tab.term[k, T.TERM_J]]
@@ -88,5 +93,5 @@ def hook(t, hist, npast, idata, rdata, work):
                     turns = np.round((hist[row, th + k + c] - hist[row - 1, th + k + c]) / (2.0 * np.pi))
                     hist[row, th + k + c] -= 2.0 * np.pi * turns
         tab.code[b] = new
-    track_angles(hist[0], idata, tab)
+    track_angles(t, hist[0], idata, tab)
     return changed

@@ -1,6 +1,6 @@
 """The residual G(t, y, y') of eq. (5)-(9), for the formulations I3, SI2 and SI1.
 
-With y = [u, p, eps, R, theta, lambda, F, N, mu] the rows are, in the same order as the unknowns,
+With y = [u, p, eps, R, theta, lambda, F, N, z, mu] the rows are, in the same order as the unknowns,
 
     M u' - m g + Phi_R^T lambda - H_F^T F                     (5), first
     p' - L_theta^T + Phi_theta^T lambda - H_N^T N             (5), second
@@ -9,6 +9,7 @@ With y = [u, p, eps, R, theta, lambda, F, N, mu] the rows are, in the same order
     eps - theta' - Phi_theta^T mu                             (6), second, stabilised
     Phi(q, t)                                                 (7)
     F - F(q, q', t),  N - N(q, q', t)                         definitions of the applied loads
+    z' - f  or  z - f                                         user-defined states, if any
     Phi_q q' + Phi_t   (with q' = [u, eps])                   the derivative of (7)
 
 I3 drops the last block and mu; SI1 puts the derivatives of the unknowns Lambda and Gamma in place of
@@ -20,9 +21,9 @@ from __future__ import annotations
 from numba import njit
 
 from gearmbs.dae import tables as T
-from gearmbs.dae import terms, timefunctions
+from gearmbs.dae import tapes, terms
 from gearmbs.dae.forces import element_wrench
-from gearmbs.dae.kinematics import euler_component, update_bodies, update_markers
+from gearmbs.dae.kinematics import euler_component, update_tables
 from gearmbs.dae.problem import RESIDUAL_SIG
 from gearmbs.dae.rotation import KIN_ADOT, KIN_AXES, KIN_H, KIN_R, KIN_V, KIN_W
 
@@ -40,8 +41,7 @@ S_VECTOR = 320
 def update(t, y, yp, idata, rdata, work):
     """Bring the kinematics and marker tables up to date with y."""
     tab = T.unpack(idata, rdata, work)
-    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
-    update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+    update_tables(t, y, idata, tab)
 
 
 @njit(cache=True)
@@ -75,6 +75,27 @@ def add_load(b, sign, row, y, idata, tab, out):
 
 
 @njit(cache=True)
+def add_tape_row(k, t, lam, mu, y, idata, tab, out):
+    """Add the constraint forces of a row given by tape k; return its value and rate."""
+    row = tab.tape[k]
+    n = 6 * row[T.TAPE_N_BODIES] + 1
+    room = tapes.tail(tab, n * (n + 1))
+    grad, hess = room[0:n], room[n:]
+    value = tapes.second(k, t, y, tab, grad, hess)
+    rate = grad[n - 1]
+    for p in range(row[T.TAPE_N_BODIES]):
+        q = 3 * (tab.extra_i[row[T.TAPE_BODIES] + p] - 1)
+        for c in range(3):
+            along, about = grad[6 * p + c], grad[6 * p + 3 + c]
+            rate += along * y[idata[T.H_U] + q + c] + about * y[idata[T.H_EPS] + q + c]
+            out[idata[T.H_U] + q + c] += lam * along
+            out[idata[T.H_P] + q + c] += lam * about
+            out[idata[T.H_R] + q + c] -= mu * along
+            out[idata[T.H_THETA] + q + c] -= mu * about
+    return value, rate
+
+
+@njit(cache=True)
 def add_constraints(t, y, yp, idata, tab, out):
     """Constraint rows, their derivatives, and the constraint forces of lambda and mu."""
     form = idata[T.H_FORMULATION]
@@ -87,7 +108,7 @@ def add_constraints(t, y, yp, idata, tab, out):
         value, rate = 0.0, 0.0
         if tab.row[r, T.ROW_FUNCTION] >= 0:
             fun = tab.row[r, T.ROW_FUNCTION]
-            f, f1, _ = timefunctions.evaluate(tab.function[fun, 0], tab.function_r, tab.function[fun, 1], t)
+            f, f1 = tab.fval[fun, 0], tab.fval[fun, 1]
             value, rate = -f, -f1
         lam = yp[lam0 + r] if form == T.SI1 else y[lam0 + r]
         mu = 0.0
@@ -99,10 +120,8 @@ def add_constraints(t, y, yp, idata, tab, out):
             coef = tab.coef[k]
             phi, phi_t = terms.gradient(
                 k,
-                t,
                 tab.term,
-                tab.function,
-                tab.function_r,
+                tab.fval,
                 tab.reference,
                 tab.marker_body,
                 tab.kin,
@@ -126,6 +145,10 @@ def add_constraints(t, y, yp, idata, tab, out):
                     out[p0 + q + c] += lam * angle
                     out[r0 + q + c] -= coef * mu * g[h + c]
                     out[t0 + q + c] -= mu * angle
+        if tab.row[r, T.ROW_TAPE] >= 0:
+            v, d = add_tape_row(tab.row[r, T.ROW_TAPE], t, lam, mu, y, idata, tab, out)
+            value += v
+            rate += d
         out[lam0 + r] = value
         if form != T.I3:
             out[mu0 + r] = rate
@@ -135,8 +158,7 @@ def add_constraints(t, y, yp, idata, tab, out):
 def residual(t, y, yp, out, idata, rdata, work):
     """Evaluate G(t, y, y') of eq. (8) into ``out``."""
     tab = T.unpack(idata, rdata, work)
-    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
-    update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+    update_tables(t, y, idata, tab)
     u0, p0, e0, r0, t0 = idata[T.H_U], idata[T.H_P], idata[T.H_EPS], idata[T.H_R], idata[T.H_THETA]
     for b in range(1, idata[T.H_BODIES]):
         k = 3 * (b - 1)
@@ -163,3 +185,7 @@ def residual(t, y, yp, out, idata, rdata, work):
                 out[row[T.FORCE_N] + c] = y[row[T.FORCE_N] + c] - wrench[3 + c]
         add_load(tab.marker_body[row[T.FORCE_I]], 1.0, row, y, idata, tab, out)
         add_load(tab.marker_body[row[T.FORCE_J]], -1.0, row, y, idata, tab, out)
+    for k in range(idata[T.H_STATES]):
+        z = idata[T.H_Z] + k
+        left = yp[z] if tab.state[k, T.STATE_KIND] == T.STATE_DIFFERENTIAL else y[z]
+        out[z] = left - tapes.value(tab.state[k, T.STATE_TAPE], t, y, tab)

@@ -38,6 +38,7 @@ BLOCKS = {
     "lambda": ("multiplier of the constraint", "(5), (7)", "N or N m"),
     "F": ("applied force", "(5)", "N"),
     "N": ("applied torque", "(5)", "N m"),
+    "z": ("user-defined state", "-", "-"),
     "mu": ("multiplier of the stabilisation", "(6), stabilised", "-"),
 }
 
@@ -120,6 +121,8 @@ class System:
         self.row_names = row_names
         self.force_names = force_names
         self.row_index = list(range(len(row_names)))
+        self.state_names: list[str] = []
+        self.state_start = np.zeros(0)
         self.t0 = t0
         self.report: initial.InitialReport | None = None
 
@@ -159,6 +162,7 @@ class System:
         idata, rdata, size = self.builder.pack(T.I3)
         work = np.zeros(size)
         y = np.zeros(int(idata[T.H_UNKNOWNS]))
+        y[int(idata[T.H_Z]) : int(idata[T.H_Z]) + self.state_start.size] = self.state_start
         state_from_pose(np.ascontiguousarray(pose), idata, rdata, work, y)
         plan = self._index1_plan(idata, rdata, size)
         indptr, indices, slots = plan
@@ -187,10 +191,10 @@ class System:
         if kept.size == len(self.builder.rows):
             return
         old = self.builder
-        bounds = [first for first, _ in old.rows] + [len(old.terms)]
+        bounds = [row[0] for row in old.rows] + [len(old.terms)]
         rows, terms, coef, reference = [], [], [], []
         for i in kept:
-            rows.append((len(terms), old.rows[i][1]))
+            rows.append((len(terms), *old.rows[i][1:]))
             span = slice(bounds[i], bounds[i + 1])
             terms.extend(old.terms[span])
             coef.extend(old.coef[span])
@@ -272,6 +276,8 @@ class System:
         n = int(idata[T.H_UNKNOWNS])
         y, yp = np.zeros(n), np.zeros(n)
         y[: int(idata[T.H_LAMBDA])] = y_small[: int(idata[T.H_LAMBDA])]
+        z = slice(int(idata[T.H_Z]), int(idata[T.H_Z]) + self.state_start.size)
+        y[z] = self.state_start
         rows = slice(int(idata[T.H_LAMBDA]), int(idata[T.H_LAMBDA]) + len(lam))
         (yp if form == T.SI1 else y)[rows] = lam
         forces = idata[int(idata[T.H_I_FORCE]) : int(idata[T.H_I_FUNCTION])].reshape(-1, T.FORCE_COLUMNS)
@@ -281,6 +287,7 @@ class System:
             if row[T.FORCE_N] >= 0:
                 y[row[T.FORCE_N] : row[T.FORCE_N] + 3] = loads[f, 3:6]
         work = np.zeros(size)
+        self._settle_states(y, yp, z, idata, rdata, work)
         self._rates(y, yp, acc, idata, rdata, work)
         at = self.builder.layout(form)
         differential = np.zeros(n, dtype=bool)
@@ -288,6 +295,9 @@ class System:
         differential[at["R"] : at["lambda"]] = True
         error_mask = np.zeros(n, dtype=bool)
         error_mask[at["R"] : at["lambda"]] = True
+        if self.state_start.size:
+            kinds = np.array([kind for kind, _ in self.builder.states])
+            differential[z] = error_mask[z] = kinds == T.STATE_DIFFERENTIAL
         if form != T.I3:
             error_mask[at["u"] : at["p"]] = True
             error_mask[at["eps"] : at["R"]] = True
@@ -326,6 +336,18 @@ class System:
             return 0.2 / max(float(np.abs(y[rates][1::3]).max(initial=0.0)), 1e-12)
 
         return interval
+
+    def _settle_states(self, y, yp, z, idata, rdata, work) -> None:
+        """Iterate algebraic states to their definitions; set the rates of the differential ones."""
+        out = np.zeros(y.size)
+        algebraic = np.array([kind == T.STATE_ALGEBRAIC for kind, _ in self.builder.states], dtype=bool)
+        for _ in range(100 if algebraic.any() else 1):
+            residual.residual(self.t0, y, yp, out, idata, rdata, work)
+            correction = out[z] * algebraic
+            y[z] -= correction
+            if np.abs(correction).max(initial=0.0) <= 1e-12 * (1.0 + np.abs(y[z]).max(initial=0.0)):
+                break
+        yp[z] -= out[z] * ~algebraic
 
     def _rates(self, y, yp, acc, idata, rdata, work) -> None:
         """Fill y' from the accelerations; p' is what makes its own residual vanish."""
@@ -380,6 +402,8 @@ class System:
                 if force[column]:
                     for part in "xyz":
                         add(block, f"{block}_{part}({name})")
+        for name in self.state_names:
+            add("z", f"z({name})")
         if formulation != "I3":
             for row in self.row_names:
                 add("mu", f"mu({row})")

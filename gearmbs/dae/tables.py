@@ -11,6 +11,8 @@ from collections import namedtuple
 import numpy as np
 from numba import njit
 
+from gearmbs.dae.expressions import Tape
+from gearmbs.dae.expressions import opcodes as op
 from gearmbs.dae.rotation import KIN_COLUMNS
 
 I3 = 0
@@ -58,9 +60,16 @@ H_W_MARKER = 36
 H_W_SCRATCH = 37
 H_WORK = 38
 H_R_REFERENCE = 39
-H_STATES = 40
-H_N_STATES = 41
-H_SIZE = 42
+H_Z = 40
+"""First of the user-defined states z, between N and mu."""
+H_STATES = 41
+H_TAPES = 42
+H_I_STATE = 43
+H_I_TAPE = 44
+H_W_FUNCTION = 45
+H_W_TAPE = 46
+H_W_TAPE_SIZE = 47
+H_SIZE = 48
 
 BODY_MASS = 0
 BODY_INERTIA = 1
@@ -86,7 +95,9 @@ TERM_COLUMNS = 6
 
 ROW_FIRST = 0
 ROW_FUNCTION = 1
-ROW_COLUMNS = 2
+ROW_TAPE = 2
+"""Tape of a general constraint, or -1."""
+ROW_COLUMNS = 3
 
 FORCE_KIND = 0
 FORCE_I = 1
@@ -108,15 +119,36 @@ FORCE_COLUMNS = 12
 
 FUNCTION_KIND = 0
 FUNCTION_OFFSET = 1
+"""Offset of the parameters, or the tape of an expression of time."""
 FUNCTION_COLUMNS = 2
+
+TAPE_I = 0
+TAPE_I_SIZE = 1
+TAPE_R = 2
+TAPE_R_SIZE = 3
+TAPE_REFERENCE = 4
+TAPE_REFERENCE_SIZE = 5
+TAPE_BODIES = 6
+"""Offset in the extra integers of the bodies, then the unknowns, the tape depends on."""
+TAPE_N_BODIES = 7
+TAPE_N_UNKNOWNS = 8
+TAPE_COLUMNS = 9
+
+STATE_KIND = 0
+STATE_TAPE = 1
+STATE_COLUMNS = 2
+STATE_DIFFERENTIAL = 0
+"""z' = f(...)"""
+STATE_ALGEBRAIC = 1
+"""z = f(...)"""
 
 SCRATCH_FIXED = 512
 """Scratch for gradients, Hessians and small vectors; then the widest element's derivatives, then the elements' own."""
 
 Tables = namedtuple(
     "Tables",
-    "code marker_body row term force function extra_i slot "
-    "gravity body marker coef function_r extra_r reference kin frame scratch",
+    "code marker_body row term force function extra_i slot state tape "
+    "gravity body marker coef function_r extra_r reference kin frame fval scratch tape_work",
 )
 
 
@@ -140,6 +172,8 @@ def unpack(idata, rdata, work):
         i[i[H_I_FUNCTION] : i[H_I_FUNCTION] + functions * FUNCTION_COLUMNS].reshape(functions, FUNCTION_COLUMNS),
         i[i[H_I_EXTRA] : i[H_I_EXTRA] + i[H_N_EXTRA_I]],
         i[i[H_I_SLOT] : i[H_I_SLOT] + i[H_SLOTS]],
+        i[i[H_I_STATE] : i[H_I_STATE] + i[H_STATES] * STATE_COLUMNS].reshape(i[H_STATES], STATE_COLUMNS),
+        i[i[H_I_TAPE] : i[H_I_TAPE] + i[H_TAPES] * TAPE_COLUMNS].reshape(i[H_TAPES], TAPE_COLUMNS),
         r[i[H_R_GRAVITY] : i[H_R_GRAVITY] + 3],
         r[i[H_R_BODY] : i[H_R_BODY] + bodies * BODY_COLUMNS].reshape(bodies, BODY_COLUMNS),
         r[i[H_R_MARKER] : i[H_R_MARKER] + markers * MARKER_COLUMNS].reshape(markers, MARKER_COLUMNS),
@@ -149,7 +183,9 @@ def unpack(idata, rdata, work):
         r[i[H_R_REFERENCE] : i[H_R_REFERENCE] + terms],
         work[i[H_W_KIN] : i[H_W_KIN] + bodies * KIN_COLUMNS].reshape(bodies, KIN_COLUMNS),
         work[i[H_W_MARKER] : i[H_W_MARKER] + markers * MK_COLUMNS].reshape(markers, MK_COLUMNS),
+        work[i[H_W_FUNCTION] : i[H_W_FUNCTION] + 3 * functions].reshape(functions, 3),
         work[i[H_W_SCRATCH] :],
+        work[i[H_W_TAPE] : i[H_W_TAPE] + i[H_W_TAPE_SIZE]],
     )
 
 
@@ -165,7 +201,11 @@ class TableBuilder:
         self.codes: list[int] = []
         self.marker_body: list[int] = []
         self.marker_frame: list[np.ndarray] = []
-        self.rows: list[tuple[int, int]] = []
+        self.rows: list[tuple[int, int, int]] = []
+        self.states: list[tuple[int, int]] = []
+        self.tapes: list[Tape] = []
+        self.tape_rows: list[tuple[int, ...]] = []
+        self.tape_work = 0
         self.terms: list[tuple[int, ...]] = []
         self.coef: list[float] = []
         self.reference: list[float] = []
@@ -196,12 +236,40 @@ class TableBuilder:
         self, terms: list[tuple[int, int, int, int, int, float]], function: int = -1, extras: list[int] | None = None
     ) -> int:
         """Add a constraint row: terms of (type, I, J, axes, function, coefficient)."""
-        self.rows.append((len(self.terms), function))
+        self.rows.append((len(self.terms), function, -1))
         for k, (kind, i, j, axes, fun, coefficient) in enumerate(terms):
             self.terms.append((kind, i, j, axes, fun, extras[k] if extras else -1))
             self.coef.append(coefficient)
             self.reference.append(0.0)
         return len(self.rows) - 1
+
+    def add_tape(self, tape: Tape) -> int:
+        """Add an expression whose unknowns are bound to indices of y; return its number."""
+        bodies = len(self.extra_i)
+        unknowns = tape.ints[tape.ints[op.HEAD_ALGEBRAIC_LIST] :][: len(tape.algebraic)]
+        self.extra_i.extend([*tape.bodies, *(int(k) for k in unknowns)])
+        i = len(self.extra_i)
+        self.extra_i.extend(int(v) for v in tape.ints)
+        r = len(self.extra_r)
+        self.extra_r.extend(float(v) for v in tape.floats)
+        reference = len(self.extra_r)
+        self.extra_r.extend([0.0] * tape.n_angles)
+        row = (i, len(tape.ints), r, len(tape.floats), reference, tape.n_angles)
+        self.tape_rows.append((*row, bodies, len(tape.bodies), len(tape.algebraic)))
+        self.tapes.append(tape)
+        second = tape.second_size if tape.second_order else 0
+        self.tape_work = max(self.tape_work, tape.work_size + tape.gradient_size + second * (second + 1) + 16)
+        return len(self.tapes) - 1
+
+    def add_tape_row(self, tape: int) -> int:
+        """Add a constraint row given by an expression that must vanish."""
+        self.rows.append((len(self.terms), -1, tape))
+        return len(self.rows) - 1
+
+    def add_state(self, kind: int, tape: int) -> int:
+        """Add a user-defined state z with z' = f or z = f."""
+        self.states.append((kind, tape))
+        return len(self.states) - 1
 
     def add_extra(self, integers: np.ndarray | list[int], reals: np.ndarray | list[float]) -> tuple[int, int]:
         """Append a force element's own tables; return their offsets and lengths are stored in front."""
@@ -249,7 +317,8 @@ class TableBuilder:
         at = {"u": 0, "p": n3, "eps": 2 * n3, "R": 3 * n3, "theta": 4 * n3, "lambda": 5 * n3}
         at["F"] = 5 * n3 + m
         at["N"] = at["F"] + n_f
-        at["mu"] = at["N"] + n_n
+        at["z"] = at["N"] + n_n
+        at["mu"] = at["z"] + len(self.states)
         at["n"] = at["mu"] + (0 if formulation == I3 else m)
         return at
 
@@ -276,7 +345,7 @@ class TableBuilder:
             need = row[FORCE_WORK]
             row[FORCE_WORK] = next_work
             next_work += need
-        rows = np.array([*self.rows, (len(self.terms), -1)], dtype=np.int64)
+        rows = np.array([*self.rows, (len(self.terms), -1, -1)], dtype=np.int64)
         tables_i = [
             (H_I_CODE, np.array(self.codes)),
             (H_I_MARKER_BODY, np.array(self.marker_body)),
@@ -286,6 +355,8 @@ class TableBuilder:
             (H_I_FUNCTION, np.array(self.functions)),
             (H_I_EXTRA, np.array(self.extra_i)),
             (H_I_SLOT, slots),
+            (H_I_STATE, np.array(self.states)),
+            (H_I_TAPE, np.array(self.tape_rows)),
         ]
         tables_r = [
             (H_R_GRAVITY, self.gravity),
@@ -298,9 +369,13 @@ class TableBuilder:
         ]
         head[H_N_EXTRA_I], head[H_N_EXTRA_R] = len(self.extra_i), len(self.extra_r)
         head[H_N_FUNCTION_R] = len(self.function_r)
+        head[H_Z], head[H_STATES], head[H_TAPES] = at["z"], len(self.states), len(self.tapes)
         head[H_W_KIN] = 0
         head[H_W_MARKER] = bodies * KIN_COLUMNS
-        head[H_W_SCRATCH] = head[H_W_MARKER] + markers * MK_COLUMNS
+        head[H_W_FUNCTION] = head[H_W_MARKER] + markers * MK_COLUMNS
+        head[H_W_TAPE] = head[H_W_FUNCTION] + 3 * len(self.functions)
+        head[H_W_TAPE_SIZE] = self.tape_work
+        head[H_W_SCRATCH] = head[H_W_TAPE] + self.tape_work
         head[H_WORK] = head[H_W_SCRATCH] + next_work
         offset = H_SIZE
         for key, table in tables_i:

@@ -12,7 +12,6 @@ import numpy as np
 from numba import njit
 
 from gearmbs.dae import tables as T
-from gearmbs.dae import timefunctions
 from gearmbs.dae.rotation import KIN_AXES, KIN_R, KIN_V, KIN_W
 
 POINT = 0
@@ -78,7 +77,7 @@ def turned_axis(frame, j, f, out, k):
 
 
 @njit(cache=True)
-def gradient(k, t, term, function, function_r, reference, marker_body, kin, frame, scratch, g, gt):
+def gradient(k, term, fval, reference, marker_body, kin, frame, scratch, g, gt):
     """Return (phi, phi_t); write the spatial gradient to ``g[0:12]`` and that of phi_t to ``gt[0:12]``."""
     kind = term[k, T.TERM_TYPE]
     i, j = term[k, T.TERM_I], term[k, T.TERM_J]
@@ -102,7 +101,7 @@ def gradient(k, t, term, function, function_r, reference, marker_body, kin, fram
         return dot3(frame[i], a, frame[j], b), 0.0
     if kind == ROTATION:
         fun = term[k, T.TERM_FUNCTION]
-        f, f1, _ = timefunctions.evaluate(function[fun, 0], function_r, function[fun, 1], t)
+        f, f1 = fval[fun, 0], fval[fun, 1]
         turned_axis(frame, j, f, scratch, 0)
         turned_axis(frame, j, f + 0.5 * np.pi, scratch, 3)
         copy3(scratch, 3, scratch, 3, f1)
@@ -156,7 +155,7 @@ def product_rates(a, ka, kin_i, kin_j, s):
 
 
 @njit(cache=True)
-def quadratic_part(k, t, term, function, function_r, marker_body, kin, frame, s):
+def quadratic_part(k, term, fval, marker_body, kin, frame, s):
     """Return d2(phi)/dt2 without the terms in accelerations; ``s`` is scratch."""
     kind = term[k, T.TERM_TYPE]
     i, j = term[k, T.TERM_I], term[k, T.TERM_J]
@@ -169,7 +168,7 @@ def quadratic_part(k, t, term, function, function_r, marker_body, kin, frame, s)
         f1, f2 = 0.0, 0.0
         if kind == ROTATION:
             fun = term[k, T.TERM_FUNCTION]
-            f, f1, f2 = timefunctions.evaluate(function[fun, 0], function_r, function[fun, 1], t)
+            f, f1, f2 = fval[fun, 0], fval[fun, 1], fval[fun, 2]
             turned_axis(frame, j, f, s, 0)
             turned_axis(frame, j, f + 0.5 * np.pi, s, 12)
         if kind == ANGLE:
@@ -250,7 +249,7 @@ def product_hessian(axes_i, axes_j, a, ka, b, kb, factor, hess, s):
 
 
 @njit(cache=True)
-def hessian(k, t, term, function, function_r, marker_body, kin, frame, hess, s):
+def hessian(k, term, fval, marker_body, kin, frame, hess, s):
     """Write the Hessian of term k over [R_I, theta_I, R_J, theta_J] to ``hess[12, 12]``; ``s`` is scratch."""
     kind = term[k, T.TERM_TYPE]
     i, j = term[k, T.TERM_I], term[k, T.TERM_J]
@@ -266,7 +265,7 @@ def hessian(k, t, term, function, function_r, marker_body, kin, frame, hess, s):
         return
     if kind == ROTATION:
         fun = term[k, T.TERM_FUNCTION]
-        f, _, _ = timefunctions.evaluate(function[fun, 0], function_r, function[fun, 1], t)
+        f = fval[fun, 0]
         turned_axis(frame, j, f, s, 20)
         product_hessian(ki, kj, frame[i], T.MK_AXES, s[20:23], 0, 1.0, hess, s)
         return

@@ -1,8 +1,8 @@
 """What a person builds: bodies, markers, joints, motions, forces."""
 
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
-from gearmbs.mechanism.elements import GearContact, Torque
-from gearmbs.mechanism.functions import TimeFunction, constant, harmonic, polynomial, ramp, step
+from gearmbs.mechanism.elements import GearContact, Load, State, Torque
+from gearmbs.mechanism.functions import TimeFunction, constant, expression, harmonic, polynomial, ramp, step
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts import Body, Marker
@@ -13,13 +13,16 @@ __all__ = [
     "Body",
     "GearContact",
     "Joint",
+    "Load",
     "Marker",
     "Mechanism",
     "ModelError",
     "SingularModelError",
+    "State",
     "TimeFunction",
     "Torque",
     "constant",
+    "expression",
     "harmonic",
     "polynomial",
     "ramp",

@@ -44,3 +44,56 @@ class GearContact:
 
     def __repr__(self) -> str:
         return f"GearContact({self.name!r}, {self.i.body.name!r} with {self.j.body.name!r})"
+
+
+LINE, AXIS_FORCE, AXIS_TORQUE, COMPONENTS = 0, 1, 2, 3
+
+
+@dataclass(eq=False)
+class Load:
+    """Force and torque given by expressions in the ADAMS function language.
+
+    Attributes
+    ----------
+    name, kind : str
+        The kind is the element's name in the language ("sforce", "gforce", "bushing", ...), for functions that
+        ask for its force.
+    i, j, rm : Marker
+        I feels the load at its origin, J the reaction at the same point; RM gives the directions.
+    mode : int
+        LINE (along the line from J to I), AXIS_FORCE or AXIS_TORQUE (along z of RM), COMPONENTS (in RM's frame).
+    expressions : tuple of str or None
+        One expression, or for COMPONENTS six: fx, fy, fz, tx, ty, tz.
+    """
+
+    name: str
+    kind: str
+    i: Marker
+    j: Marker
+    rm: Marker
+    mode: int
+    expressions: tuple[str | None, ...]
+
+    @property
+    def has_force(self) -> bool:
+        """Whether F is an unknown."""
+        return self.mode in (LINE, AXIS_FORCE) or (self.mode == COMPONENTS and any(self.expressions[:3]))
+
+    @property
+    def has_torque(self) -> bool:
+        """Whether N is an unknown."""
+        return self.mode == AXIS_TORQUE or (self.mode == COMPONENTS and any(self.expressions[3:]))
+
+    def __repr__(self) -> str:
+        shown = ", ".join(e for e in self.expressions if e)
+        return f"Load({self.name!r}, {self.kind}, I={self.i.name!r}, J={self.j.name!r}, {shown})"
+
+
+@dataclass(eq=False)
+class State:
+    """A user-defined state: z' = expression from ``start``, or z = expression when it is algebraic."""
+
+    name: str
+    expression: str
+    start: float = 0.0
+    algebraic: bool = False

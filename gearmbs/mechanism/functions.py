@@ -25,6 +25,11 @@ class TimeFunction:
         if not np.all(np.isfinite(self.parameters)):
             raise ModelError(f"function {self.text}: its parameters must be finite")
 
+    @property
+    def is_expression(self) -> bool:
+        """Whether the function is given by a text that is compiled with the mechanism."""
+        return self.kind == tf.TAPE
+
     def __call__(self, t: float) -> float:
         """Return f(t)."""
         return tf.evaluate(self.kind, np.array(self.parameters), 0, float(t))[0]
@@ -81,6 +86,13 @@ def polynomial(coefficients: list[float]) -> TimeFunction:
     return TimeFunction(tf.POLYNOMIAL, (len(coefficients) - 1, *map(float, coefficients)), text)
 
 
-def as_function(value: float | TimeFunction) -> TimeFunction:
-    """Return ``value`` as a function of time; a number becomes a constant."""
+def expression(text: str) -> TimeFunction:
+    """Return a function of TIME in the ADAMS function language; it is read when the mechanism is compiled."""
+    return TimeFunction(tf.TAPE, (), text)
+
+
+def as_function(value: float | str | TimeFunction) -> TimeFunction:
+    """Return ``value`` as a function of time; a number becomes a constant, a text an expression of TIME."""
+    if isinstance(value, str):
+        return expression(value)
     return value if isinstance(value, TimeFunction) else constant(value)

@@ -112,3 +112,11 @@ def coordinate_term(joint: Joint, coefficient: float) -> Term:
     if joint.kind == "translational":
         return Term(terms.DOT2, joint.i, joint.j, Z, coefficient)
     return Term(terms.ANGLE, joint.i, joint.j, 0, coefficient)
+
+
+def initial_coordinate(term: Term) -> float:
+    """Return the value at the initial position of an angle (principal value) or displacement term."""
+    ai, aj = term.i.global_orientation(), term.j.global_orientation()
+    if term.kind == terms.ANGLE:
+        return float(np.arctan2(ai[:, 0] @ aj[:, 1], ai[:, 0] @ aj[:, 0]))
+    return float(aj[:, 2] @ (term.i.global_position() - term.j.global_position()))

@@ -7,16 +7,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gearmbs.dae import forces as force_kinds
 from gearmbs.dae import terms
 from gearmbs.dae.errors import ModelError
+from gearmbs.dae.expressions import SplineData
 from gearmbs.dae.system import System
-from gearmbs.dae.tables import TableBuilder
+from gearmbs.mechanism import elements as el
 from gearmbs.mechanism import joints as jt
-from gearmbs.mechanism.elements import ContactTables, GearContact, Torque
+from gearmbs.mechanism.elements import ContactTables, GearContact, Load, State, Torque
+from gearmbs.mechanism.expression import Units
 from gearmbs.mechanism.functions import TimeFunction, as_function, constant
 from gearmbs.mechanism.geometry import Vector, frame_along, vector
 from gearmbs.mechanism.parts import Body, Marker, make_body
+
+Expression = str | float | None
 
 
 class Mechanism:
@@ -45,6 +48,11 @@ class Mechanism:
         self.bodies: dict[str, Body] = {}
         self.joints: dict[str, jt.Joint] = {}
         self.elements: dict[str, Any] = {}
+        self.constraints: dict[str, str] = {}
+        self.variables: dict[Any, str] = {}
+        self.states: dict[Any, State] = {}
+        self.splines: dict[Any, SplineData] = {}
+        self.units = Units()
 
     # --- bodies -----------------------------------------------------------------------------------
 
@@ -179,7 +187,7 @@ class Mechanism:
             raise ModelError(f"coupler '{name}': it needs at least two joints")
         row_terms = tuple(jt.coordinate_term(joint, coefficient) for joint, coefficient in parts)
         if offset is None:
-            offset = sum(t.coefficient * _initial_coordinate(t) for t in row_terms)
+            offset = sum(t.coefficient * jt.initial_coordinate(t) for t in row_terms)
         row = jt.Row("coupled coordinates", row_terms, constant(offset))
         return self._add_joint(jt.Joint(name, "coupler", parts[0][0].i, parts[0][0].j, [row]))
 
@@ -244,6 +252,127 @@ class Mechanism:
         self.elements[name] = element
         return element
 
+    def load(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        fx: Expression = None,
+        fy: Expression = None,
+        fz: Expression = None,
+        tx: Expression = None,
+        ty: Expression = None,
+        tz: Expression = None,
+        rm: Marker | None = None,
+        kind: str = "gforce",
+    ) -> Load:
+        """Apply forces and torques given by expressions, in the frame of marker ``rm`` (default: J).
+
+        They act on I's body at I; the reaction acts on J's body at the same point. Expressions are in the ADAMS
+        function language and SI units, for instance ``"-100*DX(tip, anchor, anchor) - STEP(TIME, 0, 0, 1, 5)"``;
+        markers go by their names (in quotes when they hold other characters than letters, digits, dot and underscore).
+        """
+        expressions = tuple(None if e is None else str(e) for e in (fx, fy, fz, tx, ty, tz))
+        if not any(expressions):
+            raise ModelError(f"load '{name}': give at least one of fx, fy, fz, tx, ty, tz")
+        return self._add_load(Load(name, kind, i, j, rm or j, el.COMPONENTS, expressions))
+
+    def line_force(self, name: str, i: Marker, j: Marker, expression: Expression, kind: str = "sforce") -> Load:
+        """Apply a force along the line between two markers; positive values push I and J apart."""
+        return self._add_load(Load(name, kind, i, j, j, el.LINE, (str(expression),)))
+
+    def axis_force(self, name: str, i: Marker, j: Marker, expression: Expression, rm: Marker | None = None) -> Load:
+        """Apply a force on I along z of ``rm`` (default: J), the reaction on J's body at the same point."""
+        return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_FORCE, (str(expression),)))
+
+    def axis_torque(self, name: str, i: Marker, j: Marker, expression: Expression, rm: Marker | None = None) -> Load:
+        """Apply a torque on I about z of ``rm`` (default: J), the reaction on J's body."""
+        return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_TORQUE, (str(expression),)))
+
+    def spring_damper(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        stiffness: float,
+        damping: float = 0.0,
+        length: float | None = None,
+        preload: float = 0.0,
+    ) -> Load:
+        """Connect two markers by a spring (N/m) and damper (N s/m) along the line between them.
+
+        ``length`` is the length at which the force is ``preload`` (default: the initial distance).
+        """
+        if length is None:
+            length = float(np.linalg.norm(i.global_position() - j.global_position()))
+        a, b = _ref(i), _ref(j)
+        k, c, free, start = float(stiffness), float(damping), float(length), float(preload)
+        text = f"{start!r} - {k!r}*(DM({a},{b}) - {free!r}) - {c!r}*VR({a},{b})"
+        return self.line_force(name, i, j, text, kind="springdamper")
+
+    def torsion_spring(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        stiffness: float,
+        damping: float = 0.0,
+        angle: float = 0.0,
+        preload: float = 0.0,
+    ) -> Load:
+        """Connect two markers by a rotational spring (N m/rad) and damper (N m s/rad) about z of J."""
+        a, b = _ref(i), _ref(j)
+        k, c, free, start = float(stiffness), float(damping), float(angle), float(preload)
+        text = f"{start!r} - {k!r}*(AZ({a},{b}) - {free!r}) - {c!r}*WZ({a},{b},{b})"
+        return self._add_load(Load(name, "springdamper", i, j, j, el.AXIS_TORQUE, (text,)))
+
+    def bushing(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        stiffness: Vector = (0.0, 0.0, 0.0),
+        damping: Vector = (0.0, 0.0, 0.0),
+        torsional_stiffness: Vector = (0.0, 0.0, 0.0),
+        torsional_damping: Vector = (0.0, 0.0, 0.0),
+    ) -> Load:
+        """Connect two markers by springs and dampers along and about the three axes of J (small rotations)."""
+        a, b = _ref(i), _ref(j)
+        label = f"bushing '{name}'"
+        k = vector(stiffness, f"{label}: stiffness").tolist()
+        c = vector(damping, f"{label}: damping").tolist()
+        kt = vector(torsional_stiffness, f"{label}: torsional_stiffness").tolist()
+        ct = vector(torsional_damping, f"{label}: torsional_damping").tolist()
+        force = [f"-{k[n]!r}*D{x}({a},{b},{b}) - {c[n]!r}*V{x}({a},{b},{b},{b})" for n, x in enumerate("XYZ")]
+        turn = [f"-{kt[n]!r}*A{x}({a},{b}) - {ct[n]!r}*W{x}({a},{b},{b})" for n, x in enumerate("XYZ")]
+        parts = [e if k[n] or c[n] else None for n, e in enumerate(force)]
+        parts += [e if kt[n] or ct[n] else None for n, e in enumerate(turn)]
+        if not any(parts):
+            raise ModelError(f"bushing '{name}': all stiffnesses and dampings are zero")
+        return self._add_load(Load(name, "bushing", i, j, j, el.COMPONENTS, tuple(parts)))
+
+    def general_constraint(self, name: str, expression: str) -> None:
+        """Demand that an expression of positions and time vanish (ADAMS's GCON)."""
+        self._check_name(name)
+        self.constraints[name] = str(expression)
+
+    def variable(self, name: str, expression: Expression) -> None:
+        """Name an expression; others use it as VARVAL(name)."""
+        self.variables[name] = str(expression)
+
+    def differential_state(self, name: str, expression: Expression, start: float = 0.0) -> State:
+        """Add a state with z' = expression; others use it as DIF(name)."""
+        self.states[name] = State(name, str(expression), float(start))
+        return self.states[name]
+
+    def spline(self, name: str, x: npt.ArrayLike, y: npt.ArrayLike) -> None:
+        """Name a table of points for CUBSPL and AKISPL."""
+        self.splines[name] = SplineData(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+
     # --- translation into tables ------------------------------------------------------------------
 
     def compile(self, t0: float = 0.0) -> System:
@@ -252,87 +381,11 @@ class Mechanism:
         Raises
         ------
         ModelError
-            If the mechanism has no bodies, or a body without mass is not held.
+            If the mechanism has no bodies, or an expression cannot be read.
         """
-        if not self.bodies:
-            raise ModelError(f"mechanism '{self.name}': it has no bodies; add one with .body(...)")
-        builder = TableBuilder()
-        builder.gravity = self.gravity
-        body_index: dict[int, int] = {id(self.ground): 0}
-        pose = np.zeros((len(self.bodies), 18))
-        for k, body in enumerate(self.bodies.values()):
-            body_index[id(body)] = builder.add_body(body.mass, body.inertia)
-            arm = body.orientation @ body.com
-            pose[k, 0:3] = body.position + arm
-            pose[k, 3:12] = body.orientation.ravel()
-            pose[k, 12:15] = body.velocity + np.cross(body.angular_velocity, arm)
-            pose[k, 15:18] = body.angular_velocity
-        marker_index: dict[int, int] = {}
+        from gearmbs.mechanism.compile import compile_mechanism
 
-        def index(marker: Marker) -> int:
-            if id(marker) not in marker_index:
-                position = marker.position - marker.body.com
-                marker_index[id(marker)] = builder.add_marker(body_index[id(marker.body)], position, marker.orientation)
-            return marker_index[id(marker)]
-
-        row_names: list[str] = []
-        for joint in self.joints.values():
-            for row in joint.rows:
-                self._add_row(builder, row, index)
-                row_names.append(f"{joint.name}: {row.label}")
-        for element in self.elements.values():
-            self._add_element(builder, element, index, body_index)
-        system = System(builder, pose, list(self.bodies), row_names, list(self.elements), t0)
-        system.mechanism = self
-        system.marker_index = marker_index
-        return system
-
-    @staticmethod
-    def _add_row(builder: TableBuilder, row: jt.Row, index) -> None:
-        function = -1
-        if row.function is not None:
-            function = builder.add_function(row.function.kind, list(row.function.parameters))
-        rotation = -1
-        if row.rotation is not None:
-            rotation = builder.add_function(row.rotation.kind, list(row.rotation.parameters))
-        packed = [(t.kind, index(t.i), index(t.j), t.axes, rotation, t.coefficient) for t in row.terms]
-        builder.add_row(packed, function)
-        for k, term in enumerate(row.terms):
-            if term.kind == terms.ANGLE:
-                builder.reference[len(builder.terms) - len(row.terms) + k] = _initial_coordinate(term)
-
-    @staticmethod
-    def _add_element(builder: TableBuilder, element, index, body_index) -> None:
-        i, j = index(element.i), index(element.j)
-        bi, bj = body_index[id(element.i.body)], body_index[id(element.j.body)]
-        if isinstance(element, Torque):
-            function = builder.add_function(element.function.kind, list(element.function.parameters))
-            axis = index(element.axis)
-            builder.add_force(
-                force_kinds.TORQUE,
-                i,
-                j,
-                force=False,
-                torque=True,
-                rm=axis,
-                function=function,
-                bodies=[body_index[id(element.axis.body)]],
-            )
-        elif isinstance(element, GearContact):
-            integers, reals, work = element.pair.contact_tables()
-            extra = builder.add_extra(integers, reals)
-            builder.add_force(
-                force_kinds.GEAR_CONTACT,
-                i,
-                j,
-                force=True,
-                torque=True,
-                extra=extra,
-                work=36 + work,
-                bodies=[bi, bj],
-            )
-        else:
-            raise ModelError(f"force element {element!r}: its type is unknown to the mechanism")
+        return compile_mechanism(self, t0)
 
     def simulate(self, t_end: float, **options):
         """Integrate from 0 to ``t_end`` seconds; see :func:`gearmbs.mechanism.simulate`."""
@@ -368,7 +421,7 @@ class Mechanism:
             raise ModelError(f"{label}: body '{body.name}' does not belong to mechanism '{self.name}'")
 
     def _check_name(self, name: str) -> None:
-        if not name or name in self.joints or name in self.elements:
+        if not name or any(name in table for table in (self.joints, self.elements, self.constraints)):
             raise ModelError(f"name {name!r}: empty or in use; choose another")
 
     def _check_joint(self, name: str, joint: jt.Joint, kinds: tuple[str, ...]) -> None:
@@ -377,6 +430,15 @@ class Mechanism:
             raise ModelError(f"motion '{name}': {joint!r} is not a joint of mechanism '{self.name}'")
         if joint.kind not in kinds:
             raise ModelError(f"motion '{name}': joint '{joint.name}' is {joint.kind}; it must be {' or '.join(kinds)}")
+
+    def _add_load(self, load: Load) -> Load:
+        self._check_name(load.name)
+        for marker in (load.i, load.j, load.rm):
+            if not isinstance(marker, Marker):
+                raise ModelError(f"load '{load.name}': {marker!r} is not a marker; make one with body.marker(...)")
+            self._check_body(f"load '{load.name}'", marker.body)
+        self.elements[load.name] = load
+        return load
 
     def _add_joint(self, joint: jt.Joint) -> jt.Joint:
         self._check_name(joint.name)
@@ -393,8 +455,5 @@ class Mechanism:
         return "\n".join(lines)
 
 
-def _initial_coordinate(term: jt.Term) -> float:
-    ai, aj = term.i.global_orientation(), term.j.global_orientation()
-    if term.kind == terms.ANGLE:
-        return float(np.arctan2(ai[:, 0] @ aj[:, 1], ai[:, 0] @ aj[:, 0]))
-    return float(aj[:, 2] @ (term.i.global_position() - term.j.global_position()))
+def _ref(marker: Marker) -> str:
+    return f'"{marker.name}"'

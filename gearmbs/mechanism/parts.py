@@ -23,12 +23,15 @@ class Marker:
         Origin in the body's frame, m.
     orientation : ndarray, shape (3, 3)
         Columns are the marker's axes in the body's frame.
+    number : int, optional
+        Its id in an ADAMS deck; expressions may use it.
     """
 
     name: str
     body: Body
     position: np.ndarray
     orientation: np.ndarray
+    number: int | None = None
 
     def global_position(self) -> np.ndarray:
         """Return the origin at the initial position, global components, m."""

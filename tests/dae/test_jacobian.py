@@ -48,12 +48,27 @@ def build(kind: str) -> Mechanism:
         m.coupler("joint", [(a, 1.3), (b, -0.7)])
     elif kind == "torque":
         m.torque("joint", i, harmonic(5.0, 2.0, 0.3), axis=(1, 2, 3), reaction=two)
+    elif kind == "general constraint":
+        m.general_constraint("joint", f'DX("{i.name}","{j.name}","{j.name}")*DM("{i.name}") - SIN(3*TIME)')
+    elif kind == "line force":
+        m.line_force("joint", i, j, f'-50*(DM("{i.name}","{j.name}")-1)**3 - 2*VR("{i.name}","{j.name}")')
+    elif kind == "axis force":
+        m.axis_force("joint", i, random_marker(m.ground, rng), f'TIME*DY("{i.name}","{j.name}")', rm=j)
+    elif kind == "axis torque":
+        m.axis_torque("joint", i, j, f'-3*WZ("{i.name}","{j.name}","{j.name}")')
+    elif kind == "load":
+        m.differential_state("lag", f'DZ("{i.name}") - 2*DIF(lag)', 0.3)
+        a, b = f'"{i.name}"', f'"{j.name}"'
+        m.load("joint", i, j, rm=random_marker(two, rng), fx=f"DX({a},{b})**2", fz=f"VY({a},{b},{a})", ty="DIF(lag)")
+    elif kind == "bushing":
+        m.bushing("joint", i, j, stiffness=(10, 20, 30), damping=(1, 2, 3), torsional_stiffness=(4, 5, 6))
     elif kind == "grounded revolute":
         m.revolute("joint", i, random_marker(m.ground, rng))
     return m
 
 
-KINDS = [*JOINTS, "screw", "distance", "rotation", "translation", "coupler", "torque", "grounded revolute"]
+LOADS = ["general constraint", "line force", "axis force", "axis torque", "load", "bushing"]
+KINDS = [*JOINTS, *LOADS, "screw", "distance", "rotation", "translation", "coupler", "torque", "grounded revolute"]
 
 
 def unassembled_problem(m: Mechanism, formulation: str):
@@ -107,7 +122,7 @@ def test_quadratic_part_is_the_second_derivative_along_a_motion():
 
     rng = np.random.default_rng(3)
     for kind in KINDS:
-        if kind == "torque":
+        if kind == "torque" or kind in LOADS[1:]:
             continue
         system = build(kind).compile()
         pose = system.pose.copy()
