@@ -27,6 +27,7 @@ from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, JACOBIAN_SIG, RESIDUAL_SIG
 from gearmbs.dae.sparse_lu import FACTORS_TYPE, PLAN_TYPE, factor
 from gearmbs.dae.state import STATE_TYPE
 
+EPS = 2.220446049250313e-16
 GAMMA_DRIFT = 0.3
 JAC_MAX_AGE = 50
 RATE_WORTH_RENEWING = 0.25
@@ -62,7 +63,7 @@ def _respace(real, count, times, hist, small, first):
     if k < 1:
         return
     t = times[first]
-    if abs((t - times[first + 1]) - h) <= 1e-10 * h:
+    if abs((t - times[first + 1]) - h) <= 1e-10 * h + 4.0 * EPS * abs(t):
         return
     nodes = times[first:]
     weights = np.empty((k + 1, k + 1))
@@ -261,17 +262,19 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
         # corrector
         code = correct(residual, t, gamma, vec, real, count, plan, factors, idata, rdata, work)
         if code != CONVERGED:
-            count[s.NEWTON_REJECTIONS] += 1
             if code == NOT_FINITE:
                 bad = first_not_finite(vec[s.RES])
                 count[s.WORST] = bad if bad >= 0 else first_not_finite(delta)
                 count[s.NAN_FAILS] += 1
+                count[s.NEWTON_REJECTIONS] += 1
                 real[s.H] = NEWTON_SHRINK * h
             elif count[s.FRESH] == 0:
+                count[s.STALE] += 1
                 real[s.H] = h_wish
             else:
                 count[s.WORST] = weighted_argmax(delta, vec[s.W_NEWTON])
                 count[s.NEWTON_FAILS] += 1
+                count[s.NEWTON_REJECTIONS] += 1
                 real[s.H] = NEWTON_SHRINK * h
                 count[s.SINCE_CHANGE] = 0
                 count[s.CAUTION] = 2

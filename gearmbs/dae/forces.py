@@ -24,7 +24,7 @@ DIAGNOSTICS = 8
 """Length of the diagnostics record of a gear contact (see `gearmbs.contact`)."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def marker_pose(m, marker_body, kin, frame, out):
     """Write position (3), orientation (3x3 row-major), velocity (3), angular velocity (3) of marker m."""
     row = kin[marker_body[m]]
@@ -37,7 +37,7 @@ def marker_pose(m, marker_body, kin, frame, out):
         out[15 + c] = row[KIN_W + c]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def contact_wrench(row, tab, wrench, jac, diag, want_jac):
     """Evaluate a gear contact on the frames of its two markers; columns of ``jac`` are the markers' variations."""
     i, j = row[T.FORCE_I], row[T.FORCE_J]
@@ -66,7 +66,7 @@ def contact_wrench(row, tab, wrench, jac, diag, want_jac):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def shift_to_body(m, marker_body, kin, frame, jac, first):
     """Turn columns of marker m's variations ``jac[:, first:first+12]`` into those of its body's frame.
 
@@ -90,7 +90,7 @@ def shift_to_body(m, marker_body, kin, frame, jac, first):
         jac[r, first + 11] += sx * vy - sy * vx
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def element_wrench(row, t, y, tab, wrench, jac, diag, want_jac):
     """Fill F in ``wrench[0:3]`` and N in ``wrench[3:6]`` and, if wanted, their derivatives in ``jac``.
 

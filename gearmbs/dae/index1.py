@@ -26,7 +26,7 @@ SUMMARY = 3
 FORCE_RECORD = 14
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def put(mode, places, slot, vals, k, row, col, value):
     if mode == NUMBERS:
         vals[slot[k]] += value
@@ -36,7 +36,7 @@ def put(mode, places, slot, vals, k, row, col, value):
     return k + 1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def apply_load(b, sign, row, wrench, tab, rhs):
     if b == 0:
         return
@@ -49,7 +49,7 @@ def apply_load(b, sign, row, wrench, tab, rhs):
         rhs[k + 3 + c] += sign * (s[3 + c] + wrench[3 + c])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def tape_row_rates(k, t, y, idata, tab, room):
     """Return value, rate, partial time derivative and quadratic part of a row given by tape k.
 
@@ -87,6 +87,7 @@ def tape_row_rates(k, t, y, idata, tab, room):
     "int64(int64, float64, float64[::1], int64[:, ::1], int64[::1], float64[::1], float64[::1], float64[::1], "
     "float64[:, ::1], int64[::1], float64[::1], float64[::1])",
     cache=True,
+    error_model="numpy",
 )
 def saddle(mode, t, y, places, slot, vals, rhs, phi, loads, idata, rdata, work):
     """Assemble the saddle-point matrix (by slots) and right-hand side; return the number of entries.
@@ -189,6 +190,7 @@ def saddle(mode, t, y, places, slot, vals, rhs, phi, loads, idata, rdata, work):
 @njit(
     "void(float64[::1], int64[::1], float64[::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])",
     cache=True,
+    error_model="numpy",
 )
 def joint_loads(y, idata, rdata, work, multipliers, force, moment):
     """Reaction of each constraint row on I's body: force, and moment about the origin of marker I, global.
@@ -219,7 +221,7 @@ def joint_loads(y, idata, rdata, work, multipliers, force, moment):
                 moment[r, c] += factor * g[3 + c] - s[3 + c]
 
 
-@njit("void(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1])", cache=True)
+@njit("void(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy")
 def pose_record(y, idata, rdata, work, out):
     """Write R, A (row-major), v, omega of each body (18 values, the ground left out)."""
     tab = T.unpack(idata, rdata, work)

@@ -32,7 +32,7 @@ NUMBERS, PLACES, COUNT = 0, 1, 2
 HESSIAN_BLOCKS = terms.HESSIAN_BLOCKS
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def put(mode, places, slot, vals, k, row, col, value):
     """Hand over entry k; return the number of the next."""
     if mode == NUMBERS:
@@ -43,7 +43,7 @@ def put(mode, places, slot, vals, k, row, col, value):
     return k + 1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def body_entries(mode, b, cj, idata, tab, places, slot, vals, k):
     """Entries of one body's inertia terms in eq. (5) and (6)."""
     i = 3 * (b - 1)
@@ -96,7 +96,7 @@ def body_entries(mode, b, cj, idata, tab, places, slot, vals, k):
     return k
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
     """Entries of one constraint row, its derivative, and the forces of its multipliers."""
     form = idata[T.H_FORMULATION]
@@ -179,7 +179,7 @@ def row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
     return k
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
     """Entries of a constraint row given by an expression."""
     form = idata[T.H_FORMULATION]
@@ -220,7 +220,7 @@ def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
     return k
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, idata, tab, places, slot, vals, k):
     """Entries of one row from the spatial gradient ``d`` over a list of bodies, then of unknowns."""
     for q in range(bodies):
@@ -241,7 +241,7 @@ def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, idata, ta
     return k
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def state_entries(mode, t, s, y, cj, idata, tab, places, slot, vals, k):
     """Entries of the equation of one user-defined state."""
     z = idata[T.H_Z] + s
@@ -269,7 +269,7 @@ def state_entries(mode, t, s, y, cj, idata, tab, places, slot, vals, k):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def load_entries(mode, b, sign, row, y, idata, tab, places, slot, vals, k):
     """Entries of one force element's loads on body b in the rows of eq. (5)."""
     if b == 0:
@@ -328,7 +328,7 @@ def load_entries(mode, b, sign, row, y, idata, tab, places, slot, vals, k):
     return k
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def element_entries(mode, t, row, y, idata, tab, places, slot, vals, k):
     """Entries of the rows F - F(q, q', t) and N - N(q, q', t) of one force element."""
     wrench = tab.scratch[S_WRENCH : S_WRENCH + 6]
@@ -368,6 +368,7 @@ def element_entries(mode, t, row, y, idata, tab, places, slot, vals, k):
     "int64(int64, float64, float64[::1], float64[::1], float64, int64[:, ::1], float64[::1], "
     "int64[::1], float64[::1], float64[::1])",
     cache=True,
+    error_model="numpy",
 )
 def walk(mode, t, y, yp, cj, places, vals, idata, rdata, work):
     """Go through all entries; return their number."""
@@ -396,7 +397,7 @@ def walk(mode, t, y, yp, cj, places, vals, idata, rdata, work):
 NO_PLACES = np.zeros((1, 2), dtype=np.int64)
 
 
-@njit(JACOBIAN_SIG, cache=True)
+@njit(JACOBIAN_SIG, cache=True, error_model="numpy")
 def jacobian(t, y, yp, cj, vals, idata, rdata, work):
     """Evaluate dG/dy + cj dG/dy' into ``vals``, CSC order."""
     for k in range(vals.size):

@@ -20,7 +20,7 @@ from gearmbs.dae.rotation import (
 from gearmbs.dae.terms import dot3
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def inertia_times(kin_row, body_row, v, i, out, k, s):
     """Write J_global v to ``out[k:k+3]``; ``s`` has three scratch places."""
     for c in range(3):
@@ -34,7 +34,7 @@ def inertia_times(kin_row, body_row, v, i, out, k, s):
         out[k + c] = kin_row[a] * x + kin_row[a + 1] * y + kin_row[a + 2] * z
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def update_ground(kin):
     """Set the ground's row: the global frame at rest, with no Euler axes."""
     row = kin[0]
@@ -43,7 +43,7 @@ def update_ground(kin):
     row[KIN_A] = row[KIN_A + 4] = row[KIN_A + 8] = 1.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def update_bodies(idata, y, code, body, kin, scratch):
     """Fill the kinematics table from u, eps, R, theta in y."""
     update_ground(kin)
@@ -60,7 +60,7 @@ def update_bodies(idata, y, code, body, kin, scratch):
         inertia_times(row, body[b], row, KIN_W, row, KIN_H, scratch)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def update_markers(marker_body, marker, kin, frame):
     """Fill the marker table: arms and axes in global components."""
     for m in range(marker_body.size):
@@ -74,7 +74,7 @@ def update_markers(marker_body, marker, kin, frame):
                 )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def update_functions(t, tab):
     """Evaluate every function of time with two derivatives into the function table."""
     for k in range(tab.function.shape[0]):
@@ -94,7 +94,7 @@ def update_functions(t, tab):
             tab.fval[k, 0], tab.fval[k, 1], tab.fval[k, 2] = f, f1, f2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def update_tables(t, y, idata, tab):
     """Bring bodies, markers and functions of time up to date with t and y."""
     update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
@@ -102,7 +102,7 @@ def update_tables(t, y, idata, tab):
     update_functions(t, tab)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def euler_component(kin_row, m, v, k):
     """Return a_m . v, the component of a spatial rotation gradient along Euler angle m."""
     return dot3(kin_row, KIN_AXES + 3 * m, v, k)

@@ -59,6 +59,7 @@ def new_records(m: int, bodies: int, rows: int, elements: int) -> Records:
 @njit(
     int64(int64, int64, _VEC, _MAT, _IVEC, _IVEC, _VEC, _VEC, _VEC, PLAN_TYPE, FACTORS_TYPE, RECORDS_TYPE),
     cache=True,
+    error_model="numpy",
     nogil=True,
 )
 def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, factors, records):

@@ -28,7 +28,7 @@ from gearmbs.dae.rotation import (
 from gearmbs.dae.terms import ANGLE, dot3
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def rewrite_point(y, b, old, new, idata, kin, s):
     """Turn angles, rates and conjugate momenta of body b from one reference to the other."""
     k = 3 * (b - 1)
@@ -46,7 +46,7 @@ def rewrite_point(y, b, old, new, idata, kin, s):
         y[p + m] = dot3(row, 18 + 3 * m, s, 3)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def track_angles(t, y, idata, tab):
     """Move the reference of each counted angle to its present value."""
     any_angle = False
@@ -69,7 +69,7 @@ def track_angles(t, y, idata, tab):
             tab.reference[k] += turn - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
 
 
-@njit(HOOK_SIG, cache=True)
+@njit(HOOK_SIG, cache=True, error_model="numpy")
 def hook(t, hist, npast, idata, rdata, work):
     """Switch references where due; update the reference of each counted angle. Return 1 if hist changed."""
     tab = T.unpack(idata, rdata, work)

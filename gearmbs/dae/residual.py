@@ -37,14 +37,16 @@ S_PRODUCT = 300
 S_VECTOR = 320
 
 
-@njit("void(float64, float64[::1], float64[::1], int64[::1], float64[::1], float64[::1])", cache=True)
+@njit(
+    "void(float64, float64[::1], float64[::1], int64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy"
+)
 def update(t, y, yp, idata, rdata, work):
     """Bring the kinematics and marker tables up to date with y."""
     tab = T.unpack(idata, rdata, work)
     update_tables(t, y, idata, tab)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def arm_to(b, point_marker, marker_body, kin, frame, out, k):
     """Write the vector from body b's centre of mass to the origin of a marker, global components."""
     owner = marker_body[point_marker]
@@ -52,7 +54,7 @@ def arm_to(b, point_marker, marker_body, kin, frame, out, k):
         out[k + c] = kin[owner, KIN_R + c] + frame[point_marker, c] - kin[b, KIN_R + c]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_load(b, sign, row, y, idata, tab, out):
     """Subtract the generalised loads of one force element on body b (eq. (5), H_F^T F and H_N^T N)."""
     if b == 0:
@@ -74,7 +76,7 @@ def add_load(b, sign, row, y, idata, tab, out):
         out[idata[T.H_P] + k + m] -= euler_component(tab.kin[b], m, s, 6)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_tape_row(k, t, lam, mu, y, idata, tab, out):
     """Add the constraint forces of a row given by tape k; return its value and rate."""
     row = tab.tape[k]
@@ -95,7 +97,7 @@ def add_tape_row(k, t, lam, mu, y, idata, tab, out):
     return value, rate
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_constraints(t, y, yp, idata, tab, out):
     """Constraint rows, their derivatives, and the constraint forces of lambda and mu."""
     form = idata[T.H_FORMULATION]
@@ -154,7 +156,7 @@ def add_constraints(t, y, yp, idata, tab, out):
             out[mu0 + r] = rate
 
 
-@njit(RESIDUAL_SIG, cache=True)
+@njit(RESIDUAL_SIG, cache=True, error_model="numpy")
 def residual(t, y, yp, out, idata, rdata, work):
     """Evaluate G(t, y, y') of eq. (8) into ``out``."""
     tab = T.unpack(idata, rdata, work)

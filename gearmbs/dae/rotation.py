@@ -37,14 +37,14 @@ SWITCH_SINE = 0.5
 """Below this |sin(theta)| the other reference is at least sqrt(3)/2 away from its singularity."""
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def cross_into(ax, ay, az, bx, by, bz, out, k):
     out[k] = ay * bz - az * by
     out[k + 1] = az * bx - ax * bz
     out[k + 2] = ax * by - ay * bx
 
 
-@njit("void(float64, float64, float64, int64, float64[::1], int64)", cache=True)
+@njit("void(float64, float64, float64, int64, float64[::1], int64)", cache=True, error_model="numpy")
 def rotation_matrix(psi, theta, phi, code, out, k):
     """Write A (row-major) of the 3-1-3 angles and the reference code to ``out[k:k+9]``."""
     c1, s1 = np.cos(psi), np.sin(psi)
@@ -63,7 +63,7 @@ def rotation_matrix(psi, theta, phi, code, out, k):
         out[k + 6], out[k + 7], out[k + 8] = zx, -zz, zy
 
 
-@njit("void(float64[::1], int64, int64, float64[::1], int64)", cache=True)
+@njit("void(float64[::1], int64, int64, float64[::1], int64)", cache=True, error_model="numpy")
 def euler_angles(a, k, code, out, j):
     """Write the 3-1-3 angles (theta in [0, pi]) of the row-major matrix ``a[k:k+9]`` to ``out[j:j+3]``."""
     if code == REFERENCE_IDENTITY:
@@ -82,7 +82,7 @@ def euler_angles(a, k, code, out, j):
         out[j + 2] = 0.0
 
 
-@njit("int64(float64[::1], int64)", cache=True)
+@njit("int64(float64[::1], int64)", cache=True, error_model="numpy")
 def best_reference(a, k):
     """Return the reference code whose |sin(theta)| is the larger for the matrix ``a[k:k+9]``."""
     if abs(a[k + 8]) <= abs(a[k + 7]):
@@ -90,7 +90,7 @@ def best_reference(a, k):
     return REFERENCE_QUARTER_TURN
 
 
-@njit("void(float64, float64, float64, float64, float64, float64[:, ::1], int64)", cache=True)
+@njit("void(float64, float64, float64, float64, float64, float64[:, ::1], int64)", cache=True, error_model="numpy")
 def axes_and_velocity(psi, theta, e1, e2, e3, kin, b):
     """Fill axes, omega, d(omega)/d(theta) and axis rates of body b in the kinematics table."""
     c1, s1 = np.cos(psi), np.sin(psi)
@@ -113,7 +113,7 @@ def axes_and_velocity(psi, theta, e1, e2, e3, kin, b):
     cross_into(e2 * c1, e2 * s1, e1, row[g + 6], row[g + 7], row[g + 8], row, r + 6)
 
 
-@njit("void(float64[:, ::1], int64, float64[::1], int64, float64[::1], int64)", cache=True)
+@njit("void(float64[:, ::1], int64, float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
 def euler_rates(kin, b, w, i, out, j):
     """Solve omega = sum_k a_k eps_k for the Euler rates of body b; ``w[i:i+3]`` is omega."""
     row = kin[b]
@@ -128,7 +128,7 @@ def euler_rates(kin, b, w, i, out, j):
     out[j] = wz - c2 * e3
 
 
-@njit("void(float64[:, ::1], int64, float64[::1], int64, float64[::1], int64)", cache=True)
+@njit("void(float64[:, ::1], int64, float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
 def momentum_from_conjugate(kin, b, p, i, out, j):
     """Solve p_k = a_k . h for the angular momentum h of body b."""
     row = kin[b]

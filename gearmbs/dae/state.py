@@ -73,6 +73,7 @@ MAX_STEPS = 29
 CAUTION = 30
 SINGULAR_FAILS = 31
 SHIFTED = 32
+STALE = 33
 N_COUNT = 36
 
 # rows of RunState.vec

@@ -55,7 +55,7 @@ class Unknown:
     unit: str
 
 
-@njit("void(float64[:, ::1], int64[::1], float64[::1], float64[::1], float64[::1])", cache=True)
+@njit("void(float64[:, ::1], int64[::1], float64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy")
 def state_from_pose(pose, idata, rdata, work, y):
     """Fill u, p, eps, R, theta of y from R, A, v, omega of each moving body."""
     tab = T.unpack(idata, rdata, work)

@@ -152,7 +152,7 @@ Tables = namedtuple(
 )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def unpack(idata, rdata, work):
     """Return the named views of the flat tables; nothing is copied."""
     bodies = idata[H_BODIES]

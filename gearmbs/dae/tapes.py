@@ -21,7 +21,7 @@ LOAD_TAPES = 1
 """Six tape numbers or -1, after the mode."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def value(k, t, y, tab):
     """Return the value of tape k."""
     row = tab.tape[k]
@@ -39,7 +39,7 @@ def value(k, t, y, tab):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def gradient(k, t, y, tab, grad):
     """Return the value of tape k; write its spatial gradient to ``grad``."""
     row = tab.tape[k]
@@ -58,7 +58,7 @@ def gradient(k, t, y, tab, grad):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def second(k, t, y, tab, grad, hess):
     """Return the value of tape k with gradient and Hessian over [R, theta] of its bodies and time."""
     row = tab.tape[k]
@@ -78,18 +78,18 @@ def second(k, t, y, tab, grad, hess):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def gradient_size(row):
     return 12 * row[T.TAPE_N_BODIES] + row[T.TAPE_N_UNKNOWNS]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def tail(tab, size):
     """Return ``size`` floats at the end of the tapes' scratch, which the evaluators leave alone."""
     return tab.tape_work[tab.tape_work.size - size :]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def update_references(t, y, tab):
     """Move the reference of every counted angle to its present value; the tables must be up to date."""
     for k in range(tab.tape.shape[0]):
@@ -109,7 +109,7 @@ def update_references(t, y, tab):
             )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def slot_of(tab, depends, body):
     """Return the place of a body in an element's dependency list."""
     for q in range(tab.extra_i[depends]):
@@ -118,7 +118,7 @@ def slot_of(tab, depends, body):
     return -1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_component(row, k, ex, ey, ez, first, t, y, tab, wrench, jac, want_jac):
     """Add tape k times the unit vector e to ``wrench[first:first+3]`` and e times its gradient to ``jac``; return f."""
     if want_jac == 0:
@@ -149,7 +149,7 @@ def add_component(row, k, ex, ey, ez, first, t, y, tab, wrench, jac, want_jac):
     return f
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def turn_columns(jac, first, q, fx, fy, fz):
     """Add d(f e) = dpi x (f e) of a direction fixed in the body of block q."""
     c = 12 * q + 3
@@ -161,7 +161,7 @@ def turn_columns(jac, first, q, fx, fy, fz):
     jac[first + 2, c + 1] -= fx
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def line_direction_columns(row, f, ex, ey, ez, length, tab, jac):
     """Add f d(e) for e = (P_I - P_J)/|P_I - P_J|: f/length times the projector normal to e."""
     depends = row[T.FORCE_DEPENDS]
@@ -188,7 +188,7 @@ def line_direction_columns(row, f, ex, ey, ez, length, tab, jac):
             jac[r, c + 5] += sx * py - sy * px
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def load(row, t, y, tab, wrench, jac, want_jac):
     """Fill F and N of an expression element and, if wanted, their derivatives; both start from zero."""
     at = row[T.FORCE_IEXTRA] + 2

@@ -43,12 +43,12 @@ for _kind, _blocks in {
         HESSIAN_BLOCKS[(_kind, *_block)] = True
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def dot3(a, i, b, j):
     return a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def cross3(a, i, b, j, out, k):
     x = a[i + 1] * b[j + 2] - a[i + 2] * b[j + 1]
     y = a[i + 2] * b[j] - a[i] * b[j + 2]
@@ -56,19 +56,19 @@ def cross3(a, i, b, j, out, k):
     out[k], out[k + 1], out[k + 2] = x, y, z
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def copy3(a, i, out, k, factor):
     out[k], out[k + 1], out[k + 2] = factor * a[i], factor * a[i + 1], factor * a[i + 2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def separation(kin, frame, bi, bj, i, j, out, k):
     """Write P_I - P_J (global) to ``out[k:k+3]``."""
     for c in range(3):
         out[k + c] = kin[bi, KIN_R + c] + frame[i, c] - kin[bj, KIN_R + c] - frame[j, c]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def turned_axis(frame, j, f, out, k):
     """Write y_J cos f - x_J sin f to ``out[k:k+3]``."""
     c, s = np.cos(f), np.sin(f)
@@ -76,7 +76,7 @@ def turned_axis(frame, j, f, out, k):
         out[k + m] = c * frame[j, T.MK_AXES + 3 + m] - s * frame[j, T.MK_AXES + m]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def gradient(k, term, fval, reference, marker_body, kin, frame, scratch, g, gt):
     """Return (phi, phi_t); write the spatial gradient to ``g[0:12]`` and that of phi_t to ``gt[0:12]``."""
     kind = term[k, T.TERM_TYPE]
@@ -142,7 +142,7 @@ def gradient(k, term, fval, reference, marker_body, kin, frame, scratch, g, gt):
     return length, 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def product_rates(a, ka, kin_i, kin_j, s):
     """Return first and second rate (without accelerations) of a . b, b in ``s[0:3]`` fixed in body J."""
     cross3(kin_i, KIN_W, a, ka, s, 3)
@@ -154,7 +154,7 @@ def product_rates(a, ka, kin_i, kin_j, s):
     return first, second + dot3(s, 3, s, 0) + dot3(a, ka, s, 6)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def quadratic_part(k, term, fval, marker_body, kin, frame, s):
     """Return d2(phi)/dt2 without the terms in accelerations; ``s`` is scratch."""
     kind = term[k, T.TERM_TYPE]
@@ -215,14 +215,14 @@ def quadratic_part(k, term, fval, marker_body, kin, frame, s):
     return (dot3(s, 0, s, 0) - rate * rate + dot3(s, 6, s, 3)) / length
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def first_derivatives(axes, v, k, d):
     """Write d(v)/d(theta_m) = a_m x v of the body-fixed vector ``v[k:k+3]`` to ``d[3 m:]``."""
     for m in range(3):
         cross3(axes, KIN_AXES + 3 * m, v, k, d, 3 * m)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def second_derivative_dot(axes, d, b, k, m, n):
     """Return d2(v)/d(theta_m)d(theta_n) . b from the first derivatives ``d`` of v."""
     lo, hi = min(m, n), max(m, n)
@@ -234,7 +234,7 @@ def second_derivative_dot(axes, d, b, k, m, n):
     return x * b[k] + y * b[k + 1] + z * b[k + 2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def product_hessian(axes_i, axes_j, a, ka, b, kb, factor, hess, s):
     """Add ``factor`` times the Hessian of a . b (a fixed in I, b in J) over the angle blocks."""
     first_derivatives(axes_i, a, ka, s[0:9])
@@ -248,7 +248,7 @@ def product_hessian(axes_i, axes_j, a, ka, b, kb, factor, hess, s):
             hess[9 + n, 3 + m] += cross_term
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def hessian(k, term, fval, marker_body, kin, frame, hess, s):
     """Write the Hessian of term k over [R_I, theta_I, R_J, theta_J] to ``hess[12, 12]``; ``s`` is scratch."""
     kind = term[k, T.TERM_TYPE]

@@ -18,7 +18,7 @@ STEP5 = 6
 STEP5_INTEGRAL = 7
 
 
-@njit("UniTuple(float64, 4)(float64, int64)", cache=True)
+@njit("UniTuple(float64, 4)(float64, int64)", cache=True, error_model="numpy")
 def smooth_step(x, quintic):
     """Return STEP (cubic) or STEP5 (quintic) on the unit interval: integral from 0, value, slope, curvature."""
     if x <= 0.0:
@@ -33,7 +33,7 @@ def smooth_step(x, quintic):
     return integral, value, slope, 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x)
 
 
-@njit("UniTuple(float64, 3)(int64, float64[::1], int64, float64)", cache=True)
+@njit("UniTuple(float64, 3)(int64, float64[::1], int64, float64)", cache=True, error_model="numpy")
 def evaluate(kind, par, k, t):
     """Return f(t), f'(t), f''(t) of the function with parameters ``par[k:]``."""
     if kind == CONSTANT:

@@ -23,7 +23,7 @@ from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, SolverStats, Status
 from gearmbs.dae.sparse_lu import GROWTH_LIMIT, LUPlan, SingularMatrixError, analyse, factor, new_factors, solve
 
-NEWTON_TOLERANCE = 0.1
+NEWTON_TOLERANCE = 0.02
 FIRST_CHUNK = 16
 CHUNK_SECONDS = 0.05
 RECORD_BYTES = 8_000_000

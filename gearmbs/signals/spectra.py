@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy.fft
@@ -16,6 +16,7 @@ from .signal import rate_of, units_of
 
 Scaling = Literal["amplitude", "rms", "power", "density"]
 Progress = Callable[[float, str], None]
+SCALINGS = ("amplitude", "rms", "power", "density")
 
 
 def spectrum(
@@ -68,20 +69,60 @@ def spectrum(
     rate = rate_of(signal)
     n = signal.sizes["time"]
     length = n if segment is None else (round(segment * rate) if isinstance(segment, float) else int(segment))
-    if not 2 <= length:
-        raise SignalError(f"segment: must hold at least 2 samples, got {segment!r}")
+    result, details = periodograms(signal.values, rate, length, window, overlap, detrend, scaling, progress)
+    units = [spectral_unit(u, scaling, "Hz") for u in units_of(signal)]
+    return xr.DataArray(
+        result,
+        dims=("frequency", "channel"),
+        coords={
+            "frequency": ("frequency", scipy.fft.rfftfreq(details["length"], 1.0 / rate), {"units": "Hz"}),
+            "channel": signal["channel"].values,
+            "units": ("channel", np.asarray(units, dtype=str)),
+        },
+        attrs={
+            "units": units[0] if len(set(units)) == 1 else "mixed",
+            "scaling": scaling,
+            "window": str(window),
+            "segments": details["segments"],
+            "resolution": rate / details["length"],
+            "noise_bandwidth": details["noise_bandwidth"],
+        },
+    )
+
+
+def periodograms(
+    values: np.ndarray,
+    rate: float,
+    length: int,
+    window: str | tuple,
+    overlap: float,
+    detrend: bool,
+    scaling: str,
+    progress: Progress | None = None,
+) -> tuple[np.ndarray, dict[str, Any]]:
+    """Averaged one-sided periodograms of `values` (n, channels), `rate` samples per unit of the axis; see `spectrum`.
+
+    Returns
+    -------
+    lines : ndarray of shape (length // 2 + 1, channels)
+    details : dict
+        `length`, `segments`, `noise_bandwidth`.
+    """
+    n, channels = values.shape
+    if length < 2:
+        raise SignalError(f"segment: must hold at least 2 samples, got {length!r}")
     length = min(length, n)
     if not 0.0 <= overlap < 1.0:
         raise SignalError(f"overlap: must lie in [0, 1), got {overlap!r}")
-    if scaling not in ("amplitude", "rms", "power", "density"):
-        raise SignalError(f"scaling: must be 'amplitude', 'rms', 'power' or 'density', got {scaling!r}")
+    if scaling not in SCALINGS:
+        raise SignalError(f"scaling: must be one of {', '.join(SCALINGS)}, got {scaling!r}")
     step = max(1, length - round(overlap * length))
     weights = ss.get_window(window, length)
     starts = range(0, n - length + 1, step)
-    total = np.zeros((length // 2 + 1, signal.sizes["channel"]))
+    total = np.zeros((length // 2 + 1, channels))
     for done, start in enumerate(starts):
-        for channel in range(total.shape[1]):
-            piece = signal.values[start : start + length, channel]
+        for channel in range(channels):
+            piece = values[start : start + length, channel]
             line = scipy.fft.rfft((piece - piece.mean() if detrend else piece) * weights)
             total[:, channel] += line.real**2 + line.imag**2
         if progress is not None:
@@ -102,29 +143,13 @@ def spectrum(
         result[0] /= math.sqrt(2.0)
         if last is not None:
             result[-1] /= math.sqrt(2.0)
-    units = [spectral_unit(u, scaling) for u in units_of(signal)]
-    return xr.DataArray(
-        result,
-        dims=("frequency", "channel"),
-        coords={
-            "frequency": ("frequency", scipy.fft.rfftfreq(length, 1.0 / rate), {"units": "Hz"}),
-            "channel": signal["channel"].values,
-            "units": ("channel", np.asarray(units, dtype=str)),
-        },
-        attrs={
-            "units": units[0] if len(set(units)) == 1 else "mixed",
-            "scaling": scaling,
-            "window": str(window),
-            "segments": len(starts),
-            "resolution": rate / length,
-            "noise_bandwidth": rate * float((weights**2).sum() / weights.sum() ** 2),
-        },
-    )
+    bandwidth = rate * float((weights**2).sum() / weights.sum() ** 2)
+    return result, {"length": length, "segments": len(starts), "noise_bandwidth": bandwidth}
 
 
-def spectral_unit(unit: str, scaling: str) -> str:
-    """Unit of a spectrum of a signal in `unit`."""
+def spectral_unit(unit: str, scaling: str, axis: str = "Hz") -> str:
+    """Unit of a spectrum over `axis` of a signal in `unit`."""
     if scaling in ("amplitude", "rms"):
         return unit
     squared = f"({unit})^2"
-    return squared if scaling == "power" else f"{squared}/Hz"
+    return squared if scaling == "power" else f"{squared}/{axis}"
