@@ -1,0 +1,164 @@
+"""Pressure along the face: from gaps at the nodes of the slices to nodal forces, with their derivatives.
+
+Between two nodes gap and gap rate are linear. The part of a slice that touches, and that lies on both faces, is
+integrated by Gauss's two-point rule, so that the ends of a wedge move through the slices without a jump.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from gearmbs.contact import layout as L
+from gearmbs.contact.laws import normal_law
+
+N_GAP, N_GRAD, N_HESS, N_RATE, N_DRATE = L.N_GAP, L.N_GRAD, L.N_HESS, L.N_RATE, L.N_DRATE
+N_FORCE, N_FX, N_FV = L.N_FORCE, L.N_FX, L.N_FV
+LAW, K_, E_, C_, D_ = L.LAW, L.LAW_K, L.LAW_E, L.LAW_C, L.LAW_D
+WIDTH = L.WIDTH
+Q_, H_ = L.Q_, L.H_
+GAUSS_LO = 0.21132486540518713
+GAUSS_HI = 0.7886751345948129
+
+
+@njit(cache=True)
+def plane_force(gi, gr, nodes, o, soft, diag, want):
+    """Force of a pair described by a single section: the pressure there times the common face width."""
+    width = gr[WIDTH]
+    delta = -nodes[o + N_GAP]
+    rate = -nodes[o + N_RATE]
+    p, p_d, p_r, energy, elastic = normal_law(
+        gi[LAW], soft * gr[K_], gr[E_], soft * gr[C_] if gi[LAW] == 0 else gr[C_], gr[D_], delta, rate
+    )
+    nodes[o + N_FORCE] = width * p
+    diag[0] += width * energy
+    diag[1] += width * (p - elastic) * rate
+    if want != 0:
+        for i in range(6):
+            g = nodes[o + N_GRAD + i]
+            nodes[o + N_FX + i] = -width * (p_d * g + p_r * nodes[o + N_DRATE + i])
+            nodes[o + N_FV + i] = -width * p_r * g
+    return delta
+
+
+@njit(cache=True)
+def cell_force(gi, gr, nodes, o0, o1, step, ua, ub, lo_moves, hi_moves, limits, soft, diag, want):
+    """Add the nodal forces of one slice between the records ``o0`` and ``o1``; returns the largest penetration.
+
+    Parameters
+    ----------
+    step : float
+        Width of the slice, m.
+    ua, ub : float
+        The part of the slice on both faces, as fractions (outside 0..1 in the end slices if the face goes on).
+    lo_moves, hi_moves : bool
+        Whether that part ends at the lower or upper limit of the face rather than at a node.
+    limits : ndarray
+        Derivatives of the two limits by the pose.
+    """
+    d0 = -nodes[o0 + N_GAP]
+    d1 = -nodes[o1 + N_GAP]
+    slope = d1 - d0
+    da = d0 + slope * ua
+    db = d0 + slope * ub
+    if da <= 0.0 and db <= 0.0:
+        return 0.0
+    clip_a = da < 0.0
+    clip_b = db < 0.0
+    if clip_a:
+        ua = -d0 / slope
+    if clip_b:
+        ub = -d0 / slope
+    r0 = -nodes[o0 + N_RATE]
+    rs = -nodes[o1 + N_RATE] - r0
+    k = soft * gr[K_]
+    c = soft * gr[C_] if gi[LAW] == 0 else gr[C_]
+    span = ub - ua
+    f0 = 0.0
+    f1 = 0.0
+    K00 = 0.0
+    K01 = 0.0
+    K11 = 0.0
+    R00 = 0.0
+    R01 = 0.0
+    R11 = 0.0
+    f0a = 0.0
+    f0b = 0.0
+    f1a = 0.0
+    f1b = 0.0
+    for g in range(2):
+        t = GAUSS_LO if g == 0 else GAUSS_HI
+        u = ua + span * t
+        rate = r0 + rs * u
+        p, p_d, p_r, energy, elastic = normal_law(gi[LAW], k, gr[E_], c, gr[D_], d0 + slope * u, rate)
+        m = 0.5 * step * span
+        v = 1.0 - u
+        f0 += m * v * p
+        f1 += m * u * p
+        diag[0] += m * energy
+        diag[1] += m * (p - elastic) * rate
+        if want != 0:
+            K00 += m * v * v * p_d
+            K01 += m * u * v * p_d
+            K11 += m * u * u * p_d
+            R00 += m * v * v * p_r
+            R01 += m * u * v * p_r
+            R11 += m * u * u * p_r
+            half = 0.5 * step
+            p_u = p_d * slope + p_r * rs
+            m0 = span * (v * p_u - p) * half
+            m1 = span * (u * p_u + p) * half
+            f0a += (1.0 - t) * m0 - half * v * p
+            f0b += t * m0 + half * v * p
+            f1a += (1.0 - t) * m1 - half * u * p
+            f1b += t * m1 + half * u * p
+    nodes[o0 + N_FORCE] += f0
+    nodes[o1 + N_FORCE] += f1
+    if want != 0:
+        k10 = K01
+        if clip_a or clip_b:
+            c0 = -d1 / (slope * slope)
+            c1 = d0 / (slope * slope)
+            e0 = f0a if clip_a else f0b
+            e1 = f1a if clip_a else f1b
+            K00 += e0 * c0
+            K01 += e0 * c1
+            k10 += e1 * c0
+            K11 += e1 * c1
+        for i in range(6):
+            g0 = nodes[o0 + N_GRAD + i]
+            g1 = nodes[o1 + N_GRAD + i]
+            h0 = nodes[o0 + N_DRATE + i]
+            h1 = nodes[o1 + N_DRATE + i]
+            x0 = -(K00 * g0 + K01 * g1 + R00 * h0 + R01 * h1)
+            x1 = -(k10 * g0 + K11 * g1 + R01 * h0 + R11 * h1)
+            if lo_moves and not clip_a:
+                x0 += f0a * limits[1 + i] / step
+                x1 += f1a * limits[1 + i] / step
+            if hi_moves and not clip_b:
+                x0 += f0b * limits[44 + i] / step
+                x1 += f1b * limits[44 + i] / step
+            nodes[o0 + N_FX + i] += x0
+            nodes[o1 + N_FX + i] += x1
+            nodes[o0 + N_FV + i] -= R00 * g0 + R01 * g1
+            nodes[o1 + N_FV + i] -= R01 * g0 + R11 * g1
+    return max(da, db)
+
+
+@njit(cache=True)
+def end_force(gi, gr, nodes, o0, o1, step, u, sign, limits, l, soft, sums, want):
+    """Force from cutting the elastic layer at an end of the face: its energy density times the limit's motion."""
+    d0 = -nodes[o0 + N_GAP]
+    slope = -nodes[o1 + N_GAP] - d0
+    delta = d0 + slope * u
+    if delta <= 0.0:
+        return
+    p, p_d, p_r, energy, elastic = normal_law(0, soft * gr[K_], gr[E_], 0.0, 1.0, delta, 0.0)
+    for i in range(6):
+        sums[Q_ + i] -= sign * energy * limits[l + 1 + i]
+    if want == 0:
+        return
+    for j in range(6):
+        dd = -(1.0 - u) * nodes[o0 + N_GRAD + j] - u * nodes[o1 + N_GRAD + j] + slope / step * limits[l + 1 + j]
+        for i in range(6):
+            moved = elastic * dd * limits[l + 1 + i] + energy * limits[l + 7 + 6 * i + j]
+            sums[H_ + 6 * i + j] -= sign * moved

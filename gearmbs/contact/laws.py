@@ -1,0 +1,91 @@
+"""Force laws of the contact: normal pressure against penetration and its rate, friction against sliding speed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from gearmbs.contact import layout as L
+
+LAW_IMPACT, LAW_HUNT_CROSSLEY = L.LAW_IMPACT, L.LAW_HUNT_CROSSLEY
+FRICTION_ADAMS = L.FRICTION_ADAMS
+K_, E_, C_, D_ = L.LAW_K, L.LAW_E, L.LAW_C, L.LAW_D
+MU_S, MU_D, V_S, V_D = L.MU_S, L.MU_D, L.V_S, L.V_D
+
+
+@njit(cache=True, inline="never")
+def normal_law(law, k, e, c, d, delta, rate):
+    """Pressure per unit face width, its derivatives and the elastic energy density.
+
+    IMPACT is the paper's eq. (10) and (11) with the damping acting on the penetration rate and no adhesion:
+    ``p = max(0, k delta^e + c STEP(delta, 0, 0, d, 1) rate)``. The Hunt-Crossley law is
+    ``p = max(0, k delta^e (1 + c rate))``. Linear and Hertz line contact are IMPACT with their own exponents.
+
+    Parameters
+    ----------
+    law : int
+        One of ``layout.LAW_*``.
+    k, e, c, d : float
+        Stiffness, exponent, damping and penetration of full damping, per unit face width.
+    delta, rate : float
+        Penetration, m, and its rate, m/s.
+
+    Returns
+    -------
+    p, p_delta, p_rate, energy, p_elastic : float
+    """
+    if delta <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    elastic = k * delta if e == 1.0 else k * delta**e
+    slope = e * elastic / delta
+    energy = elastic * delta / (e + 1.0)
+    if law == LAW_HUNT_CROSSLEY:
+        factor = 1.0 + c * rate
+        if factor <= 0.0:
+            return 0.0, 0.0, 0.0, energy, elastic
+        return elastic * factor, slope * factor, elastic * c, energy, elastic
+    if delta >= d:
+        step = 1.0
+        step_slope = 0.0
+    else:
+        ratio = delta / d
+        step = ratio * ratio * (3.0 - 2.0 * ratio)
+        step_slope = 6.0 * ratio * (1.0 - ratio) / d
+    p = elastic + c * step * rate
+    if p <= 0.0:
+        return 0.0, 0.0, 0.0, energy, elastic
+    return p, slope + c * step_slope * rate, c * step, energy, elastic
+
+
+@njit(cache=True, inline="never")
+def friction_law(kind, mu_s, mu_d, v_s, v_d, speed):
+    """Friction coefficient over sliding speed, and the derivative of that ratio over the speed.
+
+    The ADAMS law rises as a cubic STEP from ``-mu_s`` at ``-v_s`` to ``mu_s`` at ``v_s`` and falls as a STEP to
+    ``mu_d`` at ``v_d``. The smooth law is ``mu_d tanh(speed / v_s)``: no Stribeck peak, every derivative continuous.
+
+    Returns
+    -------
+    ratio : float
+        ``mu(speed) / speed``, finite at rest.
+    ratio_slope : float
+        ``(d ratio / d speed) / speed``, finite at rest.
+    """
+    if kind == FRICTION_ADAMS:
+        if speed <= v_s:
+            r = speed / v_s
+            return 0.5 * mu_s * (3.0 - r * r) / v_s, -mu_s / v_s**3
+        if speed >= v_d:
+            return mu_d / speed, -mu_d / speed**3
+        r = (speed - v_s) / (v_d - v_s)
+        mu = mu_s + (mu_d - mu_s) * r * r * (3.0 - 2.0 * r)
+        slope = (mu_d - mu_s) * 6.0 * r * (1.0 - r) / (v_d - v_s)
+        ratio = mu / speed
+        return ratio, (slope - ratio) / (speed * speed)
+    y = speed / v_s
+    if y < 1e-2:
+        y2 = y * y
+        return mu_d / v_s * (1.0 - y2 / 3.0 + 2.0 * y2 * y2 / 15.0), mu_d / v_s**3 * (-2.0 / 3.0 + 8.0 * y2 / 15.0)
+    t = np.tanh(y)
+    ratio = mu_d * t / speed
+    return ratio, (mu_d * (1.0 - t * t) / v_s - ratio) / (speed * speed)

@@ -1,0 +1,130 @@
+"""Contact and friction laws as a person states them; the compiled forms live in ``gearmbs.contact.laws``."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from gearmbs.units import to_si
+
+LawKind = Literal["impact", "hunt-crossley", "linear", "hertz"]
+
+
+@dataclass(frozen=True)
+class ContactLaw:
+    """Normal force of one tooth pair over its face, against penetration and its rate.
+
+    Use the class methods; each states its own formula. ``stiffness`` and ``damping`` refer to the whole face of a
+    pair of parallel wheels and are distributed evenly over it.
+
+    Attributes
+    ----------
+    kind : {"impact", "hunt-crossley", "linear", "hertz"}
+    stiffness : float
+        K, N/m^exponent.
+    exponent : float
+    damping : float
+        C, N s/m; for Hunt-Crossley the factor on the penetration rate, s/m.
+    depth : float
+        Penetration at which the damping is fully on, m.
+    """
+
+    kind: LawKind
+    stiffness: float
+    exponent: float
+    damping: float
+    depth: float
+
+    def __post_init__(self) -> None:
+        for name, low in (("stiffness", 0.0), ("exponent", 0.0), ("depth", 0.0)):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > low):
+                raise ValueError(f"ContactLaw.{name} is {value}; it must be positive and finite")
+        if not (math.isfinite(self.damping) and self.damping >= 0):
+            raise ValueError(f"ContactLaw.damping is {self.damping}; it must not be negative")
+        if self.exponent < 1:
+            raise ValueError(
+                f"ContactLaw.exponent is {self.exponent}; below 1 the stiffness is infinite at first touch"
+            )
+
+    @classmethod
+    def impact(
+        cls,
+        stiffness: float | str = "2.9852e5 N/mm^1.3",
+        exponent: float = 1.3,
+        damping: float | str | None = None,
+        depth: float | str = "0.1 mm",
+    ) -> ContactLaw:
+        """ADAMS's IMPACT, the paper's eq. (10)-(11): ``max(0, K x^e + C STEP(x, 0, 0, d, 1) dx/dt)``.
+
+        Parameters
+        ----------
+        stiffness : float or str
+            K in N/m^e, or text such as ``"2.9852e5 N/mm^1.3"``.
+        exponent : float
+            e.
+        damping : float or str, optional
+            C; default 0.001 of the stiffness, taken as the paper and ADAMS do: the number of K in N/mm^e times 0.001
+            is the number of C in N s/mm.
+        depth : float or str
+            d, the penetration of full damping.
+        """
+        k = to_si(stiffness, f"N/m^{exponent!r}", "ContactLaw.stiffness")
+        c = 0.001 * k * 1e-3**exponent * 1e3 if damping is None else to_si(damping, "N*s/m", "ContactLaw.damping")
+        return cls("impact", k, float(exponent), c, to_si(depth, "length", "ContactLaw.depth"))
+
+    @classmethod
+    def hunt_crossley(
+        cls, stiffness: float | str = "2.9852e5 N/mm^1.3", exponent: float = 1.3, factor: float | str = "0.5 s/m"
+    ) -> ContactLaw:
+        """Hunt and Crossley's law ``max(0, K x^e (1 + c dx/dt))``; c is about 1.5 (1 - restitution) / impact speed."""
+        k = to_si(stiffness, f"N/m^{exponent!r}", "ContactLaw.stiffness")
+        return cls("hunt-crossley", k, float(exponent), to_si(factor, "s/m", "ContactLaw.factor"), 1.0)
+
+    @classmethod
+    def linear(cls, stiffness: float | str, damping: float | str = 0.0, depth: float | str = "0.1 mm") -> ContactLaw:
+        """A linear spring per tooth pair with IMPACT's damping."""
+        k = to_si(stiffness, "N/m", "ContactLaw.stiffness")
+        c = to_si(damping, "N*s/m", "ContactLaw.damping")
+        return cls("linear", k, 1.0, c, to_si(depth, "length", "ContactLaw.depth"))
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Coulomb friction between flanks, regularised in the sliding speed.
+
+    Parameters
+    ----------
+    static, dynamic : float
+        Coefficients.
+    static_speed, dynamic_speed : float or str
+        Speeds of full static and of dynamic friction (ADAMS law); the smooth law uses ``dynamic`` and the first.
+    kind : {"adams", "smooth", "none"}
+    """
+
+    static: float = 0.1
+    dynamic: float = 0.05
+    static_speed: float | str = "100 mm/s"
+    dynamic_speed: float | str = "1000 mm/s"
+    kind: Literal["adams", "smooth", "none"] = "adams"
+
+    def __post_init__(self) -> None:
+        for name in ("static_speed", "dynamic_speed"):
+            object.__setattr__(self, name, to_si(getattr(self, name), "speed", f"Friction.{name}"))
+        for name in ("static", "dynamic"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and 0 <= value <= 2):
+                raise ValueError(f"Friction.{name} is {value}; give 0 to 2")
+        if not 0 < self.static_speed < self.dynamic_speed:
+            raise ValueError(
+                f"Friction.static_speed is {self.static_speed} m/s and dynamic_speed {self.dynamic_speed} m/s; "
+                "the first must be positive and below the second"
+            )
+        if self.kind not in ("adams", "smooth", "none"):
+            raise ValueError(f"Friction.kind is {self.kind!r}; choose 'adams', 'smooth' or 'none'")
+
+    @classmethod
+    def none(cls) -> Friction:
+        """No friction."""
+        return cls(kind="none")

@@ -1,0 +1,51 @@
+"""Tables for people: what a wheel and a pair are, in the units of a drawing."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from gearmbs.gears.pair import GearPair
+
+
+def pair_table(pair: GearPair) -> Table:
+    """Table of a gear pair for a terminal or a notebook."""
+    mm = 1e3
+    table = Table(title=f"Gear pair {pair.driver.teeth}/{pair.driven.teeth}")
+    for column in ("", pair.driver.name, pair.driven.name):
+        table.add_column(column, justify="left" if not column else "right")
+
+    def both(label: str, form: str, attribute: str, factor: float = mm) -> None:
+        table.add_row(label, *(format(getattr(w, attribute) * factor, form) for w in pair.wheels))
+
+    both("teeth", "d", "teeth", 1)
+    for label, attribute in (
+        ("module mm", "module"),
+        ("pitch radius mm", "pitch_radius"),
+        ("tip radius mm", "tip_radius"),
+        ("base radius mm", "base_radius"),
+        ("root radius mm", "root_radius"),
+        ("root arc mm", "fillet_radius"),
+        ("face width mm", "face_width"),
+    ):
+        both(label, ".4f", attribute)
+    both("mass kg", ".4f", "mass", 1)
+    table.add_section()
+    for label, value in (
+        ("centre distance mm", f"{pair.centre_distance * mm:.4f}"),
+        ("working pressure angle deg", f"{math.degrees(pair.working_pressure_angle):.3f}"),
+        ("contact ratio", f"{pair.contact_ratio:.4f}"),
+        ("path of contact mm", f"{pair.path_of_contact * mm:.3f}"),
+        ("normal backlash mm", f"{pair.normal_backlash * mm:.4f}"),
+        ("misalignment deg", f"{math.degrees(pair.misalignment):.3f} {pair.plane if pair.misalignment else ''}"),
+        ("load torque N m", f"{pair.torque:.1f}"),
+        ("normal force N", f"{pair.normal_force:.1f}"),
+        ("penetration, one pair um", f"{pair.penetration() * 1e6:.2f}"),
+    ):
+        table.add_row(label, value, "")
+    if pair.jams:
+        table.add_row("jams", f"needs {pair.jam_backlash * mm:.4f} mm of normal backlash", "")
+    return table

@@ -1,0 +1,117 @@
+"""Units at the border: text with a unit, or a float in SI, becomes a float in SI.
+
+Floats and integers pass through as SI values. Text is read by pint, imported only when text arrives.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from numbers import Real
+from typing import Any
+
+DIMENSIONS = {
+    "length": "m",
+    "area": "m^2",
+    "angle": "rad",
+    "time": "s",
+    "mass": "kg",
+    "inertia": "kg*m^2",
+    "density": "kg/m^3",
+    "force": "N",
+    "torque": "N*m",
+    "speed": "m/s",
+    "angular speed": "rad/s",
+    "acceleration": "m/s^2",
+    "frequency": "Hz",
+    "pressure": "Pa",
+    "stiffness": "N/m",
+    "damping": "N*s/m",
+    "power": "W",
+    "energy": "J",
+    "dimensionless": "dimensionless",
+}
+
+
+@functools.cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+
+
+def to_si(value: Any, unit: str, field: str = "value") -> float:
+    """Value in SI units.
+
+    Parameters
+    ----------
+    value : float or str
+        A number, taken as SI, or text with a unit: ``"0.1 mm"``, ``"1000 rpm"``, ``"2.9852e5 N/mm^1.3"``.
+    unit : str
+        The SI unit wanted (``"N/m^1.3"``), or a dimension by name (``"length"``, ``"angle"``, ``"torque"`` ...).
+    field : str
+        Name used in error messages.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        For text that is not a number with a unit, unknown units, units of another dimension, and NaN.
+    TypeError
+        For anything that is neither a number nor text.
+
+    Examples
+    --------
+    >>> to_si("0.1 mm", "length")
+    0.0001
+    >>> to_si(20.0, "length")
+    20.0
+    >>> round(to_si("1 N/mm^1.3", "N/m^1.3"), 3)
+    7943.282
+    """
+    target = DIMENSIONS.get(unit, unit)
+    if isinstance(value, bool):
+        raise TypeError(f"{field}: got {value!r}; give a number in {target} or text with a unit")
+    if isinstance(value, Real):
+        number = float(value)
+    elif isinstance(value, str):
+        number = _parse(value, target, field)
+    elif hasattr(value, "to") and hasattr(value, "magnitude"):
+        number = _parse(f"{float(value.magnitude)!r} {value.units!s}", target, field)
+    else:
+        raise TypeError(f"{field}: got {value!r}; give a number in {target} or text with a unit, such as '1 {target}'")
+    if math.isnan(number):
+        raise ValueError(f"{field}: got NaN; give a finite number in {target}")
+    return number
+
+
+def _parse(text: str, target: str, field: str) -> float:
+    import pint
+
+    registry = _registry()
+    clean = re.sub(r"(?<=\d)\s*°", " deg", text.strip()).replace("·", "*").replace("µ", "u").replace("μ", "u")
+    try:
+        quantity = registry.Quantity(clean)
+    except Exception as error:
+        raise ValueError(
+            f"{field}: cannot read {text!r} as a number with a unit ({error}); write for example '1 {target}'"
+        ) from None
+    if not isinstance(quantity, registry.Quantity):
+        quantity = registry.Quantity(quantity, "dimensionless")
+    if not isinstance(quantity.magnitude, Real):
+        raise ValueError(f"{field}: cannot read {text!r} as a number with a unit; write for example '1 {target}'")
+    wanted = registry.Quantity(1.0, target)
+    if quantity.dimensionless and not wanted.dimensionless:
+        raise ValueError(f"{field}: {text!r} has no unit; write for example '{text.strip()} {target}'")
+    if wanted.units == registry.radian and quantity.dimensionless and quantity.unitless:
+        raise ValueError(f"{field}: {text!r} has no unit; write 'deg' or 'rad'")
+    try:
+        return float(quantity.to(target).magnitude)
+    except pint.DimensionalityError:
+        raise ValueError(
+            f"{field}: {text!r} is in {quantity.units:~} where a quantity in {target} is expected"
+        ) from None
