@@ -1,0 +1,62 @@
+"""Reading command scripts."""
+
+from __future__ import annotations
+
+import pytest
+
+from gearmbs.adams import DeckError, parse_deck, parse_script
+from gearmbs.adams import statements as st
+from gearmbs.adams.commands import Change, Simulate, Stop, Switch, apply_change
+
+from .decks import PENDULUM, SCRIPT
+
+
+def test_script():
+    script = parse_script(SCRIPT)
+    assert (script.model, script.prefix) == ("pendulum.adm", "out")
+    kinds = [type(c) for c in script]
+    assert kinds == [Change, Simulate, Switch, Change, Simulate, Stop]
+    first, second = (c for c in script if isinstance(c, Simulate))
+    assert (first.kind, first.end, first.dtout) == ("DYNAMICS", 1.0, 0.01)
+    assert (second.kind, second.duration, second.steps, second.line) == ("DYNAMICS", 1.0, 50, 7)
+    switch = next(c for c in script if isinstance(c, Switch))
+    assert (switch.element, switch.id, switch.on) == ("JOINT", 1, False)
+
+
+def test_script_without_names_starts_with_a_command():
+    assert parse_script("sim/tran, end=1, steps=2\nstop").model == ""
+    assert parse_script("file/model=a.adm, output_prefix=b\nstop").prefix == "b"
+
+
+def test_changes_replace_only_what_they_give():
+    deck = parse_deck(PENDULUM)
+    change = next(c for c in parse_script("\n\npart/2, mass=3\nstop") if isinstance(c, Change))
+    part = apply_change(deck.of(st.Part)[2], change.statement)
+    assert (part.mass, part.cm, part.ip) == (3.0, 201, (0.04, 0.1, 0.1))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("sim/foo, end=1, steps=1", "unknown argument FOO"),
+        ("simulate/dynamics, end=1", "give STEPS or DTOUT"),
+        ("simulate/dynamics, end=1, steps=3, dtout=1", "not both"),
+        ("simulate/dynamics, end=1, steps=0", "must be positive"),
+        ("simulate/end=1, steps=3", "give one of DYNAMICS"),
+        ("deactivate/joint", "give an element and its id"),
+        ("stop\n", None),
+        ("var/2", "no argument is given"),
+        ("output/separator\nsimlate/dynamics, end=1, steps=1", "did you mean SIMULATE"),
+    ],
+)
+def test_messages(text, message):
+    if message is None:
+        assert len(parse_script(text).commands) == 1
+        return
+    with pytest.raises(DeckError, match=message):
+        parse_script("model\nout\n" + text)
+
+
+def test_unsupported_commands_are_named():
+    script = parse_script("m\no\nsave/file=x\nstop")
+    assert [str(d) for d in script.unsupported] == ["<script>:3: unsupported: SAVE is not supported"]

@@ -1,0 +1,100 @@
+"""Mutated, truncated and random decks give a deck or an error with a line; nothing else."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gearmbs.adams import Deck, DeckError, Script, parse_deck, parse_script
+from gearmbs.adams.source import read_text
+
+from .decks import EVERYTHING, PENDULUM, SCRIPT
+
+SPICE = ["/", ",", "=", "\\", "(", ")", "!", "&", ";", "\n", "\n,", "D", "E", "90D", "1E400", "-", "0", "\x00", "\t", "'",
+         '"', ":", "**", "PART/", "END", "é", "\x01", "9" * 30, "FUNCTION=", "I=", " "]  # fmt: skip
+
+
+def mutated(text: str, rng: random.Random) -> str:
+    """Return the text after a few random edits."""
+    for _ in range(rng.randint(1, 6)):
+        at = rng.randrange(len(text) + 1)
+        to = min(len(text), at + rng.randint(1, 12))
+        kind = rng.randrange(6)
+        if kind == 0:
+            text = text[:at] + text[to:]
+        elif kind == 1:
+            text = text[:at] + rng.choice(SPICE) + text[at:]
+        elif kind == 2:
+            text = text[:at] + "".join(chr(rng.randint(1, 255)) for _ in range(3)) + text[to:]
+        elif kind == 3:
+            text = text[: rng.randrange(len(text) + 1)]
+        elif kind == 4:
+            lines = text.split("\n")
+            i, j = rng.randrange(len(lines)), rng.randrange(len(lines))
+            lines[i], lines[j] = lines[j], lines[i]
+            text = "\n".join(lines)
+        else:
+            piece = text[at:to]
+            text = text[:at] + piece * rng.randint(2, 4) + text[to:]
+    return text
+
+
+def outcome(parser, text: str) -> None:
+    """Parse; an error must name at least one place."""
+    try:
+        result = parser(text, "fuzz")
+    except DeckError as error:
+        assert error.diagnostics
+        assert all(d.line >= 0 and d.message and d.file == "fuzz" for d in error.diagnostics)
+        assert str(error).startswith("fuzz:")
+        return
+    assert isinstance(result, (Deck, Script))
+
+
+def run(cases: int, seed: int) -> None:
+    rng = random.Random(seed)
+    for _ in range(cases):
+        outcome(parse_deck, mutated(PENDULUM if rng.random() < 0.7 else EVERYTHING, rng))
+        outcome(parse_script, mutated(SCRIPT, rng))
+
+
+def test_mutated_decks():
+    run(1200, 1)
+
+
+@pytest.mark.slow
+def test_mutated_decks_in_tens_of_thousands():
+    run(40_000, 2)
+
+
+def test_every_truncation_of_a_deck():
+    for cut in range(0, len(PENDULUM), 3):
+        outcome(parse_deck, PENDULUM[:cut])
+    for cut in range(len(SCRIPT)):
+        outcome(parse_script, SCRIPT[:cut])
+
+
+@settings(max_examples=300, deadline=None, derandomize=True)
+@given(st.one_of(st.text(max_size=200), st.lists(st.sampled_from([*SPICE, "MARKER/1", "QP=", "JOINT"])).map("".join)))
+def test_random_text(text):
+    outcome(parse_deck, "title\n" + text)
+    outcome(parse_script, text)
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(st.binary(max_size=200))
+def test_random_bytes(data):
+    outcome(parse_deck, read_text(data))
+
+
+def test_long_deck_reads_in_linear_time():
+    parts = [
+        f"PART/{k}, MASS=1, CM={10 * k}, IP=1,1,1\nMARKER/{10 * k}, PART={k}\nMARKER/{10 * k + 1}, PART={k}, QP=1,0,0"
+        for k in range(2, 1002)
+    ]
+    joints = [f"JOINT/{k}, REVOLUTE, I={10 * k + 10}, J={10 * k + 1}" for k in range(2, 1001)]
+    deck = parse_deck("chain\nUNITS/SYSTEM=MKS\nPART/1,GROUND\n" + "\n".join(parts + joints) + "\nEND\n")
+    assert sum(1 for _ in deck) == 1 + 1 + 3000 + 999
