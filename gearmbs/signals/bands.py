@@ -52,11 +52,18 @@ def band_rms(
     -------
     xarray.DataArray of dimension (channel,)
     """
-    passed = bandpass(
-        signal, frequency - half_width, frequency + half_width, transition=transition, attenuation=ATTENUATION_DB
-    )
-    count = whole_period_count(passed.sizes["time"], rate_of(signal), 1.0 / period if period else frequency)
-    return _per_channel(signal, rms(passed.values[:count]))
+    levels = []
+    for channel in range(signal.sizes["channel"]):
+        passed = bandpass(
+            signal[:, [channel]],
+            frequency - half_width,
+            frequency + half_width,
+            transition=transition,
+            attenuation=ATTENUATION_DB,
+        )
+        count = whole_period_count(passed.sizes["time"], rate_of(signal), 1.0 / period if period else frequency)
+        levels.append(rms(passed.values[:count, 0]))
+    return _per_channel(signal, np.asarray(levels))
 
 
 def order_rms(signal: xr.DataArray, fundamental: float, orders: Sequence[float]) -> xr.DataArray:

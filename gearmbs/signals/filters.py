@@ -94,7 +94,8 @@ def apply_zero_phase(values: np.ndarray, taps: np.ndarray, edges: Edges, step: i
                 (2 * source[0] - source[half:0:-1], source, 2 * source[-1] - source[-2 : -half - 2 : -1])
             )
         columns.append(_valid(source, taps, step))
-    return np.stack(columns, axis=1), half if edges == "trim" else 0
+    result = columns[0][:, None] if len(columns) == 1 else np.stack(columns, axis=1)
+    return result, half if edges == "trim" else 0
 
 
 def _valid(source: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:

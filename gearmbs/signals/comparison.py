@@ -1,0 +1,264 @@
+"""Experiment against model as in section 4 of the paper: scale, band-pass, compare state by state and load by load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+
+from .analysis import analyse
+from .bands import HALF_WIDTH
+from .comparison_report import ComparisonReport
+from .errors import SignalError
+from .io import read_signal
+
+Progress = Callable[[float, str], None]
+States = Mapping[str, Mapping[str, xr.DataArray]]
+Scope = Literal["load", "all", "each"]
+FEATURES = ("kurtosis", "fm4", "energy_ratio", "sideband_level")
+
+
+def compare(
+    experiment: States,
+    model: States | None = None,
+    *,
+    reference: str = "healthy",
+    scope: Scope = "load",
+    channel: str | None = None,
+    model_channel: str | None = None,
+    way: Literal["band", "orders"] = "band",
+    harmonics: int = 3,
+    half_width: float = HALF_WIDTH,
+    wheel: int = 1,
+    progress: Progress | None = None,
+) -> ComparisonReport:
+    """Compare the gear mesh harmonics of states and loads, measured and simulated.
+
+    For every load and state the RMS of the first GMF harmonics is taken (`analyse`). The model's are multiplied by
+    the ratio of the mean-free RMS, experiment over model, of the whole records.
+
+    Parameters
+    ----------
+    experiment : mapping of load to mapping of state to signal
+        E.g. {"low": {"healthy": s1, "misaligned": s2}, "high": {...}}, loads from low to high. Each signal needs
+        `teeth`; its speed is used if it has one, and found from the mesh line otherwise.
+    model : the same, optional
+        Without it the report says what each state does to the experiment. Its loads and states must cover some of the
+        experiment's; the rest is left out and named.
+    reference : str
+        The state the others are held against.
+    scope : {"load", "all", "each"}
+        Which records set the scaling factor: "load", the reference state at each load (its factor kept for the faults);
+        "all", the reference state at the first load, for everything; "each", every record its own.
+    channel, model_channel : str, optional
+        Channel to compare; needed with a model where a signal has more than one.
+    way : {"band", "orders"}
+        RMS in the band (the paper's) or of the line alone.
+    harmonics, half_width
+        As for `gmf_rms`.
+    wheel : int
+        Whose shaft the indicators follow (`analyse`).
+    progress : callable, optional
+        Called as progress(fraction, stage).
+
+    Returns
+    -------
+    ComparisonReport
+
+    Raises
+    ------
+    SignalError
+        If the reference is missing at a load, a channel is not named, or the units of experiment and model are of
+        different kinds.
+    MissingMetadataError
+        If a signal does not know its tooth count.
+    """
+    if scope not in ("load", "all", "each"):
+        raise SignalError(f"scope: must be 'load', 'all' or 'each', got {scope!r}")
+    if way not in ("band", "orders"):
+        raise SignalError(f"way: must be 'band' or 'orders', got {way!r}")
+    loads, states, left_out = _common_cases(experiment, model, reference)
+    total = len(loads) * len(states) * (1 if model is None else 2)
+    done = 0
+
+    def tell(fraction: float, stage: str) -> None:
+        if progress is not None:
+            progress((done + fraction) / total, stage)
+
+    measured: dict[tuple[str, str], xr.Dataset] = {}
+    simulated: dict[tuple[str, str], xr.Dataset] = {}
+    for side, cases, pick, found in (
+        ("experiment", experiment, channel, measured),
+        ("model", model, model_channel, simulated),
+    ):
+        if cases is None:
+            continue
+        for load in loads:
+            for state in states:
+                if state not in cases[load]:
+                    continue
+                signal = _picked(cases[load][state], pick, side, single=model is not None)
+                found[load, state] = _features(signal, harmonics, half_width, way, wheel, tell)
+                done += 1
+    data = _tabulate(measured, loads, states, "experiment")
+    if model is not None:
+        data = data.isel(channel=0, drop=True)
+        other = _tabulate(simulated, loads, states, "model").isel(channel=0, drop=True)
+        if data.attrs["units"] != other.attrs["units"] and "unknown" not in (data.attrs["units"], other.attrs["units"]):
+            raise SignalError(
+                f"units: the experiment is in {data.attrs['units']!r}, the model in {other.attrs['units']!r}; "
+                "bring both to one with convert or force_to_acceleration"
+            )
+        factor = _factors(data["level"], other["level"], reference, scope)
+        data["model"] = other["rms"] * factor
+        data["factor"] = factor
+        data["model_unscaled"] = other["rms"]
+        data["model_gmf"] = other["gmf"]
+    data = data.rename(rms="experiment")
+    data.attrs.update(reference=reference, scope=scope, way=way, half_width=half_width)
+    return ComparisonReport(data, reference, left_out)
+
+
+def compare_files(
+    experiment: Mapping[str, Mapping[str, str | Path]],
+    model: Mapping[str, Mapping[str, str | Path]] | None = None,
+    *,
+    teeth: int | Sequence[int] | None = None,
+    rate: float | None = None,
+    units: str | None = None,
+    speed: float | None = None,
+    reference: str = "healthy",
+    scope: Scope = "load",
+    channel: str | None = None,
+    model_channel: str | None = None,
+    way: Literal["band", "orders"] = "band",
+    harmonics: int = 3,
+    half_width: float = HALF_WIDTH,
+    wheel: int = 1,
+    progress: Progress | None = None,
+) -> ComparisonReport:
+    """Read the files and `compare` them.
+
+    Parameters
+    ----------
+    experiment, model : mapping of load to mapping of state to path
+    teeth, rate, units, speed
+        Metadata that the experiment's files lack (`read_signal`); the model's files must know theirs.
+    reference, scope, channel, model_channel, way, harmonics, half_width, wheel, progress
+        As for `compare`.
+
+    Returns
+    -------
+    ComparisonReport
+    """
+    measured = {
+        load: {s: read_signal(p, rate=rate, units=units, teeth=teeth, speed=speed) for s, p in cases.items()}
+        for load, cases in experiment.items()
+    }
+    simulated = None
+    if model is not None:
+        simulated = {load: {s: read_signal(p) for s, p in cases.items()} for load, cases in model.items()}
+    return compare(
+        measured,
+        simulated,
+        reference=reference,
+        scope=scope,
+        channel=channel,
+        model_channel=model_channel,
+        way=way,
+        harmonics=harmonics,
+        half_width=half_width,
+        wheel=wheel,
+        progress=progress,
+    )
+
+
+def _common_cases(experiment: States, model: States | None, reference: str) -> tuple[list[str], list[str], list[str]]:
+    sides = [("experiment", experiment)] + ([] if model is None else [("model", model)])
+    loads = [load for load in experiment if model is None or load in model]
+    if not loads:
+        raise SignalError(f"loads: experiment {list(experiment)} and model {list(model or {})} have none in common")
+    left_out = [f"load {load!r} of the {n}" for n, side in sides for load in side if load not in loads]
+    states: list[str] = [reference]
+    for load in loads:
+        for name, side in sides:
+            if reference not in side[load]:
+                raise SignalError(
+                    f"reference: the {name} at load {load!r} has no state {reference!r}, only {list(side[load])}"
+                )
+        for state in experiment[load]:
+            if all(state in side[load] for _, side in sides):
+                if state not in states:
+                    states.append(state)
+            else:
+                left_out.append(f"state {state!r} at load {load!r} of the experiment")
+        if model is not None:
+            left_out += [f"state {s!r} at load {load!r} of the model" for s in model[load] if s not in experiment[load]]
+    return loads, states, left_out
+
+
+def _picked(signal: xr.DataArray, channel: str | None, side: str, single: bool) -> xr.DataArray:
+    names = [str(c) for c in signal["channel"].values]
+    if channel is not None:
+        if channel not in names:
+            raise SignalError(f"channel: the {side} has no {channel!r}, only {names}")
+        return signal[:, [names.index(channel)]]
+    if single and len(names) > 1:
+        keyword = "channel" if side == "experiment" else "model_channel"
+        raise SignalError(f"{keyword}: name the {side}'s channel to compare, one of {names}")
+    return signal
+
+
+def _features(
+    signal: xr.DataArray, harmonics: int, half_width: float, way: str, wheel: int, tell: Progress
+) -> xr.Dataset:
+    report = analyse(signal, harmonics=harmonics, half_width=half_width, wheel=wheel, lines=1, progress=tell)
+    found = report.harmonics.sizes["harmonic"]
+    if found < harmonics:
+        raise SignalError(
+            f"harmonics: only {found} of {harmonics} fit below half the sampling rate of {report.source!r}; "
+            "ask for fewer"
+        )
+    data = xr.Dataset({"rms": report.harmonics[way].drop_vars(["frequency", "channel_units"])})
+    data["level"] = report.levels["rms"]
+    data["gmf"] = report.gmf
+    for name in FEATURES:
+        if report.indicators is not None:
+            data[name] = report.indicators[name]
+        else:
+            data[name] = ("channel", np.full(signal.sizes["channel"], np.nan))
+    data.attrs["units"] = report.harmonics["band"].attrs["units"]
+    return data
+
+
+def _tabulate(found: dict[tuple[str, str], xr.Dataset], loads: list[str], states: list[str], side: str) -> xr.Dataset:
+    first = next(iter(found.values()))
+    for (load, state), one in found.items():
+        if one["channel"].values.tolist() != first["channel"].values.tolist():
+            raise SignalError(
+                f"channels: {state!r} at load {load!r} of the {side} has {one['channel'].values.tolist()}, "
+                f"others have {first['channel'].values.tolist()}"
+            )
+        if one.attrs["units"] != first.attrs["units"]:
+            raise SignalError(
+                f"units: {state!r} at load {load!r} of the {side} is in {one.attrs['units']!r}, "
+                f"others are in {first.attrs['units']!r}"
+            )
+    empty = xr.full_like(first, np.nan)
+    rows = [xr.concat([found.get((load, s), empty) for s in states], "state") for load in loads]
+    data = xr.concat(rows, "load").assign_coords(load=loads, state=states)
+    data.attrs = {"units": first.attrs["units"]}
+    return data
+
+
+def _factors(measured: xr.DataArray, simulated: xr.DataArray, reference: str, scope: str) -> xr.DataArray:
+    ratio = measured / simulated
+    if scope == "each":
+        return ratio
+    at_reference = ratio.sel(state=reference, drop=True)
+    if scope == "all":
+        at_reference = xr.full_like(at_reference, float(at_reference.values[0]))
+    return at_reference * xr.ones_like(ratio)

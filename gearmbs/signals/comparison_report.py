@@ -1,0 +1,290 @@
+"""What a comparison of states and loads found, as data, tables and Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from .ordinal import level_distance, ordinal_agreement
+from .report import markdown_table, significant
+
+# What each fault is expected to do, by harmonic or indicator: +1 rises, by name of the state.
+# Misalignment and centre distance after the paper; local tooth faults after the usual reading of the indicators.
+EXPECTED: dict[str, dict[int | str, int]] = {
+    "misaligned": {2: 1},
+    "distance": {1: 1, 2: 1, 3: 1},
+    "broken": {"sideband_level": 1, "energy_ratio": 1, "fm4": 1, "kurtosis": 1},
+    "chipped": {"sideband_level": 1, "energy_ratio": 1, "fm4": 1, "kurtosis": 1},
+}
+CHANGE_DB = 1.0
+INDICATOR_TIE = 0.05
+CONTRADICTION_DB = 3.0
+
+
+@dataclass
+class ComparisonReport:
+    """Gear mesh harmonics of states and loads.
+
+    Attributes
+    ----------
+    data : xarray.Dataset
+        `experiment` and, with a model, `model` (scaled) of dimensions (load, state, harmonic), plus channel without a
+        model: RMS in the units of the experiment. Also `gmf` and `level` (RMS of the record) by load and state, the
+        indicators, `factor` and `model_unscaled`.
+    reference : str
+        The state the others are held against.
+    left_out : list of str
+        Cases that only one side has.
+    """
+
+    data: xr.Dataset
+    reference: str
+    left_out: list[str] = field(default_factory=list)
+
+    @property
+    def has_model(self) -> bool:
+        """Whether there is a model to compare with."""
+        return "model" in self.data
+
+    @property
+    def faults(self) -> list[str]:
+        """The states but the reference."""
+        return [str(s) for s in self.data["state"].values if s != self.reference]
+
+    def changes(self, side: str = "experiment") -> xr.DataArray:
+        """Change of each harmonic against the reference state, in dB, dimensions (load, state, harmonic[, channel])."""
+        values = self.data[side]
+        ratio = values / values.sel(state=self.reference, drop=True)
+        change = ratio.copy(data=20.0 * np.log10(ratio.values))
+        return change.sel(state=self.faults).assign_attrs(units="dB")
+
+    def agreement(self) -> xr.Dataset:
+        """Agreement of model and experiment.
+
+        Returns
+        -------
+        xarray.Dataset
+            `ordinal` (load, harmonic): fraction of the pairs of states in the same order; `ordinal_load` (state,
+            harmonic): the same for the pairs of loads; `distance` (load,): dB, root mean square over states and
+            harmonics; `same_direction` (load, state, harmonic): whether a fault moves the harmonic the same way.
+        """
+        if not self.has_model:
+            raise ValueError("agreement: there is no model in this comparison")
+        a, b = self.data["experiment"], self.data["model"]
+        complete = np.isfinite(a.values) & np.isfinite(b.values)
+        loads, states, numbers = self.data["load"].values, self.data["state"].values, self.data["harmonic"].values
+        ordinal = np.empty((loads.size, numbers.size))
+        by_load = np.empty((states.size, numbers.size))
+        distance = np.empty(loads.size)
+        for i in range(loads.size):
+            kept = complete[i].all(axis=1)
+            distance[i] = level_distance(a.values[i][kept], b.values[i][kept])
+            for k in range(numbers.size):
+                ordinal[i, k] = ordinal_agreement(a.values[i, kept, k], b.values[i, kept, k])
+        for j in range(states.size):
+            kept = complete[:, j].all(axis=1)
+            for k in range(numbers.size):
+                by_load[j, k] = ordinal_agreement(a.values[kept, j, k], b.values[kept, j, k])
+        one, two = self.changes("experiment"), self.changes("model")
+        same = one.copy(data=np.sign(one.values) == np.sign(two.values)).assign_attrs(units="1")
+        return xr.Dataset(
+            {
+                "ordinal": (("load", "harmonic"), ordinal),
+                "ordinal_load": (("state", "harmonic"), by_load),
+                "distance": ("load", distance, {"units": "dB"}),
+                "same_direction": same,
+            },
+            coords={"load": loads, "state": states, "harmonic": numbers},
+        )
+
+    def expectations(self, expected: Mapping[str, Mapping[int | str, int]] | None = None) -> pd.DataFrame:
+        """Expected against found, fault by fault, in the experiment.
+
+        Parameters
+        ----------
+        expected : mapping of state to mapping of harmonic number or indicator name to +1 or -1, optional
+            Default `EXPECTED`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns load, state, feature, expected, found (median change over channels, in dB for harmonics and as a
+            ratio for indicators), channels (how many moved as expected, of how many), as_expected (more than half did).
+        """
+        expected = EXPECTED if expected is None else expected
+        rows = []
+        for state in self.faults:
+            for feature, sign in expected.get(state, {}).items():
+                for load in self.data["load"].values:
+                    if isinstance(feature, int):
+                        if feature not in self.data["harmonic"].values:
+                            continue
+                        change = np.atleast_1d(self.changes().sel(load=load, state=state, harmonic=feature).values)
+                        moved, shown = sign * change > CHANGE_DB, f"{np.nanmedian(change):+.1f} dB"
+                        name = f"{feature} x GMF"
+                    else:
+                        pair = self.data[feature].sel(load=load)
+                        ratio = np.atleast_1d((pair.sel(state=state) / pair.sel(state=self.reference)).values)
+                        moved, shown = sign * (ratio - 1.0) > INDICATOR_TIE, f"x {np.nanmedian(ratio):.2f}"
+                        name = feature.replace("_", " ")
+                    word = "rises" if sign > 0 else "falls"
+                    share = f"{int(moved.sum())} of {moved.size}"
+                    rows.append((load, state, name, word, shown, share, bool(moved.mean() > 0.5)))
+        columns = ["load", "state", "feature", "expected", "found", "channels", "as_expected"]
+        return pd.DataFrame(rows, columns=columns)
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The numbers as tables: harmonics (side by side), changes, expectations; with a model agreement, distance."""
+        names = ["experiment", "model"] if self.has_model else ["experiment"]
+        tables = {
+            "harmonics": self.data[names].to_dataframe()[names].reset_index(),
+            "changes": self.changes().to_dataframe(name="change_db")["change_db"].reset_index(),
+            "expectations": self.expectations(),
+        }
+        if self.has_model:
+            found = self.agreement()
+            tables["agreement"] = found["ordinal"].to_dataframe().reset_index()
+            tables["distance"] = found["distance"].to_dataframe().reset_index()
+        return tables
+
+    def sentences(self) -> list[str]:
+        """What each fault does to the harmonics, in plain words, load by load."""
+        found = []
+        units = "channels" if not self.has_model else "channel"
+        change = self.changes()
+        for state in self.faults:
+            for load in self.data["load"].values:
+                clauses = []
+                for k in self.data["harmonic"].values:
+                    values = np.atleast_1d(change.sel(load=load, state=state, harmonic=k).values)
+                    if not np.isfinite(values).any():
+                        continue
+                    up, down = int((values > CHANGE_DB).sum()), int((values < -CHANGE_DB).sum())
+                    middle = float(np.nanmedian(values))
+                    if self.has_model:
+                        clauses.append(f"{k} x GMF {_moves(middle)} ({middle:+.1f} dB)")
+                    else:
+                        spread = f"{np.nanmin(values):+.1f} to {np.nanmax(values):+.1f} dB"
+                        clauses.append(
+                            f"{k} x GMF rises on {up} and falls on {down} of {values.size} {units} ({spread})"
+                        )
+                if clauses:
+                    found.append(f"{state} against {self.reference} at load {load}: " + "; ".join(clauses) + ".")
+        return found
+
+    def cautions(self) -> list[str]:
+        """Where channels contradict each other so much that the sensors, not the gears, may differ between records."""
+        if "channel" not in self.data["experiment"].dims or self.data.sizes["channel"] < 2:
+            return []
+        change = self.changes()
+        found = []
+        for state in self.faults:
+            for load in self.data["load"].values:
+                for k in self.data["harmonic"].values:
+                    values = change.sel(load=load, state=state, harmonic=k).values
+                    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+                    if low < -CONTRADICTION_DB and high > CONTRADICTION_DB:
+                        found.append(
+                            f"{state} at load {load}: {k} x GMF moves by {low:+.1f} dB on one channel and by {high:+.1f} dB "
+                            "on another; sensors that were moved between the records would show the same."
+                        )
+        return found
+
+    def to_markdown(self) -> str:
+        """The report as Markdown text."""
+        attrs = self.data.attrs
+        parts = [f"# States against {self.reference!r}", ""]
+        how = "in a band of" if attrs.get("way") == "band" else "of the line alone; bands would be"
+        parts += [
+            f"RMS of the gear mesh harmonics {how} +- {attrs.get('half_width')} GMF, in {attrs.get('units')}.",
+            "",
+        ]
+        if self.left_out:
+            parts += ["Left out, because only one side has it: " + "; ".join(self.left_out) + ".", ""]
+        parts += ["## Harmonics", "", self._harmonic_table(), "", "## What the states do", ""]
+        parts += [f"- {s}" for s in self.sentences() + self.cautions()] + [""]
+        expected = self.expectations()
+        if len(expected):
+            parts += ["## Expected and found in the experiment", ""]
+            rows = [
+                [
+                    r.load,
+                    r.state,
+                    r.feature,
+                    r.expected,
+                    r.found,
+                    r.channels,
+                    "as expected" if r.as_expected else "not as expected",
+                ]
+                for r in expected.itertuples()
+            ]
+            parts += [
+                markdown_table(["load", "state", "feature", "expected", "median", "channels", "verdict"], rows),
+                "",
+            ]
+            unmet = expected[~expected["as_expected"]]
+            if len(unmet):
+                faults = ", ".join(sorted(set(unmet["state"])))
+                parts += [f"Not everything moved as expected of {faults}: {len(unmet)} of {len(expected)} did not.", ""]
+        if self.has_model:
+            parts += ["## Agreement of model and experiment", "", self._agreement_table(), ""]
+        return "\n".join(parts)
+
+    def _harmonic_table(self) -> str:
+        numbers = self.data["harmonic"].values
+        rows = []
+        for load in self.data["load"].values:
+            for state in self.data["state"].values:
+                here = self.data.sel(load=load, state=state)
+                if self.has_model:
+                    pairs = zip(here["experiment"].values, here["model"].values)
+                    cells = [f"{significant(a)} / {significant(b)}" for a, b in pairs]
+                    rows.append([load, state, f"{float(here['gmf']):.2f}", f"{float(here['factor']):.4g}", *cells])
+                else:
+                    for channel in here["channel"].values:
+                        cells = [significant(v) for v in here["experiment"].sel(channel=channel).values]
+                        rows.append([load, state, f"{float(here['gmf']):.2f}", channel, *cells])
+        third = "factor" if self.has_model else "channel"
+        shown = "experiment / model" if self.has_model else "RMS"
+        return markdown_table(["load", "state", "GMF, Hz", third, *(f"{k} x GMF, {shown}" for k in numbers)], rows)
+
+    def _agreement_table(self) -> str:
+        found = self.agreement()
+        numbers = self.data["harmonic"].values
+        rows = []
+        for load in self.data["load"].values:
+            ordinal = [f"{v:.2f}" for v in found["ordinal"].sel(load=load).values]
+            rows.append(
+                [f"order of the states at load {load}", *ordinal, f"{float(found['distance'].sel(load=load)):.1f}"]
+            )
+        if self.data.sizes["load"] > 1:
+            for state in self.data["state"].values:
+                rows.append(
+                    [
+                        f"order of the loads, {state}",
+                        *(f"{v:.2f}" for v in found["ordinal_load"].sel(state=state).values),
+                        "-",
+                    ]
+                )
+        return markdown_table(
+            ["share of pairs in the same order", *(f"{k} x GMF" for k in numbers), "distance, dB"], rows
+        )
+
+    def _repr_markdown_(self) -> str:
+        return self.to_markdown()
+
+    def __repr__(self) -> str:
+        sizes = self.data.sizes
+        sides = "experiment and model" if self.has_model else "experiment"
+        counts = f"{sizes['load']} loads, {sizes['state']} states, {sizes['harmonic']} harmonics"
+        return f"<ComparisonReport of {sides}: {counts}>"
+
+
+def _moves(change: float) -> str:
+    if change > CHANGE_DB:
+        return "rises"
+    return "falls" if change < -CHANGE_DB else "stays"

@@ -1,0 +1,221 @@
+"""Shaft angle over time: from a constant speed, from tacho pulses, or from a gear mesh line when there is no tacho."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import scipy.fft
+import scipy.interpolate
+import scipy.signal as ss
+import xarray as xr
+
+from .errors import SignalError
+from .filters import BLOCK, apply_zero_phase, kaiser_taps
+from .signal import check_speed, rate_of
+
+LINE_ATTENUATION_DB = 60.0
+PULSE_HYSTERESIS = 0.2
+
+
+def phase_from_speed(signal: xr.DataArray, speed: float) -> xr.DataArray:
+    """Angle (rad) of a shaft that turns at the constant `speed` (rad/s), zero at the first sample."""
+    times = signal["time"].values
+    return _phase(times, check_speed(speed) * (times - times[0]), "constant speed")
+
+
+def phase_from_tacho(
+    signal: xr.DataArray, channel: str | None = None, *, pulses_per_rev: float = 1.0, threshold: float | None = None
+) -> xr.DataArray:
+    """Angle (rad) of the shaft from a tacho channel's rising pulse edges.
+
+    Edges are placed between samples by linear interpolation at the threshold; the signal must fall below the threshold
+    by a fifth of its swing before the next edge counts. A cubic spline through the edges gives the angle between them.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel).
+    channel : str, optional
+        The tacho's channel; may be left out if there is only one.
+    pulses_per_rev : float
+        Pulses per revolution.
+    threshold : float, optional
+        Level of the edges; default the middle between the 1st and the 99th percentile.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimension (time,), only the samples between the first and the last pulse.
+
+    Raises
+    ------
+    SignalError
+        If the channel is unknown or fewer than three pulses are found.
+    """
+    names = [str(c) for c in signal["channel"].values]
+    if channel is None and len(names) > 1:
+        raise SignalError(f"channel: name the tacho channel, one of {names}")
+    if channel is not None and channel not in names:
+        raise SignalError(f"channel: there is no {channel!r}, only {names}")
+    if not (math.isfinite(pulses_per_rev) and pulses_per_rev > 0.0):
+        raise SignalError(f"pulses_per_rev: must be positive, got {pulses_per_rev!r}")
+    pulses = signal.values[:, names.index(channel) if channel is not None else 0]
+    low, high = np.percentile(pulses, [1.0, 99.0])
+    if high <= low:
+        low, high = float(pulses.min()), float(pulses.max())
+    level = 0.5 * (low + high) if threshold is None else float(threshold)
+    crossings = np.flatnonzero((pulses[:-1] < level) & (pulses[1:] >= level))
+    floor = level - PULSE_HYSTERESIS * (high - low)
+    kept: list[int] = []
+    previous = 0
+    for index in crossings.tolist():
+        if not kept or pulses[previous : index + 1].min() < floor:
+            kept.append(index)
+            previous = index + 1
+    if len(kept) < 3:
+        raise SignalError(
+            f"channel: {len(kept)} pulses cross the threshold {level:g} in {channel or names[0]!r}, "
+            "at least 3 are needed; check the channel or pass threshold=..."
+        )
+    at = np.asarray(kept)
+    times = signal["time"].values
+    edges = times[at] + (level - pulses[at]) / (pulses[at + 1] - pulses[at]) / rate_of(signal)
+    angles = 2.0 * np.pi / pulses_per_rev * np.arange(at.size)
+    inside = (times >= edges[0]) & (times <= edges[-1])
+    spline = scipy.interpolate.CubicSpline(edges, angles)
+    phase = spline(times[inside])
+    if np.any(np.diff(phase) <= 0.0):
+        raise SignalError("channel: the pulses are too uneven for one shaft that keeps turning; check the threshold")
+    return _phase(times[inside], phase, "tacho")
+
+
+def phase_from_line(
+    signal: xr.DataArray, frequency: float, order: float, *, half_bandwidth: float | None = None
+) -> xr.DataArray:
+    """Angle (rad) of the shaft from the phase of one line, such as a gear mesh harmonic.
+
+    Each channel is shifted down by `frequency`, low-passed (zero-phase FIR, flat to half_bandwidth, 60 dB down at twice
+    that) and its phase unwrapped; the channel whose line holds up best over time (fifth percentile of the envelope over
+    its RMS) is used. At either end, where the filter reaches outside, the angle is continued at the nearest speed.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel).
+    frequency : float
+        Mean frequency of the line in Hz.
+    order : float
+        Line frequency over shaft frequency, e.g. the tooth count times the harmonic.
+    half_bandwidth : float, optional
+        Largest deviation to follow, in Hz; default 0.15 shaft frequencies, which keeps out sidebands of the shaft and
+        of most mating shafts.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimension (time,), all samples; attributes `channel`, `quality` (0 to 1) and `mean_speed` in rad/s.
+
+    Raises
+    ------
+    SignalError
+        If the record is too short for the filter, or a parameter is out of range.
+    """
+    rate = rate_of(signal)
+    if not 0.0 < frequency < rate / 2 or not order > 0.0:
+        raise SignalError(
+            f"frequency, order: must be positive and below {rate / 2:g} Hz, got {frequency!r} and {order!r}"
+        )
+    half = 0.15 * frequency / order if half_bandwidth is None else float(half_bandwidth)
+    if not 0.0 < half < frequency / 2:
+        raise SignalError(f"half_bandwidth: must lie between 0 and half the line's frequency, got {half!r} Hz")
+    taps = kaiser_taps(1.5 * half, half, rate, "lowpass", LINE_ATTENUATION_DB)
+    step = max(1, int(rate / (16.0 * half)))
+    n = signal.sizes["time"]
+    times = signal["time"].values
+    if n < taps.size:
+        raise SignalError(
+            f"signal: has {n} samples, following the line needs at least {taps.size}; "
+            f"widen half_bandwidth ({half:g} Hz)"
+        )
+    first = taps.size // 2
+    best: tuple[float, int, np.ndarray] | None = None
+    for channel, column in enumerate(signal.values.T):
+        line = demodulate(column, frequency / rate, taps, step)
+        size = np.abs(line)
+        level = float(np.sqrt(np.mean(size**2)))
+        quality = float(np.percentile(size, 5.0)) / level if level > 0.0 else 0.0
+        if best is None or quality > best[0]:
+            best = (quality, channel, line)
+    assert best is not None
+    quality, channel, line = best
+    slow = np.unwrap(np.angle(line))
+    at = (first + step * np.arange(slow.size)) / rate
+    if at.size > 3:
+        track = scipy.interpolate.CubicSpline(at, slow)
+        slopes = track(np.array([at[0], at[-1]]), 1)
+    else:
+        track, slopes = (lambda x: np.interp(x, at, slow)), np.zeros(2)
+    t = np.arange(n) / rate
+    phase = np.asarray(track(np.clip(t, at[0], at[-1])))
+    phase += slopes[0] * np.minimum(t - at[0], 0.0) + slopes[1] * np.maximum(t - at[-1], 0.0)
+    angle = (2.0 * np.pi * frequency * t + phase) / order
+    if np.any(np.diff(angle) <= 0.0):
+        raise SignalError("frequency: the line at this frequency is too weak to follow; give a tacho or the speed")
+    result = _phase(times, angle - angle[0], "line")
+    span = at[-1] - at[0]
+    mean = float((2.0 * np.pi * frequency + ((slow[-1] - slow[0]) / span if span > 0.0 else 0.0)) / order)
+    result.attrs.update(channel=str(signal["channel"].values[channel]), quality=quality, mean_speed=mean)
+    return result
+
+
+def demodulate(column: np.ndarray, cycles: float, taps: np.ndarray, step: int) -> np.ndarray:
+    """Low-passed complex envelope of a line at `cycles` per sample, every `step`-th sample inside the filter's range.
+
+    Parameters
+    ----------
+    column : ndarray of shape (n,)
+    cycles : float
+        Frequency over sampling rate; its phase counts from the first sample.
+    taps : ndarray of shape (2 h + 1,)
+        Zero-phase low-pass.
+    step : int
+
+    Returns
+    -------
+    ndarray of shape ((n - 2 h + step - 1) // step,), complex
+        The sample at index i belongs to the record's sample h + i step.
+    """
+    mean = column.mean()
+    count = column.size - taps.size + 1
+    block = max(1, BLOCK // step) * step
+    pieces = []
+    for start in range(0, count, block):
+        stop = min(start + block, count) + taps.size - 1
+        shifted = (column[start:stop] - mean) * np.exp(-2j * np.pi * cycles * np.arange(start, stop))
+        parts, _ = apply_zero_phase(np.stack((shifted.real, shifted.imag), axis=1), taps, "trim", step)
+        pieces.append(parts[:, 0] + 1j * parts[:, 1])
+    return np.concatenate(pieces)
+
+
+def instantaneous_speed(phase: xr.DataArray) -> xr.DataArray:
+    """Speed (rad/s) over time, the derivative of the angle."""
+    values = np.gradient(phase.values, phase["time"].values)
+    return xr.DataArray(
+        values, dims=("time",), coords={"time": phase["time"]}, attrs={"units": "rad/s", "long_name": "speed"}
+    )
+
+
+def analytic(column: np.ndarray) -> np.ndarray:
+    """Analytic signal of a column (SciPy's Hilbert transform, at a fast length)."""
+    return ss.hilbert(column, scipy.fft.next_fast_len(column.size))[: column.size]
+
+
+def _phase(times: np.ndarray, angle: np.ndarray, origin: str) -> xr.DataArray:
+    return xr.DataArray(
+        angle,
+        dims=("time",),
+        coords={"time": ("time", times, {"units": "s"})},
+        name="angle",
+        attrs={"units": "rad", "origin": origin},
+    )

@@ -1,0 +1,192 @@
+"""Speed of the shaft from the gear mesh frequency line, where no tacho is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from .errors import SignalError
+from .phase import phase_from_line
+from .signal import rate_of, require
+from .spectra import periodograms
+
+SEGMENT_SECONDS = 2.0
+FLOOR_BINS = 64
+CLIP_DB = 30.0
+RANGE_DB = 120.0
+HARMONICS = 4
+SIDEBANDS = 3
+SIDEBAND_WEIGHT = 0.5
+BETWEEN_WEIGHT = 0.5
+FEWER_WEIGHT = 0.05
+NEARLY_BEST = 0.97
+SLOWEST = 8.0 * math.pi
+MIN_QUALITY = 0.05
+MIN_SCORE_DB = 12.0
+
+
+@dataclass(frozen=True)
+class SpeedEstimate:
+    """Speed found from the gear mesh line.
+
+    Attributes
+    ----------
+    speed : float
+        Mean speed of the wheel whose tooth count came first, rad/s.
+    gmf : float
+        Mean gear mesh frequency in Hz.
+    resolution : float
+        What one bin of the record's own length is worth, in Hz of GMF.
+    spread : float
+        Standard deviation of the GMF over the record in Hz, where it could be followed; else NaN.
+    prominence : float
+        Mean height of the mesh harmonics over the floor around them in dB.
+    phase : xarray.DataArray or None
+        Shaft angle (rad) from the line's phase, if it could be followed.
+    """
+
+    speed: float
+    gmf: float
+    resolution: float
+    spread: float
+    prominence: float
+    phase: xr.DataArray | None
+
+
+def estimate_speed(
+    signal: xr.DataArray,
+    teeth: int | Sequence[int] | None = None,
+    *,
+    speed_range: tuple[float, float] | None = None,
+) -> SpeedEstimate:
+    """Find the gear mesh frequency, and with the tooth count the speed, from the record alone.
+
+    1. Averaged spectrum (2 s segments), each channel as height over its local floor in dB, 0 to 30, mean over channels.
+    2. Comb: for every candidate GMF f the mean height at f ... 4 f, plus half of that at the first three shaft orders
+       and sidebands, less half of that midway between the harmonics; less 5 % for each harmonic beyond half the rate.
+       The lowest candidate within 3 % of the best one wins.
+    3. The fundamental's peak, then the mean of its phase's slope over the record, where it can be followed.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel), at nearly constant speed.
+    teeth : int or sequence, optional
+        Tooth count of the wheel whose speed is wanted (first); default the signal's.
+    speed_range : (float, float), optional
+        Lowest and highest speed to look for in rad/s. Default: from 240 rpm to where two harmonics
+        fit below half the sampling rate.
+
+    Returns
+    -------
+    SpeedEstimate
+
+    Raises
+    ------
+    MissingMetadataError
+        If the tooth count is unknown.
+    SignalError
+        If the range is empty, the record is too short, or no comb stands out.
+    """
+    count = require(signal, "teeth", teeth, needed_for="finding the speed from the mesh line")[0]
+    rate = rate_of(signal)
+    n = signal.sizes["time"]
+    low, high = (SLOWEST, math.inf) if speed_range is None else (float(s) for s in speed_range)
+    low_gmf = low * count / (2.0 * math.pi)
+    high_gmf = min(high * count / (2.0 * math.pi), rate / (4.0 if speed_range is None else 2.0) * 0.98)
+    if not 0.0 < low_gmf < high_gmf:
+        raise SignalError(
+            f"speed_range: {speed_range} rad/s leaves no GMF below half the sampling rate ({rate / 2:g} Hz)"
+        )
+    length = min(n, round(SEGMENT_SECONDS * rate))
+    bin_width = rate / length
+    if low_gmf < 8 * bin_width:
+        low_gmf = 8 * bin_width
+        if low_gmf >= high_gmf:
+            raise SignalError(f"signal: {n / rate:g} s are too short to tell a GMF below {high_gmf:g} Hz")
+    power, _ = periodograms(signal.values, rate, length, "hann", 0.5, True, "power")
+    height = prominence(power).mean(axis=1)
+    candidates = np.arange(low_gmf, high_gmf, bin_width / (2 * HARMONICS))
+    score, direct = _comb(height, candidates, bin_width, count)
+    best = int(np.argmax(np.where(score >= NEARLY_BEST * score.max(), 1, 0)))
+    near = np.abs(candidates - candidates[best]) <= 2 * bin_width
+    best = int(np.flatnonzero(near)[np.argmax(score[near])])
+    if direct[best] < MIN_SCORE_DB:
+        raise SignalError(
+            f"signal: no gear mesh line stands out (best {direct[best]:.1f} dB at {candidates[best]:.1f} Hz); "
+            "give the speed, a tacho, or a narrower speed_range"
+        )
+    gmf = _peak(power, candidates[best], bin_width)
+    phase, spread = _follow(signal, gmf, count)
+    if phase is not None:
+        gmf = phase.attrs["mean_speed"] * count / (2.0 * math.pi)
+    gmf = float(gmf)
+    return SpeedEstimate(2.0 * math.pi * gmf / count, gmf, rate / n, spread, float(direct[best]), phase)
+
+
+def prominence(power: np.ndarray) -> np.ndarray:
+    """Height in dB (0 to 30) of each line over the median of its surroundings, of a power spectrum (m, channels)."""
+    top = power.max(axis=0)
+    level = 10.0 * np.log10(np.maximum(power, np.where(top > 0.0, top, 1.0) * 10.0 ** (-RANGE_DB / 10.0)))
+    m = level.shape[0]
+    edges = np.arange(0, max(1, m - FLOOR_BINS // 2), FLOOR_BINS)
+    middles = [min(e + FLOOR_BINS / 2, m - 1) for e in edges]
+    result = np.empty_like(level)
+    for channel in range(level.shape[1]):
+        floors = [np.median(level[e : e + FLOOR_BINS, channel]) for e in edges]
+        result[:, channel] = level[:, channel] - np.interp(np.arange(m), middles, floors)
+    return np.clip(result, 0.0, CLIP_DB)
+
+
+def _comb(height: np.ndarray, candidates: np.ndarray, bin_width: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Comb score, and the mean height of the harmonics present alone, for each candidate."""
+
+    def at(frequency: np.ndarray) -> np.ndarray:
+        index = np.rint(frequency / bin_width).astype(int)
+        inside = index < height.size - 1
+        index = np.where(inside, index, 1)
+        # One bin to either side: the speed is never quite constant.
+        widest = np.maximum(np.maximum(height[index - 1], height[index]), height[index + 1])
+        return np.where(inside, widest, 0.0)
+
+    shaft = candidates / count
+    present = np.minimum(HARMONICS, np.floor((height.size - 1) * bin_width / candidates))
+    harmonics = sum((at(h * candidates) for h in range(1, HARMONICS + 1)), np.zeros_like(candidates)) / present
+    between = sum((at((h - 0.5) * candidates) for h in range(1, HARMONICS + 1)), np.zeros_like(candidates)) / present
+    sides = np.zeros_like(candidates)
+    for k in range(1, SIDEBANDS + 1):
+        sides += at(k * shaft) / SIDEBANDS
+        for h in range(1, HARMONICS + 1):
+            sides += (at(h * candidates - k * shaft) + at(h * candidates + k * shaft)) / (2 * SIDEBANDS * present)
+    trust = 1.0 - FEWER_WEIGHT * (HARMONICS - present)
+    return trust * (harmonics + SIDEBAND_WEIGHT * sides - BETWEEN_WEIGHT * between), harmonics
+
+
+def _peak(power: np.ndarray, guess: float, bin_width: float) -> float:
+    """Peak near `guess` by a parabola through the logarithms of three bins, channels weighted by their own level."""
+    middle = round(guess / bin_width)
+    low, high = max(1, middle - 3), min(power.shape[0] - 1, middle + 4)
+    around = power[max(0, middle - FLOOR_BINS) : middle + FLOOR_BINS].max(axis=0)
+    combined = (power[low - 1 : high + 1] / np.where(around > 0.0, around, 1.0)).sum(axis=1)
+    k = 1 + int(np.argmax(combined[1:-1]))
+    a, b, c = np.log(np.maximum(combined[k - 1 : k + 2], 1e-300))
+    curve = a - 2.0 * b + c
+    shift = 0.5 * (a - c) / curve if curve < 0.0 else 0.0
+    return (low - 1 + k + float(np.clip(shift, -0.5, 0.5))) * bin_width
+
+
+def _follow(signal: xr.DataArray, gmf: float, count: int) -> tuple[xr.DataArray | None, float]:
+    try:
+        phase = phase_from_line(signal, gmf, count)
+    except SignalError:
+        return None, math.nan
+    if phase.attrs["quality"] < MIN_QUALITY:
+        return None, math.nan
+    step = max(1, phase.size // 1000)
+    coarse = phase.values[::step]
+    speed = np.diff(coarse) / (step / rate_of(signal))
+    return phase, float(np.std(speed)) * count / (2.0 * math.pi)
