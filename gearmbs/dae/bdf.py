@@ -28,7 +28,7 @@ _VEC = float64[::1]
 _MAT = float64[:, ::1]
 
 
-@njit(float64(float64, _VEC, int64), cache=True, nogil=True)
+@njit(float64(float64, _VEC, int64), cache=True, nogil=True, error_model="numpy")
 def leading_coefficient(t, nodes, k):
     """Return gamma of the order-k formula at ``t`` over the past times ``nodes`` (newest first)."""
     gamma = 0.0
@@ -37,21 +37,21 @@ def leading_coefficient(t, nodes, k):
     return gamma
 
 
-@njit(float64(float64, _VEC, int64), cache=True, nogil=True)
+@njit(float64(float64, _VEC, int64), cache=True, nogil=True, error_model="numpy")
 def error_constant(t, nodes, k):
     """Return r/(1 + r), the local error of order k in units of corrector minus predictor."""
     r = 1.0 / (leading_coefficient(t, nodes, k) * (t - nodes[k]))
     return r / (1.0 + r)
 
 
-@njit(float64(float64, _VEC, int64, _VEC, _VEC), cache=True, nogil=True)
+@njit(float64(float64, _VEC, int64, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def step_coefficients(t, nodes, k, value, slope):
     """Write the predictor weights for y and y' of the order-k step to ``t`` and return gamma."""
     lagrange_weights(t, nodes, k + 1, value, slope)
     return leading_coefficient(t, nodes, k)
 
 
-@njit(types.void(_VEC, _VEC, int64, _MAT, _VEC, _VEC), cache=True, nogil=True)
+@njit(types.void(_VEC, _VEC, int64, _MAT, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def predict(value, slope, count, hist, y, yp):
     """Write ``y = sum value[j] hist[j]`` and ``yp = sum slope[j] hist[j]`` over ``count`` rows."""
     n = y.shape[0]
@@ -70,7 +70,7 @@ def predict(value, slope, count, hist, y, yp):
             yp[i] += b * v
 
 
-@njit(types.void(_VEC, int64, _VEC), cache=True, nogil=True)
+@njit(types.void(_VEC, int64, _VEC), cache=True, nogil=True, error_model="numpy")
 def divided_difference_weights(nodes, count, weights):
     """Write w with f[t_1 .. t_count] = sum w[j] f(t_j)."""
     for j in range(count):
@@ -81,7 +81,7 @@ def divided_difference_weights(nodes, count, weights):
         weights[j] = 1.0 / product
 
 
-@njit(float64(_VEC, int64, _MAT, _VEC, _VEC, _VEC), cache=True, nogil=True)
+@njit(float64(_VEC, int64, _MAT, _VEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def divided_difference_norm(nodes, count, hist, inv_weight, weights, scratch):
     """Return max_i inv_weight[i] |f_i[t_1 .. t_count]| over the rows of ``hist``."""
     divided_difference_weights(nodes, count, weights)
@@ -99,7 +99,7 @@ def divided_difference_norm(nodes, count, hist, inv_weight, weights, scratch):
     return top
 
 
-@njit(float64(float64, _VEC, int64, float64), cache=True, nogil=True)
+@njit(float64(float64, _VEC, int64, float64), cache=True, nogil=True, error_model="numpy")
 def local_error(h, nodes, k, difference):
     """Return the local error of an order-k step of size h from ``nodes[0]``.
 
@@ -119,7 +119,7 @@ def local_error(h, nodes, k, difference):
     return error_constant(t, nodes, k) * product * difference
 
 
-@njit(float64(float64, _VEC, int64, float64, float64), cache=True, nogil=True)
+@njit(float64(float64, _VEC, int64, float64, float64), cache=True, nogil=True, error_model="numpy")
 def step_for_error(h, nodes, k, difference, target):
     """Return about the step size whose local error at order k is ``target``, within a factor 8 of h."""
     trial = h

@@ -31,14 +31,14 @@ _IVEC = int64[::1]
 _MAT = float64[:, ::1]
 
 
-@njit(float64(int64, float64, _VEC, _VEC, _MAT, _MAT, _MAT), cache=True, nogil=True)
+@njit(float64(int64, float64, _VEC, _VEC, _MAT, _MAT, _MAT), cache=True, nogil=True, error_model="numpy")
 def _step_at_order(k, h, nodes, times, hist, vec, small):
     """Return the step size at order k from ``nodes[0]``, from the difference over the newest k + 2 points."""
     difference = divided_difference_norm(times, k + 2, hist, vec[W_ERROR], small[VALUE], vec[RES])
     return step_for_error(h, nodes, k, difference, TARGET)
 
 
-@njit(types.void(_VEC, _IVEC, _VEC, _MAT, _MAT, _MAT), cache=True, nogil=True)
+@njit(types.void(_VEC, _IVEC, _VEC, _MAT, _MAT, _MAT), cache=True, nogil=True, error_model="numpy")
 def after_success(real, count, times, hist, vec, small):
     """Set order and step size after an accepted step; ``hist[0]`` is its result.
 
@@ -79,7 +79,7 @@ def after_success(real, count, times, hist, vec, small):
         count[SINCE_CHANGE] = 0
 
 
-@njit(types.void(_VEC, _IVEC, _VEC, _MAT, _MAT, _MAT, float64, int64), cache=True, nogil=True)
+@njit(types.void(_VEC, _IVEC, _VEC, _MAT, _MAT, _MAT, float64, int64), cache=True, nogil=True, error_model="numpy")
 def after_error_failure(real, count, times, hist, vec, small, error, fails):
     """Set order and step size after the error test failed for the ``fails``-th time at this step.
 

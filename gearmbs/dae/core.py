@@ -41,7 +41,7 @@ _IVEC = int64[::1]
 _MAT = float64[:, ::1]
 
 
-@njit(types.void(_VEC, _MAT, int64), cache=True, nogil=True)
+@njit(types.void(_VEC, _MAT, int64), cache=True, nogil=True, error_model="numpy")
 def _shift(times, hist, rows):
     """Make room for a new point in front of the ``rows`` stored ones."""
     n = hist.shape[1]
@@ -51,7 +51,7 @@ def _shift(times, hist, rows):
             hist[j, i] = hist[j - 1, i]
 
 
-@njit(types.void(_VEC, _IVEC, _VEC, _MAT, _MAT, int64), cache=True, nogil=True)
+@njit(types.void(_VEC, _IVEC, _VEC, _MAT, _MAT, int64), cache=True, nogil=True, error_model="numpy")
 def _respace(real, count, times, hist, small, first):
     """Re-interpolate the history to the current step size: fixed leading coefficients (GSTIFF).
 
@@ -90,7 +90,7 @@ def _respace(real, count, times, hist, small, first):
     count[s.SINCE_CHANGE] = 0
 
 
-@njit(types.void(_IVEC, _VEC, _MAT, int64, _VEC, _VEC, _MAT, _IVEC), cache=True, nogil=True)
+@njit(types.void(_IVEC, _VEC, _MAT, int64, _VEC, _VEC, _MAT, _IVEC), cache=True, nogil=True, error_model="numpy")
 def _record_history(count, times, hist, first, rec_t, rec_h, rec_y, rec_order):
     """Append the rewritten history, oldest point first, as points of order 0."""
     n = hist.shape[1]
@@ -106,7 +106,7 @@ def _record_history(count, times, hist, first, rec_t, rec_h, rec_y, rec_order):
         count[s.N_RECORDS] = p + 1
 
 
-@njit(types.void(_VEC, _IVEC), cache=True, nogil=True)
+@njit(types.void(_VEC, _IVEC), cache=True, nogil=True, error_model="numpy")
 def _restart(real, count):
     """Forget the history but its newest point and go on at order one."""
     count[s.NPAST] = 1
@@ -116,7 +116,7 @@ def _restart(real, count):
     count[s.JAC_WANTED] = 1
 
 
-@njit(float64(_VEC, _IVEC, float64, float64), cache=True, nogil=True)
+@njit(float64(_VEC, _IVEC, float64, float64), cache=True, nogil=True, error_model="numpy")
 def _fit_step(real, count, t, stop):
     """Return the end of the next step: not beyond ``stop``, and without a sliver left before it."""
     h = real[s.H]
@@ -140,6 +140,7 @@ def _fit_step(real, count, t, stop):
     ),
     cache=True,
     nogil=True,
+    error_model="numpy",
 )
 def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
     """Take at most ``max_accepted`` accepted steps.

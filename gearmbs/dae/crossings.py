@@ -30,14 +30,19 @@ _IVEC = int64[::1]
 _MAT = float64[:, ::1]
 
 
-@njit(types.void(float64, int64, _VEC, _MAT, _MAT, _VEC, _VEC), cache=True, nogil=True)
+@njit(types.void(float64, int64, _VEC, _MAT, _MAT, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def interpolate(t, k, times, hist, small, y, yp):
     """Write y and y' at ``t`` from the order-k polynomial through the newest k + 1 points."""
     lagrange_weights(t, times, k + 1, small[VALUE], small[SLOPE])
     combine(small[VALUE], small[SLOPE], k + 1, hist, 0, y, yp)
 
 
-@njit(types.void(float64, int64, _IVEC, _VEC, _MAT, _MAT, _MAT, _VEC, _MAT, _MAT), cache=True, nogil=True)
+@njit(
+    types.void(float64, int64, _IVEC, _VEC, _MAT, _MAT, _MAT, _VEC, _MAT, _MAT),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
 def write_outputs(t, k, count, times, hist, vec, small, outputs, y_out, yp_out):
     """Write all outputs up to ``t``, which lies in the last step; at its very end the corrector's values."""
     n = hist.shape[1]
@@ -56,6 +61,7 @@ def write_outputs(t, k, count, times, hist, vec, small, outputs, y_out, yp_out):
     float64(types.FunctionType(EVENTS_SIG), int64, int64, _VEC, _MAT, _MAT, _MAT, _VEC, _VEC, _IVEC, _VEC, _VEC),
     cache=True,
     nogil=True,
+    error_model="numpy",
 )
 def _root(events, which, k, times, hist, vec, small, g_old, g_work, idata, rdata, work):
     """Return the time in the last step where event ``which`` changes sign (Illinois method on the polynomial).
@@ -119,6 +125,7 @@ def _root(events, which, k, times, hist, vec, small, g_old, g_work, idata, rdata
     ),
     cache=True,
     nogil=True,
+    error_model="numpy",
 )
 def locate_events(
     events, t, k, count, times, hist, vec, small, g_old, g_new, rules, hit_t, hit_which, hit_y, idata, rdata, work

@@ -9,31 +9,18 @@ per output time, it gives reaction forces that are free of the integrator's nois
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
 
 from gearmbs.dae import tables as T
 from gearmbs.dae import tapes, terms
 from gearmbs.dae.forces import element_wrench
+from gearmbs.dae.jacobian import NUMBERS, put
 from gearmbs.dae.kinematics import inertia_times, update_bodies, update_tables
 from gearmbs.dae.residual import S_DIAG, S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR, S_WRENCH, arm_to
 from gearmbs.dae.rotation import KIN_A, KIN_ADOT, KIN_H, KIN_R, KIN_V, KIN_W, momentum_from_conjugate
 
-NUMBERS, PLACES, COUNT = 0, 1, 2
-
-SUMMARY = 3
 """Per force element: F, N, then eight diagnostics of a contact."""
 FORCE_RECORD = 14
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def put(mode, places, slot, vals, k, row, col, value):
-    if mode == NUMBERS:
-        vals[slot[k]] += value
-    elif mode == PLACES:
-        places[k, 0] = row
-        places[k, 1] = col
-    return k + 1
 
 
 @njit(cache=True, error_model="numpy")
@@ -83,19 +70,15 @@ def tape_row_rates(k, t, y, idata, tab, room):
     return value, rate, partial, gamma
 
 
-@njit(
-    "int64(int64, float64, float64[::1], int64[:, ::1], int64[::1], float64[::1], float64[::1], float64[::1], "
-    "float64[:, ::1], int64[::1], float64[::1], float64[::1])",
-    cache=True,
-    error_model="numpy",
-)
-def saddle(mode, t, y, places, slot, vals, rhs, phi, loads, idata, rdata, work):
+@njit(cache=True, error_model="numpy")
+def saddle(t, y, slot, vals, rhs, phi, loads, idata, rdata, work):
     """Assemble the saddle-point matrix (by slots) and right-hand side; return the number of entries.
 
     ``phi`` receives 3 values a row one after the other: Phi, Phi_q v + Phi_t, Phi_t.
     ``loads[f]`` receives F, N and the diagnostics of force element f.
     """
     tab = T.unpack(idata, rdata, work)
+    mode = idata[T.H_MODE]
     update_tables(t, y, idata, tab)
     bodies, rows = idata[T.H_BODIES], idata[T.H_ROWS]
     base = 6 * (bodies - 1)
@@ -108,13 +91,13 @@ def saddle(mode, t, y, places, slot, vals, rhs, phi, loads, idata, rdata, work):
         i = 6 * (b - 1)
         mass = tab.body[b, T.BODY_MASS]
         for c in range(3):
-            k = put(mode, places, slot, vals, k, i + c, i + c, mass)
+            k = put(mode, slot, vals, k, i + c, i + c, mass)
             rhs[i + c] = mass * tab.gravity[c]
             s[0] = s[1] = s[2] = 0.0
             s[c] = 1.0
             inertia_times(kin, tab.body[b], s, 0, s, 3, s[6:9])
             for d in range(3):
-                k = put(mode, places, slot, vals, k, i + 3 + d, i + 3 + c, s[3 + d])
+                k = put(mode, slot, vals, k, i + 3 + d, i + 3 + c, s[3 + d])
         terms.cross3(kin, KIN_H, kin, KIN_W, rhs, i + 3)
     g = tab.scratch[S_GRADIENT : S_GRADIENT + 12]
     gt = tab.scratch[S_GRADIENT_T : S_GRADIENT_T + 12]
@@ -150,8 +133,8 @@ def saddle(mode, t, y, places, slot, vals, rhs, phi, loads, idata, rdata, work):
                 kin = tab.kin[b]
                 rate += coef * (terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W))
                 for c in range(6):
-                    k = put(mode, places, slot, vals, k, base + r, q + c, coef * g[h + c])
-                    k = put(mode, places, slot, vals, k, q + c, base + r, coef * g[h + c])
+                    k = put(mode, slot, vals, k, base + r, q + c, coef * g[h + c])
+                    k = put(mode, slot, vals, k, q + c, base + r, coef * g[h + c])
         if tab.row[r, T.ROW_TAPE] >= 0:
             tape = tab.tape[tab.row[r, T.ROW_TAPE]]
             n = 6 * tape[T.TAPE_N_BODIES] + 1
@@ -164,8 +147,8 @@ def saddle(mode, t, y, places, slot, vals, rhs, phi, loads, idata, rdata, work):
             for b in range(tape[T.TAPE_N_BODIES]):
                 q = 6 * (tab.extra_i[tape[T.TAPE_BODIES] + b] - 1)
                 for c in range(6):
-                    k = put(mode, places, slot, vals, k, base + r, q + c, room[6 * b + c])
-                    k = put(mode, places, slot, vals, k, q + c, base + r, room[6 * b + c])
+                    k = put(mode, slot, vals, k, base + r, q + c, room[6 * b + c])
+                    k = put(mode, slot, vals, k, q + c, base + r, room[6 * b + c])
         rhs[base + r] = -gamma
         phi[3 * r], phi[3 * r + 1], phi[3 * r + 2] = value, rate, partial
     if mode == NUMBERS:
@@ -234,21 +217,3 @@ def pose_record(y, idata, rdata, work, out):
             out[k + 15 + c] = tab.kin[b, KIN_W + c]
         for c in range(9):
             out[k + 3 + c] = tab.kin[b, KIN_A + c]
-
-
-def pattern(idata: np.ndarray, rdata: np.ndarray, work_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (indptr, indices, slots) of the saddle-point matrix in CSC form."""
-    n = int(6 * (idata[T.H_BODIES] - 1) + idata[T.H_ROWS])
-    y = np.zeros(int(idata[T.H_UNKNOWNS]))
-    work = np.zeros(work_size)
-    rhs, phi = np.zeros(n), np.zeros(3 * int(idata[T.H_ROWS]))
-    loads = np.zeros((1, FORCE_RECORD))
-    none, no_slot, no_vals = np.zeros((1, 2), dtype=np.int64), np.zeros(1, dtype=np.int64), np.zeros(1)
-    count = saddle(COUNT, 0.0, y, none, no_slot, no_vals, rhs, phi, loads, idata, rdata, work)
-    places = np.zeros((count, 2), dtype=np.int64)
-    saddle(PLACES, 0.0, y, places, no_slot, no_vals, rhs, phi, loads, idata, rdata, work)
-    key = places[:, 1] * n + places[:, 0]
-    unique, slots = np.unique(key, return_inverse=True)
-    columns, rows = np.divmod(unique, n)
-    indptr = np.searchsorted(columns, np.arange(n + 1)).astype(np.int64)
-    return indptr, rows.astype(np.int64), slots.astype(np.int64)

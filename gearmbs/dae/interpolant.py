@@ -9,7 +9,7 @@ _VEC = float64[::1]
 _MAT = float64[:, ::1]
 
 
-@njit(types.void(float64, _VEC, int64, _VEC, _VEC), cache=True, nogil=True)
+@njit(types.void(float64, _VEC, int64, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def lagrange_weights(t, nodes, count, value, slope):
     """Weights of the polynomial through ``count`` nodes, for its value and its slope at ``t``.
 
@@ -38,7 +38,7 @@ def lagrange_weights(t, nodes, count, value, slope):
         slope[j] = d
 
 
-@njit(types.void(_VEC, _VEC, int64, _MAT, int64, _VEC, _VEC), cache=True, nogil=True)
+@njit(types.void(_VEC, _VEC, int64, _MAT, int64, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def combine(value, slope, count, rows, first, y, yp):
     """Write ``y = sum value[j] rows[first + j]`` and ``yp`` likewise with ``slope``."""
     n = y.shape[0]

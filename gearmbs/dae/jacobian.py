@@ -32,19 +32,19 @@ NUMBERS, PLACES, COUNT = 0, 1, 2
 HESSIAN_BLOCKS = terms.HESSIAN_BLOCKS
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def put(mode, places, slot, vals, k, row, col, value):
+@njit(cache=True, error_model="numpy")
+def put(mode, slot, vals, k, row, col, value):
     """Hand over entry k; return the number of the next."""
     if mode == NUMBERS:
         vals[slot[k]] += value
     elif mode == PLACES:
-        places[k, 0] = row
-        places[k, 1] = col
+        vals[2 * k] = row
+        vals[2 * k + 1] = col
     return k + 1
 
 
 @njit(cache=True, error_model="numpy")
-def body_entries(mode, b, cj, idata, tab, places, slot, vals, k):
+def body_entries(mode, b, cj, idata, tab, slot, vals, k):
     """Entries of one body's inertia terms in eq. (5) and (6)."""
     i = 3 * (b - 1)
     u, p, e, r, th = (
@@ -65,23 +65,23 @@ def body_entries(mode, b, cj, idata, tab, places, slot, vals, k):
         for c in range(3):
             s[18 + 3 * m + c] += s[9 + 3 * m + c]
     for m in range(3):
-        k = put(mode, places, slot, vals, k, u + m, u + m, mass * cj)
-        k = put(mode, places, slot, vals, k, p + m, p + m, cj)
-        k = put(mode, places, slot, vals, k, e + m, p + m, 1.0)
-        k = put(mode, places, slot, vals, k, r + m, u + m, 1.0)
-        k = put(mode, places, slot, vals, k, r + m, r + m, -cj)
-        k = put(mode, places, slot, vals, k, th + m, e + m, 1.0)
-        k = put(mode, places, slot, vals, k, th + m, th + m, -cj)
+        k = put(mode, slot, vals, k, u + m, u + m, mass * cj)
+        k = put(mode, slot, vals, k, p + m, p + m, cj)
+        k = put(mode, slot, vals, k, e + m, p + m, 1.0)
+        k = put(mode, slot, vals, k, r + m, u + m, 1.0)
+        k = put(mode, slot, vals, k, r + m, r + m, -cj)
+        k = put(mode, slot, vals, k, th + m, e + m, 1.0)
+        k = put(mode, slot, vals, k, th + m, th + m, -cj)
         for n in range(3):
             # L_eps_m = a_m . h
-            k = put(mode, places, slot, vals, k, e + m, e + n, -terms.dot3(kin, KIN_AXES + 3 * m, s, 3 * n))
+            k = put(mode, slot, vals, k, e + m, e + n, -terms.dot3(kin, KIN_AXES + 3 * m, s, 3 * n))
             mixed_mn = terms.dot3(kin, KIN_ADOT + 3 * n, s, 3 * m)
             if m < n:
                 terms.cross3(kin, KIN_AXES + 3 * m, kin, KIN_AXES + 3 * n, s, 30)
                 mixed_mn += terms.dot3(s, 30, kin, KIN_H)
             # d2T/d(eps_m)d(theta_n) serves p - L_eps and p' - L_theta
-            k = put(mode, places, slot, vals, k, e + m, th + n, -mixed_mn)
-            k = put(mode, places, slot, vals, k, p + n, e + m, -mixed_mn)
+            k = put(mode, slot, vals, k, e + m, th + n, -mixed_mn)
+            k = put(mode, slot, vals, k, p + n, e + m, -mixed_mn)
     for m in range(3):
         for n in range(3):
             value = terms.dot3(kin, KIN_ADOT + 3 * m, s, 18 + 3 * n)
@@ -92,12 +92,12 @@ def body_entries(mode, b, cj, idata, tab, places, slot, vals, k):
                     terms.cross3(kin, KIN_AXES + 3 * hi, kin, KIN_AXES + 3 * m, s, 30)
                     terms.cross3(kin, KIN_AXES + 3 * lo, s, 30, s, 33)
                     value += tab.scratch[S_PRODUCT + l] * terms.dot3(s, 33, kin, KIN_H)
-            k = put(mode, places, slot, vals, k, p + m, th + n, -value)
+            k = put(mode, slot, vals, k, p + m, th + n, -value)
     return k
 
 
 @njit(cache=True, error_model="numpy")
-def row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
+def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
     """Entries of one constraint row, its derivative, and the forces of its multipliers."""
     form = idata[T.H_FORMULATION]
     e0, t0 = idata[T.H_EPS], idata[T.H_THETA]
@@ -137,16 +137,16 @@ def row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
                 if kind == terms.POINT and c != tab.term[j, T.TERM_AXES]:
                     pass
                 elif kind != terms.DOT1 and kind != terms.ANGLE and kind != terms.ROTATION:
-                    k = put(mode, places, slot, vals, k, u0 + q + c, lam, factor * along)
-                    k = put(mode, places, slot, vals, k, lam, r0 + q + c, along)
+                    k = put(mode, slot, vals, k, u0 + q + c, lam, factor * along)
+                    k = put(mode, slot, vals, k, lam, r0 + q + c, along)
                     if form != T.I3:
-                        k = put(mode, places, slot, vals, k, r0 + q + c, mu, -factor * along)
-                        k = put(mode, places, slot, vals, k, mu, u0 + q + c, along)
-                k = put(mode, places, slot, vals, k, p0 + q + c, lam, factor * about)
-                k = put(mode, places, slot, vals, k, lam, t0 + q + c, about)
+                        k = put(mode, slot, vals, k, r0 + q + c, mu, -factor * along)
+                        k = put(mode, slot, vals, k, mu, u0 + q + c, along)
+                k = put(mode, slot, vals, k, p0 + q + c, lam, factor * about)
+                k = put(mode, slot, vals, k, lam, t0 + q + c, about)
                 if form != T.I3:
-                    k = put(mode, places, slot, vals, k, t0 + q + c, mu, -factor * about)
-                    k = put(mode, places, slot, vals, k, mu, e0 + q + c, about)
+                    k = put(mode, slot, vals, k, t0 + q + c, mu, -factor * about)
+                    k = put(mode, slot, vals, k, mu, e0 + q + c, about)
         for bm in range(4):
             b = tab.marker_body[tab.term[j, T.TERM_I + bm // 2]]
             if b == 0:
@@ -164,9 +164,9 @@ def row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
                 for m in range(3):
                     for n in range(3):
                         value = coef * hess[3 * bm + m, 3 * bn + n]
-                        k = put(mode, places, slot, vals, k, force_row + m, other + n, lam_value * value)
+                        k = put(mode, slot, vals, k, force_row + m, other + n, lam_value * value)
                         if form != T.I3:
-                            k = put(mode, places, slot, vals, k, position + m, other + n, -mu_value * value)
+                            k = put(mode, slot, vals, k, position + m, other + n, -mu_value * value)
             if form != T.I3 and any_block:
                 # the derivative of Phi_q q' + Phi_t with respect to q
                 for m in range(3):
@@ -175,12 +175,12 @@ def row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
                         value += hess[3 * bm + m, n] * w[n]
                     if bm % 2 == 1:
                         value += euler_component(tab.kin[b], m, gt, 6 * (bm // 2) + 3)
-                    k = put(mode, places, slot, vals, k, mu, position + m, coef * value)
+                    k = put(mode, slot, vals, k, mu, position + m, coef * value)
     return k
 
 
 @njit(cache=True, error_model="numpy")
-def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
+def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k):
     """Entries of a constraint row given by an expression."""
     form = idata[T.H_FORMULATION]
     lam, mu = idata[T.H_LAMBDA] + r, idata[T.H_MU] + r
@@ -202,26 +202,26 @@ def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k):
         position = (idata[T.H_THETA] if turn else idata[T.H_R]) + q
         speed = (idata[T.H_EPS] if turn else idata[T.H_U]) + q
         force = (idata[T.H_P] if turn else idata[T.H_U]) + q
-        k = put(mode, places, slot, vals, k, lam, position, grad[i])
-        k = put(mode, places, slot, vals, k, force, lam, factor * grad[i])
+        k = put(mode, slot, vals, k, lam, position, grad[i])
+        k = put(mode, slot, vals, k, force, lam, factor * grad[i])
         rate = hess[i * n + n - 1]
         for j in range(n - 1):
             q2 = 3 * (tab.extra_i[first + j // 6] - 1) + j % 3
             turn2 = j % 6 >= 3
             other = (idata[T.H_THETA] if turn2 else idata[T.H_R]) + q2
             rate += hess[i * n + j] * y[(idata[T.H_EPS] if turn2 else idata[T.H_U]) + q2]
-            k = put(mode, places, slot, vals, k, force, other, lam_value * hess[i * n + j])
+            k = put(mode, slot, vals, k, force, other, lam_value * hess[i * n + j])
             if form != T.I3:
-                k = put(mode, places, slot, vals, k, position, other, -mu_value * hess[i * n + j])
+                k = put(mode, slot, vals, k, position, other, -mu_value * hess[i * n + j])
         if form != T.I3:
-            k = put(mode, places, slot, vals, k, position, mu, -factor * grad[i])
-            k = put(mode, places, slot, vals, k, mu, speed, grad[i])
-            k = put(mode, places, slot, vals, k, mu, position, rate)
+            k = put(mode, slot, vals, k, position, mu, -factor * grad[i])
+            k = put(mode, slot, vals, k, mu, speed, grad[i])
+            k = put(mode, slot, vals, k, mu, position, rate)
     return k
 
 
 @njit(cache=True, error_model="numpy")
-def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, idata, tab, places, slot, vals, k):
+def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, idata, tab, slot, vals, k):
     """Entries of one row from the spatial gradient ``d`` over a list of bodies, then of unknowns."""
     for q in range(bodies):
         b = tab.extra_i[first + q]
@@ -232,20 +232,20 @@ def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, idata, ta
         for m in range(3):
             turn = euler_component(kin, m, d, col + 3) + terms.dot3(kin, KIN_DW + 3 * m, d, col + 9)
             spin = euler_component(kin, m, d, col + 9)
-            k = put(mode, places, slot, vals, k, base, idata[T.H_R] + i + m, sign * d[col + m])
-            k = put(mode, places, slot, vals, k, base, idata[T.H_THETA] + i + m, sign * turn)
-            k = put(mode, places, slot, vals, k, base, idata[T.H_U] + i + m, sign * d[col + 6 + m])
-            k = put(mode, places, slot, vals, k, base, idata[T.H_EPS] + i + m, sign * spin)
+            k = put(mode, slot, vals, k, base, idata[T.H_R] + i + m, sign * d[col + m])
+            k = put(mode, slot, vals, k, base, idata[T.H_THETA] + i + m, sign * turn)
+            k = put(mode, slot, vals, k, base, idata[T.H_U] + i + m, sign * d[col + 6 + m])
+            k = put(mode, slot, vals, k, base, idata[T.H_EPS] + i + m, sign * spin)
     for q in range(unknowns):
-        k = put(mode, places, slot, vals, k, base, tab.extra_i[after + q], sign * d[12 * bodies + q])
+        k = put(mode, slot, vals, k, base, tab.extra_i[after + q], sign * d[12 * bodies + q])
     return k
 
 
 @njit(cache=True, error_model="numpy")
-def state_entries(mode, t, s, y, cj, idata, tab, places, slot, vals, k):
+def state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k):
     """Entries of the equation of one user-defined state."""
     z = idata[T.H_Z] + s
-    k = put(mode, places, slot, vals, k, z, z, cj if tab.state[s, T.STATE_KIND] == T.STATE_DIFFERENTIAL else 1.0)
+    k = put(mode, slot, vals, k, z, z, cj if tab.state[s, T.STATE_KIND] == T.STATE_DIFFERENTIAL else 1.0)
     tape = tab.state[s, T.STATE_TAPE]
     row = tab.tape[tape]
     grad = tapes.tail(tab, tapes.gradient_size(row))
@@ -262,7 +262,6 @@ def state_entries(mode, t, s, y, cj, idata, tab, places, slot, vals, k):
         first + bodies,
         idata,
         tab,
-        places,
         slot,
         vals,
         k,
@@ -270,7 +269,7 @@ def state_entries(mode, t, s, y, cj, idata, tab, places, slot, vals, k):
 
 
 @njit(cache=True, error_model="numpy")
-def load_entries(mode, b, sign, row, y, idata, tab, places, slot, vals, k):
+def load_entries(mode, b, sign, row, y, idata, tab, slot, vals, k):
     """Entries of one force element's loads on body b in the rows of eq. (5)."""
     if b == 0:
         return k
@@ -297,12 +296,12 @@ def load_entries(mode, b, sign, row, y, idata, tab, places, slot, vals, k):
         for c in range(3):
             if f >= 0:
                 if m == 0:
-                    k = put(mode, places, slot, vals, k, u + c, f + c, -sign)
+                    k = put(mode, slot, vals, k, u + c, f + c, -sign)
                 # a . (s x e_c) = (a x s)_c
                 terms.cross3(kin, a, s, 0, s, 9)
-                k = put(mode, places, slot, vals, k, p + m, f + c, -sign * s[9 + c])
+                k = put(mode, slot, vals, k, p + m, f + c, -sign * s[9 + c])
             if n >= 0:
-                k = put(mode, places, slot, vals, k, p + m, n + c, -sign * kin[a + c])
+                k = put(mode, slot, vals, k, p + m, n + c, -sign * kin[a + c])
         for l in range(3):
             value = 0.0
             if l < m:
@@ -313,23 +312,23 @@ def load_entries(mode, b, sign, row, y, idata, tab, places, slot, vals, k):
                 terms.cross3(kin, KIN_AXES + 3 * l, s, 0, s, 9)
                 terms.cross3(s, 9, s, 3, s, 12)
                 value += terms.dot3(kin, a, s, 12)
-            k = put(mode, places, slot, vals, k, p + m, th + l, -value)
+            k = put(mode, slot, vals, k, p + m, th + l, -value)
         if f >= 0 and owner != b:
             # a . (ds x F) = ds . (F x a)
             terms.cross3(s, 3, kin, a, s, 9)
             for l in range(3):
-                k = put(mode, places, slot, vals, k, p + m, idata[T.H_R] + i + l, s[9 + l])
+                k = put(mode, slot, vals, k, p + m, idata[T.H_R] + i + l, s[9 + l])
             if owner > 0:
                 o = 3 * (owner - 1)
                 for l in range(3):
                     terms.cross3(tab.kin[owner], KIN_AXES + 3 * l, tab.frame[point], 0, s, 12)
-                    k = put(mode, places, slot, vals, k, p + m, idata[T.H_R] + o + l, -s[9 + l])
-                    k = put(mode, places, slot, vals, k, p + m, idata[T.H_THETA] + o + l, -terms.dot3(s, 9, s, 12))
+                    k = put(mode, slot, vals, k, p + m, idata[T.H_R] + o + l, -s[9 + l])
+                    k = put(mode, slot, vals, k, p + m, idata[T.H_THETA] + o + l, -terms.dot3(s, 9, s, 12))
     return k
 
 
 @njit(cache=True, error_model="numpy")
-def element_entries(mode, t, row, y, idata, tab, places, slot, vals, k):
+def element_entries(mode, t, row, y, idata, tab, slot, vals, k):
     """Entries of the rows F - F(q, q', t) and N - N(q, q', t) of one force element."""
     wrench = tab.scratch[S_WRENCH : S_WRENCH + 6]
     diag = tab.scratch[S_DIAG : S_DIAG + 8]
@@ -344,7 +343,7 @@ def element_entries(mode, t, row, y, idata, tab, places, slot, vals, k):
         if base < 0:
             continue
         for c in range(3):
-            k = put(mode, places, slot, vals, k, base + c, base + c, 1.0)
+            k = put(mode, slot, vals, k, base + c, base + c, 1.0)
             k = chain_entries(
                 mode,
                 base + c,
@@ -356,7 +355,6 @@ def element_entries(mode, t, row, y, idata, tab, places, slot, vals, k):
                 depends + 2 + bodies,
                 idata,
                 tab,
-                places,
                 slot,
                 vals,
                 k,
@@ -364,60 +362,55 @@ def element_entries(mode, t, row, y, idata, tab, places, slot, vals, k):
     return k
 
 
-@njit(
-    "int64(int64, float64, float64[::1], float64[::1], float64, int64[:, ::1], float64[::1], "
-    "int64[::1], float64[::1], float64[::1])",
-    cache=True,
-    error_model="numpy",
-)
-def walk(mode, t, y, yp, cj, places, vals, idata, rdata, work):
-    """Go through all entries; return their number."""
+@njit(JACOBIAN_SIG, cache=True, error_model="numpy")
+def jacobian(t, y, yp, cj, vals, idata, rdata, work):
+    """Evaluate dG/dy + cj dG/dy' into ``vals``, CSC order.
+
+    Asked for it in the header, count the entries or write their rows and columns instead.
+    """
     tab = T.unpack(idata, rdata, work)
+    mode = idata[T.H_MODE]
     update_tables(t, y, idata, tab)
     slot = tab.slot
+    if mode == NUMBERS:
+        for k in range(vals.size):
+            vals[k] = 0.0
     k = 0
     for b in range(1, idata[T.H_BODIES]):
         for l in range(3):
             tab.scratch[S_PRODUCT + l] = y[idata[T.H_EPS] + 3 * (b - 1) + l]
-        k = body_entries(mode, b, cj, idata, tab, places, slot, vals, k)
+        k = body_entries(mode, b, cj, idata, tab, slot, vals, k)
     for r in range(idata[T.H_ROWS]):
-        k = row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k)
+        k = row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k)
         if tab.row[r, T.ROW_TAPE] >= 0:
-            k = tape_row_entries(mode, t, r, y, yp, cj, idata, tab, places, slot, vals, k)
+            k = tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k)
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]
-        k = load_entries(mode, tab.marker_body[row[T.FORCE_I]], 1.0, row, y, idata, tab, places, slot, vals, k)
-        k = load_entries(mode, tab.marker_body[row[T.FORCE_J]], -1.0, row, y, idata, tab, places, slot, vals, k)
-        k = element_entries(mode, t, row, y, idata, tab, places, slot, vals, k)
+        k = load_entries(mode, tab.marker_body[row[T.FORCE_I]], 1.0, row, y, idata, tab, slot, vals, k)
+        k = load_entries(mode, tab.marker_body[row[T.FORCE_J]], -1.0, row, y, idata, tab, slot, vals, k)
+        k = element_entries(mode, t, row, y, idata, tab, slot, vals, k)
     for s in range(idata[T.H_STATES]):
-        k = state_entries(mode, t, s, y, cj, idata, tab, places, slot, vals, k)
-    return k
-
-
-NO_PLACES = np.zeros((1, 2), dtype=np.int64)
-
-
-@njit(JACOBIAN_SIG, cache=True, error_model="numpy")
-def jacobian(t, y, yp, cj, vals, idata, rdata, work):
-    """Evaluate dG/dy + cj dG/dy' into ``vals``, CSC order."""
-    for k in range(vals.size):
-        vals[k] = 0.0
-    walk(NUMBERS, t, y, yp, cj, idata[0:2].reshape(1, 2), vals, idata, rdata, work)
+        k = state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k)
+    if mode == COUNT:
+        vals[0] = k
 
 
 def pattern(idata: np.ndarray, rdata: np.ndarray, work_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return (indptr, indices, slots): the CSC pattern and, for each entry in walking order, its place in it."""
-    from gearmbs.dae.tables import H_UNKNOWNS
+    n = int(idata[T.H_UNKNOWNS])
+    y, work, count = np.zeros(n), np.zeros(work_size), np.zeros(1)
+    ask = idata.copy()
+    ask[T.H_MODE] = COUNT
+    jacobian(0.0, y, y, 1.0, count, ask, rdata.copy(), work)
+    places = np.zeros(2 * int(count[0]))
+    ask[T.H_MODE] = PLACES
+    jacobian(0.0, y, y, 1.0, places, ask, rdata.copy(), work)
+    return compressed(places.reshape(-1, 2).astype(np.int64), n)
 
-    n = int(idata[H_UNKNOWNS])
-    y = np.zeros(n)
-    work = np.zeros(work_size)
-    vals = np.zeros(1)
-    count = walk(COUNT, 0.0, y, y, 1.0, NO_PLACES, vals, idata, rdata, work)
-    places = np.zeros((count, 2), dtype=np.int64)
-    walk(PLACES, 0.0, y, y, 1.0, places, vals, idata, rdata, work)
-    key = places[:, 1] * n + places[:, 0]
-    unique, slots = np.unique(key, return_inverse=True)
+
+def compressed(places: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the CSC pattern of a list of (row, column) places and the slot of each place in it."""
+    unique, slots = np.unique(places[:, 1] * n + places[:, 0], return_inverse=True)
     columns, rows = np.divmod(unique, n)
     indptr = np.searchsorted(columns, np.arange(n + 1)).astype(np.int64)
     return indptr, rows.astype(np.int64), slots.astype(np.int64)

@@ -39,7 +39,7 @@ _IVEC = int64[::1]
 _MAT = float64[:, ::1]
 
 
-@njit(float64(_VEC, _VEC), cache=True, nogil=True, fastmath=True)
+@njit(float64(_VEC, _VEC), cache=True, nogil=True, fastmath=True, error_model="numpy")
 def weighted_max(v, weight):
     """Return max_i |v[i]| weight[i] of finite vectors."""
     top = 0.0
@@ -49,7 +49,7 @@ def weighted_max(v, weight):
     return top
 
 
-@njit(int64(_VEC, _VEC), cache=True, nogil=True)
+@njit(int64(_VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def weighted_argmax(v, weight):
     """Return the index of the largest |v[i]| weight[i]."""
     top = -1.0
@@ -62,7 +62,7 @@ def weighted_argmax(v, weight):
     return where
 
 
-@njit(boolean(_VEC), cache=True, nogil=True)
+@njit(boolean(_VEC), cache=True, nogil=True, error_model="numpy")
 def all_finite(v):
     """Return whether every entry is finite."""
     # 0 * x is 0 for finite x and NaN otherwise
@@ -82,7 +82,7 @@ def all_finite(v):
     return s0 + s1 + s2 + s3 == 0.0
 
 
-@njit(int64(_VEC), cache=True, nogil=True)
+@njit(int64(_VEC), cache=True, nogil=True, error_model="numpy")
 def first_not_finite(v):
     """Return the index of the first entry that is not finite, or -1."""
     for i in range(v.shape[0]):
@@ -91,7 +91,7 @@ def first_not_finite(v):
     return -1
 
 
-@njit(types.void(_VEC, _VEC, _MAT), cache=True, nogil=True)
+@njit(types.void(_VEC, _VEC, _MAT), cache=True, nogil=True, error_model="numpy")
 def set_weights(real, y, vec):
     """Set the weights of the error test and of the corrector test from tolerances at ``y``."""
     rtol = real[RTOL]
@@ -122,6 +122,7 @@ def set_weights(real, y, vec):
     ),
     cache=True,
     nogil=True,
+    error_model="numpy",
 )
 def correct(residual, t, gamma, vec, real, count, plan, factors, idata, rdata, work):
     """Iterate from the prediction in rows Y and YP of ``vec`` until the corrector test is passed.

@@ -25,7 +25,7 @@ _VEC = float64[::1]
 _IVEC = int64[::1]
 
 
-@njit(types.void(_IVEC, _IVEC, _VEC, _VEC, _VEC), cache=True, nogil=True)
+@njit(types.void(_IVEC, _IVEC, _VEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def equilibrate(indptr, indices, vals, row_scale, col_scale):
     """Scale rows and columns so that the largest entry of each is near one, by powers of two.
 
@@ -62,7 +62,7 @@ def equilibrate(indptr, indices, vals, row_scale, col_scale):
         col_scale[i] = 2.0 ** np.round(np.log2(col_scale[i]))
 
 
-@njit(types.void(int64, int64, _IVEC, _IVEC, _IVEC), cache=True, nogil=True)
+@njit(types.void(int64, int64, _IVEC, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
 def _unlink(item, count, head, after, before):
     """Take ``item`` out of the list of items with ``count`` entries."""
     a = after[item]
@@ -75,7 +75,7 @@ def _unlink(item, count, head, after, before):
         before[a] = b
 
 
-@njit(types.void(int64, int64, _IVEC, _IVEC, _IVEC), cache=True, nogil=True)
+@njit(types.void(int64, int64, _IVEC, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
 def _link(item, count, head, after, before):
     """Put ``item`` at the front of the list of items with ``count`` entries."""
     a = head[count]
@@ -86,7 +86,12 @@ def _link(item, count, head, after, before):
     head[count] = item
 
 
-@njit(types.Tuple((_IVEC, _VEC))(_IVEC, _VEC, _IVEC, _IVEC, _IVEC, int64, int64), cache=True, nogil=True)
+@njit(
+    types.Tuple((_IVEC, _VEC))(_IVEC, _VEC, _IVEC, _IVEC, _IVEC, int64, int64),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
 def _make_room(pool, pool_vals, start, length, room, line, want):
     """Move ``line`` to the end of the pool with room for ``want`` entries; compact or grow the pool when full.
 
@@ -129,6 +134,7 @@ def _make_room(pool, pool_vals, start, length, room, line, want):
     ),
     cache=True,
     nogil=True,
+    error_model="numpy",
 )
 def _best_pivot(n, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, cvals, rpool, rhead, rafter):
     """Return the row and column of the acceptable entry with the lowest Markowitz cost, or (-1, -1)."""
@@ -181,7 +187,12 @@ def _best_pivot(n, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, 
     return best_row, best_col
 
 
-@njit(types.Tuple((int64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC))(_IVEC, _IVEC, _VEC), cache=True, nogil=True)
+@njit(
+    types.Tuple((int64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC))(_IVEC, _IVEC, _VEC),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
 def choose_pivots(indptr, indices, scaled):
     """Eliminate the matrix once with Markowitz's rule and record pivots and fill.
 

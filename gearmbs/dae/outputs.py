@@ -8,6 +8,8 @@ import numpy as np
 from numba import float64, int64, njit, types
 
 from gearmbs.dae import index1
+from gearmbs.dae import tables as T
+from gearmbs.dae.jacobian import COUNT, NUMBERS, PLACES, compressed
 from gearmbs.dae.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, PLAN_TYPE, analyse, factor, new_factors, solve
 
 _VEC = float64[::1]
@@ -63,18 +65,26 @@ def new_records(m: int, bodies: int, rows: int, elements: int) -> Records:
     nogil=True,
 )
 def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, factors, records):
-    """Evaluate output rows from ``first``; return the row where new pivots are needed, or ``last``."""
-    none = np.zeros((1, 2), dtype=np.int64)
+    """Evaluate output rows from ``first``; return the row where new pivots are needed, or ``last``.
+
+    Asked for it in the header of ``idata``, only count the entries of the matrix or write their places to ``vals``;
+    with ``last`` less than ``first``, assemble row ``first`` without solving.
+    """
     rows = records.force.shape[1]
     base = records.solution.shape[1] - rows
     multipliers = np.zeros((2, max(rows, 1)))
     rhs = np.zeros(records.solution.shape[1])
-    for k in range(first, last):
-        for c in range(vals.size):
-            vals[c] = 0.0
-        index1.saddle(
-            index1.NUMBERS, t[k], y[k], none, slots, vals, rhs, records.phi[k], records.loads[k], idata, rdata, work
-        )
+    only_assemble = last < first or idata[T.H_MODE] != NUMBERS
+    for k in range(first, first + 1 if only_assemble else last):
+        if idata[T.H_MODE] == NUMBERS:
+            for c in range(vals.size):
+                vals[c] = 0.0
+        count = index1.saddle(t[k], y[k], slots, vals, rhs, records.phi[k], records.loads[k], idata, rdata, work)
+        if only_assemble:
+            records.solution[k, :] = rhs
+            if idata[T.H_MODE] == COUNT:
+                vals[0] = count
+            return last
         growth = factor(plan, factors, vals)
         if not growth <= GROWTH_LIMIT:
             return k
@@ -87,6 +97,32 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
     return last
 
 
+NO_PLAN = analyse(np.array([0, 1]), np.array([0]), np.ones(1), np.ones(1))
+NO_FACTORS = new_factors(NO_PLAN)
+
+
+def pattern(idata, rdata, work_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (indptr, indices, slots) of the saddle-point matrix in CSC form."""
+    n = int(6 * (idata[T.H_BODIES] - 1) + idata[T.H_ROWS])
+    y, slots = np.zeros((1, int(idata[T.H_UNKNOWNS]))), np.zeros(1, dtype=np.int64)
+    ask = idata.copy()
+    count = np.zeros(1)
+    for mode in (COUNT, PLACES):
+        ask[T.H_MODE] = mode
+        places = count if mode == COUNT else np.zeros(2 * int(count[0]))
+        assemble(np.zeros(1), y, slots, ask, rdata.copy(), work_size, places)
+    return compressed(places.reshape(-1, 2).astype(np.int64), n)
+
+
+def assemble(t, y, slots, idata, rdata, work_size, vals) -> Records:
+    """Assemble the index-1 system at ``t[0], y[0]`` into ``vals`` and the right-hand side in ``solution``."""
+    bodies, rows, elements = int(idata[T.H_BODIES]) - 1, int(idata[T.H_ROWS]), int(idata[T.H_FORCES])
+    records = new_records(1, bodies, rows, elements)
+    work = np.zeros(work_size)
+    evaluate_rows(0, -1, t, y, slots, idata, rdata, work, vals, NO_PLAN, NO_FACTORS, records)
+    return records
+
+
 def evaluate(t, y, epochs, idata, rdata, work_size, records: Records) -> None:
     """Fill ``records`` for all rows of ``y``; ``epochs`` names the integer tables valid from each row on.
 
@@ -95,10 +131,8 @@ def evaluate(t, y, epochs, idata, rdata, work_size, records: Records) -> None:
     SingularMatrixError
         If the equations of motion have no unique solution at an output time.
     """
-    indptr, indices, slots = index1.pattern(idata, rdata, work_size)
+    indptr, indices, slots = pattern(idata, rdata, work_size)
     work, vals = np.zeros(work_size), np.zeros(indices.size)
-    rhs, rows = np.zeros(indptr.size - 1), records.force.shape[1]
-    none = np.zeros((1, 2), dtype=np.int64)
     bounds = [row for row, _ in epochs] + [t.size]
     ones = np.ones(indptr.size - 1)
     y = np.ascontiguousarray(y)
@@ -108,12 +142,7 @@ def evaluate(t, y, epochs, idata, rdata, work_size, records: Records) -> None:
         stuck = -1
         while first < last:
             if plan is None or stuck == first:
-                vals[:] = 0.0
-                scratch = np.zeros(3 * rows)
-                loads = np.zeros_like(records.loads[first])
-                index1.saddle(
-                    index1.NUMBERS, t[first], y[first], none, slots, vals, rhs, scratch, loads, table, rdata, work
-                )
+                assemble(t[first : first + 1], y[first : first + 1], slots, table, rdata, work_size, vals)
                 plan = analyse(indptr, indices, vals, ones)
                 factors = new_factors(plan)
             done = evaluate_rows(first, last, t, y, slots, table, rdata, work, vals, plan, factors, records)

@@ -155,7 +155,7 @@ def new_factors(plan: LUPlan) -> LUFactors:
     return LUFactors(np.zeros(len(plan.l_pos)), np.zeros(len(plan.u_pos)), np.zeros(n), np.zeros(n))
 
 
-@njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True)
+@njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
 def factor(plan, factors, vals):
     """Factor the matrix with values ``vals`` along the plan.
 
@@ -207,7 +207,7 @@ def factor(plan, factors, vals):
     return growth
 
 
-@njit(types.void(PLAN_TYPE, FACTORS_TYPE, _VEC, _VEC), cache=True, nogil=True)
+@njit(types.void(PLAN_TYPE, FACTORS_TYPE, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def solve(plan, factors, b, out):
     """Write the solution of A out = b; ``out`` may be ``b`` itself.
 

@@ -9,7 +9,7 @@ from numba import njit
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-from gearmbs.dae import index1, initial, jacobian, residual
+from gearmbs.dae import initial, jacobian, outputs, residual
 from gearmbs.dae import tables as T
 from gearmbs.dae.errors import ModelError, SingularModelError
 from gearmbs.dae.kinematics import inertia_times
@@ -125,6 +125,7 @@ class System:
         self.state_start = np.zeros(0)
         self.t0 = t0
         self.report: initial.InitialReport | None = None
+        self._plan: tuple = (None, None)
 
     # --- before the integration -------------------------------------------------------------------
 
@@ -164,21 +165,15 @@ class System:
         y = np.zeros(int(idata[T.H_UNKNOWNS]))
         y[int(idata[T.H_Z]) : int(idata[T.H_Z]) + self.state_start.size] = self.state_start
         state_from_pose(np.ascontiguousarray(pose), idata, rdata, work, y)
-        plan = self._index1_plan(idata, rdata, size)
-        indptr, indices, slots = plan
-        n = indptr.size - 1
-        vals, rhs = np.zeros(indices.size), np.zeros(n)
-        phi = np.zeros(3 * len(self.builder.rows))
-        loads = np.zeros((max(1, len(self.builder.forces)), index1.FORCE_RECORD))
-        none = np.zeros((1, 2), dtype=np.int64)
-        index1.saddle(index1.NUMBERS, t, y, none, slots, vals, rhs, phi, loads, idata, rdata, work)
-        return csc_array((vals, indices, indptr), shape=(n, n)), rhs, phi, loads, y, idata, rdata, work
-
-    def _index1_plan(self, idata, rdata, size):
         key = len(self.builder.rows)
-        if getattr(self, "_plan", (None, None))[0] != key:
-            self._plan = (key, index1.pattern(idata, rdata, size))
-        return self._plan[1]
+        if self._plan[0] != key:
+            self._plan = (key, outputs.pattern(idata, rdata, size))
+        indptr, indices, slots = self._plan[1]
+        n = indptr.size - 1
+        vals = np.zeros(indices.size)
+        records = outputs.assemble(np.array([t]), y[None, :], slots, idata, rdata, size, vals)
+        matrix = csc_array((vals, indices, indptr), shape=(n, n))
+        return matrix, records.solution[0], records.phi[0], records.loads[0], y, idata, rdata, work
 
     def constraint_jacobian(self, pose: np.ndarray, t: float) -> tuple[csc_array, np.ndarray, np.ndarray]:
         """Return Phi_q in spatial displacements, Phi, and Phi_q v + Phi_t at a pose."""

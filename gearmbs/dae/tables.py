@@ -69,7 +69,9 @@ H_I_TAPE = 44
 H_W_FUNCTION = 45
 H_W_TAPE = 46
 H_W_TAPE_SIZE = 47
-H_SIZE = 48
+H_MODE = 48
+"""What `jacobian` and `saddle` do with the entries: add up numbers, note places, count."""
+H_SIZE = 49
 
 BODY_MASS = 0
 BODY_INERTIA = 1

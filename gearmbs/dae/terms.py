@@ -43,12 +43,12 @@ for _kind, _blocks in {
         HESSIAN_BLOCKS[(_kind, *_block)] = True
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def dot3(a, i, b, j):
     return a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def cross3(a, i, b, j, out, k):
     x = a[i + 1] * b[j + 2] - a[i + 2] * b[j + 1]
     y = a[i + 2] * b[j] - a[i] * b[j + 2]
@@ -56,7 +56,7 @@ def cross3(a, i, b, j, out, k):
     out[k], out[k + 1], out[k + 2] = x, y, z
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def copy3(a, i, out, k, factor):
     out[k], out[k + 1], out[k + 2] = factor * a[i], factor * a[i + 1], factor * a[i + 2]
 

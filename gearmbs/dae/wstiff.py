@@ -33,13 +33,13 @@ SINGULAR_RETRIES = 8
 EPS = float(np.finfo(float).eps)
 
 
-@njit(HOOK_SIG, cache=True, nogil=True)
+@njit(HOOK_SIG, cache=True, nogil=True, error_model="numpy")
 def no_hook(t, hist, npast, idata, rdata, work):
     """Stand in for a problem without a hook."""
     return 0
 
 
-@njit(EVENTS_SIG, cache=True, nogil=True)
+@njit(EVENTS_SIG, cache=True, nogil=True, error_model="numpy")
 def no_events(t, y, yp, out, idata, rdata, work):
     """Stand in for a problem without events."""
 

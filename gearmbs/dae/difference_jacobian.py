@@ -1,0 +1,370 @@
+"""Newton matrix by coloured differences, and adapters that give users' functions the fixed signatures.
+
+A user's function is called with its own few arguments; what the integrator needs beside them (pattern, colours, increments, addresses of
+Python callbacks) stands in front of the user's parameters in the tables of the problem:
+
+* ``idata``: the header below, then colour pointers, columns by colour, ``indptr``, ``indices``
+* ``rdata``: magnitude of each unknown for the increments, then the user's parameters
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+
+import numpy as np
+from llvmlite import ir
+from numba import int64, njit, types
+from numba.extending import intrinsic
+
+from gearmbs.dae.problem import EVENTS_SIG, JACOBIAN_SIG, RESIDUAL_SIG
+
+# header of idata
+N = 0
+N_COLOURS = 1
+RESIDUAL_ADDRESS = 2
+JACOBIAN_ADDRESS = 3
+EVENTS_ADDRESS = 4
+COLOUR_PTR = 5
+COLOUR_COLS = 6
+INDPTR = 7
+INDICES = 8
+N_HEADER = 9
+
+INCREMENT = 1.4901161193847656e-08
+
+_IVEC = int64[::1]
+
+
+@njit(int64(_IVEC, _IVEC, _IVEC), cache=True)
+def colour_columns(indptr, indices, colours):
+    """Give columns that share a row different colours, greedily; return the number of colours.
+
+    Parameters
+    ----------
+    indptr, indices : ndarray of int64
+        CSC pattern of a square matrix.
+    colours : ndarray of int64, shape (n,)
+        Written.
+    """
+    n = colours.shape[0]
+    row_ptr = np.zeros(n + 1, dtype=np.int64)
+    for p in range(indices.shape[0]):
+        row_ptr[indices[p] + 1] += 1
+    for i in range(n):
+        row_ptr[i + 1] += row_ptr[i]
+    fill = row_ptr.copy()
+    row_cols = np.empty(indices.shape[0], dtype=np.int64)
+    for j in range(n):
+        for p in range(indptr[j], indptr[j + 1]):
+            i = indices[p]
+            row_cols[fill[i]] = j
+            fill[i] += 1
+    taken = np.full(n + 1, -1, dtype=np.int64)
+    colours[:] = -1
+    count = 0
+    for j in range(n):
+        for p in range(indptr[j], indptr[j + 1]):
+            i = indices[p]
+            for q in range(row_ptr[i], row_ptr[i + 1]):
+                c = colours[row_cols[q]]
+                if c >= 0:
+                    taken[c] = j
+        c = 0
+        while taken[c] == j:
+            c += 1
+        colours[j] = c
+        count = max(count, c + 1)
+    return count
+
+
+def pack_tables(
+    indptr: np.ndarray, indices: np.ndarray, scale: np.ndarray, parameters: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Lay out ``idata``, ``rdata`` and the length of ``work`` for a user's problem.
+
+    Parameters
+    ----------
+    indptr, indices : ndarray of int64
+        CSC pattern.
+    scale : ndarray, shape (n,)
+        Magnitude of each unknown, for the increments.
+    parameters : ndarray
+        The user's parameters.
+
+    Returns
+    -------
+    idata, rdata : ndarray
+    work_size : int
+    """
+    n = len(indptr) - 1
+    colours = np.empty(n, dtype=np.int64)
+    count = colour_columns(indptr, indices, colours)
+    columns = np.argsort(colours, kind="stable").astype(np.int64)
+    pointers = np.concatenate(([0], np.cumsum(np.bincount(colours, minlength=count)))).astype(np.int64)
+    header = np.zeros(N_HEADER, dtype=np.int64)
+    header[N] = n
+    header[N_COLOURS] = count
+    header[COLOUR_PTR] = N_HEADER
+    header[COLOUR_COLS] = header[COLOUR_PTR] + len(pointers)
+    header[INDPTR] = header[COLOUR_COLS] + n
+    header[INDICES] = header[INDPTR] + n + 1
+    idata = np.concatenate((header, pointers, columns, indptr, indices)).astype(np.int64)
+    rdata = np.concatenate((scale, parameters)).astype(float)
+    return idata, rdata, 4 * n
+
+
+@njit(
+    types.void(
+        types.FunctionType(RESIDUAL_SIG),
+        types.float64,
+        types.float64[::1],
+        types.float64[::1],
+        types.float64,
+        types.float64[::1],
+        _IVEC,
+        types.float64[::1],
+        types.float64[::1],
+    ),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def difference_matrix(residual, t, y, yp, cj, vals, idata, rdata, work):
+    """Write dG/dy + cj dG/dy' by forward differences, one residual for each colour and one for the base.
+
+    ``idata``, ``rdata`` and ``work`` are laid out by `pack_tables`; ``residual`` gets them as they are.
+    """
+    n = idata[N]
+    base = work[0:n]
+    moved = work[n : 2 * n]
+    y_moved = work[2 * n : 3 * n]
+    yp_moved = work[3 * n : 4 * n]
+    residual(t, y, yp, base, idata, rdata, work)
+    for i in range(n):
+        y_moved[i] = y[i]
+        yp_moved[i] = yp[i]
+    colour_ptr = idata[idata[COLOUR_PTR] :]
+    columns = idata[idata[COLOUR_COLS] :]
+    indptr = idata[idata[INDPTR] :]
+    indices = idata[idata[INDICES] :]
+    for c in range(idata[N_COLOURS]):
+        for q in range(colour_ptr[c], colour_ptr[c + 1]):
+            j = columns[q]
+            # the magnitude of y' enters through cj: its increment is cj times that of y
+            d = INCREMENT * max(abs(y[j]), max(rdata[j], abs(yp[j]) / cj if cj > 0.0 else 0.0))
+            y_moved[j] = y[j] + d
+            yp_moved[j] = yp[j] + cj * d
+        residual(t, y_moved, yp_moved, moved, idata, rdata, work)
+        for q in range(colour_ptr[c], colour_ptr[c + 1]):
+            j = columns[q]
+            d = INCREMENT * max(abs(y[j]), max(rdata[j], abs(yp[j]) / cj if cj > 0.0 else 0.0))
+            for p in range(indptr[j], indptr[j + 1]):
+                vals[p] = (moved[indices[p]] - base[indices[p]]) / d
+            y_moved[j] = y[j]
+            yp_moved[j] = yp[j]
+
+
+@intrinsic
+def _call_address(typingctx, address, t, y, yp, extra, out):
+    """Call the C function ``void f(double t, double *y, double *yp, double extra, double *out)`` at ``address``."""
+    signature = types.void(types.int64, types.float64, y, yp, types.float64, out)
+
+    def codegen(context, builder, sig, args):
+        ll_double = context.get_value_type(types.float64)
+        ll_pointer = ll_double.as_pointer()
+        function_type = ir.FunctionType(ir.VoidType(), [ll_double, ll_pointer, ll_pointer, ll_double, ll_pointer])
+        function = builder.inttoptr(args[0], function_type.as_pointer())
+        pointers = [
+            context.make_array(ty)(context, builder, value).data
+            for ty, value in ((sig.args[2], args[2]), (sig.args[3], args[3]), (sig.args[5], args[5]))
+        ]
+        builder.call(function, [args[1], pointers[0], pointers[1], args[4], pointers[2]])
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@njit(RESIDUAL_SIG, cache=True, nogil=True, error_model="numpy")
+def python_residual(t, y, yp, out, idata, rdata, work):
+    """Call the user's Python residual through its C callback."""
+    _call_address(idata[RESIDUAL_ADDRESS], t, y, yp, 0.0, out)
+
+
+@njit(JACOBIAN_SIG, cache=True, nogil=True, error_model="numpy")
+def python_jacobian(t, y, yp, cj, vals, idata, rdata, work):
+    """Call the user's Python Jacobian through its C callback."""
+    _call_address(idata[JACOBIAN_ADDRESS], t, y, yp, cj, vals)
+
+
+@njit(JACOBIAN_SIG, cache=True, nogil=True, error_model="numpy")
+def python_difference_jacobian(t, y, yp, cj, vals, idata, rdata, work):
+    """Difference the user's Python residual."""
+    difference_matrix(python_residual, t, y, yp, cj, vals, idata, rdata, work)
+
+
+@njit(EVENTS_SIG, cache=True, nogil=True, error_model="numpy")
+def python_events(t, y, yp, out, idata, rdata, work):
+    """Call the user's Python event functions through their C callback."""
+    _call_address(idata[EVENTS_ADDRESS], t, y, yp, 0.0, out)
+
+
+_C_CALLBACK = ctypes.CFUNCTYPE(
+    None, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p
+)
+
+
+class PythonCallback:
+    """A Python function behind a C function pointer, safe to call from the compiled loop.
+
+    Parameters
+    ----------
+    function : callable
+        Called as ``function(t, y, yp, extra, out)`` with arrays over the integrator's memory.
+    n, n_out : int
+        Lengths of ``y`` and of ``out``.
+    errors : list
+        Exceptions are appended here, and ``out`` becomes NaN, so that the integrator stops.
+    """
+
+    def __init__(self, function: Callable, n: int, n_out: int, errors: list[BaseException]):
+        views: dict[tuple[int, int], np.ndarray] = {}
+
+        def view(address: int, length: int) -> np.ndarray:
+            array = views.get((address, length))
+            if array is None:
+                array = np.ctypeslib.as_array((ctypes.c_double * length).from_address(address))
+                views[address, length] = array
+            return array
+
+        def call(t, y, yp, extra, out):
+            target = view(out, n_out)
+            if errors:
+                target[:] = np.nan
+                return
+            try:
+                function(t, view(y, n), view(yp, n), extra, target)
+            except BaseException as error:
+                errors.append(error)
+                target[:] = np.nan
+
+        self._callback = _C_CALLBACK(call)
+        self.address = ctypes.cast(self._callback, ctypes.c_void_p).value
+
+
+def adapt_residual(function: Callable, with_parameters: bool) -> Callable:
+    """Return a numba function of RESIDUAL_SIG around a user's ``f(t, y, yp, out[, p])`` compiled by numba."""
+    if with_parameters:
+
+        @njit(RESIDUAL_SIG, nogil=True, error_model="numpy")
+        def residual(t, y, yp, out, idata, rdata, work):
+            function(t, y, yp, out, rdata[idata[N] :])
+
+    else:
+
+        @njit(RESIDUAL_SIG, nogil=True, error_model="numpy")
+        def residual(t, y, yp, out, idata, rdata, work):
+            function(t, y, yp, out)
+
+    return residual
+
+
+def adapt_jacobian(function: Callable, with_parameters: bool, dense: bool) -> Callable:
+    """Return a numba function of JACOBIAN_SIG around a user's ``jac(t, y, yp, cj, out[, p])`` compiled by numba."""
+    if dense and with_parameters:
+
+        @njit(JACOBIAN_SIG, nogil=True, error_model="numpy")
+        def jacobian(t, y, yp, cj, vals, idata, rdata, work):
+            n = idata[N]
+            function(t, y, yp, cj, vals.reshape((n, n)).T, rdata[n:])
+
+    elif dense:
+
+        @njit(JACOBIAN_SIG, nogil=True, error_model="numpy")
+        def jacobian(t, y, yp, cj, vals, idata, rdata, work):
+            n = idata[N]
+            function(t, y, yp, cj, vals.reshape((n, n)).T)
+
+    elif with_parameters:
+
+        @njit(JACOBIAN_SIG, nogil=True, error_model="numpy")
+        def jacobian(t, y, yp, cj, vals, idata, rdata, work):
+            function(t, y, yp, cj, vals, rdata[idata[N] :])
+
+    else:
+
+        @njit(JACOBIAN_SIG, nogil=True, error_model="numpy")
+        def jacobian(t, y, yp, cj, vals, idata, rdata, work):
+            function(t, y, yp, cj, vals)
+
+    return jacobian
+
+
+def differenced(residual: Callable) -> Callable:
+    """Return a numba function of JACOBIAN_SIG that differences ``residual``; tables as by `pack_tables`."""
+
+    @njit(JACOBIAN_SIG, nogil=True, error_model="numpy")
+    def jacobian(t, y, yp, cj, vals, idata, rdata, work):
+        difference_matrix(residual, t, y, yp, cj, vals, idata, rdata, work)
+
+    return jacobian
+
+
+def _no_events(t, y, yp, out, idata, rdata, work):
+    pass
+
+
+def adapt_events(functions: list[Callable], with_parameters: list[bool]) -> Callable:
+    """Return a numba function of EVENTS_SIG around users' ``g(t, y, yp[, p])`` compiled by numba."""
+    chain = njit(EVENTS_SIG, nogil=True, error_model="numpy")(_no_events)
+    for place, (function, takes_p) in enumerate(zip(functions, with_parameters, strict=True)):
+        chain = _append_event(chain, function, takes_p, place)
+    return chain
+
+
+def _append_event(before: Callable, function: Callable, takes_p: bool, place: int) -> Callable:
+    if takes_p:
+
+        @njit(EVENTS_SIG, nogil=True, error_model="numpy")
+        def events(t, y, yp, out, idata, rdata, work):
+            before(t, y, yp, out, idata, rdata, work)
+            out[place] = function(t, y, yp, rdata[idata[N] :])
+
+    else:
+
+        @njit(EVENTS_SIG, nogil=True, error_model="numpy")
+        def events(t, y, yp, out, idata, rdata, work):
+            before(t, y, yp, out, idata, rdata, work)
+            out[place] = function(t, y, yp)
+
+    return events
+
+
+@njit(
+    types.void(
+        types.FunctionType(RESIDUAL_SIG),
+        types.float64,
+        types.float64[::1],
+        types.float64[::1],
+        types.boolean[::1],
+        _IVEC,
+        types.float64[::1],
+        types.float64[::1],
+    ),
+    cache=True,
+)
+def find_differential(residual, t, y, yp, differential, idata, rdata, work):
+    """Mark the unknowns whose derivative changes the residual at one point."""
+    n = y.shape[0]
+    base = np.empty(n)
+    moved = np.empty(n)
+    yp_moved = yp.copy()
+    residual(t, y, yp, base, idata, rdata, work)
+    for j in range(n):
+        yp_moved[j] = yp[j] + 1e-3 * max(1.0, abs(yp[j]))
+        residual(t, y, yp_moved, moved, idata, rdata, work)
+        differential[j] = False
+        for i in range(n):
+            if moved[i] != base[i]:
+                differential[j] = True
+        yp_moved[j] = yp[j]

@@ -1,0 +1,428 @@
+"""One call for users: `solve_dae`, in the manner of scipy's ``solve_ivp``, for any DAE and any of our integrators."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numba.core.registry import CPUDispatcher
+from scipy.sparse import csc_array, issparse
+
+from gearmbs.dae import difference_jacobian as dj
+from gearmbs.dae.ida import solve_ida
+from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.result import DAEResult, DenseOutput, Status
+from gearmbs.dae.sparse_lu import SingularMatrixError, analyse, factor, new_factors, solve
+from gearmbs.dae.wstiff import solve_wstiff
+
+METHODS = ("WSTIFF", "GSTIFF", "IDA")
+IDA_DEFAULT_OUTPUTS = 201
+SETTLING_STEP = 1e-8
+
+
+def _takes(function: Callable, fewest: int, what: str) -> bool:
+    """Return whether ``function`` takes the parameters ``p`` beside its ``fewest`` arguments."""
+    inner = function.py_func if isinstance(function, CPUDispatcher) else function
+    try:
+        count = len(inspect.signature(inner).parameters)
+    except (TypeError, ValueError):
+        return False
+    if count not in (fewest, fewest + 1):
+        raise ValueError(
+            f"{what} takes {count} arguments; it must take {fewest}, or {fewest + 1} with the parameters p last"
+        )
+    return count == fewest + 1
+
+
+class _UserFunctions:
+    """Compiled functions of one user's problem, and the exceptions its Python callbacks have raised."""
+
+    def __init__(self, n: int, parameters: np.ndarray):
+        self.n = n
+        self.parameters = parameters
+        self.errors: list[BaseException] = []
+        self.callbacks: list[dj.PythonCallback] = []
+        self.addresses: dict[int, int] = {}
+
+    def _register(self, slot: int, function: Callable, n_out: int) -> None:
+        callback = dj.PythonCallback(function, self.n, n_out, self.errors)
+        self.callbacks.append(callback)
+        self.addresses[slot] = callback.address
+
+    def residual(self, fun: Callable) -> Callable:
+        takes_p = _takes(fun, 4, "the residual")
+        if isinstance(fun, CPUDispatcher):
+            return dj.adapt_residual(fun, takes_p)
+        extra = (self.parameters,) if takes_p else ()
+
+        def call(t, y, yp, _unused, out):
+            fun(t, y, yp, out, *extra)
+
+        self._register(dj.RESIDUAL_ADDRESS, call, self.n)
+        return dj.python_residual
+
+    def jacobian(self, jac: Callable | None, residual: Callable, nnz: int, dense: bool) -> Callable:
+        if jac is None:
+            return dj.python_difference_jacobian if residual is dj.python_residual else dj.differenced(residual)
+        takes_p = _takes(jac, 5, "the Jacobian")
+        if isinstance(jac, CPUDispatcher):
+            return dj.adapt_jacobian(jac, takes_p, dense)
+        extra = (self.parameters,) if takes_p else ()
+        n = self.n
+
+        def call(t, y, yp, cj, vals):
+            jac(t, y, yp, cj, vals.reshape((n, n)).T if dense else vals, *extra)
+
+        self._register(dj.JACOBIAN_ADDRESS, call, nnz)
+        return dj.python_jacobian
+
+    def events(self, functions: Sequence[Callable]) -> Callable:
+        takes_p = [_takes(g, 3, "an event function") for g in functions]
+        if all(isinstance(g, CPUDispatcher) for g in functions):
+            return dj.adapt_events(list(functions), takes_p)
+        extras = [(self.parameters,) if p else () for p in takes_p]
+
+        def call(t, y, yp, _unused, out):
+            for i, (g, extra) in enumerate(zip(functions, extras, strict=True)):
+                out[i] = g(t, y, yp, *extra)
+
+        self._register(dj.EVENTS_ADDRESS, call, len(functions))
+        return dj.python_events
+
+    def probe(self) -> BaseException | None:
+        """Return the first exception a callback has raised."""
+        return self.errors[0] if self.errors else None
+
+
+def _vector(value: Any, n: int, name: str) -> np.ndarray:
+    array = np.asarray(value, dtype=float)
+    if array.ndim == 0:
+        array = np.full(n, float(array))
+    if array.shape != (n,):
+        raise ValueError(
+            f"{name} has shape {array.shape}; it must be a number or have one entry for each of {n} unknowns"
+        )
+    return array.copy()
+
+
+def _mask(value: Any, n: int, name: str) -> np.ndarray:
+    mask = np.asarray(value)
+    if mask.dtype != bool or mask.shape != (n,):
+        raise ValueError(f"{name} must be {n} booleans, has shape {mask.shape} and type {mask.dtype}")
+    return mask.copy()
+
+
+def _pattern(jac_sparsity: Any, n: int) -> tuple[np.ndarray, np.ndarray]:
+    if jac_sparsity is None:
+        return np.arange(0, n * n + 1, n, dtype=np.int64), np.tile(np.arange(n, dtype=np.int64), n)
+    pattern = csc_array(jac_sparsity if issparse(jac_sparsity) else np.asarray(jac_sparsity) != 0)
+    if pattern.shape != (n, n):
+        raise ValueError(f"jac_sparsity has shape {pattern.shape}; it must be ({n}, {n})")
+    pattern.sort_indices()
+    return pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64)
+
+
+def _settle_rates(problem: DAEProblem, span: float) -> None:
+    """Set y' of differential unknowns by one Newton step of a vanishing implicit Euler step."""
+    gamma = 1.0 / (SETTLING_STEP * span)
+    vals = np.empty(len(problem.indices))
+    work = np.zeros(problem.work_size)
+    out = np.empty(problem.n)
+    tables = (problem.idata, problem.rdata, work)
+    problem.residual(problem.t0, problem.y0, problem.yp0, out, *tables)
+    problem.jacobian(problem.t0, problem.y0, problem.yp0, gamma, vals, *tables)
+    if not (np.isfinite(out).all() and np.isfinite(vals).all()):
+        return
+    try:
+        plan = analyse(problem.indptr, problem.indices, vals, problem.scale)
+    except SingularMatrixError:
+        return
+    factors = new_factors(plan)
+    factor(plan, factors, vals)
+    solve(plan, factors, out, out)
+    problem.yp0[problem.differential] -= gamma * out[problem.differential]
+
+
+def as_problem(
+    fun: Callable,
+    t0: float,
+    y0: np.ndarray,
+    yp0: np.ndarray | None,
+    span: float,
+    *,
+    p: np.ndarray | None = None,
+    atol: float | np.ndarray = 1e-8,
+    scale: float | np.ndarray = 1.0,
+    error_mask: np.ndarray | None = None,
+    differential: np.ndarray | None = None,
+    jac: Callable | None = None,
+    jac_sparsity: Any = None,
+    events: Sequence[Callable] = (),
+    names: Sequence[str] = (),
+) -> tuple[DAEProblem, Callable[[], BaseException | None]]:
+    """Turn a user's functions into a `DAEProblem`; parameters as in `solve_dae`.
+
+    Returns
+    -------
+    problem : DAEProblem
+        With ``atol_scale`` set to ``atol``: integrate with ``tol=1``.
+    error_probe : callable
+        Returns the first exception raised by a Python callback, or None.
+    """
+    y0 = np.array(y0, dtype=float).ravel()
+    n = len(y0)
+    if n == 0:
+        raise ValueError("y0 is empty")
+    parameters = np.array([] if p is None else p, dtype=float).ravel()
+    scales = _vector(scale, n, "scale")
+    atols = _vector(atol, n, "atol")
+    if not (atols > 0).all():
+        raise ValueError(f"atol must be positive, is {atols.min():g} for unknown {int(np.argmin(atols))}")
+    indptr, indices = _pattern(jac_sparsity, n)
+    functions = _UserFunctions(n, parameters)
+    residual = functions.residual(fun)
+    jacobian = functions.jacobian(jac, residual, len(indices), jac_sparsity is None)
+    compiled_events = functions.events(events) if len(events) else None
+    idata, rdata, work_size = dj.pack_tables(indptr, indices, scales, parameters)
+    for slot, address in functions.addresses.items():
+        idata[slot] = address
+    rates = np.zeros(n) if yp0 is None else _vector(yp0, n, "yp0")
+    if differential is None:
+        differential = np.empty(n, dtype=np.bool_)
+        dj.find_differential(residual, float(t0), y0, rates, differential, idata, rdata, np.zeros(work_size))
+    else:
+        differential = _mask(differential, n, "differential")
+    problem = DAEProblem(
+        n=n,
+        residual=residual,
+        jacobian=jacobian,
+        indptr=indptr,
+        indices=indices,
+        idata=idata,
+        rdata=rdata,
+        work_size=work_size,
+        y0=y0,
+        yp0=rates,
+        error_mask=differential.copy() if error_mask is None else _mask(error_mask, n, "error_mask"),
+        atol_scale=atols,
+        scale=scales,
+        differential=differential,
+        t0=float(t0),
+        names=list(names),
+        events=compiled_events,
+        n_events=len(events),
+    )
+    if not problem.error_mask.any():
+        raise ValueError("error_mask leaves no unknown under error control")
+    if yp0 is None:
+        _settle_rates(problem, span)
+    return problem, functions.probe
+
+
+def _event_rules(events: Sequence[Callable]) -> tuple[list[int], list[int]]:
+    """Read scipy's attributes ``direction`` and ``terminal``, and ours ``restart``, from event functions."""
+    direction, action = [], []
+    for g in events:
+        attributes = g.py_func if isinstance(g, CPUDispatcher) else g
+        direction.append(int(np.sign(getattr(attributes, "direction", 0))))
+        action.append(
+            1 if getattr(attributes, "terminal", False) else 2 if getattr(attributes, "restart", False) else 0
+        )
+    return direction, action
+
+
+def solve_dae(
+    fun: Callable | DAEProblem,
+    t_span: tuple[float, float],
+    y0: np.ndarray | None = None,
+    yp0: np.ndarray | None = None,
+    *,
+    method: str = "WSTIFF",
+    rtol: float = 1e-6,
+    atol: float | np.ndarray = 1e-8,
+    tol: float = 1e-6,
+    error_mask: np.ndarray | None = None,
+    differential: np.ndarray | None = None,
+    jac: Callable | None = None,
+    jac_sparsity: Any = None,
+    events: Callable | Sequence[Callable] | None = None,
+    t_eval: np.ndarray | None = None,
+    dense_output: bool = False,
+    max_step: float = np.inf,
+    first_step: float | None = None,
+    min_step: float | None = None,
+    max_order: int | None = None,
+    p: np.ndarray | None = None,
+    scale: float | np.ndarray = 1.0,
+    names: Sequence[str] = (),
+    **options: Any,
+) -> DAEResult:
+    """Solve an implicit system G(t, y, y') = 0 of index up to three.
+
+    Parameters
+    ----------
+    fun : callable or DAEProblem
+        ``fun(t, y, yp, out)`` or ``fun(t, y, yp, out, p)`` writes G into ``out``: compiled by numba (fast, runs without
+        the GIL) or plain Python. A `DAEProblem` brings its own initial values, Jacobian, tolerances and events.
+    t_span : (float, float)
+        Start and end.
+    y0, yp0 : array_like, shape (n,)
+        Initial values. ``y0`` must satisfy the algebraic equations. Without ``yp0`` the derivatives are worked out.
+    method : {"WSTIFF", "GSTIFF", "IDA"}
+        Variable-coefficient BDF, fixed-leading-coefficient BDF, or SUNDIALS IDA.
+    rtol, atol : float or ndarray
+        Local error of unknown i per step: ``atol[i] + rtol * |y[i]|``. Ignored for a `DAEProblem`, which takes ``tol``.
+    tol : float
+        For a `DAEProblem`: its ``atol_scale`` times this is the absolute tolerance (ADAMS: ERROR).
+    error_mask : ndarray of bool, optional
+        Unknowns under error control; default those whose derivative appears (multipliers are left out).
+    differential : ndarray of bool, optional
+        Unknowns whose derivative appears in G; found by probing G at the start if not given.
+    jac : callable, optional
+        ``jac(t, y, yp, cj, out[, p])`` writes dG/dy + cj dG/dy' into ``out``: the (n, n) matrix, or with
+        ``jac_sparsity`` its entries in CSC order. Without it coloured differences are used.
+    jac_sparsity : array_like or sparse matrix, shape (n, n), optional
+        Pattern of dG/dy and dG/dy' together.
+    events : callable or list of callable, optional
+        ``g(t, y, yp[, p])`` whose zeros are located. Attributes: ``direction`` (-1, 0, 1), ``terminal`` (stop there),
+        ``restart`` (land there and start afresh, for discontinuities).
+    t_eval : array_like, optional
+        Output times; default every step.
+    dense_output : bool
+        Return the interpolant ``sol``. Not with IDA.
+    max_step, first_step, min_step, max_order : optional
+        HMAX, HINIT, HMIN and KMAX.
+    p : array_like, optional
+        Parameters handed to ``fun``, ``jac`` and ``events``.
+    scale : float or ndarray
+        Typical magnitude of the unknowns, for increments and for scaling the Newton matrix.
+    names : sequence of str
+        Names of the unknowns, for messages.
+    **options
+        Further options of `gearmbs.dae.wstiff.solve_wstiff`: ``corrector``, ``breakpoints``, ``interpolate``, ...
+
+    Returns
+    -------
+    DAEResult
+        ``y`` has one row for each time. Numerical failures do not raise: see ``status`` and ``message``.
+
+    Raises
+    ------
+    ValueError
+        For arguments that make no sense.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from gearmbs.dae.solve import solve_dae
+    >>> def decay(t, y, yp, out):
+    ...     out[0] = yp[0] + y[0]
+    >>> result = solve_dae(decay, (0.0, 1.0), [1.0], rtol=1e-8, t_eval=[1.0])
+    >>> bool(abs(result.y[-1, 0] - np.exp(-1.0)) < 1e-6)
+    True
+    """
+    if method not in METHODS:
+        raise ValueError(f"method is {method!r}; choose one of {', '.join(METHODS)}")
+    t0, t_end = (float(t) for t in t_span)
+    if not (np.isfinite([t0, t_end]).all() and t_end > t0):
+        raise ValueError(f"t_span is ({t0:g}, {t_end:g}); it must be two increasing, finite times")
+    probe = None
+    if isinstance(fun, DAEProblem):
+        if y0 is not None or jac is not None or events is not None:
+            raise ValueError("a DAEProblem brings its own y0, jac and events: set them there")
+        if fun.t0 != t0:
+            raise ValueError(f"t_span starts at {t0:g}, the problem at {fun.t0:g}")
+        problem, relative = fun, 0.0
+    else:
+        if y0 is None:
+            raise ValueError("y0 is missing")
+        functions = [events] if callable(events) else list(events or ())
+        problem, probe = as_problem(
+            fun,
+            t0,
+            y0,
+            yp0,
+            t_end - t0,
+            p=p,
+            atol=atol,
+            scale=scale,
+            error_mask=error_mask,
+            differential=differential,
+            jac=jac,
+            jac_sparsity=jac_sparsity,
+            events=functions,
+            names=names,
+        )
+        tol, relative = 1.0, float(rtol)
+        options.setdefault("event_direction", None)
+        if functions:
+            options["event_direction"], options["event_action"] = _event_rules(functions)
+    if method == "IDA":
+        return _dispatch_ida(
+            problem,
+            probe,
+            t0,
+            t_end,
+            t_eval,
+            tol,
+            relative,
+            max_order,
+            max_step,
+            first_step,
+            min_step,
+            dense_output,
+            options,
+        )
+    return solve_wstiff(
+        problem,
+        t_eval,
+        t_end=t_end,
+        tol=tol,
+        rtol=relative,
+        method=method,
+        max_order=6 if max_order is None else max_order,
+        max_step=max_step,
+        first_step=first_step,
+        min_step=min_step,
+        dense_output=dense_output,
+        error_probe=probe,
+        **options,
+    )
+
+
+def _dispatch_ida(
+    problem, probe, t0, t_end, t_eval, tol, rtol, max_order, max_step, first_step, min_step, dense_output, options
+) -> DAEResult:
+    if dense_output or problem.n_events:
+        raise ValueError("method='IDA' has neither dense output nor events here; use WSTIFF or GSTIFF")
+    known = {name: options[name] for name in ("max_iterations", "progress") if name in options}
+    unknown = set(options) - set(known) - {"event_direction"}
+    if unknown:
+        raise ValueError(f"method='IDA' does not know {', '.join(sorted(unknown))}")
+    times = np.linspace(t0, t_end, IDA_DEFAULT_OUTPUTS) if t_eval is None else np.asarray(t_eval, dtype=float)
+    if times[0] < t0 or times[-1] > t_end:
+        raise ValueError(f"t_eval {times[0]:g} .. {times[-1]:g} leaves t_span")
+    padded = times if times[0] == t0 else np.concatenate(([t0], times))
+    result = solve_ida(
+        problem,
+        padded,
+        tol=tol,
+        rtol=rtol,
+        max_order=5 if max_order is None else min(max_order, 5),
+        max_step=0.0 if np.isinf(max_step) else max_step,
+        first_step=first_step or 0.0,
+        min_step=min_step or 0.0,
+        **known,
+    )
+    if padded is not times:
+        result.t, result.y, result.yp = result.t[1:], result.y[1:], result.yp[1:]
+    error = probe() if probe is not None else None
+    if error is not None:
+        result.status = Status.USER_ERROR
+        result.message = f"{Status.USER_ERROR.sentence} {type(error).__name__}: {error}"
+    return result
+
+
+__all__ = ["DAEResult", "DenseOutput", "Status", "as_problem", "solve_dae"]
