@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from gearmbs.dae.expressions import opcodes as op
@@ -309,6 +309,46 @@ def parse(text: str) -> Node:
     return _Parser(text).whole()
 
 
+def unparse(node: Node, rename: Callable[[Call], Call] = lambda call: call) -> str:
+    """Write a syntax tree as text again.
+
+    Parameters
+    ----------
+    node : Node
+    rename : callable
+        Given every function call before it is written; returns the call to write instead.
+    """
+    if isinstance(node, Number):
+        return str(node.integer) if node.integer is not None else repr(node.value)
+    if isinstance(node, Name):
+        return node.text if re.fullmatch(r"[A-Z_.$][A-Z0-9_.$]*", node.text) else f'"{node.text}"'
+    if isinstance(node, Negative):
+        return f"(-{unparse(node.operand, rename)})"
+    if isinstance(node, Power):
+        return f"({unparse(node.base, rename)})**({unparse(node.exponent, rename)})"
+    if isinstance(node, Chain):
+        rest = "".join(f" {symbol} {unparse(operand, rename)}" for symbol, operand in node.rest)
+        return f"({unparse(node.first, rename)}{rest})"
+    call = rename(node)
+    return f"{call.name}({', '.join(unparse(a, rename) for a in call.args)})"
+
+
+def walk(node: Node) -> Iterator[Node]:
+    """Yield a syntax tree's nodes, parents first."""
+    yield node
+    children: Sequence[Node] = ()
+    if isinstance(node, Negative):
+        children = (node.operand,)
+    elif isinstance(node, Power):
+        children = (node.base, node.exponent)
+    elif isinstance(node, Chain):
+        children = (node.first, *(operand for _, operand in node.rest))
+    elif isinstance(node, Call):
+        children = node.args
+    for child in children:
+        yield from walk(child)
+
+
 def compile_expression(text: str, scope: Scope, dimension: str = "number", accelerations: bool = False) -> Tape:
     """Compile a function expression to a tape that returns SI values.
 
@@ -344,4 +384,4 @@ def compile_expression(text: str, scope: Scope, dimension: str = "number", accel
     return tape
 
 
-__all__ = ["ExpressionError", "Scope", "SplineData", "Units", "compile_expression", "parse"]
+__all__ = ["ExpressionError", "Scope", "SplineData", "Units", "compile_expression", "parse", "unparse", "walk"]

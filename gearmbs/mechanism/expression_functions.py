@@ -219,20 +219,19 @@ class Lowering:
 
     def force_between(self, node: Call, torque: bool, axis: int) -> int:
         """Return FX ... TM: all forces on marker i from elements between markers i and j."""
-        self.marker(node, 0)
-        i = self.ref(node.args[0])
-        j = self.ref(node.args[1]) if len(node.args) > 1 else 0
-        self.marker(node, 1)
+        i, j = self.marker(node, 0), self.marker(node, 1)
         rm = self.marker(node, 2)
         shift = 3 if torque else 0
         found = []
-        for (kind, ref), (first, second) in self.scope.forces.items():
-            if first == i and (second or 0) == j:
+        for (kind, ref), pair in self.scope.forces.items():
+            first, second = (op.GLOBAL if m is None else self.scope.markers[m] for m in pair)
+            if first == i and second == j:
                 found.append((kind, ref, shift))
             elif first == j and second == i:
                 found.append((kind, ref, shift + 6))
         if not found:
-            self.fail(f"no force or joint acts between MARKER {i} and MARKER {j}", node.at)
+            refs = " and ".join(f"MARKER {self.ref(a)}" for a in node.args[:2])
+            self.fail(f"no force or joint acts between {refs}", node.at)
         axes = (0, 1, 2) if axis == op.MAGNITUDE and len(found) > 1 else (axis,)
         sums = []
         for a in axes:

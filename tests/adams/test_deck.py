@@ -160,5 +160,5 @@ def test_units():
         st.Units(force="X", mass="KILO", length="METER", time="SEC"),
         st.Units(ucf=0),
     ):
-        with pytest.raises(ValueError, match="missing|unknown|positive|ambiguous"):
+        with pytest.raises(ValueError, match=r"missing|unknown|positive|ambiguous"):
             deck_units(bad)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearmbs.mechanism.expression import ExpressionError, Scope, compile_expression, parse
+from gearmbs.mechanism.expression import ExpressionError, Scope, compile_expression, parse, unparse
 
 from .support import MARKER_BODY, MARKERS, time_series
 
@@ -43,6 +43,14 @@ from .support import MARKER_BODY, MARKERS, time_series
 def test_messages(text, message):
     with pytest.raises(ExpressionError, match=message):
         compile_expression(text, Scope(markers=MARKERS, marker_body=MARKER_BODY))
+
+
+@pytest.mark.parametrize("text", ["-2**2", "1-(2-3)-4*5/6", "2**(3-1)**.5", "IF(TIME-1: SIN(90D), 2, 3E-7)*-TIME"])
+def test_unparsed_text_means_the_same(text):
+    again = unparse(parse(text))
+    for t in (0.3, 1.7):
+        tapes = [compile_expression(f"{x}+0*SIN(TIME)+TIME", Scope()) for x in (text, again)]
+        assert time_series(tapes[0], t)[0] == time_series(tapes[1], t)[0]
 
 
 def test_long_sums_do_not_nest():

@@ -30,11 +30,11 @@ class SplineData:
 
     Parameters
     ----------
-    x : tuple of float
+    x : array_like of float
         At least four increasing values.
-    y : tuple of tuples of float
-        One row a curve, each as long as ``x``.
-    z : tuple of float
+    y : array_like of float
+        One row a curve, each as long as ``x``; a single curve may be given without its row.
+    z : array_like of float
         Increasing values of the second variable; empty for a single curve.
     linear_extrapolate : bool
         Continue with the end tangents instead of the end parabolas.
@@ -46,6 +46,10 @@ class SplineData:
     linear_extrapolate: bool = False
 
     def __post_init__(self) -> None:
+        rows = self.y if len(self.y) and np.ndim(self.y[0]) else (self.y,)
+        for name, values in (("x", self.x), ("z", self.z)):
+            object.__setattr__(self, name, tuple(float(v) for v in values))
+        object.__setattr__(self, "y", tuple(tuple(float(v) for v in row) for row in rows))
         if len(self.x) < 4:
             raise ValueError(f"a spline needs at least four x values, got {len(self.x)}")
         if not all(math.isfinite(v) for row in (self.x, self.z, *self.y) for v in row):
