@@ -8,6 +8,7 @@ at the smallest sensible value and the vector of absolute tolerances does the wo
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable
 
 import numpy as np
@@ -65,18 +66,23 @@ class _Callbacks:
 
 
 def _solver(problem: DAEProblem, calls: _Callbacks, atol: np.ndarray, rtol: float, options: dict) -> IDA:
-    pattern = csc_array((np.ones(problem.indices.size), problem.indices, problem.indptr), shape=(problem.n,) * 2)
+    # the binding insists on 32-bit indices
+    places = problem.indices.astype(np.int32), problem.indptr.astype(np.int32)
+    pattern = csc_array((np.ones(problem.indices.size), *places), shape=(problem.n,) * 2)
     linear = {"linsolver": "dense"} if calls.dense else {"linsolver": "sparse", "sparsity": pattern}
-    return IDA(
-        calls.residual,
-        jacfn=calls.jacobian,
-        rtol=max(rtol, SMALLEST_RTOL),
-        atol=atol,
-        algebraic_idx=np.flatnonzero(~problem.differential),
-        max_num_steps=1_000_000,
-        **linear,
-        **options,
-    )
+    with warnings.catch_warnings():
+        # it says that our Jacobian is used instead of differences on the pattern, which is what we want
+        warnings.filterwarnings("ignore", message="Custom sparse Jacobian", category=UserWarning)
+        return IDA(
+            calls.residual,
+            jacfn=calls.jacobian,
+            rtol=max(rtol, SMALLEST_RTOL),
+            atol=atol,
+            algebraic_idx=np.flatnonzero(~problem.differential),
+            max_num_steps=1_000_000,
+            **linear,
+            **options,
+        )
 
 
 def solve_ida(
