@@ -32,16 +32,10 @@ def _end_of_wheel(wheel, end, gr, x, w, f1, f2, out, o, want):
         T -= p * a
     iw = 1.0 / w
     out[o] = -sign * 0.5 * h + T * iw
-    if want == 0:
-        return
     k1 = Rb / (a * length)
-    k2 = -Rb * (1.0 / (a * a * length) + 1.0 / length**3)
     s_a = 0.5 * ((rb1 - rb2) * k1 + a / length)
-    s_aa = 0.5 * ((rb1 - rb2) * k2 - Rb * Rb / length**3)
     X_a = Y * k1 + s_a * sa
     Y_a = -X * k1 + s_a * ca
-    X_aa = Y_a * k1 + Y * k2 + s_aa * sa + s_a * ca * k1
-    Y_aa = -X_a * k1 - X * k2 + s_aa * ca - s_a * sa * k1
     s_f = (0.5 * rb1, -0.5 * rb2)
     extra = 1.0 if wheel == 1 else 0.0
     T_a = -sign * (p * X_a + q * Y_a) - extra * p
@@ -53,6 +47,15 @@ def _end_of_wheel(wheel, end, gr, x, w, f1, f2, out, o, want):
     out[o + 2] = -sign * 0.5
     out[o + 3] = T_p * iw + T * p * iw3
     out[o + 4] = T_q * iw + T * q * iw3
+    across = p * sa + q * ca
+    for k in range(2):
+        out[o + 5 + k] = -sign * across * s_f[k] * iw
+    if want == 0:
+        return
+    k2 = -Rb * (1.0 / (a * a * length) + 1.0 / length**3)
+    s_aa = 0.5 * ((rb1 - rb2) * k2 - Rb * Rb / length**3)
+    X_aa = Y_a * k1 + Y * k2 + s_aa * sa + s_a * ca * k1
+    Y_aa = -X_a * k1 - X * k2 + s_aa * ca - s_a * sa * k1
     D = o + 7
     for i in range(36):
         out[D + i] = 0.0
@@ -64,10 +67,8 @@ def _end_of_wheel(wheel, end, gr, x, w, f1, f2, out, o, want):
     out[D + 14] = 2.0 * T_p * p * iw3 + T * (iw3 + 3.0 * p * p * iw5)
     out[D + 15] = T_p * q * iw3 + T_q * p * iw3 + 3.0 * T * p * q * iw5
     out[D + 21] = 2.0 * T_q * q * iw3 + T * (iw3 + 3.0 * q * q * iw5)
-    across = p * sa + q * ca
     for k in range(2):
         T_f = -sign * across * s_f[k]
-        out[o + 5 + k] = T_f * iw
         out[D + 4 + k] = -sign * (p * ca - q * sa) * s_f[k] * k1 * iw
         out[D + 16 + k] = -sign * sa * s_f[k] * iw + T_f * p * iw3
         out[D + 22 + k] = -sign * ca * s_f[k] * iw + T_f * q * iw3
@@ -80,7 +81,7 @@ def _end_of_wheel(wheel, end, gr, x, w, f1, f2, out, o, want):
 def face_limit(end, gr, x, w, f1, f2, out, o, want):
     """Limit of the common face towards ``end``: the nearer end face of the two wheels, blended where they tie.
 
-    Fills value, gradient (6) and Hessian (36) at ``out[o:]``, using two more records behind it as scratch.
+    Fills value, gradient (6) and, if wanted, Hessian (36) at ``out[o:]``, using two more records as scratch.
     """
     u = o + 2 * LIMIT if o == 0 else o + LIMIT
     v = u + LIMIT
@@ -90,13 +91,13 @@ def face_limit(end, gr, x, w, f1, f2, out, o, want):
     d = out[u] - out[v]
     r = np.sqrt(d * d + blend * blend)
     out[o] = 0.5 * (out[u] + out[v] - end * r)
-    if want == 0:
-        return
     wu = 0.5 * (1.0 - end * d / r)
     wv = 1.0 - wu
-    curve = -0.5 * end * blend * blend / r**3
     for i in range(6):
         out[o + 1 + i] = wu * out[u + 1 + i] + wv * out[v + 1 + i]
+    if want == 0:
+        return
+    curve = -0.5 * end * blend * blend / r**3
     for i in range(6):
         di = out[u + 1 + i] - out[v + 1 + i]
         for j in range(6):
