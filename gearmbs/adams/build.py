@@ -1,0 +1,317 @@
+"""From a deck to a Mechanism: parts, markers, constraints, motions.
+
+The mechanism keeps the deck's units in its expressions (``Mechanism.units``); its numbers are SI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from dataclasses import replace as replaced
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from gearmbs.adams import statements as st
+from gearmbs.adams.build_data import spline_data
+from gearmbs.adams.deck import Deck
+from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
+from gearmbs.adams.frames import inertia_about_cm, marker_orientation, part_orientation
+from gearmbs.dae.errors import ModelError
+from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.elements import State
+from gearmbs.mechanism.expression import Call, Name, Number, Scope, parse, unparse, walk
+from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
+from gearmbs.mechanism.joints import Joint
+from gearmbs.mechanism.parts import Marker
+
+KINDS: dict[type, str] = {
+    st.Joint: "joint", st.Jprim: "jprim", st.Motion: "motion", st.Sforce: "sforce", st.Vforce: "vforce",
+    st.Vtorque: "vtorque", st.Gforce: "gforce", st.Bushing: "bushing", st.Field: "field",
+    st.SpringDamper: "springdamper", st.Gcon: "gcon", st.Coupler: "coupler", st.Gear: "gear",
+}  # fmt: skip
+"""Kinds under which functions such as JOINT and SFORCE ask for an element's force."""
+
+MEASURES = frozenset("DX DY DZ DM AX AY AZ PSI THETA PHI YAW PITCH ROLL".split())
+
+
+@dataclass
+class AdamsModel:
+    """A mechanism built from a deck, with the way back from names to ids.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    deck : Deck
+    names : dict
+        (kind, id) -> name in the mechanism; parts and markers have the kinds "part" and "marker".
+    pairs : dict
+        (kind, id) -> (I marker id, J marker id or None) of everything that transmits a force.
+    sources : dict
+        Name in the mechanism -> statement.
+    """
+
+    mechanism: Mechanism
+    deck: Deck
+    names: dict[tuple[str, int], str] = field(default_factory=dict)
+    pairs: dict[tuple[str, int], tuple[int, int | None]] = field(default_factory=dict)
+    sources: dict[str, st.Statement] = field(default_factory=dict)
+
+    def scope(self, marker_index: dict[int, int], marker_body: list[int]) -> Scope:
+        """Return what the deck's expressions may name, for requests."""
+        deck = self.deck
+        markers = {m.number: marker_index[id(m)] for m in _markers(self.mechanism) if m.number is not None}
+        variables = {v.id: v.function or "" for v in deck.of(st.Variable).values()}
+        plants = {("pinput", p.id): p.variables for p in deck.of(st.PlantInput).values()}
+        plants |= {("poutput", p.id): p.variables for p in deck.of(st.PlantOutput).values()}
+        return Scope(
+            markers=markers,  # type: ignore[arg-type]
+            marker_body=marker_body,
+            variables=variables,  # type: ignore[arg-type]
+            diffs={d.id: None if d.implicit else d.function for d in deck.of(st.Diff).values()},
+            splines={s.id: spline_data(s) for s in deck.of(st.Spline).values()},
+            arrays={a.id: a.numbers for a in deck.of(st.Array).values()},
+            plants=plants,  # type: ignore[arg-type]
+            forces=dict(self.pairs),  # type: ignore[arg-type]
+            units=deck.units,
+        )
+
+
+def build(deck: Deck, allow_unsupported: bool = False, inactive: frozenset[tuple[str, int]] = frozenset()) -> Mechanism:
+    """Return the mechanism a deck describes; see :func:`build_model`."""
+    return build_model(deck, allow_unsupported, inactive).mechanism
+
+
+def build_model(
+    deck: Deck, allow_unsupported: bool = False, inactive: frozenset[tuple[str, int]] = frozenset()
+) -> AdamsModel:
+    """Build the mechanism of a deck.
+
+    Parameters
+    ----------
+    deck : Deck
+    allow_unsupported : bool
+        Build it without what is not supported instead of refusing.
+    inactive : set of (statement name, id)
+        Elements a script has deactivated.
+
+    Returns
+    -------
+    AdamsModel
+
+    Raises
+    ------
+    DeckError
+        Naming the line of what is not supported or cannot be built.
+    """
+    if deck.unsupported and not allow_unsupported:
+        raise DeckError(deck.unsupported)
+    builder = Builder(deck, inactive)
+    model = builder.run()
+    left_out = [d for d in builder.problems if d.severity == UNSUPPORTED]
+    errors = [d for d in builder.problems if d.severity == ERROR]
+    if errors or (left_out and not allow_unsupported):
+        raise DeckError(errors + left_out)
+    deck.diagnostics.extend(d for d in left_out if d not in deck.diagnostics)
+    return model
+
+
+def _markers(mechanism: Mechanism) -> list[Marker]:
+    return [m for body in (mechanism.ground, *mechanism.bodies.values()) for m in body.markers]
+
+
+class Builder:
+    """Adds a deck's statements to a mechanism one by one; use :func:`build_model`."""
+
+    def __init__(self, deck: Deck, inactive: frozenset[tuple[str, int]]) -> None:
+        self.deck = deck
+        self.units = deck.units
+        self.inactive = inactive
+        self.mechanism = Mechanism(deck.title or "adams")
+        self.mechanism.units = deck.units
+        self.model = AdamsModel(self.mechanism, deck)
+        self.markers: dict[int, Marker] = {}
+        self.joints: dict[int, Joint] = {}
+        self.problems: list[Diagnostic] = []
+        self.initial_motions: list[tuple[Joint, str, tuple[float, ...]]] = []
+        self._taken: set[str] = {"ground"}
+
+    def run(self) -> AdamsModel:
+        gravity = self.deck.only(st.Accgrav)
+        if gravity is not None and ("ACCGRAV", 0) not in self.inactive:
+            scale = self.units.factor("acceleration")
+            self.mechanism.gravity = scale * np.array([gravity.igrav, gravity.jgrav, gravity.kgrav])
+        for part in self.deck.of(st.Part).values():
+            self.attempt(part, self.add_part)
+        for marker in self.deck.of(st.Marker).values():
+            self.attempt(marker, self.add_marker)
+        if self.problems and any(d.severity == ERROR for d in self.problems):
+            return self.model
+        self.name_elements()
+        self.add_data()
+        from gearmbs.adams.build_constraints import CONSTRAINTS
+        from gearmbs.adams.build_forces import FORCES
+
+        for kind, make in (CONSTRAINTS | FORCES).items():
+            for statement in self.active(kind):
+                self.attempt(statement, partial(make, self))
+        return self.model
+
+    # --- helpers ------------------------------------------------------------------------------------
+
+    def active(self, kind: type[Any]) -> list[Any]:
+        keyword = st.KEYWORD_OF[kind]
+        return [s for s in self.deck.of(kind).values() if (keyword, s.id) not in self.inactive]
+
+    def attempt(self, statement: st.Statement, add: Callable[[Any], None]) -> None:
+        """Add one statement; what is wrong with it gets its line."""
+        try:
+            add(statement)
+        except (ModelError, ValueError) as error:
+            message = f"{statement.label()}: {error}"
+            self.problems.append(Diagnostic(ERROR, message, self.deck.file, statement.line))
+
+    def unsupported(self, statement: st.Statement, what: str) -> None:
+        message = f"{statement.label()}: {what} is not supported"
+        self.problems.append(Diagnostic(UNSUPPORTED, message, self.deck.file, statement.line))
+
+    def claim(self, statement: st.Statement, kind: str) -> str:
+        """Return a unique name for a statement and remember it."""
+        keyword = st.KEYWORD_OF[type(statement)]
+        name = (statement.name or f"{keyword}_{statement.id}").replace('"', "'")
+        while name in self._taken:
+            name = f"{name}_{keyword}_{statement.id}"
+        self._taken.add(name)
+        self.model.names[kind, statement.id] = name
+        self.model.sources[name] = statement
+        return name
+
+    def name_elements(self) -> None:
+        """Name everything that transmits a force before any expression refers to it."""
+        for cls, kind in KINDS.items():
+            for statement in self.active(cls):
+                self.claim(statement, kind)
+                self.model.pairs[kind, statement.id] = self.marker_pair(statement)
+
+    def marker_pair(self, s: Any) -> tuple[int, int | None]:
+        if isinstance(s, st.Motion) and s.joint is not None:
+            joint = self.deck.of(st.Joint)[s.joint]
+            return joint.i or 0, joint.j
+        if isinstance(s, (st.Coupler, st.Gear)):
+            joint = self.deck.of(st.Joint)[s.joints[0]]
+            return joint.i or 0, joint.j
+        if isinstance(s, st.Gcon):
+            return self.gcon_pair(s)
+        if isinstance(s, (st.Vforce, st.Vtorque, st.Gforce)):
+            return s.i or 0, s.jfloat
+        if isinstance(s, st.Sforce) and s.action_only:
+            return s.i or 0, None
+        return s.i or 0, s.j
+
+    def gcon_pair(self, s: st.Gcon) -> tuple[int, int | None]:
+        """Return a general constraint's I marker and, when its expression names just one other, that one."""
+        used = marker_ids(s.function or "")
+        first = s.i if s.i is not None else (used[0] if used else 0)
+        others = [m for m in used if m != first]
+        return first, others[0] if len(others) == 1 else None
+
+    def text(self, source: str) -> str:
+        """Return an expression with element ids replaced by the mechanism's names."""
+
+        def rename(call: Call) -> Call:
+            kind = ELEMENT_FORCES.get(call.name)
+            first = call.args[0] if call.args else None
+            if kind is None or not isinstance(first, Number) or first.integer is None:
+                return call
+            name = self.model.names.get((kind, first.integer))
+            if name is None:
+                return call
+            return replaced(call, args=(Name(name, first.at), *call.args[1:]))
+
+        return unparse(parse(source), rename)
+
+    # --- parts and markers --------------------------------------------------------------------------
+
+    def add_part(self, part: st.Part) -> None:
+        if part.ground:
+            self.model.names["part", part.id] = "ground"
+            return
+        name = self.claim(part, "part")
+        units = self.units
+        markers = self.deck.of(st.Marker)
+        axes = part_orientation(part)
+        com, inertia = np.zeros(3), np.zeros((3, 3))
+        cm = markers[part.cm] if part.cm is not None else None
+        if cm is not None:
+            com = units.length * np.array(cm.qp)
+            im = markers[part.im] if part.im is not None else cm
+            inertia = units.factor("inertia") * inertia_about_cm(part, cm, im)
+        spin = self.direction(part.wm, part, axes, cm) @ np.array([part.wx, part.wy, part.wz])
+        spin = units.factor("angular_velocity") * spin
+        velocity = np.array([part.vx, part.vy, part.vz])
+        if part.vm is not None:
+            velocity = self.direction(part.vm, part, axes, cm) @ velocity
+        velocity = units.factor("velocity") * velocity
+        body = self.mechanism.body(
+            name,
+            units.mass * part.mass,
+            inertia,
+            com=com,
+            position=units.length * np.array(part.qg),
+            orientation=axes,
+            velocity=velocity - np.cross(spin, axes @ com),
+            angular_velocity=spin,
+        )
+        self.model.sources[body.name] = part
+
+    def direction(self, ref: int | None, part: st.Part, axes: np.ndarray, cm: st.Marker | None) -> np.ndarray:
+        """Return the axes along which an initial velocity is given: a marker's, by default the CM marker's."""
+        marker = self.deck.of(st.Marker)[ref] if ref is not None else cm
+        if marker is None:
+            return np.eye(3)
+        owner = self.deck.of(st.Part)[marker.part or 0]
+        own = np.eye(3) if owner.ground else (axes if owner.id == part.id else part_orientation(owner))
+        return own @ marker_orientation(marker)
+
+    def add_marker(self, statement: st.Marker) -> None:
+        if statement.part is None:
+            return
+        owner = self.model.names["part", statement.part]
+        body = self.mechanism.ground if owner == "ground" else self.mechanism.bodies[owner]
+        position = self.units.length * np.array(statement.qp)
+        name = self.claim(statement, "marker")
+        marker = body.marker(position, marker_orientation(statement), name=name)
+        marker.number = statement.id
+        self.markers[statement.id] = marker
+
+    def ground_marker(self, name: str) -> Marker:
+        """Return a marker on the ground that takes the reaction of an action-only force."""
+        return self.mechanism.ground.marker(name=name)
+
+    # --- data ---------------------------------------------------------------------------------------
+
+    def add_data(self) -> None:
+        m = self.mechanism
+        for variable in self.deck.of(st.Variable).values():
+            m.variables[variable.id] = self.text(variable.function or "0")
+        for spline in self.deck.of(st.Spline).values():
+            if spline.data_file is None:
+                m.splines[spline.id] = spline_data(spline)
+        for diff in self.active(st.Diff):
+            if diff.implicit:
+                self.unsupported(diff, "IMPLICIT")
+                continue
+            text = f"({self.text(diff.function)})/{self.units.time!r}"
+            m.states[diff.id] = State(f"DIFF_{diff.id}", text, diff.ic[0])
+
+
+def marker_ids(text: str) -> list[int]:
+    """Return the markers an expression's measures name, in order of appearance."""
+    found: list[int] = []
+    for node in walk(parse(text)):
+        if isinstance(node, Call) and node.name in MEASURES:
+            for a in node.args:
+                if isinstance(a, Number) and a.integer and a.integer not in found:
+                    found.append(a.integer)
+    return found

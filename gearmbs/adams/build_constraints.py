@@ -1,0 +1,179 @@
+"""Joints, primitives, couplers, gears, general constraints and motions of a deck."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gearmbs.adams import statements as st
+from gearmbs.adams.build import Builder
+from gearmbs.mechanism.joints import Joint
+from gearmbs.mechanism.parts import Marker
+
+JOINT_KINDS = {
+    "FIXED": "fixed", "REVOLUTE": "revolute", "TRANSLATIONAL": "translational", "CYLINDRICAL": "cylindrical",
+    "SPHERICAL": "spherical", "UNIVERSAL": "universal", "PLANAR": "planar", "CONVEL": "constant_velocity",
+}  # fmt: skip
+JPRIM_KINDS = {
+    "ATPOINT": "at_point", "INLINE": "inline", "INPLANE": "inplane", "ORIENTATION": "orientation",
+    "PARALLEL_AXES": "parallel_axes", "PERPENDICULAR": "perpendicular",
+}  # fmt: skip
+X_TO_Z = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]).T
+"""Columns y, z, x: the old x axis becomes the new z axis."""
+Y_TO_Z = X_TO_Z.T
+
+
+def add_joint(b: Builder, s: st.Joint) -> None:
+    """JOINT of any type."""
+    name = b.model.names["joint", s.id]
+    i, j = b.markers[s.i or 0], b.markers[s.j or 0]
+    if s.type in JOINT_KINDS:
+        b.joints[s.id] = b.mechanism.joint(JOINT_KINDS[s.type], name, i, j)
+    elif s.type == "SCREW":
+        b.joints[s.id] = b.mechanism.screw(name, i, j, pitch=b.units.length * (s.pitch or 0.0))
+    elif s.type == "HOOKE":
+        b.joints[s.id] = _hooke(b, name, i, j)
+    else:
+        _rack_and_pinion(b, s, name, i, j)
+    _initial_conditions(b, s)
+
+
+def _initial_conditions(b: Builder, s: st.Joint) -> None:
+    """Remember displacements and velocities a joint starts with."""
+    joint = b.joints.get(s.id)
+    for keyword, value in (("IC", s.ic), ("ICTRAN", s.ictran), ("ICROT", s.icrot)):
+        if value is None:
+            continue
+        rotational = s.type == "REVOLUTE" or (s.type == "CYLINDRICAL" and keyword == "ICROT")
+        if joint is None or s.type not in ("REVOLUTE", "TRANSLATIONAL", "CYLINDRICAL"):
+            b.unsupported(s, f"{keyword} of a {s.type} joint")
+            continue
+        b.initial_motions.append((joint, "rotation" if rotational else "translation", value))
+
+
+def _hooke(b: Builder, name: str, i: Marker, j: Marker) -> Joint:
+    """HOOKE: the arms of the cross lie along x of I and y of J; markers turned so that they are z axes."""
+    arm_i = i.body.marker(i.position, i.orientation @ X_TO_Z, name=f"{name}.arm I")
+    arm_j = j.body.marker(j.position, j.orientation @ Y_TO_Z, name=f"{name}.arm J")
+    return b.mechanism.joint("universal", name, arm_i, arm_j)
+
+
+def _rack_and_pinion(b: Builder, s: st.Joint, name: str, i: Marker, j: Marker) -> None:
+    """RACKPIN: the pinion (I, about z_I) rolls on the rack's line (J, along z_J).
+
+    The side on which the rack passes the pinion's axis tells the direction; the travel is PD/2 times the angle
+    counted from the start.
+    """
+    zi, zj = i.global_orientation()[:, 2], j.global_orientation()[:, 2]
+    apart = j.global_position() - i.global_position()
+    foot = apart - zj * (zj @ apart)
+    lever = np.cross(zi, foot) @ zj
+    if abs(lever) < 1e-9 * max(float(np.linalg.norm(apart)), 1e-12) or abs(zi @ zj) > 1e-6:
+        raise ValueError("z_J must pass the pinion's axis z_I at a distance and at a right angle")
+    axes = np.column_stack([zj, np.cross(zi, zj), zi])
+    fixed = j.body.marker_at(j.global_position(), axes, name=f"{name}.angle J")
+    turned = i.body.marker_at(i.global_position(), axes, name=f"{name}.angle I")
+    travel = float(zj @ apart) / b.units.length
+    rate = float(np.sign(lever)) * 0.5 * (s.pd or 0.0)
+    text = f'-DZ({s.i},{s.j},{s.j}) - ({travel!r}) - ({rate!r})*AZ("{turned.name}","{fixed.name}")'
+    b.mechanism.general_constraint(name, text)
+
+
+def add_jprim(b: Builder, s: st.Jprim) -> None:
+    """JPRIM."""
+    name = b.model.names["jprim", s.id]
+    b.mechanism.joint(JPRIM_KINDS[s.type or ""], name, b.markers[s.i or 0], b.markers[s.j or 0])
+
+
+def _coupled(b: Builder, s: st.Statement, refs: tuple[int, ...]) -> list[Joint]:
+    joints = []
+    for ref in refs:
+        joint = b.joints.get(ref)
+        if joint is None or joint.kind not in ("revolute", "translational", "cylindrical"):
+            raise ValueError(f"JOINT/{ref} must be an active revolute, translational or cylindrical joint")
+        joints.append(joint)
+    return joints
+
+
+def add_coupler(b: Builder, s: st.Coupler) -> None:
+    """COUPLER: the weighted sum of the joints' displacements keeps its initial value."""
+    if s.function is not None:
+        return
+    joints = _coupled(b, s, s.joints)
+    scales = s.scales if len(s.scales) == len(joints) else (1.0, *s.scales)
+    types = s.type or tuple("TRANSLATIONAL" if j.kind == "translational" else "ROTATIONAL" for j in joints)
+    terms = []
+    for joint, scale, kind in zip(joints, scales, types):
+        if (kind == "TRANSLATIONAL") != (joint.kind == "translational"):
+            if joint.kind == "cylindrical":
+                b.unsupported(s, f"the translation of the cylindrical joint {joint.name}")
+                return
+            raise ValueError(f"TYPE is {kind}, but {joint.name} is {joint.kind}")
+        terms.append((joint, scale / b.units.length if kind == "TRANSLATIONAL" else scale))
+    b.mechanism.coupler(b.model.names["coupler", s.id], terms)
+
+
+def add_gear(b: Builder, s: st.Gear) -> None:
+    """GEAR: both parts have the same velocity along z of the CV marker, seen from the carrier."""
+    cv = b.markers[s.cv or 0]
+    joints = _coupled(b, s, s.joints)
+    for joint in joints:
+        if joint.j.body is not cv.body:
+            raise ValueError(f"J of {joint.name} and the CV marker must be on one part, the carrier")
+    along = cv.global_orientation()[:, 2]
+    levers = []
+    for joint in joints:
+        z = joint.j.global_orientation()[:, 2]
+        arm = cv.global_position() - joint.j.global_position()
+        levers.append(float(z @ along if joint.kind == "translational" else np.cross(z, arm) @ along))
+    if min(abs(v) for v in levers) < 1e-12:
+        raise ValueError("the CV marker's z axis must point along the common velocity, off both joints' axes")
+    b.mechanism.coupler(b.model.names["gear", s.id], [(joints[0], levers[0]), (joints[1], -levers[1])])
+
+
+def add_gcon(b: Builder, s: st.Gcon) -> None:
+    """GCON."""
+    b.mechanism.general_constraint(b.model.names["gcon", s.id], b.text(s.function or ""))
+
+
+def add_motion(b: Builder, s: st.Motion) -> None:
+    """MOTION of a joint or between two markers, at displacement level."""
+    name = b.model.names["motion", s.id]
+    text = b.text(s.function or "")
+    if s.level in ("VELOCITY", "ACCELERATION"):
+        b.unsupported(s, f"a motion given by its {s.level}")
+        return
+    if s.joint is None:
+        measures = {"X": "DX", "Y": "DY", "Z": "DZ"}
+        if s.direction in measures:
+            shown = f"{measures[s.direction]}({s.i},{s.j},{s.j})"
+        else:
+            shown = f"ORIENT(1,{(s.direction or 'B1')[1]},{s.i},{s.j})"
+        b.mechanism.general_constraint(name, f"{shown} - ({text})")
+        return
+    joint = b.joints.get(s.joint)
+    if joint is None:
+        raise ValueError(f"JOINT/{s.joint} is not active")
+    rotational = joint.kind == "revolute" or (joint.kind == "cylindrical" and s.direction == "ROTATIONAL")
+    if joint.kind == "cylindrical" and s.direction is None:
+        raise ValueError("give ROTATION or TRANSLATION for a motion of a cylindrical joint")
+    if rotational:
+        b.mechanism.rotation(name, joint, text)
+    else:
+        b.mechanism.translation(name, joint, _scaled(text, b.units.length))
+
+
+def _scaled(text: str, factor: float) -> str:
+    return text if factor == 1.0 else f"{factor!r}*({text})"
+
+
+CONSTRAINTS: dict[type, Callable[[Builder, Any], None]] = {
+    st.Joint: add_joint,
+    st.Jprim: add_jprim,
+    st.Coupler: add_coupler,
+    st.Gear: add_gear,
+    st.Gcon: add_gcon,
+    st.Motion: add_motion,
+}

@@ -1,0 +1,258 @@
+"""Evaluate a deck's REQUESTs on a solution: eight columns each, in the deck's units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from gearmbs.adams import statements as st
+from gearmbs.adams.build import AdamsModel
+from gearmbs.dae.expressions import eval_gradient, eval_request, update_angles
+from gearmbs.dae.expressions.kinematics import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.expressions.tape import ExpressionError, Tape
+from gearmbs.dae.solution import Solution
+from gearmbs.mechanism.expression import Scope, compile_expression
+
+COLUMNS = {
+    "DISPLACEMENT": ("DM", "DX", "DY", "DZ", "", "PSI", "THETA", "PHI"),
+    "VELOCITY": ("VM", "VX", "VY", "VZ", "WM", "WX", "WY", "WZ"),
+    "ACCELERATION": ("ACCM", "ACCX", "ACCY", "ACCZ", "WDTM", "WDTX", "WDTY", "WDTZ"),
+    "FORCE": ("FM", "FX", "FY", "FZ", "TM", "TX", "TY", "TZ"),
+}
+"""Functions behind the eight columns of the standard requests."""
+
+NAMES = ("F1", "F2", "F3", "F4", "F5", "F6", "F7", "F8")
+
+
+@dataclass(frozen=True)
+class RequestSeries:
+    """One evaluated REQUEST.
+
+    Attributes
+    ----------
+    statement : Request
+    names : tuple of str
+        Names of the eight columns.
+    values : ndarray, shape (m, 8)
+        In the deck's units, angles in radians; zero in columns that were not asked for.
+    """
+
+    statement: st.Request
+    names: tuple[str, ...]
+    values: np.ndarray
+
+
+def request_texts(request: st.Request) -> tuple[str | None, ...]:
+    """Return the expressions of a request's eight columns."""
+    if request.type is None:
+        return request.functions()
+    i, j, k = request.i or 0, request.j or 0, request.rm or 0
+    texts: list[str | None] = []
+    for name in COLUMNS[request.type]:
+        if not name:
+            texts.append(None)
+        elif name in ("PSI", "THETA", "PHI", "DM", "VM", "ACCM", "WM", "WDTM", "FM", "TM"):
+            texts.append(f"{name}({i},{j})")
+        else:
+            texts.append(f"{name}({i},{j},{k})")
+    return tuple(texts)
+
+
+def column_names(request: st.Request) -> tuple[str, ...]:
+    """Return the names of a request's columns: CNAMES, TITLE, or the functions'."""
+    standard = COLUMNS[request.type] if request.type else NAMES
+    given = request.cnames or request.title
+    return tuple(given[k] if k < len(given) and given[k] else (standard[k] or NAMES[k]) for k in range(8))
+
+
+class RequestEvaluator:
+    """Evaluates expressions of a deck on a solution.
+
+    Parameters
+    ----------
+    model : AdamsModel
+    solution : Solution
+    """
+
+    def __init__(self, model: AdamsModel, solution: Solution) -> None:
+        self.model = model
+        self.solution = solution
+        system = solution.system
+        builder = system.builder
+        self.marker_body = np.array(builder.marker_body, dtype=np.int64)
+        self.marker_frame = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float)
+        self.kin, self.acc = _tables(solution)
+        self.scope: Scope = model.scope(system.marker_index, builder.marker_body)
+        self._wrenches: dict[tuple[str, int], np.ndarray] = {}
+
+    def request(self, request: st.Request) -> RequestSeries:
+        """Evaluate all columns of a request.
+
+        Raises
+        ------
+        ExpressionError
+            When a column names something that does not exist.
+        """
+        values = np.zeros((self.solution.t.size, 8))
+        for column, text in enumerate(request_texts(request)):
+            if text is None:
+                continue
+            try:
+                values[:, column] = self.expression(text)
+            except ExpressionError as error:
+                if request.type == "FORCE" and "no force or joint acts" in str(error):
+                    continue
+                raise ExpressionError(f"{request.label()}: {NAMES[column]}: {error}") from error
+        return RequestSeries(request, column_names(request), values)
+
+    def expression(self, text: str) -> np.ndarray:
+        """Return the values of an expression over time, in the deck's units, shape (m,)."""
+        tape = compile_expression(text, self.scope, accelerations=True)
+        m = self.solution.t.size
+        y = np.zeros((m, max(1, len(tape.algebraic))))
+        for q, key in enumerate(tape.algebraic):
+            y[:, q] = self._unknown(key)
+        tape = tape.bind(tape.algebraic.index)
+        out = np.zeros(m)
+        _series(
+            tape.ints, tape.floats, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
+            np.zeros(max(1, tape.n_angles)), np.zeros(tape.work_size), out,
+        )  # fmt: skip
+        return out
+
+    def _unknown(self, key: tuple) -> np.ndarray:
+        if key[0] == "diff":
+            return self._state(key[1])
+        kind, ref, component = key
+        return self.wrench(kind, ref)[:, component]
+
+    def _state(self, ref: int) -> np.ndarray:
+        system = self.solution.system
+        names = [str(s) for s in self.model.mechanism.states]
+        from gearmbs.dae import tables
+
+        at = int(self.solution.problem.idata[tables.H_Z]) + names.index(str(ref))
+        del system
+        return self.solution.result.y[:, at]
+
+    def wrench(self, kind: str, ref: int) -> np.ndarray:
+        """Return force and torque on the I side, then on the J side, global components, shape (m, 12), SI.
+
+        Torques are about the origin of the marker of their side.
+        """
+        if (kind, ref) in self._wrenches:
+            return self._wrenches[kind, ref]
+        name = self.model.names[kind, ref]
+        i, j = self.model.pairs[kind, ref]
+        out = np.zeros((self.solution.t.size, 12))
+        if kind == "gcon" or name in self.model.mechanism.constraints:
+            out[:, :6] = self._constraint_wrench(name, i)
+        elif kind in ("joint", "jprim", "motion", "coupler", "gear"):
+            out[:, :3], out[:, 3:6] = self._reaction(name)
+        elif name in self.solution.system.force_names:
+            out[:, :3], out[:, 3:6] = self.solution.load(name)
+        out[:, 6:9] = -out[:, 0:3]
+        lever = self._origin(i) - (self._origin(j) if j is not None else self._origin(i))
+        out[:, 9:12] = -out[:, 3:6] - np.cross(lever, out[:, 0:3])
+        self._wrenches[kind, ref] = out
+        return out
+
+    def _reaction(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return a joint's reaction; zero when all its rows were redundant."""
+        try:
+            return self.solution.reaction(name)
+        except KeyError:
+            zero = np.zeros((self.solution.t.size, 3))
+            return zero, zero
+
+    def _origin(self, number: int) -> np.ndarray:
+        """Return a marker's origin over time, global components."""
+        index = self.scope.markers[number]
+        body = self.marker_body[index]
+        axes = self.kin[:, body, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
+        return self.kin[:, body, KIN_R : KIN_R + 3] + axes @ self.marker_frame[index, :3]
+
+    def _constraint_wrench(self, name: str, i: int) -> np.ndarray:
+        """Return -lambda dPhi/d(R, pi) of a general constraint on the body of marker I, about that marker.
+
+        The ground takes minus what the others feel, moments about the global origin: the constraint does not
+        change when everything moves together.
+        """
+        m = self.solution.t.size
+        rows = [k for k, row in enumerate(self.solution.system.row_names) if row.rsplit(": ", 1)[0] == name]
+        if not rows:
+            return np.zeros((m, 6))
+        lam = self.solution.multipliers[:, rows[0]]
+        text = self.model.mechanism.constraints[name]
+        from gearmbs.mechanism.compile import _Compiler
+
+        compiler = _Compiler(self.model.mechanism)
+        for body in self.model.mechanism.bodies.values():
+            compiler.add_body(body)
+        compiler.index_all_markers()
+        tape = compile_expression(text, compiler.scope())
+        grad = np.zeros((m, tape.gradient_size))
+        _gradient_series(
+            tape.ints, tape.floats, self.solution.t, self.kin, self.marker_body, self.marker_frame, np.zeros(1),
+            np.zeros(max(1, tape.n_angles)), np.zeros(tape.work_size), grad,
+        )  # fmt: skip
+        body = int(self.marker_body[self.scope.markers[i]])
+        origin = self._origin(i)
+        out = np.zeros((m, 6))
+        for p, other in enumerate(tape.bodies):
+            if body not in (0, other):
+                continue
+            force = -lam[:, None] * grad[:, 12 * p : 12 * p + 3]
+            torque = -lam[:, None] * grad[:, 12 * p + 3 : 12 * p + 6]
+            center = self.kin[:, other, KIN_R : KIN_R + 3]
+            sign = 1.0 if body else -1.0
+            out[:, :3] += sign * force
+            out[:, 3:] += sign * (torque + np.cross(center - origin, force))
+        return out
+
+
+def _tables(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """Return the kinematics (m, bodies + 1, 27) and acceleration (m, bodies + 1, 6) tables over time."""
+    names = solution.system.body_names
+    m = solution.t.size
+    kin = np.zeros((m, len(names) + 1, KIN_AXES + 9))
+    acc = np.zeros((m, len(names) + 1, 6))
+    kin[:, 0, KIN_A : KIN_A + 9] = np.eye(3).ravel()
+    for b, name in enumerate(names, 1):
+        kin[:, b, KIN_R : KIN_R + 3] = solution.position(name)
+        kin[:, b, KIN_V : KIN_V + 3] = solution.velocity(name)
+        kin[:, b, KIN_A : KIN_A + 9] = solution.orientation(name).reshape(m, 9)
+        kin[:, b, KIN_W : KIN_W + 3] = solution.angular_velocity(name)
+        acc[:, b, :3] = solution.acceleration(name)
+        acc[:, b, 3:] = solution.angular_acceleration(name)
+    return kin, acc
+
+
+@njit(
+    "void(int64[::1], float64[::1], float64[::1], float64[:, :, ::1], float64[:, :, ::1], int64[::1],"
+    " float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1])",
+    cache=True,
+    nogil=True,
+)
+def _series(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, work, out):
+    """Evaluate a tape at every time, counting its angles on."""
+    for k in range(t.size):
+        update_angles(ints, floats, t[k], kin[k], marker_body, marker_frame, y[k], ref, work)
+        out[k] = eval_request(ints, floats, t[k], kin[k], acc[k], marker_body, marker_frame, y[k], ref, work)
+
+
+@njit(
+    "void(int64[::1], float64[::1], float64[::1], float64[:, :, ::1], int64[::1], float64[:, ::1], float64[::1],"
+    " float64[::1], float64[::1], float64[:, ::1])",
+    cache=True,
+    nogil=True,
+)
+def _gradient_series(ints, floats, t, kin, marker_body, marker_frame, y, ref, work, grad):
+    """Write a tape's spatial gradient at every time."""
+    for k in range(t.size):
+        eval_gradient(ints, floats, t[k], kin[k], marker_body, marker_frame, y, ref, grad[k], work)
+
+
+__all__ = ["RequestEvaluator", "RequestSeries", "Tape", "column_names", "request_texts"]
