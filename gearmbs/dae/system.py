@@ -257,8 +257,11 @@ class System:
 
     # --- the problem ------------------------------------------------------------------------------
 
-    def problem(self, formulation: str = "SI2") -> DAEProblem:
-        """Return the DAE in one of the formulations ``I3``, ``SI2``, ``SI1`` with consistent initial values."""
+    def problem(self, formulation: str = "SI2", rate_scale: float = 1.0) -> DAEProblem:
+        """Return the DAE in one of the formulations ``I3``, ``SI2``, ``SI1`` with consistent initial values.
+
+        ``rate_scale`` (1/s) is the ratio of the error allowed in velocities to that in positions.
+        """
         if formulation not in FORMULATIONS:
             raise ModelError(f"formulation: {formulation!r} is unknown; choose one of {', '.join(FORMULATIONS)}")
         if self.report is None:
@@ -300,6 +303,9 @@ class System:
             differential[at["lambda"] : at["F"]] = True
             differential[at["mu"] :] = True
         scale = self._scales(form, loads)
+        allowed = scale.copy()
+        allowed[at["u"] : at["p"]] *= rate_scale
+        allowed[at["eps"] : at["R"]] *= rate_scale
         return DAEProblem(
             n=n,
             residual=residual.residual,
@@ -312,7 +318,7 @@ class System:
             y0=y,
             yp0=yp,
             error_mask=error_mask,
-            atol_scale=scale,
+            atol_scale=allowed,
             scale=scale,
             differential=differential,
             t0=self.t0,

@@ -24,6 +24,7 @@ def simulate(
     integrator: str = "WSTIFF",
     formulation: str = "SI2",
     tol: float = 1e-6,
+    rate_scale: float = 1.0,
     progress: bool | Callable[[float], None] = False,
     **options,
 ) -> Solution:
@@ -44,6 +45,9 @@ def simulate(
     tol : float
         Local error allowed a step: in metres or radians and their rates for lengths of the order of 1 m; lengths are
         scaled by the size of the mechanism.
+    rate_scale : float
+        Velocities are allowed an error this many times larger (1/s) than positions: the angular frequency of the
+        motion one is interested in; 1 is ADAMS's practice.
     progress : bool or callable
         True shows a bar; a callable is given the time reached.
     **options
@@ -72,7 +76,7 @@ def simulate(
     if name not in INTEGRATORS:
         raise ModelError(f"integrator: {integrator!r} is unknown; choose one of {', '.join(INTEGRATORS)}")
     system = mechanism.compile(t_start)
-    problem = system.problem(formulation)
+    problem = system.problem(formulation, rate_scale)
     with _reporter(progress, float(t_eval[0]), float(t_eval[-1])) as report:
         if name == "IDA":
             result = solve_ida(problem, t_eval, tol=tol, progress=report, **options)
