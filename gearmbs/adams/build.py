@@ -5,11 +5,11 @@ The mechanism keeps the deck's units in its expressions (``Mechanism.units``); i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from dataclasses import replace as replaced
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,6 +36,21 @@ KINDS: dict[type, str] = {
 MEASURES = frozenset("DX DY DZ DM AX AY AZ PSI THETA PHI YAW PITCH ROLL".split())
 
 
+class BodyState(NamedTuple):
+    """Where a part's frame is and how it moves: SI, global components.
+
+    Attributes
+    ----------
+    position, velocity, angular_velocity : ndarray, shape (3,)
+    orientation : ndarray, shape (3, 3)
+    """
+
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+
+
 @dataclass
 class AdamsModel:
     """A mechanism built from a deck, with the way back from names to ids.
@@ -50,6 +65,8 @@ class AdamsModel:
         (kind, id) -> (I marker id, J marker id or None) of everything that transmits a force.
     sources : dict
         Name in the mechanism -> statement.
+    initial_motions : list
+        Joints with initial conditions: joint, "rotation" or "translation", displacement and velocity in deck units.
     """
 
     mechanism: Mechanism
@@ -57,16 +74,21 @@ class AdamsModel:
     names: dict[tuple[str, int], str] = field(default_factory=dict)
     pairs: dict[tuple[str, int], tuple[int, int | None]] = field(default_factory=dict)
     sources: dict[str, st.Statement] = field(default_factory=dict)
+    initial_motions: list[tuple[Joint, str, tuple[float, ...]]] = field(default_factory=list)
 
     def scope(self, marker_index: dict[int, int], marker_body: list[int]) -> Scope:
         """Return what the deck's expressions may name, for requests."""
         deck = self.deck
-        markers = {m.number: marker_index[id(m)] for m in _markers(self.mechanism) if m.number is not None}
+        markers: dict[Any, int] = {}
+        for m in _markers(self.mechanism):
+            markers[m.name.upper()] = marker_index[id(m)]
+            if m.number is not None:
+                markers[m.number] = marker_index[id(m)]
         variables = {v.id: v.function or "" for v in deck.of(st.Variable).values()}
         plants = {("pinput", p.id): p.variables for p in deck.of(st.PlantInput).values()}
         plants |= {("poutput", p.id): p.variables for p in deck.of(st.PlantOutput).values()}
         return Scope(
-            markers=markers,  # type: ignore[arg-type]
+            markers=markers,
             marker_body=marker_body,
             variables=variables,  # type: ignore[arg-type]
             diffs={d.id: None if d.implicit else d.function for d in deck.of(st.Diff).values()},
@@ -84,7 +106,10 @@ def build(deck: Deck, allow_unsupported: bool = False, inactive: frozenset[tuple
 
 
 def build_model(
-    deck: Deck, allow_unsupported: bool = False, inactive: frozenset[tuple[str, int]] = frozenset()
+    deck: Deck,
+    allow_unsupported: bool = False,
+    inactive: frozenset[tuple[str, int]] = frozenset(),
+    state: Mapping[int, BodyState] | None = None,
 ) -> AdamsModel:
     """Build the mechanism of a deck.
 
@@ -95,6 +120,8 @@ def build_model(
         Build it without what is not supported instead of refusing.
     inactive : set of (statement name, id)
         Elements a script has deactivated.
+    state : mapping of int to BodyState, optional
+        Where the parts are and how they move, by part id, instead of the deck's initial conditions.
 
     Returns
     -------
@@ -107,7 +134,7 @@ def build_model(
     """
     if deck.unsupported and not allow_unsupported:
         raise DeckError(deck.unsupported)
-    builder = Builder(deck, inactive)
+    builder = Builder(deck, inactive, state or {})
     model = builder.run()
     left_out = [d for d in builder.problems if d.severity == UNSUPPORTED]
     errors = [d for d in builder.problems if d.severity == ERROR]
@@ -124,8 +151,9 @@ def _markers(mechanism: Mechanism) -> list[Marker]:
 class Builder:
     """Adds a deck's statements to a mechanism one by one; use :func:`build_model`."""
 
-    def __init__(self, deck: Deck, inactive: frozenset[tuple[str, int]]) -> None:
+    def __init__(self, deck: Deck, inactive: frozenset[tuple[str, int]], state: Mapping[int, BodyState]) -> None:
         self.deck = deck
+        self.state = state
         self.units = deck.units
         self.inactive = inactive
         self.mechanism = Mechanism(deck.title or "adams")
@@ -134,7 +162,6 @@ class Builder:
         self.markers: dict[int, Marker] = {}
         self.joints: dict[int, Joint] = {}
         self.problems: list[Diagnostic] = []
-        self.initial_motions: list[tuple[Joint, str, tuple[float, ...]]] = []
         self._taken: set[str] = {"ground"}
 
     def run(self) -> AdamsModel:
@@ -253,15 +280,19 @@ class Builder:
         if part.vm is not None:
             velocity = self.direction(part.vm, part, axes, cm) @ velocity
         velocity = units.factor("velocity") * velocity
+        start = self.state.get(part.id)
+        if start is None:
+            position = units.length * np.array(part.qg)
+            start = BodyState(position, axes, velocity - np.cross(spin, axes @ com), spin)
         body = self.mechanism.body(
             name,
             units.mass * part.mass,
             inertia,
             com=com,
-            position=units.length * np.array(part.qg),
-            orientation=axes,
-            velocity=velocity - np.cross(spin, axes @ com),
-            angular_velocity=spin,
+            position=start.position,
+            orientation=start.orientation,
+            velocity=start.velocity,
+            angular_velocity=start.angular_velocity,
         )
         self.model.sources[body.name] = part
 

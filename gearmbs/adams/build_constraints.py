@@ -9,6 +9,7 @@ import numpy as np
 
 from gearmbs.adams import statements as st
 from gearmbs.adams.build import Builder
+from gearmbs.mechanism.functions import expression
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Marker
 
@@ -50,7 +51,7 @@ def _initial_conditions(b: Builder, s: st.Joint) -> None:
         if joint is None or s.type not in ("REVOLUTE", "TRANSLATIONAL", "CYLINDRICAL"):
             b.unsupported(s, f"{keyword} of a {s.type} joint")
             continue
-        b.initial_motions.append((joint, "rotation" if rotational else "translation", value))
+        b.model.initial_motions.append((joint, "rotation" if rotational else "translation", value))
 
 
 def _hooke(b: Builder, name: str, i: Marker, j: Marker) -> Joint:
@@ -160,9 +161,9 @@ def add_motion(b: Builder, s: st.Motion) -> None:
     if joint.kind == "cylindrical" and s.direction is None:
         raise ValueError("give ROTATION or TRANSLATION for a motion of a cylindrical joint")
     if rotational:
-        b.mechanism.rotation(name, joint, text)
+        b.mechanism.rotation(name, joint, expression(text))
     else:
-        b.mechanism.translation(name, joint, _scaled(text, b.units.length))
+        b.mechanism.translation(name, joint, expression(_scaled(text, b.units.length)))
 
 
 def _scaled(text: str, factor: float) -> str:

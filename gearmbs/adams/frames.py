@@ -33,7 +33,7 @@ def axes_from_points(
     if np.linalg.norm(first) == 0.0:
         raise ValueError("the point on the axis coincides with the origin")
     first = first / np.linalg.norm(first)
-    if np.linalg.norm(np.cross(first, second)) < PARALLEL * max(np.linalg.norm(second), 1e-300):
+    if float(np.linalg.norm(np.cross(first, second))) <= PARALLEL * float(np.linalg.norm(second)):
         second = spare if abs(first @ spare) < 0.9 else np.array([0.0, 0.0, 1.0])
     second = second - first * (first @ second)
     second = second / np.linalg.norm(second)

@@ -9,9 +9,10 @@ from numba import njit
 
 from gearmbs.adams import statements as st
 from gearmbs.adams.build import AdamsModel
+from gearmbs.dae import tables
 from gearmbs.dae.expressions import eval_gradient, eval_request, update_angles
 from gearmbs.dae.expressions.kinematics import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
-from gearmbs.dae.expressions.tape import ExpressionError, Tape
+from gearmbs.dae.expressions.tape import ExpressionError
 from gearmbs.dae.solution import Solution
 from gearmbs.mechanism.expression import Scope, compile_expression
 
@@ -84,7 +85,7 @@ class RequestEvaluator:
         self.marker_body = np.array(builder.marker_body, dtype=np.int64)
         self.marker_frame = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float)
         self.kin, self.acc = _tables(solution)
-        self.scope: Scope = model.scope(system.marker_index, builder.marker_body)
+        self.scope: Scope = model.scope(system.marker_index, builder.marker_body)  # type: ignore[attr-defined]
         self._wrenches: dict[tuple[str, int], np.ndarray] = {}
 
     def request(self, request: st.Request) -> RequestSeries:
@@ -124,17 +125,14 @@ class RequestEvaluator:
 
     def _unknown(self, key: tuple) -> np.ndarray:
         if key[0] == "diff":
-            return self._state(key[1])
+            return self.state(key[1])
         kind, ref, component = key
         return self.wrench(kind, ref)[:, component]
 
-    def _state(self, ref: int) -> np.ndarray:
-        system = self.solution.system
+    def state(self, ref: int) -> np.ndarray:
+        """Return the value of DIFF/ref over time, shape (m,)."""
         names = [str(s) for s in self.model.mechanism.states]
-        from gearmbs.dae import tables
-
         at = int(self.solution.problem.idata[tables.H_Z]) + names.index(str(ref))
-        del system
         return self.solution.result.y[:, at]
 
     def wrench(self, kind: str, ref: int) -> np.ndarray:
@@ -185,29 +183,22 @@ class RequestEvaluator:
         if not rows:
             return np.zeros((m, 6))
         lam = self.solution.multipliers[:, rows[0]]
-        text = self.model.mechanism.constraints[name]
-        from gearmbs.mechanism.compile import _Compiler
-
-        compiler = _Compiler(self.model.mechanism)
-        for body in self.model.mechanism.bodies.values():
-            compiler.add_body(body)
-        compiler.index_all_markers()
-        tape = compile_expression(text, compiler.scope())
+        tape = compile_expression(self.model.mechanism.constraints[name], self.scope)
         grad = np.zeros((m, tape.gradient_size))
         _gradient_series(
             tape.ints, tape.floats, self.solution.t, self.kin, self.marker_body, self.marker_frame, np.zeros(1),
             np.zeros(max(1, tape.n_angles)), np.zeros(tape.work_size), grad,
         )  # fmt: skip
-        body = int(self.marker_body[self.scope.markers[i]])
+        owner = int(self.marker_body[self.scope.markers[i]])
         origin = self._origin(i)
         out = np.zeros((m, 6))
         for p, other in enumerate(tape.bodies):
-            if body not in (0, other):
+            if owner not in (0, other):
                 continue
             force = -lam[:, None] * grad[:, 12 * p : 12 * p + 3]
             torque = -lam[:, None] * grad[:, 12 * p + 3 : 12 * p + 6]
             center = self.kin[:, other, KIN_R : KIN_R + 3]
-            sign = 1.0 if body else -1.0
+            sign = 1.0 if owner else -1.0
             out[:, :3] += sign * force
             out[:, 3:] += sign * (torque + np.cross(center - origin, force))
         return out
@@ -255,4 +246,4 @@ def _gradient_series(ints, floats, t, kin, marker_body, marker_frame, y, ref, wo
         eval_gradient(ints, floats, t[k], kin[k], marker_body, marker_frame, y, ref, grad[k], work)
 
 
-__all__ = ["RequestEvaluator", "RequestSeries", "Tape", "column_names", "request_texts"]
+__all__ = ["RequestEvaluator", "RequestSeries", "column_names", "request_texts"]

@@ -1,0 +1,286 @@
+"""Run a deck, by its script or for a given time: ``run_deck``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearmbs.adams import statements as st
+from gearmbs.adams.build import AdamsModel, BodyState, build_model
+from gearmbs.adams.commands import Change, Linear, Script, Simulate, Stop, Switch, apply_change, read_script
+from gearmbs.adams.deck import Deck, read_deck
+from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
+from gearmbs.adams.requests import RequestEvaluator
+from gearmbs.adams.result import AdamsResult, Segment
+from gearmbs.dae.errors import ModelError
+from gearmbs.dae.expressions import ExpressionError
+from gearmbs.mechanism.functions import polynomial
+
+DEFAULT_TOLERANCE = 1e-8
+"""Local error where a deck gives no ERROR, tighter than ADAMS's 1e-3 so that results do not depend on it."""
+
+METHODS = {"GSTIFF": "GSTIFF", "WSTIFF": "WSTIFF", "SI2_GSTIFF": "GSTIFF"}
+
+
+@dataclass
+class _Session:
+    """What changes while a script is carried out."""
+
+    deck: Deck
+    inactive: set[tuple[str, int]] = field(default_factory=set)
+    state: dict[int, BodyState] | None = None
+    states: dict[int, float] = field(default_factory=dict)
+    time: float = 0.0
+
+
+def run_deck(
+    adm: str | Path | Deck,
+    acf: str | Path | Script | None = None,
+    out: str | Path | None = None,
+    *,
+    end: float | None = None,
+    steps: int | None = None,
+    dtout: float | None = None,
+    tol: float | None = None,
+    allow_unsupported: bool = False,
+    progress: bool | Callable[[float], None] = False,
+) -> AdamsResult:
+    """Run an ADAMS deck.
+
+    Parameters
+    ----------
+    adm : path or Deck
+        The model.
+    acf : path or Script, optional
+        Commands; without them one dynamic analysis is run up to ``end``.
+    out : path, optional
+        Prefix of the files to write (.req, .res, .msg, .nc).
+    end : float, optional
+        End time in the deck's unit, when there is no script.
+    steps, dtout : int or float, optional
+        Number of output steps or their size in the deck's unit; default 100 steps.
+    tol : float, optional
+        Local error instead of INTEGRATOR's ERROR.
+    allow_unsupported : bool
+        Leave out what is not supported instead of refusing to run.
+    progress : bool or callable
+        As in :func:`gearmbs.mechanism.simulate`.
+
+    Returns
+    -------
+    AdamsResult
+        Also when an integration failed: see its ``success`` and ``messages``.
+
+    Raises
+    ------
+    DeckError
+        Naming file and line of what is wrong or not supported.
+    """
+    deck = adm if isinstance(adm, Deck) else read_deck(adm)
+    script = _script(acf, end, steps, dtout)
+    if script.unsupported and not allow_unsupported:
+        raise DeckError(script.unsupported)
+    result = AdamsResult(deck, script)
+    session = _Session(replace(deck, items={k: dict(v) for k, v in deck.items.items()}))
+    for command in script:
+        if isinstance(command, Stop):
+            break
+        if isinstance(command, Change):
+            _change(session, command)
+        elif isinstance(command, Switch):
+            element = (command.element or "", command.id or 0)
+            (session.inactive.discard if command.on else session.inactive.add)(element)
+        elif isinstance(command, Linear):
+            raise _unsupported(command, "LINEAR is not supported")
+        elif isinstance(command, Simulate):
+            segment = _simulate(session, command, tol, allow_unsupported, progress)
+            result.segments.append(segment)
+            if not segment.success:
+                break
+    if out is not None:
+        result.write(out)
+    return result
+
+
+def _script(acf: str | Path | Script | None, end: float | None, steps: int | None, dtout: float | None) -> Script:
+    if isinstance(acf, Script):
+        return acf
+    if acf is not None:
+        return read_script(acf)
+    if end is None:
+        message = "there is no script and no end time; give an .acf file, or end (and steps or dtout)"
+        raise DeckError([Diagnostic(ERROR, message, "<run>", 0)])
+    if not end > 0.0 or (dtout is not None and not dtout > 0.0) or (steps is not None and steps < 1):
+        message = f"end = {end}, steps = {steps}, dtout = {dtout}; they must be positive"
+        raise DeckError([Diagnostic(ERROR, message, "<run>", 0)])
+    if steps is None and dtout is None:
+        steps = 100
+    return Script(commands=[Simulate(kind="DYNAMICS", end=end, steps=steps, dtout=dtout)])
+
+
+def _unsupported(command: Any, message: str) -> DeckError:
+    return DeckError([Diagnostic(UNSUPPORTED, message, command.file, command.line)])
+
+
+def _change(session: _Session, command: Change) -> None:
+    """Put a command's arguments into the session's deck."""
+    change = command.statement
+    assert change is not None
+    group = session.deck.items.setdefault(type(change), {})
+    old = group.get(change.id)
+    if old is None:
+        if change.id:
+            message = f"there is no {change.label()} to change"
+            raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
+        group[0] = change
+        return
+    group[change.id] = apply_change(old, change)
+    session.deck.__dict__.pop("units", None)
+
+
+def _times(session: _Session, command: Simulate) -> np.ndarray:
+    """Return the output times in the deck's unit."""
+    end = command.end if command.end is not None else session.time + (command.duration or 0.0)
+    if not end > session.time:
+        message = f"END = {end}, but the model is at time {session.time} already"
+        raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
+    span = end - session.time
+    if command.dtout is None:
+        return session.time + span * np.arange((command.steps or 100) + 1) / (command.steps or 100)
+    count = int(np.floor(span / command.dtout * (1.0 + 1e-12) + 1e-9))
+    times = session.time + command.dtout * np.arange(count + 1)
+    return times if end - times[-1] < 1e-9 * command.dtout else np.append(times, end)
+
+
+def _settings(session: _Session, tol: float | None) -> tuple[dict[str, Any], str | None]:
+    """Return the integrator options and a remark when the method is another than asked for."""
+    integrator = session.deck.only(st.Integrator) or st.Integrator()
+    options: dict[str, Any] = {"integrator": "WSTIFF", "formulation": "SI2", "tol": DEFAULT_TOLERANCE}
+    note = None
+    if integrator.method is not None:
+        options["integrator"] = METHODS.get(integrator.method, "WSTIFF")
+        if integrator.method not in METHODS:
+            note = f"{integrator.method} is not available; WSTIFF is used"
+        elif integrator.formulation is None and integrator.method != "SI2_GSTIFF":
+            options["formulation"] = "I3"
+    if integrator.formulation is not None:
+        options["formulation"] = integrator.formulation
+    if integrator.error is not None:
+        options["tol"] = integrator.error
+    if tol is not None:
+        options["tol"] = tol
+    scale = session.deck.units.time
+    for key, value in (("max_step", integrator.hmax), ("first_step", integrator.hinit), ("min_step", integrator.hmin)):
+        if value is not None:
+            options[key] = scale * value
+    if integrator.kmax is not None:
+        options["max_order"] = min(max(integrator.kmax, 1), 6)
+    if integrator.corrector is not None:
+        options["corrector"] = "modified" if integrator.corrector.startswith("MOD") else "original"
+    return options, note
+
+
+def _simulate(
+    session: _Session,
+    command: Simulate,
+    tol: float | None,
+    allow_unsupported: bool,
+    progress: bool | Callable[[float], None],
+) -> Segment:
+    """Carry out one SIMULATE."""
+    kind = command.kind or "DYNAMICS"
+    if kind not in ("DYNAMICS", "KINEMATICS", "TRANSIENT"):
+        raise _unsupported(command, f"SIMULATE/{kind} is not supported")
+    times = _times(session, command)
+    try:
+        model = _model(session, allow_unsupported)
+        options, note = _settings(session, tol)
+        solution = model.mechanism.simulate(
+            float(times[-1]) * session.deck.units.time,
+            t_start=session.time * session.deck.units.time,
+            t_eval=times * session.deck.units.time,
+            progress=progress,
+            **options,
+        )
+    except (ModelError, ArithmeticError) as error:
+        raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, 0)]) from error
+    report = solution.system.report
+    freedom = report.degrees_of_freedom if report is not None else 0
+    if kind == "KINEMATICS" and freedom > 0:
+        message = f"a kinematic analysis needs zero degrees of freedom; the model has {freedom}"
+        raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
+    evaluator = RequestEvaluator(model, solution)
+    segment = Segment(command, kind, model, solution, options, note)
+    for request in session.deck.of(st.Request).values():
+        try:
+            segment.requests[request.id] = evaluator.request(request)
+        except ExpressionError as error:
+            raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, request.line)]) from error
+    for kind_id in model.pairs:
+        segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
+    _remember(session, model, segment)
+    return segment
+
+
+def _model(session: _Session, allow_unsupported: bool) -> AdamsModel:
+    """Build the mechanism of the session's present state."""
+    inactive = frozenset(session.inactive)
+    if session.state is None:
+        session.state = {}
+        model = build_model(session.deck, allow_unsupported, inactive)
+        if not model.initial_motions:
+            return model
+        session.state = _with_initial_motions(model)
+    model = build_model(session.deck, allow_unsupported, inactive, session.state)
+    for number, value in session.states.items():
+        if number in model.mechanism.states:
+            model.mechanism.states[number].start = value
+    return model
+
+
+def _with_initial_motions(model: AdamsModel) -> dict[int, BodyState]:
+    """Return the state in which every joint with initial conditions has them."""
+    units = model.deck.units
+    mechanism = model.mechanism
+    for k, (joint, kind, value) in enumerate(model.initial_motions):
+        rate = value[1] if len(value) > 1 else 0.0
+        name = f"initial condition {k + 1} of {joint.name}"
+        if kind == "rotation":
+            mechanism.rotation(name, joint, polynomial([value[0], rate / units.time]))
+        else:
+            start, speed = value[0] * units.length, rate * units.factor("velocity")
+            mechanism.translation(name, joint, polynomial([start, speed]))
+    system = mechanism.compile(0.0)
+    system.initialise()
+    return _states(model, system.pose)
+
+
+def _states(model: AdamsModel, pose: np.ndarray) -> dict[int, BodyState]:
+    """Return the parts' states from R, A, v, omega of their centres of mass."""
+    found = {}
+    for row, (name, body) in zip(pose, model.mechanism.bodies.items()):
+        axes = row[3:12].reshape(3, 3)
+        arm = axes @ body.com
+        spin = row[15:18].copy()
+        number = model.sources[name].id
+        found[number] = BodyState(row[0:3] - arm, axes.copy(), row[12:15] - np.cross(spin, arm), spin)
+    return found
+
+
+def _remember(session: _Session, model: AdamsModel, segment: Segment) -> None:
+    """Keep the final state as the start of the next analysis."""
+    s = segment.solution
+    names = s.system.body_names
+    last = [
+        np.concatenate([s.position(n)[-1], s.orientation(n)[-1].ravel(), s.velocity(n)[-1], s.angular_velocity(n)[-1]])
+        for n in names
+    ]
+    session.state = _states(model, np.array(last))
+    evaluator = RequestEvaluator(model, s)
+    for number in model.mechanism.states:
+        session.states[number] = float(evaluator.state(number)[-1])
+    session.time = float(s.t[-1]) / session.deck.units.time
