@@ -139,7 +139,7 @@ def record(case: Case, solution: Solution) -> xr.Dataset:
     dataset["acceleration"].attrs.update(
         units="m/s^2", long_name="force on the driven gear over its mass (Newton's second law)"
     )
-    both = xr.concat([levels["band"], levels["orders"]], dim="method").assign_coords(method=["band", "orders"])
+    both = xr.concat([levels["band"], levels["orders"]], dim="way").assign_coords(way=["band", "orders"])
     dataset["gmf_rms"] = both.drop_vars(["channel_units", "units"], errors="ignore").rename(channel="component")
     dataset["gmf_rms"].attrs = {"units": "m/s^2", "long_name": "RMS of the gear mesh frequency harmonics"}
     dataset.attrs = attributes_of(case, solution)

@@ -1,0 +1,162 @@
+"""Command line: a thin layer over the library's public calls."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(
+    name="gearmbs",
+    help="Multibody gear dynamics: simulate gear pairs and mechanisms, evaluate and compare vibration signals.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")]
+
+
+def fail(message: str) -> None:
+    """End with a message and exit status 1."""
+    typer.secho(f"gearmbs: {message}", fg="red", err=True)
+    raise typer.Exit(1)
+
+
+@contextmanager
+def guarded() -> Iterator[None]:
+    """Turn the library's errors into messages and Ctrl-C into exit status 130."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        typer.secho("gearmbs: interrupted; finished cases are kept, nothing is half-written", err=True)
+        raise typer.Exit(130) from None
+    except (ValueError, RuntimeError, OSError) as error:
+        fail(str(error))
+
+
+@contextmanager
+def case_bars(names: list[str]) -> Iterator[Callable[[str, float], None]]:
+    """Show a progress bar a case; yield the function that moves them."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description:>24}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
+    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True)) as progress:
+        tasks = {name: progress.add_task(name, total=1.0) for name in names}
+        yield lambda name, fraction: progress.update(tasks[name], completed=fraction)
+
+
+def _raise_interrupt(*_args) -> None:
+    raise KeyboardInterrupt
+
+
+@app.callback(invoke_without_command=True)
+def main(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    """Multibody gear dynamics."""
+    signal.signal(signal.SIGTERM, _raise_interrupt)
+    if version:
+        import gearmbs
+
+        typer.echo(f"gearmbs {gearmbs.__version__}")
+        raise typer.Exit
+
+
+@app.command()
+def paper(
+    out: Out = Path("out/paper"),
+    speed: Annotated[str | None, typer.Option(help='Speed of the driver, e.g. "1000 rpm".')] = None,
+    duration: Annotated[str | None, typer.Option(help='Length of the record, e.g. "1 s".')] = None,
+    torque: Annotated[str | None, typer.Option(help='Low load, e.g. "100 N m"; the high load is twice that.')] = None,
+    depth: Annotated[str | None, typer.Option(help='Penetration d of full damping, e.g. "0.1 mm".')] = None,
+    backlash: Annotated[str | None, typer.Option(help='Normal backlash, e.g. "0.1 mm".')] = None,
+    face_width: Annotated[str | None, typer.Option(help='Face width, e.g. "20 mm".')] = None,
+    friction: Annotated[bool, typer.Option(help="Coulomb friction between the flanks.")] = True,
+    misalignment: Annotated[str, typer.Option(help='Plane of the misalignment: "skew" or "inclination".')] = "skew",
+    angle: Annotated[str, typer.Option(help="Angle of the misalignment.")] = "1 deg",
+    integrator: Annotated[str, typer.Option(help="WSTIFF, GSTIFF or IDA.")] = "WSTIFF",
+    tolerance: Annotated[float | None, typer.Option(help="Integrator tolerance.")] = None,
+    component: Annotated[str, typer.Option(help="Force component of the figures.")] = "line_of_action",
+    workers: Annotated[int | None, typer.Option(help="Cases at a time; default: the cores.")] = None,
+) -> None:
+    """Reproduce the paper: six cases, GMF table, figures 5 and 7, report."""
+    with guarded():
+        from gearmbs.studies.case import make_case
+        from gearmbs.studies.paper import LOADS, paper_cases, run_paper
+        from gearmbs.studies.store import write_dataset
+        from gearmbs.units import to_si
+
+        data: dict = {"solver": {"integrator": integrator.upper()}, "fault": {"plane": misalignment}}
+        for section, key, value in (
+            ("operation", "speed", speed),
+            ("operation", "duration", duration),
+            ("contact", "depth", depth),
+            ("fault", "backlash", backlash),
+            ("gears", "face_width", face_width),
+            ("solver", "tolerance", tolerance),
+        ):
+            if value is not None:
+                data.setdefault(section, {})[key] = value
+        data["friction"] = {"enabled": friction}
+        base = make_case(data, "options")
+        low = to_si(torque, "torque", "--torque") if torque is not None else LOADS[0]
+        tilt = to_si(angle, "angle", "--angle")
+        settings = {"torques": (low, 2.0 * low), "misalignment": tilt}
+        names = [case.name for case in paper_cases(base=base, **settings)]
+        single = out / "cases"
+        with case_bars(names) as move:
+            study = run_paper(
+                base,
+                component=component,
+                workers=workers,
+                progress=move,
+                done=lambda case, record: write_dataset(single / f"{case.name.replace(', ', '_')}.nc", record),
+                **settings,
+            )
+        paths = study.save(out)
+        for claim in study.claims():
+            mark = "held    " if claim.held else "NOT HELD"
+            typer.echo(f"{mark}  {claim.name}\n          {claim.numbers}")
+        typer.echo("\n".join(f"wrote {path}" for path in paths))
+
+
+@app.command()
+def run(
+    case_file: Annotated[Path, typer.Argument(help="Case in TOML.")],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="NetCDF file; default: beside the case.")] = None,
+) -> None:
+    """Simulate one case file and write its record as NetCDF."""
+    with guarded():
+        from gearmbs.studies.case import load_case
+        from gearmbs.studies.run import SimulationFailed, run_case
+        from gearmbs.studies.store import write_dataset
+
+        case = load_case(case_file)
+        target = out or case_file.with_suffix(".nc")
+        operation = case.operation
+        span = operation.run_up + operation.settling + operation.duration
+        with case_bars([case.name]) as move:
+            try:
+                data = run_case(case, lambda t: move(case.name, min(t / span, 1.0)))
+            except SimulationFailed as failure:
+                part = target.with_name(f"{target.stem}.partial.nc")
+                write_dataset(part, failure.solution.to_dataset())
+                raise RuntimeError(f"{failure}\nWhat was computed until then is in {part}") from failure
+        write_dataset(target, data)
+        levels = data["gmf_rms"].sel(way="band")
+        typer.echo(f"{'component':<18}" + "".join(f"{h:>4} x GMF" for h in levels.harmonic.values) + "   RMS, m/s^2")
+        for component in levels.component.values:
+            row = levels.sel(component=component).values
+            typer.echo(f"{component!s:<18}" + "".join(f"{v:10.4g}" for v in row))
+        typer.echo(f"wrote {target}")
+
+
+if __name__ == "__main__":
+    sys.exit(app())
