@@ -167,6 +167,12 @@ class Solution:
             total += 0.5 * np.einsum("ti,ij,tj->t", local, row[1:].reshape(3, 3), local)
         return total
 
+    def energy_balance(self) -> xr.Dataset:
+        """Return energies, works, dissipation and their imbalance; see `gearmbs.dae.energy.energy_balance`."""
+        from gearmbs.dae.energy import energy_balance
+
+        return energy_balance(self)
+
     def __len__(self) -> int:
         return self.t.size
 
