@@ -310,15 +310,22 @@ def _harmonic_table(
 
 
 def _levels(signal: xr.DataArray) -> xr.Dataset:
-    columns = [column - column.mean() for column in signal.values.T]
-    unit = common_unit(signal)
-    found = {
-        "rms": ([float(np.sqrt(np.mean(c * c))) for c in columns], unit),
-        "peak_to_peak": ([peak_to_peak(c) for c in columns], unit),
-        "crest": ([crest_factor(c) for c in columns], "1"),
-        "kurtosis": ([kurtosis(c) for c in columns], "1"),
+    measures: dict[str, Callable[[np.ndarray], float]] = {
+        "rms": np.std,
+        "peak_to_peak": peak_to_peak,
+        "crest": crest_factor,
+        "kurtosis": kurtosis,
     }
-    variables = {name: ("channel", np.asarray(values), {"units": u}) for name, (values, u) in found.items()}
+    found: dict[str, list[float]] = {name: [] for name in measures}
+    for column in signal.values.T:
+        one = np.ascontiguousarray(column)
+        for name, measure in measures.items():
+            found[name].append(float(measure(one)))
+    unit = common_unit(signal)
+    variables = {
+        name: ("channel", np.asarray(values), {"units": "1" if name in ("crest", "kurtosis") else unit})
+        for name, values in found.items()
+    }
     return xr.Dataset(variables, coords={"channel": signal["channel"].values})
 
 

@@ -160,9 +160,10 @@ class _Clock:
         rate = rate_of(signal)
         start = float(signal["time"].values[0])
         at = (phase["time"].values - start) * rate
-        inside = (at >= -1e-6) & (at <= signal.sizes["time"] - 1 + 1e-6)
-        self.at = np.clip(at[inside], 0.0, signal.sizes["time"] - 1)
-        self.turns = np.asarray(phase.values, dtype=float)[inside] / TURN
+        last = signal.sizes["time"] - 1
+        inside = slice(int(np.searchsorted(at, -1e-6)), int(np.searchsorted(at, last + 1e-6, side="right")))
+        self.at = np.clip(at[inside], 0.0, last, out=at[inside])
+        self.turns = np.asarray(phase.values[inside], dtype=float) / TURN
         if self.at.size < 2:
             raise SignalError("phase: does not overlap the record; both need the same time axis in s")
         steps = np.diff(self.turns)
@@ -180,7 +181,11 @@ class _Clock:
         self.last = math.floor(self.turns[-1] * self.per_rev + 1e-9)
 
     def positions(self, begin: int, end: int) -> np.ndarray:
-        return np.interp(np.arange(begin, end) / self.per_rev, self.turns, self.at)
+        angles = np.arange(begin, end) / self.per_rev
+        # Only the stretch that is needed: the whole record's tables would be copied each time.
+        low = max(0, int(np.searchsorted(self.turns, angles[0])) - 1)
+        high = int(np.searchsorted(self.turns, angles[-1])) + 1
+        return np.interp(angles, self.turns[low:high], self.at[low:high])
 
 
 def _angular(

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from .errors import SignalError
-from .filters import bandpass
+from .filters import bandpass_taps, filtered_mean_square
 from .orders import MIN_PERIODS, harmonic_amplitudes
 from .signal import check_teeth, common_unit, mesh_frequency, rate_of, units_of
 
@@ -52,17 +52,15 @@ def band_rms(
     -------
     xarray.DataArray of dimension (channel,)
     """
-    levels = []
-    for channel in range(signal.sizes["channel"]):
-        passed = bandpass(
-            signal[:, [channel]],
-            frequency - half_width,
-            frequency + half_width,
-            transition=transition,
-            attenuation=ATTENUATION_DB,
+    rate, n = rate_of(signal), signal.sizes["time"]
+    taps = bandpass_taps(rate, frequency - half_width, frequency + half_width, transition, ATTENUATION_DB)
+    if n < taps.size:
+        raise SignalError(
+            f"signal: has {n} samples, the band-pass at {frequency:g} Hz needs at least {taps.size}; "
+            "give a longer record or a wider transition band"
         )
-        count = whole_period_count(passed.sizes["time"], rate_of(signal), 1.0 / period if period else frequency)
-        levels.append(rms(passed.values[:count, 0]))
+    count = whole_period_count(n - taps.size + 1, rate, 1.0 / period if period else frequency)
+    levels = [math.sqrt(filtered_mean_square(column, taps, count)) for column in signal.values.T]
     return _per_channel(signal, np.asarray(levels))
 
 

@@ -188,9 +188,10 @@ class ComparisonReport:
                     values = change.sel(load=load, state=state, harmonic=k).values
                     low, high = float(np.nanmin(values)), float(np.nanmax(values))
                     if low < -CONTRADICTION_DB and high > CONTRADICTION_DB:
+                        moves = f"{low:+.1f} dB on one channel and by {high:+.1f} dB on another"
                         found.append(
-                            f"{state} at load {load}: {k} x GMF moves by {low:+.1f} dB on one channel and by {high:+.1f} dB "
-                            "on another; sensors that were moved between the records would show the same."
+                            f"{state} at load {load}: {k} x GMF moves by {moves}; "
+                            "sensors that were moved between the records would show the same."
                         )
         return found
 

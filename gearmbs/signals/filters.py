@@ -144,16 +144,31 @@ def bandpass(
     SignalError
         If the band does not fit between 0 and half the sampling rate, or the record is too short.
     """
-    rate = rate_of(signal)
+    taps = bandpass_taps(rate_of(signal), low, high, transition, attenuation)
+    # A static load can be thousands of times the vibration; taking it out first spares the stop band.
+    values, first = apply_zero_phase(signal.values - signal.values.mean(axis=0), taps, edges)
+    return like(signal, values, t0=float(signal["time"].values[first]))
+
+
+def bandpass_taps(rate: float, low: float, high: float, transition: float, attenuation: float) -> np.ndarray:
+    """The filter of `bandpass`; SignalError if the band does not fit below half the sampling rate."""
     if not (0.0 < transition and 0.0 < low - transition / 2 and low < high and high + transition / 2 < rate / 2):
         raise SignalError(
             f"band: {low:g} to {high:g} Hz with transitions of {transition:g} Hz must lie between 0 and "
             f"{rate / 2:g} Hz (half the sampling rate)"
         )
-    taps = kaiser_taps((low - transition / 2, high + transition / 2), transition, rate, "bandpass", attenuation)
-    # A static load can be thousands of times the vibration; taking it out first spares the stop band.
-    values, first = apply_zero_phase(signal.values - signal.values.mean(axis=0), taps, edges)
-    return like(signal, values, t0=float(signal["time"].values[first]))
+    return kaiser_taps((low - transition / 2, high + transition / 2), transition, rate, "bandpass", attenuation)
+
+
+def filtered_mean_square(column: np.ndarray, taps: np.ndarray, count: int) -> float:
+    """Mean square of the first `count` fully supported samples of the filtered, mean-free column, block by block."""
+    mean = column.mean()
+    total = 0.0
+    for start in range(0, count, BLOCK):
+        stop = min(start + BLOCK, count)
+        piece = ss.oaconvolve(column[start : stop + taps.size - 1] - mean, taps, mode="valid")
+        total += float(piece @ piece)
+    return total / count
 
 
 def decimation_taps(ratio: int, rate: float, attenuation: float = ATTENUATION_DB) -> np.ndarray:

@@ -156,13 +156,16 @@ def phase_from_line(
         slopes = track(np.array([at[0], at[-1]]), 1)
     else:
         track, slopes = (lambda x: np.interp(x, at, slow)), np.zeros(2)
-    t = np.arange(n) / rate
-    phase = np.asarray(track(np.clip(t, at[0], at[-1])))
-    phase += slopes[0] * np.minimum(t - at[0], 0.0) + slopes[1] * np.maximum(t - at[-1], 0.0)
-    angle = (2.0 * np.pi * frequency * t + phase) / order
-    if np.any(np.diff(angle) <= 0.0):
+    angle = np.empty(n)
+    for start in range(0, n, BLOCK):
+        t = np.arange(start, min(start + BLOCK, n)) / rate
+        inside = np.clip(t, at[0], at[-1])
+        beyond = np.where(t < at[0], slopes[0], slopes[1]) * (t - inside)
+        angle[start : start + t.size] = (2.0 * np.pi * frequency * t + track(inside) + beyond) / order
+    angle -= angle[0]
+    if np.diff(angle).min() <= 0.0:
         raise SignalError("frequency: the line at this frequency is too weak to follow; give a tacho or the speed")
-    result = _phase(times, angle - angle[0], "line")
+    result = _phase(times, angle, "line")
     span = at[-1] - at[0]
     mean = float((2.0 * np.pi * frequency + ((slow[-1] - slow[0]) / span if span > 0.0 else 0.0)) / order)
     result.attrs.update(channel=str(signal["channel"].values[channel]), quality=quality, mean_speed=mean)

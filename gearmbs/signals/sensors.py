@@ -167,8 +167,8 @@ def accelerometer(
     """Acceleration at a bearing support, the force (N) through a transfer path.
 
     The force's spectrum times the path's accelerance, the record padded with the path's settling time so that nothing
-    wraps around. The mean force, which accelerates nothing, is taken out first; before the record the force is taken as its
-    mean, so the first settling time shows the path's transient.
+    wraps around. The mean force, which accelerates nothing, is taken out first; before the record the force is taken
+    as its mean, so the first settling time shows the path's transient.
 
     Parameters
     ----------
