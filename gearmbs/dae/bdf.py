@@ -1,7 +1,8 @@
 """Coefficients of variable-coefficient BDF from the actual step history.
 
-With past points t_1 > t_2 > ... (``nodes``, newest first) and a new time t, the predictor of order k is the polynomial
-through the k + 1 newest points. The corrector polynomial agrees with it at t_1 .. t_k and takes the unknown value y at t, so
+With past points t_1 > t_2 > ... (``nodes``, newest first) and a new time t, the predictor of order k is the
+polynomial through the k + 1 newest points. The corrector polynomial agrees with it at t_1 .. t_k and takes the unknown
+value y at t, so
 
     y' = y'_pred + gamma (y - y_pred),   gamma = sum_{j=1..k} 1/(t - t_j),
 

@@ -1,8 +1,8 @@
 """The compiled step loop of WSTIFF and GSTIFF.
 
-`advance` takes accepted steps until a limit, without Python and without the GIL. All it knows lies in `RunState`, so it can
-return at any time and be called again. It returns early when only Python can help: for new pivots, when a buffer is full, and after
-a change of coordinates.
+`advance` takes accepted steps until a limit, without Python and without the GIL. All it knows lies in `RunState`, so it
+can return at any time and be called again. It returns early when only Python can help: for new pivots, when a buffer is
+full, and after a change of coordinates.
 """
 
 from __future__ import annotations
@@ -368,7 +368,7 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
             rewritten = True
         else:
             after_success(real, count, times, hist, vec, small)
-            if h < h_wish and real[s.H] >= h:
+            if h < 0.999 * h_wish and real[s.H] >= h:
                 # shortened only to land: go on with the size the error test had asked for
                 real[s.H] = min(h_wish, 2.0 * real[s.H]) if count[s.INTERPOLATE] else h_wish
         if real[s.T] >= real[s.T_END]:

@@ -1,7 +1,7 @@
 """Newton matrix by coloured differences, and adapters that give users' functions the fixed signatures.
 
-A user's function is called with its own few arguments; what the integrator needs beside them (pattern, colours, increments, addresses of
-Python callbacks) stands in front of the user's parameters in the tables of the problem:
+A user's function is called with its own few arguments; what the integrator needs beside them (pattern, colours,
+increments, addresses of Python callbacks) stands in front of the user's parameters in the tables of the problem:
 
 * ``idata``: the header below, then colour pointers, columns by colour, ``indptr``, ``indices``
 * ``rdata``: magnitude of each unknown for the increments, then the user's parameters
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 from llvmlite import ir
@@ -197,12 +198,6 @@ def python_jacobian(t, y, yp, cj, vals, idata, rdata, work):
     _call_address(idata[JACOBIAN_ADDRESS], t, y, yp, cj, vals)
 
 
-@njit(JACOBIAN_SIG, cache=True, nogil=True, error_model="numpy")
-def python_difference_jacobian(t, y, yp, cj, vals, idata, rdata, work):
-    """Difference the user's Python residual."""
-    difference_matrix(python_residual, t, y, yp, cj, vals, idata, rdata, work)
-
-
 @njit(EVENTS_SIG, cache=True, nogil=True, error_model="numpy")
 def python_events(t, y, yp, out, idata, rdata, work):
     """Call the user's Python event functions through their C callback."""
@@ -252,6 +247,7 @@ class PythonCallback:
         self.address = ctypes.cast(self._callback, ctypes.c_void_p).value
 
 
+@cache
 def adapt_residual(function: Callable, with_parameters: bool) -> Callable:
     """Return a numba function of RESIDUAL_SIG around a user's ``f(t, y, yp, out[, p])`` compiled by numba."""
     if with_parameters:
@@ -269,6 +265,7 @@ def adapt_residual(function: Callable, with_parameters: bool) -> Callable:
     return residual
 
 
+@cache
 def adapt_jacobian(function: Callable, with_parameters: bool, dense: bool) -> Callable:
     """Return a numba function of JACOBIAN_SIG around a user's ``jac(t, y, yp, cj, out[, p])`` compiled by numba."""
     if dense and with_parameters:
@@ -300,6 +297,7 @@ def adapt_jacobian(function: Callable, with_parameters: bool, dense: bool) -> Ca
     return jacobian
 
 
+@cache
 def differenced(residual: Callable) -> Callable:
     """Return a numba function of JACOBIAN_SIG that differences ``residual``; tables as by `pack_tables`."""
 

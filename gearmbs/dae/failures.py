@@ -40,17 +40,17 @@ def _list_indices(rows: np.ndarray) -> str:
 def inconsistent(problem: DAEProblem, t: float, worst: int, row: int, jump: float) -> str:
     """Explain initial values that do not satisfy the equations."""
     return (
-        f"{Status.INCONSISTENT_START.sentence} At t = {t:.9g} {unknown_name(problem, worst)} would have to jump by about "
-        f"{jump:.3g} in the first instant; equation {row} is violated most. Make positions and velocities satisfy the "
-        "constraints before the run, or pass check_start=False to let the first step repair them."
+        f"{Status.INCONSISTENT_START.sentence} At t = {t:.9g} {unknown_name(problem, worst)} would have to jump by "
+        f"about {jump:.3g} in the first instant; equation {row} is violated most. Make positions and velocities "
+        "satisfy the constraints before the run, or pass check_start=False to let the first step repair them."
     )
 
 
 def not_finite(problem: DAEProblem, t: float, row: int, what: str = "equation") -> str:
     """Explain NaN or infinity out of a user's function."""
     return (
-        f"{Status.NOT_FINITE.sentence} Near t = {t:.9g} {what} {row} is NaN or infinite, and smaller steps did not help. "
-        "Look for a division by zero, the root or logarithm of a negative number, or a table that ends there."
+        f"{Status.NOT_FINITE.sentence} Near t = {t:.9g} {what} {row} is NaN or infinite, and smaller steps did not "
+        "help. Look for a division by zero, the root or logarithm of a negative number, or a table that ends there."
     )
 
 

@@ -19,7 +19,8 @@ from gearmbs.dae.wstiff import solve_wstiff
 
 METHODS = ("WSTIFF", "GSTIFF", "IDA")
 IDA_DEFAULT_OUTPUTS = 201
-SETTLING_STEP = 1e-8
+SETTLING_STEP = 1e-12
+SETTLING_SWEEPS = 3
 
 
 def _takes(function: Callable, fewest: int, what: str) -> bool:
@@ -65,7 +66,7 @@ class _UserFunctions:
 
     def jacobian(self, jac: Callable | None, residual: Callable, nnz: int, dense: bool) -> Callable:
         if jac is None:
-            return dj.python_difference_jacobian if residual is dj.python_residual else dj.differenced(residual)
+            return dj.differenced(residual)
         takes_p = _takes(jac, 5, "the Jacobian")
         if isinstance(jac, CPUDispatcher):
             return dj.adapt_jacobian(jac, takes_p, dense)
@@ -125,7 +126,7 @@ def _pattern(jac_sparsity: Any, n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _settle_rates(problem: DAEProblem, span: float) -> None:
-    """Set y' of differential unknowns by one Newton step of a vanishing implicit Euler step."""
+    """Set y' of differential unknowns by a few Newton sweeps on a vanishing implicit Euler step."""
     gamma = 1.0 / (SETTLING_STEP * span)
     vals = np.empty(len(problem.indices))
     work = np.zeros(problem.work_size)
@@ -141,8 +142,10 @@ def _settle_rates(problem: DAEProblem, span: float) -> None:
         return
     factors = new_factors(plan)
     factor(plan, factors, vals)
-    solve(plan, factors, out, out)
-    problem.yp0[problem.differential] -= gamma * out[problem.differential]
+    for _ in range(SETTLING_SWEEPS):
+        problem.residual(problem.t0, problem.y0, problem.yp0, out, *tables)
+        solve(plan, factors, out, out)
+        problem.yp0[problem.differential] -= gamma * out[problem.differential]
 
 
 def as_problem(
@@ -356,25 +359,18 @@ def solve_dae(
             names=names,
         )
         tol, relative = 1.0, float(rtol)
-        options.setdefault("event_direction", None)
         if functions:
             options["event_direction"], options["event_action"] = _event_rules(functions)
     if method == "IDA":
-        return _dispatch_ida(
-            problem,
-            probe,
-            t0,
-            t_end,
-            t_eval,
-            tol,
-            relative,
-            max_order,
-            max_step,
-            first_step,
-            min_step,
-            dense_output,
-            options,
-        )
+        if dense_output or problem.n_events:
+            raise ValueError("method='IDA' has neither dense output nor events here; use WSTIFF or GSTIFF")
+        limits = {
+            "max_order": 5 if max_order is None else min(max_order, 5),
+            "max_step": 0.0 if np.isinf(max_step) else max_step,
+            "first_step": first_step or 0.0,
+            "min_step": min_step or 0.0,
+        }
+        return _dispatch_ida(problem, probe, (t0, t_end), t_eval, tol=tol, rtol=relative, **limits, **options)
     return solve_wstiff(
         problem,
         t_eval,
@@ -393,29 +389,21 @@ def solve_dae(
 
 
 def _dispatch_ida(
-    problem, probe, t0, t_end, t_eval, tol, rtol, max_order, max_step, first_step, min_step, dense_output, options
+    problem: DAEProblem,
+    probe: Callable[[], BaseException | None] | None,
+    t_span: tuple[float, float],
+    t_eval: np.ndarray | None,
+    **options: Any,
 ) -> DAEResult:
-    if dense_output or problem.n_events:
-        raise ValueError("method='IDA' has neither dense output nor events here; use WSTIFF or GSTIFF")
-    known = {name: options[name] for name in ("max_iterations", "progress") if name in options}
-    unknown = set(options) - set(known) - {"event_direction"}
+    """Run IDA over ``t_span``; without ``t_eval`` at evenly spaced times."""
+    unknown = set(options) - set(inspect.signature(solve_ida).parameters)
     if unknown:
         raise ValueError(f"method='IDA' does not know {', '.join(sorted(unknown))}")
-    times = np.linspace(t0, t_end, IDA_DEFAULT_OUTPUTS) if t_eval is None else np.asarray(t_eval, dtype=float)
-    if times[0] < t0 or times[-1] > t_end:
+    times = np.linspace(*t_span, IDA_DEFAULT_OUTPUTS) if t_eval is None else np.asarray(t_eval, dtype=float)
+    if times[0] < t_span[0] or times[-1] > t_span[1]:
         raise ValueError(f"t_eval {times[0]:g} .. {times[-1]:g} leaves t_span")
-    padded = times if times[0] == t0 else np.concatenate(([t0], times))
-    result = solve_ida(
-        problem,
-        padded,
-        tol=tol,
-        rtol=rtol,
-        max_order=5 if max_order is None else min(max_order, 5),
-        max_step=0.0 if np.isinf(max_step) else max_step,
-        first_step=first_step or 0.0,
-        min_step=min_step or 0.0,
-        **known,
-    )
+    padded = times if times[0] == t_span[0] else np.concatenate((t_span[:1], times))
+    result = solve_ida(problem, padded, **options)
     if padded is not times:
         result.t, result.y, result.yp = result.t[1:], result.y[1:], result.yp[1:]
     error = probe() if probe is not None else None

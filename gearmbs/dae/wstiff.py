@@ -1,7 +1,7 @@
 """WSTIFF and GSTIFF: the Python side of the compiled integrator.
 
-The loop in `gearmbs.dae.core` does the work; here a run is set up, driven in chunks so that Ctrl-C and progress work, helped out when new
-pivots are needed, and turned into a `DAEResult`.
+The loop in `gearmbs.dae.core` does the work; here a run is set up, driven in chunks so that Ctrl-C and progress work,
+helped out when new pivots are needed, and turned into a `DAEResult`.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ CHUNK_SECONDS = 0.05
 RECORD_BYTES = 8_000_000
 EVENT_BUFFER = 64
 START_JUMP_LIMIT = 100.0
+CHECK_STEP = 1e-10
 SINGULAR_RETRIES = 8
 EPS = float(np.finfo(float).eps)
 
@@ -82,6 +83,7 @@ class Run:
         self.dense_output = dense_output
         self.wall_time = 0.0
         self.repivots = 0
+        self.first_pivots = 0
         self.started = False
         t0 = float(problem.t0)
         outputs, t_end = _output_times(t_eval, t0, t_end)
@@ -197,11 +199,12 @@ class Run:
             return Status.NOT_FINITE, failures.not_finite(problem, t0, int(bad[0]))
         if st.count[s.HAS_EVENTS]:
             problem.events(t0, st.vec[s.Y], st.vec[s.YP], st.g_old, st.idata, st.rdata, st.work)
-        gamma = 1.0 / st.real[s.H]
-        problem.jacobian(t0, st.vec[s.Y], st.vec[s.YP], gamma, st.jac, st.idata, st.rdata, st.work)
-        st.count[s.JACOBIANS] += 1
-        failure = self._repivot()
+        failure = self._choose_first_pivots(st.real[s.H])
         if failure is not None or not self.check_start:
+            return failure
+        # over a vanishing step wrong rates are harmless, but values off the constraints still have to jump
+        h_check = min(st.real[s.H], CHECK_STEP * (st.real[s.T_END] - t0))
+        if h_check < st.real[s.H] and (failure := self._choose_first_pivots(h_check)) is not None:
             return failure
         solve(self.plan, self.factors, res, delta)
         jump = np.abs(delta) * st.vec[s.W_ERROR]
@@ -210,7 +213,15 @@ class Run:
             row = int(np.argmax(np.abs(res[self.plan.row_from]) * self.plan.row_scale))
             message = failures.inconsistent(problem, t0, worst, int(self.plan.row_from[row]), float(abs(delta[worst])))
             return Status.INCONSISTENT_START, message
-        return None
+        return self._choose_first_pivots(st.real[s.H])
+
+    def _choose_first_pivots(self, h: float) -> tuple[Status, str] | None:
+        """Factor the Newton matrix of a first step of size ``h``; return a failure or None."""
+        st = self.state
+        self.problem.jacobian(st.real[s.T], st.vec[s.Y], st.vec[s.YP], 1.0 / h, st.jac, st.idata, st.rdata, st.work)
+        st.count[s.JACOBIANS] += 1
+        self.first_pivots += 1
+        return self._repivot()
 
     def _repivot(self) -> tuple[Status, str] | None:
         """Choose new pivots for the current Newton matrix; return a failure or None."""
@@ -352,7 +363,7 @@ class Run:
             jacobians=int(count[s.JACOBIANS]),
             factorizations=int(count[s.FACTORIZATIONS]),
             solves=int(count[s.SOLVES]),
-            repivots=max(0, self.repivots - 1),
+            repivots=max(0, self.repivots - self.first_pivots),
             wall_time=wall_time,
         )
 
