@@ -23,6 +23,9 @@ from gearmbs.mechanism.functions import polynomial
 DEFAULT_TOLERANCE = 1e-8
 """Local error where a deck gives no ERROR, tighter than ADAMS's 1e-3 so that results do not depend on it."""
 
+FIRST_STEP = 0.05
+"""ADAMS's default HINIT, in output steps."""
+
 METHODS = {"GSTIFF": "GSTIFF", "WSTIFF": "WSTIFF", "SI2_GSTIFF": "GSTIFF"}
 
 
@@ -159,7 +162,12 @@ def _times(session: _Session, command: Simulate) -> np.ndarray:
 def _settings(session: _Session, tol: float | None) -> tuple[dict[str, Any], str | None]:
     """Return the integrator options and a remark when the method is another than asked for."""
     integrator = session.deck.only(st.Integrator) or st.Integrator()
-    options: dict[str, Any] = {"integrator": "WSTIFF", "formulation": "SI2", "tol": DEFAULT_TOLERANCE}
+    options: dict[str, Any] = {
+        "integrator": "WSTIFF",
+        "formulation": "SI2",
+        "tol": DEFAULT_TOLERANCE,
+        "corrector": "modified",
+    }
     note = None
     if integrator.method is not None:
         options["integrator"] = METHODS.get(integrator.method, "WSTIFF")
@@ -199,6 +207,8 @@ def _simulate(
     try:
         model = _model(session, allow_unsupported)
         options, note = _settings(session, tol)
+        output_step = float(times[1] - times[0]) * session.deck.units.time
+        options.setdefault("first_step", FIRST_STEP * output_step)
         solution = model.mechanism.simulate(
             float(times[-1]) * session.deck.units.time,
             t_start=session.time * session.deck.units.time,

@@ -1,0 +1,229 @@
+"""Every joint, motion and force of a deck against a closed solution of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from .test_run import model, run
+
+G = 9.80665
+BLOCK = "PART/2,MASS=2,CM=20,IP=0.1,0.2,0.3\nMARKER/20,PART=2\n"
+SECOND = "PART/3,MASS=3,CM=30,IP=0.4,0.5,0.6\nMARKER/30,PART=3\n"
+
+
+def test_translational_joint_on_an_inclined_rail():
+    # z of the rail 30 degrees below the horizontal: s = g sin(30) t^2 / 2
+    body = BLOCK + "MARKER/21,PART=2,REULER=90D,120D,0\nMARKER/11,PART=1,REULER=90D,120D,0\nACCGRAV/KGRAV=-9.80665\n"
+    result = run(model(body + "JOINT/1,TRANSLATIONAL,I=21,J=11\nREQUEST/1,F2=DZ(21,11,11)\\F3=JOINT(1,0,3,11)"), 1.0)
+    np.testing.assert_allclose(result.request(1)[:, 1], 0.25 * G * result.t**2, atol=1e-7)
+    # the rail carries m g cos(30) on the block, across z
+    assert abs(result.request(1)[-1, 2]) == pytest.approx(2 * G * np.cos(np.pi / 6), rel=1e-9)
+
+
+def test_cylindrical_joint_turns_and_slides():
+    body = BLOCK + "JOINT/1,CYLINDRICAL,I=20,J=10\nVFORCE/1,I=20,JFLOAT=12,RM=10,FX=0\\FY=0\\FZ=4\n"
+    body += "MARKER/12,PART=1,FLOATING\nVTORQUE/1,I=20,JFLOAT=12,RM=10,TX=0\\TY=0\\TZ=0.6*TIME\n"
+    result = run(model(body + "REQUEST/1,F2=DZ(20,10)\\F3=AZ(20,10)\\F4=WZ(20,10)"), 3.0)
+    t = result.t
+    np.testing.assert_allclose(result.request(1)[:, 1], t**2, atol=1e-6)  # 4/2 t^2/2
+    np.testing.assert_allclose(result.request(1)[:, 2], t**3 / 3, atol=1e-6)  # 0.6 t/0.3, counted past pi
+    np.testing.assert_allclose(result.request(1)[:, 3], t**2, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["UNIVERSAL", "HOOKE"])
+def test_cross_joint_between_bent_shafts(kind):
+    """Driven shaft behind a cross joint bent by b: tan(out) = tan(in)/cos(b), from the driving arm upright."""
+    bend = 0.4
+    # shaft 2 along z; shaft 3 along (0, -sin b, cos b): turned about x by b
+    out = f"QP=0,0,0,REULER=0,{bend},0"
+    body = BLOCK + SECOND + f"MARKER/11,PART=1,{out}\nMARKER/31,PART=3,{out}\n"
+    body += "JOINT/1,REVOLUTE,I=20,J=10\nJOINT/2,CYLINDRICAL,I=31,J=11\nMOTION/1,JOINT=1,ROTATION,FUNCTION=2*TIME\n"
+    if kind == "UNIVERSAL":
+        # arms: x on shaft 2; on shaft 3 the direction across x and its own axis, its y
+        body += "MARKER/22,PART=2,REULER=90D,90D,0\n"
+        body += f"MARKER/32,PART=3,ZP=0,{np.cos(bend):.17g},{np.sin(bend):.17g}\nJOINT/3,UNIVERSAL,I=22,J=32\n"
+    else:
+        body += "JOINT/3,HOOKE,I=20,J=31\n"
+    result = run(model(body + "REQUEST/1,F2=AZ(20,10)\\F3=AZ(31,11)"), 2.0, 40)
+    driving, driven = result.request(1)[:, 1], result.request(1)[:, 2]
+    np.testing.assert_allclose(driving, 2 * result.t, atol=1e-8)
+    expected = np.unwrap(np.arctan2(np.sin(driving) * np.cos(bend), np.cos(driving)))
+    other = np.unwrap(np.arctan2(np.sin(driving), np.cos(driving) * np.cos(bend)))
+    assert min(np.abs(driven - expected).max(), np.abs(driven - other).max()) < 1e-7
+    assert np.abs(driven - driving).max() > 0.02
+
+
+def test_constant_velocity_joint_between_bent_shafts():
+    out = "QP=0,0,0,REULER=0,0.4,0"
+    body = BLOCK + SECOND + f"MARKER/11,PART=1,{out}\nMARKER/31,PART=3,{out}\n"
+    body += "JOINT/1,REVOLUTE,I=20,J=10\nJOINT/2,CYLINDRICAL,I=31,J=11\nMOTION/1,JOINT=1,FUNCTION=2*TIME\n"
+    result = run(model(body + "JOINT/3,CONVEL,I=20,J=31\nREQUEST/1,F2=AZ(20,10)\\F3=AZ(31,11)"), 2.0, 40)
+    np.testing.assert_allclose(np.abs(result.request(1)[:, 2]), 2 * result.t, atol=1e-7)
+
+
+def test_screw_advances_by_its_pitch():
+    body = (
+        BLOCK + "JOINT/1,SCREW,I=20,J=10,PITCH=0.05\nVTORQUE/1,I=20,JFLOAT=12,RM=10,TZ=0.6\nMARKER/12,PART=1,FLOATING\n"
+    )
+    result = run(model(body + "REQUEST/1,F2=DZ(20,10)\\F3=AZ(20,10)"), 4.0)
+    lead = 0.05 / (2 * np.pi)
+    angle = 0.5 * 0.6 / (0.3 + 2 * lead**2) * result.t**2
+    np.testing.assert_allclose(result.request(1)[:, 2], angle, rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(result.request(1)[:, 1], lead * angle, rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_rack_and_pinion_rolls_without_slip(side):
+    """Pinion about z, rack along x below or above it: the point of contact moves with -+ r w."""
+    height = -0.2 * side
+    body = BLOCK + SECOND.replace("MARKER/30,PART=3", f"MARKER/30,PART=3,QP=0,{height},0")
+    body += f"MARKER/31,PART=3,QP=0,{height},0,ZP=1,{height},0\nMARKER/11,PART=1,QP=0,{height},0,ZP=1,{height},0\n"
+    body += "JOINT/1,REVOLUTE,I=20,J=10\nJOINT/2,TRANSLATIONAL,I=31,J=11\nJOINT/3,RACKPIN,I=20,J=31,PD=0.4\n"
+    body += "VTORQUE/1,I=20,JFLOAT=12,RM=10,TZ=1.2\nMARKER/12,PART=1,FLOATING\n"
+    result = run(model(body + "REQUEST/1,F2=DX(30,10)\\F3=AZ(20,10)"), 3.0)
+    # (I + m r^2) a = T: 0.3 + 3 * 0.04 = 0.42; contact below the axis moves along +x for a turn about z
+    angle = 0.5 * 1.2 / 0.42 * result.t**2
+    np.testing.assert_allclose(result.request(1)[:, 2], angle, atol=1e-6)
+    np.testing.assert_allclose(result.request(1)[:, 1], side * 0.2 * angle, atol=1e-6)
+
+
+def test_gear_and_coupler_agree():
+    """Wheels of radius 0.1 and 0.3 on parallel axes: w2 = -w1/3; effective inertia I1 + I2/9."""
+    body = BLOCK + SECOND.replace("MARKER/30,PART=3", "MARKER/30,PART=3,QP=0.4,0,0") + "MARKER/11,PART=1,QP=0.4,0,0\n"
+    body += "JOINT/1,REVOLUTE,I=20,J=10\nJOINT/2,REVOLUTE,I=30,J=11\nVTORQUE/1,I=20,JFLOAT=12,RM=10,TZ=1\n"
+    body += "MARKER/12,PART=1,FLOATING\nMARKER/13,PART=1,QP=0.1,0,0,ZP=0.1,1,0\nREQUEST/1,F2=AZ(20,10)\\F3=AZ(30,11)\n"
+    angle = lambda t: 0.5 / (0.3 + 0.6 / 9) * t**2  # noqa: E731
+    for link in (
+        "GEAR/1,JOINTS=1,2,CV=13",
+        "COUPLER/1,JOINTS=1,2,SCALES=1,3",
+        "COUPLER/1,JOINTS=1,2,TYPE=R:R,SCALES=3",
+    ):
+        result = run(model(body + link), 3.0)
+        np.testing.assert_allclose(result.request(1)[:, 1], angle(result.t), atol=1e-6)
+        np.testing.assert_allclose(result.request(1)[:, 2], -angle(result.t) / 3, atol=1e-6)
+
+
+def test_primitives_and_planar_joint():
+    """INPLANE plus PARALLEL_AXES is PLANAR: a body pushed off its centre moves in the plane only."""
+    push = "MARKER/21,PART=2,QP=0.3,0,0\nMARKER/12,PART=1,FLOATING\n"
+    push += "GFORCE/1,I=21,JFLOAT=12,RM=10,FX=1\\FY=2\\FZ=3\\TX=1\\TY=0\\TZ=0\n"
+    request = "REQUEST/1,D,I=20,J=10\nREQUEST/2,F2=AZ(20,10)\n"
+    one = run(model(BLOCK + push + request + "JOINT/1,PLANAR,I=20,J=10"), 1.0)
+    two = run(model(BLOCK + push + request + "JPRIM/1,INPLANE,I=20,J=10\nJPRIM/2,PARALLEL_AXES,I=20,J=10"), 1.0)
+    np.testing.assert_allclose(one.request(1)[:, 1:4], two.request(1)[:, 1:4], atol=1e-7)
+    np.testing.assert_allclose(one.request(1)[:, 1], 0.25 * one.t**2, atol=1e-7)
+    np.testing.assert_allclose(one.request(1)[:, 2], 0.5 * one.t**2, atol=1e-7)
+    assert np.abs(one.request(1)[:, 3]).max() < 1e-9
+    # torque about the centre: 0.3 (cos a Fy - sin a Fx), early a'' = 0.3 * 2/0.3 = 2
+    assert one.request(2)[5, 1] == pytest.approx(one.t[5] ** 2, rel=0.02)
+
+
+def test_point_motion_and_general_constraint():
+    body = BLOCK + "JPRIM/1,ORIENTATION,I=20,J=10\nMOTION/1,I=20,J=10,X,FUNCTION=0.1*SIN(3*TIME)\n"
+    body += "MOTION/2,I=20,J=10,Y,FUNCTION=0.2*TIME**2\nGCON/1,I=20,FUNCTION=DZ(20,10)-DX(20,10)**2\n"
+    result = run(model(body + "REQUEST/1,D,I=20,J=10\nREQUEST/2,F2=MOTION(2,0,3,0)\\F3=GCON(1,0,4,0)"), 1.0)
+    t = result.t
+    x = 0.1 * np.sin(3 * t)
+    np.testing.assert_allclose(result.request(1)[:, 1:4], np.column_stack([x, 0.2 * t**2, x**2]), atol=1e-8)
+    # forces: m y'' = 2 * 0.4; m z'' with z = x^2
+    np.testing.assert_allclose(result.request(2)[:, 1], 0.8, atol=1e-6)
+    rate, curve = 0.3 * np.cos(3 * t), -0.9 * np.sin(3 * t)
+    np.testing.assert_allclose(result.request(2)[:, 2], 2 * (2 * rate**2 + 2 * x * curve), atol=1e-6)
+
+
+def test_joint_initial_conditions():
+    body = BLOCK + "JOINT/1,REVOLUTE,I=20,J=10,IC=30D,2\nREQUEST/1,F2=AZ(20,10)\\F3=WZ(20,10)\n"
+    result = run(model(body + "ACCGRAV/IGRAV=0"), 1.0)
+    np.testing.assert_allclose(result.request(1)[:, 1], np.pi / 6 + 2 * result.t, atol=1e-7)
+    rail = BLOCK + "JOINT/1,TRANSLATIONAL,I=20,J=10,IC=0.5,-2\nREQUEST/1,F2=DZ(20,10)\n"
+    result = run(model(rail), 1.0)
+    np.testing.assert_allclose(result.request(1)[:, 1], 0.5 - 2 * result.t, atol=1e-7)
+
+
+def test_part_velocities_and_inertia_marker():
+    """A free body keeps spinning about a principal axis; IP given about another marker must be moved to CM."""
+    body = (
+        "PART/2,MASS=2,CM=20,IM=21,IP=0.1,0.7,0.8,QG=1,0,0,VX=1,WZ=3\nMARKER/20,PART=2,QP=0.5,0,0\nMARKER/21,PART=2\n"
+    )
+    result = run(model(body + "REQUEST/1,D,I=20,J=10\nREQUEST/2,V,I=20,J=10"), 1.0)
+    np.testing.assert_allclose(result.request(1)[:, 1], 1.5 + result.t, atol=1e-8)
+    np.testing.assert_allclose(result.request(2)[:, 7], 3.0, atol=1e-8)
+    inertia = result.segments[0].model.mechanism.bodies["PART_2"].inertia
+    # shift of 0.5 along x: 2 * 0.25 off yy and zz
+    np.testing.assert_allclose(np.diag(inertia), [0.1, 0.2, 0.3], atol=1e-12)
+
+
+def test_rotational_spring_damper():
+    """I a'' = -k (a - a0) - c a': frequency and decay of the damped swing."""
+    body = BLOCK + "JOINT/1,REVOLUTE,I=20,J=10\nSPRINGDAMPER/1,ROTATION,I=20,J=10,KT=30,CT=0.6,ANGLE=20D,TORQUE=1.5\n"
+    result = run(model(body + "REQUEST/1,F2=AZ(20,10)\\F3=SPDP(1,0,8,0)"), 2.0, 100)
+    decay, omega = 0.6 / 0.6, np.sqrt(30 / 0.3 - 1.0)
+    rest = np.radians(20) + 1.5 / 30
+    swing = np.exp(-decay * result.t) * (np.cos(omega * result.t) + decay / omega * np.sin(omega * result.t))
+    np.testing.assert_allclose(result.request(1)[:, 1], rest * (1 - swing), atol=1e-6)
+    rate = rest * np.exp(-decay * result.t) * (omega + decay**2 / omega) * np.sin(omega * result.t)
+    torque = 1.5 - 30 * (rest * (1 - swing) - np.radians(20)) - 0.6 * rate
+    np.testing.assert_allclose(result.request(1)[:, 2], torque, atol=1e-5)
+
+
+def test_bushing_and_field_are_the_same_when_diagonal():
+    k, kt, c, ct = (100.0, 200.0, 300.0), (4.0, 5.0, 6.0), (1.0, 2.0, 3.0), (0.1, 0.2, 0.3)
+    setup = BLOCK + "MARKER/11,PART=1,QP=0.01,-0.02,0.03,REULER=10D,5D,-8D\nACCGRAV/KGRAV=-9.80665\n"
+    setup += "REQUEST/1,D,I=20,J=10\nREQUEST/2,F,I=20,J=11\n"
+
+    def listed(*rows):
+        return ",".join(repr(float(v)) for v in np.ravel(rows))
+
+    bushing = f"BUSHING/1,I=20,J=11,K={listed(k)},KT={listed(kt)},C={listed(c)},CT={listed(ct)},FORCE=1,2,3"
+    full_k, full_c = np.diag([*k, *kt]), np.diag([*c, *ct])
+    field = f"FIELD/1,I=20,J=11,KMATRIX={listed(*full_k)},CMATRIX={listed(*full_c)},FORCE=1,2,3,0,0,0"
+    a, b = run(model(setup + bushing), 0.5, 10), run(model(setup + field), 0.5, 10)
+    np.testing.assert_allclose(a.request(1), b.request(1), atol=1e-8)
+    np.testing.assert_allclose(a.request(2), b.request(2), atol=1e-6)
+    assert np.abs(a.request(2)[0, 1:4]).max() > 1.0
+
+
+def test_field_matrix_is_stored_by_columns():
+    """A lone entry in column 1, row 2 makes Fy = -K21 x."""
+    k = np.zeros((6, 6))
+    k[0, 1] = 50.0
+    listed = ",".join(repr(float(v)) for v in k.ravel())
+    body = BLOCK.replace("MARKER/20,PART=2", "MARKER/20,PART=2,QP=0.1,0,0") + f"FIELD/1,I=20,J=10,KMATRIX={listed}\n"
+    result = run(model(body + "REQUEST/1,F,I=20,J=10"), 0.01, 1)
+    np.testing.assert_allclose(result.request(1)[0, 1:4], [0, -5, 0], atol=1e-12)
+
+
+def test_single_component_forces():
+    """A rotational SFORCE acts and reacts; an action-only one does not react."""
+    two = BLOCK + SECOND + "JOINT/1,REVOLUTE,I=20,J=10\nJOINT/2,REVOLUTE,I=30,J=10\nREQUEST/1,F2=WZ(20)\\F3=WZ(30)\n"
+    both = run(model(two + "SFORCE/1,ROTATIONAL,I=20,J=30,FUNCTION=1.5"), 1.0)
+    np.testing.assert_allclose(both.request(1)[-1, 1:3], [5.0, -2.5], atol=1e-6)
+    one = run(model(two + "SFORCE/1,ROTATIONAL,ACTIONONLY,I=20,J=30,FUNCTION=1.5"), 1.0)
+    np.testing.assert_allclose(one.request(1)[-1, 1:3], [5.0, 0.0], atol=1e-6)
+
+
+def test_differential_equation_and_variable():
+    body = BLOCK + "DIFF/1,IC=2,FUNCTION=-3*DIF(1)\nVARIABLE/1,FUNCTION=DIF(1)*2\nJOINT/1,TRANSLATIONAL,I=20,J=10\n"
+    body += (
+        "SFORCE/1,TRANSLATIONAL,ACTIONONLY,I=20,J=10,FUNCTION=VARVAL(1)\nREQUEST/1,F2=DIF(1)\\F3=DZ(20)\\F4=DIF1(1)\n"
+    )
+    result = run(model(body), 2.0)
+    t = result.t
+    np.testing.assert_allclose(result.request(1)[:, 1], 2 * np.exp(-3 * t), atol=1e-6)
+    # 2 z'' = 4 exp(-3 t)
+    np.testing.assert_allclose(result.request(1)[:, 2], 2 * (np.exp(-3 * t) - 1 + 3 * t) / 9, atol=1e-6)
+    np.testing.assert_allclose(result.request(1)[:, 3], -6 * np.exp(-3 * t), atol=1e-5)
+
+
+def test_force_on_an_impact_expression():
+    """A ball dropped on a stop without damping returns to its height: energy is kept."""
+    body = BLOCK.replace("MARKER/20,PART=2", "MARKER/20,PART=2,QP=0,0,0.1") + "ACCGRAV/KGRAV=-9.80665\n"
+    body += "SFORCE/1,TRANS,ACTION,I=20,J=10,FUNCTION=IMPACT(DZ(20,10),VZ(20,10),0.05,1E5,1.5,0,0.001)\n"
+    result = run(model(body + "REQUEST/1,F2=DZ(20)\\F3=VZ(20)\\F4=SFORCE(1,0,4,0)"), 0.5, 500)
+    z, v = result.request(1)[:, 1], result.request(1)[:, 2]
+    elastic = 1e5 * np.maximum(0.05 - z, 0) ** 2.5 / 2.5
+    energy = 2 * G * z + v**2 + elastic
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-5)
+    np.testing.assert_allclose(result.request(1)[:, 3], 1e5 * np.maximum(0.05 - z, 0) ** 1.5, atol=1e-4)
+    assert z.min() < 0.05
