@@ -20,6 +20,7 @@ app = typer.Typer(
 )
 
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")]
+ReportFile = Annotated[Path | None, typer.Option("--out", "-o", help="Write the report here instead of printing it.")]
 
 
 def fail(message: str) -> None:
@@ -156,6 +157,107 @@ def run(
             row = levels.sel(component=component).values
             typer.echo(f"{component!s:<18}" + "".join(f"{v:10.4g}" for v in row))
         typer.echo(f"wrote {target}")
+
+
+@app.command()
+def analyse(
+    file: Annotated[Path, typer.Argument(help="CSV, CSV.GZ, MAT, UFF, WAV, NetCDF, HDF5 or TDMS.")],
+    teeth: Annotated[int | None, typer.Option(help="Teeth of the wheel on the reference shaft.")] = None,
+    rate: Annotated[float | None, typer.Option(help="Sampling rate in Hz, if the file does not name it.")] = None,
+    speed: Annotated[str | None, typer.Option(help='Shaft speed, e.g. "1780 rpm"; default: from the GMF line.')] = None,
+    units: Annotated[str | None, typer.Option(help='Units of the samples, e.g. "m/s^2".')] = None,
+    channel: Annotated[list[str] | None, typer.Option(help="Channel to use; repeat for several; default: all.")] = None,
+    harmonics: Annotated[int, typer.Option(help="Mesh harmonics to evaluate.")] = 3,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Write the report here instead of printing it.")
+    ] = None,
+) -> None:
+    """Analyse a measured vibration file: mesh frequency, harmonics, sidebands, indicators."""
+    with guarded():
+        from gearmbs.signals import analyse_file
+        from gearmbs.studies.store import write_text
+        from gearmbs.units import to_si
+
+        report = analyse_file(
+            file,
+            teeth=teeth,
+            rate=rate,
+            speed=None if speed is None else to_si(speed, "angular speed", "--speed"),
+            units=units,
+            channels=channel,
+            harmonics=harmonics,
+        )
+        if out is None:
+            typer.echo(report.to_markdown())
+        else:
+            write_text(out, report.to_markdown())
+            typer.echo(f"wrote {out}")
+
+
+@app.command()
+def compare(
+    experiment: Annotated[list[str], typer.Option(help="Measured file as load:state=path; repeat.")],
+    model: Annotated[Path | None, typer.Option(help="paper.nc of `gearmbs paper`.")] = None,
+    component: Annotated[str, typer.Option(help="Force component of the model.")] = "line_of_action",
+    teeth: Annotated[int | None, typer.Option(help="Teeth of the measured wheel.")] = None,
+    rate: Annotated[float | None, typer.Option(help="Sampling rate of the measured files, Hz.")] = None,
+    units: Annotated[str | None, typer.Option(help="Units of the measured samples.")] = None,
+    channel: Annotated[str | None, typer.Option(help="Measured channel.")] = None,
+    reference: Annotated[str, typer.Option(help="State the others are held against.")] = "healthy",
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Write the report here instead of printing it.")
+    ] = None,
+) -> None:
+    """Compare measured states with each other and with the model, as in the paper's section 4."""
+    with guarded():
+        from gearmbs.signals import compare as compare_signals
+        from gearmbs.signals import read_signal
+        from gearmbs.studies.exchange import model_signals, parse_states
+        from gearmbs.studies.store import write_text
+
+        measured = {
+            load: {state: read_signal(path, teeth=teeth, rate=rate, units=units) for state, path in states.items()}
+            for load, states in parse_states(experiment).items()
+        }
+        simulated = None if model is None else model_signals(model, component)
+        report = compare_signals(measured, simulated, reference=reference, channel=channel)
+        if out is None:
+            typer.echo(report.to_markdown())
+        else:
+            write_text(out, report.to_markdown())
+            typer.echo(f"wrote {out}")
+
+
+@app.command()
+def adams(
+    model: Annotated[Path, typer.Argument(help="ADAMS/Solver deck (.adm).")],
+    script: Annotated[Path | None, typer.Argument(help="Commands (.acf).")] = None,
+    end: Annotated[float | None, typer.Option(help="End time, when there is no script.")] = None,
+    steps: Annotated[int | None, typer.Option(help="Output steps, when there is no script.")] = None,
+    tolerance: Annotated[float | None, typer.Option(help="Local error instead of INTEGRATOR/ERROR.")] = None,
+    skip_unsupported: Annotated[bool, typer.Option(help="Leave out what is not supported.")] = False,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Prefix of the files written.")] = None,
+) -> None:
+    """Run an ADAMS deck; write .req, .res, .msg and NetCDF."""
+    with guarded():
+        from gearmbs.adams.run import run_deck
+
+        prefix = out or model.with_suffix("")
+        result = run_deck(
+            model,
+            script,
+            prefix,
+            end=end,
+            steps=steps,
+            tol=tolerance,
+            allow_unsupported=skip_unsupported,
+            progress=sys.stderr.isatty(),
+        )
+        for message in result.messages:
+            typer.echo(str(message))
+        if not result.success:
+            fail(f"{model}: the analysis did not finish; see {prefix}.msg")
+        typer.echo(f"wrote {prefix}.req, .res, .msg, .nc")
 
 
 if __name__ == "__main__":
