@@ -81,32 +81,26 @@ def compare(
     if way not in ("band", "orders"):
         raise SignalError(f"way: must be 'band' or 'orders', got {way!r}")
     loads, states, left_out = _common_cases(experiment, model, reference)
-    total = len(loads) * len(states) * (1 if model is None else 2)
+    sides = [("experiment", experiment, channel)] + ([] if model is None else [("model", model, model_channel)])
+    kept = [(load, s) for load in loads for s in states if all(s in cases[load] for _, cases, _ in sides)]
+    total = len(kept) * len(sides)
     done = 0
 
     def tell(fraction: float, stage: str) -> None:
         if progress is not None:
             progress((done + fraction) / total, stage)
 
-    measured: dict[tuple[str, str], xr.Dataset] = {}
-    simulated: dict[tuple[str, str], xr.Dataset] = {}
-    for side, cases, pick, found in (
-        ("experiment", experiment, channel, measured),
-        ("model", model, model_channel, simulated),
-    ):
-        if cases is None:
-            continue
-        for load in loads:
-            for state in states:
-                if state not in cases[load]:
-                    continue
-                signal = _picked(cases[load][state], pick, side, single=model is not None)
-                found[load, state] = _features(signal, harmonics, half_width, way, wheel, tell)
-                done += 1
-    data = _tabulate(measured, loads, states, "experiment")
+    found: dict[str, dict[tuple[str, str], xr.Dataset]] = {}
+    for side, cases, pick in sides:
+        found[side] = {}
+        for load, state in kept:
+            signal = _picked(cases[load][state], pick, side, single=model is not None)
+            found[side][load, state] = _features(signal, harmonics, half_width, way, wheel, tell)
+            done += 1
+    data = _tabulate(found["experiment"], loads, states, "experiment")
     if model is not None:
         data = data.isel(channel=0, drop=True)
-        other = _tabulate(simulated, loads, states, "model").isel(channel=0, drop=True)
+        other = _tabulate(found["model"], loads, states, "model").isel(channel=0, drop=True)
         if data.attrs["units"] != other.attrs["units"] and "unknown" not in (data.attrs["units"], other.attrs["units"]):
             raise SignalError(
                 f"units: the experiment is in {data.attrs['units']!r}, the model in {other.attrs['units']!r}; "

@@ -23,6 +23,7 @@ from .phase import analytic
 from .tsa import difference_signal, regular_signal, residual_signal, tooth_count, whole_revolutions
 
 BLOCK = 1 << 17
+CONSTANT = 1e-11
 INDICATORS = (
     "rms",
     "peak_to_peak",
@@ -138,7 +139,9 @@ def mesh_envelope(average: np.ndarray, turns: int, teeth: int, width: int | None
 
 
 def nb4(envelope: np.ndarray, history: Sequence[np.ndarray] = ()) -> float:
-    """As `na4`, of the envelope about the mesh order (`mesh_envelope`)."""
+    """As `na4`, of the envelope about the mesh order (`mesh_envelope`); NaN for an envelope constant to rounding."""
+    if float(np.std(envelope)) <= CONSTANT * abs(float(np.mean(envelope))):
+        return float("nan")
     return na4(envelope, history)
 
 

@@ -97,7 +97,7 @@ def phase_from_line(
 
     Each channel is shifted down by `frequency`, low-passed (zero-phase FIR, flat to half_bandwidth, 60 dB down at twice
     that) and its phase unwrapped; the channel whose line holds up best over time (fifth percentile of the envelope over
-    its RMS) is used. At either end, where the filter reaches outside, the angle is continued at the nearest speed.
+    its RMS) is used.
 
     Parameters
     ----------
@@ -114,7 +114,8 @@ def phase_from_line(
     Returns
     -------
     xarray.DataArray
-        Dimension (time,), all samples; attributes `channel`, `quality` (0 to 1) and `mean_speed` in rad/s.
+        Dimension (time,), the samples for which the filter, 3.6 / half_bandwidth seconds long, lies inside the record;
+        attributes `channel`, `quality` (0 to 1) and `mean_speed` in rad/s.
 
     Raises
     ------
@@ -151,21 +152,18 @@ def phase_from_line(
     quality, channel, line = best
     slow = np.unwrap(np.angle(line))
     at = (first + step * np.arange(slow.size)) / rate
-    if at.size > 3:
-        track = scipy.interpolate.CubicSpline(at, slow)
-        slopes = track(np.array([at[0], at[-1]]), 1)
-    else:
-        track, slopes = (lambda x: np.interp(x, at, slow)), np.zeros(2)
-    angle = np.empty(n)
-    for start in range(0, n, BLOCK):
-        t = np.arange(start, min(start + BLOCK, n)) / rate
-        inside = np.clip(t, at[0], at[-1])
-        beyond = np.where(t < at[0], slopes[0], slopes[1]) * (t - inside)
-        angle[start : start + t.size] = (2.0 * np.pi * frequency * t + track(inside) + beyond) / order
+    if at.size < 4:
+        raise SignalError(f"signal: {n / rate:g} s are too short to follow a line within {half:g} Hz")
+    track = scipy.interpolate.CubicSpline(at, slow)
+    last = first + step * (slow.size - 1)
+    angle = np.empty(last + 1 - first)
+    for start in range(0, angle.size, BLOCK):
+        t = np.arange(first + start, first + min(start + BLOCK, angle.size)) / rate
+        angle[start : start + t.size] = (2.0 * np.pi * frequency * t + track(t)) / order
     angle -= angle[0]
     if np.diff(angle).min() <= 0.0:
         raise SignalError("frequency: the line at this frequency is too weak to follow; give a tacho or the speed")
-    result = _phase(times, angle, "line")
+    result = _phase(times[first : last + 1], angle, "line")
     span = at[-1] - at[0]
     mean = float((2.0 * np.pi * frequency + ((slow[-1] - slow[0]) / span if span > 0.0 else 0.0)) / order)
     result.attrs.update(channel=str(signal["channel"].values[channel]), quality=quality, mean_speed=mean)

@@ -20,7 +20,7 @@ from .filters import decimate, resample
 from .signal import check_rate, common_unit, like, make_signal, rate_of
 
 XYZ = ("x", "y", "z")
-DECAY_TIMES = 7.0
+DECAY_TIMES = 10.0
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class ModalPath:
 
     @property
     def settling(self) -> float:
-        """Seconds after which what happened before has decayed by e^-7."""
+        """Seconds after which what happened before has decayed by e^-10."""
         return max(DECAY_TIMES / (2.0 * np.pi * m.frequency * m.damping) for m in self.modes)
 
 

@@ -19,6 +19,8 @@ FLOOR_BINS = 64
 CLIP_DB = 30.0
 RANGE_DB = 120.0
 HARMONICS = 4
+# Falling, so that one lone line is its own fundamental and not the second or third harmonic of something lower.
+HARMONIC_WEIGHTS = (1.0, 0.9, 0.8, 0.7)
 SIDEBANDS = 3
 SIDEBAND_WEIGHT = 0.5
 BETWEEN_WEIGHT = 0.5
@@ -44,7 +46,7 @@ class SpeedEstimate:
     spread : float
         Standard deviation of the GMF over the record in Hz, where it could be followed; else NaN.
     prominence : float
-        Mean height of the mesh harmonics over the floor around them in dB.
+        Root mean square height of the mesh harmonics over the floor around them in dB.
     phase : xarray.DataArray or None
         Shaft angle (rad) from the line's phase, if it could be followed.
     """
@@ -66,9 +68,9 @@ def estimate_speed(
     """Find the gear mesh frequency, and with the tooth count the speed, from the record alone.
 
     1. Averaged spectrum (2 s segments), each channel as height over its local floor in dB, 0 to 30, mean over channels.
-    2. Comb: for every candidate GMF f the mean height at f ... 4 f, plus half of that at the first three shaft orders
-       and sidebands, less half of that midway between the harmonics; less 5 % for each harmonic beyond half the rate.
-       The lowest candidate within 3 % of the best one wins.
+    2. Comb: for every candidate GMF f the mean height at f ... 4 f (weights 1 to 0.7), plus half of that at the first
+       three shaft orders and sidebands, less half of that midway between the harmonics; less 5 % for each harmonic
+       beyond half the rate. Of the candidates within 3 % of the best the one whose harmonics carry most power wins.
     3. The fundamental's peak, then the mean of its phase's slope over the record, where it can be followed.
 
     Parameters
@@ -112,9 +114,10 @@ def estimate_speed(
     height = prominence(power).mean(axis=1)
     candidates = np.arange(low_gmf, high_gmf, bin_width / (2 * HARMONICS))
     score, direct = _comb(height, candidates, bin_width, count)
-    best = int(np.argmax(np.where(score >= NEARLY_BEST * score.max(), 1, 0)))
-    near = np.abs(candidates - candidates[best]) <= 2 * bin_width
-    best = int(np.flatnonzero(near)[np.argmax(score[near])])
+    near = np.flatnonzero(score >= NEARLY_BEST * score.max())
+    share = (power / np.maximum(power.sum(axis=0), 1e-300)).sum(axis=1)
+    carried = sum((_at(share, h * candidates[near], bin_width) for h in range(1, HARMONICS + 1)), np.zeros(near.size))
+    best = int(near[np.argmax(carried)])
     if direct[best] < MIN_SCORE_DB:
         raise SignalError(
             f"signal: no gear mesh line stands out (best {direct[best]:.1f} dB at {candidates[best]:.1f} Hz); "
@@ -143,27 +146,41 @@ def prominence(power: np.ndarray) -> np.ndarray:
 
 
 def _comb(height: np.ndarray, candidates: np.ndarray, bin_width: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Comb score, and the mean height of the harmonics present alone, for each candidate."""
+    """Comb score, and the RMS height of the harmonics present alone, for each candidate."""
 
     def at(frequency: np.ndarray) -> np.ndarray:
-        index = np.rint(frequency / bin_width).astype(int)
-        inside = index < height.size - 1
-        index = np.where(inside, index, 1)
-        # One bin to either side: the speed is never quite constant.
-        widest = np.maximum(np.maximum(height[index - 1], height[index]), height[index + 1])
-        return np.where(inside, widest, 0.0)
+        return _at(height, frequency, bin_width)
 
     shaft = candidates / count
     present = np.minimum(HARMONICS, np.floor((height.size - 1) * bin_width / candidates))
-    harmonics = sum((at(h * candidates) for h in range(1, HARMONICS + 1)), np.zeros_like(candidates)) / present
-    between = sum((at((h - 0.5) * candidates) for h in range(1, HARMONICS + 1)), np.zeros_like(candidates)) / present
+    harmonics = np.zeros_like(candidates)
+    between = np.zeros_like(candidates)
+    squares = np.zeros_like(candidates)
+    weights = np.zeros_like(candidates)
+    for h, weight in enumerate(HARMONIC_WEIGHTS, 1):
+        here = at(h * candidates)
+        harmonics += weight * here
+        squares += here**2
+        weights += weight * (h <= present)
+        between += at((h - 0.5) * candidates)
+    harmonics /= weights
+    between /= present
     sides = np.zeros_like(candidates)
     for k in range(1, SIDEBANDS + 1):
         sides += at(k * shaft) / SIDEBANDS
         for h in range(1, HARMONICS + 1):
             sides += (at(h * candidates - k * shaft) + at(h * candidates + k * shaft)) / (2 * SIDEBANDS * present)
     trust = 1.0 - FEWER_WEIGHT * (HARMONICS - present)
-    return trust * (harmonics + SIDEBAND_WEIGHT * sides - BETWEEN_WEIGHT * between), harmonics
+    score = trust * (harmonics + SIDEBAND_WEIGHT * sides - BETWEEN_WEIGHT * between)
+    return score, np.sqrt(squares / present)
+
+
+def _at(line: np.ndarray, frequency: np.ndarray, bin_width: float) -> np.ndarray:
+    """Largest of the three bins around each frequency, for the speed is never quite constant; zero beyond the end."""
+    index = np.rint(frequency / bin_width).astype(int)
+    inside = index < line.size - 1
+    index = np.where(inside, index, 1)
+    return np.where(inside, np.maximum(np.maximum(line[index - 1], line[index]), line[index + 1]), 0.0)
 
 
 def _peak(power: np.ndarray, guess: float, bin_width: float) -> float:

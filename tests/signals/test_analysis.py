@@ -1,0 +1,182 @@
+"""The analysis of a record, simulated or measured, and its report."""
+
+import math
+import os
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearmbs.signals import (
+    MissingMetadataError,
+    SignalError,
+    SignalFileError,
+    analyse,
+    analyse_file,
+    compare_files,
+    make_signal,
+    write_signal,
+)
+
+RATE = 12800.0
+TEETH = 32
+
+
+def record(seconds=4.0, f=29.75, depth=0.3, amplitudes=(1.0, 0.6, 0.3), noise=0.05, seed=1, **kwargs):
+    t = np.arange(round(seconds * RATE)) / RATE
+    angle = 2 * np.pi * f * t + 0.02 * np.sin(2 * np.pi * 0.3 * t)
+    x = sum(a * np.cos(k * TEETH * angle + k) for k, a in enumerate(amplitudes, 1)) * (1 + depth * np.cos(angle))
+    x = x + noise * np.random.default_rng(seed).standard_normal(t.size)
+    return make_signal({"acc": x, "tacho": np.sin(angle)}, RATE, units=["m/s^2", "V"], teeth=TEETH, **kwargs)
+
+
+def test_analysis_finds_speed_harmonics_and_sidebands():
+    report = analyse(record()[:, [0]])
+    # the mean speed of the wobbling angle over the part that was followed differs by at most its swing over its length
+    assert report.gmf == pytest.approx(TEETH * 29.75, abs=0.2)
+    assert report.speed == pytest.approx(2 * math.pi * report.gmf / TEETH)
+    expected = np.array([1.0, 0.6, 0.3]) / math.sqrt(2)
+    np.testing.assert_allclose(report.harmonics["orders"][:, 0], expected, rtol=0.01)
+    # the band holds the carrier, two sidebands of depth / 2, and noise: 0.05^2 over 6400 Hz, 7 / 12 GMF + of it
+    width = 0.5 * report.gmf + 0.25 * report.gmf
+    inside = expected**2 * (1 + 0.3**2 / 2) + 0.05**2 * width / 6400
+    np.testing.assert_allclose(report.harmonics["band"][:, 0], np.sqrt(inside), rtol=0.01)
+    side = report.sidebands.sel(harmonic=1)
+    assert float((side.sel(sideband=1) / side.sel(sideband=0)).item()) == pytest.approx(0.15, rel=0.03)
+    assert report.indicators["sideband_index"].item() == pytest.approx(0.15, rel=0.03)
+    assert report.lines["frequency"].iloc[0] == pytest.approx(report.gmf, abs=0.5)
+    assert report.speed_origin == "estimated from the mesh line"
+
+
+def test_analysis_with_given_speed_and_tacho():
+    omega = 2 * math.pi * 29.75
+    given = analyse(record()[:, [0]], speed=omega * 1.005)
+    assert given.gmf == pytest.approx(952.0, abs=0.2)
+    assert "off the given speed" in given.speed_origin
+    tacho = analyse(record(), tacho="tacho")
+    assert tacho.harmonics["channel"].values.tolist() == ["acc"]
+    assert tacho.gmf == pytest.approx(952.0, abs=0.2)
+    np.testing.assert_allclose(tacho.harmonics["orders"], given.harmonics["orders"], rtol=0.01)
+
+
+def test_analysis_of_a_noise_free_simulated_second():
+    # as a simulation gives it: exact speed, lines at multiples of GMF only
+    rpm, teeth = 1000.0, 29
+    t = np.arange(12800) / RATE
+    gmf = teeth * rpm / 60
+    x = sum(a * np.cos(2 * np.pi * k * gmf * t + k) for k, a in enumerate([3.0, 2.0, 1.0, 0.5], 1))
+    report = analyse(make_signal(x, RATE, units="m/s^2", speed=2 * math.pi * rpm / 60, teeth=(29, 29)))
+    assert report.gmf == pytest.approx(gmf, rel=1e-6)
+    expected = np.array([3.0, 2.0, 1.0]) / math.sqrt(2)
+    np.testing.assert_allclose(report.harmonics["orders"][:, 0], expected, rtol=1e-3)
+    np.testing.assert_allclose(report.harmonics["band"][:, 0], expected, rtol=1e-3)
+
+
+def test_report_reads_well():
+    report = analyse(record()[:, [0]])
+    text = report.to_markdown()
+    for part in ("# Analysis of", "Gear mesh frequency: 95", "acc [m/s^2]", "1 x GMF", "fm4", "Strongest lines"):
+        assert part in text
+    assert set(report.tables()) == {"harmonics", "levels", "lines", "sidebands", "indicators", "impulsive"}
+    assert report.tables()["harmonics"].columns.tolist() == ["harmonic", "frequency", "channel", "band", "orders"]
+    assert "GMF 95" in repr(report)
+
+
+def test_analysis_notes_what_it_leaves_out():
+    # only two harmonics fit below 2 kHz
+    t = np.arange(4 * 4000) / 4000.0
+    x = np.cos(2 * np.pi * 640 * t) + 0.5 * np.cos(2 * np.pi * 1280 * t)
+    report = analyse(make_signal(x, 4000.0, teeth=TEETH), speed=40 * math.pi)
+    assert report.harmonics.sizes["harmonic"] == 2
+    assert any("Only 2 of 3" in note for note in report.notes)
+
+
+def test_analysis_errors():
+    with pytest.raises(MissingMetadataError, match="teeth is missing"):
+        analyse(make_signal(np.ones(10000), RATE))
+    with pytest.raises(SignalError, match="wheel: must be 1 to 1"):
+        analyse(record()[:, [0]], wheel=2)
+    with pytest.raises(SignalError, match="nothing is left"):
+        analyse(record()[:, [1]], tacho="tacho")
+
+
+def test_second_wheel_follows_its_own_shaft():
+    t = np.arange(8 * 12800) / RATE
+    angle = 2 * np.pi * 30.0 * t
+    other = angle * 32 / 80
+    x = np.cos(32 * angle) * (1 + 0.3 * np.cos(angle)) * (1 + 0.2 * np.cos(other))
+    signal = make_signal(x, RATE, teeth=(32, 80))
+    first, second = analyse(signal), analyse(signal, wheel=2)
+    assert first.indicators["sideband_index"].item() == pytest.approx(0.15, rel=0.05)
+    assert second.indicators["sideband_index"].item() == pytest.approx(0.10, rel=0.05)
+    assert second.gmf == pytest.approx(first.gmf)
+
+
+def test_analyse_file_and_its_progress(tmp_path):
+    path = write_signal(record()[:, [0]], tmp_path / "x.csv.gz")
+    stages = []
+    report = analyse_file(path, progress=lambda f, s: stages.append((f, s)))
+    assert report.source == "x.csv.gz"
+    fractions = [f for f, s in stages if s != "reading"]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+    with pytest.raises(SignalFileError, match=r"none\.csv"):
+        analyse_file(tmp_path / "none.csv", teeth=32)
+
+
+def test_scratch_memory_stays_below_twice_the_record():
+    t = np.arange(10 * 51200) / 51200.0
+    angle = 2 * np.pi * 29.75 * t
+    rng = np.random.default_rng(0)
+    data = np.stack([np.cos(32 * angle + c) + 0.3 * rng.standard_normal(t.size) for c in range(4)], axis=1)
+    signal = make_signal(data, 51200.0, teeth=32)
+    analyse(signal[: 51200 * 2])
+    tracemalloc.start()
+    analyse(signal)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    # blocks of 2^16 to 2^17 samples and a few columns, whatever the number of channels
+    assert peak < 2.0 * data.nbytes + 16e6
+
+
+MEASUREMENTS = os.environ.get("GEARMBS_MEASUREMENTS")
+
+
+@pytest.mark.skipif(not MEASUREMENTS, reason="GEARMBS_MEASUREMENTS names no folder with the measured records")
+class TestMeasuredRecords:
+    """SpectraQuest gearbox, kokikwbt/predictive-maintenance on GitHub (MIT): 12.8 kHz, 32 teeth, accelerometers."""
+
+    @pytest.mark.parametrize(("name", "gmf"), [("h30hz0", 952.1), ("h30hz90", 948.1)])
+    def test_healthy_gear_mesh_frequency(self, name, gmf):
+        report = analyse_file(Path(MEASUREMENTS) / f"{name}.csv.gz", teeth=32, rate=12800.0)
+        # one line of the record's own spectrum is 0.12 to 0.14 Hz
+        assert report.gmf == pytest.approx(gmf, abs=0.1)
+        assert report.speed / (2 * math.pi) == pytest.approx(gmf / 32, abs=0.01)
+
+    @pytest.mark.parametrize(("name", "gmf"), [("b30hz0", 952.1), ("b30hz90", 948.0)])
+    def test_broken_tooth_gear_mesh_frequency(self, name, gmf):
+        report = analyse_file(Path(MEASUREMENTS) / f"{name}.csv.gz", teeth=32, rate=12800.0)
+        assert report.gmf == pytest.approx(gmf, abs=0.5)
+
+    @pytest.mark.parametrize("channel", ["a1", "a2", "a3", "a4"])
+    def test_each_channel_alone_gives_the_same(self, channel):
+        for name, gmf in (("h30hz0", 952.16), ("h30hz90", 948.05)):
+            path = Path(MEASUREMENTS) / f"{name}.csv.gz"
+            assert analyse_file(path, teeth=32, rate=12800.0, channels=[channel]).gmf == pytest.approx(gmf, abs=0.05)
+
+    def test_comparison_says_what_the_broken_tooth_does(self):
+        folder = Path(MEASUREMENTS)
+        cases = {
+            f"{load} %": {"healthy": folder / f"h30hz{load}.csv.gz", "broken": folder / f"b30hz{load}.csv.gz"}
+            for load in (0, 90)
+        }
+        report = compare_files(cases, teeth=32, rate=12800.0)
+        text = report.to_markdown()
+        assert "broken against healthy at load 0 %: 1 x GMF" in text
+        assert "as expected" in text
+        # load raises the healthy pair's harmonics on every channel
+        ratio = report.data["experiment"].sel(state="healthy", load="90 %") / report.data["experiment"].sel(
+            state="healthy", load="0 %"
+        )
+        assert float(ratio.min()) > 1.0

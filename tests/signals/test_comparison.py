@@ -1,0 +1,164 @@
+"""Experiment against model: scaling, agreement, distance, and what the report says."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gearmbs.signals import (
+    SignalError,
+    compare,
+    compare_files,
+    level_distance,
+    make_signal,
+    ordinal_agreement,
+    write_signal,
+)
+
+RATE, GMF, TEETH = 12800.0, 480.0, 29
+OMEGA = 2 * math.pi * GMF / TEETH
+BASE = {"healthy": (1.0, 0.5, 0.25), "misaligned": (1.1, 1.5, 0.3), "distance": (2.0, 1.0, 0.75)}
+
+
+def tone(amplitudes, factor=1.0, seconds=1.0, mean=0.0):
+    t = np.arange(round(seconds * RATE)) / RATE
+    x = mean + factor * sum(a * np.cos(2 * np.pi * k * GMF * t + k) for k, a in enumerate(amplitudes, 1))
+    return make_signal({"acc": x}, RATE, units="m/s^2", speed=OMEGA, teeth=TEETH)
+
+
+def cases(factor=1.0, states=BASE, mean=0.0):
+    return {
+        "low": {s: tone(a, factor, mean=mean) for s, a in states.items()},
+        "high": {s: tone(a, 3 * factor, mean=mean) for s, a in states.items()},
+    }
+
+
+def test_a_model_that_is_the_experiment_times_a_factor_agrees_perfectly():
+    report = compare(cases(), cases(0.02, mean=55.0))
+    np.testing.assert_allclose(report.data["model"], report.data["experiment"], rtol=1e-6)
+    np.testing.assert_allclose(report.data["factor"], 50.0, rtol=1e-6)
+    found = report.agreement()
+    assert (found["ordinal"] == 1.0).all()
+    assert (found["ordinal_load"] == 1.0).all()
+    assert found["same_direction"].all()
+    assert float(found["distance"].max()) < 1e-4
+    assert report.data["experiment"].sel(load="low", state="misaligned", harmonic=2).item() == pytest.approx(
+        1.5 / math.sqrt(2), rel=1e-4
+    )
+
+
+def test_scaling_scopes():
+    model = {
+        "low": {s: tone(a, 0.5 if s == "healthy" else 1.0) for s, a in BASE.items()},
+        "high": {s: tone(a, 1.0) for s, a in BASE.items()},
+    }
+    low_fault = {"load": "low", "state": "misaligned"}
+    by_load = compare(cases(), model, scope="load").data["factor"]
+    assert by_load.sel(low_fault).item() == pytest.approx(2.0, rel=1e-4)  # the healthy case's factor is kept
+    assert by_load.sel(load="high", state="healthy").item() == pytest.approx(3.0, rel=1e-4)
+    everywhere = compare(cases(), model, scope="all").data["factor"]
+    np.testing.assert_allclose(everywhere, 2.0, rtol=1e-4)
+    each = compare(cases(), model, scope="each").data["factor"]
+    assert each.sel(low_fault).item() == pytest.approx(1.0, rel=1e-4)
+
+
+def test_disagreement_is_counted():
+    # the model turns misalignment's second harmonic down instead of up: pairs (h, m) and (m, d) flip, (h, d) stays
+    model_states = {**BASE, "misaligned": (1.1, 0.1, 0.3)}
+    report = compare(cases(), cases(states=model_states))
+    found = report.agreement()
+    assert found["ordinal"].sel(load="low", harmonic=2).item() == pytest.approx(1 / 3)
+    assert not found["same_direction"].sel(load="low", state="misaligned", harmonic=2).item()
+    assert found["same_direction"].sel(load="low", state="distance", harmonic=2).item()
+    text = report.to_markdown()
+    assert "misaligned against healthy at load low: 1 x GMF stays (+0.8 dB); 2 x GMF rises (+9.5 dB)" in text
+    assert "Agreement of model and experiment" in text
+
+
+def test_expectations_of_the_paper():
+    table = compare(cases()).expectations()
+    assert table["as_expected"].all()
+    assert len(table) == 2 * (1 + 3)
+    reverse = {"low": {"healthy": tone((1, 1, 1)), "misaligned": tone((1, 0.5, 1))}}
+    report = compare(reverse)
+    assert not report.expectations()["as_expected"].any()
+    assert "Not everything moved as expected of misaligned: 1 of 1 did not." in report.to_markdown()
+
+
+def test_channels_that_contradict_each_other_are_named():
+    def two(a, b):
+        return make_signal({"a": tone(a).values[:, 0], "b": tone(b).values[:, 0]}, RATE, speed=OMEGA, teeth=TEETH)
+
+    report = compare({"one": {"healthy": two((1, 1, 1), (1, 1, 1)), "broken": two((1, 1, 3), (1, 1, 0.3))}})
+    assert len(report.cautions()) == 1
+    assert "3 x GMF moves by -10.5 dB on one channel and by +9.5 dB on another" in report.cautions()[0]
+    assert "rises on 1 and falls on 1 of 2 channels" in report.to_markdown()
+
+
+def test_cases_of_one_side_only_are_left_out_and_named():
+    experiment = cases()
+    experiment["odd"] = experiment["low"]
+    model = cases()
+    del model["high"]["distance"]
+    report = compare(experiment, model)
+    assert report.data["load"].values.tolist() == ["low", "high"]
+    assert "load 'odd' of the experiment" in report.left_out
+    assert "state 'distance' at load 'high' of the experiment" in report.left_out
+    assert math.isnan(report.data["experiment"].sel(load="high", state="distance", harmonic=1).item())
+    assert np.isfinite(report.agreement()["distance"]).all()
+    assert "Left out" in report.to_markdown()
+
+
+def test_tables_have_bars_side_by_side():
+    tables = compare(cases(), cases(2.0)).tables()
+    assert tables["harmonics"].columns.tolist()[-2:] == ["experiment", "model"]
+    assert len(tables["harmonics"]) == 2 * 3 * 3
+    assert {"changes", "expectations", "agreement", "distance"} <= set(tables)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "expected"),
+    [
+        ([1, 2, 3], [10, 20, 30], 1.0),
+        ([1, 2, 3], [3, 2, 1], 0.0),
+        ([1, 2, 3], [1, 3, 2], 2 / 3),
+        ([1, 1.001, 3], [1, 2, 3], (0.5 + 1 + 1) / 3),
+    ],
+)
+def test_ordinal_agreement(a, b, expected):
+    assert ordinal_agreement(np.array(a), np.array(b)) == pytest.approx(expected)
+
+
+def test_level_distance():
+    # factors of 10 up and down are 20 dB each
+    assert level_distance(np.array([1.0, 1.0]), np.array([10.0, 0.1])) == pytest.approx(20.0)
+    assert level_distance(np.array([2.0]), np.array([2.0])) == 0.0
+
+
+def test_compare_files(tmp_path):
+    paths = {"low": {}}
+    for state, amplitudes in BASE.items():
+        paths["low"][state] = write_signal(tone(amplitudes), tmp_path / f"{state}.nc")
+    report = compare_files(paths, paths)
+    assert float(report.agreement()["distance"].max()) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("call", "match"),
+    [
+        (lambda: compare({"low": {"misaligned": tone((1, 1, 1))}}), "no state 'healthy'"),
+        (lambda: compare(cases(), {"other": cases()["low"]}), "none in common"),
+        (lambda: compare(cases(), scope="both"), "scope"),
+        (lambda: compare(cases(), way="both"), "way"),
+        (lambda: compare(cases(), channel="nope"), "has no 'nope'"),
+    ],
+)
+def test_bad_calls_name_the_field(call, match):
+    with pytest.raises(SignalError, match=match):
+        call()
+
+
+def test_units_must_agree():
+    force = {"low": {"healthy": tone((1, 1, 1)).assign_coords(units=("channel", ["N"])).assign_attrs(units="N")}}
+    with pytest.raises(SignalError, match="the experiment is in 'm/s\\^2', the model in 'N'"):
+        compare({"low": {"healthy": tone((1, 1, 1))}}, force)
