@@ -193,7 +193,6 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
             count[s.NEWTON_FAILS] = 0
             count[s.NAN_FAILS] = 0
             count[s.SINGULAR_FAILS] = 0
-            set_weights(real, hist[1], vec)
         past = times[1:]
         t_old = past[0]
         if count[s.ERROR_FAILS] + count[s.NEWTON_FAILS] + count[s.NAN_FAILS] > MAX_FAILS:
@@ -215,6 +214,7 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
             if count[s.NEWTON_FAILS] > count[s.ERROR_FAILS]:
                 return s.FAIL_NEWTON
             return s.FAIL_STEP_TOO_SMALL
+        set_weights(real, hist[1], h, vec)
         h_wish = real[s.H]
         real[s.H] = h
         if count[s.FIXED_LEADING] and count[s.NPAST] > 1:

@@ -91,19 +91,26 @@ def first_not_finite(v):
     return -1
 
 
-@njit(types.void(_VEC, _VEC, _MAT), cache=True, nogil=True, error_model="numpy")
-def set_weights(real, y, vec):
-    """Set the weights of the error test and of the corrector test from tolerances at ``y``."""
+@njit(types.void(_VEC, _VEC, float64, _MAT), cache=True, nogil=True, error_model="numpy")
+def set_weights(real, y, h, vec):
+    """Set the weights of the error test and of the corrector test from tolerances at ``y``.
+
+    Algebraic unknowns outside error control (multipliers, forces) reach the others only through a step of size h, and
+    h times their error is what the corrector test sees; taken at face value their rounding noise, which grows
+    like 1/h, would never let a small step converge.
+    """
     rtol = real[RTOL]
     atol = vec[ATOL]
     w_error = vec[W_ERROR]
     w_newton = vec[W_NEWTON]
     controlled = vec[IS_CONTROLLED]
     tested = vec[IS_TESTED]
+    differential = vec[IS_DIFFERENTIAL]
+    reach = min(h, 1.0)
     for i in range(y.shape[0]):
         w = 1.0 / (atol[i] + rtol * abs(y[i]))
         w_error[i] = controlled[i] * w
-        w_newton[i] = tested[i] * w
+        w_newton[i] = tested[i] * w * max(max(controlled[i], differential[i]), reach)
 
 
 @njit(

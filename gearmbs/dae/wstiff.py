@@ -72,7 +72,7 @@ class Run:
         event_action: Sequence[int] | None,
         dense_output: bool,
         max_steps: int | None,
-        progress: Callable[[float, SolverStats], None] | None,
+        progress: Callable[[float], None] | None,
         check_start: bool,
         error_probe: Callable[[], BaseException | None] | None,
     ):
@@ -153,7 +153,7 @@ class Run:
         st.count[s.HAS_EVENTS] = n_events
         st.count[s.KEEP_ROWS] = keep
         st.count[s.MAX_STEPS] = max_steps or 0
-        set_weights(st.real, st.hist[0], st.vec)
+        set_weights(st.real, st.hist[0], 1.0, st.vec)
         st.real[s.H] = first_step if first_step is not None else self._first_step()
         self.indptr = np.asarray(problem.indptr, dtype=np.int64)
         self.indices = np.asarray(problem.indices, dtype=np.int64)
@@ -284,12 +284,12 @@ class Run:
         """Run to the end, a failure or an interruption, and return everything computed so far."""
         begin = time.perf_counter()
         with _InterruptFlag() as interrupt:
-            status, message = self._loop(interrupt, begin)
+            status, message = self._loop(interrupt)
         self.wall_time += time.perf_counter() - begin
         self._drain()
         return self._result(status, message)
 
-    def _loop(self, interrupt: _InterruptFlag, begin: float) -> tuple[Status, str]:
+    def _loop(self, interrupt: _InterruptFlag) -> tuple[Status, str]:
         st, problem = self.state, self.problem
         if not self.started:
             failure = self._start()
@@ -305,7 +305,7 @@ class Run:
             if self._user_exception() is not None:
                 return self._user_failure()
             if code == s.DONE:
-                self._report(begin)
+                self._report()
                 return Status.SUCCESS, f"{Status.SUCCESS.sentence}"
             if code == s.TERMINAL:
                 return Status.TERMINAL_EVENT, f"{Status.TERMINAL_EVENT.sentence} t = {st.real[s.T]:.9g}."
@@ -323,7 +323,7 @@ class Run:
             if interrupt.raised:
                 return Status.INTERRUPTED, self._interrupted_message()
             if code == s.RUNNING:
-                self._report(begin)
+                self._report()
                 elapsed = time.perf_counter() - tic
                 if elapsed < 0.5 * CHUNK_SECONDS:
                     chunk *= 2
@@ -333,9 +333,9 @@ class Run:
     def _accepted_so_far(self) -> int:
         return 1 + int(self.state.count[s.STEPS])
 
-    def _report(self, begin: float) -> None:
+    def _report(self) -> None:
         if self.progress is not None:
-            self.progress(float(self.state.real[s.T]), self._stats(self.wall_time + time.perf_counter() - begin))
+            self.progress(float(self.state.real[s.T]))
 
     def _failure(self, code: int) -> tuple[Status, str]:
         st, problem = self.state, self.problem
@@ -502,7 +502,7 @@ def solve_wstiff(
     event_action: Sequence[int] | None = None,
     dense_output: bool = False,
     max_steps: int | None = None,
-    progress: Callable[[float, SolverStats], None] | None = None,
+    progress: Callable[[float], None] | None = None,
     check_start: bool = True,
     error_probe: Callable[[], BaseException | None] | None = None,
 ) -> DAEResult:
@@ -538,7 +538,7 @@ def solve_wstiff(
     max_steps : int, optional
         Limit on accepted steps.
     progress : callable, optional
-        Called now and then as ``progress(t, stats)``.
+        Called now and then as ``progress(t)``.
     check_start : bool
         Refuse initial values that do not satisfy the equations.
     error_probe : callable, optional
