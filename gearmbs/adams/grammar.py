@@ -235,6 +235,7 @@ class ArgumentReader:
 
 def items(raw: str) -> list[str]:
     """Split a list value at its commas."""
+    raw = re.sub(rf",\s*{CONTINUED}", ",", raw)
     parts = [p.strip() for p in re.split(f"[{_SEPARATORS}]", raw)]
     while parts and not parts[-1]:
         parts.pop()

@@ -1,0 +1,391 @@
+"""Write a Mechanism as an .adm deck: ``write_deck``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gearmbs.adams.build_constraints import JOINT_KINDS, JPRIM_KINDS
+from gearmbs.adams.units import TABLES
+from gearmbs.adams.write_functions import function_text
+from gearmbs.adams.write_gears import gear_statements, is_gear_contact
+from gearmbs.dae import terms
+from gearmbs.dae.errors import ModelError
+from gearmbs.dae.rotation import euler_from_matrix
+from gearmbs.mechanism import Mechanism, Torque
+from gearmbs.mechanism.elements import AXIS_FORCE, AXIS_TORQUE, LINE, Load
+from gearmbs.mechanism.expression import Call, Name, Node, Number, parse, unparse
+from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
+from gearmbs.mechanism.joints import Joint
+from gearmbs.mechanism.parts import Body, Marker
+
+WIDTH = 78
+STATEMENT_OF = {v: k for k, v in JOINT_KINDS.items()}
+PRIMITIVE_OF = {v: k for k, v in JPRIM_KINDS.items()}
+COMPONENTS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
+
+
+def write_deck(mechanism: Mechanism, title: str | None = None) -> str:
+    """Return a mechanism as the text of an .adm file, in the mechanism's units.
+
+    Contacts of gears with parallel axes become GFORCEs of IMPACT expressions along both lines of action; their
+    friction and the contact of tooth corners beyond the path of contact are left out, as comments say.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    title : str, optional
+        First line; default: the mechanism's name.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ModelError
+        Naming what cannot be written.
+    """
+    return DeckWriter(mechanism).text(title)
+
+
+class DeckWriter:
+    """Numbers the parts of a mechanism and writes their statements."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self.units = mechanism.units
+        self.lines: list[str] = []
+        self.bodies: dict[int, int] = {}
+        self.markers: dict[int, int] = {}
+        self.marker_names: dict[str, int] = {}
+        self.elements: dict[tuple[str, str], int] = {}
+        self.variables = {_upper(k): n for n, k in enumerate(mechanism.variables, 1)}
+        self.states = {_upper(k): n for n, k in enumerate(mechanism.states, 1)}
+        self.splines = {_upper(k): n for n, k in enumerate(mechanism.splines, 1)}
+        self._next_marker = 1
+
+    def text(self, title: str | None) -> str:
+        """Return the deck."""
+        self.lines = [" ".join((title or self.mechanism.name).split()) or "mechanism", "!"]
+        self._units()
+        self._number()
+        self._parts()
+        self._constraints()
+        self._data()
+        for name, element in self.mechanism.elements.items():
+            self._element(name, element)
+        g = self.mechanism.gravity / self.units.factor("acceleration")
+        if np.any(g != 0.0):
+            keys = ("IGRAV", "JGRAV", "KGRAV")
+            self.statement("ACCGRAV/", [f"{k} = {number(v)}" for k, v in zip(keys, g) if v != 0.0])
+        self.lines.append("END")
+        return "\n".join(self.lines) + "\n"
+
+    # --- pieces -------------------------------------------------------------------------------------
+
+    def statement(self, head: str, arguments: Iterable[str], name: str | None = None) -> None:
+        """Append a statement, one argument a line, with its name in a comment in front."""
+        if name:
+            self.lines.append(f"!   adams_view_name='{name}'")
+        self.lines.append(head)
+        for argument in arguments:
+            self.lines.extend(wrapped(argument))
+
+    def comment(self, text: str) -> None:
+        """Append a comment."""
+        self.lines.append(f"! {text}")
+
+    def new_marker(self, body: Body, position: np.ndarray, axes: np.ndarray, floating: bool = False) -> int:
+        """Write a marker on a body and return its id."""
+        number_ = self._next_marker
+        self._next_marker += 1
+        arguments = [f"PART = {self.bodies[id(body)]}"]
+        if floating:
+            arguments.append("FLOATING")
+        else:
+            arguments += self._frame("QP", position, axes)
+        self.statement(f"MARKER/{number_}", arguments)
+        return number_
+
+    def _frame(self, keyword: str, position: np.ndarray, axes: np.ndarray) -> list[str]:
+        out = []
+        if np.any(position != 0.0):
+            out.append(f"{keyword} = {listed(position / self.units.length)}")
+        if np.abs(axes - np.eye(3)).max() > 1e-15:
+            out.append(f"REULER = {listed(euler_from_matrix(axes))}")
+        return out
+
+    def expression(self, text: str) -> str:
+        """Return an expression with names replaced by ids."""
+
+        def rename(call: Call) -> Call:
+            call = replace(call, args=tuple(self._argument(call, k, a) for k, a in enumerate(call.args)))
+            return self._element_call(call) if call.name in ELEMENT_FORCES else call
+
+        return unparse(parse(text), rename)
+
+    def _argument(self, call: Call, position: int, arg: Node) -> Node:
+        """Replace the name of a marker or data element by its id."""
+        key: Any = arg.text if isinstance(arg, Name) else arg.integer if isinstance(arg, Number) else None
+        table: dict[Any, int] = {}
+        if call.name == "VARVAL":
+            table = self.variables if key in self.variables else self.states
+        elif call.name in ("DIF", "DIF1"):
+            table = self.states
+        elif call.name in ("CUBSPL", "AKISPL") and position == 2:
+            table = self.splines
+        elif isinstance(arg, Name) and (call.name not in ELEMENT_FORCES or position > 0):
+            table = self.marker_names
+        return Number(float(table[key]), arg.at, table[key]) if key in table else arg
+
+    def _element_call(self, call: Call) -> Call:
+        """Ask for an element's force under the statement it is written as."""
+        first = call.args[0] if call.args else None
+        if isinstance(first, Name):
+            for (kind, name), n in self.elements.items():
+                if name.upper() == first.text:
+                    keyword = next(k for k, v in ELEMENT_FORCES.items() if v == kind)
+                    return replace(call, name=keyword, args=(Number(float(n), first.at, n), *call.args[1:]))
+        return call
+
+    # --- sections -----------------------------------------------------------------------------------
+
+    def _units(self) -> None:
+        names = []
+        for quantity, table in TABLES.items():
+            value = getattr(self.units, quantity)
+            found = [n for n, v in table.items() if abs(v - value) <= 1e-12 * value]
+            if not found:
+                raise ModelError(f"units: {value} SI is no unit of {quantity} that ADAMS knows; change mechanism.units")
+            names.append(f"{quantity.upper()} = {found[0]}")
+        self.statement("UNITS/", names)
+
+    def _number(self) -> None:
+        m = self.mechanism
+        for n, body in enumerate((m.ground, *m.bodies.values()), 1):
+            self.bodies[id(body)] = n
+        used = {mk.number for body in (m.ground, *m.bodies.values()) for mk in body.markers if mk.number}
+        fresh = (n for n in range(1, 10**9) if n not in used)
+        for body in (m.ground, *m.bodies.values()):
+            for marker in body.markers:
+                self.markers[id(marker)] = marker.number or next(fresh)
+                self.marker_names[marker.name.upper()] = self.markers[id(marker)]
+        self._next_marker = max(self.markers.values(), default=0) + 1
+        counts: dict[str, int] = {}
+        for name, kind in self._kinds():
+            counts[kind] = counts.get(kind, 0) + 1
+            self.elements[kind, name] = counts[kind]
+
+    def _kinds(self) -> Iterable[tuple[str, str]]:
+        for name, joint in self.mechanism.joints.items():
+            yield name, joint_statement(joint).lower()
+        for name in self.mechanism.constraints:
+            yield name, "gcon"
+        for name, element in self.mechanism.elements.items():
+            yield name, "sforce" if isinstance(element, Load) and element.mode == LINE else "gforce"
+
+    def _parts(self) -> None:
+        for body in (self.mechanism.ground, *self.mechanism.bodies.values()):
+            n = self.bodies[id(body)]
+            if body.is_ground:
+                self.statement(f"PART/{n}", ["GROUND"], "ground")
+            else:
+                self._part(body, n)
+            for marker in body.markers:
+                arguments = [f"PART = {n}", *self._frame("QP", marker.position, marker.orientation)]
+                self.statement(f"MARKER/{self.markers[id(marker)]}", arguments, marker.name)
+
+    def _part(self, body: Body, n: int) -> None:
+        units = self.units
+        cm = self._next_marker
+        self._next_marker += 1
+        i = body.inertia / units.factor("inertia")
+        inertia = [i[0, 0], i[1, 1], i[2, 2], -i[0, 1], -i[0, 2], -i[1, 2]]
+        if not any(inertia[3:]):
+            inertia = inertia[:3]
+        arguments = [f"MASS = {number(body.mass / units.mass)}", f"CM = {cm}", f"IP = {listed(inertia)}"]
+        arguments += self._frame("QG", body.position, body.orientation)
+        arm = body.orientation @ body.com
+        velocity = (body.velocity + np.cross(body.angular_velocity, arm)) / units.factor("velocity")
+        spin = body.orientation.T @ body.angular_velocity / units.factor("angular_velocity")
+        arguments += [f"V{a} = {number(v)}" for a, v in zip("XYZ", velocity) if v != 0.0]
+        arguments += [f"W{a} = {number(v)}" for a, v in zip("XYZ", spin) if v != 0.0]
+        self.statement(f"PART/{n}", arguments, body.name)
+        self.statement(f"MARKER/{cm}", [f"PART = {n}", *self._frame("QP", body.com, np.eye(3))])
+
+    def _constraints(self) -> None:
+        for name, joint in self.mechanism.joints.items():
+            keyword = joint_statement(joint)
+            head = f"{keyword}/{self.elements[keyword.lower(), name]}"
+            i, j = f"I = {self.markers[id(joint.i)]}", f"J = {self.markers[id(joint.j)]}"
+            if keyword == "JOINT":
+                self.statement(head, [*self._joint_type(joint), i, j], name)
+            elif keyword == "JPRIM":
+                self.statement(head, [PRIMITIVE_OF[joint.kind], i, j], name)
+            elif keyword == "COUPLER":
+                self.statement(head, self._coupler(joint), name)
+            elif keyword == "MOTION":
+                self.statement(head, self._motion(joint), name)
+            else:
+                length = joint.rows[0].function
+                assert length is not None
+                a, b = self.markers[id(joint.i)], self.markers[id(joint.j)]
+                text = f"DM({a}, {b}) - {number(length.parameters[0] / self.units.length)}"
+                self.statement(head, [i, f"FUNCTION = {text}"], name)
+        for name, text in self.mechanism.constraints.items():
+            self.statement(f"GCON/{self.elements['gcon', name]}", [f"FUNCTION = {self.expression(text)}"], name)
+
+    def _joint_type(self, joint: Joint) -> list[str]:
+        if joint.kind != "screw":
+            return [STATEMENT_OF[joint.kind]]
+        angle = next(t for t in joint.rows[-1].terms if t.kind == terms.ANGLE)
+        return ["SCREW", f"PITCH = {number(-2.0 * np.pi * angle.coefficient / self.units.length)}"]
+
+    def _joint_id(self, i: Marker, j: Marker) -> int:
+        for name, joint in self.mechanism.joints.items():
+            if joint.i is i and joint.j is j and joint_statement(joint) == "JOINT":
+                return self.elements["joint", name]
+        raise ModelError(f"no joint connects {i.name} and {j.name}; a motion or coupler of it cannot be written")
+
+    def _coupler(self, joint: Joint) -> list[str]:
+        row = joint.rows[0].terms
+        ids = [self._joint_id(t.i, t.j) for t in row]
+        scales = [t.coefficient if t.kind == terms.ANGLE else t.coefficient * self.units.length for t in row]
+        kinds = ["R" if t.kind == terms.ANGLE else "T" for t in row]
+        return [f"JOINTS = {', '.join(map(str, ids))}", f"TYPE = {':'.join(kinds)}", f"SCALES = {listed(scales)}"]
+
+    def _motion(self, joint: Joint) -> list[str]:
+        row = joint.rows[0]
+        rotational = joint.kind == "rotation"
+        function = row.rotation if rotational else row.function
+        assert function is not None
+        scale = 1.0 if rotational else self.units.length
+        text = self.expression(function_text(function, self.units.time, scale))
+        kind = "ROTATIONAL" if rotational else "TRANSLATIONAL"
+        return [f"JOINT = {self._joint_id(joint.i, joint.j)}", kind, f"FUNCTION = {text}"]
+
+    def _data(self) -> None:
+        m = self.mechanism
+        for key, text in m.variables.items():
+            n = self.variables[_upper(key)]
+            self.statement(f"VARIABLE/{n}", [f"FUNCTION = {self.expression(text)}"], str(key))
+        for key, state in m.states.items():
+            if state.algebraic:
+                raise ModelError(f"state '{key}': an algebraic state cannot be written; use a variable")
+            text = _times(self.expression(state.expression), self.units.time)
+            arguments = [f"IC = {number(state.start)}", f"FUNCTION = {text}"]
+            self.statement(f"DIFF/{self.states[_upper(key)]}", arguments, str(key))
+        for key, data in m.splines.items():
+            arguments = [f"X = {listed(data.x)}"]
+            if data.z:
+                arguments += [f"Y = {number(z)}, {listed(row)}" for z, row in zip(data.z, data.y)]
+            else:
+                arguments.append(f"Y = {listed(data.y[0])}")
+            if data.linear_extrapolate:
+                arguments.append("LINEAR_EXTRAPOLATE")
+            self.statement(f"SPLINE/{self.splines[_upper(key)]}", arguments, str(key))
+
+    def _element(self, name: str, element: Any) -> None:
+        if isinstance(element, Load):
+            self._load(name, element)
+        elif isinstance(element, Torque):
+            text = self.expression(function_text(element.function, self.units.time, self.units.factor("torque")))
+            self._gforce(name, element.i, element.j, element.axis, {"TZ": text})
+        elif is_gear_contact(element):
+            gear_statements(self, name, element)
+        else:
+            raise ModelError(f"element '{name}': {element!r} has no form in an ADAMS deck")
+
+    def _load(self, name: str, load: Load) -> None:
+        if load.mode == LINE:
+            text = self.expression(load.expressions[0] or "0")
+            ends = [f"I = {self.markers[id(load.i)]}", f"J = {self.markers[id(load.j)]}"]
+            head = f"SFORCE/{self.elements['sforce', name]}"
+            self.statement(head, ["TRANSLATIONAL", *ends, f"FUNCTION = {text}"], name)
+            return
+        slots = {AXIS_FORCE: ("FZ",), AXIS_TORQUE: ("TZ",)}.get(load.mode, COMPONENTS)
+        given = {c: self.expression(e) for c, e in zip(slots, load.expressions) if e is not None}
+        self._gforce(name, load.i, load.j, load.rm, given)
+
+    def _gforce(self, name: str, i: Marker, j: Marker, rm: Marker, given: dict[str, str]) -> None:
+        floating = self.new_marker(j.body, np.zeros(3), np.eye(3), floating=True)
+        self.gforce(name, self.markers[id(i)], floating, self.markers[id(rm)], given)
+
+    def gforce(self, name: str, i: int, jfloat: int, rm: int, given: dict[str, str]) -> None:
+        """Write a GFORCE with all six components."""
+        n = self.elements["gforce", name]
+        arguments = [f"I = {i}", f"JFLOAT = {jfloat}", f"RM = {rm}"]
+        arguments += [f"{c} = {given.get(c, '0')}" + ("\\" if c != "TZ" else "") for c in COMPONENTS]
+        self.statement(f"GFORCE/{n}", arguments, name)
+
+
+def joint_statement(joint: Joint) -> str:
+    """Return the statement a joint of the mechanism is written as.
+
+    Raises
+    ------
+    ModelError
+        For a kind ADAMS does not have.
+    """
+    if joint.kind in STATEMENT_OF or joint.kind == "screw":
+        return "JOINT"
+    if joint.kind in PRIMITIVE_OF:
+        return "JPRIM"
+    table = {"coupler": "COUPLER", "rotation": "MOTION", "translation": "MOTION", "distance": "GCON"}
+    if joint.kind not in table:
+        raise ModelError(f"joint '{joint.name}': its kind {joint.kind} has no form in an ADAMS deck")
+    return table[joint.kind]
+
+
+def number(value: float) -> str:
+    """Return a number with all its digits."""
+    return f"{float(value):.17g}"
+
+
+def listed(values: Iterable[float]) -> str:
+    """Return numbers separated by commas."""
+    return ", ".join(number(v) for v in values)
+
+
+def wrapped(argument: str) -> list[str]:
+    """Break an argument into continuation lines: lists at commas, expressions after operators."""
+    lines, rest, lead = [], argument, ", "
+    is_list = "(" not in argument
+    while len(rest) > WIDTH - len(lead):
+        cut = _break(rest, WIDTH - len(lead), is_list)
+        if cut <= 0:
+            break
+        piece = rest[:cut].rstrip()
+        # the comma that leads the next line separates the items of a list
+        lines.append(lead + (piece.rstrip(",") if is_list else piece))
+        rest, lead = rest[cut:].lstrip(), ",   "
+    lines.append(lead + rest)
+    return lines
+
+
+def _break(text: str, limit: int, is_list: bool) -> int:
+    """Return where to break, at most ``limit``: after a comma of a list, else after an operator between blanks.
+
+    An expression without an operator in reach is broken after a comma between arguments.
+    """
+    operator = comma = 0
+    for k in range(2, min(limit, len(text) - 1)):
+        if text[k] != " ":
+            continue
+        if text[k - 1] == ",":
+            comma = k
+        elif text[k - 1] in "+-*/" and text[k - 2] == " ":
+            operator = k
+    return comma if is_list else operator or comma
+
+
+def _times(text: str, factor: float) -> str:
+    return text if factor == 1.0 else f"{number(factor)}*({text})"
+
+
+def _upper(key: Any) -> Any:
+    return key.upper() if isinstance(key, str) else key
