@@ -17,7 +17,17 @@ from gearmbs.dae.forces import element_wrench
 from gearmbs.dae.jacobian import NUMBERS, put
 from gearmbs.dae.kinematics import inertia_times, update_bodies, update_tables
 from gearmbs.dae.residual import S_DIAG, S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR, S_WRENCH, arm_to
-from gearmbs.dae.rotation import KIN_A, KIN_ADOT, KIN_H, KIN_R, KIN_V, KIN_W, momentum_from_conjugate
+from gearmbs.dae.rotation import (
+    KIN_A,
+    KIN_ADOT,
+    KIN_H,
+    KIN_R,
+    KIN_V,
+    KIN_W,
+    axes_and_velocity,
+    euler_rates,
+    momentum_from_conjugate,
+)
 
 """Per force element: F, N, then eight diagnostics of a contact."""
 FORCE_RECORD = 14
@@ -71,8 +81,10 @@ def tape_row_rates(k, t, y, idata, tab, room):
 
 
 @njit(cache=True, error_model="numpy")
-def saddle(t, y, slot, vals, rhs, phi, loads, idata, rdata, work):
+def saddle(t, y, slot, vals, rhs, phi, loads, idata, rdata, work, with_loads):
     """Assemble the saddle-point matrix (by slots) and right-hand side; return the number of entries.
+
+    Without loads the right-hand side lacks the applied forces: enough for a projection.
 
     ``phi`` receives 3 values a row one after the other: Phi, Phi_q v + Phi_t, Phi_t.
     ``loads[f]`` receives F, N and the diagnostics of force element f.
@@ -151,7 +163,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, rdata, work):
                     k = put(mode, slot, vals, k, q + c, base + r, room[6 * b + c])
         rhs[base + r] = -gamma
         phi[3 * r], phi[3 * r + 1], phi[3 * r + 2] = value, rate, partial
-    if mode == NUMBERS:
+    if mode == NUMBERS and with_loads:
         wrench = tab.scratch[S_WRENCH : S_WRENCH + 6]
         diag = tab.scratch[S_DIAG : S_DIAG + 8]
         for f in range(idata[T.H_FORCES]):
@@ -217,3 +229,27 @@ def pose_record(y, idata, rdata, work, out):
             out[k + 15 + c] = tab.kin[b, KIN_W + c]
         for c in range(9):
             out[k + 3 + c] = tab.kin[b, KIN_A + c]
+
+
+@njit(cache=True, error_model="numpy")
+def displace(y, d, w, idata, rdata, work):
+    """Move the bodies of y by the spatial displacements ``d`` and change their spatial velocities by ``w``.
+
+    The kinematics table must be up to date; conjugate momenta are left alone.
+    """
+    tab = T.unpack(idata, rdata, work)
+    s = tab.scratch
+    for b in range(1, idata[T.H_BODIES]):
+        k, i = 3 * (b - 1), 6 * (b - 1)
+        e, th = idata[T.H_EPS] + k, idata[T.H_THETA] + k
+        for c in range(3):
+            y[idata[T.H_R] + k + c] += d[i + c]
+            y[idata[T.H_U] + k + c] += w[i + c]
+            s[c] = d[i + 3 + c]
+            s[3 + c] = tab.kin[b, KIN_W + c] + w[i + 3 + c]
+        euler_rates(tab.kin, b, s, 0, s, 6)
+        for c in range(3):
+            y[th + c] += s[6 + c]
+        # the new rates give the corrected velocity about the displaced axes
+        axes_and_velocity(y[th], y[th + 1], 0.0, 0.0, 0.0, tab.kin, b)
+        euler_rates(tab.kin, b, s, 3, y, e)

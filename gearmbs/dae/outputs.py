@@ -67,33 +67,54 @@ def new_records(m: int, bodies: int, rows: int, elements: int) -> Records:
 def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, factors, records):
     """Evaluate output rows from ``first``; return the row where new pivots are needed, or ``last``.
 
+    Each row of y is first projected onto the constraints, from which the integrator and its interpolant stray by the
+    tolerance; y itself is not changed.
+
     Asked for it in the header of ``idata``, only count the entries of the matrix or write their places to ``vals``;
     with ``last`` less than ``first``, assemble row ``first`` without solving.
     """
     rows = records.force.shape[1]
-    base = records.solution.shape[1] - rows
+    size = records.solution.shape[1]
+    base = size - rows
     multipliers = np.zeros((2, max(rows, 1)))
-    rhs = np.zeros(records.solution.shape[1])
+    rhs, moved, pushed = np.zeros(size), np.zeros(size), np.zeros(size)
+    at = np.zeros(y.shape[1])
     only_assemble = last < first or idata[T.H_MODE] != NUMBERS
     for k in range(first, first + 1 if only_assemble else last):
+        for c in range(at.size):
+            at[c] = y[k, c]
+        phi, loads = records.phi[k], records.loads[k]
         if idata[T.H_MODE] == NUMBERS:
-            for c in range(vals.size):
-                vals[c] = 0.0
-        count = index1.saddle(t[k], y[k], slots, vals, rhs, records.phi[k], records.loads[k], idata, rdata, work)
+            vals[:] = 0.0
         if only_assemble:
+            count = index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, True)
             records.solution[k, :] = rhs
             if idata[T.H_MODE] == COUNT:
                 vals[0] = count
             return last
-        growth = factor(plan, factors, vals)
-        if not growth <= GROWTH_LIMIT:
+        index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, rows == 0)
+        if not factor(plan, factors, vals) <= GROWTH_LIMIT:
             return k
+        if rows > 0:
+            # the nearest position and velocity, in the metric of the masses, that satisfy the constraints
+            rhs[:base] = 0.0
+            for r in range(rows):
+                rhs[base + r] = -phi[3 * r]
+            solve(plan, factors, rhs, moved)
+            for r in range(rows):
+                rhs[base + r] = -phi[3 * r + 1]
+            solve(plan, factors, rhs, pushed)
+            index1.displace(at, moved, pushed, idata, rdata, work)
+            vals[:] = 0.0
+            index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, True)
+            if not factor(plan, factors, vals) <= GROWTH_LIMIT:
+                return k
         solve(plan, factors, rhs, records.solution[k])
         for r in range(rows):
             multipliers[0, r] = records.solution[k, base + r]
         multipliers[1, 0] = t[k]
-        index1.joint_loads(y[k], idata, rdata, work, multipliers, records.force[k], records.moment[k])
-        index1.pose_record(y[k], idata, rdata, work, records.pose[k])
+        index1.joint_loads(at, idata, rdata, work, multipliers, records.force[k], records.moment[k])
+        index1.pose_record(at, idata, rdata, work, records.pose[k])
     return last
 
 

@@ -83,6 +83,8 @@ def simulate(
         else:
             from gearmbs.dae.wstiff import solve_wstiff
 
+            # errors are controlled on positions and velocities, and so is the corrector
+            options.setdefault("corrector", "modified")
             result = solve_wstiff(problem, t_eval, tol=tol, method=name, progress=report, **options)
     return Solution(system, problem, result)
 
