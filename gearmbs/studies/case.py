@@ -120,7 +120,7 @@ class Solver(_Section):
 
     integrator: Literal["WSTIFF", "GSTIFF", "IDA"] = "WSTIFF"
     formulation: Literal["SI2", "SI1", "I3"] = "SI2"
-    tolerance: float = Field(default=1e-6, gt=0, le=1e-2)
+    tolerance: float = Field(default=1e-7, gt=0, le=1e-2)
     output_rate: Frequency = Field(default=51200.0, gt=0)
     signal_rate: Frequency = Field(default=12800.0, gt=0)
 
