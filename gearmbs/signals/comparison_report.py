@@ -124,11 +124,15 @@ class ComparisonReport:
                         if feature not in self.data["harmonic"].values:
                             continue
                         change = np.atleast_1d(self.changes().sel(load=load, state=state, harmonic=feature).values)
+                        if not np.isfinite(change).any():
+                            continue
                         moved, shown = sign * change > CHANGE_DB, f"{np.nanmedian(change):+.1f} dB"
                         name = f"{feature} x GMF"
                     else:
                         pair = self.data[feature].sel(load=load)
                         ratio = np.atleast_1d((pair.sel(state=state) / pair.sel(state=self.reference)).values)
+                        if not np.isfinite(ratio).any():
+                            continue
                         moved, shown = sign * (ratio - 1.0) > INDICATOR_TIE, f"x {np.nanmedian(ratio):.2f}"
                         name = feature.replace("_", " ")
                     word = "rises" if sign > 0 else "falls"

@@ -160,9 +160,10 @@ def kurtogram(signal: xr.DataArray, *, levels: int = 7, progress: Progress | Non
             line = scipy.fft.rfft(column[start : start + block] - mean)
             for row, (_, low, high) in enumerate(edges):
                 piece = line[max(1, round(low * half)) : max(2, round(high * half))]
-                power = np.abs(scipy.fft.ifft(piece)) ** 2
+                cut = scipy.fft.ifft(piece)
+                power = cut.real**2 + cut.imag**2
                 second[row, channel] += power.mean()
-                fourth[row, channel] += (power**2).mean()
+                fourth[row, channel] += power @ power / power.size
             if progress is not None:
                 progress((channel + (at + 1) / len(starts)) / signal.sizes["channel"], "kurtogram")
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -11,7 +11,7 @@ import scipy.signal as ss
 import xarray as xr
 
 from .errors import SignalError
-from .filters import BLOCK, apply_zero_phase, kaiser_taps
+from .filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kaiser_taps
 from .signal import check_speed, rate_of
 
 LINE_ATTENUATION_DB = 60.0
@@ -114,7 +114,7 @@ def phase_from_line(
     Returns
     -------
     xarray.DataArray
-        Dimension (time,), the samples for which the filter, 3.6 / half_bandwidth seconds long, lies inside the record;
+        Dimension (time,), the samples for which the filter, 3.9 / half_bandwidth seconds long, lies inside the record;
         attributes `channel`, `quality` (0 to 1) and `mean_speed` in rad/s.
 
     Raises
@@ -130,19 +130,18 @@ def phase_from_line(
     half = 0.15 * frequency / order if half_bandwidth is None else float(half_bandwidth)
     if not 0.0 < half < frequency / 2:
         raise SignalError(f"half_bandwidth: must lie between 0 and half the line's frequency, got {half!r} Hz")
-    taps = kaiser_taps(1.5 * half, half, rate, "lowpass", LINE_ATTENUATION_DB)
-    step = max(1, int(rate / (16.0 * half)))
+    line_filter = _LineFilter(rate, half)
+    step, first = line_filter.step, line_filter.reach
     n = signal.sizes["time"]
     times = signal["time"].values
-    if n < taps.size:
+    if n < 2 * first + 1:
         raise SignalError(
-            f"signal: has {n} samples, following the line needs at least {taps.size}; "
+            f"signal: has {n} samples, following the line needs at least {2 * first + 1}; "
             f"widen half_bandwidth ({half:g} Hz)"
         )
-    first = taps.size // 2
     best: tuple[float, int, np.ndarray] | None = None
     for channel, column in enumerate(signal.values.T):
-        line = demodulate(column, frequency / rate, taps, step)
+        line = line_filter(column, frequency / rate)
         size = np.abs(line)
         level = float(np.sqrt(np.mean(size**2)))
         quality = float(np.percentile(size, 5.0)) / level if level > 0.0 else 0.0
@@ -170,33 +169,43 @@ def phase_from_line(
     return result
 
 
-def demodulate(column: np.ndarray, cycles: float, taps: np.ndarray, step: int) -> np.ndarray:
-    """Low-passed complex envelope of a line at `cycles` per sample, every `step`-th sample inside the filter's range.
+class _LineFilter:
+    """Complex envelope of a line: shifted down to zero, low-passed without delay in two stages, and thinned out.
 
-    Parameters
-    ----------
-    column : ndarray of shape (n,)
-    cycles : float
-        Frequency over sampling rate; its phase counts from the first sample.
-    taps : ndarray of shape (2 h + 1,)
-        Zero-phase low-pass.
-    step : int
-
-    Returns
-    -------
-    ndarray of shape ((n - 2 h + step - 1) // step,), complex
-        The sample at index i belongs to the record's sample h + i step.
+    The first stage, short, lowers the rate to some 64 times the half bandwidth, the second does the narrow work there.
     """
-    mean = column.mean()
-    count = column.size - taps.size + 1
-    block = max(1, BLOCK // step) * step
-    pieces = []
-    for start in range(0, count, block):
-        stop = min(start + block, count) + taps.size - 1
-        shifted = (column[start:stop] - mean) * np.exp(-2j * np.pi * cycles * np.arange(start, stop))
-        parts, _ = apply_zero_phase(np.stack((shifted.real, shifted.imag), axis=1), taps, "trim", step)
-        pieces.append(parts[:, 0] + 1j * parts[:, 1])
-    return np.concatenate(pieces)
+
+    def __init__(self, rate: float, half: float) -> None:
+        self.coarse = max(1, int(rate / (64.0 * half)))
+        slow = rate / self.coarse
+        self.wide = (
+            kaiser_taps(slow / 2, slow - 4.0 * half, rate, "lowpass", ATTENUATION_DB) if self.coarse > 1 else None
+        )
+        self.narrow = kaiser_taps(1.5 * half, half, slow, "lowpass", LINE_ATTENUATION_DB)
+        self.fine = max(1, int(slow / (16.0 * half)))
+        self.step = self.coarse * self.fine
+        """Samples of the record between samples of the envelope."""
+        lead = 0 if self.wide is None else self.wide.size // 2
+        self.reach = lead + self.coarse * (self.narrow.size // 2)
+        """Index in the record of the envelope's first sample, and as many samples as are lost at the end."""
+
+    def __call__(self, column: np.ndarray, cycles: float) -> np.ndarray:
+        """Envelope of the line at `cycles` per sample, complex; its phase counts from the first sample."""
+        mean = column.mean()
+        lead = 0 if self.wide is None else self.wide.size // 2
+        count = column.size - 2 * lead
+        block = max(1, BLOCK // self.coarse) * self.coarse
+        pieces = []
+        for start in range(0, count, block):
+            stop = min(start + block, count) + 2 * lead
+            shifted = (column[start:stop] - mean) * np.exp(-2j * np.pi * cycles * np.arange(start, stop))
+            pieces.append(shifted if self.wide is None else _thinned(shifted, self.wide, self.coarse))
+        return _thinned(np.concatenate(pieces), self.narrow, self.fine)
+
+
+def _thinned(line: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:
+    parts, _ = apply_zero_phase(np.stack((line.real, line.imag), axis=1), taps, "trim", step)
+    return parts[:, 0] + 1j * parts[:, 1]
 
 
 def instantaneous_speed(phase: xr.DataArray) -> xr.DataArray:

@@ -36,6 +36,18 @@ NAMES = {
 KEEPS_ATTRS = set(NAMES) - {"uff58"}
 
 
+EXTRAS = {"tdms": "nptdms", "uff58": "pyuff"}
+
+
+@pytest.fixture(autouse=True)
+def _skip_without_its_library(request):
+    """The libraries for TDMS and UFF are optional extras."""
+    wanted = getattr(request.node, "callspec", None)
+    for value in wanted.params.values() if wanted else ():
+        if isinstance(value, str) and value in EXTRAS:
+            pytest.importorskip(EXTRAS[value])
+
+
 def example(n=257, rate=51200.0, seed=0):
     rng = np.random.default_rng(seed)
     data = {"laser": rng.standard_normal(n) * 1e-3, "force, y": 1e6 * rng.standard_normal(n), "aux": rng.random(n) / 3}
@@ -309,7 +321,7 @@ def test_wav_whose_comment_contradicts_its_header(tmp_path):
 
 
 def test_text_uff_of_others(tmp_path):
-    import pyuff
+    pyuff = pytest.importorskip("pyuff")
 
     t = np.arange(40) / 51200.0
     data = np.sin(2 * np.pi * 1000 * t)
@@ -325,7 +337,8 @@ def test_text_uff_of_others(tmp_path):
 
 
 def test_tdms_with_unequal_channels(tmp_path):
-    from nptdms import ChannelObject, TdmsWriter
+    nptdms = pytest.importorskip("nptdms")
+    ChannelObject, TdmsWriter = nptdms.ChannelObject, nptdms.TdmsWriter
 
     with TdmsWriter(tmp_path / "a.tdms") as writer:
         writer.write_segment(
@@ -340,6 +353,7 @@ def test_tdms_with_unequal_channels(tmp_path):
 
 
 def test_failed_writes_leave_nothing(tmp_path):
+    pytest.importorskip("pyuff")
     with pytest.raises(SignalFileError, match=r"x\.uff"):
         write_signal(make_signal([1.0, 2.0], 1.0, units="a unit with a very long name"), tmp_path / "x.uff")
     assert list(tmp_path.iterdir()) == []

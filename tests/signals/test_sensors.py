@@ -166,7 +166,7 @@ def test_a_measured_chain_keeps_the_gear_mesh_harmonics(tmp_path):
     seen = measure(laser_vibrometer(motion, [1, 0, 0]), noise_rms=1e-3, bits=16, full_scale=4.0, seed=1)
     assert seen.attrs["sampling_rate"] == 12800.0
     np.testing.assert_allclose(gmf_rms(seen)["orders"][:, 0], np.array([1.0, 0.5, 0.25]) / math.sqrt(2), rtol=2e-3)
-    back = read_signal(write_signal(seen, tmp_path / "laser.uff"))
+    back = read_signal(write_signal(seen, tmp_path / "laser.nc"))
     np.testing.assert_array_equal(back.values, seen.values)
     acceleration = convert(back, "acceleration", band=(100.0, 5000.0))
     expected = 2 * math.pi * gmf * np.array([1.0, 1.0, 0.75]) / math.sqrt(2)  # a = w v, w = k times the first

@@ -129,7 +129,7 @@ def test_phase_from_the_mesh_line():
     assert phase.attrs["channel"] == "good"
     error = phase.values - np.interp(phase["time"].values, t, wobble)
     assert np.ptp(error) < 3e-3
-    assert phase.sizes["time"] > t.size - 3.7 / (0.15 * 30) * RATE
+    assert phase.sizes["time"] > t.size - 3.9 / (0.15 * 30) * RATE
     with pytest.raises(SignalError, match="needs at least"):
         phase_from_line(signal[:1000], 960.0, 32)
 
