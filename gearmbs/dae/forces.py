@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from numba import njit
 
-from gearmbs.contact import gear_contact
+from gearmbs.dae import linkage, tapes
 from gearmbs.dae import tables as T
-from gearmbs.dae import tapes
+from gearmbs.dae.linkage import contact_at
 from gearmbs.dae.rotation import KIN_R, KIN_V, KIN_W
 from gearmbs.dae.terms import cross3
 
@@ -47,7 +47,7 @@ def contact_wrench(row, tab, wrench, jac, diag, want_jac):
     marker_pose(j, tab.marker_body, tab.kin, tab.frame, second)
     gi0, gr0 = row[T.FORCE_IEXTRA], row[T.FORCE_REXTRA]
     ni, nr = tab.extra_i[gi0], tab.extra_i[gi0 + 1]
-    gear_contact(
+    contact_at(tab.address[linkage.CONTACT])(
         tab.extra_i[gi0 + 2 : gi0 + 2 + ni],
         tab.extra_r[gr0 : gr0 + nr],
         first[0:3],

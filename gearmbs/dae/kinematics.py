@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from numba import njit
 
+from gearmbs.dae import linkage, timefunctions
 from gearmbs.dae import tables as T
-from gearmbs.dae import timefunctions
-from gearmbs.dae.expressions import eval_time
+from gearmbs.dae.linkage import time_at
 from gearmbs.dae.rotation import (
     KIN_A,
     KIN_AXES,
@@ -82,7 +82,7 @@ def update_functions(t, tab):
         if kind == timefunctions.TAPE:
             row = tab.tape[at]
             i, r = row[T.TAPE_I], row[T.TAPE_R]
-            eval_time(
+            time_at(tab.address[linkage.TIME])(
                 tab.extra_i[i : i + row[T.TAPE_I_SIZE]],
                 tab.extra_r[r : r + row[T.TAPE_R_SIZE]],
                 t,

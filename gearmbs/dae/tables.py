@@ -7,12 +7,13 @@ run of ``idata`` or ``rdata``.  :func:`unpack` turns the two arrays into named v
 from __future__ import annotations
 
 from collections import namedtuple
+from typing import Any
 
 import numpy as np
 from numba import njit
 
-from gearmbs.dae.expressions import Tape
-from gearmbs.dae.expressions import opcodes as op
+from gearmbs.dae.expressions.opcodes import HEAD_ALGEBRAIC_LIST
+from gearmbs.dae.linkage import NAMES, addresses
 from gearmbs.dae.rotation import KIN_COLUMNS
 
 I3 = 0
@@ -71,7 +72,9 @@ H_W_TAPE = 46
 H_W_TAPE_SIZE = 47
 H_MODE = 48
 """What `jacobian` and `saddle` do with the entries: add up numbers, note places, count."""
-H_SIZE = 49
+H_ADDRESS = 49
+"""Addresses of the kernels called from outside, in the order of `gearmbs.dae.linkage.NAMES`."""
+H_SIZE = 55
 
 BODY_MASS = 0
 BODY_INERTIA = 1
@@ -149,7 +152,7 @@ SCRATCH_FIXED = 512
 
 Tables = namedtuple(
     "Tables",
-    "code marker_body row term force function extra_i slot state tape "
+    "address code marker_body row term force function extra_i slot state tape "
     "gravity body marker coef function_r extra_r reference kin frame fval scratch tape_work",
 )
 
@@ -166,6 +169,7 @@ def unpack(idata, rdata, work):
     i = idata
     r = rdata
     return Tables(
+        i[H_ADDRESS:H_SIZE],
         i[i[H_I_CODE] : i[H_I_CODE] + bodies],
         i[i[H_I_MARKER_BODY] : i[H_I_MARKER_BODY] + markers],
         i[i[H_I_ROW] : i[H_I_ROW] + (rows + 1) * ROW_COLUMNS].reshape(rows + 1, ROW_COLUMNS),
@@ -205,7 +209,7 @@ class TableBuilder:
         self.marker_frame: list[np.ndarray] = []
         self.rows: list[tuple[int, int, int]] = []
         self.states: list[tuple[int, int]] = []
-        self.tapes: list[Tape] = []
+        self.tapes: list[Any] = []
         self.tape_rows: list[tuple[int, ...]] = []
         self.tape_work = 0
         self.terms: list[tuple[int, ...]] = []
@@ -245,10 +249,10 @@ class TableBuilder:
             self.reference.append(0.0)
         return len(self.rows) - 1
 
-    def add_tape(self, tape: Tape) -> int:
-        """Add an expression whose unknowns are bound to indices of y; return its number."""
+    def add_tape(self, tape: Any) -> int:
+        """Add an expression (`gearmbs.dae.expressions.Tape`), its unknowns bound to indices of y; return its number."""
         bodies = len(self.extra_i)
-        unknowns = tape.ints[tape.ints[op.HEAD_ALGEBRAIC_LIST] :][: len(tape.algebraic)]
+        unknowns = tape.ints[tape.ints[HEAD_ALGEBRAIC_LIST] :][: len(tape.algebraic)]
         self.extra_i.extend([*tape.bodies, *(int(k) for k in unknowns)])
         i = len(self.extra_i)
         self.extra_i.extend(int(v) for v in tape.ints)
@@ -369,6 +373,7 @@ class TableBuilder:
             (H_R_EXTRA, np.array(self.extra_r)),
             (H_R_REFERENCE, np.array(self.reference)),
         ]
+        head[H_ADDRESS : H_ADDRESS + len(NAMES)] = addresses()
         head[H_N_EXTRA_I], head[H_N_EXTRA_R] = len(self.extra_i), len(self.extra_r)
         head[H_N_FUNCTION_R] = len(self.function_r)
         head[H_Z], head[H_STATES], head[H_TAPES] = at["z"], len(self.states), len(self.tapes)

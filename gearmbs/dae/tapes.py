@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from numba import njit
 
+from gearmbs.dae import linkage
 from gearmbs.dae import tables as T
-from gearmbs.dae.expressions import eval_gradient, eval_second, eval_value, update_angles
+from gearmbs.dae.linkage import angles_at, gradient_at, second_at, value_at
 
 LINE = 0
 """Force f along the line from J to I."""
@@ -26,7 +27,7 @@ def value(k, t, y, tab):
     """Return the value of tape k."""
     row = tab.tape[k]
     i, r, a = row[T.TAPE_I], row[T.TAPE_R], row[T.TAPE_REFERENCE]
-    return eval_value(
+    return value_at(tab.address[linkage.VALUE])(
         tab.extra_i[i : i + row[T.TAPE_I_SIZE]],
         tab.extra_r[r : r + row[T.TAPE_R_SIZE]],
         t,
@@ -44,7 +45,7 @@ def gradient(k, t, y, tab, grad):
     """Return the value of tape k; write its spatial gradient to ``grad``."""
     row = tab.tape[k]
     i, r, a = row[T.TAPE_I], row[T.TAPE_R], row[T.TAPE_REFERENCE]
-    return eval_gradient(
+    return gradient_at(tab.address[linkage.GRADIENT])(
         tab.extra_i[i : i + row[T.TAPE_I_SIZE]],
         tab.extra_r[r : r + row[T.TAPE_R_SIZE]],
         t,
@@ -63,7 +64,7 @@ def second(k, t, y, tab, grad, hess):
     """Return the value of tape k with gradient and Hessian over [R, theta] of its bodies and time."""
     row = tab.tape[k]
     i, r, a = row[T.TAPE_I], row[T.TAPE_R], row[T.TAPE_REFERENCE]
-    return eval_second(
+    return second_at(tab.address[linkage.SECOND])(
         tab.extra_i[i : i + row[T.TAPE_I_SIZE]],
         tab.extra_r[r : r + row[T.TAPE_R_SIZE]],
         t,
@@ -96,7 +97,7 @@ def update_references(t, y, tab):
         row = tab.tape[k]
         if row[T.TAPE_REFERENCE_SIZE] > 0:
             i, r, a = row[T.TAPE_I], row[T.TAPE_R], row[T.TAPE_REFERENCE]
-            update_angles(
+            angles_at(tab.address[linkage.ANGLES])(
                 tab.extra_i[i : i + row[T.TAPE_I_SIZE]],
                 tab.extra_r[r : r + row[T.TAPE_R_SIZE]],
                 t,
