@@ -110,6 +110,7 @@ def build_model(
     allow_unsupported: bool = False,
     inactive: frozenset[tuple[str, int]] = frozenset(),
     state: Mapping[int, BodyState] | None = None,
+    span: tuple[float, float] = (0.0, 1.0),
 ) -> AdamsModel:
     """Build the mechanism of a deck.
 
@@ -122,6 +123,9 @@ def build_model(
         Elements a script has deactivated.
     state : mapping of int to BodyState, optional
         Where the parts are and how they move, by part id, instead of the deck's initial conditions.
+    span : tuple of float
+        Start of the analysis and about its end, in the deck's unit; motions given by their velocity or acceleration
+        start from it.
 
     Returns
     -------
@@ -134,7 +138,7 @@ def build_model(
     """
     if deck.unsupported and not allow_unsupported:
         raise DeckError(deck.unsupported)
-    builder = Builder(deck, inactive, state or {})
+    builder = Builder(deck, inactive, state or {}, span)
     model = builder.run()
     left_out = [d for d in builder.problems if d.severity == UNSUPPORTED]
     errors = [d for d in builder.problems if d.severity == ERROR]
@@ -151,8 +155,15 @@ def _markers(mechanism: Mechanism) -> list[Marker]:
 class Builder:
     """Adds a deck's statements to a mechanism one by one; use :func:`build_model`."""
 
-    def __init__(self, deck: Deck, inactive: frozenset[tuple[str, int]], state: Mapping[int, BodyState]) -> None:
+    def __init__(
+        self,
+        deck: Deck,
+        inactive: frozenset[tuple[str, int]],
+        state: Mapping[int, BodyState],
+        span: tuple[float, float],
+    ) -> None:
         self.deck = deck
+        self.span = span
         self.state = state
         self.units = deck.units
         self.inactive = inactive

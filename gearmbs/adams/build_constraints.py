@@ -143,27 +143,65 @@ def add_motion(b: Builder, s: st.Motion) -> None:
     """MOTION of a joint or between two markers, at displacement level."""
     name = b.model.names["motion", s.id]
     text = b.text(s.function or "")
-    if s.level in ("VELOCITY", "ACCELERATION"):
-        b.unsupported(s, f"a motion given by its {s.level}")
-        return
     if s.joint is None:
         measures = {"X": "DX", "Y": "DY", "Z": "DZ"}
         if s.direction in measures:
             shown = f"{measures[s.direction]}({s.i},{s.j},{s.j})"
+            start = _start(b, b.markers[s.i or 0], b.markers[s.j or 0], "XYZ".index(s.direction), False)
+        elif s.level in ("VELOCITY", "ACCELERATION"):
+            b.unsupported(s, f"{s.direction} of a motion given by its {s.level}")
+            return
         else:
             shown = f"ORIENT(1,{(s.direction or 'B1')[1]},{s.i},{s.j})"
-        b.mechanism.general_constraint(name, f"{shown} - ({text})")
+            start = (0.0, 0.0)
+        b.mechanism.general_constraint(name, f"{shown} - ({_displacement(b, s, text, start)})")
         return
     joint = b.joints.get(s.joint)
     if joint is None:
         raise ValueError(f"JOINT/{s.joint} is not active")
+    if joint.kind not in ("revolute", "translational", "cylindrical"):
+        raise ValueError(f"JOINT/{s.joint} is {joint.kind}; it must be revolute, translational or cylindrical")
     rotational = joint.kind == "revolute" or (joint.kind == "cylindrical" and s.direction == "ROTATIONAL")
     if joint.kind == "cylindrical" and s.direction is None:
         raise ValueError("give ROTATION or TRANSLATION for a motion of a cylindrical joint")
+    text = _displacement(b, s, text, _start(b, joint.i, joint.j, 2, rotational))
     if rotational:
         b.mechanism.rotation(name, joint, expression(text))
     else:
         b.mechanism.translation(name, joint, expression(_scaled(text, b.units.length)))
+
+
+def _start(b: Builder, i: Marker, j: Marker, axis: int, rotational: bool) -> tuple[float, float]:
+    """Return the angle about z of J, or the displacement along an axis of J, and its rate, in the deck's units."""
+    ai, aj = i.global_orientation(), j.global_orientation()
+    e = aj[:, axis]
+    if rotational:
+        angle = float(np.arctan2(ai[:, 0] @ aj[:, 1], ai[:, 0] @ aj[:, 0]))
+        rate = float(e @ (i.body.angular_velocity - j.body.angular_velocity))
+        return angle, rate / b.units.factor("angular_velocity")
+    apart = i.global_position() - j.global_position()
+    rate = float(e @ (_velocity(i) - _velocity(j)) + apart @ np.cross(j.body.angular_velocity, e))
+    return float(e @ apart) / b.units.length, rate / b.units.factor("velocity")
+
+
+def _velocity(marker: Marker) -> np.ndarray:
+    body = marker.body
+    return body.velocity + np.cross(body.angular_velocity, marker.global_position() - body.position)
+
+
+def _displacement(b: Builder, s: st.Motion, text: str, start: tuple[float, float]) -> str:
+    """Return a motion's displacement; a velocity or acceleration is integrated from the present time."""
+    if s.level not in ("VELOCITY", "ACCELERATION"):
+        return text
+    first, last = b.span
+    where = s.icdisp if s.icdisp is not None and not b.state else start[0]
+    once = f"INTEGRAL({text}, {first!r}, {last!r})"
+    if s.level == "VELOCITY":
+        return f"({where!r}) + {once}"
+    speed = s.icvel if s.icvel is not None and not b.state else start[1]
+    # the second integral of f is (t - t0) int f - int (t - t0) f
+    since = f"(TIME - ({first!r}))"
+    return f"({where!r}) + ({speed!r})*{since} + {since}*{once} - INTEGRAL({since}*({text}), {first!r}, {last!r})"
 
 
 def _scaled(text: str, factor: float) -> str:

@@ -205,7 +205,7 @@ def _simulate(
         raise _unsupported(command, f"SIMULATE/{kind} is not supported")
     times = _times(session, command)
     try:
-        model = _model(session, allow_unsupported)
+        model = _model(session, allow_unsupported, (session.time, float(times[-1])))
         options, note = _settings(session, tol)
         output_step = float(times[1] - times[0]) * session.deck.units.time
         options.setdefault("first_step", FIRST_STEP * output_step)
@@ -236,16 +236,16 @@ def _simulate(
     return segment
 
 
-def _model(session: _Session, allow_unsupported: bool) -> AdamsModel:
+def _model(session: _Session, allow_unsupported: bool, span: tuple[float, float]) -> AdamsModel:
     """Build the mechanism of the session's present state."""
     inactive = frozenset(session.inactive)
     if session.state is None:
         session.state = {}
-        model = build_model(session.deck, allow_unsupported, inactive)
+        model = build_model(session.deck, allow_unsupported, inactive, span=span)
         if not model.initial_motions:
             return model
         session.state = _with_initial_motions(model)
-    model = build_model(session.deck, allow_unsupported, inactive, session.state)
+    model = build_model(session.deck, allow_unsupported, inactive, session.state, span)
     for number, value in session.states.items():
         if number in model.mechanism.states:
             model.mechanism.states[number].start = value

@@ -51,7 +51,7 @@ def _step_integral(function: TimeFunction, time: float, value: float) -> str:
     if not math.isfinite(width) or width <= 0.0:
         raise ModelError(f"function {function.text}: its end must be later than its start")
     x = f"((TIME - ({t0 / time!r}))/{width / time!r})"
-    u = f"MAX(0, MIN(1, {x}))"
+    u = f"MAX(0, MIN({x}, 1))"
     if function.kind == tf.STEP5_INTEGRAL:
         inside = f"{u}**4*(2.5 - 3*{u} + {u}**2)"
     else:

@@ -212,6 +212,20 @@ def _spline(method: str, low: Lowering, call: Call) -> int:
     return low.builder.spline(data, method, order, low.node(call.args[0]), low.node(call.args[1]))
 
 
+def _integral(low: Lowering, call: Call) -> int:
+    """INTEGRAL(f, start, end): the integral of a function of TIME from ``start``; no function of ADAMS.
+
+    ``end`` says how far it is tabulated beforehand.
+    """
+    b = low.builder
+    value, *span = low.values(call)
+    start, end = (b.value_of(r) for r in span)
+    if start is None or end is None:
+        low.fail("the span of INTEGRAL must be constant", call.at)
+    seconds = low.scope.units.time
+    return b.binary(op.DIV, b.integral(value, start * seconds, end * seconds), b.constant(seconds))
+
+
 def _variable(low: Lowering, call: Call, ref: Ref | None = None) -> int:
     ref = low.ref(call.args[0]) if ref is None else ref
     if ref in low.scope.states:
@@ -298,6 +312,7 @@ def _table() -> dict[str, tuple[Function, int, int]]:
         "FORSIN": (partial(_fourier, op.SIN), 4, 34),
         "SHF": (_shf, 5, 6),
         "SWEEP": (_sweep, 7, 7),
+        "INTEGRAL": (_integral, 3, 3),
         "VARVAL": (_variable, 1, 1),
         "DIF": (_diff, 1, 1),
         "DIF1": (_diff_rate, 1, 1),

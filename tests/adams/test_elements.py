@@ -227,3 +227,22 @@ def test_force_on_an_impact_expression():
     np.testing.assert_allclose(energy, energy[0], rtol=1e-5)
     np.testing.assert_allclose(result.request(1)[:, 3], 1e5 * np.maximum(0.05 - z, 0) ** 1.5, atol=1e-4)
     assert z.min() < 0.05
+
+
+def test_motions_given_by_velocity_and_acceleration():
+    """A turn at 3 cos(t) rad/s from 20 degrees, a slide at 2 t m/s^2 from rest and one with ICVEL."""
+    turn = BLOCK.replace("MARKER/20,PART=2", "MARKER/20,PART=2,REULER=20D,0,0") + "JOINT/1,REVOLUTE,I=20,J=10\n"
+    turn += "MOTION/1,JOINT=1,ROTATION,VELOCITY,FUNCTION=3*COS(TIME)\n"
+    turn += "REQUEST/1,F2=AZ(20,10)\\F3=WZ(20,10)\\F4=WDTZ(20,10)\n"
+    result = run(model(turn), 4.0, 80)
+    t = result.t
+    np.testing.assert_allclose(result.request(1)[:, 1], np.radians(20) + 3 * np.sin(t), atol=1e-9)
+    np.testing.assert_allclose(result.request(1)[:, 2], 3 * np.cos(t), atol=1e-9)
+    np.testing.assert_allclose(result.request(1)[:, 3], -3 * np.sin(t), atol=1e-7)
+    slide = BLOCK + "JOINT/1,TRANSLATIONAL,I=20,J=10\nREQUEST/1,F2=DZ(20,10)\\F3=MOTION(1,0,4,0)\n"
+    result = run(model(slide + "MOTION/1,JOINT=1,TRANSLATION,ACCELERATION,FUNCTION=2*TIME"), 3.0)
+    np.testing.assert_allclose(result.request(1)[:, 1], result.t**3 / 3, atol=1e-8)
+    np.testing.assert_allclose(result.request(1)[:, 2], 4 * result.t, atol=1e-6)
+    point = BLOCK + "JPRIM/1,ORIENTATION,I=20,J=10\nREQUEST/1,F2=DX(20,10)\n"
+    result = run(model(point + "MOTION/1,I=20,J=10,X,ACCELERATION,ICVEL=-1,ICDISP=0.5,FUNCTION=SIN(TIME)"), 3.0)
+    np.testing.assert_allclose(result.request(1)[:, 1], 0.5 - np.sin(result.t), atol=1e-8)

@@ -174,3 +174,40 @@ def test_arrays_and_plants():
     assert at("PINVAL(2,1)", 0.5, **scope) == 0.5
     with pytest.raises(ExpressionError, match="from 1 to 2"):
         at("ARYVAL(3,3)", 0.0, **scope)
+
+
+@pytest.mark.parametrize(
+    ("text", "exact"),
+    [
+        ("3*COS(2*TIME)", lambda t: 1.5 * np.sin(2 * t)),
+        ("STEP(TIME,0.2,0,0.7,5)", lambda t: 5 * (t - 0.45)),
+        ("POLY(TIME,0,1,2,3)", lambda t: t + t**2 + t**3),
+        ("EXP(-TIME)*TIME", lambda t: 1 - (1 + t) * np.exp(-t)),
+        ("7", lambda t: 7 * t),
+    ],
+)
+def test_integrals_over_time(text, exact):
+    """Inside the table, beyond it, and its derivatives: the integrand and the integrand's slope."""
+    tape = compile_expression(f"2*INTEGRAL({text},0,1)", Scope())
+    integrand = compile_expression(f"({text})+0*TIME+TIME-TIME", Scope())
+    for t in (0.83, 1.0, 4.7):
+        f, f1, f2 = time_series(tape, t)
+        assert f == pytest.approx(2 * exact(t), rel=1e-11, abs=1e-11)
+        if integrand.constant is None:
+            g, g1, _ = time_series(integrand, t)
+            assert (f1, f2) == pytest.approx((2 * g, 2 * g1), rel=1e-13, abs=1e-13)
+
+
+def test_integral_starts_where_told_and_refuses_what_is_not_time():
+    tape = compile_expression("INTEGRAL(TIME,2,3)", Scope(units=Units(time=1e-3)))
+    # in ms: from 2 ms to 10 ms, (100 - 4)/2
+    assert time_series(tape, 0.010)[0] == pytest.approx(48.0, rel=1e-12)
+    world = World(1)
+    with pytest.raises(ExpressionError, match="only a function of TIME"):
+        world.compile("INTEGRAL(DX(1,2),0,1)")
+    with pytest.raises(ExpressionError, match="only a function of TIME"):
+        world.compile("INTEGRAL(INTEGRAL(TIME,0,1),0,1)")
+    _, gradient, hessian = world.second(world.compile("DX(1,2)*INTEGRAL(COS(TIME),0,1)"), t=0.4)
+    displacement = world.value(world.compile("DX(1,2)"))
+    assert gradient[-1] == pytest.approx(displacement * np.cos(0.4), rel=1e-12)
+    assert hessian[-1, -1] == pytest.approx(-displacement * np.sin(0.4), rel=1e-12)

@@ -12,6 +12,7 @@ import math
 from numba import njit
 
 from gearmbs.dae.expressions import opcodes as op
+from gearmbs.dae.expressions.integrals import integral
 from gearmbs.dae.expressions.measure_gradients import (
     cosine_gradient,
     euler_parameter_gradient,
@@ -104,6 +105,8 @@ def _forward(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, work,
             a = work[ints[at + 1]]
             if code == op.UNWRAP:
                 d = (unwrap_angle(a, ref[ints[at + 2]]), 1.0, 0.0)
+            elif code == op.INTEGRAL:
+                d = (integral(ints, floats, t, ints[at + 1], ints[at + 2], work[work.size - n :]), 0.0, 0.0)
             else:
                 d = unary(code, a, float(ints[at + 2]))
             work[k] = d[0]
@@ -229,10 +232,13 @@ def eval_time(ints, floats, t, out, work):
             f, f1, f2 = t, 1.0, 0.0
         elif op.FIRST_UNARY <= code <= op.LAST_UNARY:
             a = ints[at + 1]
-            d = unary(code, work[a], float(ints[at + 2]))
+            d = (0.0, 0.0, 0.0) if code == op.INTEGRAL else unary(code, work[a], float(ints[at + 2]))
             f = d[0]
             f1 = f2 = 0.0
-            if work[n + a] != 0.0 or work[2 * n + a] != 0.0:
+            if code == op.INTEGRAL:
+                f = integral(ints, floats, t, a, ints[at + 2], work[work.size - n :])
+                f1, f2 = work[a], work[n + a]
+            elif work[n + a] != 0.0 or work[2 * n + a] != 0.0:
                 f1 = d[1] * work[n + a]
                 f2 = d[2] * work[n + a] ** 2 + d[1] * work[2 * n + a]
         elif op.FIRST_BINARY <= code <= op.LAST_BINARY:
@@ -277,6 +283,11 @@ def _combine_rows(ints, at, k, n, work, rows):
             rows[k, q] = rows[s, q]
         return
     a = ints[at + 1]
+    if ints[at] == op.INTEGRAL:
+        for q in range(columns):
+            rows[k, q] = 0.0
+        rows[k, columns - 1] = work[a]
+        return
     pa = work[count + k]
     for q in range(columns):
         rows[k, q] = pa * rows[a, q] if rows[a, q] != 0.0 else 0.0
@@ -293,6 +304,10 @@ def _curvature(ints, at, k, weight, work, rows, hess):
     """Add the second partials of a scalar instruction, times its operands' gradients, to the Hessian."""
     count = ints[op.HEAD_COUNT]
     aa, ab, bb = work[3 * count + k], work[4 * count + k], work[5 * count + k]
+    if ints[at] == op.INTEGRAL:
+        last = rows.shape[1] - 1
+        hess[last, last] += weight * rows[ints[at + 1], last]
+        return
     if ints[at] == op.SELECT or (aa == 0.0 and ab == 0.0 and bb == 0.0):
         return
     a = ints[at + 1]

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -46,7 +47,7 @@ class SplineData:
     linear_extrapolate: bool = False
 
     def __post_init__(self) -> None:
-        rows = self.y if len(self.y) and np.ndim(self.y[0]) else (self.y,)
+        rows: Any = self.y if len(self.y) and np.ndim(self.y[0]) else (self.y,)
         for name, values in (("x", self.x), ("z", self.z)):
             object.__setattr__(self, name, tuple(float(v) for v in values))
         object.__setattr__(self, "y", tuple(tuple(float(v) for v in row) for row in rows))

@@ -10,6 +10,7 @@ import numpy as np
 
 from gearmbs.dae.expressions import opcodes as op
 from gearmbs.dae.expressions.evaluate import JACOBIAN_AT
+from gearmbs.dae.expressions.integrals import integral_table, time_value
 from gearmbs.dae.expressions.measures import LEAF_WORK
 from gearmbs.dae.expressions.scalar import binary, unary
 from gearmbs.dae.expressions.splines import SplineData, spline_table
@@ -64,6 +65,8 @@ class Tape:
         Whether ``eval_second`` may be used: only TIME and position-level leaves with a Hessian.
     text : str
         The source.
+    integrates : bool
+        Whether the value holds an integral over time.
     """
 
     ints: np.ndarray
@@ -74,6 +77,7 @@ class Tape:
     level: int
     second_order: bool
     text: str = ""
+    integrates: bool = False
 
     @property
     def length(self) -> int:
@@ -94,11 +98,11 @@ class Tape:
     def work_size(self) -> int:
         """Scratch that suffices for every evaluator the tape may be used with."""
         n = self.length
-        first = 4 * n + LEAF_WORK
-        if not self.second_order:
-            return first
-        c = self.second_size
-        return max(first, 7 * n + n * c + JACOBIAN_AT + 6 * c)
+        size = 4 * n + LEAF_WORK
+        if self.second_order:
+            c = self.second_size
+            size = max(size, 7 * n + n * c + JACOBIAN_AT + 6 * c)
+        return size + n if self.integrates else size
 
     @property
     def constant(self) -> float | None:
@@ -158,7 +162,7 @@ class TapeBuilder:
     def unary(self, code: int, a: int, parameter: int = 0) -> int:
         """Return the register of a one-operand operation."""
         value = self.value_of(a)
-        if value is not None and code != op.UNWRAP:
+        if value is not None and code not in (op.UNWRAP, op.INTEGRAL):
             return self.constant(self._fold(unary.py_func, code, value, float(parameter)))
         if code == op.NEG and self._code[a][0] == op.NEG:
             return self._code[a][1]
@@ -254,6 +258,34 @@ class TapeBuilder:
         self._angles += 1
         return self._emit(op.UNWRAP, a, self._angles - 1)
 
+    def integral(self, a: int, start: float, end: float) -> int:
+        """Return the register of the integral of a function of time from ``start`` to t.
+
+        Parameters
+        ----------
+        a : int
+            Register of the function.
+        start, end : float
+            Span over which the integral is tabulated; later times take longer to evaluate.
+        """
+        tape = self.finish(a)
+        if tape.level > LEVEL_TIME or tape.integrates:
+            raise ExpressionError("only a function of TIME, itself without an integral, can be integrated")
+        if not end > start:
+            raise ExpressionError(f"the end {end} of the span must be later than its start {start}")
+        work = np.zeros(tape.work_size)
+        register = int(tape.ints[op.HEAD_RESULT])
+
+        def values(times: np.ndarray) -> np.ndarray:
+            return np.array([time_value(tape.ints, tape.floats, t, register, work) for t in times])
+
+        table = integral_table(values, start, end)
+        if not np.all(np.isfinite(table)):
+            raise ExpressionError("the function is not finite over the span")
+        at = len(self._floats)
+        self._floats.extend(table.tolist())
+        return self._emit(op.INTEGRAL, a, at)
+
     def finish(self, result: int, text: str = "") -> Tape:
         """Return the tape with ``result`` as its value; instructions it does not need are dropped."""
         if len(self._code) > 200_000:
@@ -278,6 +310,8 @@ class TapeBuilder:
                 if c[0] == op.UNWRAP:
                     row[2] = angle_slot[c[2]]
         levels = [_LEAF_LEVEL[c[0]] for c in used if c[0] <= op.LAST_LEAF]
+        if any(c[0] == op.INTEGRAL for c in used):
+            levels.append(LEVEL_TIME)
         smooth = {op.CONST, op.TIME, op.DISPLACEMENT, op.COSINE}
         body_at = op.HEAD_SIZE
         algebraic_at = body_at + len(bodies)
@@ -293,6 +327,7 @@ class TapeBuilder:
             level=max(levels, default=LEVEL_CONSTANT),
             second_order=all(c[0] in smooth for c in used if c[0] <= op.LAST_LEAF),
             text=text,
+            integrates=any(c[0] == op.INTEGRAL for c in used),
         )
 
     def _needed(self, result: int) -> list[int]:
