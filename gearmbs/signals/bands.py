@@ -126,6 +126,15 @@ def gmf_rms(
         If GMF is not given and speed or teeth are unknown.
     SignalError
         If a harmonic's band does not fit below half the sampling rate, or the record is too short.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from gearmbs.signals import make_signal
+    >>> t = np.arange(12800) / 12800.0
+    >>> signal = make_signal(np.cos(2 * np.pi * 480 * t) + 0.5 * np.cos(2 * np.pi * 960 * t), 12800.0, units="m/s^2")
+    >>> gmf_rms(signal, 480.0)["orders"].values.round(4).ravel().tolist()
+    [0.7071, 0.3536, 0.0]
     """
     gmf = mesh_frequency(signal, speed, teeth) if gmf is None else float(gmf)
     if not (math.isfinite(gmf) and gmf > 0.0):

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-
-import pint
+from typing import Any
 
 from .errors import SignalError
 
@@ -22,9 +21,11 @@ def unit_kind(unit: str) -> tuple[str, float]:
     SignalError
         If the unit is unknown or of another kind.
     """
+    from pint.errors import PintError
+
     try:
         return _kind(unit)
-    except (pint.errors.PintError, AttributeError, ValueError, TypeError, AssertionError) as exc:
+    except (PintError, AttributeError, ValueError, TypeError, AssertionError) as exc:
         raise SignalError(
             f"units: {unit!r} is not a unit of displacement, velocity, acceleration or force; "
             "set the right one with with_metadata(signal, units=...)"
@@ -44,5 +45,7 @@ def _kind(unit: str) -> tuple[str, float]:
 
 
 @lru_cache(maxsize=1)
-def _registry() -> pint.UnitRegistry:
+def _registry() -> Any:
+    import pint
+
     return pint.UnitRegistry()

@@ -74,6 +74,12 @@ def make_signal(
         If `rate` is None.
     SignalError
         If the shapes do not agree, there are no samples, a sample is not finite, or a value is out of range.
+
+    Examples
+    --------
+    >>> signal = make_signal({"laser": [0.0, 0.1, 0.0, -0.1]}, 12800.0, units="m/s", speed=104.72, teeth=29)
+    >>> signal.dims, signal.attrs["units"], round(mesh_frequency(signal), 1)
+    (('time', 'channel'), 'm/s', 483.3)
     """
     if isinstance(data, Mapping):
         channels = [str(key) for key in data] if channels is None else channels
