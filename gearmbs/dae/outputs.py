@@ -10,12 +10,17 @@ from numba import float64, int64, njit, types
 from gearmbs.dae import index1
 from gearmbs.dae import tables as T
 from gearmbs.dae.jacobian import COUNT, NUMBERS, PLACES, compressed
+from gearmbs.dae.rereference import track
 from gearmbs.dae.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, PLAN_TYPE, analyse, factor, new_factors, solve
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
 _CUBE = float64[:, :, ::1]
 _IVEC = int64[::1]
+
+
+FARTHEST = 1e-3
+"""A constraint farther off than this belongs to an angle whose full turns were not counted; it is left alone."""
 
 
 class Records(NamedTuple):
@@ -92,6 +97,7 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
             if idata[T.H_MODE] == COUNT:
                 vals[0] = count
             return last
+        track(t[k], at, idata, rdata, work)
         index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, rows == 0)
         if not factor(plan, factors, vals) <= GROWTH_LIMIT:
             return k
@@ -99,7 +105,7 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
             # the nearest position and velocity, in the metric of the masses, that satisfy the constraints
             rhs[:base] = 0.0
             for r in range(rows):
-                rhs[base + r] = -phi[3 * r]
+                rhs[base + r] = 0.0 if abs(phi[3 * r]) > FARTHEST else -phi[3 * r]
             solve(plan, factors, rhs, moved)
             for r in range(rows):
                 rhs[base + r] = -phi[3 * r + 1]
@@ -153,7 +159,7 @@ def evaluate(t, y, epochs, idata, rdata, work_size, records: Records) -> None:
         If the equations of motion have no unique solution at an output time.
     """
     indptr, indices, slots = pattern(idata, rdata, work_size)
-    work, vals = np.zeros(work_size), np.zeros(indices.size)
+    work, vals, rdata = np.zeros(work_size), np.zeros(indices.size), rdata.copy()
     bounds = [row for row, _ in epochs] + [t.size]
     ones = np.ones(indptr.size - 1)
     y = np.ascontiguousarray(y)

@@ -69,6 +69,12 @@ def track_angles(t, y, idata, tab):
             tab.reference[k] += turn - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
 
 
+@njit("void(float64, float64[::1], int64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy")
+def track(t, y, idata, rdata, work):
+    """Count the turns of all counted angles up to a later point, less than half a turn away."""
+    track_angles(t, y, idata, T.unpack(idata, rdata, work))
+
+
 @njit(HOOK_SIG, cache=True, error_model="numpy")
 def hook(t, hist, npast, idata, rdata, work):
     """Switch references where due; update the reference of each counted angle. Return 1 if hist changed."""

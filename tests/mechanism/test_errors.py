@@ -1,0 +1,182 @@
+"""Wrong models get an error that names the part and says what to do."""
+
+import numpy as np
+import pytest
+
+from gearmbs.mechanism import AssemblyError, Mechanism, ModelError, SingularModelError, ramp, step
+
+UNIT = (1.0, 1.0, 1.0)
+
+
+def pendulum() -> Mechanism:
+    m = Mechanism("pendulum", gravity=(0, 0, -9.81))
+    rod = m.body("rod", 1.0, (0.1, 0.1, 0.01), position=(0.5, 0, 0))
+    m.revolute("pin", rod, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+    return m
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"mass": -1.0}, "body 'b': mass = -1.0 kg"),
+        ({"mass": float("nan")}, "body 'b': mass = nan"),
+        ({"inertia": (1, -1, 1)}, "body 'b': inertia"),
+        ({"inertia": (1, 2)}, "give 3 moments"),
+        ({"inertia": [[1, 2, 0], [0, 1, 0], [0, 0, 1]]}, "not symmetric"),
+        ({"position": (0, 0)}, "body 'b': position"),
+        ({"position": (0, np.inf, 0)}, "not three finite numbers"),
+        ({"orientation": 2 * np.eye(3)}, "not a rotation"),
+        ({"velocity": "fast"}, "body 'b': velocity"),
+    ],
+)
+def test_bad_body(options, words):
+    values = {"mass": 1.0, "inertia": UNIT, **options}
+    with pytest.raises(ModelError, match=words):
+        Mechanism().body("b", **values)
+
+
+def test_names_are_unique_and_belong():
+    m = pendulum()
+    with pytest.raises(ModelError, match="body 'rod': the name is in use"):
+        m.body("rod", 1.0, UNIT)
+    with pytest.raises(ModelError, match="in use"):
+        m.revolute("pin", m.bodies["rod"], m.ground)
+    stranger = Mechanism().body("other", 1.0, UNIT)
+    with pytest.raises(ModelError, match="'other' does not belong"):
+        m.fixed("weld", stranger, m.ground)
+
+
+def test_bad_joints():
+    m = pendulum()
+    rod = m.bodies["rod"]
+    with pytest.raises(ModelError, match="kind 'rubber' is unknown; choose one of"):
+        m.joint("rubber", "x", rod, m.ground)
+    with pytest.raises(ModelError, match="both markers are on body 'rod'"):
+        m.fixed("weld", rod, rod)
+    with pytest.raises(ModelError, match="the zero vector"):
+        m.revolute("x", rod, m.ground, axis=(0, 0, 0))
+    with pytest.raises(ModelError, match="must be translational or cylindrical"):
+        m.translation("push", m.joints["pin"], 1.0)
+    with pytest.raises(ModelError, match="positive length"):
+        m.distance("stick", rod.marker(), m.ground.marker(), length=-1)
+    with pytest.raises(ModelError, match="later than its start"):
+        step(1.0, 0.0, 1.0, 1.0)
+    with pytest.raises(ModelError, match="cannot be negative"):
+        ramp(1.0, over=-1.0)
+
+
+def test_empty_mechanism():
+    with pytest.raises(ModelError, match="it has no bodies"):
+        Mechanism("nothing").compile()
+
+
+def test_bad_expression_names_element_and_place():
+    m = pendulum()
+    tip = m.bodies["rod"].marker((0.5, 0, 0), name="tip")
+    m.line_force("spring", tip, m.ground.marker((0, 0, 2), name="hook"), "-10*(DM(tip, hok) - 1)")
+    with pytest.raises(ModelError, match=r"sforce 'spring'.*(?i:hok)"):
+        m.compile()
+
+
+def test_general_constraint_of_velocities_is_refused():
+    m = pendulum()
+    m.bodies["rod"].marker(name="tip")
+    m.general_constraint("odd", "VX(tip) - 1")
+    with pytest.raises(ModelError, match="positions and TIME only"):
+        m.compile()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"t_end": -1.0}, "t_end = -1.0"),
+        ({"t_end": float("nan")}, "t_end = nan"),
+        ({"t_end": 1.0, "integrator": "EULER"}, "integrator: 'EULER' is unknown"),
+        ({"t_end": 1.0, "formulation": "SI9"}, "formulation: 'SI9' is unknown"),
+        ({"t_end": 1.0, "tol": -1.0}, "tol = -1.0"),
+        ({"t_end": 1.0, "rate": 0.0}, "rate = 0.0"),
+    ],
+)
+def test_bad_simulation_options(options, words):
+    with pytest.raises(ModelError, match=words):
+        pendulum().simulate(**options)
+
+
+def test_redundant_constraints_are_named_and_set_aside():
+    """A planar four-bar in space with four revolutes: Kutzbach counts 24 - 4 x 5 - ... = -2, three rows too many."""
+    m = Mechanism("four-bar", gravity=(0, -9.81, 0))
+    points = [(0, 0, 0), (0, 1, 0), (2, 1, 0), (2, 0, 0)]
+    bars = []
+    for k in range(3):
+        a, b = np.array(points[k]), np.array(points[k + 1])
+        bars.append(m.body(f"bar{k + 1}", 1.0, (0.1, 0.1, 0.1), position=(a + b) / 2))
+    chain = [m.ground, *bars, m.ground]
+    for k, point in enumerate(points):
+        m.revolute(f"pin{k + 1}", chain[k + 1], chain[k], at=point, axis=(0, 0, 1))
+    system = m.compile()
+    report = system.initialise()
+    # 18 coordinates, 20 rows, of which three repeat that the mechanism is planar
+    assert report.degrees_of_freedom == 1
+    assert len(report.redundant) == 3
+    assert all(name.startswith("pin4") for name in report.redundant)
+    assert "pin4" in str(report)
+    solution = m.simulate(0.5, integrator="IDA", tol=1e-8)
+    assert solution.success
+    assert solution.constraint_violation.max() < 1e-9
+
+
+def test_conflicting_constraints():
+    m = Mechanism("conflict")
+    body = m.body("b", 1.0, UNIT)
+    m.fixed("weld", body, m.ground)
+    m.distance("stick", body.marker((0, 0, 0)), m.ground.marker((1, 0, 0)), length=2.0)
+    with pytest.raises(AssemblyError, match="stick"):
+        m.compile().initialise()
+
+
+def test_impossible_assembly():
+    m = Mechanism("too short")
+    body = m.body("b", 1.0, UNIT, position=(1, 0, 0))
+    m.spherical("ball", body, m.ground, at=(0, 0, 0))
+    m.distance("stick", body.marker((0, 0, 0)), m.ground.marker((10, 3, 0)), length=1.0)
+    with pytest.raises(AssemblyError, match="cannot be assembled"):
+        m.compile().initialise()
+
+
+def test_massless_free_body():
+    m = Mechanism("massless")
+    m.body("ghost", 0.0, (0, 0, 0))
+    with pytest.raises(SingularModelError, match="body 'ghost' can move without any inertia"):
+        m.compile().problem()
+
+
+def test_massless_held_body_is_fine():
+    m = Mechanism("carried", gravity=(0, 0, -9.81))
+    weight = m.body("weight", 2.0, UNIT)
+    ghost = m.body("ghost", 0.0, (0, 0, 0))
+    m.fixed("weld", ghost, weight)
+    solution = m.simulate(1.0, integrator="IDA", tol=1e-8)
+    # free fall: z = -g t^2 / 2
+    assert solution.position("ghost")[-1, 2] == pytest.approx(-4.905, abs=1e-6)
+
+
+def test_repr_lists_the_parts():
+    text = repr(pendulum())
+    assert "6 coordinates, 5 constraint rows" in text
+    assert "'rod'" in text
+    assert "revolute" in text
+
+
+def test_unknown_names_in_results():
+    solution = pendulum().simulate(0.1, integrator="IDA")
+    with pytest.raises(KeyError, match="the bodies are rod"):
+        solution.position("arm")
+    with pytest.raises(KeyError, match="the joints are pin"):
+        solution.reaction("hinge")
+
+
+def test_table_of_unknowns():
+    table = pendulum().compile().unknowns_table()
+    assert "theta_psi(rod)" in table
+    assert "lambda(pin: coincident x)" in table
+    assert "(5), (7)" in table

@@ -1,0 +1,145 @@
+"""Motions against closed solutions: what the equations must give whatever the integrator."""
+
+import numpy as np
+import pytest
+from scipy.special import ellipk
+
+from gearmbs.mechanism import Mechanism, harmonic, polynomial, ramp
+
+INTEGRATORS = ("IDA", "WSTIFF")
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize("formulation", ["SI2", "SI1"])
+def test_pendulum_period(integrator, formulation):
+    """Point pendulum of length 1 m from rest at 90 degrees: T = 4 sqrt(l/g) K(sin^2 45), K the elliptic integral."""
+    m = Mechanism("pendulum", gravity=(0, 0, -9.81))
+    bob = m.body("bob", 1.0, (1e-9, 1e-9, 1e-9), position=(1, 0, 0))
+    m.revolute("pin", bob, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+    period = 4.0 * np.sqrt(1.0 / 9.81) * ellipk(0.5)
+    solution = m.simulate(period, integrator=integrator, formulation=formulation, tol=1e-9)
+    assert solution.success, solution.message
+    np.testing.assert_allclose(solution.position("bob")[-1], [1, 0, 0], atol=2e-7)
+    # at the lowest point (T/4) the pin carries m g + m v^2/l = 3 m g
+    force, _ = m.simulate(period / 4, integrator=integrator, tol=1e-9).reaction("pin")
+    np.testing.assert_allclose(force[-1], [0, 0, 3 * 9.81], atol=1e-5)
+
+
+def test_free_fall_and_spin():
+    m = Mechanism("stone", gravity=(0, 0, -9.81))
+    m.body("stone", 2.0, (1, 1, 1), velocity=(1, 2, 3), angular_velocity=(0, 0, 5), com=(0.1, 0, 0))
+    solution = m.simulate(1.0, integrator="IDA", tol=1e-9)
+    # the centre of mass starts at (0.1, 0, 0) with v + w x r = (1, 2.5, 3)
+    np.testing.assert_allclose(solution.position("stone")[-1], [1.1, 2.5, 3 - 4.905], atol=1e-7)
+    np.testing.assert_allclose(solution.angular_velocity("stone")[-1], [0, 0, 5], atol=1e-8)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_tumbling_body_keeps_energy_and_angular_momentum(integrator):
+    """Intermediate-axis tumbling crosses the Euler singularity again and again; A J A^T w is constant."""
+    moments = np.diag([1.0, 2.0, 3.0])
+    m = Mechanism("tumbler")
+    m.body("t", 1.0, (1.0, 2.0, 3.0), angular_velocity=(1e-3, 10.0, 0.0))
+    solution = m.simulate(10.0, rate=100, integrator=integrator, tol=1e-10)
+    assert solution.success, solution.message
+    assert len(solution.result.epochs) > 3
+    a, w = solution.orientation("t"), solution.angular_velocity("t")
+    h = np.einsum("tij,jk,tlk,tl->ti", a, moments, a, w)
+    limit = 1e-8 if integrator == "WSTIFF" else 1e-6
+    assert np.abs(h - h[0]).max() < limit * np.linalg.norm(h[0])
+    assert np.abs(solution.kinetic_energy / solution.kinetic_energy[0] - 1).max() < limit
+
+
+def test_wheel_spinning_about_its_own_axis_along_global_z():
+    """Exactly on the singularity of the plain 3-1-3 angles; the angle is known: phi(t) = 100 t."""
+    m = Mechanism("wheel")
+    wheel = m.body("w", 1.0, (0.5, 0.5, 1.0))
+    pin = m.revolute("pin", wheel, m.ground, axis=(0, 0, 1))
+    m.rotation("drive", pin, polynomial([0.0, 100.0]))
+    solution = m.simulate(60.0, integrator="IDA", tol=1e-8)
+    turned = solution.orientation("w")[:, :, 0]
+    angle = 100.0 * solution.t
+    np.testing.assert_allclose(turned[:, 0], np.cos(angle), atol=1e-8)
+    np.testing.assert_allclose(turned[:, 1], np.sin(angle), atol=1e-8)
+    assert solution.constraint_violation.max() < 1e-12
+
+
+def test_prescribed_rotation_needs_the_torque_j_alpha():
+    """Reaction of the drive is J f''(t) about z; f is the integral of STEP, closed form."""
+    m = Mechanism("drive")
+    wheel = m.body("w", 1.0, (0.5, 0.5, 2.0))
+    pin = m.revolute("pin", wheel, m.ground)
+    function = ramp(30.0, over=0.5)
+    m.rotation("drive", pin, function)
+    solution = m.simulate(0.5, integrator="IDA", tol=1e-9)
+    _, moment = solution.reaction("drive")
+    expected = 2.0 * np.array([function.derivatives(t)[2] for t in solution.t])
+    np.testing.assert_allclose(moment[:, 2], expected, atol=1e-8 * np.abs(expected).max())
+
+
+def test_prescribed_translation_and_expression_agree():
+    def moved(function):
+        m = Mechanism("slide")
+        block = m.body("b", 3.0, (1, 1, 1))
+        slide = m.translational("slide", block, m.ground, axis=(1, 0, 0))
+        m.translation("push", slide, function)
+        return m.simulate(1.0, integrator="IDA", tol=1e-9)
+
+    closed, text = moved(harmonic(0.2, 3.0)), moved("0.2*SIN(3*TIME)")
+    np.testing.assert_allclose(closed.position("b"), text.position("b"), atol=1e-8)
+    # m x'' = -m A w^2 sin(w t)
+    force, _ = text.reaction("push")
+    np.testing.assert_allclose(force[:, 0], -3.0 * 0.2 * 9.0 * np.sin(3.0 * text.t), atol=1e-7)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_spring_damper_oscillator(integrator):
+    """m x'' + c x' + k x = 0 from x0: x = x0 e^{-d t} (cos(w t) + d/w sin(w t))."""
+    m = Mechanism("oscillator")
+    mass = m.body("m", 2.0, (1, 1, 1), position=(1.1, 0, 0))
+    m.translational("guide", mass, m.ground, axis=(1, 0, 0))
+    hook = m.ground.marker((0, 0, 0), name="hook")
+    m.spring_damper("spring", mass.marker(name="eye"), hook, stiffness=200.0, damping=4.0, length=1.0)
+    solution = m.simulate(2.0, integrator=integrator, tol=1e-9)
+    d, w = 1.0, np.sqrt(99.0)
+    x = 1.0 + 0.1 * np.exp(-d * solution.t) * (np.cos(w * solution.t) + d / w * np.sin(w * solution.t))
+    np.testing.assert_allclose(solution.position("m")[:, 0], x, atol=5e-8)
+
+
+def test_screw_advances_by_its_pitch():
+    m = Mechanism("screw")
+    nut = m.body("nut", 1.0, (1, 1, 1), angular_velocity=(0, 0, 2 * np.pi), velocity=(0, 0, 0.01))
+    m.screw("thread", nut, m.ground, pitch=0.01)
+    solution = m.simulate(5.0, integrator="IDA", tol=1e-9)
+    # five free turns: 50 mm
+    assert solution.position("nut")[-1, 2] == pytest.approx(0.05, abs=1e-8)
+
+
+def test_coupler_is_a_gear():
+    """Two wheels coupled -2 : 1; J1 a1 = T - 2 ... gives a1 = T / (J1 + 4 J2)."""
+    m = Mechanism("gears")
+    one, two = m.body("one", 1.0, (1, 1, 0.1)), m.body("two", 1.0, (1, 1, 0.2), position=(1, 0, 0))
+    pins = [m.revolute(f"pin {b.name}", b, m.ground, at=b.position) for b in (one, two)]
+    m.coupler("gear", [(pins[0], 2.0), (pins[1], 1.0)])
+    m.torque("motor", one, 0.9)
+    solution = m.simulate(2.0, integrator="IDA", tol=1e-9)
+    np.testing.assert_allclose(solution.angular_velocity("one")[-1, 2], 0.9 / (0.1 + 4 * 0.2) * 2.0, rtol=1e-7)
+    np.testing.assert_allclose(solution.angular_velocity("two")[-1, 2], -4.0, rtol=1e-7)
+
+
+def test_energy_balance_of_a_driven_oscillator():
+    m = Mechanism("driven", gravity=(0, 0, -9.81))
+    arm = m.body("arm", 1.0, (0.1, 0.1, 0.1), position=(0.5, 0, 0))
+    pin = m.revolute("pin", arm, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+    m.rotation("drive", pin, harmonic(0.5, 4.0))
+    balance = m.simulate(2.0, rate=2000, integrator="IDA", tol=1e-9).energy_balance()
+    assert balance.attrs["relative_imbalance"] < 1e-6
+
+
+def test_same_run_twice_is_bit_identical():
+    m = Mechanism("p", gravity=(0, 0, -9.81))
+    bob = m.body("bob", 1.0, (0.1, 0.1, 0.1), position=(1, 0, 0))
+    m.spherical("pin", bob, m.ground, at=(0, 0, 0))
+    for integrator in INTEGRATORS:
+        first, second = (m.simulate(1.0, integrator=integrator).result.y for _ in range(2))
+        assert np.array_equal(first, second)
