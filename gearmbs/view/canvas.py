@@ -1,0 +1,147 @@
+"""Figures without global state: colours everyone can tell apart, one look for all plots, whole files only."""
+
+from __future__ import annotations
+
+import io
+import os
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
+SKY, PURPLE, YELLOW, BLACK = "#56B4E9", "#CC79A7", "#F0E442", "#222222"
+GREY = "#8A8F98"
+COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION, BLACK, YELLOW)
+"""Palette of Okabe and Ito, distinguishable under the common forms of colour blindness."""
+
+DPI = 200
+
+LOOK = {
+    "font.size": 10.0,
+    "axes.titlesize": 11.0,
+    "axes.labelsize": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "grid.color": "#DADDE2",
+    "grid.linewidth": 0.7,
+    "axes.edgecolor": "#555555",
+    "axes.titlelocation": "left",
+    "legend.frameon": False,
+    "legend.fontsize": 9.0,
+    "lines.linewidth": 1.3,
+    "svg.hashsalt": "gearmbs",
+    "svg.fonttype": "path",
+}
+
+UNITS = {
+    "m/s^2": "m/s²",
+    "m s^-2": "m/s²",
+    "m/s": "m/s",
+    "N m": "N m",
+    "um": "µm",
+    "dimensionless": "",
+    "1": "",
+    "mixed": "",
+    "unknown": "unknown unit",
+}
+
+
+class Picture(Figure):
+    """A matplotlib figure that shows itself in notebooks without any backend being chosen."""
+
+    def _repr_png_(self) -> bytes:
+        return png_bytes(self, dpi=110)
+
+
+@contextmanager
+def look() -> Iterator[None]:
+    """Apply the common look while a figure is made, and nothing of it afterwards."""
+    with matplotlib.rc_context(LOOK):
+        yield
+
+
+def new_figure(width: float = 6.4, height: float = 4.0) -> Picture:
+    """Return an empty figure, size in inches, that lays itself out."""
+    return Picture(figsize=(width, height), layout="constrained")
+
+
+def drawn_on(ax: Axes | None, width: float = 6.4, height: float = 4.0) -> tuple[Figure, Axes]:
+    """Return the figure and axes to draw on: the caller's, or new ones."""
+    if ax is None:
+        figure = new_figure(width, height)
+        return figure, figure.subplots()
+    owner = ax.get_figure(root=True)
+    if owner is None:
+        raise ValueError("ax: these axes belong to no figure; make them with Figure.subplots()")
+    return owner, ax
+
+
+def unit_text(unit: object) -> str:
+    """Return a unit as it is written in a label."""
+    text = str(unit or "").strip()
+    return UNITS.get(text, text.replace("^2", "²").replace("^3", "³"))
+
+
+def label(quantity: str, unit: object = "") -> str:
+    """Return an axis label, quantity and unit."""
+    text = unit_text(unit)
+    return f"{quantity}, {text}" if text else quantity
+
+
+def legend_below(ax: Axes, columns: int = 3) -> None:
+    """Put the legend under the axes where it hides no data."""
+    handles, labels = ax.get_legend_handles_labels()
+    if handles:
+        ax.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=columns)
+
+
+def png_bytes(figure: Figure, dpi: float = DPI) -> bytes:
+    """Return a figure as a PNG image."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path in the same folder; rename it to ``path`` on success, remove it on failure."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:8]}{path.suffix}")
+    try:
+        yield part
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def save_figure(figure: Figure, stem: str | Path, *, dpi: float = DPI) -> list[Path]:
+    """Write a figure as PNG and SVG; a file appears under its name only when it is whole.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    stem : path
+        Path without the ending.
+    dpi : float
+        Resolution of the PNG, dots per inch.
+
+    Returns
+    -------
+    list of Path
+        The PNG and the SVG.
+    """
+    paths = [Path(f"{stem}.png"), Path(f"{stem}.svg")]
+    with look():
+        with whole_file(paths[0]) as part:
+            figure.savefig(part, format="png", dpi=dpi)
+        with whole_file(paths[1]) as part:
+            figure.savefig(part, format="svg", metadata={"Date": None})
+    return paths
