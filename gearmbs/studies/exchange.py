@@ -52,7 +52,7 @@ def model_signals(path: str | Path, component: str) -> dict[str, dict[str, xr.Da
     time = records.signal_time.values
     rate = float(attributes["solver_signal_rate"])
     out: dict[str, dict[str, xr.DataArray]] = {}
-    for load in records.load.values:
+    for load in records["load"].values:
         for state in records.state.values:
             values = records["acceleration"].sel(load=load, state=state, component=component).values
             out.setdefault(str(load), {})[str(state)] = make_signal(

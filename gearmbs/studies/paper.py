@@ -109,7 +109,7 @@ class PaperStudy:
         """Return the GMF table of all components as CSV."""
         lines = ["load,state,component,way,harmonic,frequency_hz,rms_m_s2,scaled_rms_m_s2"]
         raw, scaled = self.records["gmf_rms"], self.records["gmf_rms_scaled"]
-        for load in raw.load.values:
+        for load in raw["load"].values:
             for state in raw.state.values:
                 for component in raw.component.values:
                     for way in raw.way.values:

@@ -109,7 +109,7 @@ def _table(study: PaperStudy, component: str) -> list[str]:
     lines = ["| load | state | 1 x band | 2 x band | 3 x band | 1 x orders | 2 x orders | 3 x orders |"]
     lines.append("|---|---|---|---|---|---|---|---|")
     band, orders = study.table(component, "band"), study.table(component, "orders")
-    for load in band.load.values:
+    for load in band["load"].values:
         for state in band.state.values:
             values = [*band.sel(load=load, state=state).values, *orders.sel(load=load, state=state).values]
             lines.append(f"| {load} | {state} | " + " | ".join(f"{v:.4g}" for v in values) + " |")
