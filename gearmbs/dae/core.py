@@ -30,6 +30,7 @@ from gearmbs.dae.state import STATE_TYPE
 EPS = 2.220446049250313e-16
 GAMMA_DRIFT = 0.3
 JAC_MAX_AGE = 50
+SLOPE_MAX_AGE = 20
 RATE_WORTH_RENEWING = 0.25
 RATE_OF_FRESH = 0.1
 MAX_FAILS = 30
@@ -104,6 +105,33 @@ def _record_history(count, times, hist, first, rec_t, rec_h, rec_y, rec_order):
             for i in range(n):
                 rec_y[p, i] = hist[first + j, i]
         count[s.N_RECORDS] = p + 1
+
+
+@njit(
+    types.void(types.FunctionType(JACOBIAN_SIG), float64, float64, _MAT, _VEC, _IVEC, _VEC, _VEC, _IVEC, _VEC, _VEC),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def _evaluate_jacobian(jacobian, t, gamma, vec, real, count, jac, jac_slope, idata, rdata, work):
+    """Evaluate the Newton matrix at the prediction, and now and then its slope dG/dy' by a second evaluation."""
+    jacobian(t, vec[s.Y], vec[s.YP], gamma, jac, idata, rdata, work)
+    count[s.JACOBIANS] += 1
+    count[s.SLOPE_AGE] += 1
+    if count[s.SLOPE_AGE] >= SLOPE_MAX_AGE:
+        jacobian(t, vec[s.Y], vec[s.YP], 2.0 * gamma, jac_slope, idata, rdata, work)
+        count[s.JACOBIANS] += 1
+        count[s.SLOPE_AGE] = 0
+        for p in range(jac.shape[0]):
+            jac_slope[p] = (jac_slope[p] - jac[p]) / gamma
+    real[s.GAMMA_BASE] = gamma
+
+
+@njit(types.void(float64, _VEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
+def _carry_over(change, jac, jac_slope, matrix):
+    """Write the Newton matrix for a leading coefficient that has changed since its evaluation."""
+    for p in range(jac.shape[0]):
+        matrix[p] = jac[p] + change * jac_slope[p]
 
 
 @njit(types.void(_VEC, _IVEC), cache=True, nogil=True, error_model="numpy")
@@ -240,25 +268,23 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
 
         # Newton matrix
         drift = gamma / real[s.GAMMA_J]
-        if (
-            count[s.JAC_WANTED]
-            or count[s.JAC_AGE] >= JAC_MAX_AGE
-            or drift > 1.0 + GAMMA_DRIFT
-            or drift < 1.0 / (1.0 + GAMMA_DRIFT)
-        ):
-            jacobian(t, y, yp, gamma, st.jac, idata, rdata, work)
-            growth = factor(plan, factors, st.jac)
-            count[s.JACOBIANS] += 1
+        wanted = count[s.JAC_WANTED] != 0 or count[s.JAC_AGE] >= JAC_MAX_AGE
+        if wanted or drift > 1.0 + GAMMA_DRIFT or drift < 1.0 / (1.0 + GAMMA_DRIFT):
+            if wanted:
+                count[s.JAC_WANTED] = 1
+                _evaluate_jacobian(jacobian, t, gamma, vec, real, count, st.jac, st.jac_slope, idata, rdata, work)
+            _carry_over(gamma - real[s.GAMMA_BASE], st.jac, st.jac_slope, st.matrix)
+            growth = factor(plan, factors, st.matrix)
             count[s.FACTORIZATIONS] += 1
-            count[s.JAC_WANTED] = 1
             if not (growth <= real[s.GROWTH_MAX]):
                 real[s.H] = h_wish
                 return s.REPIVOT
-            count[s.JAC_WANTED] = 0
-            count[s.JAC_AGE] = 0
-            count[s.FRESH] = 1
             real[s.GAMMA_J] = gamma
-            real[s.RATE] = RATE_OF_FRESH
+            if wanted:
+                count[s.JAC_WANTED] = 0
+                count[s.JAC_AGE] = 0
+                count[s.FRESH] = 1
+                real[s.RATE] = RATE_OF_FRESH
 
         # corrector
         code = correct(residual, t, gamma, vec, real, count, plan, factors, idata, rdata, work)
@@ -375,6 +401,7 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
             return s.DONE
         if count[s.HAS_HOOK] and hook(times[0], hist, min(count[s.NPAST], HISTORY), idata, rdata, work) != 0:
             count[s.JAC_WANTED] = 1
+            count[s.SLOPE_AGE] = SLOPE_MAX_AGE
             for i in range(n):
                 y[i] = hist[0, i]
             _record_history(count, times, hist, 0, st.rec_t, st.rec_h, st.rec_y, st.rec_order)

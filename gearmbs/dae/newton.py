@@ -16,6 +16,7 @@ from gearmbs.dae.state import (
     IS_TESTED,
     MAX_ITERATIONS,
     NEWTON_TOL,
+    ORDER,
     RATE,
     RES,
     RESIDUALS,
@@ -150,7 +151,7 @@ def correct(residual, t, gamma, vec, real, count, plan, factors, idata, rdata, w
     differential = vec[IS_DIFFERENTIAL]
     n = y.shape[0]
     damp = 2.0 / (1.0 + gamma / real[GAMMA_J]) - 1.0
-    limit = real[NEWTON_TOL]
+    limit = real[NEWTON_TOL] * 0.5 ** count[ORDER]
     previous = 0.0
     iterations = count[MAX_ITERATIONS]
     for m in range(iterations):

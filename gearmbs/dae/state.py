@@ -36,7 +36,7 @@ GROWTH_MAX = 8
 ERROR = 9
 H_USED = 10
 NEWTON_TOL = 11
-T_PAST = 12
+GAMMA_BASE = 12
 N_REAL = 16
 
 # RunState.count
@@ -74,6 +74,7 @@ CAUTION = 30
 SINGULAR_FAILS = 31
 SHIFTED = 32
 STALE = 33
+SLOPE_AGE = 34
 N_COUNT = 36
 
 # rows of RunState.vec
@@ -121,8 +122,9 @@ class RunState(NamedTuple):
         Vectors of the current step.
     small : ndarray, shape (N_SMALL, 16)
         Coefficients of the current step.
-    jac : ndarray
-        Newton matrix, CSC values.
+    jac, jac_slope, matrix : ndarray
+        CSC values: the Newton matrix at its last evaluation, its derivative dG/dy' by the leading coefficient, and the
+        matrix carried over to the current leading coefficient, which is the one that is factored.
     idata, rdata, work : ndarray
         Tables and scratch of the problem.
     stops : ndarray
@@ -148,6 +150,8 @@ class RunState(NamedTuple):
     vec: np.ndarray
     small: np.ndarray
     jac: np.ndarray
+    jac_slope: np.ndarray
+    matrix: np.ndarray
     idata: np.ndarray
     rdata: np.ndarray
     work: np.ndarray
@@ -175,6 +179,8 @@ STATE_TYPE = types.NamedTuple(
         _MAT,
         _MAT,
         _MAT,
+        _VEC,
+        _VEC,
         _VEC,
         _IVEC,
         _VEC,

@@ -17,13 +17,13 @@ from numba import njit
 from gearmbs.dae import failures
 from gearmbs.dae import state as s
 from gearmbs.dae.bdf import HISTORY, MAX_ORDER
-from gearmbs.dae.core import advance
+from gearmbs.dae.core import SLOPE_MAX_AGE, advance
 from gearmbs.dae.newton import set_weights
 from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, SolverStats, Status
 from gearmbs.dae.sparse_lu import GROWTH_LIMIT, LUPlan, SingularMatrixError, analyse, factor, new_factors, solve
 
-NEWTON_TOLERANCE = 0.02
+NEWTON_TOLERANCE = 0.4
 FIRST_CHUNK = 16
 CHUNK_SECONDS = 0.05
 RECORD_BYTES = 8_000_000
@@ -102,6 +102,8 @@ class Run:
             vec=np.zeros((s.N_VEC, n)),
             small=np.zeros((s.N_SMALL, 16)),
             jac=np.zeros(len(problem.indices)),
+            jac_slope=np.zeros(len(problem.indices)),
+            matrix=np.zeros(len(problem.indices)),
             idata=np.array(problem.idata, dtype=np.int64),
             rdata=np.array(problem.rdata, dtype=float),
             work=np.zeros(max(1, problem.work_size)),
@@ -145,6 +147,7 @@ class Run:
         st.count[s.ORDER] = 1
         st.count[s.NPAST] = 1
         st.count[s.JAC_WANTED] = 1
+        st.count[s.SLOPE_AGE] = SLOPE_MAX_AGE
         st.count[s.MAX_ORDER_ALLOWED] = max_order
         st.count[s.MAX_ITERATIONS] = max_iterations
         st.count[s.FIXED_LEADING] = method == "GSTIFF"
@@ -218,7 +221,7 @@ class Run:
     def _choose_first_pivots(self, h: float) -> tuple[Status, str] | None:
         """Factor the Newton matrix of a first step of size ``h``; return a failure or None."""
         st = self.state
-        self.problem.jacobian(st.real[s.T], st.vec[s.Y], st.vec[s.YP], 1.0 / h, st.jac, st.idata, st.rdata, st.work)
+        self.problem.jacobian(st.real[s.T], st.vec[s.Y], st.vec[s.YP], 1.0 / h, st.matrix, st.idata, st.rdata, st.work)
         st.count[s.JACOBIANS] += 1
         self.first_pivots += 1
         return self._repivot()
@@ -228,7 +231,7 @@ class Run:
         st, problem = self.state, self.problem
         t = float(st.real[s.T])
         self.repivots += 1
-        bad = np.flatnonzero(~np.isfinite(st.jac))
+        bad = np.flatnonzero(~np.isfinite(st.matrix))
         retry = st.count[s.STEPS] > 0 and st.count[s.SINGULAR_FAILS] < SINGULAR_RETRIES
         if len(bad):
             if retry:
@@ -238,14 +241,14 @@ class Run:
                 problem, t, int(self.indices[bad[0]]), "the Jacobian of equation"
             )
         try:
-            self.plan = analyse(self.indptr, self.indices, st.jac, self.scale)
+            self.plan = analyse(self.indptr, self.indices, st.matrix, self.scale)
         except SingularMatrixError as error:
             if retry:
                 self._retry_smaller()
                 return None
             return Status.SINGULAR_JACOBIAN, failures.singular(problem, t, error.rows, error.cols)
         self.factors = new_factors(self.plan)
-        growth = factor(self.plan, self.factors, st.jac)
+        growth = factor(self.plan, self.factors, st.matrix)
         st.count[s.FACTORIZATIONS] += 1
         st.real[s.GROWTH_MAX] = max(GROWTH_LIMIT, 100.0 * growth)
         return None
