@@ -11,6 +11,9 @@ import re
 from numbers import Real
 from typing import Any
 
+# A field that takes a float in SI or text with a unit, and holds the float once its object is built.
+Quantity = Any
+
 DIMENSIONS = {
     "length": "m",
     "area": "m^2",

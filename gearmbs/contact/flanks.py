@@ -3,203 +3,261 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.cells import cell_force, end_force, plane_force
+from gearmbs.contact.centroid import centroid_force
+from gearmbs.contact.deviations import add_deviation, pair_softness, set_corner, tip_string, tooth_record
 from gearmbs.contact.face import LIMIT, face_limit
-from gearmbs.contact.node import contact_point, corner_normal, corner_start, flank_normal, section_gap
+from gearmbs.contact.jit import kernel
+from gearmbs.contact.node import contact_point, corner_normal, corner_start, flank_normal, section_gap, turn_normal
 from gearmbs.contact.sums import add_friction, add_normal
 
 RB, PSI, S_TIP, WHEEL = L.RB, L.PSI, L.S_TIP, L.WHEEL
-R_CORNER, PSI_CORNER, R_ROUND = L.R_CORNER, L.PSI_CORNER, L.R_ROUND
 NODE, N_GAP, N_GRAD, N_HESS, N_RATE, N_DRATE = L.NODE, L.N_GAP, L.N_GRAD, L.N_HESS, L.N_RATE, L.N_DRATE
-N_FORCE, N_FX, N_FV, N_S1, N_S2, N_ALPHA = L.N_FORCE, L.N_FX, L.N_FV, L.N_S1, L.N_S2, L.N_ALPHA
+N_FORCE, N_FX, N_S1, N_S2, N_KIND, N_ELASTIC = L.N_FORCE, L.N_FX, L.N_S1, L.N_S2, L.N_KIND, L.N_ELASTIC
 PITCH, FRICTION, N_SLICES = L.PITCH, L.FRICTION, L.N_SLICES
 ZETA_LO, ZETA_HI, GAP_MARGIN = L.ZETA_LO, L.ZETA_HI, L.GAP_MARGIN
+S_A, S_H, S_P, S_Q, S_F1, S_F2, S_XD = L.S_X, L.S_X + 1, L.S_X + 2, L.S_X + 3, L.S_X + 4, L.S_X + 5, L.S_XD
+S_W, S_A0, S_LENGTH, S_ALPHA, S_SIN, S_COS = L.S_W, L.S_A0, L.S_LENGTH, L.S_ALPHA, L.S_SIN, L.S_COS
+S_SLOPE, S_CURVE = L.S_SLOPE, L.S_CURVE
+NODES, LO, HI = L.W_NODES, L.W_LIMIT, L.W_LIMIT + LIMIT
 TWO_PI = 2.0 * np.pi
 NO_CONTACT = 1.0  # a gap, m, for profiles that cannot meet
+CORNER_SLACK = 0.45  # share of the corner gap's parabola taken as its lower bound
 
 
-@njit(cache=True)
-def gap_rate(nodes, o, xd, want):
-    """Rate of the gap under the pose rates ``xd``, and its derivative by the pose."""
+@kernel
+def gap_rate(wk, o, want):
+    """Rate of the gap under the pose rates, and its derivative by the pose."""
     rate = 0.0
     for i in range(6):
-        rate += nodes[o + N_GRAD + i] * xd[i]
-    nodes[o + N_RATE] = rate
+        rate += wk[o + N_GRAD + i] * wk[S_XD + i]
+    wk[o + N_RATE] = rate
     if want != 0:
         for i in range(6):
             total = 0.0
             row = o + N_HESS + 6 * i
             for j in range(6):
-                total += nodes[row + j] * xd[j]
-            nodes[o + N_DRATE + i] = total
+                total += wk[row + j] * wk[S_XD + j]
+            wk[o + N_DRATE + i] = total
 
 
-@njit(cache=True)
-def corner_section(gr, kind, x, w, f1, f2, zeta, alpha, nodes, o, sup, want):
-    """Gap of the tip corner of wheel ``kind`` on the mate's flank; the record at ``nodes[o:]`` is filled."""
-    if kind == 1:
-        mate = WHEEL
-        own = 0
-        f = f1
-        g = f2
-    else:
-        mate = 0
-        own = WHEEL
-        f = f2
-        g = f1
-    eta = f + gr[own + PSI_CORNER]
-    se = np.sin(eta)
-    ce = np.cos(eta)
+@kernel
+def set_normal(wk, alpha, sa, ca):
+    wk[S_ALPHA] = alpha
+    wk[S_SIN] = sa
+    wk[S_COS] = ca
+
+
+@kernel
+def corner_section(gr, wk, kind, f1, f2, zeta, near, o, want):
+    """Gap of the corner at work, the tip of wheel ``kind``, on the mate's flank.
+
+    ``near`` tells that the running normal is already close; else it starts from parallel axes.
+    """
+    mate = WHEEL if kind == 1 else 0
     rb = gr[mate + RB]
-    start = corner_start(x[0], rb, se, ce, gr[own + R_CORNER])
-    if start != start:
-        nodes[o + N_GAP] = NO_CONTACT
-        nodes[o + L.N_KIND] = kind
-        for i in range(o + N_GRAD, o + L.N_DALPHA):
-            nodes[i] = 0.0
-        return
-    s0 = rb * (g + gr[mate + PSI])
-    alpha = corner_normal(x[0], x[2], x[3], w, s0, rb, se, ce, gr[own + R_CORNER], gr[own + R_ROUND], zeta, start)
-    section_gap(gr, kind, x, w, f1, f2, zeta, alpha, nodes, o, sup, want)
+    s0 = rb * ((f2 if kind == 1 else f1) + gr[mate + PSI])
+    if (near or corner_start(wk, rb)) and corner_normal(wk, s0, rb, zeta):
+        section_gap(gr, wk, kind, f1, f2, zeta, o, want)
+        return True
+    wk[o + N_GAP] = NO_CONTACT
+    wk[o + N_KIND] = kind
+    for i in range(o + N_GRAD, o + L.N_DALPHA):
+        wk[i] = 0.0
+    return False
 
 
-@njit(cache=True)
-def clear_force(nodes, o, want):
-    nodes[o + N_FORCE] = 0.0
-    if want != 0:
-        for i in range(12):
-            nodes[o + N_FX + i] = 0.0
+@kernel
+def copy_record(wk, source, target):
+    for i in range(L.NODE):
+        wk[target + i] = wk[source + i]
 
 
-@njit(cache=True)
-def side_contacts(gi, gr, side, x, xd, V, sums, diag, want, nodes, sel, sup, limits):
+@kernel
+def station(gi, gr, j, step):
+    """Place of a node along the mean axis."""
+    return 0.0 if gi[N_SLICES] == 1 else gr[ZETA_LO] + j * step
+
+
+@kernel
+def flank_pitch(gr, wk):
+    """Index n of the tooth of wheel 2 facing tooth 0 of wheel 1: their sum is what the nominal gap depends on."""
+    Rb = gr[RB] + gr[WHEEL + RB]
+    base1 = gr[RB] * (wk[S_F1] + gr[PSI])
+    base2 = gr[WHEEL + RB] * (wk[S_F2] + gr[WHEEL + PSI])
+    return np.floor((wk[S_LENGTH] - Rb * wk[S_A0] - base1 - base2) / gr[PITCH] + 0.5)
+
+
+@kernel
+def open_side(gr, wk):
+    """Set up what a side's pose implies; False when the base circles meet."""
+    a, p, q = wk[S_A], wk[S_P], wk[S_Q]
+    Rb = gr[RB] + gr[WHEEL + RB]
+    if a <= Rb * 1.0001:
+        return False
+    length = np.sqrt(a * a - Rb * Rb)
+    w = np.sqrt(1.0 - p * p - q * q)
+    iw = 1.0 / w
+    one = 1.0 / (1.0 + w)
+    m = iw * one
+    wk[S_W] = w
+    wk[L.S_IW] = iw
+    wk[L.S_IW3] = iw * iw * iw
+    wk[L.S_IW5] = iw * iw * iw * iw * iw
+    wk[L.S_ONE] = one
+    wk[L.S_M] = m
+    wk[L.S_MW] = -(1.0 + 2.0 * w) * m * m
+    wk[L.S_MWW] = 2.0 * m * m * ((1.0 + 2.0 * w) ** 2 * m - 1.0)
+    wk[S_LENGTH] = length
+    wk[S_A0] = np.arctan2(length, Rb)
+    wk[S_A0 + 1] = length / a
+    wk[S_A0 + 2] = Rb / a
+    return True
+
+
+@kernel
+def side_contacts(gi, gr, wk, side, diag, want):
     """Add every contact of one side of the teeth, seen so that wheel 1's counter-clockwise flanks press.
 
     Parameters
     ----------
     side : int
-        +1 or -1, for the tables that name teeth and flanks; pose and twist are already mirrored for -1.
-    x, xd, V : ndarray, shape (6,)
-        Pose numbers, their rates, relative twist in the mean frame.
-    sums, diag : ndarray
-        Accumulators.
-    nodes, sel, sup, limits : ndarray
-        Scratch.
+        +1 or -1, for the tables that name teeth and flanks; the pose at ``S_X`` is already mirrored for -1.
     """
-    a, p, q = x[0], x[2], x[3]
-    w = np.sqrt(1.0 - p * p - q * q)
+    if not open_side(gr, wk):
+        return
+    p, q, w, length, alpha0 = wk[S_P], wk[S_Q], wk[S_W], wk[S_LENGTH], wk[S_A0]
     rb1 = gr[RB]
     rb2 = gr[WHEEL + RB]
     Rb = rb1 + rb2
-    if a <= Rb * 1.0001:
-        return
-    length = np.sqrt(a * a - Rb * Rb)
-    alpha0 = np.arctan2(length, Rb)
     pitch = gr[PITCH]
-    base1 = rb1 * (x[4] + gr[PSI])
-    base2 = rb2 * (x[5] + gr[WHEEL + PSI])
-    n = np.floor((length - Rb * alpha0 - base1 - base2) / pitch + 0.5)
-    total = base1 + base2 + n * pitch
-    step1 = TWO_PI / gi[L.Z1]
+    n = flank_pitch(gr, wk)
+    base1 = rb1 * (wk[S_F1] + gr[PSI])
+    total = base1 + rb2 * (wk[S_F2] + gr[WHEEL + PSI]) + n * pitch
     step2 = TWO_PI / gi[L.Z2]
     slices = gi[N_SLICES]
     margin = gr[GAP_MARGIN]
-    f2_n = x[5] + n * step2
+    f1 = wk[S_F1]
+    f2 = wk[S_F2] + n * step2
 
     # the gap over the face is convex: its tangent at the middle bounds the touching part
     middle = 0.0 if slices == 1 else 0.5 * (gr[ZETA_LO] + gr[ZETA_HI])
-    alpha = flank_normal(a, p, q, w, total, Rb, middle, alpha0)
-    section_gap(gr, 0, x, w, x[4], f2_n, middle, alpha, nodes, 0, sup, want if slices == 1 else 0)
-    deepest = margin - nodes[N_GAP]
-    sa = nodes[L.N_SIN]
-    ca = nodes[L.N_COS]
-    slope = 2.0 * (p * sa + q * ca) / w
+    set_normal(wk, alpha0, wk[S_A0 + 1], wk[S_A0 + 2])
+    tilted = p != 0.0 or q != 0.0
+    if tilted:
+        flank_normal(wk, total, Rb, middle)
+    alpha, sa, ca = wk[S_ALPHA], wk[S_SIN], wk[S_COS]
     ja = 0
     jb = 0
     step = 0.0
+    turn = 2.0 * (q * sa - p * ca) / (w * length)
     if slices == 1:
+        section_gap(gr, wk, 0, f1, f2, middle, NODES, want)
+        deepest = margin - wk[NODES + N_GAP]
         if deepest <= 0.0:
             return
-        gap_rate(nodes, 0, xd, want)
+        gap_rate(wk, NODES, want)
+        wander = 0.0
     else:
+        section_gap(gr, wk, 0, f1, f2, middle, NODES, 0)
+        deepest = margin - wk[NODES + N_GAP]
+        slope = 2.0 * (p * sa + q * ca) / w
         jb = slices
         step = (gr[ZETA_HI] - gr[ZETA_LO]) / slices
         reach = 0.5 * (gr[ZETA_HI] - gr[ZETA_LO]) + step
         if deepest + abs(slope) * reach <= 0.0:
             return
         if deepest - abs(slope) * reach < 0.0:
-            edge = -deepest / slope + middle
+            edge = (middle - deepest / slope - gr[ZETA_LO]) / step
             if slope > 0.0:
-                ja = max(0, int(np.floor((edge - gr[ZETA_LO]) / step)))
+                ja = min(max(0, int(np.floor(edge))), slices - 1)
             else:
-                jb = min(slices, int(np.floor((edge - gr[ZETA_LO]) / step)) + 1)
-        ja = min(ja, slices - 1)
-        jb = max(jb, 1)
-        turn = 2.0 * (p * ca - q * sa) / (w * -length)
+                jb = max(min(slices, int(np.floor(edge)) + 1), 1)
         deepest = 0.0
+        before = middle
         for j in range(ja, jb + 1):
             zeta = gr[ZETA_LO] + j * step
-            at = flank_normal(a, p, q, w, total, Rb, zeta, alpha + turn * (zeta - middle))
-            section_gap(gr, 0, x, w, x[4], f2_n, zeta, at, nodes, j * NODE, sup, want)
-            gap_rate(nodes, j * NODE, xd, want)
-            deepest = max(deepest, margin - nodes[j * NODE + N_GAP])
+            o = NODES + j * NODE
+            if tilted:
+                turn_normal(wk, wk[S_SLOPE] * (zeta - before))
+                before = zeta
+                flank_normal(wk, total, Rb, zeta)
+            section_gap(gr, wk, 0, f1, f2, zeta, o, want)
+            gap_rate(wk, o, want)
+            deepest = max(deepest, margin - wk[o + N_GAP])
         if deepest <= 0.0 and ja > 0 and jb < slices:
             return
+        wander = max(rb1, rb2) * abs(turn) * (gr[ZETA_HI] - gr[ZETA_LO])
 
+    # how far beyond the path of contact a corner may still bear, from the parabola of the corner gap
     tip1 = gr[S_TIP]
     tip2 = gr[WHEEL + S_TIP]
-    # how far beyond the path of contact a corner may still bear, from the parabola of the corner gap
-    curve = min(
-        length * tip1 / (2.0 * (length - tip1) * rb2 * rb2) if length > tip1 else 1e9,
-        length * tip2 / (2.0 * (length - tip2) * rb1 * rb1) if length > tip2 else 1e9,
+    curve = CORNER_SLACK * min(
+        length * tip1 / (2.0 * (length - tip1) * rb1 * rb1) if length > tip1 else 1e9,
+        length * tip2 / (2.0 * (length - tip2) * rb2 * rb2) if length > tip2 else 1e9,
     )
-    beyond = min(
-        pitch, np.sqrt(max(deepest, 1e-9) / (0.3 * curve)) + abs(turn_over_face(p, q, w, length, gr, slices, Rb))
-    )
+    wk[S_CURVE] = curve
+    beyond = min(pitch, np.sqrt(max(deepest, 0.0) / curve) + wander)
     first = np.ceil((length - tip2 - beyond - base1 - rb1 * alpha0) / pitch)
     last = np.floor((tip1 + beyond - base1 - rb1 * alpha0) / pitch)
+    step1 = TWO_PI / gi[L.Z1]
     for i in range(int(first), int(last) + 1):
-        f1 = x[4] + i * step1
-        f2 = x[5] + (n - i) * step2
-        depth = pair_contact(
-            gi, gr, side, i, x, xd, V, w, f1, f2, ja, jb, step, alpha, sums, diag, want, nodes, sel, sup, limits
-        )
+        f1 = wk[S_F1] + i * step1
+        f2 = wk[S_F2] + (n - i) * step2
+        depth = pair_contact(gi, gr, wk, side, i, int(n) - i, f1, f2, ja, jb, step, alpha, sa, ca, diag, want)
         if depth > 0.0:
-            if side == gi[L.DRIVE]:
-                diag[3] = max(diag[3], depth)
-                diag[5] += 1.0
-            else:
-                diag[4] = max(diag[4], depth)
-                diag[6] += 1.0
+            drive = side == gi[L.DRIVE]
+            k = 3 if drive else 4
+            diag[k] = max(diag[k], depth)
+            diag[k + 2] += 1.0
 
 
-@njit(cache=True)
-def turn_over_face(p, q, w, length, gr, slices, Rb):
-    """Bound on how far tilt moves the contact along the profile between mid-face and an end of the face."""
-    if slices == 1:
-        return 0.0
-    return Rb * np.sqrt(p * p + q * q) / w * 2.0 * (gr[ZETA_HI] - gr[ZETA_LO]) / length
-
-
-@njit(cache=True)
-def pair_contact(
-    gi, gr, side, tooth, x, xd, V, w, f1, f2, ja, jb, step, alpha, sums, diag, want, nodes, sel, sup, limits
-):
-    """Add the contact of one tooth pair over the nodes ``ja``..``jb``; returns its largest penetration."""
-    slices = gi[N_SLICES]
+@kernel
+def touching_range(gi, gr, wk, shift, ja, jb):
+    """Nodes that may touch, and one more on either side: the gap is at least that of the flanks plus a parabola."""
     tip1 = gr[S_TIP]
     tip2 = gr[WHEEL + S_TIP]
-    own = (slices + 1) * NODE
-    friction = gi[FRICTION] != 0
-    touching = False
-    shift1 = gr[RB] * (f1 - x[4])
+    margin = gr[GAP_MARGIN]
+    curve = wk[S_CURVE]
+    first = jb + 1
+    last = ja - 1
     for j in range(ja, jb + 1):
-        o = j * NODE
-        s1 = nodes[o + N_S1] + shift1
-        s2 = nodes[o + N_S2] - shift1
+        o = NODES + j * NODE
+        bound = wk[o + N_GAP] - margin
+        x = max(wk[o + N_S1] + shift - tip1, wk[o + N_S2] - shift - tip2)
+        if x > 0.0:
+            bound += curve * x * x
+        if bound < 0.0:
+            first = min(first, j)
+            last = j
+    return max(first - 1, ja), min(last + 1, jb)
+
+
+@kernel
+def pair_sections(gi, gr, wk, side, i1, i2, f1, f2, ja, jb, step, alpha, sa, ca, want):
+    """Choose and fill the node records of one tooth pair; returns whether any of them has a negative gap."""
+    slices = gi[N_SLICES]
+    own = NODES + (slices + 1) * NODE
+    sel = NODES + 2 * (slices + 1) * NODE
+    teeth = gi[L.O_TOOTH] != 0
+    record1 = tooth_record(gi, 0, side, i1) if teeth else 0
+    record2 = tooth_record(gi, 1, side, i2) if teeth else 0
+    tip1 = gr[S_TIP]
+    tip2 = gr[WHEEL + S_TIP]
+    shift = gr[RB] * (f1 - wk[S_F1])
+    touching = False
+    last_kind = 0
+    last_string = 0.0
+    for j in range(ja, jb + 1):
+        o = NODES + j * NODE
+        s1 = wk[o + N_S1] + shift
+        s2 = wk[o + N_S2] - shift
+        zeta = station(gi, gr, j, step)
+        if teeth:
+            tip1 = tip_string(gi, gr, 0, record1, zeta, wk[S_H])
+            tip2 = tip_string(gi, gr, 1, record2, zeta, wk[S_H])
         kind = 0
         if s1 - tip1 > s2 - tip2:
             if s1 > tip1:
@@ -207,66 +265,135 @@ def pair_contact(
         elif s2 > tip2:
             kind = 2
         if kind != 0:
-            o += own
-            zeta = gr[ZETA_LO] + j * step if slices > 1 else 0.0
-            corner_section(gr, kind, x, w, f1, f2, zeta, alpha, nodes, o, sup, want)
-            gap_rate(nodes, o, xd, want)
-        sel[j] = o
-        clear_force(nodes, o, want)
-        if nodes[o + N_GAP] < 0.0:
+            o = own + j * NODE
+            string = tip1 if kind == 1 else tip2
+            near = kind == last_kind and string == last_string
+            if kind != last_kind or string != last_string:
+                set_corner(gr, wk, kind - 1, f1 if kind == 1 else f2, string)
+            if near:
+                turn_normal(wk, wk[S_SLOPE] * step)
+            else:
+                set_normal(wk, alpha, sa, ca)
+            if not corner_section(gr, wk, kind, f1, f2, zeta, near, o, want):
+                string = 0.0
+            last_string = string
+        last_kind = kind
+        if teeth:
+            if kind == 0:
+                copy_record(wk, o, own + j * NODE)
+                o = own + j * NODE
+                wk[o + N_S1] = s1
+                wk[o + N_S2] = s2
+            if wk[o + N_GAP] < NO_CONTACT:
+                add_deviation(gi, gr, wk, 0, record1, kind, f1, f2, zeta, o, want)
+                add_deviation(gi, gr, wk, 1, record2, kind, f1, f2, zeta, o, want)
+        if kind != 0 or teeth:
+            gap_rate(wk, o, want)
+        wk[sel + j] = o
+        wk[o + N_FORCE] = 0.0
+        wk[o + N_ELASTIC] = 0.0
+        if want != 0:
+            for i in range(12):
+                wk[o + N_FX + i] = 0.0
+        if wk[o + N_GAP] < 0.0:
             touching = True
-    if not touching and slices == 1:
+    return touching
+
+
+@kernel
+def pair_contact(gi, gr, wk, side, i1, i2, f1, f2, ja, jb, step, alpha, sa, ca, diag, want):
+    """Add the contact of one tooth pair over the nodes ``ja``..``jb``; returns its largest penetration."""
+    slices = gi[N_SLICES]
+    ja, jb = touching_range(gi, gr, wk, gr[RB] * (f1 - wk[S_F1]), ja, jb)
+    if jb < ja:
         return 0.0
-    depth = 0.0
+    touching = pair_sections(gi, gr, wk, side, i1, i2, f1, f2, ja, jb, step, alpha, sa, ca, want)
+    if not touching and (slices == 1 or (ja > 0 and jb < slices)):
+        return 0.0
+    soft = 1.0
+    varying = gi[L.O_COMPLIANCE] != 0
+    if varying:
+        record1 = tooth_record(gi, 0, side, i1) if gi[L.O_TOOTH] != 0 else 0
+        record2 = tooth_record(gi, 1, side, i2) if gi[L.O_TOOTH] != 0 else 0
+        pair_softness(gi, gr, wk, record1, record2, f1, f2, want)
+        soft = wk[L.P_SOFT]
+    sel = NODES + 2 * (slices + 1) * NODE
+    energy = diag[0]
     if slices == 1:
-        depth = plane_force(gi, gr, nodes, int(sel[0]), 1.0, diag, want)
+        depth = plane_force(gi, gr, wk, int(wk[sel]), soft, diag, want)
     else:
-        depth = face_forces(gi, gr, x, w, f1, f2, ja, jb, step, sums, diag, want, nodes, sel, limits)
+        face_limit(-1.0, gr, wk, f1, f2, LO, want)
+        face_limit(1.0, gr, wk, f1, f2, HI, want)
+        if gi[L.LOAD] == L.LOAD_ADAMS:
+            depth = centroid_force(gi, gr, wk, sel, ja, jb, step, soft, diag, want)
+        else:
+            depth = face_forces(gi, gr, wk, sel, ja, jb, step, soft, diag, want)
     if depth <= 0.0:
         return 0.0
+    if varying:
+        add_softness(wk, sel, ja, jb, diag[0] - energy, want)
     for j in range(ja, jb + 1):
-        o = int(sel[j])
-        if nodes[o + N_FORCE] > 0.0:
-            diag[7] += nodes[o + N_FORCE]
-            add_normal(nodes, o, sums, want)
-            if friction:
-                zeta = gr[ZETA_LO] + j * step if slices > 1 else 0.0
-                contact_point(gr, int(nodes[o + L.N_KIND]), x, w, f1, zeta, nodes, o, sup, want)
-                add_friction(gi, gr, nodes, o, zeta + 0.5 * x[1], V, sums, diag, want)
+        o = int(wk[sel + j])
+        if wk[o + N_FORCE] != 0.0:
+            diag[7] += wk[o + N_FORCE]
+            add_normal(wk, o, want)
+            if gi[FRICTION] != 0:
+                zeta = station(gi, gr, j, step)
+                kind = int(wk[o + N_KIND])
+                if kind == 1:
+                    set_corner(gr, wk, 0, f1, wk[o + N_S1])
+                contact_point(gr, wk, kind, f1, zeta, o, want)
+                add_friction(gi, gr, wk, o, zeta + 0.5 * wk[S_H], diag, want)
     return depth
 
 
-@njit(cache=True)
-def face_forces(gi, gr, x, w, f1, f2, ja, jb, step, sums, diag, want, nodes, sel, limits):
+@kernel
+def add_softness(wk, sel, ja, jb, energy, want):
+    """Complete the derivatives of nodal forces, and add the force of a stiffness that varies along the path."""
+    ratio = energy / wk[L.P_SOFT]
+    for i in range(6):
+        wk[L.Q_ + i] -= ratio * wk[L.P_SOFT_X + i]
+    if want == 0:
+        return
+    for i in range(36):
+        wk[L.H_ + i] -= ratio * wk[L.P_SOFT_XX + i]
+    for j in range(ja, jb + 1):
+        o = int(wk[sel + j])
+        force = wk[o + N_FORCE] / wk[L.P_SOFT]
+        elastic = wk[o + N_ELASTIC] / wk[L.P_SOFT]
+        for k in range(6):
+            wk[o + N_FX + k] += force * wk[L.P_SOFT_X + k]
+            for i in range(6):
+                wk[L.H_ + 6 * i + k] += elastic * wk[o + N_GRAD + k] * wk[L.P_SOFT_X + i]
+
+
+@kernel
+def face_forces(gi, gr, wk, sel, ja, jb, step, soft, diag, want):
     """Integrate the pressure of a pair over the slices ``ja``..``jb``; returns the largest penetration."""
     slices = gi[N_SLICES]
-    z0 = gr[ZETA_LO]
-    face_limit(-1.0, gr, x, w, f1, f2, limits, 0, want)
-    face_limit(1.0, gr, x, w, f1, f2, limits, LIMIT, want)
-    lo = limits[0]
-    hi = limits[LIMIT]
+    lo = (wk[LO] - gr[ZETA_LO]) / step
+    hi = (wk[HI] - gr[ZETA_LO]) / step
     depth = 0.0
     for j in range(ja, jb):
-        o0 = int(sel[j])
-        o1 = int(sel[j + 1])
-        ua = (lo - z0) / step - j
-        ub = (hi - z0) / step - j
-        lo_moves = (ua > 0.0 or j == 0) and ua < 1.0
-        hi_moves = (ub < 1.0 or j == slices - 1) and ub > 0.0
+        ua = lo - j
+        ub = hi - j
         if (ua >= 1.0 and j < slices - 1) or (ub <= 0.0 and j > 0):
             continue
+        lo_moves = ua > 0.0 or j == 0
+        hi_moves = ub < 1.0 or j == slices - 1
         if not lo_moves:
             ua = 0.0
         if not hi_moves:
             ub = 1.0
         if ub <= ua:
             continue
-        depth = max(
-            depth,
-            cell_force(gi, gr, nodes, o0, o1, step, ua, ub, lo_moves, hi_moves, limits, 1.0, diag, want),
-        )
+        o0 = int(wk[sel + j])
+        o1 = int(wk[sel + j + 1])
+        if wk[o0 + N_GAP] >= 0.0 and wk[o1 + N_GAP] >= 0.0 and ua >= 0.0 and ub <= 1.0:
+            continue
+        depth = max(depth, cell_force(gi, gr, wk, o0, o1, step, ua, ub, lo_moves, hi_moves, soft, diag, want))
         if lo_moves:
-            end_force(gi, gr, nodes, o0, o1, step, ua, -1.0, limits, 0, 1.0, sums, want)
+            end_force(gi, gr, wk, o0, o1, step, ua, -1.0, LO, soft, want)
         if hi_moves:
-            end_force(gi, gr, nodes, o0, o1, step, ub, 1.0, limits, LIMIT, 1.0, sums, want)
+            end_force(gi, gr, wk, o0, o1, step, ub, 1.0, HI, soft, want)
     return depth

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit, types
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.flanks import side_contacts
+from gearmbs.contact.jit import kernel
 from gearmbs.contact.pose import pose_columns, pose_rates, pose_wrench, relative_pose
 from gearmbs.contact.sums import mirror
 
@@ -15,11 +15,24 @@ MAT = types.float64[:, ::1]
 GEAR_CONTACT_SIG = types.void(
     types.int64[::1], VEC, VEC, MAT, VEC, VEC, VEC, MAT, VEC, VEC, VEC, MAT, VEC, types.int64, VEC
 )
-Q_, H_, B_, F_, FX_, FV_, FR_ = L.Q_, L.H_, L.B_, L.F_, L.FX_, L.FV_, L.FR_
+H_, B_, F_, FX_, FV_, FR_ = L.H_, L.B_, L.F_, L.FX_, L.FV_, L.FR_
+M, V, W, G, MU, XDX, WX, KX, KV, J = (
+    L.W_M,
+    L.W_V,
+    L.W_W,
+    L.W_G,
+    L.W_MU,
+    L.W_XDX,
+    L.W_WX,
+    L.W_KX,
+    L.W_KV,
+    L.W_J,
+)
+W2 = L.S_X  # angular velocity of wheel 2 in M, once the sides are done
 
 
-@njit(cache=True)
-def relative_twist(M, R1, v1, w1, R2, v2, w2, V):
+@kernel
+def relative_twist(R1, v1, w1, R2, v2, w2, wk):
     """Twist of wheel 1 relative to wheel 2 at R1, in the mean frame."""
     dx = R1[0] - R2[0]
     dy = R1[1] - R2[1]
@@ -31,113 +44,132 @@ def relative_twist(M, R1, v1, w1, R2, v2, w2, V):
     oy = w1[1] - w2[1]
     oz = w1[2] - w2[2]
     for k in range(3):
-        V[k] = M[0, k] * vx + M[1, k] * vy + M[2, k] * vz
-        V[3 + k] = M[0, k] * ox + M[1, k] * oy + M[2, k] * oz
+        wk[V + k] = wk[M + k] * vx + wk[M + 3 + k] * vy + wk[M + 6 + k] * vz
+        wk[V + 3 + k] = wk[M + k] * ox + wk[M + 3 + k] * oy + wk[M + 6 + k] * oz
 
 
-@njit(cache=True)
-def chain(x, xd_x, W_x, G, mu, w2m, V, W, sums, KX, KV, J):
-    """Derivatives of the wrench on wheel 1 by its own variations, all in the mean frame: ``J`` (6, 12)."""
-    # KX = dW/dx, KV = dW/dV with the wrench W = G^T Q + F
+@kernel
+def wrench_slopes(wk):
+    """Derivatives of the wrench W = G^T Q + F by the pose numbers (KX) and the relative twist (KV), (6, 6) each."""
+    # J holds dQ/dx and dQ/dV, row by row, on the way
     for i in range(6):
+        row = 6 * i
         for j in range(6):
-            hb = sums[H_ + 6 * i + j]
-            fb = sums[FX_ + 6 * i + j]
-            if j < 4:
-                for k in range(6):
-                    hb += sums[B_ + 6 * i + k] * xd_x[k, j]
-                    fb += sums[FR_ + 6 * i + k] * xd_x[k, j]
-            J[i, j] = hb
-            KX[i, j] = fb + (W_x[i, j] if j < 4 else 0.0)
-            bg = 0.0
-            fg = sums[FV_ + 6 * i + j]
-            for k in range(6):
-                bg += sums[B_ + 6 * i + k] * G[k, j]
-                fg += sums[FR_ + 6 * i + k] * G[k, j]
-            J[i, 6 + j] = bg
-            KV[i, j] = fg
-    for i in range(6):
-        for j in range(6):
-            kx = KX[i, j]
-            kv = KV[i, j]
-            for k in range(6):
-                kx += G[k, i] * J[k, j]
-                kv += G[k, i] * J[k, 6 + j]
-            KX[i, j] = kx
-            KV[i, j] = kv
-    for j in range(6):
-        ux, uy, uz = mu[0, j], mu[1, j], mu[2, j]
-        # the relative twist seen from the turning mean frame
-        d0 = -(uy * V[2] - uz * V[1])
-        d1 = -(uz * V[0] - ux * V[2])
-        d2 = -(ux * V[1] - uy * V[0])
-        d3 = -(uy * V[5] - uz * V[4])
-        d4 = -(uz * V[3] - ux * V[5])
-        d5 = -(ux * V[4] - uy * V[3])
-        if j == 0:
-            d1 -= w2m[2]
-            d2 += w2m[1]
-        elif j == 1:
-            d0 += w2m[2]
-            d2 -= w2m[0]
-        elif j == 2:
-            d0 -= w2m[1]
-            d1 += w2m[0]
+            wk[J + 12 * i + j] = wk[H_ + row + j]
+            wk[J + 12 * i + 6 + j] = 0.0
+            wk[KX + row + j] = wk[FX_ + row + j]
+            wk[KV + row + j] = wk[FV_ + row + j]
+        for j in range(4):
+            wk[KX + row + j] += wk[WX + 4 * i + j]
+        for k in range(6):
+            b = wk[B_ + row + k]
+            for j in range(4):
+                wk[J + 12 * i + j] += b * wk[XDX + 4 * k + j]
+            for j in range(6):
+                wk[J + 12 * i + 6 + j] += b * wk[G + 6 * k + j]
+            f = wk[FR_ + row + k]
+            for j in range(4):
+                wk[KX + row + j] += f * wk[XDX + 4 * k + j]
+            for j in range(6):
+                wk[KV + row + j] += f * wk[G + 6 * k + j]
+    for k in range(6):
         for i in range(6):
-            total = KV[i, 0] * d0 + KV[i, 1] * d1 + KV[i, 2] * d2 + KV[i, 3] * d3 + KV[i, 4] * d4 + KV[i, 5] * d5
-            for k in range(6):
-                total += KX[i, k] * G[k, j]
-            J[i, j] = total
-        for b in range(0, 6, 3):
-            J[b, j] += uy * W[b + 2] - uz * W[b + 1]
-            J[b + 1, j] += uz * W[b] - ux * W[b + 2]
-            J[b + 2, j] += ux * W[b + 1] - uy * W[b]
+            g = wk[G + 6 * k + i]
+            for j in range(6):
+                wk[KX + 6 * i + j] += g * wk[J + 12 * k + j]
+                wk[KV + 6 * i + j] += g * wk[J + 12 * k + 6 + j]
+
+
+@kernel
+def own_columns(wk):
+    """Derivatives of the wrench by the variations of wheel 1, all in the mean frame: ``J`` (6, 12)."""
     for i in range(6):
         for j in range(6):
-            J[i, 6 + j] = KV[i, j]
+            wk[J + 12 * i + j] = 0.0
+            wk[J + 12 * i + 6 + j] = wk[KV + 6 * i + j]
+        for k in range(6):
+            x = wk[KX + 6 * i + k]
+            for j in range(6):
+                wk[J + 12 * i + j] += x * wk[G + 6 * k + j]
+    for j in range(6):
+        ux, uy, uz = wk[MU + j], wk[MU + 6 + j], wk[MU + 12 + j]
+        # the relative twist seen from the turning mean frame
+        d0 = uz * wk[V + 1] - uy * wk[V + 2]
+        d1 = ux * wk[V + 2] - uz * wk[V]
+        d2 = uy * wk[V] - ux * wk[V + 1]
+        d3 = uz * wk[V + 4] - uy * wk[V + 5]
+        d4 = ux * wk[V + 5] - uz * wk[V + 3]
+        d5 = uy * wk[V + 3] - ux * wk[V + 4]
+        if j == 0:
+            d1 -= wk[W2 + 2]
+            d2 += wk[W2 + 1]
+        elif j == 1:
+            d0 += wk[W2 + 2]
+            d2 -= wk[W2]
+        elif j == 2:
+            d0 -= wk[W2 + 1]
+            d1 += wk[W2]
+        for i in range(6):
+            r = KV + 6 * i
+            wk[J + 12 * i + j] += (
+                wk[r] * d0 + wk[r + 1] * d1 + wk[r + 2] * d2 + wk[r + 3] * d3 + wk[r + 4] * d4 + wk[r + 5] * d5
+            )
+        for b in range(0, 6, 3):
+            wk[J + 12 * b + j] += uy * wk[W + b + 2] - uz * wk[W + b + 1]
+            wk[J + 12 * b + 12 + j] += uz * wk[W + b] - ux * wk[W + b + 2]
+            wk[J + 12 * b + 24 + j] += ux * wk[W + b + 1] - uy * wk[W + b]
 
 
-@njit(cache=True)
-def spread(M, J, R1, v1, w1, R2, v2, w2, wrench, jac):
+@kernel
+def spread(wk, R1, v1, w1, R2, v2, w2, wrench, jac):
     """Turn ``J`` into global components and complete the columns of wheel 2 from the invariance under motions."""
     for b in range(0, 6, 3):
         for c in range(0, 12, 3):
+            o = J + 12 * b + c
             for k in range(3):
-                m0 = J[b, c] * M[k, 0] + J[b, c + 1] * M[k, 1] + J[b, c + 2] * M[k, 2]
-                m1 = J[b + 1, c] * M[k, 0] + J[b + 1, c + 1] * M[k, 1] + J[b + 1, c + 2] * M[k, 2]
-                m2 = J[b + 2, c] * M[k, 0] + J[b + 2, c + 1] * M[k, 1] + J[b + 2, c + 2] * M[k, 2]
-                jac[b, c + k] = M[0, 0] * m0 + M[0, 1] * m1 + M[0, 2] * m2
-                jac[b + 1, c + k] = M[1, 0] * m0 + M[1, 1] * m1 + M[1, 2] * m2
-                jac[b + 2, c + k] = M[2, 0] * m0 + M[2, 1] * m1 + M[2, 2] * m2
-    D = (R2[0] - R1[0], R2[1] - R1[1], R2[2] - R1[2])
+                mx, my, mz = wk[M + 3 * k], wk[M + 3 * k + 1], wk[M + 3 * k + 2]
+                m0 = wk[o] * mx + wk[o + 1] * my + wk[o + 2] * mz
+                m1 = wk[o + 12] * mx + wk[o + 13] * my + wk[o + 14] * mz
+                m2 = wk[o + 24] * mx + wk[o + 25] * my + wk[o + 26] * mz
+                jac[b, c + k] = wk[M] * m0 + wk[M + 1] * m1 + wk[M + 2] * m2
+                jac[b + 1, c + k] = wk[M + 3] * m0 + wk[M + 4] * m1 + wk[M + 5] * m2
+                jac[b + 2, c + k] = wk[M + 6] * m0 + wk[M + 7] * m1 + wk[M + 8] * m2
+    dx, dy, dz = R2[0] - R1[0], R2[1] - R1[1], R2[2] - R1[2]
+    ax, ay, az = v1[0] - v2[0], v1[1] - v2[1], v1[2] - v2[2]
+    bx, by, bz = w1[0] - w2[0], w1[1] - w2[1], w1[2] - w2[2]
     for i in range(6):
-        for k in range(3):
-            jac[i, 12 + k] = -jac[i, k]
-            jac[i, 18 + k] = -jac[i, 6 + k]
-        for k in range(3):
-            k1 = (k + 1) % 3
-            k2 = (k + 2) % 3
-            jac[i, 21 + k] = -jac[i, 9 + k] - jac[i, 6 + k1] * D[k2] + jac[i, 6 + k2] * D[k1]
-    for i in range(6):
-        for k in range(3):
-            k1 = (k + 1) % 3
-            k2 = (k + 2) % 3
-            total = -jac[i, 3 + k]
-            total -= -jac[i, 12 + k1] * D[k2] + jac[i, 12 + k2] * D[k1]
-            total -= -jac[i, 6 + k1] * v1[k2] + jac[i, 6 + k2] * v1[k1]
-            total -= -jac[i, 9 + k1] * w1[k2] + jac[i, 9 + k2] * w1[k1]
-            total -= -jac[i, 18 + k1] * v2[k2] + jac[i, 18 + k2] * v2[k1]
-            total -= -jac[i, 21 + k1] * w2[k2] + jac[i, 21 + k2] * w2[k1]
-            jac[i, 15 + k] = total
+        rx, ry, rz = jac[i, 0], jac[i, 1], jac[i, 2]
+        px, py, pz = jac[i, 6], jac[i, 7], jac[i, 8]
+        ox, oy, oz = jac[i, 9], jac[i, 10], jac[i, 11]
+        jac[i, 12] = -rx
+        jac[i, 13] = -ry
+        jac[i, 14] = -rz
+        # J_R2 = -J_R1 as for dv; the moment of dw2 about R1 joins J_w2
+        jac[i, 18] = -px
+        jac[i, 19] = -py
+        jac[i, 20] = -pz
+        jac[i, 21] = -ox + dy * pz - dz * py
+        jac[i, 22] = -oy + dz * px - dx * pz
+        jac[i, 23] = -oz + dx * py - dy * px
+        jac[i, 15] = -jac[i, 3] + dy * rz - dz * ry
+        jac[i, 16] = -jac[i, 4] + dz * rx - dx * rz
+        jac[i, 17] = -jac[i, 5] + dx * ry - dy * rx
+        # minus J_v (dpi x (v1 - v2)) and so on, J_w2 (dpi x w2) expanded
+        qx, qy, qz = jac[i, 21] + ox, jac[i, 22] + oy, jac[i, 23] + oz
+        jac[i, 15] -= ay * pz - az * py + by * oz - bz * oy + w2[1] * qz - w2[2] * qy
+        jac[i, 16] -= az * px - ax * pz + bz * ox - bx * oz + w2[2] * qx - w2[0] * qz
+        jac[i, 17] -= ax * py - ay * px + bx * oy - by * ox + w2[0] * qy - w2[1] * qx
     for b in range(0, 6, 3):
-        for k in range(3):
-            k1 = (k + 1) % 3
-            k2 = (k + 2) % 3
-            jac[b + k1, 15 + k] -= wrench[b + k2]
-            jac[b + k2, 15 + k] += wrench[b + k1]
+        fx, fy, fz = wrench[b], wrench[b + 1], wrench[b + 2]
+        jac[b + 1, 15] -= fz
+        jac[b + 2, 15] += fy
+        jac[b + 2, 16] -= fx
+        jac[b, 16] += fz
+        jac[b, 17] -= fy
+        jac[b + 1, 17] += fx
 
 
-@njit(GEAR_CONTACT_SIG, cache=True, nogil=True)
+@njit(GEAR_CONTACT_SIG, cache=True, nogil=True, error_model="numpy")
 def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want_jac, work):
     """Wrench of the contact of two wheels, its derivatives and diagnostics.
 
@@ -173,55 +205,39 @@ def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want
         for i in range(6):
             for j in range(24):
                 jac[i, j] = 0.0
-    x = work[L.W_X : L.W_X + 6]
-    M = work[L.W_FRAME : L.W_FRAME + 9].reshape((3, 3))
-    if not relative_pose(R1, A1, R2, A2, x, M):
+    if not relative_pose(R1, A1, R2, A2, work):
         return
-    xd = work[L.W_XD : L.W_XD + 6]
-    V = work[L.W_V : L.W_V + 6]
-    xd_x = work[L.W_XDX : L.W_XDX + 24].reshape((6, 4))
-    relative_twist(M, R1, v1, w1, R2, v2, w2, V)
-    pose_rates(x, V, xd, xd_x)
-    sums = work[L.W_SUMS : L.W_SUMS + L.SUMS]
+    relative_twist(R1, v1, w1, R2, v2, w2, work)
+    pose_rates(work)
     for i in range(L.SUMS):
-        sums[i] = 0.0
-    slices = gi[L.N_SLICES]
-    sup = work[L.W_SUP : L.W_SUP + 30]
-    limits = work[L.W_LIMIT : L.W_LIMIT + 172]
-    nodes = work[L.W_NODES : L.W_NODES + 2 * L.NODE * (slices + 1)]
-    sel = work[L.W_NODES + 2 * L.NODE * (slices + 1) : L.W_NODES + (2 * L.NODE + 1) * (slices + 1)]
-    side_contacts(gi, gr, 1, x, xd, V, sums, diag, want_jac, nodes, sel, sup, limits)
-    mx = work[L.W_MX : L.W_MX + 6]
-    mxd = work[L.W_MXD : L.W_MXD + 6]
-    mV = work[L.W_MV : L.W_MV + 6]
+        work[L.W_SUMS + i] = 0.0
+    for i in range(18):
+        work[L.S_X + i] = work[L.W_X + i]
+    side_contacts(gi, gr, work, 1, diag, want_jac)
     for i in range(6):
-        s = -1.0 if i > 2 else 1.0
-        mx[i] = s * x[i]
-        mxd[i] = s * xd[i]
-        mV[i] = -V[i] if i % 2 == 1 else V[i]
-    mirror(sums)
-    side_contacts(gi, gr, -1, mx, mxd, mV, sums, diag, want_jac, nodes, sel, sup, limits)
-    mirror(sums)
-    if diag[7] == 0.0 and diag[0] == 0.0:
+        sign = -1.0 if i > 2 else 1.0
+        work[L.S_X + i] = sign * work[L.W_X + i]
+        work[L.S_XD + i] = sign * work[L.W_XD + i]
+        work[L.S_V + i] = -work[V + i] if i % 2 == 1 else work[V + i]
+    front = diag[0] > 0.0
+    if front:
+        mirror(work)
+    side_contacts(gi, gr, work, -1, diag, want_jac)
+    if not diag[0] > 0.0:
         return
-    W = work[L.W_W : L.W_W + 6]
-    W_x = work[L.W_WX : L.W_WX + 24].reshape((6, 4))
-    pose_wrench(x, sums, W, W_x, want_jac)
+    mirror(work)
+    pose_wrench(work, want_jac)
     for i in range(6):
-        W[i] += sums[F_ + i]
+        work[W + i] += work[F_ + i]
     for b in range(0, 6, 3):
         for k in range(3):
-            wrench[b + k] = M[k, 0] * W[b] + M[k, 1] * W[b + 1] + M[k, 2] * W[b + 2]
+            row = M + 3 * k
+            wrench[b + k] = work[row] * work[W + b] + work[row + 1] * work[W + b + 1] + work[row + 2] * work[W + b + 2]
     if want_jac == 0:
         return
-    G = work[L.W_G : L.W_G + 36].reshape((6, 6))
-    mu = work[L.W_MU : L.W_MU + 18].reshape((3, 6))
-    pose_columns(x, G, mu)
-    KX = work[L.W_KX : L.W_KX + 36].reshape((6, 6))
-    KV = work[L.W_KV : L.W_KV + 36].reshape((6, 6))
-    J = work[L.W_J : L.W_J + 72].reshape((6, 12))
-    w2m = mx
+    pose_columns(work)
     for k in range(3):
-        w2m[k] = M[0, k] * w2[0] + M[1, k] * w2[1] + M[2, k] * w2[2]
-    chain(x, xd_x, W_x, G, mu, w2m, V, W, sums, KX, KV, J)
-    spread(M, J, R1, v1, w1, R2, v2, w2, wrench, jac)
+        work[W2 + k] = work[M + k] * w2[0] + work[M + 3 + k] * w2[1] + work[M + 6 + k] * w2[2]
+    wrench_slopes(work)
+    own_columns(work)
+    spread(work, R1, v1, w1, R2, v2, w2, wrench, jac)

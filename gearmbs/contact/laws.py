@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.jit import kernel
 
-LAW_IMPACT, LAW_HUNT_CROSSLEY = L.LAW_IMPACT, L.LAW_HUNT_CROSSLEY
+LAW_HUNT_CROSSLEY = L.LAW_HUNT_CROSSLEY
 FRICTION_ADAMS = L.FRICTION_ADAMS
-K_, E_, C_, D_ = L.LAW_K, L.LAW_E, L.LAW_C, L.LAW_D
-MU_S, MU_D, V_S, V_D = L.MU_S, L.MU_D, L.V_S, L.V_D
 
 
-@njit(cache=True, inline="never")
+@kernel
 def normal_law(law, k, e, c, d, delta, rate):
     """Pressure per unit face width, its derivatives and the elastic energy density.
 
@@ -57,7 +55,7 @@ def normal_law(law, k, e, c, d, delta, rate):
     return p, slope + c * step_slope * rate, c * step, energy, elastic
 
 
-@njit(cache=True, inline="never")
+@kernel
 def friction_law(kind, mu_s, mu_d, v_s, v_d, speed):
     """Friction coefficient over sliding speed, and the derivative of that ratio over the speed.
 

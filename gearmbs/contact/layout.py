@@ -1,6 +1,7 @@
-"""Where things stand in the flat tables of a gear pair, and how large they are.
+"""Where things stand in the flat tables of a gear pair and in the kernel's scratch array.
 
-The tables are plain arrays (``gi`` int64, ``gr`` float64) so that one compiled kernel serves every pair.
+The tables are plain arrays (``gi`` int64, ``gr`` float64) so that one compiled kernel serves every pair. The scratch
+array holds everything the kernel computes on the way, at fixed places: no slices are made, nothing is allocated.
 """
 
 from __future__ import annotations
@@ -13,16 +14,17 @@ LAW = 3  # one of LAW_*
 FRICTION = 4  # one of FRICTION_*
 DRIVE = 5  # +1: wheel 1 drives turning positive about its z axis, -1: negative
 LOAD = 6  # one of LOAD_*
-N_SHAPE_S = 7  # stations of a deviation shape along the profile
-N_SHAPE_Z = 8  # stations of a deviation shape along the face
-O_TEETH_I = 9  # offset in gi of the shape numbers per wheel, flank and tooth (-1: none)
-O_TEETH_R = 10  # offset in gr of the tooth records
-O_SHAPES = 11  # offset in gr of the deviation shapes
-HAS_TEETH = 12  # 0: every tooth is the same and perfect
-O_STIFF = 13  # offset in gr of the stiffness curves
-N_STIFF = 14  # stations of a stiffness curve, 0: none
-ROOT = 15  # 1: tip corners also meet the mate's root arc and root circle
+SHAPE_S = 7  # stations of a deviation shape along the profile
+SHAPE_Z = 8  # stations of a deviation shape along the face
+O_TOOTH = 9  # offset in gi of the tooth records (shape, tip, compliance numbers; -1: none), 0: all teeth perfect
+O_OFFSET = 10  # offset in gr of one constant deviation per tooth flank
+O_SHAPE = 11  # offset in gr of the deviation shapes
+O_TIP = 12  # offset in gr of tip strings over the face, for broken and chipped teeth
+O_COMPLIANCE = 13  # offset in gr of relative compliances along the profile, 0: constant stiffness
+N_COMPLIANCE = 14  # stations of a compliance curve
+ROOT = 15  # 1: tips also meet the mate's root
 GI_HEADER = 16
+TOOTH = 3  # integers per tooth record
 
 # --- gr: reals; wheel 1 at 0, wheel 2 at WHEEL ----------------------------------------------------
 RB = 0  # base radius, m
@@ -38,11 +40,13 @@ S_FORM = 9  # string length where the involute begins, m
 R_FILLET = 10  # radius of the root arc, m
 R_FILLET_CENTRE = 11  # radius of the arc's centre, m
 PSI_FILLET = 12  # half angle of the arc's centre from the tooth's middle, rad
+SHAPE_S0 = 13  # string length of the first profile station, m
+SHAPE_DS = 14  # spacing of the profile stations, m
 WHEEL = 16
 PITCH = 32  # base pitch, m
 LAW_K = 33  # stiffness per unit face width, N/m^(1+e)
 LAW_E = 34
-LAW_C = 35  # damping per unit face width, N s/m^2 (IMPACT), or restitution factor (Hunt-Crossley), s/m
+LAW_C = 35  # damping per unit face width, N s/m^2 (IMPACT), or rate factor (Hunt-Crossley), s/m
 LAW_D = 36  # penetration of full damping, m
 MU_S = 37
 MU_D = 38
@@ -50,20 +54,15 @@ V_S = 39
 V_D = 40
 WIDTH = 41  # common face width the stiffness refers to, m
 EDGE_BLEND = 42  # rounding of the face ends in the overlap, m
-ZETA_LO = 51  # the slices' range along the mean axis, m
-ZETA_HI = 52
 GAP_MARGIN = 43  # most material added to a flank pair by deviations, m
-SHAPE_S0 = 44  # string length of the first profile station of wheel 1, m; wheel 2 follows
-SHAPE_DS = 46  # spacing of the profile stations of wheel 1, m; wheel 2 follows
-STIFF_S0 = 48  # first station of the stiffness curves along the path of contact, m
-STIFF_DS = 49
-ROOT_K = 50  # stiffness per unit width of tip-root contact, N/m^(1+e)
-GR_HEADER = 56
+ZETA_LO = 44  # the slices' range along the mean axis, m
+ZETA_HI = 45
+COMPLIANCE_S0 = 46  # first station of the pair's compliance curve on wheel 1's string, m
+COMPLIANCE_DS = 47
+GR_HEADER = 48
 
 LAW_IMPACT = 0
 LAW_HUNT_CROSSLEY = 1
-LAW_LINEAR = 2
-LAW_HERTZ = 3
 
 FRICTION_NONE = 0
 FRICTION_ADAMS = 1
@@ -72,10 +71,12 @@ FRICTION_SMOOTH = 2
 LOAD_SLICES = 0
 LOAD_ADAMS = 1
 
-# --- records in the work array --------------------------------------------------------------------
-X_A, X_H, X_P, X_Q, X_F1, X_F2 = range(6)  # centre distance, axial offset, tilt, spin angles
+# --- pose numbers -----------------------------------------------------------------------------------
+# centre distance, axial offset, tilt (inclination, skew), spin angles
+X_A, X_H, X_P, X_Q, X_F1, X_F2 = range(6)
 
-N_ALPHA = 0  # operating angle of the contact normal in this section
+# --- scratch: node records ----------------------------------------------------------------------------
+N_ALPHA = 0  # operating angle of the contact normal in this section, its sine and cosine
 N_SIN = 1
 N_COS = 2
 N_GAP = 3
@@ -94,32 +95,64 @@ N_S1 = 80  # string length on wheel 1 at the contact
 N_S2 = 81
 N_KIND = 82  # 0 flank on flank, 1 corner of wheel 1, 2 corner of wheel 2
 N_DRATE = 83  # 6: d (d gap / d t) / d x
-NODE = 89
+N_ELASTIC = 89  # elastic part of the nodal force, N
+NODE = 90
 
-# sums over all contacts, in the mean frame, and the matrices of the final chain
-Q_ = 0  # 6: generalised normal force
-H_ = 6  # 36: dQ/dx
-B_ = 42  # 36: dQ/d(dx/dt)
-F_ = 78  # 6: friction wrench on wheel 1
-FX_ = 84  # 36: its derivative by x
-FV_ = 120  # 36: and by the relative twist
-FR_ = 156  # 36: and by dx/dt, through the damping in the normal force
+# --- scratch: sums over all contacts, in the mean frame -------------------------------------------------
+W_SUMS = 560
+Q_ = W_SUMS  # 6: generalised normal force
+H_ = Q_ + 6  # 36: dQ/dx
+B_ = H_ + 36  # 36: dQ/d(dx/dt)
+F_ = B_ + 36  # 6: friction wrench on wheel 1
+FX_ = F_ + 6  # 36: its derivative by x
+FV_ = FX_ + 36  # 36: and by the relative twist
+FR_ = FV_ + 36  # 36: and by dx/dt, through the damping in the normal force
 SUMS = 192
 
-W_X, W_XD, W_V, W_MX, W_MXD, W_MV = 0, 6, 12, 18, 24, 30
-W_FRAME = 36  # 9
-W_XDX = 45  # 24
-W_WX = 69  # 24
-W_G = 93  # 36
-W_MU = 129  # 18
-W_W = 147  # 6
-W_KX = 153  # 36
-W_KV = 189  # 36
-W_J = 225  # 72
-W_SUP = 297  # 30
-W_LIMIT = 327  # 2 x (1 + 6 + 36) for the ends, 2 x 43 scratch
-W_SUMS = 499
-W_NODES = W_SUMS + SUMS
+# --- scratch: single places -------------------------------------------------------------------------------
+W_X = 0  # 6: pose numbers
+W_XD = 6  # 6: their rates
+W_V = 12  # 6: relative twist of wheel 1 in the mean frame
+W_M = 18  # 9: mean frame, row by row
+W_XDX = 27  # 24: d(dx/dt)/d(a, h, p, q)
+S_X = 51  # the same, as seen on the side of the teeth at work
+S_XD = 57
+S_V = 63
+S_W = 69  # cosine of half the angle between the axes
+S_A0 = 70  # operating angle of parallel axes, its sine and cosine
+S_LENGTH = 73  # length of the line of action, m
+S_ALPHA = 74  # running normal: alpha, sine, cosine
+S_SIN = 75
+S_COS = 76
+C_SIN = 77  # tip corner at work: its polar angle's sine and cosine, radius, rounding, string, half angle
+C_COS = 78
+C_R = 79
+C_ROUND = 80
+C_STRING = 81
+C_PSI = 82
+S_IW = 529  # 1/w, its third and fifth power, 1/(1 + w), and m = 1/(w (1 + w)) with two derivatives by w
+S_IW3 = 530
+S_IW5 = 531
+S_ONE = 532
+S_M = 533
+S_MW = 534
+S_MWW = 535
+S_SLOPE = 536  # d alpha / d zeta at the last solution
+S_CURVE = 537  # lower bound of the corner gap's growth beyond the path of contact, 1/m
+P_SOFT = 83  # stiffness factor of the tooth pair at work, and its gradient (6) and Hessian (36)
+P_SOFT_X = 84
+P_SOFT_XX = 90
+P_DEV = 126  # deviation lookup: value, gradient (6), Hessian (36)
+W_SUP = 169  # 30: two support records
+W_LIMIT = 199  # 172: limits of the face, with derivatives
+W_G = 371  # 36
+W_MU = 407  # 18
+W_W = 425  # 6
+W_WX = 431  # 24
+W_KX = 455  # 36
+W_KV = 491  # 36
+W_NODES = W_SUMS + SUMS + 72
+W_J = W_SUMS + SUMS  # 72
 
 
 def work_size(n_slices: int) -> int:

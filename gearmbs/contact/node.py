@@ -1,15 +1,16 @@
 """The gap of one pair of profiles in one section: solve for the normal, then value, gradient and Hessian.
 
-A wheel's profile is either its involute (kind 0) or its tip corner (kind 1).
+A wheel's profile is either its involute or its tip corner. The pose is the one at ``S_X`` in the scratch array, the
+normal the one at ``S_ALPHA``; the corner at work stands at ``C_SIN`` and on.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from gearmbs.contact import layout as L
 from gearmbs.contact import support as S
+from gearmbs.contact.jit import kernel
 from gearmbs.contact.support import corner_support, involute_support, tilt_turn
 
 H, HA_, HAA_, H_A, H_B, H_F = S.H, S.HA_, S.HAA_, S.H_A, S.H_B, S.H_F
@@ -17,215 +18,274 @@ HA_A, HA_B, HA_F = S.HA_A, S.HA_B, S.HA_F
 H_AA, H_AB, H_BB, H_AF, H_BF, H_FF = S.H_AA, S.H_AB, S.H_BB, S.H_AF, S.H_BF, S.H_FF
 N_ALPHA, N_SIN, N_COS, N_GAP, N_GRAD, N_HESS = L.N_ALPHA, L.N_SIN, L.N_COS, L.N_GAP, L.N_GRAD, L.N_HESS
 N_DALPHA, N_PN, N_PT, N_DPN, N_DPT = L.N_DALPHA, L.N_PN, L.N_PT, L.N_DPN, L.N_DPT
-N_S1, N_S2 = L.N_S1, L.N_S2
-RB, PSI, S_TIP, WHEEL = L.RB, L.PSI, L.S_TIP, L.WHEEL
-R_CORNER, PSI_CORNER, R_ROUND = L.R_CORNER, L.PSI_CORNER, L.R_ROUND
-N_KIND = L.N_KIND
-SUP_LENGTH = 15
+N_S1, N_KIND = L.N_S1, L.N_KIND
+RB, PSI, WHEEL = L.RB, L.PSI, L.WHEEL
+S_A, S_H, S_P, S_Q, S_W = L.S_X, L.S_X + 1, L.S_X + 2, L.S_X + 3, L.S_W
+S_ALPHA, S_SIN, S_COS, S_SLOPE = L.S_ALPHA, L.S_SIN, L.S_COS, L.S_SLOPE
+C_SIN, C_COS, C_R, C_ROUND, C_STRING = L.C_SIN, L.C_COS, L.C_R, L.C_ROUND, L.C_STRING
+SUP1 = L.W_SUP
+SUP2 = L.W_SUP + 15
 NEWTON_STEPS = 20
+BASE_MARGIN = 1.0001  # on the squared base radius, below which an involute is too curved to bear on
+NEWTON_END = 1e-6  # a further step would change alpha by about the square of it
 
 
-@njit(cache=True)
-def flank_normal(a, p, q, w, S0, rb, zeta, alpha):
-    """Operating angle of the common normal of two involutes, by Newton's method from ``alpha``.
+@kernel
+def turn_normal(wk, step):
+    """Advance the running normal by a small angle."""
+    wk[S_ALPHA] += step
+    if abs(step) > 0.1:
+        wk[S_SIN] = np.sin(wk[S_ALPHA])
+        wk[S_COS] = np.cos(wk[S_ALPHA])
+        return
+    d2 = step * step
+    c = 1.0 - d2 * (0.5 - d2 * (1.0 / 24.0 - d2 * (1.0 / 720.0 - d2 / 40320.0)))
+    s = step * (1.0 - d2 * (1.0 / 6.0 - d2 * (1.0 / 120.0 - d2 * (1.0 / 5040.0 - d2 / 362880.0))))
+    sa = wk[S_SIN]
+    ca = wk[S_COS]
+    wk[S_SIN] = sa * c + ca * s
+    wk[S_COS] = ca * c - sa * s
 
-    ``S0`` is the sum of ``rb (phi + psi)`` over the wheels and ``rb`` the sum of the base radii.
+
+@kernel
+def flank_normal(wk, s0, rb, zeta):
+    """Turn the running normal onto the common normal of two involutes, by Newton's method.
+
+    ``s0`` is the sum of ``rb (phi + psi)`` over the wheels and ``rb`` the sum of the base radii.
     """
+    a, p, q, w, iw = wk[S_A], wk[S_P], wk[S_Q], wk[S_W], wk[L.S_IW]
     for _ in range(NEWTON_STEPS):
-        sa = np.sin(alpha)
-        ca = np.cos(alpha)
+        sa = wk[S_SIN]
+        ca = wk[S_COS]
         A = p * sa + q * ca
         B = p * ca - q * sa
-        kap2 = 1.0 - B * B
-        kap = np.sqrt(kap2)
-        s = S0 + rb * (alpha + tilt_turn(A, B, w))
-        g1 = a * ca - A * B * s / (w * kap) - rb / kap - 2.0 * B * zeta / w
-        g2 = -a * sa - s * (B * B * w * w - A * A * kap2) / (w * kap * kap2) + 2.0 * A * zeta / w
-        step = -g1 / g2
-        alpha += step
-        if abs(step) < 1e-9:
+        ik2 = 1.0 / (1.0 - B * B)
+        ik = np.sqrt(ik2)
+        s = s0 + rb * (wk[S_ALPHA] + tilt_turn(A, B, w))
+        g1 = a * ca - A * B * s * iw * ik - rb * ik - 2.0 * B * zeta * iw
+        g2 = 1.0 / (s * (A * A * iw - B * B * w * ik2) * ik - a * sa + 2.0 * A * zeta * iw)
+        step = -g1 * g2
+        turn_normal(wk, step)
+        if abs(step) < NEWTON_END:
+            wk[S_SLOPE] = 2.0 * B * iw * g2
             break
-    return alpha
 
 
-@njit(cache=True)
-def corner_normal(a, p, q, w, s0, rb, se, ce, r, rt, zeta, alpha):
-    """Operating angle of the normal where a corner line bears on an involute; ``s0 = rb (phi + psi)``."""
-    m = 1.0 / (w * (1.0 + w))
+@kernel
+def corner_start(wk, rb):
+    """Turn the running normal onto the mate's involute under the corner at work, axes taken as parallel.
+
+    Returns False, with the normal unchanged, when the corner is inside the mate's base circle.
+    """
+    X = wk[S_A] - wk[C_R] * wk[C_COS]
+    Y = -wk[C_R] * wk[C_SIN]
+    R2 = X * X + Y * Y
+    if R2 < rb * rb * BASE_MARGIN:
+        return False
+    string = np.sqrt(R2 - rb * rb)
+    sa = (string * X - rb * Y) / R2
+    ca = (rb * X + string * Y) / R2
+    wk[S_ALPHA] += np.arctan2(sa * wk[S_COS] - ca * wk[S_SIN], ca * wk[S_COS] + sa * wk[S_SIN])
+    wk[S_SIN] = sa
+    wk[S_COS] = ca
+    return True
+
+
+@kernel
+def corner_normal(wk, s0, rb, zeta):
+    """Turn the running normal onto that where the corner at work bears on the mate's involute, by Newton's method.
+
+    ``s0`` is the mate's ``rb (phi + psi)``. Returns False when the iteration does not settle.
+    """
+    a, p, q, w, iw = wk[S_A], wk[S_P], wk[S_Q], wk[S_W], wk[L.S_IW]
+    se, ce, r, rt = wk[C_SIN], wk[C_COS], wk[C_R], wk[C_ROUND]
+    m = wk[L.S_M]
     for _ in range(NEWTON_STEPS):
-        sa = np.sin(alpha)
-        ca = np.cos(alpha)
+        sa = wk[S_SIN]
+        ca = wk[S_COS]
         A = p * sa + q * ca
         B = p * ca - q * sa
-        kap2 = 1.0 - B * B
-        kap = np.sqrt(kap2)
-        s = s0 + rb * (alpha + tilt_turn(A, B, w)) + rt
+        ik2 = 1.0 / (1.0 - B * B)
+        ik = np.sqrt(ik2)
+        s = s0 + rb * (wk[S_ALPHA] + tilt_turn(A, B, w)) + rt
         sn = sa * ce + ca * se
         cs = ca * ce - sa * se
         V = A * sn + B * cs
-        g1 = a * ca - A * B * s / (w * kap) - rb / kap - r * (cs + m * B * V) - 2.0 * B * zeta / w
-        g2 = -a * sa - s * (B * B * w * w - A * A * kap2) / (w * kap * kap2) + r * (sn + m * A * V)
-        g2 += 2.0 * A * zeta / w
+        g1 = a * ca - A * B * s * iw * ik - rb * ik - r * (cs + m * B * V) - 2.0 * B * zeta * iw
+        g2 = s * (A * A * iw - B * B * w * ik2) * ik - a * sa + r * (sn + m * A * V) + 2.0 * A * zeta * iw
         step = -g1 / g2
         if abs(step) > 0.1:
             step = 0.1 if step > 0.0 else -0.1
-        alpha += step
-        if abs(step) < 1e-9:
-            break
-    return alpha
+        turn_normal(wk, step)
+        if abs(step) < NEWTON_END:
+            wk[S_SLOPE] = 2.0 * B * iw / g2
+            return True
+    return False
 
 
-@njit(cache=True)
-def corner_start(a, rb, se, ce, r):
-    """Operating angle at which a corner bears on an involute when the axes are parallel; NaN inside the base circle."""
-    X = a - r * ce
-    Y = -r * se
-    R2 = X * X + Y * Y
-    if not R2 > rb * rb * 1.0001:
-        return np.nan
-    return np.arccos(rb / np.sqrt(R2)) - np.arctan2(Y, X)
+@kernel
+def share_spin(wk, share, want):
+    """Split the derivatives by the spin of two involutes taken together: wheel 1 has this share of the base radii."""
+    wk[SUP1 + H_F] *= share
+    if want != 0:
+        for k in (HA_F, H_AF, H_BF, H_FF):
+            wk[SUP2 + k] = (1.0 - share) * wk[SUP1 + k]
+            wk[SUP1 + k] *= share
 
 
-@njit(cache=True)
-def section_gap(gr, kind, x, w, f1, f2, zeta, alpha, rec, o, sup, want):
-    """Fill the node record at ``rec[o:]`` with the gap at the normal ``alpha`` and its derivatives by the pose.
+@kernel
+def add_supports(wk, want):
+    """Add the second support record to the first, except for the derivatives by the spins."""
+    for k in (H, H_A, H_B):
+        wk[SUP1 + k] += wk[SUP2 + k]
+    if want != 0:
+        for k in (HAA_, HA_A, HA_B, H_AA, H_AB, H_BB):
+            wk[SUP1 + k] += wk[SUP2 + k]
+
+
+@kernel
+def section_gap(gr, wk, kind, f1, f2, zeta, o, want):
+    """Fill the node record at ``wk[o:]`` with the gap at the running normal and its derivatives by the pose.
 
     Parameters
     ----------
     kind : int
         0: flank on flank; 1: corner of wheel 1 on flank of wheel 2; 2: corner of wheel 2 on flank of wheel 1.
-    x : ndarray, shape (6,)
-        Pose numbers; the spin angles in it are not used.
     f1, f2 : float
         Angles of the two teeth from the line of centres.
+    zeta : float
+        Station along the mean axis.
     want : int
         Nonzero to fill second derivatives.
     """
-    a, p, q = x[0], x[2], x[3]
-    sa = np.sin(alpha)
-    ca = np.cos(alpha)
+    a, p, q, w = wk[S_A], wk[S_P], wk[S_Q], wk[S_W]
+    sa = wk[S_SIN]
+    ca = wk[S_COS]
     A = p * sa + q * ca
     B = p * ca - q * sa
     kap = np.sqrt(1.0 - B * B)
-    turned = alpha + tilt_turn(A, B, w)
-    for k in range(2):
-        base = k * WHEEL
-        f = f1 if k == 0 else f2
-        if kind == k + 1:
-            eta = f + gr[base + PSI_CORNER]
-            se = np.sin(eta)
-            ce = np.cos(eta)
-            r = gr[base + R_CORNER]
-            corner_support(A, B, w, kap, sa, ca, se, ce, r, gr[base + R_ROUND], sup, k * SUP_LENGTH, want)
-            rec[o + N_S1 + k] = gr[base + S_TIP]
-        else:
-            rb = gr[base + RB]
-            s = rb * (f + gr[base + PSI] + turned)
-            involute_support(A, B, w, kap, s, rb, sup, k * SUP_LENGTH, want)
-            rec[o + N_S1 + k] = s
-    b = SUP_LENGTH
-    iw = 1.0 / w
-    iw3 = iw * iw * iw
+    turned = wk[S_ALPHA] + tilt_turn(A, B, w)
+    rb1 = gr[RB]
+    rb2 = gr[WHEEL + RB]
+    s1 = rb1 * (f1 + gr[PSI] + turned)
+    s2 = rb2 * (f2 + gr[WHEEL + PSI] + turned)
+    if kind == 0:
+        involute_support(A, B, w, kap, s1 + s2, rb1 + rb2, wk, SUP1, want)
+        second = wk[SUP1 + H_F] * rb2 / (rb1 + rb2)
+        share_spin(wk, rb1 / (rb1 + rb2), want)
+    elif kind == 1:
+        s1 = wk[C_STRING]
+        corner_support(A, B, w, kap, wk, SUP1, want)
+        involute_support(A, B, w, kap, s2, rb2, wk, SUP2, want)
+        second = wk[SUP2 + H_F]
+        add_supports(wk, want)
+    else:
+        s2 = wk[C_STRING]
+        involute_support(A, B, w, kap, s1, rb1, wk, SUP1, want)
+        corner_support(A, B, w, kap, wk, SUP2, want)
+        second = wk[SUP2 + H_F]
+        add_supports(wk, want)
+    wk[o + N_S1] = s1
+    wk[o + N_S1 + 1] = s2
+    iw, iw3 = wk[L.S_IW], wk[L.S_IW3]
     AW_A = kap * kap * iw3
     AW_B = A * B * iw3
-    gA = -(sup[H_A] + sup[b + H_A]) - 2.0 * zeta * AW_A
-    gB = -(sup[H_B] + sup[b + H_B]) - 2.0 * zeta * AW_B
-    gap = a * sa - 2.0 * A * iw * zeta - sup[H] - sup[b + H]
-    rec[o + N_ALPHA] = alpha
-    rec[o + N_SIN] = sa
-    rec[o + N_COS] = ca
-    rec[o + N_GAP] = gap
-    rec[o + N_KIND] = kind
+    gA = -wk[SUP1 + H_A] - 2.0 * zeta * AW_A
+    gB = -wk[SUP1 + H_B] - 2.0 * zeta * AW_B
+    wk[o + N_ALPHA] = wk[S_ALPHA]
+    wk[o + N_SIN] = sa
+    wk[o + N_COS] = ca
+    wk[o + N_GAP] = a * sa - 2.0 * A * iw * zeta - wk[SUP1 + H]
+    wk[o + N_KIND] = kind
     G = o + N_GRAD
-    rec[G] = sa
-    rec[G + 1] = 0.0
-    rec[G + 2] = gA * sa + gB * ca
-    rec[G + 3] = gA * ca - gB * sa
-    rec[G + 4] = -sup[H_F]
-    rec[G + 5] = -sup[b + H_F]
+    wk[G] = sa
+    wk[G + 1] = 0.0
+    wk[G + 2] = gA * sa + gB * ca
+    wk[G + 3] = gA * ca - gB * sa
+    wk[G + 4] = -wk[SUP1 + H_F]
+    wk[G + 5] = -second
     if want == 0:
         return
     # mixed derivatives of the gap by alpha and by the pose, then the Hessian with alpha eliminated
-    gaa = -a * sa - sup[HAA_] - sup[b + HAA_] + 2.0 * A * iw * zeta
-    gaA = -(sup[HA_A] + sup[b + HA_A]) - 2.0 * zeta * AW_B
-    gaB = -(sup[HA_B] + sup[b + HA_B]) - 2.0 * zeta * (iw + B * B * iw3)
+    gaa = -a * sa - wk[SUP1 + HAA_] + 2.0 * A * iw * zeta
+    gaA = -wk[SUP1 + HA_A] - 2.0 * zeta * AW_B
+    gaB = -wk[SUP1 + HA_B] - 2.0 * zeta * (iw + B * B * iw3)
     D = o + N_DALPHA
-    rec[D] = ca
-    rec[D + 1] = 0.0
-    rec[D + 2] = gaA * sa + gaB * ca
-    rec[D + 3] = gaA * ca - gaB * sa
-    rec[D + 4] = -sup[HA_F]
-    rec[D + 5] = -sup[b + HA_F]
-    iw5 = iw3 * iw * iw
-    gAA = -(sup[H_AA] + sup[b + H_AA]) - 6.0 * zeta * kap * kap * A * iw5
-    gAB = -(sup[H_AB] + sup[b + H_AB]) - 2.0 * zeta * (3.0 * kap * kap * B * iw5 - 2.0 * B * iw3)
-    gBB = -(sup[H_BB] + sup[b + H_BB]) - 2.0 * zeta * A * (iw3 + 3.0 * B * B * iw5)
+    wk[D] = ca
+    wk[D + 1] = 0.0
+    wk[D + 2] = gaA * sa + gaB * ca
+    wk[D + 3] = gaA * ca - gaB * sa
+    wk[D + 4] = -wk[SUP1 + HA_F]
+    wk[D + 5] = -wk[SUP2 + HA_F]
+    iw5 = wk[L.S_IW5]
+    gAA = -wk[SUP1 + H_AA] - 6.0 * zeta * kap * kap * A * iw5
+    gAB = -wk[SUP1 + H_AB] - 2.0 * zeta * (3.0 * kap * kap * B * iw5 - 2.0 * B * iw3)
+    gBB = -wk[SUP1 + H_BB] - 2.0 * zeta * A * (iw3 + 3.0 * B * B * iw5)
     T = o + N_HESS
     for i in range(36):
-        rec[T + i] = 0.0
-    rec[T + 14] = gAA * sa * sa + 2.0 * gAB * sa * ca + gBB * ca * ca
-    rec[T + 15] = (gAA - gBB) * sa * ca + gAB * (ca * ca - sa * sa)
-    rec[T + 21] = gAA * ca * ca - 2.0 * gAB * sa * ca + gBB * sa * sa
-    rec[T + 16] = -(sup[H_AF] * sa + sup[H_BF] * ca)
-    rec[T + 22] = -(sup[H_AF] * ca - sup[H_BF] * sa)
-    rec[T + 17] = -(sup[b + H_AF] * sa + sup[b + H_BF] * ca)
-    rec[T + 23] = -(sup[b + H_AF] * ca - sup[b + H_BF] * sa)
-    rec[T + 28] = -sup[H_FF]
-    rec[T + 35] = -sup[b + H_FF]
+        wk[T + i] = 0.0
+    wk[T + 14] = gAA * sa * sa + 2.0 * gAB * sa * ca + gBB * ca * ca
+    wk[T + 15] = (gAA - gBB) * sa * ca + gAB * (ca * ca - sa * sa)
+    wk[T + 21] = gAA * ca * ca - 2.0 * gAB * sa * ca + gBB * sa * sa
+    wk[T + 16] = -(wk[SUP1 + H_AF] * sa + wk[SUP1 + H_BF] * ca)
+    wk[T + 22] = -(wk[SUP1 + H_AF] * ca - wk[SUP1 + H_BF] * sa)
+    wk[T + 17] = -(wk[SUP2 + H_AF] * sa + wk[SUP2 + H_BF] * ca)
+    wk[T + 23] = -(wk[SUP2 + H_AF] * ca - wk[SUP2 + H_BF] * sa)
+    wk[T + 28] = -wk[SUP1 + H_FF]
+    wk[T + 35] = -wk[SUP2 + H_FF]
     inv = -1.0 / gaa
     for i in range(6):
-        d = rec[D + i] * inv
+        d = wk[D + i] * inv
         for j in range(i, 6):
-            value = rec[T + 6 * i + j] + d * rec[D + j]
-            rec[T + 6 * i + j] = value
-            rec[T + 6 * j + i] = value
+            value = wk[T + 6 * i + j] + d * wk[D + j]
+            wk[T + 6 * i + j] = value
+            wk[T + 6 * j + i] = value
     for i in range(6):
-        rec[D + i] *= inv
+        wk[D + i] *= inv
 
 
-@njit(cache=True)
-def contact_point(gr, kind, x, w, f1, zeta, rec, o, sup, want):
+@kernel
+def contact_point(gr, wk, kind, f1, zeta, o, want):
     """Fill where the contact stands in the section, half-way between the surfaces, and its derivatives.
 
-    The record at ``rec[o:]`` must hold the section's gap. Coordinates are along the normal and the tangent
+    The record at ``wk[o:]`` must hold the section's gap. Coordinates are along the normal and the tangent
     ``(cos alpha, -sin alpha)``, from the centre of wheel 1.
     """
-    p, q = x[2], x[3]
-    sa, ca = rec[o + N_SIN], rec[o + N_COS]
+    p, q, w = wk[S_P], wk[S_Q], wk[S_W]
+    sa, ca = wk[o + N_SIN], wk[o + N_COS]
     A = p * sa + q * ca
     B = p * ca - q * sa
     kap = np.sqrt(1.0 - B * B)
-    iw = 1.0 / w
+    iw, iw3 = wk[L.S_IW], wk[L.S_IW3]
     if kind == 1:
-        eta = f1 + gr[PSI_CORNER]
-        se, ce = np.sin(eta), np.cos(eta)
-        corner_support(A, B, w, kap, sa, ca, se, ce, gr[R_CORNER], gr[R_ROUND], sup, 0, want)
+        wk[S_SIN] = sa
+        wk[S_COS] = ca
+        corner_support(A, B, w, kap, wk, SUP1, want)
     else:
-        rb = gr[RB]
-        involute_support(A, B, w, kap, rb * (f1 + gr[PSI] + rec[o + N_ALPHA] + tilt_turn(A, B, w)), rb, sup, 0, want)
-    zp = zeta + 0.5 * x[1]
-    pt = sup[HA_] + B * iw * zp
-    rec[o + N_PN] = sup[H] + A * iw * zp + 0.5 * rec[o + N_GAP]
-    rec[o + N_PT] = pt
+        s = gr[RB] * (f1 + gr[PSI] + wk[o + N_ALPHA] + tilt_turn(A, B, w))
+        involute_support(A, B, w, kap, s, gr[RB], wk, SUP1, want)
+    zp = zeta + 0.5 * wk[S_H]
+    pt = wk[SUP1 + HA_] + B * iw * zp
+    wk[o + N_PN] = wk[SUP1 + H] + A * iw * zp + 0.5 * wk[o + N_GAP]
+    wk[o + N_PT] = pt
     if want == 0:
         return
-    iw3 = iw * iw * iw
     AW_B = A * B * iw3
-    dn = sup[HAA_] - A * iw * zp
-    n_A = sup[H_A] + kap * kap * iw3 * zp
-    n_B = sup[H_B] + AW_B * zp
-    t_A = sup[HA_A] + AW_B * zp
-    t_B = sup[HA_B] + (iw + B * B * iw3) * zp
+    dn = wk[SUP1 + HAA_] - A * iw * zp
+    n_A = wk[SUP1 + H_A] + kap * kap * iw3 * zp
+    n_B = wk[SUP1 + H_B] + AW_B * zp
+    t_A = wk[SUP1 + HA_A] + AW_B * zp
+    t_B = wk[SUP1 + HA_B] + (iw + B * B * iw3) * zp
     N = o + N_DPN
     P = o + N_DPT
     for i in range(6):
-        rec[N + i] = 0.5 * rec[o + N_GRAD + i] + pt * rec[o + N_DALPHA + i]
-        rec[P + i] = dn * rec[o + N_DALPHA + i]
-    rec[N + 1] += 0.5 * A * iw
-    rec[P + 1] += 0.5 * B * iw
-    rec[N + 2] += n_A * sa + n_B * ca
-    rec[N + 3] += n_A * ca - n_B * sa
-    rec[P + 2] += t_A * sa + t_B * ca
-    rec[P + 3] += t_A * ca - t_B * sa
-    rec[N + 4] += sup[H_F]
-    rec[P + 4] += sup[HA_F]
+        wk[N + i] = 0.5 * wk[o + N_GRAD + i] + pt * wk[o + N_DALPHA + i]
+        wk[P + i] = dn * wk[o + N_DALPHA + i]
+    wk[N + 1] += 0.5 * A * iw
+    wk[P + 1] += 0.5 * B * iw
+    wk[N + 2] += n_A * sa + n_B * ca
+    wk[N + 3] += n_A * ca - n_B * sa
+    wk[P + 2] += t_A * sa + t_B * ca
+    wk[P + 3] += t_A * ca - t_B * sa
+    wk[N + 4] += wk[SUP1 + H_F]
+    wk[P + 4] += wk[SUP1 + HA_F]

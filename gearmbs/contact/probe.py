@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.deviations import add_deviation, set_corner, tip_string, tooth_record
 from gearmbs.contact.face import LIMIT, face_limit
-from gearmbs.contact.flanks import corner_section
+from gearmbs.contact.flanks import corner_section, flank_pitch, open_side, set_normal
+from gearmbs.contact.jit import kernel
 from gearmbs.contact.node import contact_point, flank_normal, section_gap
 from gearmbs.contact.pose import relative_pose
 
 COLUMNS = ("side", "tooth_1", "tooth_2", "station", "gap", "kind", "string_1", "string_2", "normal", "tangent", "alpha")
 
 
-@njit(cache=True)
+@kernel
 def pair_gaps(gi, gr, R1, A1, R2, A2, stations, rows, work):
     """Gap of every tooth pair within one pitch of the path of contact, both sides, at stations along the face.
 
@@ -36,71 +37,68 @@ def pair_gaps(gi, gr, R1, A1, R2, A2, stations, rows, work):
     int
         Number of rows filled.
     """
-    x = np.zeros(6)
-    M = np.zeros((3, 3))
-    if not relative_pose(R1, A1, R2, A2, x, M):
+    if not relative_pose(R1, A1, R2, A2, work):
         return 0
     rb1 = gr[L.RB]
     rb2 = gr[L.WHEEL + L.RB]
-    Rb = rb1 + rb2
-    a = x[0]
-    if a <= Rb * 1.0001:
-        return 0
-    length = np.sqrt(a * a - Rb * Rb)
-    alpha0 = np.arctan2(length, Rb)
     pitch = gr[L.PITCH]
-    sup = work[L.W_SUP : L.W_SUP + 30]
-    limits = work[L.W_LIMIT : L.W_LIMIT + 4 * LIMIT]
-    rec = work[L.W_NODES : L.W_NODES + L.NODE]
-    tip1 = gr[L.S_TIP]
-    tip2 = gr[L.WHEEL + L.S_TIP]
-    z1 = gi[L.Z1]
-    z2 = gi[L.Z2]
+    o = L.W_NODES
     count = 0
+    teeth = gi[L.O_TOOTH] != 0
     for side in (1, -1):
-        if side == -1:
-            for i in range(3, 6):
-                x[i] = -x[i]
-        p, q = x[2], x[3]
-        w = np.sqrt(1.0 - p * p - q * q)
-        base1 = rb1 * (x[4] + gr[L.PSI])
-        base2 = rb2 * (x[5] + gr[L.WHEEL + L.PSI])
-        n = int(np.floor((length - Rb * alpha0 - base1 - base2) / pitch + 0.5))
+        for i in range(6):
+            work[L.S_X + i] = -work[L.W_X + i] if side == -1 and i > 2 else work[L.W_X + i]
+        if not open_side(gr, work):
+            return 0
+        length = work[L.S_LENGTH]
+        alpha0 = work[L.S_A0]
+        tip1 = gr[L.S_TIP]
+        tip2 = gr[L.WHEEL + L.S_TIP]
+        base1 = rb1 * (work[L.S_X + 4] + gr[L.PSI])
+        n = int(flank_pitch(gr, work))
         first = int(np.ceil((length - tip2 - base1 - rb1 * alpha0) / pitch)) - 1
         last = int(np.floor((tip1 - base1 - rb1 * alpha0) / pitch)) + 1
         for i in range(first, last + 1):
-            f1 = x[4] + i * 2.0 * np.pi / z1
-            f2 = x[5] + (n - i) * 2.0 * np.pi / z2
+            f1 = work[L.S_X + 4] + i * 2.0 * np.pi / gi[L.Z1]
+            f2 = work[L.S_X + 5] + (n - i) * 2.0 * np.pi / gi[L.Z2]
+            record1 = tooth_record(gi, 0, side, i) if teeth else 0
+            record2 = tooth_record(gi, 1, side, n - i) if teeth else 0
             ends = stations.size == 0
             if ends:
-                face_limit(-1.0, gr, x, w, f1, f2, limits, 0, 0)
-                face_limit(1.0, gr, x, w, f1, f2, limits, LIMIT, 0)
+                face_limit(-1.0, gr, work, f1, f2, L.W_LIMIT, 0)
+                face_limit(1.0, gr, work, f1, f2, L.W_LIMIT + LIMIT, 0)
             for j in range(2 if ends else stations.size):
-                zeta = limits[j * LIMIT] if ends else stations[j]
-                total = rb1 * (f1 + gr[L.PSI]) + rb2 * (f2 + gr[L.WHEEL + L.PSI])
-                alpha = flank_normal(a, p, q, w, total, Rb, zeta, alpha0)
-                section_gap(gr, 0, x, w, f1, f2, zeta, alpha, rec, 0, sup, 0)
-                kind = 0
-                if rec[L.N_S1] - tip1 > rec[L.N_S2] - tip2:
-                    if rec[L.N_S1] > tip1:
-                        kind = 1
-                elif rec[L.N_S2] > tip2:
-                    kind = 2
-                if kind != 0:
-                    corner_section(gr, kind, x, w, f1, f2, zeta, alpha, rec, 0, sup, 0)
                 if count >= rows.shape[0]:
                     return count
-                contact_point(gr, kind, x, w, f1, zeta, rec, 0, sup, 0)
+                zeta = work[L.W_LIMIT + j * LIMIT] if ends else stations[j]
+                set_normal(work, alpha0, work[L.S_A0 + 1], work[L.S_A0 + 2])
+                flank_normal(work, base1 + i * pitch + rb2 * (f2 + gr[L.WHEEL + L.PSI]), rb1 + rb2, zeta)
+                section_gap(gr, work, 0, f1, f2, zeta, o, 0)
+                tip1 = tip_string(gi, gr, 0, record1, zeta, work[L.S_X + 1])
+                tip2 = tip_string(gi, gr, 1, record2, zeta, work[L.S_X + 1])
+                kind = 0
+                if work[o + L.N_S1] - tip1 > work[o + L.N_S2] - tip2:
+                    if work[o + L.N_S1] > tip1:
+                        kind = 1
+                elif work[o + L.N_S2] > tip2:
+                    kind = 2
+                if kind != 0:
+                    set_corner(gr, work, kind - 1, f1 if kind == 1 else f2, tip1 if kind == 1 else tip2)
+                    corner_section(gr, work, kind, f1, f2, zeta, False, o, 0)
+                if teeth:
+                    add_deviation(gi, gr, work, 0, record1, kind, f1, f2, zeta, o, 0)
+                    add_deviation(gi, gr, work, 1, record2, kind, f1, f2, zeta, o, 0)
+                contact_point(gr, work, kind, f1, zeta, o, 0)
                 rows[count, 0] = side
-                rows[count, 1] = (side * i) % z1
-                rows[count, 2] = (side * (n - i)) % z2
+                rows[count, 1] = (side * i) % gi[L.Z1]
+                rows[count, 2] = (side * (n - i)) % gi[L.Z2]
                 rows[count, 3] = zeta
-                rows[count, 4] = rec[L.N_GAP]
+                rows[count, 4] = work[o + L.N_GAP]
                 rows[count, 5] = kind
-                rows[count, 6] = rec[L.N_S1]
-                rows[count, 7] = rec[L.N_S2]
-                rows[count, 8] = rec[L.N_PN]
-                rows[count, 9] = rec[L.N_PT]
-                rows[count, 10] = rec[L.N_ALPHA]
+                rows[count, 6] = work[o + L.N_S1]
+                rows[count, 7] = work[o + L.N_S2]
+                rows[count, 8] = work[o + L.N_PN]
+                rows[count, 9] = work[o + L.N_PT]
+                rows[count, 10] = work[o + L.N_ALPHA]
                 count += 1
     return count

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from gearmbs.units import to_si
+from gearmbs.units import Quantity, to_si
 
 LawKind = Literal["impact", "hunt-crossley", "linear", "hertz"]
 
@@ -51,10 +51,10 @@ class ContactLaw:
     @classmethod
     def impact(
         cls,
-        stiffness: float | str = "2.9852e5 N/mm^1.3",
+        stiffness: Quantity = "2.9852e5 N/mm^1.3",
         exponent: float = 1.3,
-        damping: float | str | None = None,
-        depth: float | str = "0.1 mm",
+        damping: Quantity = None,
+        depth: Quantity = "0.1 mm",
     ) -> ContactLaw:
         """ADAMS's IMPACT, the paper's eq. (10)-(11): ``max(0, K x^e + C STEP(x, 0, 0, d, 1) dx/dt)``.
 
@@ -76,14 +76,14 @@ class ContactLaw:
 
     @classmethod
     def hunt_crossley(
-        cls, stiffness: float | str = "2.9852e5 N/mm^1.3", exponent: float = 1.3, factor: float | str = "0.5 s/m"
+        cls, stiffness: Quantity = "2.9852e5 N/mm^1.3", exponent: float = 1.3, factor: Quantity = "0.5 s/m"
     ) -> ContactLaw:
         """Hunt and Crossley's law ``max(0, K x^e (1 + c dx/dt))``; c is about 1.5 (1 - restitution) / impact speed."""
         k = to_si(stiffness, f"N/m^{exponent!r}", "ContactLaw.stiffness")
         return cls("hunt-crossley", k, float(exponent), to_si(factor, "s/m", "ContactLaw.factor"), 1.0)
 
     @classmethod
-    def linear(cls, stiffness: float | str, damping: float | str = 0.0, depth: float | str = "0.1 mm") -> ContactLaw:
+    def linear(cls, stiffness: Quantity, damping: Quantity = 0.0, depth: Quantity = "0.1 mm") -> ContactLaw:
         """A linear spring per tooth pair with IMPACT's damping."""
         k = to_si(stiffness, "N/m", "ContactLaw.stiffness")
         c = to_si(damping, "N*s/m", "ContactLaw.damping")
@@ -105,8 +105,8 @@ class Friction:
 
     static: float = 0.1
     dynamic: float = 0.05
-    static_speed: float | str = "100 mm/s"
-    dynamic_speed: float | str = "1000 mm/s"
+    static_speed: Quantity = "100 mm/s"
+    dynamic_speed: Quantity = "1000 mm/s"
     kind: Literal["adams", "smooth", "none"] = "adams"
 
     def __post_init__(self) -> None:

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from gearmbs.gears.laws import ContactLaw, Friction
 from gearmbs.gears.spec import GearSpec, convert_fields, involute, require
 from gearmbs.gears.tables import pack
+from gearmbs.units import Quantity
 
-TILTED_SLICES = 41
+TILTED_SLICES = 11
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class GearPair:
     torque : float or str
         Load torque on the driven wheel, N m, used by the static analyses.
     slices : int, optional
-        Slices along the face; default 1 for parallel axes without axial shift, else 41.
+        Slices along the face; default 1 for parallel axes without axial shift, else 11.
 
     Raises
     ------
@@ -83,16 +84,16 @@ class GearPair:
 
     driver: GearSpec
     driven: GearSpec
-    centre_distance_error: float | str = 0.0
-    misalignment: float | str = 0.0
+    centre_distance_error: Quantity = 0.0
+    misalignment: Quantity = 0.0
     plane: Literal["skew", "inclination"] = "skew"
-    pivot: float | str = 0.0
-    axial_shift: float | str = 0.0
-    backlash: float | str = 0.0
+    pivot: Quantity = 0.0
+    axial_shift: Quantity = 0.0
+    backlash: Quantity = 0.0
     contact: ContactLaw = field(default_factory=ContactLaw.impact)
     friction: Friction = field(default_factory=Friction)
     rotation: Literal[1, -1] = 1
-    torque: float | str = 100.0
+    torque: Quantity = 100.0
     slices: int | None = None
 
     def __post_init__(self) -> None:
@@ -102,7 +103,7 @@ class GearPair:
         self._check()
 
     @classmethod
-    def paper(cls, **changes: object) -> GearPair:
+    def paper(cls, **changes: Any) -> GearPair:
         """The paper's pair: z = 29/29, m = 95/31 mm, alpha = 20 deg, face width 20 mm, IMPACT and ADAMS friction.
 
         The printed module 3.065 mm is 95/31 = 3.064516 mm rounded: with r_a = 47.5 mm = (29/2 + 1) m exactly, the
@@ -116,13 +117,13 @@ class GearPair:
         """
         width = changes.pop("face_width", "20 mm")
         module = 95e-3 / 31
-        driver = GearSpec(29, module, face_width=width, name="driver")  # type: ignore[arg-type]
-        driven = GearSpec(29, module, face_width=width, name="driven")  # type: ignore[arg-type]
-        return cls(driver, driven, **changes)  # type: ignore[arg-type]
+        driver = GearSpec(29, module, face_width=width, name="driver")
+        driven = GearSpec(29, module, face_width=width, name="driven")
+        return cls(driver, driven, **changes)
 
-    def with_changes(self, **changes: object) -> GearPair:
+    def with_changes(self, **changes: Any) -> GearPair:
         """A copy with some fields changed."""
-        return replace(self, **changes)  # type: ignore[arg-type]
+        return replace(self, **changes)
 
     def _check(self) -> None:
         mm = 1e3
@@ -140,7 +141,7 @@ class GearPair:
         require(self.rotation in (1, -1), f"GearPair.rotation is {self.rotation!r}; give 1 or -1")
         require(
             abs(self.misalignment) <= math.radians(10),
-            f"GearPair.misalignment is {math.degrees(self.misalignment):.3f} deg; spur wheels mesh up to 10 deg at most "
+            f"GearPair.misalignment is {math.degrees(self.misalignment):.3f} deg; spur wheels mesh up to 10 deg "
             "(a plain number is in radians: write '1 deg')",
         )
         require(
@@ -156,14 +157,15 @@ class GearPair:
         a = self.centre_distance
         require(
             a > (one.base_radius + two.base_radius) * 1.0005,
-            f"GearPair.centre_distance_error is {self.centre_distance_error * mm:.4f} mm: the base circles meet; increase it",
+            f"GearPair.centre_distance_error is {self.centre_distance_error * mm:.4f} mm: the base circles meet; "
+            "increase it",
         )
         for near, far in ((one, two), (two, one)):
             require(
                 a > near.tip_radius + far.root_radius,
                 f"GearPair: overlapping wheels: centre distance {a * mm:.4f} mm leaves no clearance between the tip of "
-                f"{near.name} ({near.tip_radius * mm:.4f} mm) and the root of {far.name} ({far.root_radius * mm:.4f} mm); "
-                "increase centre_distance_error or dedendum",
+                f"{near.name} ({near.tip_radius * mm:.4f} mm) and the root of {far.name} "
+                f"({far.root_radius * mm:.4f} mm); increase centre_distance_error or dedendum",
             )
         require(
             a < one.tip_radius + two.tip_radius,
@@ -184,8 +186,8 @@ class GearPair:
             require(
                 start > near.form_string - 1e-12 and start > 0,
                 f"GearPair: the tip of {far.name} meets {near.name} inside the start of its involute (string "
-                f"{start * mm:.4f} mm, involute from {near.form_string * mm:.4f} mm): interference; reduce the addendum of "
-                f"{far.name} or increase centre_distance_error",
+                f"{start * mm:.4f} mm, involute from {near.form_string * mm:.4f} mm): interference; reduce the "
+                f"addendum of {far.name} or increase centre_distance_error",
             )
 
     @cached_property
@@ -266,7 +268,7 @@ class GearPair:
 
     @property
     def jam_backlash(self) -> float:
-        """Normal backlash the misalignment needs: b gamma cos(alpha) for skew, b gamma sin(alpha) for inclination, m."""
+        """Normal backlash the misalignment needs, m: b gamma cos(alpha) (skew) or b gamma sin(alpha) (inclination)."""
         alpha = self.working_pressure_angle
         part = math.cos(alpha) if self.plane == "skew" else math.sin(alpha)
         return self.common_face_width * abs(self.misalignment) * part

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
+from typing import Any
 
-from gearmbs.units import to_si
+from gearmbs.units import Quantity, to_si
 
 UNDERCUT_TOLERANCE = 0.8  # share of the cutter height that must clear the base circle's normal (14 teeth at 20 deg)
 
@@ -41,9 +42,9 @@ class Material:
         Between 0 and 0.5.
     """
 
-    youngs_modulus: float | str = "2.07e5 MPa"
+    youngs_modulus: Quantity = "2.07e5 MPa"
     poisson_ratio: float = 0.29
-    density: float | str = "7850 kg/m^3"
+    density: Quantity = "7850 kg/m^3"
     name: str = "steel"
 
     def __post_init__(self) -> None:
@@ -93,16 +94,16 @@ class GearSpec:
     """
 
     teeth: int
-    module: float | str
-    pressure_angle: float | str = "20 deg"
-    face_width: float | str = "20 mm"
-    addendum: float | str | None = None
-    dedendum: float | str | None = None
-    fillet_radius: float | str | None = None
+    module: Quantity
+    pressure_angle: Quantity = "20 deg"
+    face_width: Quantity = "20 mm"
+    addendum: Quantity = None
+    dedendum: Quantity = None
+    fillet_radius: Quantity = None
     profile_shift: float = 0.0
-    thinning: float | str = 0.0
-    tip_rounding: float | str = 0.0
-    bore_radius: float | str = 0.0
+    thinning: Quantity = 0.0
+    tip_rounding: Quantity = 0.0
+    bore_radius: Quantity = 0.0
     material: Material = field(default_factory=Material)
     name: str = "gear"
 
@@ -129,10 +130,10 @@ class GearSpec:
     def from_radii(
         cls,
         teeth: int,
-        module: float | str,
-        tip_radius: float | str,
-        root_radius: float | str,
-        **others: object,
+        module: Quantity,
+        tip_radius: Quantity,
+        root_radius: Quantity,
+        **others: Any,
     ) -> GearSpec:
         """Wheel from its tip and root radii instead of addendum and dedendum."""
         name = str(others.get("name", "gear"))
@@ -143,7 +144,7 @@ class GearSpec:
         require(
             root < pitch, f"{name}.root_radius is {root * 1e3:.4f} mm, outside the pitch circle {pitch * 1e3:.4f} mm"
         )
-        return cls(teeth, module, addendum=tip - pitch, dedendum=pitch - root, **others)  # type: ignore[arg-type]
+        return cls(teeth, module, addendum=tip - pitch, dedendum=pitch - root, **others)
 
     def _check(self) -> None:
         n = self.name
@@ -175,8 +176,8 @@ class GearSpec:
         )
         require(
             self.tip_radius > self.base_radius,
-            f"{n}.addendum is {self.addendum * mm:.4f} mm: the tip circle {self.tip_radius * mm:.4f} mm lies inside the "
-            f"base circle {self.base_radius * mm:.4f} mm and no involute is left",
+            f"{n}.addendum is {self.addendum * mm:.4f} mm: the tip circle {self.tip_radius * mm:.4f} mm lies inside "
+            f"the base circle {self.base_radius * mm:.4f} mm and no involute is left",
         )
         require(
             self.tooth_thickness > 0,
@@ -186,8 +187,8 @@ class GearSpec:
         clear = self.pitch_radius * math.sin(self.pressure_angle) ** 2
         require(
             clear >= UNDERCUT_TOLERANCE * cutter,
-            f"{n} is undercut: with {self.teeth} teeth the cutter reaches {cutter * mm:.3f} mm below the pitch circle where "
-            f"{clear * mm:.3f} mm is free; use more teeth, a larger profile_shift or a smaller dedendum",
+            f"{n} is undercut: with {self.teeth} teeth the cutter reaches {cutter * mm:.3f} mm below the pitch circle "
+            f"where {clear * mm:.3f} mm is free; use more teeth, a larger profile_shift or a smaller dedendum",
         )
         require(
             self.tip_thickness > 0,
@@ -196,17 +197,19 @@ class GearSpec:
         )
         require(
             2 * self.tip_rounding < self.tip_thickness and self.tip_rounding < 0.5 * self.addendum,
-            f"{n}.tip_rounding is {self.tip_rounding * mm:.4f} mm, too large for a tip {self.tip_thickness * mm:.4f} mm thick",
+            f"{n}.tip_rounding is {self.tip_rounding * mm:.4f} mm, too large for a tip "
+            f"{self.tip_thickness * mm:.4f} mm thick",
         )
         require(
             self.form_radius < self.tip_radius and self.form_radius < self.pitch_radius,
-            f"{n}: root circle {self.root_radius * mm:.4f} mm and fillet_radius {self.fillet_radius * mm:.4f} mm leave no "
-            f"involute below the pitch circle (base circle {self.base_radius * mm:.4f} mm); increase dedendum or "
+            f"{n}: root circle {self.root_radius * mm:.4f} mm and fillet_radius {self.fillet_radius * mm:.4f} mm leave "
+            f"no involute below the pitch circle (base circle {self.base_radius * mm:.4f} mm); increase dedendum or "
             "reduce fillet_radius",
         )
         require(
             self.fillet_half_angle < math.pi / self.teeth,
-            f"{n}.fillet_radius is {self.fillet_radius * mm:.4f} mm: the root arcs of neighbouring flanks overlap; reduce it",
+            f"{n}.fillet_radius is {self.fillet_radius * mm:.4f} mm: the root arcs of neighbouring flanks overlap; "
+            "reduce it",
         )
 
     @property

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 LAWS = {
     "impact": L.LAW_IMPACT,
     "hunt-crossley": L.LAW_HUNT_CROSSLEY,
-    "linear": L.LAW_LINEAR,
-    "hertz": L.LAW_HERTZ,
+    "linear": L.LAW_IMPACT,
+    "hertz": L.LAW_IMPACT,
 }
 FRICTIONS = {"none": L.FRICTION_NONE, "adams": L.FRICTION_ADAMS, "smooth": L.FRICTION_SMOOTH}
 EDGE_BLEND = 1e-6
