@@ -69,6 +69,9 @@ class GearPair:
         Load torque on the driven wheel, N m, used by the static analyses.
     slices : int, optional
         Slices along the face; default 1 for parallel axes without axial shift, else 11.
+    load : {"slices", "adams"}
+        How a tooth pair carries its load. ``slices``: pressure distributed over the face. ``adams``: one force at the
+        centroid of the overlap with the depth found there, as ADAMS does for solids.
 
     Raises
     ------
@@ -95,6 +98,7 @@ class GearPair:
     rotation: Literal[1, -1] = 1
     torque: Quantity = 100.0
     slices: int | None = None
+    load: Literal["slices", "adams"] = "slices"
 
     def __post_init__(self) -> None:
         lengths = ("centre_distance_error", "pivot", "axial_shift", "backlash")
@@ -117,9 +121,9 @@ class GearPair:
         """
         width = changes.pop("face_width", "20 mm")
         module = 95e-3 / 31
-        driver = GearSpec(29, module, face_width=width, name="driver")
-        driven = GearSpec(29, module, face_width=width, name="driven")
-        return cls(driver, driven, **changes)
+        for name in ("driver", "driven"):
+            changes.setdefault(name, GearSpec(29, module, face_width=width, name=name))
+        return cls(**changes)
 
     def with_changes(self, **changes: Any) -> GearPair:
         """A copy with some fields changed."""
@@ -138,6 +142,7 @@ class GearPair:
         require(
             self.plane in ("skew", "inclination"), f"GearPair.plane is {self.plane!r}; choose 'skew' or 'inclination'"
         )
+        require(self.load in ("slices", "adams"), f"GearPair.load is {self.load!r}; choose 'slices' or 'adams'")
         require(self.rotation in (1, -1), f"GearPair.rotation is {self.rotation!r}; give 1 or -1")
         require(
             abs(self.misalignment) <= math.radians(10),
