@@ -10,7 +10,7 @@ from numba import njit
 from gearmbs.adams import statements as st
 from gearmbs.adams.build import AdamsModel
 from gearmbs.dae import tables
-from gearmbs.dae.expressions import eval_gradient, eval_request, update_angles
+from gearmbs.dae.expressions import angle_rates, eval_gradient, eval_request, update_angles
 from gearmbs.dae.expressions.kinematics import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.expressions.tape import ExpressionError
 from gearmbs.dae.solution import Solution
@@ -119,7 +119,7 @@ class RequestEvaluator:
         out = np.zeros(m)
         _series(
             tape.ints, tape.floats, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
-            np.zeros(max(1, tape.n_angles)), np.zeros(tape.work_size), out,
+            np.zeros((3, max(1, tape.n_angles))), np.zeros(max(1, tape.gradient_size)), np.zeros(tape.work_size), out,
         )  # fmt: skip
         return out
 
@@ -223,14 +223,24 @@ def _tables(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
 
 @njit(
     "void(int64[::1], float64[::1], float64[::1], float64[:, :, ::1], float64[:, :, ::1], int64[::1],"
-    " float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1])",
+    " float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1])",
     cache=True,
     nogil=True,
 )
-def _series(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, work, out):
-    """Evaluate a tape at every time, counting its angles on."""
+def _series(ints, floats, t, kin, acc, marker_body, marker_frame, y, angles, grad, work, out):
+    """Evaluate a tape at every time.
+
+    Counted angles go on by the mean of their rates at both ends of an output step, to the nearest turn.
+    ``angles`` is scratch: references, present and last rates, a row each.
+    """
+    ref, rates, last = angles[0], angles[1], angles[2]
     for k in range(t.size):
+        angle_rates(ints, floats, t[k], kin[k], marker_body, marker_frame, y[k], ref, rates, grad, work)
+        if k > 0:
+            for a in range(ref.size):
+                ref[a] += 0.5 * (rates[a] + last[a]) * (t[k] - t[k - 1])
         update_angles(ints, floats, t[k], kin[k], marker_body, marker_frame, y[k], ref, work)
+        last[:] = rates
         out[k] = eval_request(ints, floats, t[k], kin[k], acc[k], marker_body, marker_frame, y[k], ref, work)
 
 

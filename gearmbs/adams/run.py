@@ -209,6 +209,7 @@ def _simulate(
         options, note = _settings(session, tol)
         output_step = float(times[1] - times[0]) * session.deck.units.time
         options.setdefault("first_step", FIRST_STEP * output_step)
+        options.setdefault("max_step", output_step)
         solution = model.mechanism.simulate(
             float(times[-1]) * session.deck.units.time,
             t_start=session.time * session.deck.units.time,

@@ -246,3 +246,10 @@ def test_motions_given_by_velocity_and_acceleration():
     point = BLOCK + "JPRIM/1,ORIENTATION,I=20,J=10\nREQUEST/1,F2=DX(20,10)\n"
     result = run(model(point + "MOTION/1,I=20,J=10,X,ACCELERATION,ICVEL=-1,ICDISP=0.5,FUNCTION=SIN(TIME)"), 3.0)
     np.testing.assert_allclose(result.request(1)[:, 1], 0.5 - np.sin(result.t), atol=1e-8)
+
+
+def test_angles_are_counted_between_distant_outputs():
+    """100 rad/s seen every 0.25 s: about four turns between outputs."""
+    body = BLOCK + "JOINT/1,REVOLUTE,I=20,J=10\nMOTION/1,JOINT=1,FUNCTION=100*TIME\nREQUEST/1,F2=AZ(20,10)\n"
+    result = run(model(body), 2.0, 8)
+    np.testing.assert_allclose(result.request(1)[:, 1], 100 * result.t, atol=1e-8)

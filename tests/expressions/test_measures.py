@@ -201,3 +201,25 @@ def test_forces_between_markers_add_up(world):
 
 def test_marker_table_is_consistent():
     assert len(set(MARKERS.values())) == len(MARKER_BODY)
+
+
+def test_rates_of_counted_angles(world):
+    """Against differences of the angle along the motion."""
+    from gearmbs.dae.expressions import angle_rates
+
+    tape = world.compile("AZ(1,10)*2+SIN(AX(1,2))")
+    rates, grad = np.zeros(2), np.zeros(tape.gradient_size)
+    ref, work = np.zeros(2), np.zeros(tape.work_size)
+    angle_rates(tape.ints, tape.floats, 0.0, world.kin, MARKER_BODY, world.frames, Y, ref, rates, grad, work)
+    h = 1e-6
+    for text in ("AZ(1,10)", "AX(1,2)"):
+        single = world.compile(text)
+        ends = []
+        for s in (h, -h):
+            kin = world.kin.copy()
+            for b in (1, 2):
+                kin[b, :3] += s * kin[b, 3:6]
+                turned = Rotation.from_rotvec(s * kin[b, 15:18]).as_matrix() @ world.rotation(b)
+                kin[b, 6:15] = turned.ravel()
+            ends.append(world.value(single, kin=kin))
+        assert np.abs(rates - (ends[0] - ends[1]) / (2 * h)).min() < 1e-8

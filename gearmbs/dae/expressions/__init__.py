@@ -1,6 +1,7 @@
 """Function expressions as flat tapes evaluated by one compiled, data-driven kernel."""
 
 from gearmbs.dae.expressions.evaluate import (
+    angle_rates,
     eval_gradient,
     eval_request,
     eval_second,
@@ -16,6 +17,7 @@ __all__ = [
     "SplineData",
     "Tape",
     "TapeBuilder",
+    "angle_rates",
     "eval_gradient",
     "eval_request",
     "eval_second",

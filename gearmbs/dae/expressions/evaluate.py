@@ -13,6 +13,7 @@ from numba import njit
 
 from gearmbs.dae.expressions import opcodes as op
 from gearmbs.dae.expressions.integrals import integral
+from gearmbs.dae.expressions.kinematics import KIN_V, KIN_W
 from gearmbs.dae.expressions.measure_gradients import (
     cosine_gradient,
     euler_parameter_gradient,
@@ -180,16 +181,15 @@ def eval_request(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, w
     return work[ints[op.HEAD_RESULT]]
 
 
-@njit(f"float64({TABLES}, float64, {STATE}, float64[::1], float64[::1])", cache=True, nogil=True, error_model="numpy")
-def eval_gradient(ints, floats, t, kin, marker_body, marker_frame, y, ref, grad, work):
-    """Return the value and write its gradient.
-
-    ``grad[12 p + 0:12]`` holds the derivatives by [dR, dpi, dv, dw] of the p-th body of the tape's
-    list, ``grad[12 n_bodies + q]`` the derivative by its q-th algebraic unknown.
-    """
-    _forward(ints, floats, t, kin, kin, marker_body, marker_frame, y, ref, work, 1)
+@njit(
+    "void(int64[::1], float64[:, ::1], int64[::1], float64[:, ::1], float64[::1], float64[::1], float64[::1])",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def _scatter(ints, kin, marker_body, marker_frame, y, grad, work):
+    """Write the gradient from the leaves' adjoints, which stand at work[3 n:]."""
     n = ints[op.HEAD_COUNT]
-    _backward(ints, work, 3 * n, ints[op.HEAD_RESULT])
     first = 12 * ints[op.HEAD_BODIES]
     for c in range(first + ints[op.HEAD_ALGEBRAIC]):
         grad[c] = 0.0
@@ -215,7 +215,45 @@ def eval_gradient(ints, floats, t, kin, marker_body, marker_frame, y, ref, grad,
             elif code <= op.ANGULAR_VELOCITY:
                 vector_gradient(ints, at, g, kin, marker_body, marker_frame, leaf, grad)
         at += op.WIDTH
+
+
+@njit(f"float64({TABLES}, float64, {STATE}, float64[::1], float64[::1])", cache=True, nogil=True, error_model="numpy")
+def eval_gradient(ints, floats, t, kin, marker_body, marker_frame, y, ref, grad, work):
+    """Return the value and write its gradient.
+
+    ``grad[12 p + 0:12]`` holds the derivatives by [dR, dpi, dv, dw] of the p-th body of the tape's
+    list, ``grad[12 n_bodies + q]`` the derivative by its q-th algebraic unknown.
+    """
+    _forward(ints, floats, t, kin, kin, marker_body, marker_frame, y, ref, work, 1)
+    _backward(ints, work, 3 * ints[op.HEAD_COUNT], ints[op.HEAD_RESULT])
+    _scatter(ints, kin, marker_body, marker_frame, y, grad, work)
     return work[ints[op.HEAD_RESULT]]
+
+
+@njit(
+    f"void({TABLES}, float64, {STATE}, float64[::1], float64[::1], float64[::1])",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def angle_rates(ints, floats, t, kin, marker_body, marker_frame, y, ref, rates, grad, work):
+    """Write the time rates of the tape's counted angles to ``rates``; ``grad`` is scratch of the gradient's size."""
+    if ints[op.HEAD_ANGLES] == 0:
+        return
+    n = ints[op.HEAD_COUNT]
+    _forward(ints, floats, t, kin, kin, marker_body, marker_frame, y, ref, work, 1)
+    for k in range(n):
+        at = ints[op.HEAD_CODE] + op.WIDTH * k
+        if ints[at] != op.UNWRAP:
+            continue
+        _backward(ints, work, 3 * n, k)
+        _scatter(ints, kin, marker_body, marker_frame, y, grad, work)
+        rate = 0.0
+        for p in range(ints[op.HEAD_BODIES]):
+            b = ints[ints[op.HEAD_BODY_LIST] + p]
+            for c in range(3):
+                rate += grad[12 * p + c] * kin[b, KIN_V + c] + grad[12 * p + 3 + c] * kin[b, KIN_W + c]
+        rates[ints[at + 2]] = rate
 
 
 @njit(f"void({TABLES}, float64, float64[::1], float64[::1])", cache=True, nogil=True, error_model="numpy")
