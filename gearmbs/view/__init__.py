@@ -11,15 +11,30 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gearmbs.view.bars import comparison_bars, gmf_bars
     from gearmbs.view.canvas import COLOURS, save_figure
+    from gearmbs.view.maps import sensitivity_map
+    from gearmbs.view.signals import order_plot, spectrum_plot, time_plot
 
 _HOMES = {
     "COLOURS": "canvas",
     "comparison_bars": "bars",
     "gmf_bars": "bars",
+    "order_plot": "signals",
     "save_figure": "canvas",
+    "sensitivity_map": "maps",
+    "spectrum_plot": "signals",
+    "time_plot": "signals",
 }
 
-__all__ = ["COLOURS", "comparison_bars", "gmf_bars", "save_figure"]
+__all__ = [
+    "COLOURS",
+    "comparison_bars",
+    "gmf_bars",
+    "order_plot",
+    "save_figure",
+    "sensitivity_map",
+    "spectrum_plot",
+    "time_plot",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -106,7 +106,9 @@ def comparison_bars(
                 colours = [state_colour(str(s), k) for k, s in enumerate(table.state.values)]
                 bars(ax, table, "state", colours, state_labels(table), True, log)
                 harmonic_axis(ax, table)
-                ax.set_title(f"{side}, {load} load")
+                ax.set_title(f"{side}, {load} load" if "load" not in str(load) else f"{side}, {load}")
+                if not log:
+                    ax.set_ylim(0.0, 1.12 * max(1e-300, *(float(t.sel(load=load).max()) for t in checked.values())))
                 if column == 0:
                     own = unit or tables.attrs.get("units") or checked[side].attrs.get("units", "")
                     ax.set_ylabel(label("RMS", own))
