@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from gearmbs.dae.result import SolverStats
 from gearmbs.signals import COMPONENTS, rms_factor
 from gearmbs.studies.case import Case, CaseError, make_case
 from gearmbs.studies.parallel import run_cases
@@ -243,7 +244,10 @@ def combine(cases: list[Case], records: list[xr.Dataset], component: str) -> xr.
     together = together.assign_coords(
         torque=("load", [row[0].attrs["operation_torque"] for row in rows], {"units": "N m"})
     )
-    together.attrs = {k: v for k, v in records[0].attrs.items() if not k.startswith(("solver_", "case"))}
+    statistics = {f"solver_{name}" for name in SolverStats().as_dict()}
+    together.attrs = {
+        k: v for k, v in records[0].attrs.items() if k not in statistics and k not in ("case", "case_json")
+    }
     together.attrs.pop("operation_torque")
     for key in ("fault_misalignment", "fault_centre_distance_error"):
         together.attrs.pop(key)
