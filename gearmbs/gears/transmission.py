@@ -17,7 +17,6 @@ MAX_ROWS = 4000
 NEWTON_STEPS = 100
 PHASE_STEPS = 50
 TOUCH_TOLERANCE = 1e-15  # m
-LAG_STEP = 1e-4  # rad, while no bracket is known
 
 
 @dataclass(frozen=True)
@@ -127,6 +126,7 @@ class StaticMesh:
         """Driven angle at which the contact carries ``torque``, by Newton's method kept inside a bracket."""
         side = self.pair.rotation
         lag = side * start
+        longest = self.pair.penetration(torque) / self.pair.driven.base_radius
         low, high = -math.inf, math.inf
         for _ in range(NEWTON_STEPS):
             value, slope = self.torque(driver_angle, side * lag)
@@ -135,12 +135,12 @@ class StaticMesh:
                 high = lag
             else:
                 low = lag
-            trial = lag + miss / slope if slope < 0 else math.inf
+            trial = lag + min(max(miss / slope, -longest), longest) if slope < 0 else math.inf
             if not low < trial < high:
                 if math.isfinite(low) and math.isfinite(high):
                     trial = 0.5 * (low + high)
                 else:
-                    trial = low + LAG_STEP if math.isfinite(low) else high - LAG_STEP
+                    trial = low + longest if math.isfinite(low) else high - longest
             if abs(trial - lag) <= 1e-16 or abs(miss) <= 1e-12 * torque:
                 break
             lag = trial

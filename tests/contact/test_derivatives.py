@@ -1,4 +1,4 @@
-"""Exact derivatives of the contact wrench against high-order differences, and support functions against complex step."""
+"""Exact derivatives of the contact wrench against differences, support functions against complex step."""
 
 import numpy as np
 import pytest

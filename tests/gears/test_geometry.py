@@ -1,0 +1,177 @@
+"""Closed-form numbers of wheels and pairs."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gearmbs.gears import GearPair, GearSpec, involute
+
+MM = 1e-3
+
+
+def test_paper_table():
+    # m = 95/31 mm: r_p = 29 m / 2, r_a = r_p + m, r_b = r_p cos 20 deg, r_f = r_p - 1.25 m, r_c = 0.38 m
+    gear = GearPair.paper().driver
+    m = 95 / 31
+    for value, expected in (
+        (gear.pitch_radius, 44.43548),
+        (gear.base_radius, 41.75570),
+        (gear.tip_radius, 47.5),
+        (gear.root_radius, 40.60484),
+        (gear.fillet_radius, 1.16452),
+        (gear.base_pitch, 9.04685),
+        (gear.tooth_thickness, 4.81373),
+        (gear.tip_thickness, 2.2503),
+    ):
+        assert value / MM == pytest.approx(expected, abs=6e-6 if expected != 2.2503 else 6e-5)
+    assert gear.tip_radius / MM == pytest.approx(15.5 * m, rel=1e-15)
+    # the printed module misses the printed radii
+    assert 0.5 * 29 * 3.065 - 44.435 > 5e-3
+
+
+def test_root_arc_closes_the_profile():
+    # an arc tangent to the root circle reaches its radial tangent within 3 um of the base circle
+    gear = GearPair.paper().driver
+    assert abs(gear.form_radius - gear.base_radius) < 3e-6
+    assert gear.form_string == 0
+
+
+def test_mass_and_inertia_of_the_disc():
+    # rho pi r_p^2 b and half that times r_p^2
+    gear = GearPair.paper().driver
+    assert gear.mass == pytest.approx(0.974, abs=5e-4)
+    assert gear.inertia[2] == pytest.approx(9.6e-4, rel=2e-3)
+    bored = GearSpec(29, "3 mm", bore_radius="10 mm")
+    plain = GearSpec(29, "3 mm")
+    assert bored.mass == pytest.approx(plain.mass * (1 - (10 / 43.5) ** 2), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("error", "alpha", "ratio", "j_wt", "j_bn", "path"),
+    [
+        (0.0, 20.000, 1.6459, 0.0, 0.0, 14.891),
+        (1.0, 21.684, 1.3353, 0.7662, 0.7120, 12.080),
+        (2.1645, 23.458, 1.0000, 1.7512, 1.6065, 9.047),
+        (3.0, 24.632, 0.7733, 2.5165, 2.2875, 6.996),
+    ],
+)
+def test_centre_distance(error, alpha, ratio, j_wt, j_bn, path):
+    # cos alpha' = (r_b1 + r_b2) / a', j_wt = 2 a' (inv alpha' - inv alpha), j_bn = j_wt cos alpha'
+    pair = GearPair.paper(centre_distance_error=error * MM)
+    assert math.degrees(pair.working_pressure_angle) == pytest.approx(alpha, abs=1.5e-3)
+    assert pair.contact_ratio == pytest.approx(ratio, abs=6e-5)
+    assert pair.circumferential_backlash / MM == pytest.approx(j_wt, abs=6e-5)
+    assert pair.normal_backlash / MM == pytest.approx(j_bn, abs=6e-5)
+    assert pair.path_of_contact / MM == pytest.approx(path, abs=6e-4)
+    if error == 0:
+        assert pair.centre_distance / MM == pytest.approx(88.87097, abs=6e-6)
+        assert pair.start_of_active_profile[0] / MM == pytest.approx(42.469, abs=6e-4)
+
+
+def test_backlash_by_thinning_adds_up():
+    pair = GearPair.paper(backlash="0.1 mm")
+    assert pair.normal_backlash == pytest.approx(0.1 * MM, rel=1e-9)
+    pair = GearPair.paper(backlash="0.1 mm", centre_distance_error="1 mm")
+    assert pair.normal_backlash / MM == pytest.approx(0.8120, abs=6e-5)
+
+
+def test_contact_ratio_of_62_62():
+    # the potential-energy code of ROSS gives 1.78978 for m = 2 mm
+    assert GearPair(GearSpec(62, "2 mm"), GearSpec(62, "2 mm")).contact_ratio == pytest.approx(1.78978, abs=6e-6)
+
+
+def test_jam_backlash():
+    gamma, alpha, b = math.radians(1), math.radians(20), 20 * MM
+    assert GearPair.paper(misalignment="1 deg").jam_backlash == pytest.approx(b * gamma * math.cos(alpha))
+    tilted = GearPair.paper(misalignment="1 deg", plane="inclination")
+    assert tilted.jam_backlash == pytest.approx(b * gamma * math.sin(alpha))
+    assert tilted.jams
+    assert not tilted.with_changes(backlash="0.2 mm").jams
+
+
+def test_placement():
+    pair = GearPair.paper(misalignment="1 deg", pivot="5 mm", centre_distance_error="1 mm")
+    place = pair.placement()
+    assert place.origin_1 == pytest.approx(np.zeros(3))
+    angle = math.acos(place.axes_1[:, 2] @ place.axes_2[:, 2])
+    assert angle == pytest.approx(math.radians(1))
+    # the pivot, 5 mm along the axis, is where it is without tilt
+    assert place.origin_2 + 5 * MM * place.axes_2[:, 2] == pytest.approx([pair.centre_distance, 0, 5 * MM])
+
+
+BAD_WHEELS = {
+    "teeth": {"teeth": 4},
+    "module": {"module": -1e-3},
+    "face_width": {"face_width": 0.0},
+    "pressure_angle": {"pressure_angle": 20.0},
+    "undercut": {"teeth": 10},
+    "pointed": {"profile_shift": 1.0, "teeth": 12},
+    "negative backlash": {"thinning": -1e-5},
+    "bore_radius": {"bore_radius": "60 mm"},
+    "fillet_radius": {"fillet_radius": "2.5 mm"},
+    "tip_rounding": {"tip_rounding": "2 mm"},
+    "addendum": {"addendum": "-1 mm"},
+    "NaN": {"module": float("nan")},
+    "kg": {"module": "3 kg"},
+}
+
+
+@pytest.mark.parametrize("word", BAD_WHEELS)
+def test_impossible_wheels_are_named(word):
+    arguments = {"teeth": 29, "module": "3 mm"} | BAD_WHEELS[word]
+    with pytest.raises(ValueError, match=word):
+        GearSpec(**arguments)
+
+
+def test_root_on_the_wrong_side():
+    with pytest.raises(ValueError, match="root_radius is 45"):
+        GearSpec.from_radii(29, "3 mm", tip_radius="46.5 mm", root_radius="45 mm")
+    with pytest.raises(ValueError, match="tip_radius is 43"):
+        GearSpec.from_radii(29, "3 mm", tip_radius="43 mm", root_radius="40 mm")
+    with pytest.raises(ValueError, match="leave no involute"):
+        GearSpec(120, "3 mm", dedendum="0.2 mm", fillet_radius="3 mm")
+
+
+BAD_PAIRS = {
+    "overlapping wheels": {"centre_distance_error": "-0.8 mm"},
+    "do not reach": {"centre_distance_error": "7 mm"},
+    "negative backlash": {"backlash": "-0.1 mm"},
+    "misalignment": {"misalignment": 1.0},
+    "plane": {"plane": "sideways"},
+    "rotation": {"rotation": 2},
+    "slices": {"slices": 0},
+    "load": {"load": "magic"},
+    "axial_shift": {"axial_shift": "25 mm"},
+    "torque": {"torque": "100 N"},
+    "module and pressure_angle": {"driven": GearSpec(29, "3 mm")},
+    "interference": {"driver": GearSpec(15, 95e-3 / 31), "driven": GearSpec(120, 95e-3 / 31)},
+}
+
+
+@pytest.mark.parametrize("words", BAD_PAIRS)
+def test_impossible_pairs_are_named(words):
+    with pytest.raises(ValueError, match=words):
+        GearPair.paper(**BAD_PAIRS[words])
+
+
+@settings(max_examples=60, derandomize=True, deadline=None)
+@given(
+    z1=st.integers(18, 80),
+    z2=st.integers(18, 80),
+    module=st.floats(1e-3, 8e-3),
+    error=st.floats(0, 0.4),
+    thinning=st.floats(0, 0.05),
+)
+def test_pairs_of_any_size(z1, z2, module, error, thinning):
+    one, two = GearSpec(z1, module, thinning=thinning * module), GearSpec(z2, module)
+    pair = GearPair(one, two, centre_distance_error=error * module)
+    alpha = pair.working_pressure_angle
+    play = 2 * pair.centre_distance * (involute(alpha) - involute(math.radians(20))) * math.cos(alpha)
+    # thinning acts along the line of action through the base circle: j = s cos(alpha)
+    expected = play + thinning * module * math.cos(math.radians(20))
+    assert pair.normal_backlash == pytest.approx(expected, abs=1e-12)
+    assert one.half_angle(one.tip_radius) > 0
+    assert pair.path_of_contact < pair.line_of_action

@@ -1,0 +1,69 @@
+"""Transmission error without dynamics, with the same kernel the dynamics use."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+from gearmbs.gears import GearPair, GearSpec, kinematic_transmission_error, loaded_transmission_error
+from gearmbs.gears.transmission import StaticMesh
+
+UM = 1e-6
+
+
+@pytest.mark.parametrize(
+    ("error", "mean", "peak_to_peak", "harmonics"),
+    [
+        (0.0, 16.574, 10.096, [4.074, 3.010, 1.671, 0.480, 0.279]),
+        (3e-3, 25.489, 8.61, [2.048, 1.850, 1.552, 1.197, 0.831]),
+    ],
+)
+def test_loaded_tables(error, mean, peak_to_peak, harmonics):
+    # K delta^1.3 per pair, corner contact, true moment arms, 100 N m
+    te = loaded_transmission_error(GearPair.paper(centre_distance_error=error), 100.0)
+    assert te.mean / UM == pytest.approx(mean, abs=6e-4)
+    assert te.peak_to_peak / UM == pytest.approx(peak_to_peak, abs=6e-3 if error else 6e-4)
+    assert te.harmonics() / UM == pytest.approx(harmonics, abs=6e-4)
+
+
+def test_kinematic_error_is_zero_with_overlap():
+    for error in (0.0, 1e-3, 2.1e-3):
+        assert kinematic_transmission_error(GearPair.paper(centre_distance_error=error), 50).peak_to_peak < 1e-12
+
+
+@pytest.mark.parametrize(("error", "value"), [(2.5e-3, 2.99), (3e-3, 17.91)])
+def test_kinematic_error_without_overlap(error, value):
+    # below contact ratio 1 a tip corner carries the motion between two spans of involute contact
+    mesh = StaticMesh(GearPair.paper(centre_distance_error=error))
+
+    def lag(phase):
+        angle = phase * 2 * np.pi / 29
+        return -(mesh.touching_angle(angle) - mesh.ideal_angle(angle)) * mesh.pair.driven.base_radius
+
+    grid = np.arange(200) / 200
+    at = grid[np.argmin([lag(p) for p in grid])]
+    peak = minimize_scalar(lag, bounds=(at - 0.01, at + 0.01), method="bounded", options={"xatol": 1e-9})
+    assert -peak.fun / UM == pytest.approx(value, abs=6e-3)
+
+
+@pytest.mark.parametrize(("z1", "z2"), [(17, 38), (62, 62), (20, 53)])
+def test_other_ratios(z1, z2):
+    pair = GearPair(GearSpec(z1, "2 mm"), GearSpec(z2, "2 mm"))
+    assert kinematic_transmission_error(pair, 20).peak_to_peak < 1e-12
+    te = loaded_transmission_error(pair, 20.0, 40)
+    # all pairs in full contact: r_b F = T; corners bear off the line of action and change the arm a little
+    assert te.forces == pytest.approx(20.0 / pair.driven.base_radius, rel=0.03)
+    # the load carries corners into contact beyond the path: one pair more at most
+    assert te.pairs.min() == 1
+    assert te.pairs.max() <= np.ceil(pair.contact_ratio) + 1
+    assert te.error.max() == pytest.approx(pair.penetration(20.0), rel=1e-2)
+
+
+def test_both_senses_of_rotation():
+    one = loaded_transmission_error(GearPair.paper(centre_distance_error="1 mm"), 100.0, 40)
+    two = loaded_transmission_error(GearPair.paper(centre_distance_error="1 mm", rotation=-1), 100.0, 40)
+    assert two.error == pytest.approx(one.error, abs=1e-15)
+
+
+def test_no_load_is_refused():
+    with pytest.raises(ValueError, match="torque is 0"):
+        loaded_transmission_error(GearPair.paper(), 0.0)

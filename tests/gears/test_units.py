@@ -1,0 +1,74 @@
+"""Text with units becomes SI; everything else is refused by name."""
+
+import pytest
+
+from gearmbs.gears import ContactLaw, Friction
+from gearmbs.units import to_si
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("0.1 mm", "length", 1e-4),
+        ("1000 rpm", "angular speed", 104.71975511965977),
+        ("1 deg", "angle", 0.017453292519943295),
+        ("1°", "angle", 0.017453292519943295),
+        ("100 N m", "torque", 100.0),
+        ("100 N*mm", "torque", 0.1),
+        ("207 GPa", "pressure", 2.07e11),
+        ("12.8 kHz", "frequency", 12800.0),
+        ("20 percent", "dimensionless", 0.2),
+        (3.0, "length", 3.0),
+        (3, "length", 3.0),
+        # 2.9852e5 N/mm^1.3 = 2.9852e5 * (1000)^1.3 N/m^1.3
+        ("2.9852e5 N/mm^1.3", "N/m^1.3", 2.9852e5 * 1e3**1.3),
+    ],
+)
+def test_values(text, unit, value):
+    assert to_si(text, unit) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit"),
+    [
+        ("3", "length"),
+        ("20", "angle"),
+        ("1 kg", "length"),
+        ("abc", "length"),
+        ("1 furlongz", "length"),
+        ("", "length"),
+        (float("nan"), "length"),
+        ("nan mm", "length"),
+        ("1 N/mm^1.5", "N/m^1.3"),
+    ],
+)
+def test_refused_values_name_the_field(value, unit):
+    with pytest.raises(ValueError, match="pair.depth"):
+        to_si(value, unit, "pair.depth")
+
+
+@pytest.mark.parametrize("value", [True, None, [1.0], {"a": 1}])
+def test_refused_types_name_the_field(value):
+    with pytest.raises(TypeError, match="pair.depth"):
+        to_si(value, "length", "pair.depth")
+
+
+def test_impact_damping_is_a_thousandth_of_the_printed_stiffness():
+    # 0.001 * 2.9852e5 = 298.52 N s/mm
+    law = ContactLaw.impact()
+    assert law.damping == pytest.approx(298.52e3, rel=1e-12)
+    assert ContactLaw.impact(damping="300 N*s/mm").damping == pytest.approx(3e5)
+
+
+def test_laws_refuse_nonsense():
+    for arguments in (
+        {"stiffness": "-1 N/mm^1.3"},
+        {"exponent": 0.5, "stiffness": 1e9},
+        {"damping": -1.0},
+        {"depth": 0.0},
+    ):
+        with pytest.raises(ValueError, match="ContactLaw"):
+            ContactLaw.impact(**arguments)
+    for arguments in ({"static": -0.1}, {"static_speed": "2 m/s"}, {"kind": "glue"}):
+        with pytest.raises(ValueError, match="Friction"):
+            Friction(**arguments)
