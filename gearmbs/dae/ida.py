@@ -20,8 +20,8 @@ from gearmbs.dae.result import DAEResult, SolverStats, Status
 
 UNCONTROLLED = 1e10
 SMALLEST_RTOL = 1e-14
-DENSE_LIMIT = 40
-"""Unknowns up to which the dense factorisation is the cheaper one."""
+DENSE_LIMIT = 150
+"""Unknowns up to which the dense factorisation is used: SuperLU_MT waits busily and stalls on a loaded machine."""
 HISTORY_GROWTH = 1024
 
 
