@@ -15,13 +15,14 @@ import numpy as np
 
 from gearmbs.adams import statements as st
 from gearmbs.adams.build_data import spline_data
+from gearmbs.adams.check import measured_markers
 from gearmbs.adams.deck import Deck
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.frames import inertia_about_cm, marker_orientation, part_orientation
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.elements import State
-from gearmbs.mechanism.expression import Call, Name, Number, Scope, parse, unparse, walk
+from gearmbs.mechanism.expression import Call, Name, Number, Scope, parse, unparse
 from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Marker
@@ -32,8 +33,6 @@ KINDS: dict[type, str] = {
     st.SpringDamper: "springdamper", st.Gcon: "gcon", st.Coupler: "coupler", st.Gear: "gear",
 }  # fmt: skip
 """Kinds under which functions such as JOINT and SFORCE ask for an element's force."""
-
-MEASURES = frozenset("DX DY DZ DM AX AY AZ PSI THETA PHI YAW PITCH ROLL".split())
 
 
 class BodyState(NamedTuple):
@@ -249,7 +248,7 @@ class Builder:
 
     def gcon_pair(self, s: st.Gcon) -> tuple[int, int | None]:
         """Return a general constraint's I marker and, when its expression names just one other, that one."""
-        used = marker_ids(s.function or "")
+        used = measured_markers(s.function or "")
         first = s.i if s.i is not None else (used[0] if used else 0)
         others = [m for m in used if m != first]
         return first, others[0] if len(others) == 1 else None
@@ -346,14 +345,3 @@ class Builder:
                 continue
             text = f"({self.text(diff.function)})/{self.units.time!r}"
             m.states[diff.id] = State(f"DIFF_{diff.id}", text, diff.ic[0])
-
-
-def marker_ids(text: str) -> list[int]:
-    """Return the markers an expression's measures name, in order of appearance."""
-    found: list[int] = []
-    for node in walk(parse(text)):
-        if isinstance(node, Call) and node.name in MEASURES:
-            for a in node.args:
-                if isinstance(a, Number) and a.integer and a.integer not in found:
-                    found.append(a.integer)
-    return found

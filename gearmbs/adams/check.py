@@ -8,6 +8,8 @@ from dataclasses import fields
 from gearmbs.adams import statements as st
 from gearmbs.adams.deck import Deck
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
+from gearmbs.adams.grammar import EXPRESSION, specs_of
+from gearmbs.mechanism.expression import Call, Number, parse, walk
 
 REQUIRED: dict[type, tuple[str, ...]] = {
     st.Marker: ("part",),
@@ -27,6 +29,11 @@ REQUIRED: dict[type, tuple[str, ...]] = {
     st.Variable: ("function",),
     st.Diff: ("function",),
 }
+MEASURES = frozenset(
+    """DX DY DZ DM AX AY AZ PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
+    WDTX WDTY WDTZ WDTM""".split()
+)
+"""Functions of the places and motions of markers."""
 MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv")
 TWO_PARTS = (st.Joint, st.Jprim)
 UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
@@ -81,6 +88,7 @@ def check(deck: Deck) -> list[Diagnostic]:
     _check_constraints(deck, fail)
     _check_forces(deck, fail)
     _check_data(deck, fail)
+    _check_floating(deck, fail)
     return errors
 
 
@@ -197,3 +205,30 @@ def _check_data(deck: Deck, fail: Fail) -> None:
             fail(request, "give DISPLACEMENT, VELOCITY, ACCELERATION or FORCE, or F1 to F8")
         if request.type is not None and request.i is None:
             fail(request, "I is missing")
+
+
+def _check_floating(deck: Deck, fail: Fail) -> None:
+    """Refuse measures of floating markers: they follow a force's I marker, which is not tracked."""
+    floating = {m.id for m in deck.of(st.Marker).values() if m.floating}
+    if not floating:
+        return
+    for statement in deck:
+        for name, spec in specs_of(type(statement)).items():
+            text = getattr(statement, name)
+            if spec.kind != EXPRESSION or text is None:
+                continue
+            for ref in measured_markers(text):
+                if ref in floating:
+                    fail(statement, f"MARKER/{ref} is FLOATING; measure at the force's I marker instead", name)
+
+
+def measured_markers(text: str) -> list[int]:
+    """Return the markers whose place or motion an expression asks for, in order of appearance."""
+    found: list[int] = []
+    for node in walk(parse(text)):
+        if isinstance(node, Call) and node.name in MEASURES:
+            refs = node.args[2:] if node.name == "ORIENT" else node.args
+            for a in refs:
+                if isinstance(a, Number) and a.integer and a.integer not in found:
+                    found.append(a.integer)
+    return found

@@ -152,8 +152,10 @@ class RequestEvaluator:
         elif name in self.solution.system.force_names:
             out[:, :3], out[:, 3:6] = self.solution.load(name)
         out[:, 6:9] = -out[:, 0:3]
-        lever = self._origin(i) - (self._origin(j) if j is not None else self._origin(i))
-        out[:, 9:12] = -out[:, 3:6] - np.cross(lever, out[:, 0:3])
+        out[:, 9:12] = -out[:, 3:6]
+        if j is not None and not self.model.deck.of(st.Marker)[j].floating:
+            # a floating marker stands where I is
+            out[:, 9:12] -= np.cross(self._origin(i) - self._origin(j), out[:, 0:3])
         self._wrenches[kind, ref] = out
         return out
 

@@ -159,7 +159,7 @@ class AdamsResult:
         Parameters
         ----------
         prefix : path
-            File name without extension; its directory must exist.
+            File name without extension; its directory is made when it does not exist.
 
         Returns
         -------
@@ -170,6 +170,7 @@ class AdamsResult:
         from gearmbs.adams.res import results_text
 
         prefix = Path(prefix)
+        prefix.parent.mkdir(parents=True, exist_ok=True)
         files = []
         for suffix, text in ((".req", request_text(self)), (".res", results_text(self)), (".msg", message_text(self))):
             path = prefix.with_name(prefix.name + suffix)

@@ -204,6 +204,7 @@ def _simulate(
     if kind not in ("DYNAMICS", "KINEMATICS", "TRANSIENT"):
         raise _unsupported(command, f"SIMULATE/{kind} is not supported")
     times = _times(session, command)
+    model = None
     try:
         model = _model(session, allow_unsupported, (session.time, float(times[-1])))
         options, note = _settings(session, tol)
@@ -218,7 +219,7 @@ def _simulate(
             **options,
         )
     except (ModelError, ArithmeticError) as error:
-        raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, 0)]) from error
+        raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, _line(model, str(error)))]) from error
     report = solution.system.report
     freedom = report.degrees_of_freedom if report is not None else 0
     if kind == "KINEMATICS" and freedom > 0:
@@ -235,6 +236,13 @@ def _simulate(
         segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
     _remember(session, model, segment)
     return segment
+
+
+def _line(model: AdamsModel | None, message: str) -> int:
+    """Return the line of the first statement a message names, 0 when it names none."""
+    sources = model.sources if model is not None else {}
+    named = [s.line for name, s in sources.items() if f"'{name}'" in message or f"{name}:" in message]
+    return min(named, default=0)
 
 
 def _model(session: _Session, allow_unsupported: bool, span: tuple[float, float]) -> AdamsModel:

@@ -91,6 +91,7 @@ def test_everything_is_read():
         ("COUPLER/1, JOINTS = 1, 2, SCALES = 1, 2, 3", 7, "there is no JOINT/1"),
         ("MOTION/1, ROTATION, FUNCTION = TIME", 7, "give JOINT, or I, J"),
         ("INTEGRATOR/ERROR", 7, "ERROR is ambiguous|ERROR needs a value"),
+        ("MARKER/30,PART=1,FLOATING\nVARIABLE/1, FUNCTION = VX(20,30)", 8, "MARKER/30 is FLOATING"),
         ("stray words", 7, "unknown statement 'STRAY'"),
         ("123", 7, "expected a statement"),
     ],

@@ -253,3 +253,27 @@ def test_angles_are_counted_between_distant_outputs():
     body = BLOCK + "JOINT/1,REVOLUTE,I=20,J=10\nMOTION/1,JOINT=1,FUNCTION=100*TIME\nREQUEST/1,F2=AZ(20,10)\n"
     result = run(model(body), 2.0, 8)
     np.testing.assert_allclose(result.request(1)[:, 1], 100 * result.t, atol=1e-8)
+
+
+def test_force_functions_on_both_sides():
+    """Action and reaction: at I, at J and about J's own origin; a floating J stands where I is."""
+    body = BLOCK + SECOND.replace("MARKER/30,PART=3", "MARKER/30,PART=3,QP=1,0,0") + "MARKER/12,PART=3,FLOATING\n"
+    body += "GFORCE/1,I=20,JFLOAT=12,RM=10,FX=1\\FY=2\\FZ=3\\TX=4\\TY=5\\TZ=6\n"
+    body += "SFORCE/1,TRANS,I=20,J=30,FUNCTION=7\nSFORCE/2,ROT,I=20,J=30,FUNCTION=2\n"
+    request = "REQUEST/1,F2=GFORCE(1,0,2,0)\\F3=GFORCE(1,1,3,0)\\F4=GFORCE(1,1,8,0)"
+    body += request + "\\F6=GFORCE(1,0,1,0)\\F7=GFORCE(1,0,5,0)\n"
+    body += "REQUEST/2,F2=SFORCE(1,0,2,0)\\F3=SFORCE(1,1,2,0)\\F4=FX(20,30)\\F6=TZ(20,30)\\F7=FX(30,20)\n"
+    result = run(model(body), 0.001, 1)
+    np.testing.assert_allclose(result.request(1)[0, [1, 2, 3, 5, 6]], [1, -2, -6, 14**0.5, 77**0.5], atol=1e-12)
+    # the line force pushes the block to the left; FX adds nothing of the torque
+    np.testing.assert_allclose(result.request(2)[0, [1, 2, 3, 5, 6]], [-7, 7, -7, 2, 7], atol=1e-12)
+
+
+def test_joint_force_about_its_other_marker():
+    """A fixed joint with markers on one point: equal and opposite; weight and its moment on the wall."""
+    body = BLOCK.replace("MARKER/20,PART=2", "MARKER/20,PART=2,QP=0.5,0,0") + "MARKER/21,PART=2\nACCGRAV/KGRAV=-10\n"
+    request = "REQUEST/1,F2=JOINT(1,0,4,0)\\F3=JOINT(1,1,4,0)\\F4=JOINT(1,0,7,0)\\F6=JOINT(1,1,7,0)\n"
+    body += "JOINT/1,FIXED,I=21,J=10\n" + request
+    result = run(model(body), 0.1, 1)
+    # 2 kg at 0.5 m: 20 N up and -10 N m about y hold it
+    np.testing.assert_allclose(result.request(1)[0, [1, 2, 3, 5]], [20, -20, -10, 10], atol=1e-9)
