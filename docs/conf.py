@@ -1,0 +1,71 @@
+"""Sphinx configuration of the gearmbs documentation."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+SCRIPTS = HERE / "scripts"
+sys.path.insert(0, str(SCRIPTS))
+
+import api_pages  # noqa: E402
+
+import gearmbs  # noqa: E402
+
+# executed pages import the drawing and checking scripts; one thread each, as in the studies
+os.environ["PYTHONPATH"] = os.pathsep.join([str(SCRIPTS), str(HERE.parent), os.environ.get("PYTHONPATH", "")])
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+
+project = "gearmbs"
+author = "the gearmbs developers"
+copyright = "2026, the gearmbs developers"
+release = version = gearmbs.__version__
+
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.viewcode",
+    "numpydoc",
+    "sphinx_copybutton",
+    "sphinx_design",
+]
+source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
+exclude_patterns = ["_build", "scripts", "data", "**/.ipynb_checkpoints"]
+myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+nb_execution_mode = "cache"
+nb_execution_timeout = 600
+nb_execution_raise_on_error = True
+nb_execution_in_temp = True
+nb_execution_show_tb = True
+nb_merge_streams = True
+
+autosummary_generate = True
+autosummary_ignore_module_all = False
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+numpydoc_class_members_toctree = False
+templates_path = ["_templates"]
+
+html_theme = "furo"
+html_title = f"gearmbs {release}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_theme_options = {"navigation_with_keys": True}
+pygments_style = "default"
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
+
+
+def setup(app) -> None:
+    """Write the API pages and let autodoc see through compiled functions and docstrings' vertical bars."""
+    api_pages.write(HERE / "_generated")
+    api_pages.unwrap_compiled()
+    app.connect("autodoc-process-docstring", api_pages.escape_bars, priority=100)

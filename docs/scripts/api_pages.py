@@ -1,0 +1,115 @@
+"""Pages of the API reference, written from what each room exports."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+import re
+from pathlib import Path
+
+import gearmbs
+
+ROOMS = {
+    "gearmbs.mechanism": "Mechanism: bodies, markers, joints, motions, forces",
+    "gearmbs.gears": "Gears: wheels, pairs, laws, static analyses",
+    "gearmbs.contact": "Contact: compiled kernels",
+    "gearmbs.dae": "DAE: equations, formulations, integrators, solutions",
+    "gearmbs.signals": "Signals: files, features, comparison, sensors",
+    "gearmbs.studies": "Studies: cases and the paper's study",
+    "gearmbs.adams": "ADAMS: decks in, results out",
+    "gearmbs.view": "View: figures",
+    "gearmbs.units": "Units and compilation",
+}
+
+MORE = {
+    "gearmbs.contact": {
+        "gearmbs.contact.laws": ["normal_law", "friction_law"],
+    },
+    "gearmbs.dae": {
+        "gearmbs.dae.solve": ["solve_dae", "as_problem"],
+        "gearmbs.dae.wstiff": ["solve_wstiff", "resume"],
+        "gearmbs.dae.ida": ["solve_ida"],
+        "gearmbs.dae.result": ["DAEResult", "SolverStats", "Status"],
+        "gearmbs.dae.interpolant": ["DenseOutput"],
+        "gearmbs.dae.problem": ["DAEProblem"],
+        "gearmbs.dae.system": ["System", "Unknown"],
+        "gearmbs.dae.solution": ["Solution"],
+        "gearmbs.dae.energy": ["energy_balance"],
+        "gearmbs.dae.initial": ["InitialReport", "assemble_position", "consistent_velocity", "independent_rows"],
+        "gearmbs.dae.errors": ["ModelError", "AssemblyError", "SingularModelError"],
+        "gearmbs.dae.residual": ["residual", "add_constraints", "add_load"],
+        "gearmbs.dae.jacobian": ["jacobian", "body_entries", "row_entries"],
+        "gearmbs.dae.index1": ["saddle"],
+        "gearmbs.dae.rereference": ["hook", "rewrite_point"],
+        "gearmbs.dae.rotation": [
+            "matrix_from_euler",
+            "euler_from_matrix",
+            "rotation_matrix",
+            "axes_and_velocity",
+            "best_reference",
+            "momentum_from_conjugate",
+        ],
+        "gearmbs.dae.terms": ["gradient", "hessian", "quadratic_part"],
+    },
+    "gearmbs.studies": {
+        "gearmbs.studies.rig": [],
+        "gearmbs.studies.run": ["record", "transmission_error"],
+        "gearmbs.studies.store": ["write_dataset", "write_text", "whole_file"],
+    },
+    "gearmbs.adams": {"gearmbs.adams.run": ["run_deck"], "gearmbs.adams.result": ["AdamsResult"]},
+    "gearmbs.units": {"gearmbs.units": ["to_si"], "gearmbs.compile": ["compile_all"]},
+}
+"""Names worth a page that their room does not export; names that do not exist are an error."""
+
+
+def entries(room: str) -> list[str]:
+    """Return the full names of the objects of a room that get a page."""
+    module = importlib.import_module(room)
+    names = [f"{room}.{name}" for name in getattr(module, "__all__", ()) if _documented(getattr(module, name))]
+    for home, more in MORE.get(room, {}).items():
+        source = importlib.import_module(home)
+        for name in more:
+            getattr(source, name)
+            names.append(f"{home}.{name}")
+    return names
+
+
+def _documented(value: object) -> bool:
+    """True for functions and classes; constants are told by their values where they are used."""
+    return callable(value) and not inspect.ismodule(value)
+
+
+def write(folder: Path) -> None:
+    """Write one page a room; files whose text is the same are left alone."""
+    folder.mkdir(exist_ok=True)
+    for room, title in ROOMS.items():
+        about = (importlib.import_module(room).__doc__ or "").strip()
+        lines = [title, "=" * len(title), "", f"Module ``{room}``.", "", about, ""]
+        lines += [".. autosummary::", "   :toctree: objects", "   :nosignatures:", ""]
+        lines += [f"   {name}" for name in entries(room)]
+        _write(folder / f"{room.rpartition('.')[2]}.rst", "\n".join(lines) + "\n")
+
+
+def _write(path: Path, text: str) -> None:
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+def unwrap_compiled() -> None:
+    """Put the Python functions in the place of numba's dispatchers, for this process only."""
+    for info in pkgutil.walk_packages(gearmbs.__path__, "gearmbs."):
+        if info.name in ("gearmbs.cli", "gearmbs.compile"):
+            continue
+        module = importlib.import_module(info.name)
+        for name, value in list(vars(module).items()):
+            if hasattr(value, "py_func"):
+                setattr(module, name, value.py_func)
+
+
+def escape_bars(app, what, name, obj, options, lines: list[str]) -> None:
+    """Keep ``|x|`` in docstrings from being read as a substitution, outside literals."""
+    for k, line in enumerate(lines):
+        pieces = re.split(r"(``[^`]*``)", line)
+        pieces[::2] = [piece.replace("|", r"\|") for piece in pieces[::2]]
+        lines[k] = "".join(pieces)
