@@ -9,6 +9,7 @@ per output time, it gives reaction forces that are free of the integrator's nois
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from gearmbs.dae import tables as T
@@ -229,6 +230,40 @@ def pose_record(y, idata, rdata, work, out):
             out[k + 15 + c] = tab.kin[b, KIN_W + c]
         for c in range(9):
             out[k + 3 + c] = tab.kin[b, KIN_A + c]
+
+
+@njit(cache=True, error_model="numpy")
+def violations(t, y, phi, idata, rdata, work):
+    """Write Phi and Phi_q v + Phi_t of each row to ``phi`` (three places a row); return the fastest body's |omega|."""
+    tab = T.unpack(idata, rdata, work)
+    update_tables(t, y, idata, tab)
+    g = tab.scratch[S_GRADIENT : S_GRADIENT + 12]
+    gt = tab.scratch[S_GRADIENT_T : S_GRADIENT_T + 12]
+    s = tab.scratch[S_TERM : S_TERM + 100]
+    for r in range(idata[T.H_ROWS]):
+        value, rate = 0.0, 0.0
+        if tab.row[r, T.ROW_FUNCTION] >= 0:
+            fun = tab.row[r, T.ROW_FUNCTION]
+            value, rate = -tab.fval[fun, 0], -tab.fval[fun, 1]
+        for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
+            coef = tab.coef[j]
+            p, p_t = terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
+            value += coef * p
+            rate += coef * p_t
+            for side in range(2):
+                kin = tab.kin[tab.marker_body[tab.term[j, T.TERM_I + side]]]
+                rate += coef * (terms.dot3(g, 6 * side, kin, KIN_V) + terms.dot3(g, 6 * side + 3, kin, KIN_W))
+        if tab.row[r, T.ROW_TAPE] >= 0:
+            k = tab.row[r, T.ROW_TAPE]
+            n = 6 * tab.tape[k, T.TAPE_N_BODIES] + 1
+            v, d, _, _ = tape_row_rates(k, t, y, idata, tab, tapes.tail(tab, n * (n + 1)))
+            value += v
+            rate += d
+        phi[3 * r], phi[3 * r + 1] = value, rate
+    spin = 0.0
+    for b in range(1, idata[T.H_BODIES]):
+        spin = max(spin, terms.dot3(tab.kin[b], KIN_W, tab.kin[b], KIN_W))
+    return np.sqrt(spin)
 
 
 @njit(cache=True, error_model="numpy")

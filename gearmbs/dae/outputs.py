@@ -23,6 +23,10 @@ FARTHEST = 1e-3
 """A constraint farther off than this belongs to an angle whose full turns were not counted; it is left alone."""
 
 
+SAME_POSITION = 0.05
+"""Rotation, rad, after which the factors of one output no longer serve to project the next."""
+
+
 class Records(NamedTuple):
     """What is evaluated, one row per output time.
 
@@ -98,11 +102,15 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
                 vals[0] = count
             return last
         track(t[k], at, idata, rdata, work)
-        index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, rows == 0)
-        if not factor(plan, factors, vals) <= GROWTH_LIMIT:
-            return k
         if rows > 0:
-            # the nearest position and velocity, in the metric of the masses, that satisfy the constraints
+            # the nearest position and velocity, in the metric of the masses, that satisfy the constraints; the
+            # factors of the row before serve while the bodies have hardly turned since
+            spin = index1.violations(t[k], at, phi, idata, rdata, work)
+            if k == first or spin * (t[k] - t[k - 1]) > SAME_POSITION:
+                index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, False)
+                if not factor(plan, factors, vals) <= GROWTH_LIMIT:
+                    return k
+                vals[:] = 0.0
             rhs[:base] = 0.0
             for r in range(rows):
                 rhs[base + r] = 0.0 if abs(phi[3 * r]) > FARTHEST else -phi[3 * r]
@@ -111,10 +119,9 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
                 rhs[base + r] = -phi[3 * r + 1]
             solve(plan, factors, rhs, pushed)
             index1.displace(at, moved, pushed, idata, rdata, work)
-            vals[:] = 0.0
-            index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, True)
-            if not factor(plan, factors, vals) <= GROWTH_LIMIT:
-                return k
+        index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, True)
+        if not factor(plan, factors, vals) <= GROWTH_LIMIT:
+            return k
         solve(plan, factors, rhs, records.solution[k])
         for r in range(rows):
             multipliers[0, r] = records.solution[k, base + r]

@@ -98,6 +98,56 @@ def add_tape_row(k, t, lam, mu, y, idata, tab, out):
 
 
 @njit(cache=True, error_model="numpy")
+def add_point_term(k, coef, lam, mu, idata, term, marker_body, kin, frame, out):
+    """As the general path of `add_constraints` for a POINT term, whose gradient is a unit vector."""
+    c = term[k, T.TERM_AXES]
+    c1, c2 = (c + 1) % 3, (c + 2) % 3
+    value, rate = 0.0, 0.0
+    for side in range(2):
+        marker = term[k, T.TERM_I + side]
+        b = marker_body[marker]
+        sign = coef if side == 0 else -coef
+        row = kin[b]
+        x1, x2 = frame[marker, T.MK_ARM + c1], frame[marker, T.MK_ARM + c2]
+        value += sign * (row[KIN_R + c] + frame[marker, T.MK_ARM + c])
+        if b == 0:
+            continue
+        rate += sign * (row[KIN_V + c] + row[KIN_W + c1] * x2 - row[KIN_W + c2] * x1)
+        q = 3 * (b - 1)
+        out[idata[T.H_U] + q + c] += sign * lam
+        out[idata[T.H_R] + q + c] -= sign * mu
+        for m in range(3):
+            a = KIN_AXES + 3 * m
+            angle = sign * (row[a + c1] * x2 - row[a + c2] * x1)
+            out[idata[T.H_P] + q + m] += lam * angle
+            out[idata[T.H_THETA] + q + m] -= mu * angle
+    return value, rate
+
+
+@njit(cache=True, error_model="numpy")
+def add_dot_term(k, coef, lam, mu, idata, term, marker_body, kin, frame, s, out):
+    """As the general path of `add_constraints` for a DOT1 term, which has no translations."""
+    i, j = term[k, T.TERM_I], term[k, T.TERM_J]
+    a = T.MK_AXES + 3 * (term[k, T.TERM_AXES] // 3)
+    b = T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3)
+    terms.cross3(frame[i], a, frame[j], b, s, 0)
+    rate = 0.0
+    for side in range(2):
+        body = marker_body[i if side == 0 else j]
+        if body == 0:
+            continue
+        sign = coef if side == 0 else -coef
+        row = kin[body]
+        rate += sign * terms.dot3(s, 0, row, KIN_W)
+        q = 3 * (body - 1)
+        for m in range(3):
+            angle = sign * terms.dot3(row, KIN_AXES + 3 * m, s, 0)
+            out[idata[T.H_P] + q + m] += lam * angle
+            out[idata[T.H_THETA] + q + m] -= mu * angle
+    return coef * terms.dot3(frame[i], a, frame[j], b), rate
+
+
+@njit(cache=True, error_model="numpy")
 def add_constraints(t, y, yp, idata, tab, out):
     """Constraint rows, their derivatives, and the constraint forces of lambda and mu."""
     form = idata[T.H_FORMULATION]
@@ -120,6 +170,17 @@ def add_constraints(t, y, yp, idata, tab, out):
             mu = yp[mu0 + r]
         for k in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
             coef = tab.coef[k]
+            kind = tab.term[k, T.TERM_TYPE]
+            if kind == terms.POINT:
+                v, d = add_point_term(k, coef, lam, mu, idata, tab.term, tab.marker_body, tab.kin, tab.frame, out)
+                value += v
+                rate += d
+                continue
+            if kind == terms.DOT1:
+                v, d = add_dot_term(k, coef, lam, mu, idata, tab.term, tab.marker_body, tab.kin, tab.frame, s, out)
+                value += v
+                rate += d
+                continue
             phi, phi_t = terms.gradient(
                 k,
                 tab.term,
