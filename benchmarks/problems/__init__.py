@@ -1,0 +1,1 @@
+"""Standard problems with reference solutions, as generic DAEs with exact sparse Jacobians."""
