@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -109,7 +109,7 @@ def paper(
         base = make_case(data, "options")
         low = to_si(torque, "torque", "--torque") if torque is not None else LOADS[0]
         tilt = to_si(angle, "angle", "--angle")
-        settings = {"torques": (low, 2.0 * low), "misalignment": tilt}
+        settings: dict[str, Any] = {"torques": (low, 2.0 * low), "misalignment": tilt}
         names = [case.name for case in paper_cases(base=base, **settings)]
         single = out / "cases"
         with case_bars(names) as move:

@@ -80,8 +80,10 @@ def _load_power(solution: Solution, k: int, row: list[int]) -> np.ndarray:
     bi, bj = (builder.marker_body[row[column]] for column in (T.FORCE_I, T.FORCE_J))
     local = builder.marker_frame[row[T.FORCE_I]][:3]
     zero = np.zeros((solution.t.size, 3))
-    pose_i = solution._pose[:, bi - 1] if bi else None
-    point = local + zero if bi == 0 else pose_i[:, 0:3] + pose_i[:, 3:12].reshape(-1, 3, 3) @ local
+    point = local + zero
+    if bi:
+        pose_i = solution._pose[:, bi - 1]
+        point = pose_i[:, 0:3] + pose_i[:, 3:12].reshape(-1, 3, 3) @ local
     power = np.zeros(solution.t.size)
     for body, sign in ((bi, 1.0), (bj, -1.0)):
         if body:

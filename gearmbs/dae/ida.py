@@ -38,11 +38,9 @@ class _Callbacks:
         self.vals = np.zeros(problem.indices.size)
         self.last_t = np.nan
         self.steps = self.residuals = self.jacobians = 0
-        self.residual_time = self.jacobian_time = 0.0
         self.bad: str | None = None
 
     def residual(self, t, y, yp, out):
-        start = time.perf_counter()
         self.y[:] = y
         self.yp[:] = yp
         self.problem.residual(t, self.y, self.yp, out, self.idata, self.rdata, self.work)
@@ -50,10 +48,8 @@ class _Callbacks:
             self.steps += 1
             self.last_t = t
         self.residuals += 1
-        self.residual_time += time.perf_counter() - start
 
     def jacobian(self, t, y, yp, res, cj, out):
-        start = time.perf_counter()
         self.y[:] = y
         self.yp[:] = yp
         self.problem.jacobian(t, self.y, self.yp, cj, self.vals, self.idata, self.rdata, self.work)
@@ -62,7 +58,6 @@ class _Callbacks:
         else:
             out[:] = self.vals
         self.jacobians += 1
-        self.jacobian_time += time.perf_counter() - start
 
 
 def _solver(problem: DAEProblem, calls: _Callbacks, atol: np.ndarray, rtol: float, options: dict) -> IDA:
@@ -165,7 +160,9 @@ def solve_ida(
                 if problem.hook(t, hist, 1, idata, rdata, calls.work):
                     epochs.append((done, idata.copy()))
                     y = hist[0].copy()
-                    yp = problem.restart_rates(t, y, np.array(yp), idata, rdata)
+                    yp = np.array(yp)
+                    if problem.restart_rates is not None:
+                        yp = problem.restart_rates(t, y, yp, idata, rdata)
                     solver = _solver(problem, calls, atol, rtol, options)
                     solver.init_step(t, y, yp)
     except KeyboardInterrupt:
@@ -179,7 +176,6 @@ def solve_ida(
         factorizations=calls.jacobians,
         wall_time=time.perf_counter() - start,
     )
-    stats.residual_time, stats.jacobian_time = calls.residual_time, calls.jacobian_time
     return DAEResult(
         t=t_eval[:done],
         y=out_y[:done],

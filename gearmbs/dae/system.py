@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -126,6 +127,8 @@ class System:
         self.t0 = t0
         self.report: initial.InitialReport | None = None
         self._plan: tuple = (None, None)
+        self.mechanism: Any = None
+        self.marker_index: dict[int, int] = {}
 
     # --- before the integration -------------------------------------------------------------------
 
@@ -187,9 +190,12 @@ class System:
             return
         old = self.builder
         bounds = [row[0] for row in old.rows] + [len(old.terms)]
-        rows, terms, coef, reference = [], [], [], []
+        rows: list[tuple[int, int, int]] = []
+        terms: list[tuple[int, ...]] = []
+        coef: list[float] = []
+        reference: list[float] = []
         for i in kept:
-            rows.append((len(terms), *old.rows[i][1:]))
+            rows.append((len(terms), old.rows[i][1], old.rows[i][2]))
             span = slice(bounds[i], bounds[i + 1])
             terms.extend(old.terms[span])
             coef.extend(old.coef[span])

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -125,13 +124,13 @@ class _Compiler:
         """Names an expression may use; markers by name, elements by kind and name."""
         if self._scope is None:
             m = self.mechanism
-            markers: dict[Hashable, int] = {}
+            markers: dict[int | str, int] = {}
             for body in (m.ground, *m.bodies.values()):
                 for marker in body.markers:
                     markers[marker.name.upper()] = self.index(marker)
                     if marker.number is not None:
                         markers[marker.number] = self.index(marker)
-            forces = {}
+            forces: dict[tuple[str, int | str], tuple[int | str, int | str | None]] = {}
             for load in m.elements.values():
                 if isinstance(load, Load):
                     forces[(load.kind, _upper(load.name))] = (load.i.name.upper(), load.j.name.upper())
@@ -228,7 +227,9 @@ class _Compiler:
 
     def add_load(self, load: Load, i: int, j: int) -> None:
         label = f"{load.kind} '{load.name}'"
-        numbers, bodies, unknowns = [], [], []
+        numbers: list[int] = []
+        bodies: list[int] = []
+        unknowns: list[int] = []
         for c in range(6):
             text = load.expressions[c] if c < len(load.expressions) else None
             if text is None:
@@ -262,5 +263,5 @@ def _blocks(element) -> tuple[bool, bool]:
     return isinstance(element, GearContact), True
 
 
-def _upper(name: Hashable) -> Hashable:
+def _upper(name: Any) -> Any:
     return name.upper() if isinstance(name, str) else name

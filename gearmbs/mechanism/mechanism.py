@@ -371,7 +371,8 @@ class Mechanism:
 
     def spline(self, name: str, x: npt.ArrayLike, y: npt.ArrayLike) -> None:
         """Name a table of points for CUBSPL and AKISPL."""
-        self.splines[name] = SplineData(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        points = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        self.splines[name] = SplineData(*points)  # type: ignore[arg-type]
 
     # --- translation into tables ------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -125,7 +126,7 @@ def _orientation(value: npt.ArrayLike | None, label: str) -> np.ndarray:
 def make_body(
     name: str,
     mass: float,
-    inertia: npt.ArrayLike,
+    inertia: Any,
     com: Vector,
     position: Vector,
     matrix: npt.ArrayLike | None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -94,7 +95,7 @@ class _reporter:
 
     def __init__(self, progress: bool | Callable[[float], None], start: float, end: float) -> None:
         self.progress, self.start, self.end = progress, start, end
-        self.bar = None
+        self.bar: Any = None
 
     def __enter__(self) -> Callable[[float], None] | None:
         if callable(self.progress):

@@ -168,7 +168,7 @@ class Case(_Section):
             If the wheels are impossible or do not mesh.
         """
         g, f, c, r = self.gears, self.fault, self.contact, self.friction
-        common = {
+        common: dict[str, Any] = {
             "pressure_angle": g.pressure_angle,
             "face_width": g.face_width,
             "addendum": g.addendum,
@@ -184,7 +184,8 @@ class Case(_Section):
         law = ContactLaw.impact(stiffness=c.stiffness, exponent=c.exponent, damping=c.damping, depth=c.depth)
         friction = Friction(r.static, r.dynamic, r.static_speed, r.dynamic_speed) if r.enabled else Friction.none()
         return GearPair(
-            *wheels,
+            wheels[0],
+            wheels[1],
             centre_distance_error=f.centre_distance_error,
             misalignment=f.misalignment,
             plane=f.plane,
@@ -260,7 +261,7 @@ def _explain(error: ValidationError, source: str) -> str:
         message = item["msg"].removeprefix("Value error, ")
         if item["type"] == "extra_forbidden":
             section = item["loc"][0] if len(item["loc"]) > 1 else None
-            model = Case.model_fields[section].annotation if section in Case.model_fields else Case
+            model: Any = Case.model_fields[section].annotation if section in Case.model_fields else Case
             message = f"unknown key; known ones are {', '.join(model.model_fields)}"
             lines.append(f"{source}: {field}: {message}")
         else:

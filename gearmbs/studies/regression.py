@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import sys
 
-from gearmbs.studies.case import Case
+from gearmbs.studies.case import make_case
 from gearmbs.studies.paper import paper_cases
 from gearmbs.studies.parallel import run_cases
 from gearmbs.studies.store import write_text
@@ -18,7 +18,7 @@ DURATION = 0.2
 
 def gmf_levels(workers: int | None = None) -> dict[str, dict[str, list[float]]]:
     """Return the RMS of the first three mesh harmonics, m/s^2, by case and component."""
-    cases = paper_cases(base=Case(operation={"duration": DURATION}))
+    cases = paper_cases(base=make_case({"operation": {"duration": DURATION}}))
     levels = {}
     for case, record in zip(cases, run_cases(cases, workers=workers)):
         table = record["gmf_rms"].sel(way="orders")

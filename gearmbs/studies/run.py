@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Callable
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -158,9 +159,9 @@ def transmission_error(case: Case, solution: Solution) -> np.ndarray:
     return pair.rotation * pair.wheels[1].base_radius * (angles[0] * ratio + angles[1])
 
 
-def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, str | float | int]:
+def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any]:
     """Return every parameter of a case, the versions and the solver's statistics as flat attributes."""
-    out: dict[str, str | float | int] = {"title": f"gear pair: {case.name}", "case": case.name}
+    out: dict[str, Any] = {"title": f"gear pair: {case.name}", "case": case.name}
     for section, values in case.model_dump().items():
         if isinstance(values, dict):
             for key, value in values.items():
