@@ -129,15 +129,14 @@ def shape_value(gi, gr, wheel, shape, s, z):
     Returns
     -------
     value, by s, by z, by s twice, by s and z : float
-        Linear in z between stations.
+        Linear in z between stations and beyond the ends.
     """
     ns = gi[L.SHAPE_S]
     nz = gi[L.SHAPE_Z]
     ds = gr[wheel * WHEEL + L.SHAPE_DS]
     u = (s - gr[wheel * WHEEL + L.SHAPE_S0]) / ds
     v = 0.5 * (z + 1.0) * (nz - 1)
-    v = min(max(v, 0.0), nz - 1.0)
-    k = min(int(v), nz - 2)
+    k = min(max(int(v), 0), nz - 2)
     t = v - k
     o = gi[L.O_SHAPE] + (shape * nz + k) * ns
     y0, d0, c0 = cubic(gr, o, ns, u)
@@ -181,8 +180,11 @@ def add_deviation(gi, gr, wk, wheel, record, kind, f1, f2, zeta, o, want):
 
 
 @kernel
-def tip_string(gi, gr, wheel, record, zeta, h):
-    """String length where a tooth's flank ends at a station: its own if broken or chipped there, else the wheel's."""
+def tip_string(gi, gr, wheel, record, zeta):
+    """String length where a tooth's flank ends at a station: its own if broken or chipped there, else the wheel's.
+
+    Stations count from the wheels' axial places in the drawing; axial vibration does not move them.
+    """
     whole = gr[wheel * WHEEL + L.S_TIP]
     if gi[L.O_TOOTH] == 0:
         return whole
@@ -191,7 +193,7 @@ def tip_string(gi, gr, wheel, record, zeta, h):
         return whole
     nz = gi[L.SHAPE_Z]
     sign = 1.0 if wheel == 0 else -1.0
-    z = (zeta + sign * 0.5 * h) * 2.0 / gr[wheel * WHEEL + L.FACE]
+    z = (zeta + sign * 0.5 * gr[L.AXIAL_SHIFT]) * 2.0 / gr[wheel * WHEEL + L.FACE]
     v = min(max(0.5 * (z + 1.0) * (nz - 1), 0.0), nz - 1.0)
     k = min(int(v), nz - 2)
     o = gi[L.O_TIP] + tip * nz + k

@@ -256,8 +256,8 @@ def pair_sections(gi, gr, wk, side, i1, i2, f1, f2, ja, jb, step, alpha, sa, ca,
         s2 = wk[o + N_S2] - shift
         zeta = station(gi, gr, j, step)
         if teeth:
-            tip1 = tip_string(gi, gr, 0, record1, zeta, wk[S_H])
-            tip2 = tip_string(gi, gr, 1, record2, zeta, wk[S_H])
+            tip1 = tip_string(gi, gr, 0, record1, zeta)
+            tip2 = tip_string(gi, gr, 1, record2, zeta)
         kind = 0
         if s1 - tip1 > s2 - tip2:
             if s1 > tip1:

@@ -59,7 +59,8 @@ ZETA_LO = 44  # the slices' range along the mean axis, m
 ZETA_HI = 45
 COMPLIANCE_S0 = 46  # first station of the pair's compliance curve on wheel 1's string, m
 COMPLIANCE_DS = 47
-GR_HEADER = 48
+AXIAL_SHIFT = 48  # nominal axial offset of wheel 2, m
+GR_HEADER = 50
 
 LAW_IMPACT = 0
 LAW_HUNT_CROSSLEY = 1

@@ -74,8 +74,8 @@ def pair_gaps(gi, gr, R1, A1, R2, A2, stations, rows, work):
                 set_normal(work, alpha0, work[L.S_A0 + 1], work[L.S_A0 + 2])
                 flank_normal(work, base1 + i * pitch + rb2 * (f2 + gr[L.WHEEL + L.PSI]), rb1 + rb2, zeta)
                 section_gap(gr, work, 0, f1, f2, zeta, o, 0)
-                tip1 = tip_string(gi, gr, 0, record1, zeta, work[L.S_X + 1])
-                tip2 = tip_string(gi, gr, 1, record2, zeta, work[L.S_X + 1])
+                tip1 = tip_string(gi, gr, 0, record1, zeta)
+                tip2 = tip_string(gi, gr, 1, record2, zeta)
                 kind = 0
                 if work[o + L.N_S1] - tip1 > work[o + L.N_S2] - tip2:
                     if work[o + L.N_S1] > tip1:

@@ -1,5 +1,6 @@
 """Wheels and pairs: geometry, mass, placement in space, faults, and analyses that need no dynamics."""
 
+from gearmbs.gears import faults
 from gearmbs.gears.laws import ContactLaw, Friction
 from gearmbs.gears.pair import GearPair, Placement
 from gearmbs.gears.spec import GearSpec, Material, involute
@@ -17,6 +18,7 @@ __all__ = [
     "Material",
     "Placement",
     "TransmissionError",
+    "faults",
     "involute",
     "kinematic_transmission_error",
     "loaded_transmission_error",

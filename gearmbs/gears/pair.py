@@ -9,12 +9,15 @@ from typing import Any, Literal
 
 import numpy as np
 
+from gearmbs.gears.faults import Fault
 from gearmbs.gears.laws import ContactLaw, Friction
 from gearmbs.gears.spec import GearSpec, convert_fields, involute, require
-from gearmbs.gears.tables import pack
+from gearmbs.gears.stiffness import pair_stiffness
+from gearmbs.gears.tables import compliance_stations, pack
 from gearmbs.units import Quantity
 
 TILTED_SLICES = 11
+FAULTY_SLICES = 41
 
 
 @dataclass(frozen=True)
@@ -68,10 +71,15 @@ class GearPair:
     torque : float or str
         Load torque on the driven wheel, N m, used by the static analyses.
     slices : int, optional
-        Slices along the face; default 1 for parallel axes without axial shift, else 11.
+        Slices along the face; default 1 for parallel axes without axial shift, 11 for
+        others, 41 when faults vary along the face.
     load : {"slices", "adams"}
         How a tooth pair carries its load. ``slices``: pressure distributed over the face. ``adams``: one force at the
         centroid of the overlap with the depth found there, as ADAMS does for solids.
+    stiffness_curve : {"constant", "potential-energy"}
+        How the stiffness of a tooth pair varies along the path of contact; ``contact.stiffness`` is its largest value.
+    faults : sequence of Fault
+        Faults and deviations of teeth, see `gearmbs.gears.faults`; they combine.
 
     Raises
     ------
@@ -99,11 +107,14 @@ class GearPair:
     torque: Quantity = 100.0
     slices: int | None = None
     load: Literal["slices", "adams"] = "slices"
+    stiffness_curve: Literal["constant", "potential-energy"] = "constant"
+    faults: tuple[Fault, ...] = ()
 
     def __post_init__(self) -> None:
         lengths = ("centre_distance_error", "pivot", "axial_shift", "backlash")
         units = {name: "length" for name in lengths} | {"misalignment": "angle", "torque": "torque"}
         convert_fields(self, units, "GearPair")
+        object.__setattr__(self, "faults", tuple(self.faults))
         self._check()
 
     @classmethod
@@ -129,6 +140,22 @@ class GearPair:
         """A copy with some fields changed."""
         return replace(self, **changes)
 
+    def with_faults(self, *faults: Fault) -> GearPair:
+        """A copy with these faults added to those it has."""
+        return replace(self, faults=self.faults + faults)
+
+    def with_potential_energy_stiffness(self, damping: Quantity = 0.0, depth: Quantity = "0.1 mm") -> GearPair:
+        """A copy with linear tooth pairs whose stiffness varies along the path by the potential-energy method.
+
+        Parameters
+        ----------
+        damping, depth : float or str
+            See `ContactLaw.linear`.
+        """
+        largest = float(pair_stiffness(self, compliance_stations(self)).max())
+        law = ContactLaw.linear(largest, damping, depth)
+        return replace(self, contact=law, stiffness_curve="potential-energy")
+
     def _check(self) -> None:
         mm = 1e3
         for name in ("centre_distance_error", "misalignment", "pivot", "axial_shift", "backlash", "torque"):
@@ -144,6 +171,12 @@ class GearPair:
         )
         require(self.load in ("slices", "adams"), f"GearPair.load is {self.load!r}; choose 'slices' or 'adams'")
         require(self.rotation in (1, -1), f"GearPair.rotation is {self.rotation!r}; give 1 or -1")
+        require(
+            self.stiffness_curve in ("constant", "potential-energy"),
+            f"GearPair.stiffness_curve is {self.stiffness_curve!r}; choose 'constant' or 'potential-energy'",
+        )
+        for fault in self.faults:
+            require(isinstance(fault, Fault), f"GearPair.faults holds {fault!r}; give faults of gearmbs.gears.faults")
         require(
             abs(self.misalignment) <= math.radians(10),
             f"GearPair.misalignment is {math.degrees(self.misalignment):.3f} deg; spur wheels mesh up to 10 deg "
@@ -311,6 +344,8 @@ class GearPair:
         """Slices along the face in use."""
         if self.slices is not None:
             return self.slices
+        if any(fault.along_face for fault in self.faults):
+            return FAULTY_SLICES
         plain = self.misalignment == 0 and self.axial_shift == 0
         return 1 if plain else TILTED_SLICES
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.contact import layout as L
+from gearmbs.gears.canvas import COMPLIANCE_STATIONS, PROFILE_STATIONS, Canvas
+from gearmbs.gears.stiffness import pair_stiffness
 
 if TYPE_CHECKING:
     from gearmbs.gears.pair import GearPair
@@ -68,4 +70,91 @@ def pack(pair: GearPair, slices: int) -> tuple[np.ndarray, np.ndarray, int]:
     low, high = pair.common_face
     gr[L.ZETA_LO] = low
     gr[L.ZETA_HI] = high
+    gr[L.AXIAL_SHIFT] = pair.axial_shift
+    if pair.faults or pair.stiffness_curve != "constant":
+        gi, gr = _pack_teeth(pair, gi, gr)
     return gi, gr, L.work_size(slices)
+
+
+def compliance_stations(pair: GearPair) -> np.ndarray:
+    """String lengths on wheel 1 at which the compliance of a tooth pair is tabulated, m."""
+    first, second = pair.wheels
+    return np.linspace(pair.line_of_action - second.tip_string, first.tip_string, COMPLIANCE_STATIONS)
+
+
+def canvases(pair: GearPair) -> tuple[Canvas, Canvas]:
+    """Deviations of all teeth of both wheels, with every fault drawn."""
+    along_face = any(fault.along_face for fault in pair.faults)
+    string = compliance_stations(pair)
+    drawn = (
+        Canvas(pair.wheels[0], pair.rotation, along_face, string),
+        Canvas(pair.wheels[1], pair.rotation, along_face, pair.line_of_action - string),
+    )
+    for fault in pair.faults:
+        fault.draw(drawn[fault.wheel == "driven"], pair)
+    return drawn
+
+
+def _numbered(rows: np.ndarray, plain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Number of the distinct row for each row, -1 where it is the plain one, and the distinct rows."""
+    distinct, number = np.unique(rows, axis=0, return_inverse=True)
+    number = number.reshape(-1)
+    return np.where((rows == plain).all(axis=1), -1, number), distinct
+
+
+def _pack_teeth(pair: GearPair, gi: np.ndarray, gr: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    drawn = canvases(pair)
+    nz = drawn[0].station.size
+    records = [c.offset.size for c in drawn]
+    tooth = np.full((sum(records), L.TOOTH), -1, dtype=np.int64)
+    base_curve = np.ones(COMPLIANCE_STATIONS)
+    if pair.stiffness_curve == "potential-energy":
+        stiffness = pair_stiffness(pair, compliance_stations(pair))
+        base_curve = stiffness.max() / stiffness
+    parts: dict[str, list[np.ndarray]] = {"offset": [], "shape": [], "tip": [], "compliance": []}
+    counts = {"shape": 0, "tip": 0, "compliance": 0}
+    added = 0.0
+    start = 0
+    for k, canvas in enumerate(drawn):
+        rows = slice(start, start + records[k])
+        parts["offset"].append(canvas.offset.ravel())
+        kinds = (
+            ("shape", canvas.shape.reshape(records[k], -1), 0.0),
+            ("tip", canvas.tip.reshape(records[k], -1), canvas.gear.tip_string),
+            ("compliance", canvas.compliance.reshape(records[k], -1) * base_curve, 0.0),
+        )
+        for column, (name, data, plain) in enumerate(kinds):
+            number, distinct = _numbered(data, np.full(data.shape[1], plain))
+            tooth[rows, column] = np.where(number < 0, -1, number + counts[name])
+            counts[name] += len(distinct)
+            parts[name].append(distinct.ravel())
+        removed = canvas.offset[:, :, None, None] + canvas.shape
+        added += max(0.0, -float(removed.min()))
+        gr[k * L.WHEEL + L.SHAPE_DS] = canvas.string[1] - canvas.string[0]
+        start += records[k]
+    gr[L.GAP_MARGIN] = added
+    softened = pair.stiffness_curve != "constant" or (tooth[:, 2] >= 0).any()
+    if softened:
+        stations = compliance_stations(pair)
+        gr[L.COMPLIANCE_S0] = stations[0]
+        gr[L.COMPLIANCE_DS] = stations[1] - stations[0]
+        parts["compliance"].insert(0, base_curve)
+    blocks = [gr]
+    end = gr.size
+    for name, slot in (
+        ("offset", L.O_OFFSET),
+        ("shape", L.O_SHAPE),
+        ("tip", L.O_TIP),
+        ("compliance", L.O_COMPLIANCE),
+    ):
+        if name == "compliance" and not softened:
+            continue
+        gi[slot] = end
+        block = np.concatenate(parts[name])
+        blocks.append(block)
+        end += block.size
+    gi[L.SHAPE_S] = PROFILE_STATIONS
+    gi[L.SHAPE_Z] = nz
+    gi[L.N_COMPLIANCE] = COMPLIANCE_STATIONS
+    gi[L.O_TOOTH] = gi.size
+    return np.concatenate([gi, tooth.ravel()]), np.concatenate(blocks)

@@ -6,9 +6,26 @@ import pytest
 from gearmbs.contact import layout
 from gearmbs.contact import support as sup
 from gearmbs.gears import ContactLaw, Friction, GearPair, GearSpec
+from gearmbs.gears.faults import (
+    BrokenTooth,
+    ChippedCorner,
+    Crowning,
+    Eccentricity,
+    GradedFlanks,
+    RootCrack,
+    TipRelief,
+    Wobble,
+)
 
 from .probe_tools import Contact, differences, shaken
 
+SHAPED = (
+    TipRelief(amount="15 um", length="6 mm", power=2.0),
+    Crowning(wheel="driven", amount="8 um"),
+    Eccentricity(amount="12 um", phase="50 deg"),
+    Wobble(wheel="driven", angle="0.02 deg", phase="20 deg"),
+    GradedFlanks(wheel="driven", grade=5, seed=3),
+)
 CASES = {
     "parallel": ({}, 1),
     "parallel, no friction": ({"friction": Friction.none()}, 1),
@@ -23,6 +40,13 @@ CASES = {
     "linear": ({"contact": ContactLaw.linear("1.3e8 N/m"), "misalignment": "0.3 deg"}, 5),
     "centroid load": ({"misalignment": "1 deg", "load": "adams"}, 9),
     "centroid load, parallel": ({"load": "adams"}, 4),
+    "shaped flanks": ({"faults": SHAPED, "misalignment": "0.2 deg"}, 9),
+    "shaped flanks, one plane": ({"faults": SHAPED}, 1),
+    "chipped and broken": (
+        {"faults": [ChippedCorner(tooth=k, length="9 mm") for k in range(0, 29, 2)] + [BrokenTooth(tooth=1, lost=0.3)]},
+        12,
+    ),
+    "varying stiffness": ({"faults": [RootCrack(tooth=k) for k in range(0, 29, 2)], "misalignment": "0.1 deg"}, 6),
     "rounded tips": (
         {
             "driver": GearSpec(29, 95e-3 / 31, tip_rounding="0.3 mm"),

@@ -90,7 +90,7 @@ def test_section_gap_against_search(name):
 
 
 def test_section_gap_is_the_distance_in_space():
-    # the gap in the section and the distance of its point to the whole other surface differ by a cosine of half the tilt
+    # the gap in the section and the distance to the whole other surface differ by a cosine of half the tilt
     pair = PAIRS["29/29 skew"]
     mesh = StaticMesh(pair)
     one, two = pair.wheels
@@ -118,11 +118,11 @@ def test_section_gap_is_the_distance_in_space():
 
 
 def test_first_order_picture_is_wrong_by_r_gamma_squared():
-    # at 1 degree the tilt shortens a wheel's section by up to r gamma^2 / 2 = 6.8 um, which a first-order picture misses
+    # at 1 degree the tilt moves a section by up to r gamma^2 / 2 = 6.8 um, which a first-order picture misses
     gamma = np.radians(1.0)
     assert 0.5 * 44.435e-3 * gamma**2 == pytest.approx(6.8e-6, rel=0.01)
-    straight, tilted = GearPair.paper(backlash="0.9 mm"), PAIRS["29/29 inclination"]
-    mid = [StaticMesh(p).gaps(0.05, p.frames(0, 0) and StaticMesh(straight).touching_angle(0.05), np.zeros(1)).copy()
-           for p in (straight, tilted)]  # fmt: skip
-    change = abs(mid[1][:, 4] - mid[0][:, 4])[mid[0][:, 0] == 1]
+    straight, tilted = StaticMesh(GearPair.paper(backlash="0.9 mm")), StaticMesh(PAIRS["29/29 inclination"])
+    driven = straight.touching_angle(0.05)
+    gaps = [mesh.gaps(0.05, driven, np.zeros(1)).copy() for mesh in (straight, tilted)]
+    change = abs(gaps[1][:, 4] - gaps[0][:, 4])[gaps[0][:, 0] == 1]
     assert 1e-6 < change.max() < 10e-6

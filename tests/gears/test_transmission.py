@@ -53,9 +53,10 @@ def test_other_ratios(z1, z2):
     # all pairs in full contact: r_b F = T; corners bear off the line of action and change the arm a little
     assert te.forces == pytest.approx(20.0 / pair.driven.base_radius, rel=0.03)
     # the load carries corners into contact beyond the path: one pair more at most
-    assert te.pairs.min() == 1
+    assert te.pairs.min() >= 1
     assert te.pairs.max() <= np.ceil(pair.contact_ratio) + 1
-    assert te.error.max() == pytest.approx(pair.penetration(20.0), rel=1e-2)
+    assert pair.penetration(20.0, 3) < te.error.min()
+    assert te.error.max() < pair.penetration(20.0) * 1.001
 
 
 def test_both_senses_of_rotation():

@@ -43,13 +43,13 @@ def test_values(text, unit, value):
     ],
 )
 def test_refused_values_name_the_field(value, unit):
-    with pytest.raises(ValueError, match="pair.depth"):
+    with pytest.raises(ValueError, match=r"pair\.depth"):
         to_si(value, unit, "pair.depth")
 
 
 @pytest.mark.parametrize("value", [True, None, [1.0], {"a": 1}])
 def test_refused_types_name_the_field(value):
-    with pytest.raises(TypeError, match="pair.depth"):
+    with pytest.raises(TypeError, match=r"pair\.depth"):
         to_si(value, "length", "pair.depth")
 
 

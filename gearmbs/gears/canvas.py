@@ -1,0 +1,95 @@
+"""Where deviations of all teeth of one wheel are collected before they go into the contact tables."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gearmbs.gears.spec import GearSpec
+
+PROFILE_STATIONS = 65
+FACE_STATIONS = 33
+COMPLIANCE_STATIONS = 65
+
+
+class Canvas:
+    """Deviations of every tooth flank of one wheel.
+
+    Material missing from a flank, along its normal, is positive. Flank 0 is the one at the counter-clockwise side of
+    its tooth, seen against the wheel's axis; flank 1 the other.
+
+    Attributes
+    ----------
+    gear : GearSpec
+    drive : int
+        The flank that carries the load.
+    string : ndarray, shape (ns,)
+        Profile stations from the base circle to the tip, string length, m.
+    station : ndarray, shape (nz,)
+        Stations along the face from mid-face, m.
+    offset : ndarray, shape (2, z)
+        Constant material missing per flank, m.
+    shape : ndarray, shape (2, z, nz, ns)
+        Material missing over face and profile, m.
+    tip : ndarray, shape (2, z, nz)
+        String length where the flank ends at the tip, m.
+    compliance : ndarray, shape (2, z, nc)
+        Compliance added to a tooth pair, relative to a healthy pair's, at `compliance_string`.
+    compliance_string : ndarray, shape (nc,)
+        String lengths on this wheel.
+    """
+
+    def __init__(self, gear: GearSpec, rotation: int, along_face: bool, compliance_string: np.ndarray) -> None:
+        z = gear.teeth
+        nz = FACE_STATIONS if along_face else 2
+        self.gear = gear
+        self.drive = 0 if rotation > 0 else 1
+        self.string = np.linspace(0.0, gear.tip_string, PROFILE_STATIONS)
+        self.station = np.linspace(-0.5, 0.5, nz) * gear.face_width
+        self.offset = np.zeros((2, z))
+        self.shape = np.zeros((2, z, nz, PROFILE_STATIONS))
+        self.tip = np.full((2, z, nz), gear.tip_string)
+        self.compliance_string = compliance_string
+        self.compliance = np.zeros((2, z, compliance_string.size))
+
+    @property
+    def radius(self) -> np.ndarray:
+        """Radii of the profile stations, m."""
+        return np.hypot(self.gear.base_radius, self.string)
+
+    def flanks(self, which: str) -> list[int]:
+        """Flank numbers of ``"drive"``, ``"back"`` or ``"both"``."""
+        choices = {"drive": [self.drive], "back": [1 - self.drive], "both": [0, 1]}
+        if which not in choices:
+            raise ValueError(f"flank is {which!r}; choose 'drive', 'back' or 'both'")
+        return choices[which]
+
+    def normal_angle(self, flank: int) -> np.ndarray:
+        """Direction of the outward normal in the wheel's frame, rad, shape (z, ns)."""
+        side = 1 - 2 * flank
+        middle = 2 * math.pi * np.arange(self.gear.teeth)[:, None] / self.gear.teeth
+        tangent = middle + side * (self.gear.base_half_angle - self.string / self.gear.base_radius)
+        return tangent + side * 0.5 * math.pi
+
+    def shift(self, x: np.ndarray | float, y: np.ndarray | float) -> None:
+        """Displace the whole toothing by (x, y) in the wheel's frame, m; arrays run along the face."""
+        x = np.broadcast_to(np.asarray(x, dtype=float), self.station.shape)
+        y = np.broadcast_to(np.asarray(y, dtype=float), self.station.shape)
+        for flank in (0, 1):
+            angle = self.normal_angle(flank)[:, None, :]
+            self.shape[flank] -= x[:, None] * np.cos(angle) + y[:, None] * np.sin(angle)
+
+    def shorten(self, tooth: int, radius: np.ndarray) -> None:
+        """Cut both flanks of a tooth at these radii along the face, m."""
+        string = np.sqrt(np.maximum(radius**2 - self.gear.base_radius**2, 0.0))
+        self.tip[:, tooth] = np.minimum(self.tip[:, tooth], string)
+
+    def tooth_list(self, teeth: object) -> list[int]:
+        """Tooth numbers from ``"all"``, one number or several; numbers wrap around the wheel."""
+        if isinstance(teeth, str):
+            if teeth != "all":
+                raise ValueError(f"teeth is {teeth!r}; give 'all', a tooth number or several")
+            return list(range(self.gear.teeth))
+        numbers = [teeth] if isinstance(teeth, int) else list(teeth)  # type: ignore[call-overload]
+        return [int(n) % self.gear.teeth for n in numbers]

@@ -1,0 +1,453 @@
+"""Faults and deviations of teeth: what is wrong, how bad, and what it is called.
+
+Each is a small frozen description with a severity and a label; ``GearPair.faults`` takes any number of them and they
+combine by addition. Lengths are in m or text with a unit, angles in rad or text.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+
+from gearmbs.gears.canvas import Canvas
+from gearmbs.gears.iso1328 import random_pitch, tolerances
+from gearmbs.gears.spec import convert_fields, require
+from gearmbs.gears.stiffness import Crack, pair_stiffness
+from gearmbs.units import Quantity
+
+if TYPE_CHECKING:
+    from gearmbs.gears.pair import GearPair
+
+Wheel = Literal["driver", "driven"]
+Flank = Literal["drive", "back", "both"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """What all faults share.
+
+    Parameters
+    ----------
+    wheel : {"driver", "driven"}
+        The wheel that has it.
+    """
+
+    label: ClassVar[str] = "fault"
+    units: ClassVar[dict[str, str]] = {}
+    along_face: ClassVar[bool] = False
+
+    wheel: Wheel = "driver"
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        convert_fields(self, self.units, name)
+        require(self.wheel in ("driver", "driven"), f"{name}.wheel is {self.wheel!r}; choose 'driver' or 'driven'")
+        for key in self.units:
+            value = getattr(self, key)
+            require(math.isfinite(value), f"{name}.{key} is {value}; give a finite number")
+
+    @property
+    def severity(self) -> float:
+        """Size of the fault, by its own main parameter."""
+        return float(getattr(self, next(iter(self.units))))
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """Label, severity and all parameters, for storing beside results."""
+        return {"label": self.label, "severity": self.severity, **asdict(self)}
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        """Add the deviation to the wheel's canvas."""
+        raise TypeError(f"{type(self).__name__} does not say what it does to a tooth")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChippedCorner(Fault):
+    """A corner of a tooth broken off at one end of the face, along a straight line.
+
+    Parameters
+    ----------
+    height : float or str
+        Missing tooth height at the end of the face.
+    length : float or str
+        Over which part of the face.
+    tooth : int
+    end : {1, -1}
+        End of the face, +1 towards +z.
+    """
+
+    label: ClassVar[str] = "chipped corner"
+    units: ClassVar[dict[str, str]] = {"height": "length", "length": "length"}
+    along_face: ClassVar[bool] = True
+
+    height: Quantity = 2e-3
+    length: Quantity = 5e-3
+    tooth: int = 0
+    end: int = 1
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        gear = canvas.gear
+        require(
+            0 < self.length <= gear.face_width, f"ChippedCorner.length is {self.length} m; give 0 up to the face width"
+        )
+        most = gear.tip_radius - gear.root_radius
+        require(0 < self.height <= most, f"ChippedCorner.height is {self.height} m; the tooth is {most:.6f} m high")
+        from_end = 0.5 * gear.face_width - self.end * canvas.station
+        cut = self.height * np.maximum(0.0, 1 - from_end / self.length)
+        canvas.shorten(self.tooth % gear.teeth, gear.tip_radius - cut)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BrokenTooth(Fault):
+    """A tooth broken off over the whole face.
+
+    Parameters
+    ----------
+    lost : float
+        Share of the tooth height that is missing, up to 1.
+    tooth : int
+    """
+
+    label: ClassVar[str] = "broken tooth"
+    units: ClassVar[dict[str, str]] = {"lost": "dimensionless"}
+
+    lost: Quantity = 0.7
+    tooth: int = 0
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        require(0 < self.lost <= 1, f"BrokenTooth.lost is {self.lost}; give a share of the height above 0 up to 1")
+        gear = canvas.gear
+        radius = gear.tip_radius - self.lost * (gear.tip_radius - gear.root_radius)
+        canvas.shorten(self.tooth % gear.teeth, np.full(canvas.station.size, radius))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RootCrack(Fault):
+    """A crack in the root of a tooth: geometry unchanged, the tooth bends more (potential-energy method).
+
+    Parameters
+    ----------
+    depth : float or str
+        Length of the crack.
+    angle : float or str
+        Between crack and the tooth's middle line.
+    tooth : int
+    """
+
+    label: ClassVar[str] = "root crack"
+    units: ClassVar[dict[str, str]] = {"depth": "length", "angle": "angle"}
+
+    depth: Quantity = 2e-3
+    angle: Quantity = "70 deg"
+    tooth: int = 0
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        require(self.depth > 0, f"RootCrack.depth is {self.depth} m; it must be positive")
+        crack = Crack(self.depth, self.angle)
+        driver = self.wheel == "driver"
+        string = canvas.compliance_string if driver else pair.line_of_action - canvas.compliance_string
+        cracked = pair_stiffness(pair, string, (crack, None) if driver else (None, crack))
+        canvas.compliance[:, self.tooth % canvas.gear.teeth] += pair_stiffness(pair, string) / cracked - 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pit(Fault):
+    """A pit or spall on a flank: an elliptic hollow.
+
+    Parameters
+    ----------
+    depth : float or str
+        Greatest depth.
+    height, width : float or str
+        Size along the profile (as radius) and along the face.
+    radius : float or str, optional
+        Of its centre on the wheel; default the pitch circle.
+    position : float or str
+        Of its centre along the face, from mid-face.
+    tooth : int
+    flank : {"drive", "back", "both"}
+    """
+
+    label: ClassVar[str] = "pitting"
+    units: ClassVar[dict[str, str]] = {
+        "depth": "length",
+        "height": "length",
+        "width": "length",
+        "position": "length",
+    }
+    along_face: ClassVar[bool] = True
+
+    depth: Quantity = 50e-6
+    height: Quantity = 2e-3
+    width: Quantity = 5e-3
+    radius: Quantity = None
+    position: Quantity = 0.0
+    tooth: int = 0
+    flank: Flank = "drive"
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        for name in ("depth", "height", "width"):
+            value = getattr(self, name)
+            require(value > 0, f"Pit.{name} is {value} m; it must be positive")
+        convert_fields(self, {"radius": "length"}, "Pit")
+        centre = canvas.gear.pitch_radius if self.radius is None else self.radius
+        u = (canvas.radius - centre) / (0.5 * self.height)
+        v = (canvas.station - self.position) / (0.5 * self.width)
+        hollow = self.depth * np.maximum(0.0, 1 - u[None, :] ** 2 - v[:, None] ** 2)
+        require(
+            hollow.max() > 0,
+            f"Pit.radius {centre} m or Pit.position {self.position} m puts the pit off the flank or between its "
+            "stations; move or enlarge it",
+        )
+        for flank in canvas.flanks(self.flank):
+            canvas.shape[flank, self.tooth % canvas.gear.teeth] += hollow
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wear(Fault):
+    """Wear as sliding makes it: nothing at the working pitch point, growing towards root and tip.
+
+    Parameters
+    ----------
+    depth : float or str
+        At the end of the active profile that slides most.
+    teeth : "all", int or several
+    flank : {"drive", "back", "both"}
+    """
+
+    label: ClassVar[str] = "wear"
+    units: ClassVar[dict[str, str]] = {"depth": "length"}
+
+    depth: Quantity = 20e-6
+    teeth: Any = "all"
+    flank: Flank = "drive"
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        require(self.depth >= 0, f"Wear.depth is {self.depth} m; it must not be negative")
+        gear = canvas.gear
+        pitch_point = gear.base_radius * math.tan(pair.working_pressure_angle)
+        start = pair.line_of_action - pair.wheels[self.wheel == "driver"].tip_string
+        # specific sliding: way slid per way rolled over, finite from the start of the active profile on
+        string = np.maximum(canvas.string, start)
+        sliding = np.abs(string - pitch_point) / string
+        worn = self.depth * sliding / max(abs(start - pitch_point) / start, sliding[-1])
+        for flank in canvas.flanks(self.flank):
+            canvas.shape[flank, canvas.tooth_list(self.teeth)] += worn
+
+
+@dataclass(frozen=True, kw_only=True)
+class Eccentricity(Fault):
+    """The toothing's centre off the axis of rotation: run-out of twice the amount.
+
+    Parameters
+    ----------
+    amount : float or str
+        Distance of the centres.
+    phase : float or str
+        Direction in the wheel's frame, from tooth 0.
+    """
+
+    label: ClassVar[str] = "eccentricity"
+    units: ClassVar[dict[str, str]] = {"amount": "length", "phase": "angle"}
+
+    amount: Quantity = 20e-6
+    phase: Quantity = 0.0
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        require(self.amount >= 0, f"Eccentricity.amount is {self.amount} m; it must not be negative")
+        canvas.shift(self.amount * math.cos(self.phase), self.amount * math.sin(self.phase))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wobble(Fault):
+    """A tilted bore: the toothing's axis crosses the axis of rotation at mid-face.
+
+    Parameters
+    ----------
+    angle : float or str
+    phase : float or str
+        Direction, in the wheel's frame, in which the toothing leans at its +z end.
+    """
+
+    label: ClassVar[str] = "wobble"
+    units: ClassVar[dict[str, str]] = {"angle": "angle", "phase": "angle"}
+    along_face: ClassVar[bool] = True
+
+    angle: Quantity = "0.05 deg"
+    phase: Quantity = 0.0
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        lean = math.tan(self.angle) * canvas.station
+        canvas.shift(lean * math.cos(self.phase), lean * math.sin(self.phase))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PitchError(Fault):
+    """One tooth out of place.
+
+    Parameters
+    ----------
+    amount : float or str
+        Displacement of its flanks along the base tangent; positive: the drive flank stands out.
+    tooth : int
+    """
+
+    label: ClassVar[str] = "single pitch error"
+    units: ClassVar[dict[str, str]] = {"amount": "length"}
+
+    amount: Quantity = 20e-6
+    tooth: int = 0
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        tooth = self.tooth % canvas.gear.teeth
+        canvas.offset[canvas.drive, tooth] -= self.amount
+        canvas.offset[1 - canvas.drive, tooth] += self.amount
+
+
+@dataclass(frozen=True, kw_only=True)
+class GradedFlanks(Fault):
+    """Random deviations that use up the tolerances of an ISO 1328-1:2013 grade.
+
+    Parameters
+    ----------
+    grade : int
+        1 (finest) to 11.
+    seed : int
+        The same seed gives the same wheel.
+    pitch, profile, lead : bool
+        Which deviations to include.
+    """
+
+    label: ClassVar[str] = "manufacturing grade"
+    units: ClassVar[dict[str, str]] = {"grade": "dimensionless"}
+    along_face: ClassVar[bool] = True
+
+    grade: Quantity = 6
+    seed: int = 0
+    pitch: bool = True
+    profile: bool = True
+    lead: bool = True
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        gear = canvas.gear
+        grade = int(self.grade)
+        limit = tolerances(gear, grade)
+        generator = np.random.default_rng([self.seed, 0 if self.wheel == "driver" else 1])
+        along = (canvas.string - canvas.string[0]) / np.ptp(canvas.string) - 0.5
+        across = canvas.station / gear.face_width
+        for flank in (0, 1):
+            side = 1 - 2 * flank
+            if self.pitch:
+                index = random_pitch(gear, grade, generator)
+                canvas.offset[flank] -= side * index
+            scale = generator.uniform(-1, 1, size=(4, gear.teeth))
+            wave = generator.uniform(0, 2 * math.pi, size=2)
+            for tooth in range(gear.teeth):
+                profile = limit.profile_slope * scale[0, tooth] * along
+                profile = profile + 0.5 * limit.profile_form * scale[1, tooth] * np.sin(4 * math.pi * along + wave[0])
+                lead = limit.lead_slope * scale[2, tooth] * across
+                lead = lead + 0.5 * limit.lead_form * scale[3, tooth] * np.sin(3 * math.pi * across + wave[1])
+                canvas.shape[flank, tooth] += self.profile * profile[None, :] + self.lead * lead[:, None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TipRelief(Fault):
+    """Material taken from the tip of all teeth.
+
+    Parameters
+    ----------
+    amount : float or str
+        At the tip.
+    length : float or str
+        Over which roll-off (string) length below the tip.
+    power : float
+        1 linear, 2 parabolic.
+    teeth, flank
+        Which flanks.
+    """
+
+    label: ClassVar[str] = "tip relief"
+    units: ClassVar[dict[str, str]] = {"amount": "length", "length": "length"}
+
+    amount: Quantity = 20e-6
+    length: Quantity = 3e-3
+    power: float = 1.0
+    teeth: Any = "all"
+    flank: Flank = "both"
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        name = type(self).__name__
+        require(self.length > 0, f"{name}.length is {self.length} m; it must be positive")
+        require(self.power >= 1, f"{name}.power is {self.power}; give 1 (linear) or more")
+        relief = self.amount * np.clip(1 - self._distance(canvas, pair) / self.length, 0, None) ** self.power
+        for flank in canvas.flanks(self.flank):
+            canvas.shape[flank, canvas.tooth_list(self.teeth)] += relief
+
+    def _distance(self, canvas: Canvas, pair: GearPair) -> np.ndarray:
+        return canvas.gear.tip_string - canvas.string
+
+
+@dataclass(frozen=True, kw_only=True)
+class RootRelief(TipRelief):
+    """Material taken from the flank near the root; ``length`` counts from the start of the active profile."""
+
+    label: ClassVar[str] = "root relief"
+
+    def _distance(self, canvas: Canvas, pair: GearPair) -> np.ndarray:
+        start = pair.line_of_action - pair.wheels[self.wheel == "driver"].tip_string
+        return np.maximum(canvas.string - start, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crowning(Fault):
+    """Flanks relieved towards both ends of the face, as a parabola.
+
+    Parameters
+    ----------
+    amount : float or str
+        At the ends of the face.
+    teeth, flank
+        Which flanks.
+    """
+
+    label: ClassVar[str] = "crowning"
+    units: ClassVar[dict[str, str]] = {"amount": "length"}
+    along_face: ClassVar[bool] = True
+
+    amount: Quantity = 10e-6
+    teeth: Any = "all"
+    flank: Flank = "both"
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        relief = self.amount * (2 * canvas.station / canvas.gear.face_width) ** 2
+        for flank in canvas.flanks(self.flank):
+            canvas.shape[flank, canvas.tooth_list(self.teeth)] += relief[:, None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeadCorrection(Fault):
+    """A flank that leans along the face: helix slope, as a fault or against a known misalignment.
+
+    Parameters
+    ----------
+    amount : float or str
+        Material missing at the +z end less that at the -z end.
+    teeth, flank
+        Which flanks.
+    """
+
+    label: ClassVar[str] = "lead deviation"
+    units: ClassVar[dict[str, str]] = {"amount": "length"}
+    along_face: ClassVar[bool] = True
+
+    amount: Quantity = 10e-6
+    teeth: Any = "all"
+    flank: Flank = "both"
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        slope = self.amount * canvas.station / canvas.gear.face_width
+        for flank in canvas.flanks(self.flank):
+            canvas.shape[flank, canvas.tooth_list(self.teeth)] += slope[:, None]

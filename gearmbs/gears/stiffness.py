@@ -1,0 +1,259 @@
+"""Tooth and mesh stiffness: the potential-energy method along the profile, and ISO 6336-1.
+
+References
+----------
+.. [1] Ma, H., Song, R., Pang, X., Wen, B.: Time-varying mesh stiffness calculation of cracked spur gears. Engineering
+   Failure Analysis 44 (2014) 179-194. Bending, shear and axial energy of a tooth as a beam with a rack-cut root.
+.. [2] Sainsot, P., Velex, P., Duverger, O.: Contribution of gear body to tooth deflections - a new bidimensional
+   analytical formula. J. Mech. Design 126 (2004) 748-752. Foundation.
+.. [3] Yang, D. C. H., Lin, J. Y.: Hertzian damping, tooth friction and bending elasticity in gear impact dynamics.
+   J. Mechanisms, Transmissions and Automation in Design 109 (1987) 189-196. Constant Hertz stiffness.
+.. [4] ISO 6336-1: Calculation of load capacity of spur and helical gears, method B for c' and c_gamma.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearmbs.gears.spec import GearSpec
+
+if TYPE_CHECKING:
+    from gearmbs.gears.pair import GearPair
+
+POINTS = 200  # stations of the beam from root to tip
+SHEAR = 1.2  # shear correction of a rectangular section
+# Sainsot's fits: coefficients of 1/theta^2, h^2, h/theta, 1/theta, h, 1
+SAINSOT = {
+    "L": (-5.574e-5, -1.9986e-3, -2.3015e-4, 4.7702e-3, 0.0271, 6.8045),
+    "M": (60.111e-5, 28.100e-3, -83.431e-4, -9.9256e-3, 0.1624, 0.9086),
+    "P": (-50.952e-5, 185.50e-3, 0.0538e-4, 53.300e-3, 0.2895, 0.9236),
+    "Q": (-6.2042e-5, 9.0889e-3, -4.0964e-4, 7.8297e-3, -0.1472, 0.6904),
+}
+ISO_STEEL_MODULUS = 206e9
+
+
+@dataclass(frozen=True)
+class Crack:
+    """A straight crack through the whole face, starting in the root.
+
+    Attributes
+    ----------
+    depth : float
+        Length of the crack, m.
+    angle : float
+        Between crack and the tooth's middle line, rad.
+    """
+
+    depth: float
+    angle: float = math.radians(70)
+
+
+def rack_root(gear: GearSpec, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
+    """Root curve cut by a rack with tip radius ``fillet_radius``: half thickness and height, from root circle upwards.
+
+    The rack's tip circle rolls off on the pitch circle; ``gamma`` is the angle at which it touches the curve.
+    """
+    alpha = gear.pressure_angle
+    radius, depth, across = _rack_tip(gear)
+    gamma = np.linspace(math.pi / 2, alpha, points)
+    turn = (depth / np.tan(gamma) + across) / gear.pitch_radius
+    arm = depth / np.sin(gamma) + radius
+    half = gear.pitch_radius * np.sin(turn) - arm * np.cos(gamma - turn)
+    height = gear.pitch_radius * np.cos(turn) - arm * np.sin(gamma - turn)
+    return half, height
+
+
+def _rack_tip(gear: GearSpec) -> tuple[float, float, float]:
+    """Tip radius of the rack, depth of its centre below the pitch circle and distance from the tooth's middle, m."""
+    alpha = gear.pressure_angle
+    radius = gear.fillet_radius
+    depth = gear.dedendum - radius
+    return radius, depth, 0.5 * gear.tooth_thickness + depth * math.tan(alpha) + radius / math.cos(alpha)
+
+
+def root_half_angle(gear: GearSpec) -> float:
+    """Half angle of the tooth where its rack-cut root meets the root circle, rad."""
+    return _rack_tip(gear)[2] / gear.pitch_radius
+
+
+@dataclass(frozen=True)
+class ToothCompliance:
+    """Compliance of one tooth for a load normal to its flank, per component, m/N, along the profile.
+
+    Attributes
+    ----------
+    string : ndarray
+        String length of the loaded point, m.
+    bending, shear, axial, foundation : ndarray
+    """
+
+    string: np.ndarray
+    bending: np.ndarray
+    shear: np.ndarray
+    axial: np.ndarray
+    foundation: np.ndarray
+
+    @property
+    def total(self) -> np.ndarray:
+        """Sum of all components, m/N."""
+        return self.bending + self.shear + self.axial + self.foundation
+
+
+def tooth_compliance(gear: GearSpec, crack: Crack | None = None, root_angle: float | None = None) -> ToothCompliance:
+    """Compliance of one tooth by the potential-energy method, from the start of its involute to its tip.
+
+    Parameters
+    ----------
+    gear : GearSpec
+    crack : Crack, optional
+        A crack in the root; sections above it keep the part of the tooth that still carries.
+    root_angle : float, optional
+        Half angle of the root for the foundation, default `root_half_angle`.
+
+    Returns
+    -------
+    ToothCompliance
+    """
+    rb, psi, b = gear.base_radius, gear.base_half_angle, gear.face_width
+    E = gear.material.youngs_modulus
+    G = E / (2 * (1 + gear.material.poisson_ratio))
+    half, height = rack_root(gear)
+    start = math.sqrt(max(half[-1] ** 2 + height[-1] ** 2 - rb**2, 0.0))
+    string = np.linspace(start, gear.tip_string, 2 * POINTS)
+    beta = string / rb - psi
+    x_load = rb * ((beta + psi) * np.cos(beta) - np.sin(beta))
+    y_load = rb * ((beta + psi) * np.sin(beta) + np.cos(beta))
+    x = np.concatenate([half, x_load[1:]])
+    y = np.concatenate([height, y_load[1:]]) - height[0]
+    thick = 2 * x
+    if crack is not None:
+        left = half[0] - crack.depth * math.sin(crack.angle)
+        if left <= -half[0]:
+            raise ValueError(f"crack depth is {crack.depth * 1e3:.4f} mm: it cuts through the tooth; make it shallower")
+        foot = crack.depth * math.cos(crack.angle)
+        cracked = (x > left) & (y <= max(foot, y[np.argmin(np.abs(x - abs(left)))]))
+        thick = np.where(cracked, x + left, thick)
+    area = thick * b
+    second = thick**3 * b / 12
+
+    def along(density: np.ndarray) -> np.ndarray:
+        steps = 0.5 * (density[1:] + density[:-1]) * np.diff(y)
+        return np.concatenate([[0.0], np.cumsum(steps)])[half.size - 1 :]
+
+    cos, sin = np.cos(beta), np.sin(beta)
+    lever = cos * (y_load - height[0]) - x_load * sin
+    bending = (lever**2 * along(1 / second) - 2 * lever * cos * along(y / second) + cos**2 * along(y**2 / second)) / E
+    shear = SHEAR * cos**2 * along(1 / area) / G
+    axial = sin**2 * along(1 / area) / E
+    theta = root_half_angle(gear) if root_angle is None else root_angle
+    ratio = gear.root_radius / gear.bore_radius if gear.bore_radius > 0 else 7.0
+    fit = {
+        name: c[0] / theta**2 + c[1] * ratio**2 + c[2] * ratio / theta + c[3] / theta + c[4] * ratio + c[5]
+        for name, c in SAINSOT.items()
+    }
+    u = (y_load - gear.root_radius) / (2 * gear.root_radius * theta)
+    foundation = cos**2 / (E * b) * (fit["L"] * u**2 + fit["M"] * u + fit["P"] * (1 + fit["Q"] * np.tan(beta) ** 2))
+    return ToothCompliance(string, bending, shear, axial, foundation)
+
+
+def hertz_stiffness(pair: GearPair) -> float:
+    """Constant stiffness of the contact of two flanks, pi E b / (4 (1 - nu^2)) for equal materials, N/m."""
+    parts = [(1 - w.material.poisson_ratio**2) / w.material.youngs_modulus for w in pair.wheels]
+    return math.pi * pair.common_face_width / (2 * sum(parts))
+
+
+def pair_stiffness(
+    pair: GearPair,
+    string: np.ndarray,
+    cracks: tuple[Crack | None, Crack | None] = (None, None),
+    root_angles: tuple[float | None, float | None] = (None, None),
+) -> np.ndarray:
+    """Stiffness of one tooth pair by the potential-energy method, N/m.
+
+    Parameters
+    ----------
+    pair : GearPair
+    string : ndarray
+        Contact on wheel 1, as string length, m; beyond the profiles' ends the end values are used.
+    cracks, root_angles : tuple
+        Per wheel, see `tooth_compliance`.
+    """
+    mate = pair.line_of_action - string
+    total = np.full(np.shape(string), 1 / hertz_stiffness(pair))
+    for wheel, at, crack, angle in zip(pair.wheels, (string, mate), cracks, root_angles):
+        tooth = tooth_compliance(wheel, crack, angle)
+        total = total + np.interp(at, tooth.string, tooth.total)
+    return 1 / total
+
+
+@dataclass(frozen=True)
+class MeshStiffness:
+    """Mesh stiffness over one mesh cycle, all pairs on the path of contact in parallel.
+
+    Attributes
+    ----------
+    phase : ndarray
+        From the entry of a pair, over the base pitch, 0 up to 1.
+    stiffness : ndarray
+        N/m.
+    single : ndarray
+        Of the entering pair alone over its whole engagement, N/m.
+    single_phase : ndarray
+        Its travel over the base pitch, 0 to the contact ratio.
+    """
+
+    phase: np.ndarray
+    stiffness: np.ndarray
+    single: np.ndarray
+    single_phase: np.ndarray
+
+    @property
+    def maximum(self) -> float:
+        """Largest mesh stiffness, N/m."""
+        return float(self.stiffness.max())
+
+    @property
+    def mean(self) -> float:
+        """Mean mesh stiffness, N/m."""
+        return float(self.stiffness.mean())
+
+
+def mesh_stiffness(
+    pair: GearPair,
+    points: int = 400,
+    root_angles: tuple[float | None, float | None] = (None, None),
+) -> MeshStiffness:
+    """Time-varying mesh stiffness of perfect wheels by the potential-energy method."""
+    begin = pair.line_of_action - pair.driven.tip_string
+    pitch, ratio = pair.driver.base_pitch, pair.contact_ratio
+    phase = np.arange(points) / points
+    stiffness = np.zeros(points)
+    for k in range(math.ceil(ratio)):
+        travel = phase + k
+        on_path = travel <= ratio
+        stiffness[on_path] += pair_stiffness(pair, begin + travel[on_path] * pitch, root_angles=root_angles)
+    single_phase = np.linspace(0, ratio, points)
+    single = pair_stiffness(pair, begin + single_phase * pitch, root_angles=root_angles)
+    return MeshStiffness(phase, stiffness, single, single_phase)
+
+
+def iso_single_stiffness(pair: GearPair) -> float:
+    """Single stiffness c' of ISO 6336-1 (method B, solid discs, high load), N/(m of face width * m)."""
+    one, two = pair.driver, pair.driven
+    z1, z2, x1, x2 = one.teeth, two.teeth, one.profile_shift, two.profile_shift
+    q = 0.04723 + 0.15551 / z1 + 0.25791 / z2 - 0.00635 * x1 - 0.11654 * x1 / z1 - 0.00193 * x2
+    q += -0.24188 * x2 / z2 + 0.00529 * x1**2 + 0.00182 * x2**2
+    depth = 0.5 * (one.dedendum / one.module + two.dedendum / two.module)
+    rack = (1 + 0.5 * (1.2 - depth)) * (1 - 0.02 * (20 - math.degrees(one.pressure_angle)))
+    moduli = [w.material.youngs_modulus for w in (one, two)]
+    material = 2 * moduli[0] * moduli[1] / sum(moduli) / ISO_STEEL_MODULUS
+    return 0.8 * rack / q * material * 1e9
+
+
+def iso_mesh_stiffness(pair: GearPair) -> float:
+    """Mesh stiffness c_gamma of ISO 6336-1, (0.75 epsilon_alpha + 0.25) c', N/(m of face width * m)."""
+    return iso_single_stiffness(pair) * (0.75 * pair.contact_ratio + 0.25)

@@ -1,0 +1,244 @@
+"""Faults: what they do to the teeth, how they combine, and what the mesh shows."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gearmbs.gears import GearPair, GearSpec, loaded_transmission_error
+from gearmbs.gears.faults import (
+    BrokenTooth,
+    ChippedCorner,
+    Crowning,
+    Eccentricity,
+    Fault,
+    GradedFlanks,
+    LeadCorrection,
+    Pit,
+    PitchError,
+    RootCrack,
+    RootRelief,
+    TipRelief,
+    Wear,
+    Wobble,
+)
+from gearmbs.gears.iso1328 import tolerances
+from gearmbs.gears.tables import canvases
+from gearmbs.gears.transmission import StaticMesh
+
+ALL = [
+    BrokenTooth,
+    ChippedCorner,
+    Crowning,
+    Eccentricity,
+    GradedFlanks,
+    LeadCorrection,
+    Pit,
+    PitchError,
+    RootCrack,
+    RootRelief,
+    TipRelief,
+    Wear,
+    Wobble,
+]
+TURN = 2 * math.pi / 29
+
+
+def gaps(pair, driver_angle, lead=0.0, stations=(0.0,), shift=None, tilt=None):
+    """Gap rows at given angles; optionally with the driver's frame shifted or turned in itself."""
+    mesh = StaticMesh(pair)
+    plain = StaticMesh(GearPair.paper(backlash=pair.backlash))
+    driven = plain.touching_angle(driver_angle) - lead / 0.0417
+    if shift is None and tilt is None:
+        return mesh.gaps(driver_angle, driven, np.array(stations)).copy()
+    from gearmbs.contact import pair_gaps
+
+    place = pair.frames(driver_angle, driven)
+    origin = place.origin_1 + place.axes_1 @ np.append(shift if shift is not None else (0, 0), 0.0)
+    axes = place.axes_1 if tilt is None else place.axes_1 @ tilt
+    rows = np.zeros((200, 11))
+    n = pair_gaps(
+        *(mesh.gi, mesh.gr, origin, np.ascontiguousarray(axes), place.origin_2, place.axes_2),
+        *(np.array(stations), rows, mesh.work),
+    )
+    return rows[:n]
+
+
+@pytest.mark.parametrize("kind", ALL)
+@pytest.mark.parametrize("wheel", ["driver", "driven"])
+def test_every_fault_has_a_name_a_size_and_an_effect(kind, wheel):
+    fault = kind(wheel=wheel)
+    assert isinstance(fault, Fault)
+    assert fault.label != Fault.label
+    assert fault.severity > 0
+    assert fault.description["label"] == fault.label
+    assert fault.description["wheel"] == wheel
+    pair = GearPair.paper().with_faults(fault)
+    mesh, plain = StaticMesh(pair, 41), StaticMesh(GearPair.paper(), 41)
+    change = 0.0
+    for k in range(29):
+        for part in (0.2, 0.5, 0.9):
+            angle = (k + part) * TURN
+            driven = plain.ideal_angle(angle) + 25e-6 / 0.0417
+            change = max(change, abs(mesh.torque(angle, driven)[0] - plain.torque(angle, driven)[0]))
+    assert change > 0.5
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "bad"),
+    [
+        (ChippedCorner, "height", -1e-3),
+        (ChippedCorner, "length", "50 mm"),
+        (BrokenTooth, "lost", 1.2),
+        (RootCrack, "depth", 0.0),
+        (Pit, "depth", -1e-6),
+        (Pit, "radius", "80 mm"),
+        (Wear, "depth", -1e-6),
+        (Eccentricity, "amount", -1e-6),
+        (TipRelief, "length", 0.0),
+        (TipRelief, "power", 0.5),
+        (GradedFlanks, "grade", 12),
+        (Wear, "flank", "top"),
+        (Wear, "teeth", "some"),
+    ],
+)
+def test_nonsense_is_named(kind, name, bad):
+    with pytest.raises(ValueError, match=name):
+        GearPair.paper().with_faults(kind(**{name: bad})).contact_tables()
+    with pytest.raises(ValueError, match="wheel"):
+        kind(wheel="third")
+
+
+def test_eccentricity_is_a_shifted_wheel():
+    # moving the driver's toothing by e in its own frame is the same as drawing the fault, to e^2 / rho
+    amount, phase = 20e-6, 0.7
+    pair = GearPair.paper(backlash="0.2 mm")
+    faulty = pair.with_faults(Eccentricity(amount=amount, phase=phase))
+    for angle in np.linspace(0, 6, 7):
+        drawn = gaps(faulty, angle, 10e-6)
+        moved = gaps(pair, angle, 10e-6, shift=(amount * math.cos(phase), amount * math.sin(phase)))
+        flank = drawn[:, 5] == 0
+        assert drawn[flank, 4] == pytest.approx(moved[flank, 4], abs=1e-7)
+
+
+def test_wobble_is_a_tilted_wheel():
+    angle, phase = 4e-4, 0.4
+    lean = np.eye(3)
+    lean[:2, 2] = angle * math.cos(phase), angle * math.sin(phase)
+    lean[2, :2] = -lean[:2, 2]
+    lean = np.linalg.qr(lean)[0] * np.sign(np.diag(np.linalg.qr(lean)[0]))
+    pair = GearPair.paper(backlash="0.2 mm")
+    faulty = pair.with_faults(Wobble(angle=angle, phase=phase))
+    for driver_angle in np.linspace(0, 6, 5):
+        drawn = gaps(faulty, driver_angle, 10e-6, (-8e-3, 5e-3))
+        moved = gaps(pair, driver_angle, 10e-6, (-8e-3, 5e-3), tilt=lean)
+        flank = (drawn[:, 5] == 0) & (moved[:, 5] == 0)
+        assert drawn[flank, 4] == pytest.approx(moved[flank, 4], abs=2e-7)
+
+
+def test_faults_add_up():
+    pair = GearPair.paper(backlash="0.2 mm")
+    one, two = Eccentricity(amount="10 um"), TipRelief(amount="20 um")
+    base, first, second, both = (
+        gaps(p, 0.4, 10e-6)[:, 4]
+        for p in (pair, pair.with_faults(one), pair.with_faults(two), pair.with_faults(one, two))
+    )
+    assert both - base == pytest.approx(first - base + second - base, abs=1e-12)
+
+
+def test_pitch_error_moves_one_tooth():
+    pair = GearPair.paper(backlash="0.2 mm")
+    plain = gaps(pair, 0.0)
+    moved = gaps(pair.with_faults(PitchError(amount="12 um", tooth=0)), 0.0)
+    change = moved[:, 4] - plain[:, 4]
+    tooth = plain[:, 1] == 0
+    assert change[tooth & (plain[:, 0] == 1)] == pytest.approx(-12e-6)
+    assert change[tooth & (plain[:, 0] == -1)] == pytest.approx(12e-6)
+    assert np.all(change[~tooth] == 0)
+
+
+def test_broken_tooth_touches_lower_down():
+    pair = GearPair.paper()
+    faulty = pair.with_faults(BrokenTooth(lost=0.25, tooth=0))
+    gear = pair.driver
+    radius = gear.tip_radius - 0.25 * (gear.tip_radius - gear.root_radius)
+    string = math.sqrt(radius**2 - gear.base_radius**2)
+    rows = np.concatenate([gaps(faulty, a) for a in np.linspace(-0.1, 0.3, 40)])
+    mine = rows[(rows[:, 1] == 0) & (rows[:, 0] == 1)]
+    corners = mine[mine[:, 5] == 1]
+    assert corners[:, 6] == pytest.approx(string)
+    assert mine[:, 6].max() <= string * (1 + 1e-12)
+
+
+def test_severity_shows_in_the_mesh():
+    def swing(fault):
+        pair = GearPair.paper().with_faults(fault)
+        mesh = StaticMesh(pair)
+        lag = []
+        for angle in np.arange(29 * 4) * TURN / 4:
+            ideal = mesh.ideal_angle(angle)
+            lag.append(mesh.loaded_angle(angle, 100.0, ideal + 20e-6 / 0.0417) - ideal)
+        spectrum = abs(np.fft.rfft(lag)) * 2 / len(lag) * 0.0417
+        return spectrum[1:29]
+
+    # once per revolution and its harmonics below the mesh frequency: none when healthy, rising with severity
+    levels = [np.linalg.norm(swing(BrokenTooth(lost=x))) for x in (0.2, 0.4, 0.8)]
+    assert 1e-8 < levels[0] < levels[1] <= levels[2]
+    levels = [np.linalg.norm(swing(RootCrack(depth=d))) for d in (1e-3, 2e-3, 3e-3)]
+    assert 1e-9 < levels[0] < levels[1] < levels[2]
+    for amount in (10e-6, 30e-6):
+        assert swing(Eccentricity(amount=amount))[0] == pytest.approx(amount, rel=0.02)
+    assert np.linalg.norm(swing(TipRelief())) < 1e-12
+
+
+def test_symmetric_crowning_carries_in_the_middle():
+    pair = GearPair.paper().with_faults(Crowning(amount="20 um"))
+    te = loaded_transmission_error(pair, 100.0, 8)
+    assert np.all(te.error > loaded_transmission_error(GearPair.paper(), 100.0, 8).error)
+
+
+def test_lead_correction_undoes_a_skew():
+    # skew by gamma opens the drive flanks by gamma cos(alpha) per unit of face
+    gamma = math.radians(0.05)
+    skewed = GearPair.paper(misalignment=gamma, backlash="0.2 mm")
+    amount = gamma * math.cos(math.radians(20)) * 20e-3
+    spread = {}
+    for sign in (1, 0, -1):
+        pair = skewed.with_faults(LeadCorrection(amount=sign * amount, flank="drive"))
+        rows = gaps(pair, 0.05, 10e-6, (-9e-3, 9e-3))
+        rows = rows[(rows[:, 0] == 1) & (rows[:, 5] == 0)]
+        spread[sign] = abs(rows[1::2, 4] - rows[::2, 4]).max()
+    assert min(spread[1], spread[-1]) < 0.01 * spread[0]
+    assert max(spread[1], spread[-1]) == pytest.approx(2 * spread[0], rel=0.01)
+
+
+@pytest.mark.parametrize("grade", [3, 6, 9])
+def test_graded_flanks_meet_their_tolerances(grade):
+    pair = GearPair.paper().with_faults(GradedFlanks(grade=grade, seed=5, profile=False, lead=False))
+    limit = tolerances(pair.driver, grade)
+    canvas = canvases(pair)[0]
+    for flank in (0, 1):
+        index = canvas.offset[flank]
+        single = abs(np.diff(np.append(index, index[0]))).max()
+        assert single <= limit.single_pitch * (1 + 1e-12)
+        assert np.ptp(index) <= limit.total_pitch * (1 + 1e-12)
+        assert single == pytest.approx(limit.single_pitch) or np.ptp(index) == pytest.approx(limit.total_pitch)
+    again = canvases(GearPair.paper().with_faults(GradedFlanks(grade=grade, seed=5, profile=False, lead=False)))[0]
+    assert np.array_equal(again.offset, canvas.offset)
+
+
+def test_iso_1328_formulas():
+    # grade 5, d = 100 mm, m = 4 mm, b = 25 mm: f_pT = 0.1 + 1.6 + 5 = 6.7 um, F_pT = 0.2 + 5.5 + 2.8 + 12 = 20.5 um
+    limit = tolerances(GearSpec(25, "4 mm", face_width="25 mm"), 5)
+    assert limit.single_pitch == pytest.approx(6.7e-6)
+    assert limit.total_pitch == pytest.approx(20.5e-6)
+    assert tolerances(GearSpec(25, "4 mm"), 7).single_pitch == pytest.approx(2 * 6.7e-6)
+
+
+def test_wear_is_least_at_the_pitch_point():
+    pair = GearPair.paper().with_faults(Wear(depth="20 um"))
+    canvas = canvases(pair)[0]
+    worn = canvas.shape[canvas.drive, 3, 0]
+    assert abs(canvas.radius[worn.argmin()] - pair.driver.pitch_radius) < 0.3e-3
+    assert worn.max() == pytest.approx(20e-6, rel=0.05)
+    assert np.all(canvas.shape[1 - canvas.drive] == 0)
