@@ -166,7 +166,7 @@ def claim_maps(ratios: pd.DataFrame, across: str, label: str) -> Figure:
         ax.set_visible(False)
     for ax, claim in zip(axes, CLAIMS):
         grid_values = table.pivot(index=across, columns="depth_mm", values=claim)
-        grid_values = grid_values.dropna(axis=1, how="all")
+        grid_values = grid_values.dropna(axis=1, how="any")
         logs = np.log10(grid_values.values)
         span = max(0.3, float(np.nanmax(np.abs(logs))))
         ax.pcolormesh(logs, cmap="PuOr_r", norm=TwoSlopeNorm(0.0, -span, span), edgecolors="white", linewidth=1.5)

@@ -1,0 +1,108 @@
+"""Links, examples and commands of the documentation's pages and the README."""
+
+from __future__ import annotations
+
+import doctest
+import re
+import shlex
+
+import matplotlib as mpl
+import pytest
+import typer
+
+from gearmbs.cli import app
+from tests.docs.support import DOCS, ROOT, blocks, links, notebooks, pages, run_blocks
+
+ALL = [ROOT / "README.md", *pages()]
+QUICK = ("own_dae.md", "own_mechanism.md", "measured.md")
+WITH_EXAMPLES = [p for p in pages() if any(b.language == "python" for b in blocks(p))]
+DOCTESTS = [p for p in ALL if ">>> " in p.read_text(encoding="utf-8")]
+
+
+def name_of(path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+@pytest.fixture
+def in_folder(tmp_path, monkeypatch):
+    """Work in an empty folder without a display."""
+    monkeypatch.chdir(tmp_path)
+    mpl.use("Agg")
+    return tmp_path
+
+
+@pytest.mark.parametrize("path", ALL, ids=name_of)
+def test_relative_links_lead_to_files(path):
+    missing = []
+    for target in links(path):
+        file = target.partition("#")[0]
+        if file and "://" not in target and not target.startswith("mailto:") and not (path.parent / file).exists():
+            missing.append(target)
+    assert not missing
+
+
+@pytest.mark.parametrize("path", ALL, ids=name_of)
+def test_commands_exist_with_their_options(path):
+    commands = typer.main.get_command(app).commands
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.M))
+    for block in blocks(path):
+        for line in block.code.replace("\\\n", " ").splitlines() if block.language == "console" else ():
+            words = shlex.split(line.removeprefix("$ "), comments=True)
+            if words[:1] == ["make"]:
+                assert set(words[1:]) <= targets, line
+            if words[:1] == ["gearmbs"] and not words[1].startswith("-"):
+                assert words[1] in commands, line
+                known = {o for p in commands[words[1]].params for o in (*p.opts, *p.secondary_opts)}
+                assert {w for w in words[2:] if w.startswith("--")} <= known, line
+
+
+@pytest.mark.parametrize("path", DOCTESTS, ids=name_of)
+def test_doctests(path, in_folder):
+    failed, count = doctest.testfile(str(path), module_relative=False, optionflags=doctest.ELLIPSIS)
+    assert count
+    assert not failed
+
+
+def test_pages_are_of_one_kind():
+    """A page is a notebook or has plain examples, since the two are run in different ways."""
+    for path in notebooks():
+        assert not any(b.language == "python" for b in blocks(path)), path
+
+
+def test_no_page_is_outside_the_tables_of_contents():
+    listed = "".join(re.findall(r"```\{toctree\}.*?```", "".join(p.read_text() for p in pages()), re.S))
+    for path in pages():
+        relative = path.relative_to(DOCS).with_suffix("")
+        assert relative.name in listed or relative.parts[0] == "theory" or relative.name == "index", relative
+
+
+def test_readme_example(in_folder):
+    """The ten lines of the README run and draw the bars of two states."""
+    readme = ROOT / "README.md"
+    code = [b.code for b in blocks(readme) if b.language == "python"]
+    assert len([line for line in code[0].splitlines() if line.strip()]) <= 15
+    names = run_blocks(readme, "python")
+    assert names["levels"].sizes["state"] == 2
+    assert float(names["levels"].min()) > 0.0
+
+
+def test_readme_picture_is_small():
+    assert (DOCS / "images" / "paper.png").stat().st_size < 200_000
+
+
+def _examples(path, folder):
+    for block in blocks(path):
+        if block.language == "toml":
+            (folder / "case.toml").write_text(block.code, encoding="utf-8")
+    run_blocks(path, "python")
+
+
+@pytest.mark.parametrize("path", [p for p in WITH_EXAMPLES if p.name in QUICK], ids=name_of)
+def test_quick_examples(path, in_folder):
+    _examples(path, in_folder)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", [p for p in WITH_EXAMPLES if p.name not in QUICK], ids=name_of)
+def test_examples(path, in_folder):
+    _examples(path, in_folder)
