@@ -5,14 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.deviations import add_deviation, set_corner, tip_string, tooth_record
+from gearmbs.contact.deviations import add_deviation, pair_softness, set_corner, tip_string, tooth_record
 from gearmbs.contact.face import LIMIT, face_limit
 from gearmbs.contact.flanks import corner_section, flank_pitch, open_side, set_normal
 from gearmbs.contact.jit import kernel
 from gearmbs.contact.node import contact_point, flank_normal, section_gap
 from gearmbs.contact.pose import relative_pose
 
-COLUMNS = ("side", "tooth_1", "tooth_2", "station", "gap", "kind", "string_1", "string_2", "normal", "tangent", "alpha")
+COLUMNS = (
+    "side",
+    "tooth_1",
+    "tooth_2",
+    "station",
+    "gap",
+    "kind",
+    "string_1",
+    "string_2",
+    "normal",
+    "tangent",
+    "alpha",
+    "stiffness",
+)
 
 
 @kernel
@@ -27,10 +40,11 @@ def pair_gaps(gi, gr, R1, A1, R2, A2, stations, rows, work):
         Poses of the wheels.
     stations : ndarray
         Positions along the mean axis from mid-way between the wheels, m; if empty, the ends of the common face.
-    rows : ndarray, shape (n, 11)
+    rows : ndarray, shape (n, 12)
         Out, columns as in ``COLUMNS``: side (+1, -1), tooth numbers, station, gap m, kind (0 flank on flank, 1 or 2
         the wheel whose corner bears), string lengths on both wheels m, contact point from the centre of wheel 1 along
-        normal and tangent m, operating angle of the normal rad (mirrored for side -1).
+        normal and tangent m, operating angle of the normal rad (mirrored for side -1), stiffness factor
+        of the pair.
 
     Returns
     -------
@@ -63,6 +77,10 @@ def pair_gaps(gi, gr, R1, A1, R2, A2, stations, rows, work):
             f2 = work[L.S_X + 5] + (n - i) * 2.0 * np.pi / gi[L.Z2]
             record1 = tooth_record(gi, 0, side, i) if teeth else 0
             record2 = tooth_record(gi, 1, side, n - i) if teeth else 0
+            soft = 1.0
+            if gi[L.O_COMPLIANCE] != 0:
+                pair_softness(gi, gr, work, record1, record2, f1, f2, 0)
+                soft = work[L.P_SOFT]
             ends = stations.size == 0
             if ends:
                 face_limit(-1.0, gr, work, f1, f2, L.W_LIMIT, 0)
@@ -100,5 +118,6 @@ def pair_gaps(gi, gr, R1, A1, R2, A2, stations, rows, work):
                 rows[count, 8] = work[o + L.N_PN]
                 rows[count, 9] = work[o + L.N_PT]
                 rows[count, 10] = work[o + L.N_ALPHA]
+                rows[count, 11] = soft
                 count += 1
     return count

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.contact import gear_contact, layout, pair_gaps
+from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
 
 if TYPE_CHECKING:
     from gearmbs.gears.pair import GearPair
@@ -72,7 +72,7 @@ class StaticMesh:
         self.wrench = np.zeros(6)
         self.jac = np.zeros((6, 24))
         self.diag = np.zeros(8)
-        self.rows = np.zeros((MAX_ROWS, 11))
+        self.rows = np.zeros((MAX_ROWS, len(GAP_COLUMNS)))
         self._zero = np.zeros(3)
 
     def torque(self, driver_angle: float, driven_angle: float) -> tuple[float, float]:

@@ -51,12 +51,12 @@ def gaps(pair, driver_angle, lead=0.0, stations=(0.0,), shift=None, tilt=None):
     driven = plain.touching_angle(driver_angle) - lead / 0.0417
     if shift is None and tilt is None:
         return mesh.gaps(driver_angle, driven, np.array(stations)).copy()
-    from gearmbs.contact import pair_gaps
+    from gearmbs.contact import GAP_COLUMNS, pair_gaps
 
     place = pair.frames(driver_angle, driven)
     origin = place.origin_1 + place.axes_1 @ np.append(shift if shift is not None else (0, 0), 0.0)
     axes = place.axes_1 if tilt is None else place.axes_1 @ tilt
-    rows = np.zeros((200, 11))
+    rows = np.zeros((200, len(GAP_COLUMNS)))
     n = pair_gaps(
         *(mesh.gi, mesh.gr, origin, np.ascontiguousarray(axes), place.origin_2, place.axes_2),
         *(np.array(stations), rows, mesh.work),

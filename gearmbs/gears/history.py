@@ -1,0 +1,108 @@
+"""What the mesh did during a motion: forces, pairs in contact, separations and hits of the back flanks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numba import njit, types
+
+from gearmbs.contact import gear_contact
+
+if TYPE_CHECKING:
+    from gearmbs.gears.pair import GearPair
+
+VEC = types.float64[::1]
+MAT = types.float64[:, ::1]
+BOX = types.float64[:, :, ::1]
+
+
+@njit(
+    types.void(types.int64[::1], VEC, MAT, BOX, MAT, MAT, MAT, BOX, MAT, MAT, MAT, MAT, VEC),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def _run(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, diag, work):
+    jac = np.zeros((6, 24))
+    for k in range(R1.shape[0]):
+        gear_contact(
+            gi, gr, R1[k], A1[k], v1[k], w1[k], R2[k], A2[k], v2[k], w2[k], wrench[k], jac, diag[k], 0, work
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ContactHistory:
+    """Contact quantities at each instant of a motion, n instants.
+
+    Attributes
+    ----------
+    wrench : ndarray, shape (n, 6)
+        Force and torque (about its origin) on the driver, global components.
+    elastic_energy, damping_power, friction_power : ndarray
+        J, W, W.
+    drive_penetration, back_penetration : ndarray
+        Largest, m.
+    drive_pairs, back_pairs : ndarray of int
+        Tooth pairs touching.
+    normal_force : ndarray
+        Sum of all normal forces, N.
+    """
+
+    wrench: np.ndarray
+    elastic_energy: np.ndarray
+    damping_power: np.ndarray
+    friction_power: np.ndarray
+    drive_penetration: np.ndarray
+    back_penetration: np.ndarray
+    drive_pairs: np.ndarray
+    back_pairs: np.ndarray
+    normal_force: np.ndarray
+
+    @property
+    def separations(self) -> int:
+        """How many times the teeth lost all contact."""
+        free = (self.drive_pairs + self.back_pairs) == 0
+        return int(np.count_nonzero(free[1:] & ~free[:-1]))
+
+    @property
+    def back_hits(self) -> int:
+        """How many times the back flanks came into contact."""
+        touching = self.back_pairs > 0
+        return int(np.count_nonzero(touching[1:] & ~touching[:-1]))
+
+
+def contact_history(
+    pair: GearPair,
+    driver: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    driven: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+) -> ContactHistory:
+    """Evaluate the contact along a motion of the two wheels.
+
+    Parameters
+    ----------
+    pair : GearPair
+    driver, driven : tuple of ndarray
+        Per wheel: origins (n, 3), axes (n, 3, 3), velocities of the origins (n, 3), angular velocities (n, 3); global
+        components.
+
+    Returns
+    -------
+    ContactHistory
+    """
+    shapes = ((-1, 3), (-1, 3, 3), (-1, 3), (-1, 3))
+    args = [
+        np.ascontiguousarray(a, dtype=float).reshape(s) for wheel in (driver, driven) for a, s in zip(wheel, shapes)
+    ]
+    n = len(args[0])
+    if any(len(a) != n for a in args):
+        raise ValueError(f"driver and driven have {[len(a) for a in args]} instants; give as many of each")
+    gi, gr, size = pair.contact_tables()
+    wrench = np.zeros((n, 6))
+    diag = np.zeros((n, 8))
+    run: Any = _run
+    run(gi, gr, *args, wrench, diag, np.zeros(size))
+    energy, damping, friction, drive, back = diag[:, :5].T
+    drive_pairs, back_pairs = diag[:, 5:7].T.astype(int)
+    return ContactHistory(wrench, energy, damping, friction, drive, back, drive_pairs, back_pairs, diag[:, 7])

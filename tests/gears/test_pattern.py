@@ -1,0 +1,75 @@
+"""Contact pattern, load sharing and histories."""
+
+import numpy as np
+import pytest
+
+from gearmbs.gears import ContactLaw, Friction, GearPair
+from gearmbs.gears.faults import Crowning, RootCrack
+from gearmbs.gears.history import contact_history
+from gearmbs.gears.pattern import contact_pattern
+
+
+def test_healthy_pattern_is_even_and_carries_the_load():
+    pair = GearPair.paper()
+    pattern = contact_pattern(pair, 100.0, points=41)
+    assert np.ptp(pattern.pressure, axis=1) == pytest.approx(0, abs=1e-6 * pattern.pressure.max())
+    assert pattern.face_load_factor == pytest.approx(1.0)
+    middle = pattern.pressure[20]
+    # alone at the pitch point: F_n = T / r_b over 20 mm
+    assert pattern.roll_angle[20] == pytest.approx(0, abs=1e-12)
+    assert middle.mean() == pytest.approx(pair.normal_force / 20e-3, rel=1e-6)
+    assert pattern.share.max() == pytest.approx(1.0)
+    assert pattern.string[20, 0] == pytest.approx(pair.driver.base_radius * np.tan(np.radians(20)), rel=1e-3)
+
+
+@pytest.mark.parametrize("rotation", [1, -1])
+def test_shares_of_a_tooth_and_the_next_add_up(rotation):
+    pattern = contact_pattern(GearPair.paper(rotation=rotation), 100.0, points=400)
+    roll = 2 * np.pi / 29
+    at = np.linspace(pattern.roll_angle[0], pattern.roll_angle[0] + roll, 40)
+    total = sum(np.interp(at + k * roll, pattern.roll_angle, pattern.share, 0, 0) for k in range(-1, 4))
+    assert total == pytest.approx(1.0, abs=0.02)
+
+
+def test_skew_loads_the_ends_of_the_face():
+    pair = GearPair.paper(misalignment="1 deg", contact=ContactLaw.impact())
+    drive, back = contact_pattern(pair, 100.0), contact_pattern(pair, 100.0, side="back")
+    heavy = [p.station[p.pressure.sum(axis=0).argmax()] for p in (drive, back)]
+    assert abs(heavy[0]) > 8e-3
+    assert abs(heavy[1]) > 8e-3
+    assert heavy[0] * heavy[1] < 0
+    assert drive.face_load_factor > 2
+
+
+def test_crowning_loads_the_middle():
+    pattern = contact_pattern(GearPair.paper(faults=[Crowning(amount="40 um")]), 100.0)
+    assert abs(pattern.station[pattern.pressure.sum(axis=0).argmax()]) < 1e-3
+
+
+def test_cracked_tooth_carries_less():
+    healthy = contact_pattern(GearPair.paper(), 100.0, points=60)
+    cracked = contact_pattern(GearPair.paper(faults=[RootCrack(depth="3 mm", tooth=0)]), 100.0, points=60)
+    assert cracked.force.sum() < healthy.force.sum()
+
+
+def test_history_counts_separations_and_back_hits():
+    pair = GearPair.paper(backlash="20 um", friction=Friction.none())
+    n = 400
+    turn = np.linspace(0, 2 * np.pi, n)
+    # the driven wheel swings from drive flank to back flank and back, four times
+    depth = 10e-6 * np.cos(4 * turn) * 2 - 10e-6
+    start = pair.driven_angle(0.0)
+    frames = [pair.frames(0.0, start + d / pair.driven.base_radius) for d in depth]
+    zero = np.zeros((n, 3))
+    history = contact_history(
+        pair,
+        (np.array([f.origin_1 for f in frames]), np.array([f.axes_1 for f in frames]), zero, zero),
+        (np.array([f.origin_2 for f in frames]), np.array([f.axes_2 for f in frames]), zero, zero),
+    )
+    assert history.back_hits == 4
+    assert history.separations == 8
+    assert history.drive_penetration.max() == pytest.approx(10e-6, rel=1e-6)
+    assert history.back_penetration.max() == pytest.approx(10e-6, rel=1e-2)
+    assert np.all(history.damping_power >= 0)
+    with pytest.raises(ValueError, match="instants"):
+        contact_history(pair, (zero, np.zeros((n, 3, 3)), zero, zero), (zero[1:], np.zeros((n, 3, 3)), zero, zero))
