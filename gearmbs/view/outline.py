@@ -1,0 +1,184 @@
+"""The transverse profile of a wheel exactly as simulated: root circle, root arc, involute, tip rounding, tip circle.
+
+One half of a tooth is a chain of rising radius, given by its radius and its half angle from the tooth's middle; the
+rest of the wheel follows by symmetry. Plane coordinates: the wheel's axis is the origin, tooth 0 points along +x.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearmbs.gears.spec import GearSpec, involute
+
+TOLERANCE = 1e-6
+"""Default largest distance of a chord from its curve, m."""
+
+FEWEST = 4
+"""Least number of chords a curved piece is cut into."""
+
+
+@dataclass(frozen=True)
+class HalfTooth:
+    """One flank of a tooth from the root circle to the tip circle.
+
+    Attributes
+    ----------
+    radius : ndarray, shape (n,)
+        Rising, m; the first on the root circle, the last on the tip circle.
+    half_angle : ndarray, shape (n,)
+        Angle from the tooth's middle, rad.
+    """
+
+    radius: np.ndarray
+    half_angle: np.ndarray
+
+
+def half_tooth(gear: GearSpec, tolerance: float = TOLERANCE) -> HalfTooth:
+    """Return the flank of a tooth as a chain of points.
+
+    Parameters
+    ----------
+    gear : GearSpec
+    tolerance : float
+        Largest distance of a chord from the curve, m.
+
+    Raises
+    ------
+    ValueError
+        If the tolerance is not positive.
+    """
+    if not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise ValueError(f"tolerance is {tolerance} m; give a positive length such as 1e-6")
+    pieces = [_root_arc(gear, tolerance), _flank(gear, tolerance)]
+    if gear.tip_rounding > 0.0:
+        pieces.append(_tip_arc(gear, tolerance))
+    radius, angle = pieces[0]
+    for next_radius, next_angle in pieces[1:]:
+        joined = int(abs(next_radius[0] - radius[-1]) < 1e-12 and abs(next_angle[0] - angle[-1]) < 1e-9)
+        radius = np.concatenate([radius, next_radius[joined:]])
+        angle = np.concatenate([angle, next_angle[joined:]])
+    return HalfTooth(radius, angle)
+
+
+def tooth_points(gear: GearSpec, tooth: int = 0, tolerance: float = TOLERANCE) -> np.ndarray:
+    """Return one tooth from root to root, anticlockwise, shape (n, 2), m."""
+    half = half_tooth(gear, tolerance)
+    count = arc_chords(gear.tip_radius, 2.0 * half.half_angle[-1], tolerance)
+    tip = np.linspace(-half.half_angle[-1], half.half_angle[-1], count + 1)[1:-1]
+    radius = np.concatenate([half.radius, np.full(tip.size, gear.tip_radius), half.radius[::-1]])
+    angle = np.concatenate([-half.half_angle, tip, half.half_angle[::-1]]) + 2.0 * math.pi * tooth / gear.teeth
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def gear_outline(gear: GearSpec, tolerance: float = TOLERANCE) -> np.ndarray:
+    """Return the closed profile of a wheel, anticlockwise, without repeating the first point.
+
+    Parameters
+    ----------
+    gear : GearSpec
+    tolerance : float
+        Largest distance of a chord from the curve, m.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        m; tooth 0 points along +x.
+    """
+    tooth = tooth_points(gear, 0, tolerance)
+    land = land_angles(gear, tolerance)[1:-1]
+    chain = np.vstack([tooth, gear.root_radius * np.column_stack([np.cos(land), np.sin(land)])])
+    turns = 2.0 * math.pi * np.arange(gear.teeth) / gear.teeth
+    c, s = np.cos(turns)[:, None], np.sin(turns)[:, None]
+    x, y = chain[:, 0], chain[:, 1]
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1).reshape(-1, 2)
+
+
+def land_angles(gear: GearSpec, tolerance: float = TOLERANCE) -> np.ndarray:
+    """Return the angles along the root circle from tooth 0 to tooth 1, both ends included, rad."""
+    start, stop = gear.fillet_half_angle, 2.0 * math.pi / gear.teeth - gear.fillet_half_angle
+    return np.linspace(start, stop, arc_chords(gear.root_radius, stop - start, tolerance, 1) + 1)
+
+
+def circle(radius: float, tolerance: float = TOLERANCE) -> np.ndarray:
+    """Return a circle about the origin as a closed chain without its last point, shape (n, 2)."""
+    angle = np.linspace(0.0, 2.0 * math.pi, arc_chords(radius, 2.0 * math.pi, tolerance, 24) + 1)[:-1]
+    return radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def arc_chords(radius: float, angle: float, tolerance: float, fewest: int = FEWEST) -> int:
+    """Return how many chords keep an arc of that opening within the tolerance."""
+    step = 2.0 * math.acos(max(0.0, 1.0 - tolerance / radius)) if radius > 0.0 else math.pi
+    return max(fewest, math.ceil(abs(angle) / step))
+
+
+def profile_area(gear: GearSpec) -> float:
+    """Return the area of the transverse profile in closed form, bore removed, m^2.
+
+    Half of the closed integral of r^2 d(angle) over root circle, root arc, involute, tip rounding and tip circle. The
+    mass of the simulated wheel is that of a disc of the pitch radius (`GearSpec.mass`); this is the true profile's.
+    """
+    start = max(gear.form_radius, gear.base_radius)
+    tip_form = math.hypot(gear.base_radius, gear.tip_string)
+    root = gear.root_radius**2 * (math.pi / gear.teeth - gear.fillet_half_angle)
+    low, high = _root_arc_span(gear)
+    arm = gear.fillet_centre_radius * (math.sin(low) - math.sin(high))
+    fillet = gear.fillet_radius * (arm - gear.fillet_radius * (high - low))
+    tangents = [math.tan(math.acos(min(1.0, gear.base_radius / r))) for r in (start, tip_form)]
+    flank = gear.base_radius**2 * (tangents[1] ** 3 - tangents[0] ** 3) / 3.0
+    low, high = _tip_arc_span(gear)
+    rounding = gear.tip_rounding * (gear.tip_rounding * low + gear.corner_radius * math.sin(low))
+    tip = gear.tip_radius**2 * gear.corner_half_angle
+    return gear.teeth * (root + fillet + flank + rounding + tip) - math.pi * gear.bore_radius**2
+
+
+def _root_arc_span(gear: GearSpec) -> tuple[float, float]:
+    """Directions from the arc's centre, against the radial direction, of its ends on root circle and flank, rad."""
+    return math.pi, math.pi + math.acos(gear.fillet_radius / gear.fillet_centre_radius)
+
+
+def _root_arc(gear: GearSpec, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    low, high = _root_arc_span(gear)
+    turn = np.linspace(low, high, arc_chords(gear.fillet_radius, high - low, tolerance) + 1)
+    along = gear.fillet_centre_radius + gear.fillet_radius * np.cos(turn)
+    across = gear.fillet_radius * np.sin(turn)
+    radius = np.hypot(along, across)
+    radius[0] = gear.root_radius
+    return radius, gear.fillet_half_angle + np.arctan2(across, along)
+
+
+def _flank(gear: GearSpec, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Involute from where it begins to the tip (or its rounding), by equal steps of the square root of the string."""
+    low, high = gear.form_string, gear.tip_string
+    # a chord of roll angle du on an involute of string s departs by s du^2 r_b / (8 r_b) = s du^2 / 8
+    roll = (high - low) / gear.base_radius
+    count = max(FEWEST, math.ceil(roll * math.sqrt(high / (8.0 * tolerance))))
+    string = np.linspace(low, high, count + 1)
+    radius = np.hypot(gear.base_radius, string)
+    angle = np.array([gear.base_half_angle - involute(math.atan2(s, gear.base_radius)) for s in string])
+    if gear.tip_rounding == 0.0:
+        radius[-1] = gear.tip_radius
+    if gear.form_radius < gear.base_radius * (1.0 - 1e-12):
+        radius = np.concatenate([[gear.form_radius], radius])
+        angle = np.concatenate([[gear.base_half_angle], angle])
+    return radius, angle
+
+
+def _tip_arc_span(gear: GearSpec) -> tuple[float, float]:
+    """Directions from the rounding's centre, against the radial direction, of its ends on flank and tip circle, rad."""
+    form = math.hypot(gear.base_radius, gear.tip_string)
+    polar = gear.base_half_angle - involute(math.acos(gear.base_radius / form)) - gear.corner_half_angle
+    along, across = form * math.cos(polar) - gear.corner_radius, form * math.sin(polar)
+    return (math.atan2(across, along) if gear.tip_rounding > 0.0 else 0.0), 0.0
+
+
+def _tip_arc(gear: GearSpec, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    low, high = _tip_arc_span(gear)
+    turn = np.linspace(low, high, arc_chords(gear.tip_rounding, high - low, tolerance) + 1)
+    along = gear.corner_radius + gear.tip_rounding * np.cos(turn)
+    across = gear.tip_rounding * np.sin(turn)
+    radius = np.hypot(along, across)
+    radius[-1] = gear.tip_radius
+    return radius, gear.corner_half_angle + np.arctan2(across, along)
