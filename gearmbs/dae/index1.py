@@ -85,7 +85,7 @@ def tape_row_rates(k, t, y, idata, tab, room):
 def saddle(t, y, slot, vals, rhs, phi, loads, idata, rdata, work, with_loads):
     """Assemble the saddle-point matrix (by slots) and right-hand side; return the number of entries.
 
-    Without loads the right-hand side lacks the applied forces: enough for a projection.
+    Without loads (0) the right-hand side lacks the applied forces: enough for a projection.
 
     ``phi`` receives 3 values a row one after the other: Phi, Phi_q v + Phi_t, Phi_t.
     ``loads[f]`` receives F, N and the diagnostics of force element f.
@@ -98,7 +98,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, rdata, work, with_loads):
     s = tab.scratch[S_TERM : S_TERM + 100]
     for c in range(rhs.size):
         rhs[c] = 0.0
-    k = 0
+    k = np.int64(0)
     for b in range(1, bodies):
         kin = tab.kin[b]
         i = 6 * (b - 1)
@@ -164,7 +164,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, rdata, work, with_loads):
                     k = put(mode, slot, vals, k, q + c, base + r, room[6 * b + c])
         rhs[base + r] = -gamma
         phi[3 * r], phi[3 * r + 1], phi[3 * r + 2] = value, rate, partial
-    if mode == NUMBERS and with_loads:
+    if mode == NUMBERS and with_loads != 0:
         wrench = tab.scratch[S_WRENCH : S_WRENCH + 6]
         diag = tab.scratch[S_DIAG : S_DIAG + 8]
         for f in range(idata[T.H_FORCES]):
@@ -173,7 +173,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, rdata, work, with_loads):
             jac = tab.scratch[T.SCRATCH_FIXED : T.SCRATCH_FIXED + 6 * width].reshape(6, width)
             for c in range(8):
                 diag[c] = 0.0
-            element_wrench(row, t, y, tab, wrench, jac, diag, 0)
+            element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(0))
             for c in range(6):
                 loads[f, c] = wrench[c]
             for c in range(8):

@@ -32,7 +32,7 @@ NUMBERS, PLACES, COUNT = 0, 1, 2
 HESSIAN_BLOCKS = terms.HESSIAN_BLOCKS
 
 
-@njit(cache=True, error_model="numpy")
+@njit("int64(int64, int64[::1], float64[::1], int64, int64, int64, float64)", cache=True, error_model="numpy")
 def put(mode, slot, vals, k, row, col, value):
     """Hand over entry k; return the number of the next."""
     if mode == NUMBERS:
@@ -334,7 +334,7 @@ def element_entries(mode, t, row, y, idata, tab, slot, vals, k):
     diag = tab.scratch[S_DIAG : S_DIAG + 8]
     width = row[T.FORCE_WIDTH]
     jac = tab.scratch[T.SCRATCH_FIXED : T.SCRATCH_FIXED + 6 * width].reshape(6, width)
-    element_wrench(row, t, y, tab, wrench, jac, diag, 1)
+    element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(1))
     depends = row[T.FORCE_DEPENDS]
     bodies = tab.extra_i[depends]
     unknowns = tab.extra_i[depends + 1 + bodies]
@@ -375,7 +375,8 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
     if mode == NUMBERS:
         for k in range(vals.size):
             vals[k] = 0.0
-    k = 0
+    # a literal 0 would make numba compile every callee once more
+    k = np.int64(0)
     for b in range(1, idata[T.H_BODIES]):
         for l in range(3):
             tab.scratch[S_PRODUCT + l] = y[idata[T.H_EPS] + 3 * (b - 1) + l]

@@ -20,7 +20,11 @@ from gearmbs.dae.rotation import (
 from gearmbs.dae.terms import dot3
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    "void(float64[::1], float64[::1], float64[::1], int64, float64[::1], int64, float64[::1])",
+    cache=True,
+    error_model="numpy",
+)
 def inertia_times(kin_row, body_row, v, i, out, k, s):
     """Write J_global v to ``out[k:k+3]``; ``s`` has three scratch places."""
     for c in range(3):
@@ -102,7 +106,7 @@ def update_tables(t, y, idata, tab):
     update_functions(t, tab)
 
 
-@njit(cache=True, error_model="numpy")
+@njit("float64(float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
 def euler_component(kin_row, m, v, k):
     """Return a_m . v, the component of a spatial rotation gradient along Euler angle m."""
     return dot3(kin_row, KIN_AXES + 3 * m, v, k)

@@ -96,7 +96,7 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
         if idata[T.H_MODE] == NUMBERS:
             vals[:] = 0.0
         if only_assemble:
-            count = index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, True)
+            count = index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, np.int64(1))
             records.solution[k, :] = rhs
             if idata[T.H_MODE] == COUNT:
                 vals[0] = count
@@ -107,7 +107,7 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
             # factors of the row before serve while the bodies have hardly turned since
             spin = index1.violations(t[k], at, phi, idata, rdata, work)
             if k == first or spin * (t[k] - t[k - 1]) > SAME_POSITION:
-                index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, False)
+                index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, np.int64(0))
                 if not factor(plan, factors, vals) <= GROWTH_LIMIT:
                     return k
                 vals[:] = 0.0
@@ -119,7 +119,7 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
                 rhs[base + r] = -phi[3 * r + 1]
             solve(plan, factors, rhs, pushed)
             index1.displace(at, moved, pushed, idata, rdata, work)
-        index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, True)
+        index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, np.int64(1))
         if not factor(plan, factors, vals) <= GROWTH_LIMIT:
             return k
         solve(plan, factors, rhs, records.solution[k])

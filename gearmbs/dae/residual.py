@@ -18,6 +18,7 @@ lambda and mu.
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from gearmbs.dae import tables as T
@@ -240,7 +241,7 @@ def residual(t, y, yp, out, idata, rdata, work):
         row = tab.force[f]
         width = row[T.FORCE_WIDTH]
         jac = tab.scratch[T.SCRATCH_FIXED : T.SCRATCH_FIXED + 6 * width].reshape(6, width)
-        element_wrench(row, t, y, tab, wrench, jac, diag, 0)
+        element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(0))
         for c in range(3):
             if row[T.FORCE_F] >= 0:
                 out[row[T.FORCE_F] + c] = y[row[T.FORCE_F] + c] - wrench[c]

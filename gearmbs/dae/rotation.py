@@ -37,7 +37,9 @@ SWITCH_SINE = 0.5
 """Below this |sin(theta)| the other reference is at least sqrt(3)/2 away from its singularity."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    "void(float64, float64, float64, float64, float64, float64, float64[::1], int64)", cache=True, error_model="numpy"
+)
 def cross_into(ax, ay, az, bx, by, bz, out, k):
     out[k] = ay * bz - az * by
     out[k + 1] = az * bx - ax * bz

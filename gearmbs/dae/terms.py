@@ -43,12 +43,12 @@ for _kind, _blocks in {
         HESSIAN_BLOCKS[(_kind, *_block)] = True
 
 
-@njit(cache=True, error_model="numpy")
+@njit("float64(float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
 def dot3(a, i, b, j):
     return a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit("void(float64[::1], int64, float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
 def cross3(a, i, b, j, out, k):
     x = a[i + 1] * b[j + 2] - a[i + 2] * b[j + 1]
     y = a[i + 2] * b[j] - a[i] * b[j + 2]
@@ -56,19 +56,23 @@ def cross3(a, i, b, j, out, k):
     out[k], out[k + 1], out[k + 2] = x, y, z
 
 
-@njit(cache=True, error_model="numpy")
+@njit("void(float64[::1], int64, float64[::1], int64, float64)", cache=True, error_model="numpy")
 def copy3(a, i, out, k, factor):
     out[k], out[k + 1], out[k + 2] = factor * a[i], factor * a[i + 1], factor * a[i + 2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    "void(float64[:, ::1], float64[:, ::1], int64, int64, int64, int64, float64[::1], int64)",
+    cache=True,
+    error_model="numpy",
+)
 def separation(kin, frame, bi, bj, i, j, out, k):
     """Write P_I - P_J (global) to ``out[k:k+3]``."""
     for c in range(3):
         out[k + c] = kin[bi, KIN_R + c] + frame[i, c] - kin[bj, KIN_R + c] - frame[j, c]
 
 
-@njit(cache=True, error_model="numpy")
+@njit("void(float64[:, ::1], int64, float64, float64[::1], int64)", cache=True, error_model="numpy")
 def turned_axis(frame, j, f, out, k):
     """Write y_J cos f - x_J sin f to ``out[k:k+3]``."""
     c, s = np.cos(f), np.sin(f)
@@ -215,14 +219,14 @@ def quadratic_part(k, term, fval, marker_body, kin, frame, s):
     return (dot3(s, 0, s, 0) - rate * rate + dot3(s, 6, s, 3)) / length
 
 
-@njit(cache=True, error_model="numpy")
+@njit("void(float64[::1], float64[::1], int64, float64[::1])", cache=True, error_model="numpy")
 def first_derivatives(axes, v, k, d):
     """Write d(v)/d(theta_m) = a_m x v of the body-fixed vector ``v[k:k+3]`` to ``d[3 m:]``."""
     for m in range(3):
         cross3(axes, KIN_AXES + 3 * m, v, k, d, 3 * m)
 
 
-@njit(cache=True, error_model="numpy")
+@njit("float64(float64[::1], float64[::1], float64[::1], int64, int64, int64)", cache=True, error_model="numpy")
 def second_derivative_dot(axes, d, b, k, m, n):
     """Return d2(v)/d(theta_m)d(theta_n) . b from the first derivatives ``d`` of v."""
     lo, hi = min(m, n), max(m, n)
@@ -234,7 +238,12 @@ def second_derivative_dot(axes, d, b, k, m, n):
     return x * b[k] + y * b[k + 1] + z * b[k + 2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    "void(float64[::1], float64[::1], float64[::1], int64, float64[::1], int64, float64, float64[:, ::1], "
+    "float64[::1])",
+    cache=True,
+    error_model="numpy",
+)
 def product_hessian(axes_i, axes_j, a, ka, b, kb, factor, hess, s):
     """Add ``factor`` times the Hessian of a . b (a fixed in I, b in J) over the angle blocks."""
     first_derivatives(axes_i, a, ka, s[0:9])
