@@ -28,14 +28,17 @@ from gearmbs.dae.sparse_lu import FACTORS_TYPE, PLAN_TYPE, factor
 from gearmbs.dae.state import STATE_TYPE
 
 EPS = 2.220446049250313e-16
-GAMMA_DRIFT = 0.3
+GAMMA_DRIFT = 0.2
 JAC_MAX_AGE = 50
 SLOPE_MAX_AGE = 20
-RATE_WORTH_RENEWING = 0.25
+RATE_WORTH_RENEWING = 0.12
 RATE_OF_FRESH = 0.1
 MAX_FAILS = 30
 NEWTON_SHRINK = 0.25
 RESTART_SHRINK = 0.1
+DROP_AFTER = 3
+DROP_LEVELS = 3
+DROPPED_STEPS = 5
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -221,6 +224,7 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
             count[s.NEWTON_FAILS] = 0
             count[s.NAN_FAILS] = 0
             count[s.SINGULAR_FAILS] = 0
+            real[s.H_TRY] = real[s.H]
         past = times[1:]
         t_old = past[0]
         if count[s.ERROR_FAILS] + count[s.NEWTON_FAILS] + count[s.NAN_FAILS] > MAX_FAILS:
@@ -268,7 +272,8 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
 
         # Newton matrix
         drift = gamma / real[s.GAMMA_J]
-        wanted = count[s.JAC_WANTED] != 0 or count[s.JAC_AGE] >= JAC_MAX_AGE
+        whole_again = count[s.DROP_LEVEL] > 0 and count[s.DROP_AGE] >= DROPPED_STEPS
+        wanted = count[s.JAC_WANTED] != 0 or count[s.JAC_AGE] >= JAC_MAX_AGE or whole_again
         if wanted or drift > 1.0 + GAMMA_DRIFT or drift < 1.0 / (1.0 + GAMMA_DRIFT):
             if wanted:
                 count[s.JAC_WANTED] = 1
@@ -276,6 +281,11 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
             _carry_over(gamma - real[s.GAMMA_BASE], st.jac, st.jac_slope, st.matrix)
             growth = factor(plan, factors, st.matrix)
             count[s.FACTORIZATIONS] += 1
+            if whole_again:
+                count[s.DROP_LEVEL] = 0
+                count[s.DROP_AGE] = 0
+                real[s.H] = h_wish
+                return s.REPIVOT
             if not (growth <= real[s.GROWTH_MAX]):
                 real[s.H] = h_wish
                 return s.REPIVOT
@@ -305,8 +315,15 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
                 real[s.H] = NEWTON_SHRINK * h
                 count[s.SINCE_CHANGE] = 0
                 count[s.CAUTION] = 2
-                if count[s.NEWTON_FAILS] > 2:
+                if count[s.NEWTON_FAILS] > DROP_AFTER:
                     count[s.ORDER] = 1
+                    if count[s.DROP_LEVEL] < DROP_LEVELS:
+                        # perhaps a singular position: go through it with the step it began with, some pivots dropped
+                        count[s.DROP_LEVEL] += 1
+                        count[s.DROP_AGE] = 0
+                        real[s.H] = real[s.H_TRY]
+                        count[s.JAC_WANTED] = 1
+                        return s.REPIVOT
             count[s.JAC_WANTED] = 1
             continue
 
@@ -330,6 +347,7 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
         count[s.SHIFTED] = 0
         count[s.FRESH] = 0
         count[s.JAC_AGE] += 1
+        count[s.DROP_AGE] += 1
         count[s.NPAST] = min(count[s.NPAST] + 1, HISTORY)
         real[s.T] = t
         real[s.H_USED] = h

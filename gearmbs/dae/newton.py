@@ -34,6 +34,7 @@ NOT_FINITE = 2
 
 RATE_LIMIT = 0.9
 RATE_FLOOR = 0.02
+ROUNDING_LEVEL = 0.1
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -177,6 +178,10 @@ def correct(residual, t, gamma, vec, real, count, plan, factors, idata, rdata, w
             rate = norm / previous if previous > 0.0 else 0.0
             if rate > RATE_LIMIT:
                 real[RATE] = 1.0
+                # no longer contracting yet harmless to the unknowns under error control: rounding, or multipliers that
+                # nothing determines near a singular position
+                if weighted_max(delta, vec[W_ERROR]) <= ROUNDING_LEVEL:
+                    return CONVERGED
                 return SLOW
             real[RATE] = max(rate, 0.3 * real[RATE])
         trust = max(real[RATE], RATE_FLOOR)

@@ -147,13 +147,13 @@ def _make_room(pool, pool_vals, start, length, room, line, want):
 
 @njit(
     types.UniTuple(int64, 2)(
-        int64, _IVEC, _IVEC, _VEC, _VEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _VEC, _IVEC, _IVEC, _IVEC
+        int64, float64, _IVEC, _IVEC, _VEC, _VEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _VEC, _IVEC, _IVEC, _IVEC
     ),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def _best_pivot(n, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, cvals, rpool, rhead, rafter):
+def _best_pivot(n, drop, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, cvals, rpool, rhead, rafter):
     """Return the row and column of the acceptable entry with the lowest Markowitz cost, or (-1, -1)."""
     best_row = -1
     best_col = -1
@@ -165,7 +165,7 @@ def _best_pivot(n, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, 
             break
         j = chead[count]
         while j >= 0:
-            if top[j] > CANCELLED * peak[j]:
+            if top[j] > drop * peak[j]:
                 for p in range(cstart[j], cstart[j] + count):
                     ratio = abs(cvals[p]) / top[j]
                     if ratio < THRESHOLD:
@@ -185,7 +185,7 @@ def _best_pivot(n, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, 
             for p in range(rstart[i], rstart[i] + count):
                 j = rpool[p]
                 cost = (clen[j] - 1) * (count - 1)
-                if cost > best_cost or top[j] <= CANCELLED * peak[j]:
+                if cost > best_cost or top[j] <= drop * peak[j]:
                     continue
                 for q in range(cstart[j], cstart[j] + clen[j]):
                     if cpool[q] == i:
@@ -205,12 +205,12 @@ def _best_pivot(n, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, 
 
 
 @njit(
-    types.Tuple((int64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC))(_IVEC, _IVEC, _VEC),
+    types.Tuple((int64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC))(_IVEC, _IVEC, _VEC, float64),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def choose_pivots(indptr, indices, scaled):
+def choose_pivots(indptr, indices, scaled, drop):
     """Eliminate the matrix once with Markowitz's rule and record pivots and fill.
 
     Parameters
@@ -219,6 +219,8 @@ def choose_pivots(indptr, indices, scaled):
         CSC pattern; entries that happen to be zero stay in the pattern.
     scaled : ndarray
         Values after `equilibrate`.
+    drop : float
+        Columns whose entries have all fallen below this fraction of their largest value are left without a pivot.
 
     Returns
     -------
@@ -292,7 +294,7 @@ def choose_pivots(indptr, indices, scaled):
     rank = 0
     for k in range(n):
         pi, pj = _best_pivot(
-            n, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, cvals, rpool, rhead, rafter
+            n, drop, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, cvals, rpool, rhead, rafter
         )
         if pi < 0:
             break
@@ -384,6 +386,9 @@ def choose_pivots(indptr, indices, scaled):
         for m in range(nl):
             i = l_rows[l_ptr[k] + m]
             _link(i, rlen[i], rhead, rafter, rbefore)
+    for k in range(rank, n):
+        l_ptr[k + 1] = l_ptr[rank]
+        u_ptr[k + 1] = u_ptr[rank]
     left_r = rank
     left_c = rank
     for m in range(n):

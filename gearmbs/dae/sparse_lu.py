@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, int64, njit, types, uint32
 
-from gearmbs.dae.ordering import choose_pivots, equilibrate
+from gearmbs.dae.ordering import CANCELLED, choose_pivots, equilibrate
 
 GROWTH_LIMIT = 1e5
 
@@ -39,6 +39,8 @@ class LUPlan(NamedTuple):
         Original row and column of each pivot.
     row_scale, col_scale : ndarray
         Scales, in pivot order.
+    kept : ndarray
+        One for a proper pivot; zero for an equation and an unknown set aside because the matrix is nearly singular.
     """
 
     a_ptr: np.ndarray
@@ -53,6 +55,7 @@ class LUPlan(NamedTuple):
     col_to: np.ndarray
     row_scale: np.ndarray
     col_scale: np.ndarray
+    kept: np.ndarray
 
 
 class LUFactors(NamedTuple):
@@ -64,7 +67,9 @@ class LUFactors(NamedTuple):
     x: np.ndarray
 
 
-PLAN_TYPE = types.NamedTuple((_IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _VEC, _VEC), LUPlan)
+PLAN_TYPE = types.NamedTuple(
+    (_IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _VEC, _VEC, _VEC), LUPlan
+)
 FACTORS_TYPE = types.NamedUniTuple(_VEC, 4, LUFactors)
 
 
@@ -83,7 +88,7 @@ class SingularMatrixError(ValueError):
         self.cols = cols
 
 
-def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np.ndarray) -> LUPlan:
+def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np.ndarray, drop: float = 0.0) -> LUPlan:
     """Choose pivots for a matrix and lay down the plan to factor every matrix of its pattern.
 
     Parameters
@@ -94,6 +99,9 @@ def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np
         Values on which pivots are chosen.
     scale : ndarray, shape (n,)
         Typical magnitude of each unknown.
+    drop : float
+        When positive, unknowns without a pivot larger than this fraction of their entries are set aside, each with an
+        equation: they come out of `solve` as zero.
 
     Returns
     -------
@@ -102,7 +110,7 @@ def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np
     Raises
     ------
     SingularMatrixError
-        If the matrix is singular to working precision, with the rows and columns left over.
+        If nothing may be dropped and the matrix is singular to working precision, with the rows and columns left over.
     ValueError
         If a value is not finite.
     """
@@ -114,8 +122,10 @@ def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np
     equilibrate(indptr, indices, vals, row_scale, col_scale)
     column = np.repeat(np.arange(n), np.diff(indptr))
     entry_scale = row_scale[indices] * col_scale[column]
-    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(indptr, indices, vals * entry_scale)
-    if rank < n:
+    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(
+        indptr, indices, vals * entry_scale, max(drop, CANCELLED)
+    )
+    if rank < n and drop == 0.0:
         raise SingularMatrixError(rows[rank:], cols[rank:])
 
     row_place = np.empty(n, dtype=np.int64)
@@ -146,6 +156,7 @@ def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np
         cols.astype(np.uint32),
         row_scale[rows],
         col_scale[cols],
+        (np.arange(n) < rank).astype(float),
     )
 
 
@@ -193,6 +204,10 @@ def factor(plan, factors, vals):
                     x[l_pos[q]] -= l_vals[q] * u
         pivot = x[k]
         x[k] = 0.0
+        if plan.kept[k] == 0.0:
+            factors.pivot_inv[k] = 0.0
+            x[:] = 0.0
+            continue
         if pivot == 0.0:
             return np.inf
         inv = 1.0 / pivot

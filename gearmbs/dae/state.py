@@ -37,6 +37,7 @@ ERROR = 9
 H_USED = 10
 NEWTON_TOL = 11
 GAMMA_BASE = 12
+H_TRY = 13
 N_REAL = 16
 
 # RunState.count
@@ -75,7 +76,9 @@ SINGULAR_FAILS = 31
 SHIFTED = 32
 STALE = 33
 SLOPE_AGE = 34
-N_COUNT = 36
+DROP_LEVEL = 35
+DROP_AGE = 36
+N_COUNT = 40
 
 # rows of RunState.vec
 Y = 0

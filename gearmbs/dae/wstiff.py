@@ -23,7 +23,7 @@ from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, SolverStats, Status
 from gearmbs.dae.sparse_lu import GROWTH_LIMIT, LUPlan, SingularMatrixError, analyse, factor, new_factors, solve
 
-NEWTON_TOLERANCE = 0.4
+NEWTON_TOLERANCE = 1.0
 FIRST_CHUNK = 16
 CHUNK_SECONDS = 0.05
 RECORD_BYTES = 8_000_000
@@ -31,6 +31,7 @@ EVENT_BUFFER = 64
 START_JUMP_LIMIT = 100.0
 CHECK_STEP = 1e-10
 SINGULAR_RETRIES = 8
+DROP_TOLERANCES = (0.0, 1e-9, 1e-7, 1e-5)
 EPS = float(np.finfo(float).eps)
 
 
@@ -242,11 +243,13 @@ class Run:
                 problem, t, int(self.indices[bad[0]]), "the Jacobian of equation"
             )
         try:
-            self.plan = analyse(self.indptr, self.indices, st.matrix, self.scale)
+            drop = DROP_TOLERANCES[st.count[s.DROP_LEVEL]]
+            self.plan = analyse(self.indptr, self.indices, st.matrix, self.scale, drop)
         except SingularMatrixError as error:
-            if retry:
-                self._retry_smaller()
-                return None
+            if st.count[s.STEPS] > 0:
+                st.count[s.DROP_LEVEL] = 1
+                st.count[s.DROP_AGE] = 0
+                return self._repivot()
             return Status.SINGULAR_JACOBIAN, failures.singular(problem, t, error.rows, error.cols)
         self.factors = new_factors(self.plan)
         growth = factor(self.plan, self.factors, st.matrix)
@@ -499,7 +502,7 @@ def solve_wstiff(
     max_step: float = np.inf,
     first_step: float | None = None,
     min_step: float | None = None,
-    max_iterations: int = 4,
+    max_iterations: int = 10,
     interpolate: bool = True,
     breakpoints: Sequence[float] = (),
     event_direction: Sequence[int] | None = None,
