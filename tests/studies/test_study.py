@@ -125,7 +125,9 @@ def test_only_lines_at_multiples_of_the_mesh_frequency():
     """
     speed = 51200.0 / 100 * 2 * np.pi / 29
     case = Case(
-        operation={"speed": speed, "run_up": 0.03, "settling": 0.03, "duration": 0.12}, friction={"enabled": False}
+        operation={"speed": speed, "run_up": 0.03, "settling": 0.03, "duration": 0.12},
+        friction={"enabled": False},
+        solver={"tolerance": 1e-9},
     )
     force = run_case(case)["force_2"].sel(xyz="x").values
     periods = force.size // 100
