@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -93,7 +94,7 @@ def gear_solid(
         rim, grid = _section(builder, teeth, j, float(z), across, between, gear, cap)
         rims.append(rim)
         grids.append(grid)
-    for low, high in zip(rims, rims[1:]):
+    for low, high in pairwise(rims):
         builder.wall(low, high)
     inner = []
     for j, up in ((0, False), (last, True)):
