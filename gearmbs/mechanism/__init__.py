@@ -1,6 +1,7 @@
 """What a person builds: bodies, markers, joints, motions, forces."""
 
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
+from gearmbs.mechanism.analyses import kinematic, linear_modes, static_equilibrium
 from gearmbs.mechanism.elements import GearContact, Load, State, Torque
 from gearmbs.mechanism.functions import TimeFunction, constant, expression, harmonic, polynomial, ramp, step
 from gearmbs.mechanism.joints import Joint
@@ -24,8 +25,11 @@ __all__ = [
     "constant",
     "expression",
     "harmonic",
+    "kinematic",
+    "linear_modes",
     "polynomial",
     "ramp",
     "simulate",
+    "static_equilibrium",
     "step",
 ]

@@ -1,0 +1,116 @@
+"""Static equilibrium, linear modes and kinematic analysis of a mechanism in one call each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearmbs.dae import kinematic as _kinematic
+from gearmbs.dae import modes as _modes
+from gearmbs.dae import statics as _statics
+from gearmbs.dae.errors import ModelError
+from gearmbs.dae.modes import Modes
+from gearmbs.dae.statics import StaticResult
+
+if TYPE_CHECKING:
+    from gearmbs.dae.solution import Solution
+    from gearmbs.mechanism.mechanism import Mechanism
+
+
+def static_equilibrium(
+    mechanism: Mechanism, *, t: float = 0.0, tol: float = 1e-10, max_iterations: int = 200, move: bool = False
+) -> StaticResult:
+    """Find the position in which a mechanism rests.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    t : float
+        Time at which functions of time are frozen, s.
+    tol : float
+        Largest unbalanced force relative to the heaviest weight or largest load.
+    max_iterations : int
+    move : bool
+        Make the equilibrium, at rest, the mechanism's initial position.
+
+    Returns
+    -------
+    StaticResult
+
+    Raises
+    ------
+    SingularModelError
+        If a body is free to move and its loads do not balance.
+    ModelError
+        If the mechanism cannot be assembled or no equilibrium is found.
+    """
+    result = _statics.static_equilibrium(mechanism.compile(t), tol=tol, max_iterations=max_iterations)
+    if move:
+        place(mechanism, result)
+    return result
+
+
+def place(mechanism: Mechanism, equilibrium: StaticResult) -> None:
+    """Make an equilibrium, at rest, the initial position of the mechanism it was found for."""
+    if list(mechanism.bodies) != list(equilibrium.body_names):
+        raise ModelError(f"the equilibrium is not one of mechanism '{mechanism.name}': its bodies differ")
+    for row, body in zip(equilibrium.pose, mechanism.bodies.values()):
+        axes = row[3:12].reshape(3, 3).copy()
+        body.orientation = axes
+        body.position = row[0:3] - axes @ body.com
+        body.velocity, body.angular_velocity = np.zeros(3), np.zeros(3)
+    states = equilibrium.solution.result.y[0]
+    for value, state in zip(states[states.size - len(mechanism.states) :], mechanism.states.values()):
+        state.start = float(value)
+
+
+def linear_modes(mechanism: Mechanism, *, t: float = 0.0, at: StaticResult | str = "initial") -> Modes:
+    """Linearise a mechanism and return its eigenvalues and mode shapes.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    t : float
+        Time at which functions of time are frozen, s.
+    at : StaticResult or {"initial", "equilibrium"}
+        Operating point: the initial position and velocity, the equilibrium reached from there, or one found before.
+
+    Returns
+    -------
+    Modes
+
+    Raises
+    ------
+    ModelError
+        If the mechanism cannot be assembled, or a free motion has no inertia.
+    """
+    if isinstance(at, str):
+        if at not in ("initial", "equilibrium"):
+            raise ModelError(f"at = {at!r}; choose 'initial', 'equilibrium' or give a StaticResult")
+        system = mechanism.compile(t)
+        if at == "equilibrium":
+            _statics.static_equilibrium(system)
+        return _modes.linear_modes(system)
+    return _modes.linear_modes(at.solution.system)
+
+
+def kinematic(mechanism: Mechanism, t_eval: np.ndarray) -> Solution:
+    """Solve positions, velocities, accelerations and reactions of a mechanism whose motion is all prescribed.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Without degrees of freedom.
+    t_eval : ndarray, shape (m,)
+        Increasing times, s.
+
+    Raises
+    ------
+    ModelError
+        If the mechanism has degrees of freedom, or locks at some time.
+    """
+    times = np.asarray(t_eval, dtype=float)
+    if times.ndim != 1 or times.size == 0 or not np.all(np.isfinite(times)):
+        raise ModelError("t_eval: give a sequence of finite times")
+    return _kinematic.kinematic(mechanism.compile(float(times[0])), times)

@@ -1,0 +1,238 @@
+"""Static equilibrium, linear modes and kinematics against closed solutions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from gearmbs.mechanism import Mechanism, ModelError, SingularModelError, polynomial
+from gearmbs.mechanism.analyses import kinematic, linear_modes, static_equilibrium
+
+G = 9.81
+
+
+def hanging(k: float = 200.0, c: float = 0.0, mass: float = 2.0) -> Mechanism:
+    m = Mechanism("hanging mass", gravity=(0, 0, -G))
+    block = m.body("block", mass, (0.1, 0.1, 0.1))
+    m.translational("guide", block, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    i, j = block.marker(name="tip"), m.ground.marker(name="anchor")
+    m.axis_force("spring", i, j, f"-{k}*DZ(tip,anchor,anchor) - {c}*VZ(tip,anchor,anchor)")
+    return m
+
+
+def pendulum(angle: float, *, mass: float = 1.5, length: float = 0.8, inertia: float = 0.02, kt: float = 0.0):
+    """A rod hanging from the origin, turned by ``angle`` from the vertical about y."""
+    m = Mechanism("pendulum", gravity=(0, 0, -G))
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    rod = m.body("rod", mass, (inertia,) * 3, position=turn @ (0, 0, -length), orientation=turn)
+    pin_i = rod.marker((0, 0, length), axis=(0, 1, 0), name="pin_i")
+    pin_j = m.ground.marker((0, 0, 0), axis=(0, 1, 0), name="pin_j")
+    m.joint("revolute", "pin", pin_i, pin_j)
+    if kt:
+        free = 0.7
+        m.torsion_spring("spring", pin_i, pin_j, stiffness=kt, angle=free)
+    return m
+
+
+def swing(result, body: str = "rod") -> float:
+    """Angle of a rod from the vertical about y."""
+    x, _, z = result.position(body)
+    return float(np.arctan2(-x, -z))
+
+
+def test_hanging_mass_sinks_by_weight_over_stiffness():
+    found = static_equilibrium(hanging())
+    # k z = -m g
+    assert found.position("block") == pytest.approx([0, 0, -2.0 * G / 200.0], abs=1e-12)
+    assert found.loads["spring"][0][2] == pytest.approx(2.0 * G, rel=1e-12)
+    assert found.reactions["guide"][0] == pytest.approx([0, 0, 0], abs=1e-9)
+    assert found.stable
+    assert not found.neutral
+    assert found.residual < 1e-10
+
+
+@pytest.mark.parametrize("start", [np.pi / 2, -0.3, 2.8, 3.1])
+def test_pendulum_comes_to_rest_below_its_pin(start):
+    found = static_equilibrium(pendulum(start))
+    assert found.position("rod") == pytest.approx([0, 0, -0.8], abs=1e-8)
+    # the pin carries the weight
+    assert found.reactions["pin"][0] == pytest.approx([0, 0, 1.5 * G], abs=1e-8)
+    assert found.stable
+
+
+def test_pendulum_with_torsion_spring_balances():
+    kt = 6.0
+    found = static_equilibrium(pendulum(0.2, kt=kt))
+    # kt (phi - 0.7) = -m g l sin(phi)
+    phi = brentq(lambda a: kt * (a - 0.7) + 1.5 * G * 0.8 * np.sin(a), -1.0, 2.0, xtol=1e-15)
+    assert swing(found) == pytest.approx(phi, abs=1e-11)
+
+
+def test_body_without_support_is_named():
+    m = Mechanism("two", gravity=(0, 0, -G))
+    m.body("held", 1.0, (0.1, 0.1, 0.1))
+    m.fixed("weld", m.bodies["held"], m.ground)
+    m.body("stone", 1.0, (0.1, 0.1, 0.1))
+    with pytest.raises(SingularModelError, match=r"'stone' is free to move \(translation along \(0, 0, -?1\)\)"):
+        static_equilibrium(m)
+
+
+def test_neutral_motion_is_named_but_accepted():
+    m = hanging()
+    wheel = m.body("wheel", 1.0, (0.1, 0.1, 0.1), position=(1, 0, 0))
+    m.revolute("axle", wheel, m.ground, at=(1, 0, 0), axis=(0, 0, 1))
+    found = static_equilibrium(m)
+    assert found.neutral == ["wheel"]
+    assert found.stable
+
+
+def test_simulation_from_equilibrium_stays():
+    m = pendulum(0.9, kt=6.0)
+    found = static_equilibrium(m, move=True)
+    solution = m.simulate(0.5, tol=1e-8)
+    assert np.abs(solution.position("rod") - found.position("rod")).max() < 1e-9
+
+
+def test_motions_are_frozen_at_the_given_time():
+    m = pendulum(0.0)
+    m.rotation("drive", m.joints["pin"], polynomial([0.0, 0.5]))
+    found = static_equilibrium(m, t=1.0)
+    assert swing(found) == pytest.approx(0.5, abs=1e-11)
+    # the motion holds the moment of the weight
+    assert abs(found.reactions["drive"][1][1]) == pytest.approx(1.5 * G * 0.8 * np.sin(0.5), rel=1e-9)
+
+
+def test_pendulum_frequency():
+    found = linear_modes(pendulum(0.0))
+    # omega^2 = m g l / (m l^2 + J)
+    omega = np.sqrt(1.5 * G * 0.8 / (1.5 * 0.64 + 0.02))
+    assert found.eigenvalues == pytest.approx([1j * omega], rel=1e-10)
+    assert found.frequencies == pytest.approx([omega / 2 / np.pi], rel=1e-10)
+    assert found.kinds == ["oscillating"]
+
+
+def test_upright_pendulum_is_unstable():
+    found = linear_modes(pendulum(np.pi))
+    omega = np.sqrt(1.5 * G * 0.8 / (1.5 * 0.64 + 0.02))
+    assert sorted(found.eigenvalues.real) == pytest.approx([-omega, omega], rel=1e-9)
+    assert not found.stable
+
+
+def test_simple_pendulum_is_square_root_of_g_over_l():
+    found = linear_modes(pendulum(0.0, inertia=1e-9))
+    assert found.frequencies[0] == pytest.approx(np.sqrt(G / 0.8) / 2 / np.pi, rel=1e-8)
+
+
+def test_double_pendulum():
+    m = Mechanism("double", gravity=(0, 0, -G))
+    a = m.body("a", 1.0, (1e-12,) * 3, position=(0, 0, -1.0))
+    b = m.body("b", 1.0, (1e-12,) * 3, position=(0, 0, -2.0))
+    m.revolute("p", a, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+    m.revolute("q", b, a, at=(0, 0, -1.0), axis=(0, 1, 0))
+    found = linear_modes(m)
+    # two equal masses and lengths: omega^2 = (2 -+ sqrt 2) g / l; x_b / x_a = 1 +- sqrt 2
+    assert (2 * np.pi * found.frequencies) ** 2 == pytest.approx([(2 - 2**0.5) * G, (2 + 2**0.5) * G], rel=1e-9)
+    ratio = found.shapes[:, 1, 0] / found.shapes[:, 0, 0]
+    assert ratio == pytest.approx([1 + 2**0.5, 1 - 2**0.5], rel=1e-8)
+
+
+def test_damped_oscillator():
+    k, c, mass = 200.0, 3.0, 2.0
+    found = linear_modes(hanging(k, c, mass), at="equilibrium")
+    # s = -c/2m +- i sqrt(k/m - (c/2m)^2)
+    decay = c / (2 * mass)
+    assert found.eigenvalues == pytest.approx([-decay + 1j * np.sqrt(k / mass - decay**2)], rel=1e-10)
+    assert found.damping_ratios == pytest.approx([decay / np.sqrt(k / mass)], rel=1e-10)
+    assert "oscillating" in found.table()
+
+
+def test_overdamped_oscillator_has_two_real_modes():
+    found = linear_modes(hanging(200.0, 100.0, 2.0))
+    # s^2 + 50 s + 100 = 0
+    assert sorted(found.eigenvalues.real) == pytest.approx(sorted(np.roots([1, 50, 100])), rel=1e-9)
+    assert found.kinds == ["real", "real"]
+
+
+def test_free_body_has_six_rigid_modes():
+    m = Mechanism("free")
+    m.body("b", 1.0, (0.1, 0.2, 0.3))
+    found = linear_modes(m)
+    assert found.kinds == ["rigid"] * 6
+    assert np.all(found.frequencies == 0.0)
+
+
+def test_filter_state_adds_its_eigenvalue():
+    m = hanging()
+    m.differential_state("lag", "-5*DIF(lag)", start=1.0)
+    found = linear_modes(m)
+    assert found.eigenvalues == pytest.approx([-5.0, 10j], rel=1e-9)
+
+
+def four_bar() -> Mechanism:
+    m = Mechanism("four-bar", gravity=(0, -G, 0))
+    a, b, c, d = (np.array(p, dtype=float) for p in ((0, 0, 0), (1, 0, 0), (3, 2, 0), (4, 0, 0)))
+    for name, mid in (("crank", (a + b) / 2), ("coupler", (b + c) / 2), ("rocker", (c + d) / 2)):
+        m.body(name, 1.0, (0.1, 0.1, 0.1), position=mid)
+    crank, coupler, rocker = m.bodies.values()
+    drive = m.revolute("A", crank, m.ground, at=a, axis=(0, 0, 1))
+    m.revolute("B", coupler, crank, at=b, axis=(0, 0, 1))
+    m.revolute("C", rocker, coupler, at=c, axis=(0, 0, 1))
+    m.revolute("D", rocker, m.ground, at=d, axis=(0, 0, 1))
+    m.rotation("motor", drive, polynomial([0.0, 3.0, 0.5]))
+    return m
+
+
+def test_four_bar_kinematics_close_the_loop():
+    m = four_bar()
+    t = np.linspace(0.0, 3.0, 61)
+    found = kinematic(m, t)
+    # crank pin on its circle; joint C is the intersection of two circles, the branch above BD
+    angle = 3.0 * t + 0.5 * t**2
+    b = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    l2, l3 = np.hypot(2, 2), np.hypot(1, 2)
+    to_d = np.array([4.0, 0.0]) - b
+    gap = np.linalg.norm(to_d, axis=1)
+    along = (l2**2 - l3**2 + gap**2) / (2 * gap)
+    up = np.sqrt(l2**2 - along**2)
+    unit = to_d / gap[:, None]
+    normal = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+    c = b + along[:, None] * unit + up[:, None] * normal
+    assert found.position("coupler")[:, :2] == pytest.approx((b + c) / 2, abs=1e-11)
+    assert found.angular_velocity("crank")[:, 2] == pytest.approx(3.0 + t, rel=1e-11)
+    assert found.angular_acceleration("crank")[:, 2] == pytest.approx(np.ones(61), rel=1e-8)
+    # velocities and accelerations are the derivatives of the positions (central differences)
+    fine = kinematic(m, np.array([0.0, 0.999, 1.0, 1.001]))
+    x, v = fine.position("rocker"), fine.velocity("rocker")
+    assert v[2] == pytest.approx((x[3] - x[1]) / 0.002, abs=1e-4)
+    assert fine.acceleration("rocker")[2] == pytest.approx((v[3] - v[1]) / 0.002, abs=1e-3)
+
+
+def test_kinematics_agree_with_dynamics():
+    t = np.linspace(0.0, 1.0, 11)
+    a, b = kinematic(four_bar(), t), four_bar().simulate(1.0, t_eval=t, tol=1e-9)
+    assert a.reaction("C")[0] == pytest.approx(b.reaction("C")[0], abs=1e-4)
+    assert a.position("rocker") == pytest.approx(b.position("rocker"), abs=1e-7)
+
+
+def test_kinematics_refuse_degrees_of_freedom():
+    with pytest.raises(ModelError, match="zero degrees of freedom; the model has 1"):
+        kinematic(pendulum(0.1), np.linspace(0.0, 1.0, 3))
+
+
+def test_kinematics_name_the_time_of_locking():
+    m = Mechanism("reach")
+    crank = m.body("crank", 1.0, (0.1, 0.1, 0.1))
+    rod = m.body("rod", 1.0, (0.1, 0.1, 0.1), position=(0.75, 0.5, 0))
+    slide = m.body("slide", 1.0, (0.1, 0.1, 0.1), position=(1.5, 0, 0))
+    knee = (0.75, np.sqrt(1.0 - 0.75**2), 0)
+    m.revolute("hip", crank, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    m.revolute("knee", rod, crank, at=knee, axis=(0, 0, 1))
+    m.revolute("foot", slide, rod, at=(1.5, 0, 0), axis=(0, 0, 1))
+    guide = m.translational("guide", slide, m.ground, at=(1.5, 0, 0), axis=(1, 0, 0))
+    m.translation("pull", guide, polynomial([0.0, 1.0]))
+    # two unit rods are stretched when the slide has moved from 1.5 m to 2 m
+    assert kinematic(m, np.array([0.0, 0.45])).position("slide")[-1, 0] == pytest.approx(1.95, abs=1e-12)
+    with pytest.raises(ModelError, match=r"t = 0\.(49999|5)"):
+        kinematic(m, np.linspace(0.0, 1.0, 5))
