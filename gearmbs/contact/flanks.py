@@ -70,6 +70,16 @@ def corner_section(gr, wk, kind, f1, f2, zeta, near, o, want):
 
 
 @kernel
+def clear_node(wk, o, want):
+    """Set a node's force and its derivatives to nothing."""
+    wk[o + N_FORCE] = 0.0
+    wk[o + N_ELASTIC] = 0.0
+    if want != 0:
+        for i in range(12):
+            wk[o + N_FX + i] = 0.0
+
+
+@kernel
 def copy_record(wk, source, target):
     for i in range(L.NODE):
         wk[target + i] = wk[source + i]
@@ -290,11 +300,7 @@ def pair_sections(gi, gr, wk, side, i1, i2, f1, f2, ja, jb, step, alpha, sa, ca,
         if kind != 0 or teeth:
             gap_rate(wk, o, want)
         wk[sel + j] = o
-        wk[o + N_FORCE] = 0.0
-        wk[o + N_ELASTIC] = 0.0
-        if want != 0:
-            for i in range(12):
-                wk[o + N_FX + i] = 0.0
+        clear_node(wk, o, want)
         if wk[o + N_GAP] < 0.0:
             touching = True
     return touching

@@ -8,6 +8,7 @@ from gearmbs.contact import layout as L
 from gearmbs.contact.flanks import side_contacts
 from gearmbs.contact.jit import kernel
 from gearmbs.contact.pose import pose_columns, pose_rates, pose_wrench, relative_pose
+from gearmbs.contact.root import root_contacts
 from gearmbs.contact.sums import mirror
 
 VEC = types.float64[::1]
@@ -214,6 +215,8 @@ def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want
     for i in range(18):
         work[L.S_X + i] = work[L.W_X + i]
     side_contacts(gi, gr, work, 1, diag, want_jac)
+    if gi[L.ROOT] != 0:
+        root_contacts(gi, gr, work, 1, diag, want_jac)
     for i in range(6):
         sign = -1.0 if i > 2 else 1.0
         work[L.S_X + i] = sign * work[L.W_X + i]
@@ -223,6 +226,8 @@ def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want
     if front:
         mirror(work)
     side_contacts(gi, gr, work, -1, diag, want_jac)
+    if gi[L.ROOT] != 0:
+        root_contacts(gi, gr, work, -1, diag, want_jac)
     if not diag[0] > 0.0:
         return
     mirror(work)

@@ -76,6 +76,8 @@ class GearPair:
     load : {"slices", "adams"}
         How a tooth pair carries its load. ``slices``: pressure distributed over the face. ``adams``: one force at the
         centroid of the overlap with the depth found there, as ADAMS does for solids.
+    root_contact : bool, optional
+        Whether tips may also meet the mate's root; default when the tip clearance is below a tenth of the module.
     stiffness_curve : {"constant", "potential-energy"}
         How the stiffness of a tooth pair varies along the path of contact; ``contact.stiffness`` is its largest value.
     faults : sequence of Fault
@@ -107,6 +109,7 @@ class GearPair:
     torque: Quantity = 100.0
     slices: int | None = None
     load: Literal["slices", "adams"] = "slices"
+    root_contact: bool | None = None
     stiffness_curve: Literal["constant", "potential-energy"] = "constant"
     faults: tuple[Fault, ...] = ()
 
@@ -198,9 +201,11 @@ class GearPair:
             f"GearPair.centre_distance_error is {self.centre_distance_error * mm:.4f} mm: the base circles meet; "
             "increase it",
         )
+        # tips may be placed pressing into roots only when their contact is asked for
+        play = 0.05 * one.module if self.root_contact else 0.0
         for near, far in ((one, two), (two, one)):
             require(
-                a > near.tip_radius + far.root_radius,
+                a + play > near.tip_radius + far.root_radius,
                 f"GearPair: overlapping wheels: centre distance {a * mm:.4f} mm leaves no clearance between the tip of "
                 f"{near.name} ({near.tip_radius * mm:.4f} mm) and the root of {far.name} "
                 f"({far.root_radius * mm:.4f} mm); increase centre_distance_error or dedendum",
@@ -315,6 +320,17 @@ class GearPair:
     def jams(self) -> bool:
         """Whether both flanks touch at once for want of backlash under the misalignment."""
         return self.misalignment != 0 and self.normal_backlash < self.jam_backlash
+
+    @property
+    def tip_clearance(self) -> float:
+        """Smaller of the two clearances between a tip and the mate's root, m."""
+        one, two = self.driver, self.driven
+        return self.centre_distance - max(one.tip_radius + two.root_radius, two.tip_radius + one.root_radius)
+
+    @property
+    def tips_may_bottom(self) -> bool:
+        """Whether contact of tips with roots is looked for."""
+        return self.tip_clearance < 0.1 * self.driver.module if self.root_contact is None else self.root_contact
 
     @property
     def mesh_frequency_per_speed(self) -> float:

@@ -52,6 +52,7 @@ def pack(pair: GearPair, slices: int) -> tuple[np.ndarray, np.ndarray, int]:
     gi[L.FRICTION] = FRICTIONS[pair.friction.kind]
     gi[L.DRIVE] = pair.rotation
     gi[L.LOAD] = L.LOAD_ADAMS if pair.load == "adams" else L.LOAD_SLICES
+    gi[L.ROOT] = int(pair.tips_may_bottom)
     _pack_wheel(first, gr, 0)
     _pack_wheel(second, gr, L.WHEEL)
     gr[L.PITCH] = first.base_pitch
