@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import sys
 from pathlib import Path
@@ -18,6 +19,16 @@ import gearmbs  # noqa: E402
 os.environ["PYTHONPATH"] = os.pathsep.join([str(SCRIPTS), str(HERE.parent), os.environ.get("PYTHONPATH", "")])
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(name, "1")
+
+
+def code_stamp() -> str:
+    """Return a number of the code and data that executed pages depend on, so that none is kept beyond a change."""
+    digest = hashlib.sha256()
+    for folder, ending in ((HERE.parent / "gearmbs", "*.py"), (SCRIPTS, "*.py"), (HERE / "data", "*.csv")):
+        for path in sorted(folder.rglob(ending)):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
 
 project = "gearmbs"
 author = "the gearmbs developers"
@@ -40,6 +51,7 @@ myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "
 myst_heading_anchors = 3
 
 nb_execution_mode = "cache"
+nb_execution_cache_path = str(HERE / "_build" / f"executed-{code_stamp()}")
 nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_execution_in_temp = True

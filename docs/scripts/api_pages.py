@@ -98,10 +98,9 @@ def _write(path: Path, text: str) -> None:
 
 def unwrap_compiled() -> None:
     """Put the Python functions in the place of numba's dispatchers, for this process only."""
-    for info in pkgutil.walk_packages(gearmbs.__path__, "gearmbs."):
-        if info.name in ("gearmbs.cli", "gearmbs.compile"):
-            continue
-        module = importlib.import_module(info.name)
+    names = [info.name for info in pkgutil.walk_packages(gearmbs.__path__, "gearmbs.")]
+    # all are imported first: compiling one needs the compiled others
+    for module in [importlib.import_module(name) for name in names]:
         for name, value in list(vars(module).items()):
             if hasattr(value, "py_func"):
                 setattr(module, name, value.py_func)

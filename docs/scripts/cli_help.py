@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import click
 import typer
 from IPython.display import Markdown, display
 
 from gearmbs.cli import app
 
 
-def option_rows(command: click.Command) -> list[str]:
+def option_rows(command) -> list[str]:
     """Return a Markdown table of a command's arguments and options."""
     rows = ["| argument or option | default | meaning |", "|---|---|---|"]
     for parameter in command.params:
         names = ", ".join(f"`{name}`" for name in [*parameter.opts, *parameter.secondary_opts])
         if parameter.param_type_name == "argument":
-            names = f"`{parameter.human_readable_name.upper()}`"
+            names = f"`{(parameter.name or '').upper()}`"
         if names == "`--help`":
             continue
         default = "" if parameter.default is None or callable(parameter.default) else f"`{parameter.default}`"
@@ -27,7 +26,6 @@ def option_rows(command: click.Command) -> list[str]:
 def show() -> None:
     """Display every command with its arguments and options."""
     group = typer.main.get_command(app)
-    assert isinstance(group, click.Group)
     for name, command in group.commands.items():
         text = [f"**`gearmbs {name}`** {(command.help or '').strip()}", "", *option_rows(command)]
         display(Markdown("\n".join(text)))
