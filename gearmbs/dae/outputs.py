@@ -68,19 +68,19 @@ def new_records(m: int, bodies: int, rows: int, elements: int) -> Records:
 
 
 @njit(
-    int64(int64, int64, _VEC, _MAT, _IVEC, _IVEC, _VEC, _VEC, _VEC, PLAN_TYPE, FACTORS_TYPE, RECORDS_TYPE),
+    int64(int64, int64, _VEC, _MAT, _IVEC, _IVEC, _VEC, _VEC, _VEC, PLAN_TYPE, FACTORS_TYPE, RECORDS_TYPE, float64),
     cache=True,
     error_model="numpy",
     nogil=True,
 )
-def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, factors, records):
+def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, factors, records, growth):
     """Evaluate output rows from ``first``; return the row where new pivots are needed, or ``last``.
 
     Each row of y is first projected onto the constraints, from which the integrator and its interpolant stray by the
     tolerance; y itself is not changed.
 
     Asked for it in the header of ``idata``, only count the entries of the matrix or write their places to ``vals``;
-    with ``last`` less than ``first``, assemble row ``first`` without solving.
+    with ``last`` less than ``first``, assemble row ``first`` without solving. ``growth`` is what the factors may grow.
     """
     rows = records.force.shape[1]
     size = records.solution.shape[1]
@@ -108,7 +108,7 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
             spin = index1.violations(t[k], at, phi, idata, rdata, work)
             if k == first or spin * (t[k] - t[k - 1]) > SAME_POSITION:
                 index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, np.int64(0))
-                if not factor(plan, factors, vals) <= GROWTH_LIMIT:
+                if not factor(plan, factors, vals) <= growth:
                     return k
                 vals[:] = 0.0
             rhs[:base] = 0.0
@@ -120,7 +120,7 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
             solve(plan, factors, rhs, pushed)
             index1.displace(at, moved, pushed, idata, rdata, work)
         index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, np.int64(1))
-        if not factor(plan, factors, vals) <= GROWTH_LIMIT:
+        if not factor(plan, factors, vals) <= growth:
             return k
         solve(plan, factors, rhs, records.solution[k])
         for r in range(rows):
@@ -153,7 +153,7 @@ def assemble(t, y, slots, idata, rdata, work_size, vals) -> Records:
     bodies, rows, elements = int(idata[T.H_BODIES]) - 1, int(idata[T.H_ROWS]), int(idata[T.H_FORCES])
     records = new_records(1, bodies, rows, elements)
     work = np.zeros(work_size)
-    evaluate_rows(0, -1, t, y, slots, idata, rdata, work, vals, NO_PLAN, NO_FACTORS, records)
+    evaluate_rows(0, -1, t, y, slots, idata, rdata, work, vals, NO_PLAN, NO_FACTORS, records, GROWTH_LIMIT)
     return records
 
 
@@ -171,6 +171,7 @@ def evaluate(t, y, epochs, idata, rdata, work_size, records: Records) -> None:
     ones = np.ones(indptr.size - 1)
     y = np.ascontiguousarray(y)
     plan = factors = None
+    growth = GROWTH_LIMIT
     for (first, table), last in zip(epochs, bounds[1:]):
         table = np.ascontiguousarray(table)
         stuck = -1
@@ -179,7 +180,9 @@ def evaluate(t, y, epochs, idata, rdata, work_size, records: Records) -> None:
                 assemble(t[first : first + 1], y[first : first + 1], slots, table, rdata, work_size, vals)
                 plan = analyse(indptr, indices, vals, ones)
                 factors = new_factors(plan)
-            done = evaluate_rows(first, last, t, y, slots, table, rdata, work, vals, plan, factors, records)
+                # an ill-scaled mechanism may grow with the best of pivots
+                growth = max(GROWTH_LIMIT, 100.0 * factor(plan, factors, vals))
+            done = evaluate_rows(first, last, t, y, slots, table, rdata, work, vals, plan, factors, records, growth)
             if done == first and stuck == first:
                 raise ArithmeticError(f"the equations of motion are nearly singular at t = {t[first]:.6g} s")
             stuck, first = done, done
