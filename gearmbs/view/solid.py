@@ -223,3 +223,20 @@ def _hub(builder: _Builder, ring: np.ndarray, gear: GearSpec, z: float, up: bool
     closed = np.stack([np.append(bore, bore[0]), np.append(ring, ring[0])])
     builder.patch(closed, up)
     return bore
+
+
+def section_outline(
+    gear: GearSpec,
+    station: float = 0.0,
+    tolerance: float = TOLERANCE,
+    deviations: Deviations | None = None,
+    exaggeration: float = 1.0,
+) -> np.ndarray:
+    """Return the closed outline of a wheel in the section at ``station`` (m from mid-face), shape (n, 2), m."""
+    teeth = _teeth(gear, tolerance, deviations, exaggeration)
+    j = int(np.argmin(np.abs(teeth.station - station)))
+    builder = _Builder()
+    across = arc_chords(gear.tip_radius, 2.0 * gear.corner_half_angle, tolerance)
+    between = land_angles(gear, tolerance).size - 1
+    rim, _ = _section(builder, teeth, j, 0.0, across, between, gear, False)
+    return np.concatenate(builder.points)[rim, :2]

@@ -1,0 +1,171 @@
+"""Where the teeth touch and how hard, in space, with the kernels and laws of the simulation itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearmbs.contact import GAP_COLUMNS, layout, pair_gaps
+from gearmbs.contact.laws import normal_law
+from gearmbs.gears import GearPair
+from gearmbs.gears.pair import Placement
+from gearmbs.view.motion import PairMotion
+
+COLUMN = {name: k for k, name in enumerate(GAP_COLUMNS)}
+MAX_ROWS = 4000
+STATIONS = 21
+
+
+@dataclass(frozen=True)
+class ContactPoints:
+    """Touching places, k of them: one a tooth pair and station of the face.
+
+    Attributes
+    ----------
+    side : ndarray of int
+        +1 where the driver's anticlockwise flank presses, -1 the other.
+    tooth_1, tooth_2 : ndarray of int
+    station : ndarray
+        Along the face, m.
+    depth : ndarray
+        Penetration, m.
+    kind : ndarray of int
+        0 flank on flank, 1 or 2 the wheel whose tip corner bears.
+    point : ndarray, shape (k, 3)
+        Global, m.
+    normal : ndarray, shape (k, 3)
+        Direction in which the driver pushes the driven wheel, global.
+    force : ndarray
+        Normal force of the station's part of the face, N.
+    """
+
+    side: np.ndarray
+    tooth_1: np.ndarray
+    tooth_2: np.ndarray
+    station: np.ndarray
+    depth: np.ndarray
+    kind: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
+    force: np.ndarray
+
+    def pairs(self) -> list[tuple[int, int, int, np.ndarray, np.ndarray]]:
+        """Return each tooth pair: side, teeth, centre of its load (3,), its force vector on the driven wheel (3,)."""
+        out = []
+        keys = np.stack([self.side, self.tooth_1, self.tooth_2], axis=1)
+        for key in np.unique(keys, axis=0):
+            mine = (keys == key).all(axis=1) & (self.force > 0.0)
+            if mine.any():
+                weight = self.force[mine]
+                centre = weight @ self.point[mine] / weight.sum()
+                out.append((int(key[0]), int(key[1]), int(key[2]), centre, weight @ self.normal[mine]))
+        return out
+
+
+class ContactProbe:
+    """Finds the touching places of a pair in any pose."""
+
+    def __init__(self, pair: GearPair, stations: int | None = None) -> None:
+        self.pair = pair
+        self.gi, self.gr, size = pair.contact_tables()
+        self.work = np.zeros(size)
+        self.rows = np.zeros((MAX_ROWS, len(GAP_COLUMNS)))
+        low, high = pair.common_face
+        single = pair.face_slices == 1
+        count = 1 if single else (STATIONS if stations is None else stations)
+        self.width = pair.common_face_width / count if single else (high - low) / count
+        self.stations = np.zeros(1) if single else low + (np.arange(count) + 0.5) * self.width
+
+    def at(
+        self,
+        place: Placement,
+        velocities: tuple[np.ndarray, np.ndarray] | None = None,
+        spins: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> ContactPoints:
+        """Return the touching places.
+
+        Parameters
+        ----------
+        place : Placement
+        velocities, spins : pair of ndarray, optional
+            Velocities of the wheels' origins and angular velocities, global; default at rest. They enter the damping.
+        """
+        rows = self._rows(place, self.stations)
+        touching = rows[:, COLUMN["gap"]] < 0.0
+        width = self._widths(place, rows)[touching]
+        rows = rows[touching]
+        mean = mean_frame(place)
+        side = rows[:, COLUMN["side"]]
+        sine, cosine = np.sin(rows[:, COLUMN["alpha"]]), side * np.cos(rows[:, COLUMN["alpha"]])
+        zero = np.zeros(len(rows))
+        normal = np.column_stack([sine, cosine, zero])
+        tangent = np.column_stack([np.abs(cosine), -side * sine, zero])
+        along = rows[:, COLUMN["station"]] + 0.5 * float((place.origin_2 - place.origin_1) @ mean[:, 2])
+        local = rows[:, [COLUMN["normal"]]] * normal + rows[:, [COLUMN["tangent"]]] * tangent
+        local[:, 2] = along
+        point = place.origin_1 + local @ mean.T
+        normal = normal @ mean.T
+        depth = -rows[:, COLUMN["gap"]]
+        rate = np.zeros(len(rows))
+        if velocities is not None and spins is not None:
+            first = velocities[0] + np.cross(spins[0], point - place.origin_1)
+            second = velocities[1] + np.cross(spins[1], point - place.origin_2)
+            rate = np.einsum("ij,ij->i", normal, first - second)
+        force = width * self._pressure(depth, rate, rows[:, COLUMN["stiffness"]])
+        return ContactPoints(
+            side=side.astype(int),
+            tooth_1=rows[:, COLUMN["tooth_1"]].astype(int),
+            tooth_2=rows[:, COLUMN["tooth_2"]].astype(int),
+            station=rows[:, COLUMN["station"]],
+            depth=depth,
+            kind=rows[:, COLUMN["kind"]].astype(int),
+            point=point,
+            normal=normal,
+            force=force,
+        )
+
+    def over(self, motion: PairMotion) -> list[ContactPoints]:
+        """Return the touching places at every instant of a motion."""
+        return [
+            self.at(
+                motion.placement(k),
+                (motion.velocities[0, k], motion.velocities[1, k]),
+                (motion.spins[0, k], motion.spins[1, k]),
+            )
+            for k in range(len(motion))
+        ]
+
+    def _rows(self, place: Placement, stations: np.ndarray) -> np.ndarray:
+        frames = [np.ascontiguousarray(a) for a in (place.origin_1, place.axes_1, place.origin_2, place.axes_2)]
+        count = pair_gaps(self.gi, self.gr, *frames, stations, self.rows, self.work)
+        return self.rows[:count].copy()
+
+    def _widths(self, place: Placement, rows: np.ndarray) -> np.ndarray:
+        """Return the part of the face each row stands for: tilt moves the ends of the faces along the teeth."""
+        count = self.stations.size
+        if count == 1 or len(rows) == 0:
+            return np.full(len(rows), self.width)
+        ends = self._rows(place, np.zeros(0))[:, COLUMN["station"]].reshape(-1, 1, 2)
+        low, high = self.stations - 0.5 * self.width, self.stations + 0.5 * self.width
+        low = np.where(np.arange(count) == 0, -np.inf, low)
+        high = np.where(np.arange(count) == count - 1, np.inf, high)
+        return np.maximum(0.0, np.minimum(high, ends[:, :, 1]) - np.maximum(low, ends[:, :, 0])).ravel()
+
+    def _pressure(self, depth: np.ndarray, rate: np.ndarray, factor: np.ndarray) -> np.ndarray:
+        law = int(self.gi[layout.LAW])
+        numbers = [float(self.gr[k]) for k in (layout.LAW_K, layout.LAW_E, layout.LAW_C, layout.LAW_D)]
+        values = [
+            normal_law(law, numbers[0] * f, *numbers[1:], float(d), float(r))[0] for d, r, f in zip(depth, rate, factor)
+        ]
+        return np.array(values)
+
+
+def mean_frame(place: Placement) -> np.ndarray:
+    """Return the frame half-way between the wheels: z between the axes, x from driver to driven."""
+    z = place.axes_1[:, 2] + place.axes_2[:, 2]
+    z = z / np.linalg.norm(z)
+    between = place.origin_2 - place.origin_1
+    x = between - (between @ z) * z
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
