@@ -18,7 +18,7 @@ from gearmbs.dae.state import (
     H,
 )
 
-TARGET = 0.25
+TARGET = 0.2
 RAISE_GAIN = 1.15
 GROW_FROM = 1.2
 GROW_AT_MOST = 2.0

@@ -35,6 +35,7 @@ NOT_FINITE = 2
 RATE_LIMIT = 0.9
 RATE_FLOOR = 0.02
 ROUNDING_LEVEL = 0.1
+LOOSEST = 0.1
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -152,7 +153,8 @@ def correct(residual, t, gamma, vec, real, count, plan, factors, idata, rdata, w
     differential = vec[IS_DIFFERENTIAL]
     n = y.shape[0]
     damp = 2.0 / (1.0 + gamma / real[GAMMA_J]) - 1.0
-    limit = real[NEWTON_TOL] * 0.5 ** count[ORDER]
+    # differences of order k + 1 amplify what the corrector leaves by 2^k, and steer order and step
+    limit = real[NEWTON_TOL] * min(LOOSEST, 0.5 ** count[ORDER])
     previous = 0.0
     iterations = count[MAX_ITERATIONS]
     for m in range(iterations):
