@@ -24,6 +24,8 @@ def message_text(result: AdamsResult) -> str:
         out += [f"---- START: {severity} ----", str(d), f"---- END: {severity} ----", ""]
     for segment in result.segments:
         out += _segment(result, segment)
+    for modes in result.modes:
+        out += ["", "  E I G E N  A N A L Y S I S", "", *modes.table().splitlines(), ""]
     return "\n".join(out) + "\n"
 
 
@@ -34,7 +36,7 @@ def _segment(result: AdamsResult, segment: Segment) -> list[str]:
     out += _initial_conditions(segment, t[0])
     options = segment.options
     name, form = options["integrator"].capitalize(), options["formulation"]
-    title = "Kinematic" if segment.kind == "KINEMATICS" else "Dynamic"
+    title = {"KINEMATICS": "Kinematic", "STATICS": "Static"}.get(segment.kind, "Dynamic")
     index = {"I3": "INDEX-3", "SI2": "stabilized INDEX-2", "SI1": "stabilized INDEX-1"}[form]
     out += [
         "",

@@ -123,7 +123,7 @@ def results_text(result: AdamsResult, now: datetime | None = None) -> str:
     out.append("</StepMap>")
     row = 0
     for k, segment in enumerate(result.segments, 1):
-        kind = "kinematic" if segment.kind == "KINEMATICS" else "dynamic"
+        kind = {"KINEMATICS": "kinematic", "STATICS": "static"}.get(segment.kind, "dynamic")
         out.append(f'<Data name="{kind}_{k:03d}" id="{k}">')
         for _ in range(segment.solution.t.size):
             out.append(f'<Step type="{kind}">')

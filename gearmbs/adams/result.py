@@ -15,6 +15,7 @@ from gearmbs.adams.commands import Script, Simulate
 from gearmbs.adams.deck import Deck
 from gearmbs.adams.requests import RequestSeries
 from gearmbs.adams.units import RESULT_NAMES, unit_names
+from gearmbs.dae.modes import Modes
 from gearmbs.dae.solution import Solution
 
 if TYPE_CHECKING:
@@ -65,11 +66,14 @@ class AdamsResult:
     deck : Deck
     script : Script
     segments : list of Segment
+    modes : list of Modes
+        Of each LINEAR/EIGENSOL, in rad/s and Hz.
     """
 
     deck: Deck
     script: Script
     segments: list[Segment] = field(default_factory=list)
+    modes: list[Modes] = field(default_factory=list)
 
     @property
     def success(self) -> bool:

@@ -18,6 +18,11 @@ from gearmbs.adams.requests import RequestEvaluator
 from gearmbs.adams.result import AdamsResult, Segment
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.expressions import ExpressionError
+from gearmbs.dae.kinematic import kinematic
+from gearmbs.dae.modes import Modes
+from gearmbs.dae.solution import Solution
+from gearmbs.dae.tables import STATE_ALGEBRAIC
+from gearmbs.mechanism.analyses import linear_modes, static_equilibrium
 from gearmbs.mechanism.functions import polynomial
 
 DEFAULT_TOLERANCE = 1e-8
@@ -25,6 +30,9 @@ DEFAULT_TOLERANCE = 1e-8
 
 FIRST_STEP = 0.05
 """ADAMS's default HINIT, in output steps."""
+
+STATIC_TOLERANCE = 1e-10
+"""Unbalanced load allowed at an equilibrium, relative to the heaviest weight or largest load."""
 
 METHODS = {"GSTIFF": "GSTIFF", "WSTIFF": "WSTIFF", "SI2_GSTIFF": "GSTIFF"}
 
@@ -98,7 +106,7 @@ def run_deck(
             element = (command.element or "", command.id or 0)
             (session.inactive.discard if command.on else session.inactive.add)(element)
         elif isinstance(command, Linear):
-            raise _unsupported(command, "LINEAR is not supported")
+            result.modes.append(_linear(session, command, allow_unsupported))
         elif isinstance(command, Simulate):
             segment = _simulate(session, command, tol, allow_unsupported, progress)
             result.segments.append(segment)
@@ -201,30 +209,18 @@ def _simulate(
 ) -> Segment:
     """Carry out one SIMULATE."""
     kind = command.kind or "DYNAMICS"
-    if kind not in ("DYNAMICS", "KINEMATICS", "TRANSIENT"):
+    if kind not in ("DYNAMICS", "KINEMATICS", "TRANSIENT", "STATICS"):
         raise _unsupported(command, f"SIMULATE/{kind} is not supported")
-    times = _times(session, command)
+    if kind == "STATICS" and (command.end is not None or command.duration is not None):
+        raise _unsupported(command, "a sequence of static positions (STATICS with END or DURATION) is not supported")
+    times = np.array([session.time]) if kind == "STATICS" else _times(session, command)
     model = None
     try:
         model = _model(session, allow_unsupported, (session.time, float(times[-1])))
         options, note = _settings(session, tol)
-        output_step = float(times[1] - times[0]) * session.deck.units.time
-        options.setdefault("first_step", FIRST_STEP * output_step)
-        options.setdefault("max_step", output_step)
-        solution = model.mechanism.simulate(
-            float(times[-1]) * session.deck.units.time,
-            t_start=session.time * session.deck.units.time,
-            t_eval=times * session.deck.units.time,
-            progress=progress,
-            **options,
-        )
+        solution = _solve(session, command, kind, model, times, options, progress)
     except (ModelError, ArithmeticError) as error:
         raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, _line(model, str(error)))]) from error
-    report = solution.system.report
-    freedom = report.degrees_of_freedom if report is not None else 0
-    if kind == "KINEMATICS" and freedom > 0:
-        message = f"a kinematic analysis needs zero degrees of freedom; the model has {freedom}"
-        raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
     evaluator = RequestEvaluator(model, solution)
     segment = Segment(command, kind, model, solution, options, note)
     for request in session.deck.of(st.Request).values():
@@ -236,6 +232,49 @@ def _simulate(
         segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
     _remember(session, model, segment)
     return segment
+
+
+def _solve(
+    session: _Session,
+    command: Simulate,
+    kind: str,
+    model: AdamsModel,
+    times: np.ndarray,
+    options: dict[str, Any],
+    progress: bool | Callable[[float], None],
+) -> Solution:
+    """Solve one analysis at the output times, given in the deck's unit."""
+    scale = session.deck.units.time
+    times = times * scale
+    if kind == "STATICS":
+        options.update(integrator="Newton", formulation="I3", tol=STATIC_TOLERANCE)
+        return static_equilibrium(model.mechanism, t=float(times[0]), tol=STATIC_TOLERANCE).solution
+    if kind == "KINEMATICS":
+        system = model.mechanism.compile(float(times[0]))
+        report = system.initialise()
+        if report.degrees_of_freedom > 0:
+            message = f"a kinematic analysis needs zero degrees of freedom; the model has {report.degrees_of_freedom}"
+            raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
+        if all(k == STATE_ALGEBRAIC for k, _ in system.builder.states):
+            return kinematic(system, times)
+    output_step = float(times[1] - times[0])
+    options.setdefault("first_step", FIRST_STEP * output_step)
+    options.setdefault("max_step", output_step)
+    return model.mechanism.simulate(
+        float(times[-1]), t_start=session.time * scale, t_eval=times, progress=progress, **options
+    )
+
+
+def _linear(session: _Session, command: Linear, allow_unsupported: bool) -> Modes:
+    """Carry out LINEAR/EIGENSOL at the present position."""
+    if not command.eigensol:
+        raise _unsupported(command, "LINEAR without EIGENSOL is not supported")
+    model = None
+    try:
+        model = _model(session, allow_unsupported, (session.time, session.time))
+        return linear_modes(model.mechanism, t=session.time * session.deck.units.time)
+    except (ModelError, ArithmeticError) as error:
+        raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, _line(model, str(error)))]) from error
 
 
 def _line(model: AdamsModel | None, message: str) -> int:

@@ -92,8 +92,8 @@ def test_times_are_in_the_decks_unit():
 @pytest.mark.parametrize(
     ("commands", "line", "message"),
     [
-        (("SIM/STATICS",), 3, "SIMULATE/STATICS is not supported"),
-        (("SIM/DYN, END=1, STEPS=2", "LINEAR/EIGENSOL"), 4, "LINEAR is not supported"),
+        (("SIM/STATICS, END=1",), 3, "a sequence of static positions"),
+        (("SIM/DYN, END=1, STEPS=2", "LINEAR/NOVECTOR"), 4, "LINEAR without EIGENSOL is not supported"),
         (("MOTION/7, FUNCTION=TIME",), 3, "there is no MOTION/7 to change"),
         (("SIM/DYN, END=1, STEPS=2", "SIM/DYN, END=1, STEPS=2"), 4, "the model is at time 1.0 already"),
         (("SIM/KIN, END=1, STEPS=2",), 3, "needs zero degrees of freedom; the model has 1"),

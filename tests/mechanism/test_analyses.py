@@ -236,3 +236,30 @@ def test_kinematics_name_the_time_of_locking():
     assert kinematic(m, np.array([0.0, 0.45])).position("slide")[-1, 0] == pytest.approx(1.95, abs=1e-12)
     with pytest.raises(ModelError, match=r"t = 0\.(49999|5)"):
         kinematic(m, np.linspace(0.0, 1.0, 5))
+
+
+DECK = """hanging mass
+ACCGRAV/KGRAV=-10
+PART/1,GROUND
+MARKER/10,PART=1
+PART/2,MASS=2,CM=20,IP=1,1,1
+MARKER/20,PART=2
+JOINT/1,TRANSLATIONAL,I=20,J=10
+SFORCE/1,TRANS,I=20,J=10,ACTIONONLY,FUNCTION=-50*DZ(20,10,10)
+REQUEST/1,F2=DZ(20,10)\\F3=VZ(20,10)
+END
+"""
+
+
+def test_script_with_statics_then_dynamics_and_modes():
+    from gearmbs.adams import parse_deck, parse_script
+    from gearmbs.adams.msg import message_text
+    from gearmbs.adams.run import run_deck
+
+    commands = "model\nout\nSIMULATE/STATICS\nLINEAR/EIGENSOL\nSIMULATE/DYNAMICS, END=1, STEPS=4\nSTOP\n"
+    result = run_deck(parse_deck(DECK), parse_script(commands))
+    # z = -m g / k = -0.4 at rest; omega = sqrt(k / m) = 5
+    assert result.success
+    assert result.request(1)[:, 1] == pytest.approx(np.full(6, -0.4), abs=1e-9)
+    assert result.modes[0].eigenvalues == pytest.approx([5j], rel=1e-9)
+    assert "Performing Static Simulation" in message_text(result)
