@@ -132,6 +132,7 @@ class _Relaxation:
         self.rows = np.concatenate([instant.block("u", "eps"), inner])
         self.columns = np.concatenate([instant.block("R", "lambda"), inner])
         self.length = system.length
+        self.held = self._held()
         scale = instant.problem.scale
         force = float(scale[instant.at["lambda"]]) if inner.size else 0.0
         weight = max((row[0] for row in system.builder.bodies[1:]), default=0.0)
@@ -153,7 +154,19 @@ class _Relaxation:
 
     def _parts(self, y: np.ndarray) -> tuple[np.ndarray, csc_array, csc_array]:
         matrix = self.instant.matrix(y)
-        return self.instant.residual(y)[self.rows], csc_array(matrix[self.rows][:, self.columns]), self._inertia(matrix)
+        stiffness = csc_array(matrix[self.rows][:, self.columns] + diags_array(self.held.astype(float)))
+        return self._rest(y), stiffness, self._inertia(matrix)
+
+    def _rest(self, y: np.ndarray) -> np.ndarray:
+        return np.where(self.held, 0.0, self.instant.residual(y)[self.rows])
+
+    def _held(self) -> np.ndarray:
+        """Mark the states whose rate depends on time alone, as of motions given by velocity: they keep their value."""
+        matrix = self.instant.matrix(self.instant.y)[self.rows][:, self.columns]
+        held = np.abs(matrix).sum(axis=1) == 0.0
+        states = np.zeros(self.rows.size, dtype=bool)
+        states[self.rows.size - self.instant.differential.size :] = self.instant.differential
+        return np.asarray(held).ravel() & states
 
     def _solve(self, stiffness: csc_array, mass: csc_array, sigma: float, rest: np.ndarray) -> np.ndarray | None:
         extra = rest.size - self.coordinates
@@ -193,7 +206,7 @@ class _Relaxation:
             y = instant.y.copy()
             y[self.columns] += step
             y = instant.settle(y)
-            new = instant.residual(y)[self.rows]
+            new = self._rest(y)
             new_size = float(np.abs(new / self.sizes).max(initial=0.0))
             if polished:
                 if new_size <= size:

@@ -104,6 +104,14 @@ def test_motions_are_frozen_at_the_given_time():
     assert abs(found.reactions["drive"][1][1]) == pytest.approx(1.5 * G * 0.8 * np.sin(0.5), rel=1e-9)
 
 
+def test_states_that_follow_time_alone_keep_their_value():
+    m = hanging()
+    m.differential_state("drive", "2", start=0.25)
+    found = static_equilibrium(m)
+    assert found.position("block")[2] == pytest.approx(-2.0 * G / 200.0, abs=1e-12)
+    assert found.solution.result.y[0, -1] == 0.25
+
+
 def test_pendulum_frequency():
     found = linear_modes(pendulum(0.0))
     # omega^2 = m g l / (m l^2 + J)
