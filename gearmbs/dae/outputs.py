@@ -23,6 +23,10 @@ FARTHEST = 1e-3
 """A constraint farther off than this belongs to an angle whose full turns were not counted; it is left alone."""
 
 
+GENERIC_TURNS = (0.1, 0.02, 0.3, 0.0)
+"""Rotations, rad, off the position at which pivots are chosen, tried in turn: at special positions entries vanish by
+accident and the pivots would not serve their neighbours."""
+
 SAME_POSITION = 0.05
 """Rotation, rad, after which the factors of one output no longer serve to project the next."""
 
@@ -174,15 +178,26 @@ def evaluate(t, y, epochs, idata, rdata, work_size, records: Records) -> None:
     growth = GROWTH_LIMIT
     for (first, table), last in zip(epochs, bounds[1:]):
         table = np.ascontiguousarray(table)
-        stuck = -1
+        attempt = 0
         while first < last:
-            if plan is None or stuck == first:
-                assemble(t[first : first + 1], y[first : first + 1], slots, table, rdata, work_size, vals)
+            if plan is None or attempt > 0:
+                if attempt > len(GENERIC_TURNS):
+                    raise ArithmeticError(f"the equations of motion are nearly singular at t = {t[first]:.6g} s")
+                near = _turned(y[first : first + 1], table, GENERIC_TURNS[max(attempt, 1) - 1])
+                vals[:] = 0.0
+                assemble(t[first : first + 1], near, slots, table, rdata, work_size, vals)
                 plan = analyse(indptr, indices, vals, ones)
                 factors = new_factors(plan)
                 # an ill-scaled mechanism may grow with the best of pivots
                 growth = max(GROWTH_LIMIT, 100.0 * factor(plan, factors, vals))
             done = evaluate_rows(first, last, t, y, slots, table, rdata, work, vals, plan, factors, records, growth)
-            if done == first and stuck == first:
-                raise ArithmeticError(f"the equations of motion are nearly singular at t = {t[first]:.6g} s")
-            stuck, first = done, done
+            attempt = attempt + 1 if done == first else 1 if done < last else 0
+            first = done
+
+
+def _turned(y: np.ndarray, idata: np.ndarray, angle: float) -> np.ndarray:
+    """Return a copy of y with every Euler angle turned differently, so that no entry is zero by accident."""
+    y = y.copy()
+    angles = slice(int(idata[T.H_THETA]), int(idata[T.H_LAMBDA]))
+    y[0, angles] += angle * np.sin(1.0 + np.arange(angles.stop - angles.start))
+    return y
