@@ -314,7 +314,7 @@ def _no_events(t, y, yp, out, idata, rdata, work):
 
 def adapt_events(functions: list[Callable], with_parameters: list[bool]) -> Callable:
     """Return a numba function of EVENTS_SIG around users' ``g(t, y, yp[, p])`` compiled by numba."""
-    chain = njit(EVENTS_SIG, nogil=True, error_model="numpy")(_no_events)
+    chain: Callable = njit(EVENTS_SIG, nogil=True, error_model="numpy")(_no_events)
     for place, (function, takes_p) in enumerate(zip(functions, with_parameters, strict=True)):
         chain = _append_event(chain, function, takes_p, place)
     return chain

@@ -50,6 +50,7 @@ class _UserFunctions:
     def _register(self, slot: int, function: Callable, n_out: int) -> None:
         callback = dj.PythonCallback(function, self.n, n_out, self.errors)
         self.callbacks.append(callback)
+        assert callback.address is not None
         self.addresses[slot] = callback.address
 
     def residual(self, fun: Callable) -> Callable:

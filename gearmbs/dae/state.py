@@ -147,7 +147,7 @@ class RunState(NamedTuple):
     """
 
     real: np.ndarray
-    count: np.ndarray
+    count: np.ndarray  # type: ignore[assignment]
     times: np.ndarray
     hist: np.ndarray
     vec: np.ndarray

@@ -21,7 +21,16 @@ from gearmbs.dae.core import SLOPE_MAX_AGE, advance
 from gearmbs.dae.newton import set_weights
 from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, SolverStats, Status
-from gearmbs.dae.sparse_lu import GROWTH_LIMIT, LUPlan, SingularMatrixError, analyse, factor, new_factors, solve
+from gearmbs.dae.sparse_lu import (
+    GROWTH_LIMIT,
+    LUFactors,
+    LUPlan,
+    SingularMatrixError,
+    analyse,
+    factor,
+    new_factors,
+    solve,
+)
 
 NEWTON_TOLERANCE = 1.0
 FIRST_CHUNK = 16
@@ -165,7 +174,7 @@ class Run:
         self.hook = problem.hook if problem.hook is not None else no_hook
         self.events = problem.events if n_events else no_events
         self.plan: LUPlan | None = None
-        self.factors = None
+        self.factors: LUFactors | None = None
 
         self.records: list[tuple[np.ndarray, ...]] = []
         self.row_blocks: list[np.ndarray] = []
@@ -201,7 +210,7 @@ class Run:
         bad = np.flatnonzero(~np.isfinite(res))
         if len(bad):
             return Status.NOT_FINITE, failures.not_finite(problem, t0, int(bad[0]))
-        if st.count[s.HAS_EVENTS]:
+        if st.count[s.HAS_EVENTS] and problem.events is not None:
             problem.events(t0, st.vec[s.Y], st.vec[s.YP], st.g_old, st.idata, st.rdata, st.work)
         failure = self._choose_first_pivots(st.real[s.H])
         if failure is not None or not self.check_start:
@@ -215,6 +224,7 @@ class Run:
         jump = np.abs(delta) * st.vec[s.W_ERROR]
         worst = int(np.argmax(jump))
         if not jump[worst] <= START_JUMP_LIMIT:
+            assert self.plan is not None
             row = int(np.argmax(np.abs(res[self.plan.row_from]) * self.plan.row_scale))
             message = failures.inconsistent(problem, t0, worst, int(self.plan.row_from[row]), float(abs(delta[worst])))
             return Status.INCONSISTENT_START, message
@@ -266,7 +276,7 @@ class Run:
         return self.error_probe() if self.error_probe is not None else None
 
     def _user_failure(self) -> tuple[Status, str]:
-        error = self._user_exception()
+        error = self._user_exception() or RuntimeError("unknown")
         if isinstance(error, KeyboardInterrupt):
             return Status.INTERRUPTED, self._interrupted_message()
         return Status.USER_ERROR, failures.user_error(float(self.state.real[s.T]), error)
@@ -349,7 +359,7 @@ class Run:
         t = float(st.real[s.T])
         h = float(st.real[s.H])
         worst = int(st.count[s.WORST])
-        status = Status(code)
+        status = Status(code)  # type: ignore[call-arg]
         if status is Status.NOT_FINITE:
             return status, failures.not_finite(problem, t, worst)
         if status is Status.STEP_TOO_SMALL:
