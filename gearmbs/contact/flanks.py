@@ -11,7 +11,7 @@ from gearmbs.contact.deviations import add_deviation, pair_softness, set_corner,
 from gearmbs.contact.face import LIMIT, face_limit
 from gearmbs.contact.jit import kernel
 from gearmbs.contact.node import contact_point, corner_normal, corner_start, flank_normal, section_gap, turn_normal
-from gearmbs.contact.sums import add_friction, add_normal
+from gearmbs.contact.sums import add_friction, add_normal, mirror
 
 RB, PSI, S_TIP, WHEEL = L.RB, L.PSI, L.S_TIP, L.WHEEL
 NODE, N_GAP, N_GRAD, N_HESS, N_RATE, N_DRATE = L.NODE, L.N_GAP, L.N_GRAD, L.N_HESS, L.N_RATE, L.N_DRATE
@@ -135,9 +135,14 @@ def side_contacts(gi, gr, wk, side, diag, want):
     ----------
     side : int
         +1 or -1, for the tables that name teeth and flanks; the pose at ``S_X`` is already mirrored for -1.
+
+    Returns
+    -------
+    bool
+        Whether the sums were mirrored to match, which is done for -1 once something may touch.
     """
     if not open_side(gr, wk):
-        return
+        return False
     p, q, w, length, alpha0 = wk[S_P], wk[S_Q], wk[S_W], wk[S_LENGTH], wk[S_A0]
     rb1 = gr[RB]
     rb2 = gr[WHEEL + RB]
@@ -167,7 +172,7 @@ def side_contacts(gi, gr, wk, side, diag, want):
         section_gap(gr, wk, 0, f1, f2, middle, NODES, want)
         deepest = margin - wk[NODES + N_GAP]
         if deepest <= 0.0:
-            return
+            return False
         gap_rate(wk, NODES, want)
         wander = 0.0
     else:
@@ -178,7 +183,7 @@ def side_contacts(gi, gr, wk, side, diag, want):
         step = (gr[ZETA_HI] - gr[ZETA_LO]) / slices
         reach = 0.5 * (gr[ZETA_HI] - gr[ZETA_LO]) + step
         if deepest + abs(slope) * reach <= 0.0:
-            return
+            return False
         if deepest - abs(slope) * reach < 0.0:
             edge = (middle - deepest / slope - gr[ZETA_LO]) / step
             if slope > 0.0:
@@ -198,8 +203,11 @@ def side_contacts(gi, gr, wk, side, diag, want):
             gap_rate(wk, o, want)
             deepest = max(deepest, margin - wk[o + N_GAP])
         if deepest <= 0.0 and ja > 0 and jb < slices:
-            return
+            return False
         wander = max(rb1, rb2) * abs(turn) * (gr[ZETA_HI] - gr[ZETA_LO])
+
+    if side < 0:
+        mirror(wk)
 
     # how far beyond the path of contact a corner may still bear, from the parabola of the corner gap
     tip1 = gr[S_TIP]
@@ -222,6 +230,7 @@ def side_contacts(gi, gr, wk, side, diag, want):
             k = 3 if drive else 4
             diag[k] = max(diag[k], depth)
             diag[k + 2] += 1.0
+    return side < 0
 
 
 @kernel

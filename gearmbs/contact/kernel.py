@@ -54,31 +54,34 @@ def wrench_slopes(wk):
     """Derivatives of the wrench W = G^T Q + F by the pose numbers (KX) and the relative twist (KV), (6, 6) each."""
     # J holds dQ/dx and dQ/dV, row by row, on the way
     for i in range(6):
-        row = 6 * i
+        b = B_ + 6 * i
+        f = FR_ + 6 * i
         for j in range(6):
-            wk[J + 12 * i + j] = wk[H_ + row + j]
-            wk[J + 12 * i + 6 + j] = 0.0
-            wk[KX + row + j] = wk[FX_ + row + j]
-            wk[KV + row + j] = wk[FV_ + row + j]
-        for j in range(4):
-            wk[KX + row + j] += wk[WX + 4 * i + j]
-        for k in range(6):
-            b = wk[B_ + row + k]
-            for j in range(4):
-                wk[J + 12 * i + j] += b * wk[XDX + 4 * k + j]
-            for j in range(6):
-                wk[J + 12 * i + 6 + j] += b * wk[G + 6 * k + j]
-            f = wk[FR_ + row + k]
-            for j in range(4):
-                wk[KX + row + j] += f * wk[XDX + 4 * k + j]
-            for j in range(6):
-                wk[KV + row + j] += f * wk[G + 6 * k + j]
-    for k in range(6):
-        for i in range(6):
-            g = wk[G + 6 * k + i]
-            for j in range(6):
-                wk[KX + 6 * i + j] += g * wk[J + 12 * k + j]
-                wk[KV + 6 * i + j] += g * wk[J + 12 * k + 6 + j]
+            qx = wk[H_ + 6 * i + j]
+            kx = wk[FX_ + 6 * i + j]
+            qv = 0.0
+            kv = wk[FV_ + 6 * i + j]
+            if j < 4:
+                kx += wk[WX + 4 * i + j]
+                for k in range(6):
+                    qx += wk[b + k] * wk[XDX + 4 * k + j]
+                    kx += wk[f + k] * wk[XDX + 4 * k + j]
+            for k in range(6):
+                qv += wk[b + k] * wk[G + 6 * k + j]
+                kv += wk[f + k] * wk[G + 6 * k + j]
+            wk[J + 12 * i + j] = qx
+            wk[J + 12 * i + 6 + j] = qv
+            wk[KX + 6 * i + j] = kx
+            wk[KV + 6 * i + j] = kv
+    for i in range(6):
+        for j in range(6):
+            kx = wk[KX + 6 * i + j]
+            kv = wk[KV + 6 * i + j]
+            for k in range(6):
+                kx += wk[G + 6 * k + i] * wk[J + 12 * k + j]
+                kv += wk[G + 6 * k + i] * wk[J + 12 * k + 6 + j]
+            wk[KX + 6 * i + j] = kx
+            wk[KV + 6 * i + j] = kv
 
 
 @kernel
@@ -86,12 +89,11 @@ def own_columns(wk):
     """Derivatives of the wrench by the variations of wheel 1, all in the mean frame: ``J`` (6, 12)."""
     for i in range(6):
         for j in range(6):
-            wk[J + 12 * i + j] = 0.0
+            total = 0.0
+            for k in range(6):
+                total += wk[KX + 6 * i + k] * wk[G + 6 * k + j]
+            wk[J + 12 * i + j] = total
             wk[J + 12 * i + 6 + j] = wk[KV + 6 * i + j]
-        for k in range(6):
-            x = wk[KX + 6 * i + k]
-            for j in range(6):
-                wk[J + 12 * i + j] += x * wk[G + 6 * k + j]
     for j in range(6):
         ux, uy, uz = wk[MU + j], wk[MU + 6 + j], wk[MU + 12 + j]
         # the relative twist seen from the turning mean frame
@@ -222,15 +224,16 @@ def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want
         work[L.S_X + i] = sign * work[L.W_X + i]
         work[L.S_XD + i] = sign * work[L.W_XD + i]
         work[L.S_V + i] = -work[V + i] if i % 2 == 1 else work[V + i]
-    front = diag[0] > 0.0
-    if front:
-        mirror(work)
-    side_contacts(gi, gr, work, -1, diag, want_jac)
+    turned = side_contacts(gi, gr, work, -1, diag, want_jac)
     if gi[L.ROOT] != 0:
+        if not turned:
+            mirror(work)
+        turned = True
         root_contacts(gi, gr, work, -1, diag, want_jac)
     if not diag[0] > 0.0:
         return
-    mirror(work)
+    if turned:
+        mirror(work)
     pose_wrench(work, want_jac)
     for i in range(6):
         work[W + i] += work[F_ + i]

@@ -1,0 +1,98 @@
+"""Cost of the gear contact kernel: per call and per evaluated pair-slice. Run ``python -m benchmarks.contact``."""
+
+from __future__ import annotations
+
+import json
+import platform
+import sys
+import time
+from pathlib import Path
+
+import numba
+import numpy as np
+from numba import njit
+
+from gearmbs.contact import gear_contact
+from gearmbs.gears import Friction, GearPair
+from gearmbs.gears.faults import GradedFlanks
+from gearmbs.gears.transmission import StaticMesh
+
+CASES = {
+    "healthy": ({}, 1),
+    "healthy, no friction": ({"friction": Friction.none()}, 1),
+    "+3 mm": ({"centre_distance_error": "3 mm"}, 1),
+    "skew 1 deg, jammed, default slices": ({"misalignment": "1 deg"}, None),
+    "skew 1 deg, jammed, 41 slices": ({"misalignment": "1 deg"}, 41),
+    "skew 1 deg, 0.4 mm backlash, 41 slices": ({"misalignment": "1 deg", "backlash": "0.4 mm"}, 41),
+    "graded flanks, 41 slices": ({"faults": (GradedFlanks(),)}, 41),
+}
+SPEED = 1000 * 2 * np.pi / 60
+REPEATS = 200
+CALLS = 10
+POSITIONS = 7
+
+
+@njit
+def _loop(n, gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want, work):
+    for _ in range(n):
+        gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want, work)
+
+
+def measure(pair: GearPair, slices: int | None) -> dict[str, float]:
+    """Shortest time per call over short bursts, averaged over a mesh cycle, at 100 N m."""
+    mesh = StaticMesh(pair, slices)
+    work = np.zeros_like(mesh.work)
+    wrench, jac, diag = np.zeros(6), np.zeros((6, 24)), np.zeros(8)
+    gi, gr, _ = pair.contact_tables(slices)
+    zero = np.zeros(3)
+    totals = {0: 0.0, 1: 0.0}
+    pair_slices = 0.0
+    for angle in np.linspace(0, 2 * np.pi / 29, POSITIONS):
+        place = pair.frames(angle, mesh.loaded_angle(angle, 100.0, mesh.touching_angle(angle) + 1e-4))
+        state = (
+            *(place.origin_1, place.axes_1, zero, SPEED * place.axes_1[:, 2]),
+            *(place.origin_2, np.ascontiguousarray(place.axes_2), zero, -SPEED * place.axes_2[:, 2]),
+        )
+        for want in totals:
+            _loop(CALLS, gi, gr, *state, wrench, jac, diag, want, work)
+            best = np.inf
+            for _ in range(REPEATS):
+                start = time.perf_counter()
+                _loop(CALLS, gi, gr, *state, wrench, jac, diag, want, work)
+                best = min(best, (time.perf_counter() - start) / CALLS)
+            totals[want] += best / POSITIONS
+        low, high = pair.common_face
+        count = int(gi[2])
+        stations = low + (np.arange(count) + 0.5) * (high - low) / count
+        rows = mesh.gaps(
+            angle, StaticMesh(pair, slices).loaded_angle(angle, 100.0, mesh.touching_angle(angle)), stations
+        )
+        pair_slices += np.count_nonzero(rows[:, 4] < 0) / POSITIONS
+    return {
+        "value_us": totals[0] * 1e6,
+        "jacobian_us": totals[1] * 1e6,
+        "touching_pair_slices": pair_slices,
+        "ns_per_pair_slice": totals[1] * 1e9 / max(pair_slices, 1.0),
+    }
+
+
+def main(out: str | None = None) -> None:
+    """Print the table, and store it as JSON when given a path."""
+    results = {name: measure(GearPair.paper(**changes), slices) for name, (changes, slices) in CASES.items()}
+    print(f"| case | value us | with derivatives us | touching pair-slices | ns per pair-slice |\n|{'---|' * 5}")
+    for name, r in results.items():
+        print(
+            f"| {name} | {r['value_us']:.2f} | {r['jacobian_us']:.2f} | {r['touching_pair_slices']:.1f} "
+            f"| {r['ns_per_pair_slice']:.0f} |"
+        )
+    if out is not None:
+        machine = {
+            "machine": platform.processor() or platform.machine(),
+            "python": platform.python_version(),
+            "numba": numba.__version__,
+        }
+        Path(out).write_text(json.dumps({"machine": machine, "results": results}, indent=2))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:2])
