@@ -22,7 +22,17 @@ ROOMS = {
     "gearmbs.units": "Units and compilation",
 }
 
+EVERYTHING = ["*"]
+"""All public functions and classes that a module defines itself."""
+
 MORE = {
+    "gearmbs.gears": {
+        "gearmbs.gears.faults": EVERYTHING,
+        "gearmbs.gears.history": EVERYTHING,
+        "gearmbs.gears.pattern": EVERYTHING,
+        "gearmbs.gears.stiffness": EVERYTHING,
+        "gearmbs.gears.iso1328": EVERYTHING,
+    },
     "gearmbs.contact": {
         "gearmbs.contact.laws": ["normal_law", "friction_law"],
     },
@@ -53,7 +63,15 @@ MORE = {
         "gearmbs.dae.terms": ["gradient", "hessian", "quadratic_part"],
     },
     "gearmbs.studies": {
-        "gearmbs.studies.rig": [],
+        "gearmbs.studies.case": [
+            "Gears",
+            "Shafts",
+            "Operation",
+            "Fault",
+            "Contact",
+            "FrictionSettings",
+            "Solver",
+        ],
         "gearmbs.studies.run": ["record", "transmission_error"],
         "gearmbs.studies.store": ["write_dataset", "write_text", "whole_file"],
     },
@@ -69,10 +87,19 @@ def entries(room: str) -> list[str]:
     names = [f"{room}.{name}" for name in getattr(module, "__all__", ()) if _documented(getattr(module, name))]
     for home, more in MORE.get(room, {}).items():
         source = importlib.import_module(home)
-        for name in more:
+        for name in _own(source) if more is EVERYTHING else more:
             getattr(source, name)
             names.append(f"{home}.{name}")
     return names
+
+
+def _own(module) -> list[str]:
+    """Return the public functions and classes defined in a module, in their order there."""
+    return [
+        name
+        for name, value in vars(module).items()
+        if not name.startswith("_") and _documented(value) and getattr(value, "__module__", "") == module.__name__
+    ]
 
 
 def _documented(value: object) -> bool:
