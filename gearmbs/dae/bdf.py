@@ -122,14 +122,23 @@ def local_error(h, nodes, k, difference):
 
 @njit(float64(float64, _VEC, int64, float64, float64), cache=True, nogil=True, error_model="numpy")
 def step_for_error(h, nodes, k, difference, target):
-    """Return about the step size whose local error at order k is ``target``, within a factor 8 of h."""
+    """Return about the step size whose local error at order k is ``target``, within a factor 8 of h.
+
+    Far older points than the step let the error grow with less than the power k + 1 of h; a shrinking step follows the
+    power that holds at the trial size, a growing one trusts the full power and so stays on the safe side.
+    """
     trial = h
     for _ in range(STEP_SEARCH_SWEEPS):
         e = local_error(trial, nodes, k, difference)
         if e <= target * MAX_STEP_RATIO ** -(k + 1.0):
             trial *= MAX_STEP_RATIO
         else:
-            trial *= (target / e) ** (1.0 / (k + 1.0))
+            power = k + 1.0
+            if e > target:
+                power = 0.0
+                for j in range(k + 1):
+                    power += trial / (trial + nodes[0] - nodes[j])
+            trial *= (target / e) ** (1.0 / power)
         trial = min(max(trial, h / MAX_STEP_RATIO), h * MAX_STEP_RATIO)
         if e > 0.8 * target and e < 1.25 * target:
             break
