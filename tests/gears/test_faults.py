@@ -191,6 +191,26 @@ def test_severity_shows_in_the_mesh():
     assert np.linalg.norm(swing(TipRelief())) < 1e-12
 
 
+def test_sidebands_around_the_mesh_frequency():
+    # one point per tooth quarter over a revolution: line 29 is the mesh frequency, 28 and 30 its sidebands
+    def lines(**changes):
+        mesh = StaticMesh(GearPair.paper(backlash="0.6 mm", **changes))
+        lag = []
+        for angle in np.arange(29 * 8) * TURN / 8:
+            ideal = mesh.ideal_angle(angle)
+            lag.append((mesh.loaded_angle(angle, 100.0, ideal + 20e-6 / 0.0417) - ideal) * 0.0417)
+        spectrum = abs(np.fft.rfft(lag)) * 2 / len(lag)
+        return spectrum[29], max(spectrum[28], spectrum[30])
+
+    mesh_line, clean = lines()
+    assert clean < 1e-4 * mesh_line
+    small, large = (lines(faults=[Eccentricity(amount=a)])[1] for a in (20e-6, 80e-6))
+    assert 10 * clean < small < large
+    for changes in ({"misalignment": "0.5 deg"}, {"centre_distance_error": "1 mm"}):
+        line, side = lines(**changes)
+        assert side < 1e-4 * line
+
+
 def test_symmetric_crowning_carries_in_the_middle():
     pair = GearPair.paper().with_faults(Crowning(amount="20 um"))
     te = loaded_transmission_error(pair, 100.0, 8)

@@ -72,3 +72,9 @@ def test_laws_refuse_nonsense():
     for arguments in ({"static": -0.1}, {"static_speed": "2 m/s"}, {"kind": "glue"}):
         with pytest.raises(ValueError, match="Friction"):
             Friction(**arguments)
+
+
+def test_hertz_line_contact():
+    # Palmgren: 1000 N on 20 mm of steel: 3.84e-5 * 1000^0.9 / 20^0.8 = 1.752e-3 mm
+    law = ContactLaw.hertz_line("20 mm", "206 GPa", 0.3)
+    assert (1000 / law.stiffness) ** 0.9 == pytest.approx(3.84e-8 * 1000**0.9 / 20**0.8, rel=1e-12)
