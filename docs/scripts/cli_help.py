@@ -27,5 +27,5 @@ def show() -> None:
     """Display every command with its arguments and options."""
     group = typer.main.get_command(app)
     for name, command in group.commands.items():
-        text = [f"**`gearmbs {name}`** {(command.help or '').strip()}", "", *option_rows(command)]
+        text = [f"**`gearmbs {name}`** — {(command.help or '').strip()}", "", *option_rows(command)]
         display(Markdown("\n".join(text)))

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from gearmbs.signals import COMPONENTS
 from gearmbs.studies import Case, SimulationFailed, make_case, run_cases
 from gearmbs.studies.store import write_text
+from gearmbs.view.canvas import new_figure
 
 DATA = Path(__file__).parent.parent / "data" / "sensitivity.csv"
 DEPTHS = (0.01, 0.03, 0.1, 0.3, 1.0)
@@ -160,7 +161,7 @@ def claim_maps(ratios: pd.DataFrame, across: str, label: str) -> Figure:
     table = ratios.reset_index()
     for name in rest:
         table = table[np.isclose(table[name], PRESET[name])]
-    figure = Figure(figsize=(9.0, 9.2), layout="constrained")
+    figure = new_figure(9.0, 9.2)
     axes = list(figure.subplots(3, 2).flat)
     for ax in axes[len(CLAIMS) :]:
         ax.set_visible(False)
