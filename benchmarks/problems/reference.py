@@ -174,7 +174,8 @@ def _heavy_top_solution(times: np.ndarray) -> np.ndarray:
     return np.array(out)
 
 
-def _chain(loops: int, t_end: float) -> ReferenceProblem:
+def chain_problem(loops: int, t_end: float) -> ReferenceProblem:
+    """Return a chain of four-bar linkages with the angle and rate of its first and last upright link."""
     times = np.linspace(0.0, t_end, 5)
     nq = 3 * (2 * loops + 1)
     columns = np.array([[3 * body + 2, nq + 3 * body + 2] for body in (0, 2 * loops)]).ravel()
@@ -219,6 +220,6 @@ def reference_problems() -> dict[str, ReferenceProblem]:
             "heavy top", "Euler's equations with a quaternion, DOP853 at 1e-13", heavy_top().problem, top_times,
             _heavy_top_solution(top_times), np.arange(24),
         ),
-        _chain(10, 2.0),
+        chain_problem(10, 2.0),
     )  # fmt: skip
     return {p.name: p for p in problems}

@@ -7,6 +7,7 @@ from numba import float64, int64, njit, types
 from gearmbs.dae.bdf import divided_difference_norm, step_for_error
 from gearmbs.dae.state import (
     CAUTION,
+    FIXED_LEADING,
     MAX_ORDER_ALLOWED,
     NODES,
     NPAST,
@@ -51,7 +52,9 @@ def after_success(real, count, times, hist, vec, small):
     count[SINCE_CHANGE] += 1
     if count[CAUTION] > 0:
         count[CAUTION] -= 1
-    if npast < k + 2:
+    settled = count[SINCE_CHANGE] > k
+    if npast < k + 2 or (count[FIXED_LEADING] and not settled):
+        # a re-interpolated history tells nothing new before it has been replaced
         return
     best = k
     h_best = _step_at_order(k, h, times, times, hist, vec, small)
@@ -60,7 +63,6 @@ def after_success(real, count, times, hist, vec, small):
         if h_low >= h_best:
             best = k - 1
             h_best = h_low
-    settled = count[SINCE_CHANGE] > k
     if best == k and k < count[MAX_ORDER_ALLOWED] and npast >= k + 3 and settled and count[CAUTION] == 0:
         h_high = _step_at_order(k + 1, h, times, times, hist, vec, small)
         if h_high > RAISE_GAIN * h_best:

@@ -36,6 +36,7 @@ RATE_OF_FRESH = 0.1
 MAX_FAILS = 16
 NEWTON_SHRINK = 0.25
 RESTART_SHRINK = 0.1
+RESTART_AFTER = 6
 DROP_AFTER = 3
 DROP_LEVELS = 3
 DROPPED_STEPS = 5
@@ -224,7 +225,9 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
             count[s.NEWTON_FAILS] = 0
             count[s.NAN_FAILS] = 0
             count[s.SINGULAR_FAILS] = 0
+            real[s.H] = max(real[s.H], real[s.H_MIN])
             real[s.H_TRY] = real[s.H]
+            real[s.H_REFUSED] = np.inf
         past = times[1:]
         t_old = past[0]
         if count[s.ERROR_FAILS] + count[s.NEWTON_FAILS] + count[s.NAN_FAILS] > MAX_FAILS:
@@ -240,7 +243,11 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
             stop = min(stop, st.outputs[count[s.NEXT_OUTPUT]])
         t = _fit_step(real, count, t_old, stop)
         h = t - t_old
-        if t <= t_old or (h < real[s.H_MIN] and t < stop):
+        if h < real[s.H_MIN] and t < stop and real[s.H_REFUSED] > (1.0 + 1e-9) * real[s.H_MIN]:
+            real[s.H] = real[s.H_MIN]
+            t = _fit_step(real, count, t_old, stop)
+            h = t - t_old
+        if t <= t_old or (h < (1.0 - 1e-9) * real[s.H_MIN] and t < stop):
             if count[s.NAN_FAILS] > 0:
                 return s.FAIL_NOT_FINITE
             if count[s.NEWTON_FAILS] > count[s.ERROR_FAILS]:
@@ -249,6 +256,7 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
         set_weights(real, hist[1], h, vec)
         h_wish = real[s.H]
         real[s.H] = h
+        real[s.H_REFUSED] = h
         if count[s.FIXED_LEADING] and count[s.NPAST] > 1:
             before = times[2]
             _respace(real, count, times, hist, small, 1)
@@ -331,6 +339,10 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
         for i in range(n):
             delta[i] = y[i] - y_pred[i]
             hist[0, i] = y[i]
+        if count[s.NPAST] == 1:
+            # algebraic unknowns may jump where a run starts afresh
+            for i in range(n):
+                delta[i] *= vec[s.IS_DIFFERENTIAL, i]
         times[0] = t
         error = constant * weighted_max(delta, vec[s.W_ERROR])
         real[s.ERROR] = error
@@ -339,9 +351,18 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
             count[s.ERROR_FAILS] += 1
             count[s.WORST] = weighted_argmax(delta, vec[s.W_ERROR])
             after_error_failure(real, count, times, hist, vec, small, error, count[s.ERROR_FAILS])
+            if count[s.ERROR_FAILS] == RESTART_AFTER and count[s.NPAST] > 1:
+                # a jump, most likely: the past says nothing about what comes
+                for i in range(n):
+                    vec[s.YP_START, i] = (hist[1, i] - hist[2, i]) / (times[1] - times[2])
+                _restart(real, count)
             continue
 
         # accepted
+        if count[s.NPAST] == 1:
+            for i in range(n):
+                if vec[s.IS_DIFFERENTIAL, i] == 0.0:
+                    hist[1, i] = y[i]
         accepted += 1
         count[s.STEPS] += 1
         count[s.SHIFTED] = 0

@@ -38,6 +38,7 @@ H_USED = 10
 NEWTON_TOL = 11
 GAMMA_BASE = 12
 H_TRY = 13
+H_REFUSED = 14
 N_REAL = 16
 
 # RunState.count
@@ -78,6 +79,7 @@ STALE = 33
 SLOPE_AGE = 34
 DROP_LEVEL = 35
 DROP_AGE = 36
+DROP_ROUNDS = 37
 N_COUNT = 40
 
 # rows of RunState.vec

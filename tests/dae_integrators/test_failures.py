@@ -1,0 +1,183 @@
+"""Every way a run can fail: status, a sentence that names time, unknown and remedy, and what was computed so far."""
+
+import numpy as np
+import pytest
+from numba import njit
+
+from gearmbs.dae.result import Status
+from gearmbs.dae.solve import solve_dae
+from gearmbs.dae.wstiff import solve_wstiff
+from tests.dae_integrators.problems import pendulum
+
+
+def test_singular_jacobian_names_the_unknown():
+    @njit
+    def residual(t, y, yp, out):
+        out[0] = yp[0] + y[0]
+        out[1] = y[1] + y[2] - y[0]
+        out[2] = 2.0 * y[1] + 2.0 * y[2] - 2.0 * y[0]
+
+    result = solve_dae(residual, (0.0, 1.0), [1.0, 0.5, 0.5], [-1.0, 0.0, 0.0], names=["a", "left", "right"])
+    assert result.status is Status.SINGULAR_JACOBIAN
+    assert "left" in result.message or "right" in result.message
+    assert "redundant" in result.message
+    assert result.t.tolist() == [0.0]
+
+
+def test_jacobian_that_becomes_singular_for_good():
+    """Nothing determines z from t = 1 on, and its equation cannot be satisfied."""
+
+    @njit
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - y[1]
+        out[1] = max(1.0 - t, 0.0) ** 4 * (y[1] ** 3 + y[1] - np.cos(t)) if t < 1.0 else 0.0 * y[1] + 1.0
+
+    result = solve_dae(residual, (0.0, 2.0), [0.0, 0.6823278], names=["q", "z"], rtol=1e-7)
+    assert not result.success
+    assert result.status is Status.SINGULAR_JACOBIAN
+    assert "z" in result.message
+    assert 0.9 < result.t_last
+    assert result.t[-1] > 0.5
+    assert "t = " in result.message
+
+
+def test_inconsistent_start_names_the_unknown():
+    problem = pendulum()
+    problem.y0[:2] = (1.001, 0.0)
+    result = solve_wstiff(problem, t_end=1.0, tol=1e-7)
+    assert result.status is Status.INCONSISTENT_START
+    assert " x " in result.message
+    assert "equation 4" in result.message
+    assert result.stats.steps == 0
+    assert result.t.tolist() == [0.0]
+
+
+def test_velocity_off_the_constraint_is_inconsistent_too():
+    problem = pendulum()
+    problem.y0[2] = 0.01
+    result = solve_wstiff(problem, t_end=1.0, tol=1e-7)
+    assert result.status is Status.INCONSISTENT_START
+    assert " u " in result.message
+
+
+def test_inconsistent_start_may_be_let_through():
+    problem = pendulum()
+    problem.y0[0] = 1.0001
+    result = solve_wstiff(problem, np.array([0.0, 0.5]), tol=1e-6, check_start=False)
+    assert result.success
+    assert abs(result.y[-1, 0] ** 2 + result.y[-1, 1] ** 2 - 1) < 1e-5
+
+
+def test_wrong_rates_and_multipliers_are_not_inconsistent():
+    problem = pendulum()
+    problem.yp0[:] = 0.0
+    problem.y0[4] = 5.0
+    assert solve_wstiff(problem, np.array([0.0, 0.5]), tol=1e-6).success
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_nan_from_a_user_function(compiled):
+    def residual(t, y, yp, out):
+        out[0] = yp[0] + 1.0 + np.sqrt(y[0])
+
+    fun = njit(residual) if compiled else residual
+    with np.errstate(invalid="ignore"):
+        result = solve_dae(fun, (0.0, 5.0), [1.0], names=["level"])
+    assert result.status is Status.NOT_FINITE
+    # y' = -1 - sqrt(y) from 1: with s = sqrt(y), t = 2 (1 - s) - 2 ln(2/(1 + s)), empty at t = 2 - 2 ln 2
+    assert result.t_last == pytest.approx(2 - 2 * np.log(2), abs=1e-2)
+    assert len(result.t) > 10
+    assert "equation 0" in result.message
+    assert "division by zero" in result.message
+
+
+def test_nan_at_the_start():
+    def residual(t, y, yp, out):
+        out[:] = np.nan
+
+    result = solve_dae(residual, (0.0, 1.0), [1.0], [0.0])
+    assert result.status is Status.NOT_FINITE
+    assert result.stats.steps == 0
+
+
+def test_step_at_hmin_names_the_dominating_unknown():
+    @njit
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - 1.0
+        out[1] = yp[1] - 1e4 * np.cos(1e4 * t)
+
+    result = solve_dae(residual, (0.0, 1.0), [0.0, 0.0], names=["slow", "fast"], atol=1e-8, min_step=1e-4)
+    assert result.status is Status.STEP_TOO_SMALL
+    assert "fast" in result.message
+    assert "HMIN" in result.message
+
+
+def test_blow_up_stops_close_to_the_pole():
+    @njit
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - y[0] ** 2
+
+    result = solve_dae(residual, (0.0, 2.0), [1.0], rtol=1e-6)
+    assert result.status in (Status.STEP_TOO_SMALL, Status.NEWTON_FAILURE, Status.TOO_MANY_REJECTIONS)
+    assert result.t_last == pytest.approx(1.0, abs=1e-3)
+    assert result.y[-1, 0] > 1e3
+
+
+def test_a_jump_of_an_algebraic_unknown_is_passed():
+    """z jumps from 0 to 1 at t = 0.5, so q ends at 0.5."""
+
+    @njit
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - y[1]
+        out[1] = y[1] - (1.0 if t > 0.5 else 0.0)
+
+    for extra in ({}, {"breakpoints": [0.5]}):
+        result = solve_dae(residual, (0.0, 1.0), [0.0, 0.0], error_mask=np.ones(2, bool), rtol=1e-6, **extra)
+        assert result.success
+        assert result.y[-1, 0] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_corrector_that_cannot_converge():
+    """A Jacobian of the wrong sign and size."""
+
+    @njit
+    def residual(t, y, yp, out):
+        out[0] = yp[0] + y[0]
+
+    @njit
+    def wrong(t, y, yp, cj, out):
+        out[0, 0] = -0.1 * cj
+
+    result = solve_dae(residual, (0.0, 1.0), [1.0], [-1.0], jac=wrong, names=["q"], first_step=1e-2)
+    assert result.status is Status.TOO_MANY_REJECTIONS
+    assert " q" in result.message
+    assert "breakpoint" in result.message
+    small = solve_dae(residual, (0.0, 1.0), [1.0], [-1.0], jac=wrong, names=["q"], first_step=1e-2, min_step=1e-4)
+    assert small.status is Status.NEWTON_FAILURE
+    assert "Jacobian" in small.message
+
+
+def test_step_limit():
+    result = solve_wstiff(pendulum(), t_end=10.0, tol=1e-8, max_steps=100)
+    assert result.status is Status.TOO_MANY_STEPS
+    assert "max_steps" in result.message
+    assert result.stats.steps == 100
+    assert len(result.t) == 101
+
+
+def test_exception_in_a_python_function():
+    def residual(t, y, yp, out):
+        if t > 0.5:
+            raise RuntimeError("valve stuck")
+        out[0] = yp[0] - 1.0
+
+    result = solve_dae(residual, (0.0, 1.0), [0.0])
+    assert result.status is Status.USER_ERROR
+    assert "valve stuck" in result.message
+    assert 0.0 < result.t_last <= 0.5
+
+
+def test_every_status_has_a_sentence():
+    for status in Status:
+        assert status.sentence.endswith(".")
+        assert Status(int(status)) is status
