@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from gearmbs.gears import GearPair, TransmissionError
 from gearmbs.gears.pattern import ContactPattern
-from gearmbs.view.canvas import BLUE, COLOURS, GREY, VERMILLION, drawn_on, label, legend_below, look
+from gearmbs.view.canvas import BLUE, COLOURS, VERMILLION, drawn_on, label, legend_below, look
 
 DASHES = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (7, 2, 1, 2)), (0, (1, 1)))
 
@@ -119,7 +119,7 @@ def _path_ends(ax: Axes, pair: GearPair) -> None:
     begin = pair.line_of_action - second.tip_string - middle
     for way, text, where in ((begin, "start of path", "top"), (first.tip_string - middle, "end of path", "bottom")):
         angle = np.rad2deg(way / first.base_radius)
-        ax.axhline(angle, color=GREY, linewidth=0.9, linestyle=(0, (5, 3)))
+        ax.axhline(angle, color=VERMILLION, linewidth=0.9, linestyle=(0, (5, 3)))
         shift = -3 if where == "top" else 3
         ax.annotate(
             text,
@@ -130,7 +130,8 @@ def _path_ends(ax: Axes, pair: GearPair) -> None:
             ha="right",
             va=where,
             fontsize=8,
-            color="#444444",
+            color=VERMILLION,
+            bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "alpha": 0.85, "edgecolor": "none"},
         )
 
 

@@ -23,8 +23,8 @@ class PairMotion:
     Attributes
     ----------
     pair : GearPair
-    label : str
-        What ``value`` counts, with its unit.
+    label, unit : str
+        What ``value`` counts, and its unit.
     value : ndarray, shape (n,)
         Time or position of each instant.
     origins, axes : ndarray, shape (2, n, 3) and (2, n, 3, 3)
@@ -35,6 +35,7 @@ class PairMotion:
 
     pair: GearPair
     label: str
+    unit: str
     value: np.ndarray
     origins: np.ndarray
     axes: np.ndarray
@@ -91,7 +92,7 @@ def static_motion(pair: GearPair, *, torque: float | None = None, pitches: float
     origins = np.array([[p.origin_1 for p in places], [p.origin_2 for p in places]])
     axes = np.array([[p.axes_1 for p in places], [p.axes_2 for p in places]])
     still = np.zeros_like(origins)
-    return PairMotion(pair, "driver angle over pitch angle", phase, origins, axes, still, still)
+    return PairMotion(pair, "driver angle over pitch angle", "", phase, origins, axes, still, still)
 
 
 def solution_motion(
@@ -125,7 +126,7 @@ def solution_motion(
     chosen = chosen_times(solution.t, start, stop, frames)
     poses = [marker_motion(solution, marker, chosen) for marker in (contact.i, contact.j)]
     origins, axes, velocities, spins = (np.array(parts) for parts in zip(*poses))
-    return PairMotion(contact.pair, "time, s", solution.t[chosen], origins, axes, velocities, spins)
+    return PairMotion(contact.pair, "time", "s", solution.t[chosen], origins, axes, velocities, spins)
 
 
 def chosen_times(t: np.ndarray, start: float | None, stop: float | None, frames: int) -> np.ndarray:

@@ -1,0 +1,198 @@
+"""The mesh in motion, seen along the axis, with contact points and forces."""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearmbs.gears import GearPair
+from gearmbs.view.canvas import png_bytes
+from gearmbs.view.contacts import ContactPoints, ContactProbe, mean_frame
+from gearmbs.view.files import whole_file
+from gearmbs.view.motion import (
+    PairMotion,
+    chosen_times,
+    gear_contact_of,
+    marker_motion,
+    solution_motion,
+    static_motion,
+)
+from gearmbs.view.page import Page, packed, rounded
+from gearmbs.view.solid import pair_deviations, section_outline
+from gearmbs.view.transverse import ARROW, FILLS, LINES, MM, TOLERANCE, force_text, mesh_view, projected
+
+if TYPE_CHECKING:
+    from gearmbs.dae.solution import Solution
+
+
+class MeshAnimation(Page):
+    """The teeth in mesh, instant by instant: a page, or an animated GIF.
+
+    Attributes
+    ----------
+    motion : PairMotion
+    points : list of ContactPoints
+        The contacts at each instant.
+    """
+
+    def __init__(
+        self, motion: PairMotion, title: str = "Gear mesh", width: float | None = None, station: float = 0.0
+    ) -> None:
+        self.motion = motion
+        self.points = ContactProbe(motion.pair).over(motion)
+        self.span = 7.0 * motion.pair.driver.module if width is None else float(width)
+        self.station = station
+        if not self.span > 0.0:
+            raise ValueError(f"width is {width} m; give a positive width of the detail")
+        data = _page_data(motion, self.points, self.span, station)
+        super().__init__(title, f"{len(motion)} instants", ("player.js", "transverse.js"), data)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the animation as ``.html`` (stands alone) or ``.gif``."""
+        if Path(path).suffix.lower() != ".gif":
+            return super().save(path)
+        from PIL import Image
+
+        images = []
+        for k in range(len(self.motion)):
+            figure = mesh_view(
+                self.motion.pair,
+                place=self.motion.placement(k),
+                points=self.points[k],
+                width=self.span,
+                station=self.station,
+                title=f"{self.title}: {self.motion.label} {self.motion.value[k]:.5f} {self.motion.unit}",
+            )
+            images.append(
+                Image.open(io.BytesIO(png_bytes(figure, dpi=80))).convert("P", palette=Image.Palette.ADAPTIVE)
+            )
+        with whole_file(path) as part:
+            images[0].save(part, format="GIF", save_all=True, append_images=images[1:], duration=60, loop=0)
+        return Path(path)
+
+
+def mesh_animation(
+    source: Solution | GearPair,
+    *,
+    element: str | None = None,
+    start: float | None = None,
+    stop: float | None = None,
+    frames: int = 120,
+    torque: float | None = None,
+    width: float | None = None,
+    station: float = 0.0,
+    title: str | None = None,
+) -> MeshAnimation:
+    """Animate the teeth in mesh with their contact forces.
+
+    Parameters
+    ----------
+    source : Solution or GearPair
+        A simulation, or a pair that rolls through two pitches at rest under load.
+    element : str, optional
+        Gear contact of the simulated mechanism, when it has several.
+    start, stop : float, optional
+        Part of the simulation, s; default the time of three mesh cycles at its end.
+    frames : int
+        At most so many instants; a simulation has no more than its outputs.
+    torque : float, optional
+        Load of a pair at rest, N m; default the pair's.
+    width : float, optional
+        Width of the detail, m; default seven modules.
+    station : float
+        Section along the face, m from mid-face.
+    title : str, optional
+
+    Returns
+    -------
+    MeshAnimation
+        Shows itself in notebooks; ``save("mesh.html")`` and ``save("mesh.gif")``.
+
+    Examples
+    --------
+    >>> animation = mesh_animation(GearPair.paper(), frames=4)
+    >>> len(animation.points)
+    4
+    """
+    if isinstance(source, GearPair):
+        motion = static_motion(source, torque=torque, pitches=2.0, frames=frames)
+        return MeshAnimation(motion, title or "Gear mesh at rest under load", width, station)
+    if start is None:
+        start = _last_cycles(source, element, stop)
+    motion = solution_motion(source, element=element, start=start, stop=stop, frames=frames)
+    return MeshAnimation(motion, title or "Gear mesh, simulated", width, station)
+
+
+def _last_cycles(solution: Solution, element: str | None, stop: float | None, cycles: float = 3.0) -> float:
+    """Return the time so many mesh cycles before the end."""
+    contact = gear_contact_of(solution, element)
+    last = chosen_times(solution.t, float(solution.t[0]), stop, solution.t.size)[-1:]
+    _, axes, _, spin = marker_motion(solution, contact.i, last)
+    begin, end = float(solution.t[0]), float(solution.t[last[0]])
+    speed = abs(float(spin[0] @ axes[0, :, 2]))
+    if speed == 0.0:
+        return begin
+    return max(begin, end - cycles * 2.0 * math.pi / (speed * contact.pair.driver.teeth))
+
+
+def _page_data(motion: PairMotion, points: list[ContactPoints], span: float, station: float) -> dict:
+    """Return what the page draws: lengths in mm, in the mean frame of each instant."""
+    pair = motion.pair
+    means = [mean_frame(motion.placement(k)) for k in range(len(motion))]
+    wheels = []
+    for w, (wheel, deviation) in enumerate(zip(pair.wheels, pair_deviations(pair))):
+        outline = section_outline(wheel, station, TOLERANCE, deviation)
+        wheels.append(
+            {
+                "name": ("driver", "driven")[w],
+                "fill": FILLS[w],
+                "line": LINES[w],
+                "outline": packed(outline * MM),
+                "bore": wheel.bore_radius * MM,
+                "base": wheel.base_radius * MM,
+                "maps": [_affine(motion, w, k, means[k], station) for k in range(len(motion))],
+            }
+        )
+    largest = max((float(np.linalg.norm(f)) for p in points for *_, f in p.pairs()), default=1.0)
+    unit = ARROW * pair.driver.module * MM / largest
+    heaviest = max((float(p.force.max(initial=0.0)) for p in points), default=0.0) or 1.0
+    dots, arrows = [], []
+    for k, found in enumerate(points):
+        base, mean = motion.origins[0, k], means[k]
+        flat = (found.point - base) @ mean * MM
+        dots.append([rounded([x, y, f / heaviest]) for (x, y, _), f in zip(flat, found.force) if f > 0.0])
+        rows = []
+        for *_, centre, force in found.pairs():
+            x, y, _ = (centre - base) @ mean * MM
+            fx, fy, _ = force @ mean * unit
+            rows.append([*rounded([x, y, fx, fy]), force_text(float(np.linalg.norm(force)))])
+        arrows.append(rows)
+    alpha, rb = pair.working_pressure_angle, pair.wheels[0].base_radius
+    begin = rb * np.array([math.cos(alpha), -pair.rotation * math.sin(alpha)])
+    end = begin + pair.line_of_action * np.array([math.sin(alpha), pair.rotation * math.cos(alpha)])
+    first, second = pair.wheels
+    return {
+        "wheels": wheels,
+        "values": rounded(motion.value, 9),
+        "label": motion.label,
+        "unit": motion.unit,
+        "span": span * MM,
+        "centre": pair.centre_distance * first.base_radius / (first.base_radius + second.base_radius) * MM,
+        "action": rounded(np.concatenate([begin, end]) * MM),
+        "points": dots,
+        "arrows": arrows,
+        "force": rounded([float(p.force.sum()) for p in points]),
+    }
+
+
+def _affine(motion: PairMotion, wheel: int, k: int, mean: np.ndarray, station: float) -> list[float]:
+    """Return the six numbers of the map from a wheel's section to the plane of the picture, mm."""
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    zero, x, y = projected(
+        corners, motion.origins[wheel, k], motion.axes[wheel, k], motion.origins[0, k], mean, station
+    )
+    return rounded([*(x - zero), *(y - zero), *(zero * MM)], 9)

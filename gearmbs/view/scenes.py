@@ -1,0 +1,324 @@
+"""Scenes of gear pairs, mechanisms and simulations, from the geometry and inertia that are simulated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearmbs.gears import GearPair
+from gearmbs.view.canvas import BLUE, COLOURS, GREY, ORANGE
+from gearmbs.view.contacts import ContactProbe
+from gearmbs.view.mesh import Mesh, ball, box, cylinder, joined, rod
+from gearmbs.view.motion import PairMotion, chosen_times, marker_motion, mechanism_of, static_motion
+from gearmbs.view.scene import UP, Part, Scene
+from gearmbs.view.solid import pair_solids
+
+if TYPE_CHECKING:
+    from gearmbs.dae.solution import Solution
+    from gearmbs.mechanism import Mechanism
+    from gearmbs.mechanism.parts import Body
+
+TOLERANCE = 8e-6
+"""Chords of the drawn profile, m; finer than a pixel."""
+
+SHAFT = "#A9B0BA"
+GEARS = (BLUE, ORANGE)
+OTHERS = tuple(c for c in COLOURS if c not in GEARS)
+SAME = 1e-6
+THIN = 0.12
+ROD = 0.012
+"""Radius of rods between markers, as a part of the mechanism's size."""
+
+
+def gear_scene(
+    pair: GearPair,
+    *,
+    torque: float | None = None,
+    pitches: float = 1.0,
+    frames: int = 1,
+    shaft_radius: float = 0.015,
+    shaft_length: float = 0.200,
+    forces: bool = True,
+    exaggeration: float = 1.0,
+    title: str | None = None,
+) -> Scene:
+    """Return both wheels on their shafts, at rest under load: the paper's Fig. 1 from the simulated geometry.
+
+    The axes are drawn as lines and, for a misaligned pair, the place where the driven axis ought to be.
+
+    Parameters
+    ----------
+    pair : GearPair
+    torque : float, optional
+        On the driven wheel, N m; default the pair's, 0 for touching without load.
+    pitches, frames : float, int
+        How far the driver turns, in how many instants.
+    shaft_radius, shaft_length : float
+        m; no shaft with radius 0.
+    forces : bool
+        Draw the forces of the driver on the driven wheel.
+    exaggeration : float
+        Deviations of the flanks are drawn this many times larger.
+    title : str, optional
+
+    Examples
+    --------
+    >>> scene = gear_scene(GearPair.paper(misalignment="1 deg", backlash="0.4 mm"))
+    >>> [part.name for part in scene.parts]
+    ['driver', 'driven', 'driver shaft', 'driven shaft']
+    """
+    if shaft_radius < 0.0 or shaft_length <= 0.0:
+        raise ValueError(f"shaft_radius {shaft_radius} m and shaft_length {shaft_length} m; give positive sizes")
+    motion = static_motion(pair, torque=torque, pitches=pitches, frames=frames)
+    names = ("driver", "driven")
+    solids = pair_solids(pair, TOLERANCE, exaggeration)
+    parts = [Part(names[w], solids[w], GEARS[w], motion.origins[w], motion.axes[w]) for w in (0, 1)]
+    if shaft_radius > 0.0:
+        shaft = cylinder(shaft_radius, shaft_length, 72)
+        parts += [Part(f"{names[w]} shaft", shaft, SHAFT, motion.origins[w], motion.axes[w]) for w in (0, 1)]
+    return Scene(
+        parts,
+        title or pair_title(pair),
+        motion.label,
+        motion.unit,
+        motion.value,
+        pair_forces(motion) if forces and (torque is None or torque > 0.0) else [],
+        axis_lines(pair, motion, 1.3 * max(shaft_length, pair.driver.face_width)),
+    )
+
+
+def pair_title(pair: GearPair) -> str:
+    """Return a heading that names the pair and its faults."""
+    parts = [f"gear pair {pair.driver.teeth}/{pair.driven.teeth}"]
+    if pair.misalignment:
+        parts.append(f"axes {math.degrees(pair.misalignment):.3g}° apart ({pair.plane})")
+    if pair.centre_distance_error:
+        parts.append(f"centre distance {pair.centre_distance_error * 1e3:+.3g} mm")
+    parts += [fault.label for fault in pair.faults]
+    return ", ".join(parts)
+
+
+def axis_lines(pair: GearPair, motion: PairMotion, length: float) -> list[tuple[str, str, np.ndarray]]:
+    """Return the wheels' axes at the start, and where a misaligned one ought to be."""
+    ways = motion.axes[:, 0, :, 2]
+    half = 0.5 * length
+    ends = np.stack([motion.origins[:, 0] - half * ways, motion.origins[:, 0] + half * ways], axis=1)
+    out = [("axes", "#333333", ends)]
+    if pair.misalignment:
+        way = motion.axes[0, 0, :, 2]
+        centre = motion.origins[1, 0]
+        out.append(("aligned axis", GREY, np.array([[centre - half * way, centre + half * way]])))
+    return out
+
+
+def pair_forces(motion: PairMotion) -> list[np.ndarray]:
+    """Return point and vector of the driver's force on the driven wheel, for each tooth pair and instant."""
+    found = ContactProbe(motion.pair).over(motion)
+    rows = [[np.stack([centre, force]) for *_, centre, force in points.pairs()] for points in found]
+    return [np.array(r).reshape(-1, 2, 3) for r in rows]
+
+
+def mechanism_scene(
+    mechanism: Mechanism,
+    *,
+    shapes: Mapping[str, Mesh] | None = None,
+    joints: bool = True,
+    title: str | None = None,
+) -> Scene:
+    """Return a mechanism at its initial position.
+
+    Wheels of a gear contact are drawn from their geometry. Any other body is the cylinder or box that has its mass
+    moments, and rods lead to its markers; a body without mass is its markers and the rods between them.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    shapes : mapping of body name to Mesh, optional
+        Meshes in the bodies' frames instead.
+    joints : bool
+        Mark joints with small balls.
+    title : str, optional
+    """
+    names = list(mechanism.bodies)
+    poses = {n: (mechanism.bodies[n].position[None], mechanism.bodies[n].orientation[None]) for n in names}
+    balls = _joint_parts(mechanism, None, np.zeros(1, dtype=int)) if joints else []
+    parts = [*_body_parts(mechanism, poses, shapes or {}), *balls]
+    return Scene(parts, title or mechanism.name, up=_up(mechanism))
+
+
+def solution_scene(
+    solution: Solution,
+    *,
+    start: float | None = None,
+    stop: float | None = None,
+    frames: int = 120,
+    shapes: Mapping[str, Mesh] | None = None,
+    joints: bool = False,
+    forces: bool = True,
+    title: str | None = None,
+) -> Scene:
+    """Return a simulated mechanism in motion; see `mechanism_scene` for how its bodies are drawn.
+
+    Parameters
+    ----------
+    solution : Solution
+    start, stop : float, optional
+        Span, s; default the last tenth of the simulation.
+    frames : int
+        At most so many instants, taken from the outputs.
+    shapes, joints
+        See `mechanism_scene`.
+    forces : bool
+        Draw the forces between the teeth of gear contacts.
+    title : str, optional
+    """
+    mechanism = mechanism_of(solution)
+    chosen = chosen_times(solution.t, start, stop, frames)
+    poses = {}
+    for name, body in mechanism.bodies.items():
+        turned = solution.orientation(name)[chosen]
+        poses[name] = (solution.position(name)[chosen] - turned @ body.com, turned)
+    balls = _joint_parts(mechanism, solution, chosen) if joints else []
+    parts = [*_body_parts(mechanism, poses, shapes or {}), *balls]
+    arrows = _contact_forces(solution, chosen) if forces else []
+    return Scene(
+        parts, title or mechanism.name, "time", "s", solution.t[chosen], arrows, _lines(mechanism), _up(mechanism)
+    )
+
+
+def body_mesh(body: Body, reach: float = 0.0) -> Mesh | None:
+    """Return the cylinder (or ball, or box) that has a body's mass and moments, in the body's frame.
+
+    A body with two equal principal moments becomes a cylinder along the third, any other a box; None without mass or
+    moments. Rods of a part ``reach`` of the size of the mechanism lead to its markers.
+    """
+    pieces: list[Mesh] = []
+    moments, axes = np.linalg.eigh(body.inertia)
+    if body.mass > 0.0 and moments[-1] > 0.0:
+        pieces.append(_equivalent(body.mass, moments, axes).placed(body.com, np.eye(3)))
+    hub = body.com if body.mass > 0.0 or not body.markers else body.markers[0].position
+    if reach > 0.0:
+        for marker in body.markers:
+            if np.linalg.norm(marker.position - hub) > 4.0 * reach:
+                pieces.append(rod(hub, marker.position, reach))
+        if not pieces:
+            pieces.append(ball(2.0 * reach).placed(hub, np.eye(3)))
+    return joined(pieces) if pieces else None
+
+
+def _equivalent(mass: float, moments: np.ndarray, axes: np.ndarray) -> Mesh:
+    for k in range(3):
+        one, two = moments[(k + 1) % 3], moments[(k + 2) % 3]
+        if abs(one - two) > SAME * moments[-1]:
+            continue
+        # a solid cylinder: I_z = m r^2 / 2, I_x = m (3 r^2 + l^2) / 12
+        square = 2.0 * moments[k] / mass
+        length = 12.0 * 0.5 * (one + two) / mass - 3.0 * square
+        if length <= 0.0:
+            continue
+        length = math.sqrt(length)
+        radius = max(math.sqrt(square), 0.5 * THIN * THIN * length)
+        frame = np.column_stack([axes[:, (k + 1) % 3], axes[:, (k + 2) % 3], axes[:, k]])
+        frame[:, 0] *= np.linalg.det(frame)
+        return cylinder(radius, length, 72).placed(np.zeros(3), frame)
+    total = moments.sum()
+    edges = np.sqrt(np.maximum(6.0 * (total - 2.0 * moments) / mass, 0.0))
+    edges = np.maximum(edges, THIN * THIN * edges.max())
+    frame = axes * np.array([1.0, 1.0, np.linalg.det(axes)])
+    return box(*edges).placed(np.zeros(3), frame)
+
+
+def _body_parts(mechanism: Mechanism, poses: dict, shapes: Mapping[str, Mesh]) -> list[Part]:
+    unknown = [name for name in shapes if name not in poses]
+    if unknown:
+        raise ValueError(f"shapes: no body {unknown[0]!r}; the bodies are {', '.join(poses)}")
+    wheels = _wheels(mechanism)
+    reach = ROD * _size(mechanism)
+    parts = []
+    other = 0
+    for name, (origins, axes) in poses.items():
+        if name in wheels and name not in shapes:
+            mesh, marker, colour = wheels[name]
+            parts.append(Part(name, mesh.placed(marker.position, marker.orientation), colour, origins, axes))
+            continue
+        body = mechanism.bodies[name]
+        own = shapes.get(name) or body_mesh(body, 0.0 if wheels else reach)
+        if own is not None:
+            colour = SHAFT if wheels else OTHERS[other % len(OTHERS)]
+            other += 1
+            parts.append(Part(name, own, colour, origins, axes))
+    return parts
+
+
+def _wheels(mechanism: Mechanism) -> dict[str, tuple]:
+    """Return mesh, marker and colour of every body that carries a wheel."""
+    from gearmbs.mechanism.elements import GearContact
+
+    out: dict[str, tuple] = {}
+    for element in mechanism.elements.values():
+        if isinstance(element, GearContact) and isinstance(element.pair, GearPair):
+            solids = pair_solids(element.pair, TOLERANCE)
+            for marker, mesh, colour in zip((element.i, element.j), solids, GEARS):
+                out.setdefault(marker.body.name, (mesh, marker, colour))
+    return out
+
+
+def _size(mechanism: Mechanism) -> float:
+    """Return the extent of centres and markers at the start, m."""
+    points = [m.global_position() for b in (mechanism.ground, *mechanism.bodies.values()) for m in b.markers]
+    points += [b.position + b.orientation @ b.com for b in mechanism.bodies.values()]
+    return float(np.ptp(np.array(points), axis=0).max()) if points else 1.0
+
+
+def _up(mechanism: Mechanism) -> tuple[float, float, float]:
+    gravity = np.asarray(mechanism.gravity, dtype=float)
+    size = float(np.linalg.norm(gravity))
+    if size == 0.0:
+        return UP
+    x, y, z = -gravity / size
+    return float(x), float(y), float(z)
+
+
+def _lines(mechanism: Mechanism) -> list[tuple[str, str, np.ndarray]]:
+    """Return the axes of revolute joints on the ground of a geared mechanism."""
+    if not _wheels(mechanism):
+        return []
+    half = 0.9 * max(_size(mechanism), 0.1)
+    ends = []
+    for joint in mechanism.joints.values():
+        if joint.kind == "revolute" and (joint.i.body.is_ground or joint.j.body.is_ground):
+            marker = joint.j if joint.j.body.is_ground else joint.i
+            way, point = marker.global_orientation()[:, 2], marker.global_position()
+            ends.append([point - half * way, point + half * way])
+    return [("axes", "#333333", np.array(ends))] if ends else []
+
+
+def _joint_parts(mechanism: Mechanism, solution: Solution | None, chosen: np.ndarray) -> list[Part]:
+    mesh = ball(1.8 * ROD * _size(mechanism), 8)
+    parts = []
+    for name, joint in mechanism.joints.items():
+        if not joint.rows or joint.kind in ("motion", "rotation", "translation", "coupler"):
+            continue
+        marker = joint.i
+        if solution is None:
+            origins, axes = marker.global_position()[None], marker.global_orientation()[None]
+        else:
+            origins, axes, _, _ = marker_motion(solution, marker, chosen)
+        parts.append(Part(f"{name} ({joint.kind})", mesh, "#444B55", origins, axes))
+    return parts
+
+
+def _contact_forces(solution: Solution, chosen: np.ndarray) -> list[np.ndarray]:
+    from gearmbs.mechanism.elements import GearContact
+
+    total: list[list[np.ndarray]] = [[] for _ in range(chosen.size)]
+    for element in mechanism_of(solution).elements.values():
+        if isinstance(element, GearContact) and isinstance(element.pair, GearPair):
+            poses = [marker_motion(solution, marker, chosen) for marker in (element.i, element.j)]
+            motion = PairMotion(element.pair, "time", "s", solution.t[chosen], *(np.array(p) for p in zip(*poses)))
+            for rows, found in zip(total, pair_forces(motion)):
+                rows.extend(found)
+    return [np.array(rows).reshape(-1, 2, 3) for rows in total] if any(total) else []
