@@ -56,3 +56,11 @@ def test_claim_ratios_of_a_made_up_table(scripts):
     ]
     ratios = sensitivity.claim_ratios(pd.DataFrame(rows))
     np.testing.assert_allclose(ratios.to_numpy()[0], [3.0, 0.5, 0.8, 2.0, 2.0])
+
+
+def test_maps_show_themselves_in_a_notebook(scripts):
+    """Figures carry their picture with them, also where nothing has set up matplotlib."""
+    import sensitivity
+
+    figure = sensitivity.claim_maps(sensitivity.claim_ratios(sensitivity.load()), "speed_rpm", "speed, rpm")
+    assert figure._repr_png_().startswith(b"\x89PNG")
