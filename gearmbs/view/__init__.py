@@ -9,38 +9,108 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gearmbs.view.animation import MeshAnimation, mesh_animation
     from gearmbs.view.bars import comparison_bars, gmf_bars
     from gearmbs.view.canvas import COLOURS, save_figure
+    from gearmbs.view.contacts import ContactPoints, ContactProbe
+    from gearmbs.view.curves import contact_pattern_plot, load_sharing_plot, stiffness_plot, transmission_error_plot
+    from gearmbs.view.export_dxf import write_dxf
+    from gearmbs.view.export_step import write_step
+    from gearmbs.view.export_stl import read_stl, write_stl
     from gearmbs.view.maps import sensitivity_map
+    from gearmbs.view.mesh import Mesh
+    from gearmbs.view.motion import PairMotion, solution_motion, static_motion
+    from gearmbs.view.outline import gear_outline, profile_area
+    from gearmbs.view.page import Page
+    from gearmbs.view.scene import Part, Scene
+    from gearmbs.view.scenes import gear_scene, mechanism_scene, solution_scene
     from gearmbs.view.signals import order_plot, spectrum_plot, time_plot
+    from gearmbs.view.solid import gear_solid, pair_solids
+    from gearmbs.view.transverse import mesh_view
 
 _HOMES = {
     "COLOURS": "canvas",
+    "ContactPoints": "contacts",
+    "ContactProbe": "contacts",
+    "Mesh": "mesh",
+    "MeshAnimation": "animation",
+    "Page": "page",
+    "PairMotion": "motion",
+    "Part": "scene",
+    "Scene": "scene",
     "comparison_bars": "bars",
+    "contact_pattern_plot": "curves",
+    "gear_outline": "outline",
+    "gear_scene": "scenes",
+    "gear_solid": "solid",
     "gmf_bars": "bars",
+    "load_sharing_plot": "curves",
+    "mechanism_scene": "scenes",
+    "mesh_animation": "animation",
+    "mesh_view": "transverse",
     "order_plot": "signals",
+    "pair_solids": "solid",
+    "profile_area": "outline",
+    "read_stl": "export_stl",
     "save_figure": "canvas",
     "sensitivity_map": "maps",
+    "solution_motion": "motion",
+    "solution_scene": "scenes",
     "spectrum_plot": "signals",
+    "static_motion": "motion",
+    "stiffness_plot": "curves",
     "time_plot": "signals",
+    "transmission_error_plot": "curves",
+    "write_dxf": "export_dxf",
+    "write_step": "export_step",
+    "write_stl": "export_stl",
 }
 
 __all__ = [
     "COLOURS",
+    "ContactPoints",
+    "ContactProbe",
+    "Mesh",
+    "MeshAnimation",
+    "Page",
+    "PairMotion",
+    "Part",
+    "Scene",
     "comparison_bars",
+    "contact_pattern_plot",
+    "gear_outline",
+    "gear_scene",
+    "gear_solid",
     "gmf_bars",
+    "load_sharing_plot",
+    "mechanism_scene",
+    "mesh_animation",
+    "mesh_view",
     "order_plot",
+    "pair_solids",
+    "profile_area",
+    "read_stl",
     "save_figure",
     "sensitivity_map",
+    "solution_motion",
+    "solution_scene",
     "spectrum_plot",
+    "static_motion",
+    "stiffness_plot",
     "time_plot",
+    "transmission_error_plot",
+    "write_dxf",
+    "write_step",
+    "write_stl",
 ]
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
 
 
 def __dir__() -> list[str]:

@@ -149,8 +149,10 @@ def bars(
         for patch in drawn:
             patch.set_hatch(HATCHES[k % len(HATCHES)])
         if values:
-            texts = [f"{v:.3g}" if np.isfinite(v) else "no data" for v in data[k]]
+            texts = [f"{v:.3g}" if np.isfinite(v) else "" for v in data[k]]
             ax.bar_label(drawn, texts, padding=2, fontsize=max(5.5, min(8.5, 10.5 - 0.8 * count)))
+        for x in at[~np.isfinite(data[k])]:
+            ax.text(x, 0.02, "no data", rotation=90, ha="center", fontsize=8, transform=ax.get_xaxis_transform())
     if log:
         ax.set_yscale("log")
     else:

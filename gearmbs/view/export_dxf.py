@@ -17,7 +17,7 @@ LAYERS = {"PROFILE": 7, "BORE": 7, "PITCH": 4, "BASE": 3, "LINE_OF_ACTION": 1}
 """Layers and their colour numbers."""
 
 
-def export_dxf(gears: GearSpec | GearPair, path: str | Path, *, tolerance: float = TOLERANCE) -> Path:
+def write_dxf(gears: GearSpec | GearPair, path: str | Path, *, tolerance: float = TOLERANCE) -> Path:
     """Write the profile of a wheel, or of a pair in mesh, as DXF (release 12, millimetres).
 
     Root circle, root arcs, tip roundings and tip circle are exact arcs, the involute a chain of chords. Layers:
@@ -46,7 +46,7 @@ def export_dxf(gears: GearSpec | GearPair, path: str | Path, *, tolerance: float
     if isinstance(gears, GearPair):
         if gears.misalignment != 0.0 or gears.faults:
             raise ValueError(
-                "gears: a plane drawing cannot show misalignment or faults of single teeth; use export_stl, or "
+                "gears: a plane drawing cannot show misalignment or faults of single teeth; use write_stl, or "
                 "with_changes(misalignment=0, faults=())"
             )
         place = gears.placement()

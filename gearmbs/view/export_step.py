@@ -22,7 +22,7 @@ UP = (0.0, 0.0, 1.0)
 DOWN = (0.0, 0.0, -1.0)
 
 
-def export_step(gears: GearSpec | GearPair, path: str | Path, *, driver_angle: float = 0.0) -> Path:
+def write_step(gears: GearSpec | GearPair, path: str | Path, *, driver_angle: float = 0.0) -> Path:
     """Write a wheel, or a placed pair as two solids, as a STEP file (AP214, millimetres).
 
     Parameters
@@ -40,13 +40,13 @@ def export_step(gears: GearSpec | GearPair, path: str | Path, *, driver_angle: f
     Raises
     ------
     ValueError
-        If the pair has faults of single teeth: those are tabulated, not curves; write them with `export_stl`.
+        If the pair has faults of single teeth: those are tabulated, not curves; write them with `write_stl`.
     """
     writer = _Writer()
     if isinstance(gears, GearPair):
         if gears.faults:
             raise ValueError(
-                "gears: the pair has faults of single teeth, which STEP curves cannot follow; use export_stl, or "
+                "gears: the pair has faults of single teeth, which STEP curves cannot follow; use write_stl, or "
                 "with_changes(faults=())"
             )
         place = gears.placement(driver_angle)

@@ -16,7 +16,7 @@ RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute
 LENGTH_UNITS = {"mm": 1e3, "m": 1.0, "cm": 1e2, "in": 1.0 / 0.0254}
 
 
-def export_stl(
+def write_stl(
     solid: GearSpec | GearPair | Mesh,
     path: str | Path,
     *,

@@ -115,13 +115,15 @@ def _is_edge(depth, facing, owner, j, i, step):
         m, n = j + dj, i + di
         if m < 0 or n < 0 or m >= h or n >= w:
             continue
-        if owner[m, n] != owner[j, i]:
+        if owner[m, n] < 0:
             return True
         turn = 0.0
         for c in range(3):
             turn += facing[m, n, c] * facing[j, i, c]
         steep = max(min(facing[m, n, 2], facing[j, i, 2]), 0.08)
-        if turn < 0.86 or abs(depth[m, n] - depth[j, i]) > step / steep:
+        # two solids that touch flush have no edge between them
+        other = owner[m, n] != owner[j, i]
+        if turn < (0.98 if other else 0.86) or abs(depth[m, n] - depth[j, i]) > (0.3 if other else 1.0) * step / steep:
             return True
     return False
 

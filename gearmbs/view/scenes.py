@@ -146,7 +146,9 @@ def mechanism_scene(
     poses = {n: (mechanism.bodies[n].position[None], mechanism.bodies[n].orientation[None]) for n in names}
     balls = _joint_parts(mechanism, None, np.zeros(1, dtype=int)) if joints else []
     parts = [*_body_parts(mechanism, poses, shapes or {}), *balls]
-    return Scene(parts, title or mechanism.name, up=_up(mechanism))
+    scene = Scene(parts, title or mechanism.name, up=_up(mechanism))
+    scene.lines = _lines(mechanism, scene.size)
+    return scene
 
 
 def solution_scene(
@@ -184,9 +186,9 @@ def solution_scene(
     balls = _joint_parts(mechanism, solution, chosen) if joints else []
     parts = [*_body_parts(mechanism, poses, shapes or {}), *balls]
     arrows = _contact_forces(solution, chosen) if forces else []
-    return Scene(
-        parts, title or mechanism.name, "time", "s", solution.t[chosen], arrows, _lines(mechanism), _up(mechanism)
-    )
+    scene = Scene(parts, title or mechanism.name, "time", "s", solution.t[chosen], arrows, [], _up(mechanism))
+    scene.lines = _lines(mechanism, scene.size)
+    return scene
 
 
 def body_mesh(body: Body, reach: float = 0.0) -> Mesh | None:
@@ -282,11 +284,11 @@ def _up(mechanism: Mechanism) -> tuple[float, float, float]:
     return float(x), float(y), float(z)
 
 
-def _lines(mechanism: Mechanism) -> list[tuple[str, str, np.ndarray]]:
+def _lines(mechanism: Mechanism, size: float) -> list[tuple[str, str, np.ndarray]]:
     """Return the axes of revolute joints on the ground of a geared mechanism."""
     if not _wheels(mechanism):
         return []
-    half = 0.9 * max(_size(mechanism), 0.1)
+    half = 0.62 * size
     ends = []
     for joint in mechanism.joints.values():
         if joint.kind == "revolute" and (joint.i.body.is_ground or joint.j.body.is_ground):
@@ -297,7 +299,7 @@ def _lines(mechanism: Mechanism) -> list[tuple[str, str, np.ndarray]]:
 
 
 def _joint_parts(mechanism: Mechanism, solution: Solution | None, chosen: np.ndarray) -> list[Part]:
-    mesh = ball(1.8 * ROD * _size(mechanism), 8)
+    mesh = ball(2.6 * ROD * _size(mechanism), 8)
     parts = []
     for name, joint in mechanism.joints.items():
         if not joint.rows or joint.kind in ("motion", "rotation", "translation", "coupler"):

@@ -1,0 +1,172 @@
+import numpy as np
+import pytest
+import xarray as xr
+
+from gearmbs import signals
+from gearmbs.gears import GearPair, loaded_transmission_error
+from gearmbs.gears.pattern import contact_pattern
+from gearmbs.view import (
+    contact_pattern_plot,
+    load_sharing_plot,
+    order_plot,
+    sensitivity_map,
+    spectrum_plot,
+    stiffness_plot,
+    time_plot,
+    transmission_error_plot,
+)
+from gearmbs.view.signals import thinned
+from tests.view.looking import assert_readable
+
+GMF = 483.3333
+
+
+@pytest.fixture(scope="module")
+def signal():
+    t = np.arange(12800) / 12800
+    x = np.sin(2 * np.pi * GMF * t) * (1 + 0.3 * np.cos(2 * np.pi * t * GMF / 29)) + 0.2 * np.sin(4 * np.pi * GMF * t)
+    data = {"line_of_action": x, "tangential": 0.5 * x**2}
+    return signals.make_signal(data, 12800, units="m/s^2", speed=2 * np.pi * GMF / 29, teeth=(29, 29))
+
+
+def test_time_plot_shows_the_span_with_units(signal):
+    figure = time_plot(signal, start=0.1, stop=0.2, title="Acceleration of gear 2")
+    assert len(figure.axes) == 2
+    line = figure.axes[0].lines[0]
+    assert line.get_xdata()[0] == pytest.approx(0.1)
+    assert line.get_xdata().size == 1280
+    assert figure.axes[0].get_ylabel() == "acceleration, m/s²"
+    assert figure.axes[1].get_xlabel() == "time, s"
+    assert_readable(figure)
+
+
+def test_spectrum_marks_the_mesh_lines_and_sidebands(signal):
+    figure = spectrum_plot(signals.spectrum(signal), gmf=GMF, sideband=GMF / 29, maximum=2000.0)
+    ax = figure.axes[0]
+    marks = [line.get_xdata()[0] for line in ax.lines[1:]]
+    np.testing.assert_allclose(marks, [GMF, 2 * GMF, 3 * GMF])
+    assert [t.get_text() for t in ax.texts] == ["1× GMF", "2× GMF", "3× GMF"]
+    assert ax.get_xlim() == (0.0, 2000.0)
+    assert_readable(figure)
+    # lines beyond the shown band are left out
+    assert len(spectrum_plot(signals.spectrum(signal), gmf=GMF, maximum=600.0).axes[0].texts) == 1
+
+
+def test_order_plot_marks_the_mesh_orders(signal):
+    phase = signals.phase_from_speed(signal, signal.attrs["speed"])
+    spectrum = signals.order_spectrum(signals.angular_resample(signal, phase))
+    figure = order_plot(spectrum, teeth=29, maximum=100.0, title="Order spectrum")
+    assert [line.get_xdata()[0] for line in figure.axes[0].lines[1:]] == [29, 58, 87]
+    assert_readable(figure)
+
+
+def test_thinning_keeps_the_extremes():
+    y = np.random.default_rng(5).standard_normal(1_000_003)
+    x, z = thinned(np.arange(y.size) * 1.0, y, 10_000)
+    assert z.size <= 10_200
+    assert (z.max(), z.min()) == (y.max(), y.min())
+    assert (np.diff(x) >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda s: time_plot(s, start=5.0), "spans 0 to"),
+        (lambda s: spectrum_plot(s), "frequency"),
+        (lambda s: spectrum_plot(signals.spectrum(s), gmf=-1.0), "gmf"),
+        (lambda s: time_plot(s[:1]), "at least 2"),
+        (lambda s: time_plot(s.values), "ndarray"),
+        (lambda s: order_plot(signals.spectrum(s), teeth=29), "order"),
+    ],
+)
+def test_wrong_signals_are_named(signal, call, message):
+    with pytest.raises(ValueError, match=message):
+        call(signal)
+
+
+@pytest.fixture
+def ratios():
+    values = np.exp(np.random.default_rng(1).standard_normal((2, 4, 5)))
+    values[1, 2, 3] = np.nan
+    depth = ("depth", [1e-5, 3e-5, 1e-4, 1e-3], {"units": "m", "long_name": "penetration depth d"})
+    backlash = ("backlash", [0, 5e-5, 1e-4, 2e-4, 4e-4], {"units": "m", "long_name": "normal backlash"})
+    return xr.DataArray(
+        values,
+        dims=("plane", "depth", "backlash"),
+        coords={"plane": ["skew", "inclination"], "depth": depth, "backlash": backlash},
+        attrs={"long_name": "misaligned / healthy at 2× GMF", "units": "1"},
+    )
+
+
+def test_map_names_axes_in_drawing_units_and_marks_failed_runs(ratios):
+    figure = sensitivity_map(ratios, centre=1.0, log=True, title="Does misalignment raise the 2nd harmonic?")
+    left, right, bar = figure.axes
+    assert left.get_xlabel() == "normal backlash, mm"
+    assert left.get_ylabel() == "penetration depth d, mm"
+    assert [t.get_text() for t in left.get_yticklabels()] == ["0.01", "0.03", "0.1", "1"]
+    assert right.get_title(loc="left") == "plane: inclination"
+    assert [t.get_text() for t in right.texts].count("no\nresult") == 1
+    assert bar.get_ylabel() == "misaligned / healthy at 2× GMF"
+    assert_readable(figure)
+    # "no change" is the middle of the colours
+    assert left.collections[0].norm(1.0) == pytest.approx(0.5)
+
+
+def test_map_axes_can_be_exchanged(ratios):
+    figure = sensitivity_map(ratios[0], x="depth", title="one plane")
+    assert figure.axes[0].get_xlabel() == "penetration depth d, mm"
+    assert_readable(figure)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda t: sensitivity_map(t, x="speed"), "speed"),
+        (lambda t: sensitivity_map(t, x="depth", y="depth"), "two dimensions"),
+        (lambda t: sensitivity_map(t[0, 0]), "two or three dimensions"),
+        (lambda t: sensitivity_map(t - 10.0, log=True), "positive"),
+        (lambda t: sensitivity_map(t * np.nan), "no finite value"),
+    ],
+)
+def test_wrong_maps_are_named(ratios, call, message):
+    with pytest.raises(ValueError, match=message):
+        call(ratios)
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return GearPair.paper(backlash="0.1 mm")
+
+
+def test_transmission_error_and_stiffness_over_cycles(pair):
+    errors = {
+        "healthy": loaded_transmission_error(pair, points=40),
+        "+3 mm": loaded_transmission_error(pair.with_changes(centre_distance_error=3e-3), points=40),
+    }
+    figure = transmission_error_plot(errors, title="Loaded transmission error, 100 N m")
+    line = figure.axes[0].lines[0]
+    assert line.get_ydata().size == 80
+    np.testing.assert_allclose(line.get_ydata()[:40], errors["healthy"].error * 1e6)
+    assert figure.axes[0].get_ylabel() == "transmission error, µm"
+    assert_readable(figure)
+    stiff = stiffness_plot(errors["healthy"])
+    assert stiff.axes[0].get_ylim()[0] == 0.0
+    assert_readable(stiff)
+    with pytest.raises(ValueError, match="cycles"):
+        transmission_error_plot(errors, cycles=0)
+    with pytest.raises(ValueError, match="empty"):
+        stiffness_plot({})
+
+
+def test_load_sharing_and_contact_pattern(pair):
+    tilted = pair.with_changes(misalignment=np.deg2rad(1.0))
+    patterns = {n: contact_pattern(p, points=21, stations=11) for n, p in (("healthy", pair), ("misaligned", tilted))}
+    assert_readable(load_sharing_plot(patterns, title="Load sharing"))
+    figure = contact_pattern_plot(patterns["misaligned"], pair=tilted, title="Contact pattern")
+    drawn = figure.axes[0].collections[0].get_array()
+    # N/m to N/mm, and nothing drawn where nothing bears
+    assert drawn.max() == pytest.approx(patterns["misaligned"].pressure.max() * 1e-3)
+    assert np.ma.getmaskarray(drawn).sum() == (patterns["misaligned"].pressure == 0).sum()
+    assert_readable(figure)
+    empty = contact_pattern(pair, points=5, stations=3, side="back")
+    assert "no load" in contact_pattern_plot(empty).axes[0].texts[0].get_text()
