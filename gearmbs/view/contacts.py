@@ -13,7 +13,9 @@ from gearmbs.gears.pair import Placement
 from gearmbs.view.motion import PairMotion
 
 COLUMN = {name: k for k, name in enumerate(GAP_COLUMNS)}
-MAX_ROWS = 4000
+MAX_PAIRS = 60
+"""More tooth pairs, of both sides, than are ever within reach."""
+
 STATIONS = 21
 
 
@@ -70,12 +72,14 @@ class ContactProbe:
         self.pair = pair
         self.gi, self.gr, size = pair.contact_tables()
         self.work = np.zeros(size)
-        self.rows = np.zeros((MAX_ROWS, len(GAP_COLUMNS)))
+        if stations is not None and stations < 1:
+            raise ValueError(f"stations is {stations}; give 1 or more")
         low, high = pair.common_face
         single = pair.face_slices == 1
         count = 1 if single else (STATIONS if stations is None else stations)
         self.width = pair.common_face_width / count if single else (high - low) / count
         self.stations = np.zeros(1) if single else low + (np.arange(count) + 0.5) * self.width
+        self.rows = np.zeros((MAX_PAIRS * max(2, count), len(GAP_COLUMNS)))
 
     def at(
         self,
