@@ -29,6 +29,10 @@ NEARLY_BEST = 0.97
 SLOWEST = 8.0 * math.pi
 MIN_QUALITY = 0.05
 MIN_SCORE_DB = 12.0
+# Weak lines count too, if their comb stands out from all others by that many robust standard deviations.
+MIN_LEAD = 5.5
+SAME_COMB = 0.01
+MIN_OTHERS = 100
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,8 @@ def estimate_speed(
     2. Comb: for every candidate GMF f the mean height at f ... 4 f (weights 1 to 0.7), plus half of that at the first
        three shaft orders and sidebands, less half of that midway between the harmonics; less 5 % for each harmonic
        beyond half the rate. Of the candidates within 3 % of the best the one whose harmonics carry most power wins.
+       It is accepted if its harmonics stand 12 dB (RMS) over the floor, or if its score is ahead of every other comb's
+       by 5.5 robust standard deviations of all scores.
     3. The fundamental's peak, then the mean of its phase's slope over the record, where it can be followed.
 
     Parameters
@@ -118,7 +124,7 @@ def estimate_speed(
     share = (power / np.maximum(power.sum(axis=0), 1e-300)).sum(axis=1)
     carried = sum((_at(share, h * candidates[near], bin_width) for h in range(1, HARMONICS + 1)), np.zeros(near.size))
     best = int(near[np.argmax(carried)])
-    if direct[best] < MIN_SCORE_DB:
+    if direct[best] < MIN_SCORE_DB and _lead(score, candidates, best) < MIN_LEAD:
         raise SignalError(
             f"signal: no gear mesh line stands out (best {direct[best]:.1f} dB at {candidates[best]:.1f} Hz); "
             "give the speed, a tacho, or a narrower speed_range"
@@ -173,6 +179,15 @@ def _comb(height: np.ndarray, candidates: np.ndarray, bin_width: float, count: i
     trust = 1.0 - FEWER_WEIGHT * (HARMONICS - present)
     score = trust * (harmonics + SIDEBAND_WEIGHT * sides - BETWEEN_WEIGHT * between)
     return score, np.sqrt(squares / present)
+
+
+def _lead(score: np.ndarray, candidates: np.ndarray, best: int) -> float:
+    """How far the best comb is ahead of the best of another frequency, in robust standard deviations of all scores."""
+    spread = 1.4826 * float(np.median(np.abs(score - np.median(score))))
+    others = score[np.abs(candidates / candidates[best] - 1.0) > SAME_COMB]
+    if others.size < MIN_OTHERS or spread == 0.0:
+        return 0.0
+    return float(score[best] - others.max()) / spread
 
 
 def _at(line: np.ndarray, frequency: np.ndarray, bin_width: float) -> np.ndarray:

@@ -64,3 +64,15 @@ def test_maps_show_themselves_in_a_notebook(scripts):
 
     figure = sensitivity.claim_maps(sensitivity.claim_ratios(sensitivity.load()), "speed_rpm", "speed, rpm")
     assert figure._repr_png_().startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_speed_search_is_right_or_refuses(scripts):
+    """On records it was not adjusted on; an answer that is wrong is worse than none."""
+    import speed_search
+
+    share = speed_search.table(speed_search.outcomes(20, first_seed=5000))
+    assert share.loc["easy", "right"] == 100.0
+    assert share.loc["usual", "right"] >= 80.0
+    assert share.loc["usual", ["multiple", "wrong"]].sum() == 0.0
+    assert share.loc["hard", ["multiple", "wrong"]].sum() <= 5.0
