@@ -10,6 +10,7 @@ from gearmbs.dae.sparse_lu import FACTORS_TYPE, PLAN_TYPE, solve
 from gearmbs.dae.state import (
     ATOL,
     DELTA,
+    FRESH,
     GAMMA_J,
     IS_CONTROLLED,
     IS_DIFFERENTIAL,
@@ -35,6 +36,7 @@ NOT_FINITE = 2
 RATE_LIMIT = 0.9
 RATE_FLOOR = 0.02
 ROUNDING_LEVEL = 0.1
+ROUNDING_LEVEL_FRESH = 0.5
 LOOSEST = 0.1
 
 _VEC = float64[::1]
@@ -116,6 +118,19 @@ def set_weights(real, y, h, vec):
         w_newton[i] = tested[i] * w * max(max(controlled[i], differential[i]), reach)
 
 
+@njit(int64(_VEC, _VEC, float64, boolean), cache=True, nogil=True, error_model="numpy")
+def _verdict(delta, w_error, rate, fresh):
+    """Return CONVERGED where a corrector that gets no further is harmless to the unknowns under error control.
+
+    Then it is rounding, or multipliers that nothing determines near a singular position. What a contracting iteration
+    leaves is judged by its rate; a stagnating one leaves about its last correction. A stale matrix is suspected first.
+    """
+    left = weighted_max(delta, w_error)
+    if rate > RATE_LIMIT:
+        return CONVERGED if left <= (ROUNDING_LEVEL_FRESH if fresh else ROUNDING_LEVEL) else SLOW
+    return CONVERGED if fresh and left * rate <= ROUNDING_LEVEL_FRESH * (1.0 - rate) else SLOW
+
+
 @njit(
     int64(
         types.FunctionType(RESIDUAL_SIG),
@@ -180,11 +195,7 @@ def correct(residual, t, gamma, vec, real, count, plan, factors, idata, rdata, w
             rate = norm / previous if previous > 0.0 else 0.0
             if rate > RATE_LIMIT:
                 real[RATE] = 1.0
-                # no longer contracting yet harmless to the unknowns under error control: rounding, or multipliers that
-                # nothing determines near a singular position
-                if weighted_max(delta, vec[W_ERROR]) <= ROUNDING_LEVEL:
-                    return CONVERGED
-                return SLOW
+                return _verdict(delta, vec[W_ERROR], rate, count[FRESH] != 0)
             real[RATE] = max(rate, 0.3 * real[RATE])
         trust = max(real[RATE], RATE_FLOOR)
         if trust < 1.0 and norm * trust <= limit * (1.0 - trust):
@@ -193,6 +204,6 @@ def correct(residual, t, gamma, vec, real, count, plan, factors, idata, rdata, w
             # would the iterations left suffice at this rate?
             rest = norm * trust / (1.0 - trust) if trust < 1.0 else norm
             if rest * trust ** (iterations - 1 - m) > limit:
-                return SLOW
+                return _verdict(delta, vec[W_ERROR], trust, count[FRESH] != 0)
         previous = norm
-    return SLOW
+    return _verdict(delta, vec[W_ERROR], real[RATE], count[FRESH] != 0) if iterations > 1 else SLOW

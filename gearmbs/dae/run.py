@@ -34,7 +34,7 @@ from gearmbs.dae.sparse_lu import (
 )
 
 NEWTON_TOLERANCE = 1.0
-FIRST_CHUNK = 16
+FIRST_CHUNK = 256
 CHUNK_SECONDS = 0.05
 RECORD_BYTES = 8_000_000
 EVENT_BUFFER = 64
@@ -215,16 +215,17 @@ class Run:
             return Status.NOT_FINITE, failures.not_finite(problem, t0, int(bad[0]))
         if st.count[s.HAS_EVENTS] and problem.events is not None:
             problem.events(t0, st.vec[s.Y], st.vec[s.YP], st.g_old, st.idata, st.rdata, st.work)
-        failure = self._choose_first_pivots(st.real[s.H])
+        # over a vanishing step wrong rates are harmless, but values off the constraints still have to jump
+        h_check = min(st.real[s.H], CHECK_STEP * (st.real[s.T_END] - t0)) if self.check_start else st.real[s.H]
+        failure = self._choose_first_pivots(h_check)
+        if failure is not None and h_check < st.real[s.H]:
+            # an index-3 matrix is singular to working precision at such a step: check over the first step itself
+            h_check = st.real[s.H]
+            failure = self._choose_first_pivots(h_check)
         if failure is not None:
             return failure
         if not self.check_start:
             return self._repair_start()
-        # over a vanishing step wrong rates are harmless, but values off the constraints still have to jump
-        h_check = min(st.real[s.H], CHECK_STEP * (st.real[s.T_END] - t0))
-        if h_check < st.real[s.H] and self._choose_first_pivots(h_check) is not None:
-            # an index-3 matrix is singular to working precision at such a step: check over the first step itself
-            self._choose_first_pivots(st.real[s.H])
         solve(self.plan, self.factors, res, delta)
         jump = np.abs(delta) * st.vec[s.W_ERROR]
         worst = int(np.argmax(jump))
@@ -233,7 +234,7 @@ class Run:
             row = int(np.argmax(np.abs(res[self.plan.row_from]) * self.plan.row_scale))
             message = failures.inconsistent(problem, t0, worst, int(self.plan.row_from[row]), float(abs(delta[worst])))
             return Status.INCONSISTENT_START, message
-        return self._choose_first_pivots(st.real[s.H])
+        return self._choose_first_pivots(st.real[s.H]) if h_check < st.real[s.H] else None
 
     def _repair_start(self) -> tuple[Status, str] | None:
         """Move the initial values onto the constraints by Newton's method over the first step."""

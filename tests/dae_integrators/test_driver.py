@@ -79,6 +79,7 @@ def test_the_loop_releases_the_gil():
 def test_ctrl_c_keeps_what_was_computed_and_resumes_bit_identically(monkeypatch):
     before = signal.getsignal(signal.SIGINT)
     whole = solve_wstiff(pendulum(), TIMES, tol=1e-9, dense_output=True)
+    monkeypatch.setattr(run, "FIRST_CHUNK", 8)
     monkeypatch.setattr(run, "CHUNK_SECONDS", 0.0)
 
     def interrupt_at_one(t):
