@@ -16,7 +16,7 @@ from gearmbs.dae import tables as T
 from gearmbs.dae import tapes, terms
 from gearmbs.dae.forces import element_wrench
 from gearmbs.dae.jacobian import NUMBERS, put
-from gearmbs.dae.kinematics import inertia_times, update_bodies, update_tables
+from gearmbs.dae.kinematics import inertia_times, update_bodies
 from gearmbs.dae.residual import S_DIAG, S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR, S_WRENCH, arm_to
 from gearmbs.dae.rotation import (
     KIN_A,
@@ -29,6 +29,7 @@ from gearmbs.dae.rotation import (
     euler_rates,
     momentum_from_conjugate,
 )
+from gearmbs.dae.simple_terms import dot_motion, point_motion
 
 """Per force element: F, N, then eight diagnostics of a contact."""
 FORCE_RECORD = 14
@@ -82,17 +83,53 @@ def tape_row_rates(k, t, y, idata, tab, room):
 
 
 @njit(cache=True, error_model="numpy")
-def saddle(t, y, slot, vals, rhs, phi, loads, idata, rdata, work, with_loads):
+def put_pair(mode, slot, vals, k, row, col, value):
+    """Hand over an entry of Phi_q and its mirror image in Phi_q^T; return the number of the next entry."""
+    k = put(mode, slot, vals, k, row, col, value)
+    return put(mode, slot, vals, k, col, row, value)
+
+
+@njit(cache=True, error_model="numpy")
+def put_point(mode, slot, vals, k, row, coef, term, marker_body, frame):
+    """Hand over the gradient of a POINT term; return the number of the next entry."""
+    c = term[T.TERM_AXES]
+    c1, c2 = (c + 1) % 3, (c + 2) % 3
+    for side in range(2):
+        marker = term[T.TERM_I + side]
+        if marker_body[marker] == 0:
+            continue
+        q = 6 * (marker_body[marker] - 1)
+        sign = coef if side == 0 else -coef
+        k = put_pair(mode, slot, vals, k, row, q + c, sign)
+        k = put_pair(mode, slot, vals, k, row, q + 3 + c1, sign * frame[marker, T.MK_ARM + c2])
+        k = put_pair(mode, slot, vals, k, row, q + 3 + c2, -sign * frame[marker, T.MK_ARM + c1])
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def put_dot(mode, slot, vals, k, row, coef, term, marker_body, cross):
+    """Hand over the gradient of a DOT1 term, given that of its first side; return the number of the next entry."""
+    for side in range(2):
+        body = marker_body[term[T.TERM_I + side]]
+        if body == 0:
+            continue
+        sign = coef if side == 0 else -coef
+        for c in range(3):
+            k = put_pair(mode, slot, vals, k, row, 6 * (body - 1) + 3 + c, sign * cross[c])
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
     """Assemble the saddle-point matrix (by slots) and right-hand side; return the number of entries.
 
-    Without loads (0) the right-hand side lacks the applied forces: enough for a projection.
+    The kinematics, marker and function tables must be up to date. Without loads (0) the right-hand side lacks the
+    applied forces: enough for a projection.
 
     ``phi`` receives 3 values a row one after the other: Phi, Phi_q v + Phi_t, Phi_t.
     ``loads[f]`` receives F, N and the diagnostics of force element f.
     """
-    tab = T.unpack(idata, rdata, work)
     mode = idata[T.H_MODE]
-    update_tables(t, y, idata, tab)
     bodies, rows = idata[T.H_BODIES], idata[T.H_ROWS]
     base = 6 * (bodies - 1)
     s = tab.scratch[S_TERM : S_TERM + 100]
@@ -122,18 +159,19 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, rdata, work, with_loads):
             value, rate, partial, gamma = -f, -f1, -f1, -f2
         for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
             coef = tab.coef[j]
-            p, p_t = terms.gradient(
-                j,
-                tab.term,
-                tab.fval,
-                tab.reference,
-                tab.marker_body,
-                tab.kin,
-                tab.frame,
-                s,
-                g,
-                gt,
-            )
+            kind = tab.term[j, T.TERM_TYPE]
+            if kind == terms.POINT or kind == terms.DOT1:
+                if kind == terms.POINT:
+                    p, d, q2 = point_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame)
+                    k = put_point(mode, slot, vals, k, base + r, coef, tab.term[j], tab.marker_body, tab.frame)
+                else:
+                    p, d, q2 = dot_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame, s)
+                    k = put_dot(mode, slot, vals, k, base + r, coef, tab.term[j], tab.marker_body, s)
+                value += coef * p
+                rate += coef * d
+                gamma += coef * q2
+                continue
+            p, p_t = terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
             value += coef * p
             rate += coef * p_t
             partial += coef * p_t
@@ -146,8 +184,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, rdata, work, with_loads):
                 kin = tab.kin[b]
                 rate += coef * (terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W))
                 for c in range(6):
-                    k = put(mode, slot, vals, k, base + r, q + c, coef * g[h + c])
-                    k = put(mode, slot, vals, k, q + c, base + r, coef * g[h + c])
+                    k = put_pair(mode, slot, vals, k, base + r, q + c, coef * g[h + c])
         if tab.row[r, T.ROW_TAPE] >= 0:
             tape = tab.tape[tab.row[r, T.ROW_TAPE]]
             n = 6 * tape[T.TAPE_N_BODIES] + 1
@@ -160,8 +197,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, rdata, work, with_loads):
             for b in range(tape[T.TAPE_N_BODIES]):
                 q = 6 * (tab.extra_i[tape[T.TAPE_BODIES] + b] - 1)
                 for c in range(6):
-                    k = put(mode, slot, vals, k, base + r, q + c, room[6 * b + c])
-                    k = put(mode, slot, vals, k, q + c, base + r, room[6 * b + c])
+                    k = put_pair(mode, slot, vals, k, base + r, q + c, room[6 * b + c])
         rhs[base + r] = -gamma
         phi[3 * r], phi[3 * r + 1], phi[3 * r + 2] = value, rate, partial
     if mode == NUMBERS and with_loads != 0:
@@ -183,18 +219,13 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, rdata, work, with_loads):
     return k
 
 
-@njit(
-    "void(float64[::1], int64[::1], float64[::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])",
-    cache=True,
-    error_model="numpy",
-)
-def joint_loads(y, idata, rdata, work, multipliers, force, moment):
-    """Reaction of each constraint row on I's body: force, and moment about the origin of marker I, global.
+@njit(cache=True, error_model="numpy")
+def loads_of_rows(multipliers, idata, tab, force, moment):
+    """Write the reaction of each constraint row on I's body: force, and moment about the origin of marker I, global.
 
-    The kinematics tables must be up to date; ``multipliers[0]`` holds lambda. Of a row that couples several
-    joints, the part that acts through the first one's marker I.
+    The kinematics tables must be up to date. Of a row that couples several joints, the part that acts through the
+    first one's marker I.
     """
-    tab = T.unpack(idata, rdata, work)
     g = tab.scratch[S_GRADIENT : S_GRADIENT + 12]
     gt = tab.scratch[S_GRADIENT_T : S_GRADIENT_T + 12]
     s = tab.scratch[S_TERM : S_TERM + 100]
@@ -202,13 +233,24 @@ def joint_loads(y, idata, rdata, work, multipliers, force, moment):
         for c in range(3):
             force[r, c] = 0.0
             moment[r, c] = 0.0
-        lam = multipliers[0, r]
+        lam = multipliers[r]
         first, last = tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]
         for j in range(first, last):
             if tab.term[j, T.TERM_I] != tab.term[first, T.TERM_I]:
                 continue
-            terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
             factor = -lam * tab.coef[j]
+            kind = tab.term[j, T.TERM_TYPE]
+            if kind == terms.POINT:
+                force[r, tab.term[j, T.TERM_AXES]] += factor
+                continue
+            if kind == terms.DOT1:
+                a, b = tab.term[j, T.TERM_AXES] // 3, tab.term[j, T.TERM_AXES] % 3
+                i_row, j_row = tab.frame[tab.term[j, T.TERM_I]], tab.frame[tab.term[j, T.TERM_J]]
+                terms.cross3(i_row, T.MK_AXES + 3 * a, j_row, T.MK_AXES + 3 * b, s, 0)
+                for c in range(3):
+                    moment[r, c] += factor * s[c]
+                continue
+            terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
             for c in range(3):
                 s[c] = factor * g[c]
                 force[r, c] += s[c]
@@ -217,26 +259,43 @@ def joint_loads(y, idata, rdata, work, multipliers, force, moment):
                 moment[r, c] += factor * g[3 + c] - s[3 + c]
 
 
-@njit("void(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy")
-def pose_record(y, idata, rdata, work, out):
-    """Write R, A (row-major), v, omega of each body (18 values, the ground left out)."""
-    tab = T.unpack(idata, rdata, work)
-    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
-    for b in range(1, idata[T.H_BODIES]):
-        k = 18 * (b - 1)
-        for c in range(3):
-            out[k + c] = tab.kin[b, KIN_R + c]
-            out[k + 12 + c] = tab.kin[b, KIN_V + c]
-            out[k + 15 + c] = tab.kin[b, KIN_W + c]
-        for c in range(9):
-            out[k + 3 + c] = tab.kin[b, KIN_A + c]
+@njit(
+    "void(float64[::1], int64[::1], float64[::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])",
+    cache=True,
+    error_model="numpy",
+)
+def joint_loads(y, idata, rdata, work, multipliers, force, moment):
+    """Write the loads of `loads_of_rows`; ``multipliers[0]`` holds lambda."""
+    loads_of_rows(multipliers[0], idata, T.unpack(idata, rdata, work), force, moment)
 
 
 @njit(cache=True, error_model="numpy")
-def violations(t, y, phi, idata, rdata, work):
-    """Write Phi and Phi_q v + Phi_t of each row to ``phi`` (three places a row); return the fastest body's |omega|."""
+def poses(kin, out):
+    """Write R, A (row-major), v, omega of each body (18 values, the ground left out) from an up-to-date table."""
+    for b in range(1, kin.shape[0]):
+        k = 18 * (b - 1)
+        for c in range(3):
+            out[k + c] = kin[b, KIN_R + c]
+            out[k + 12 + c] = kin[b, KIN_V + c]
+            out[k + 15 + c] = kin[b, KIN_W + c]
+        for c in range(9):
+            out[k + 3 + c] = kin[b, KIN_A + c]
+
+
+@njit("void(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy")
+def pose_record(y, idata, rdata, work, out):
+    """Write the record of `poses` for y."""
     tab = T.unpack(idata, rdata, work)
-    update_tables(t, y, idata, tab)
+    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
+    poses(tab.kin, out)
+
+
+@njit(cache=True, error_model="numpy")
+def violations(t, y, phi, idata, tab):
+    """Write Phi and Phi_q v + Phi_t of each row to ``phi`` (three places a row); return the fastest body's |omega|.
+
+    The kinematics, marker and function tables must be up to date.
+    """
     g = tab.scratch[S_GRADIENT : S_GRADIENT + 12]
     gt = tab.scratch[S_GRADIENT_T : S_GRADIENT_T + 12]
     s = tab.scratch[S_TERM : S_TERM + 100]
@@ -247,6 +306,15 @@ def violations(t, y, phi, idata, rdata, work):
             value, rate = -tab.fval[fun, 0], -tab.fval[fun, 1]
         for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
             coef = tab.coef[j]
+            kind = tab.term[j, T.TERM_TYPE]
+            if kind == terms.POINT or kind == terms.DOT1:
+                if kind == terms.POINT:
+                    p, d, _ = point_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame)
+                else:
+                    p, d, _ = dot_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame, s)
+                value += coef * p
+                rate += coef * d
+                continue
             p, p_t = terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
             value += coef * p
             rate += coef * p_t
@@ -267,12 +335,11 @@ def violations(t, y, phi, idata, rdata, work):
 
 
 @njit(cache=True, error_model="numpy")
-def displace(y, d, w, idata, rdata, work):
+def displace(y, d, w, idata, tab):
     """Move the bodies of y by the spatial displacements ``d`` and change their spatial velocities by ``w``.
 
     The kinematics table must be up to date; conjugate momenta are left alone.
     """
-    tab = T.unpack(idata, rdata, work)
     s = tab.scratch
     for b in range(1, idata[T.H_BODIES]):
         k, i = 3 * (b - 1), 6 * (b - 1)

@@ -10,6 +10,7 @@ from numba import float64, int64, njit, types
 from gearmbs.dae import index1
 from gearmbs.dae import tables as T
 from gearmbs.dae.jacobian import COUNT, NUMBERS, PLACES, compressed
+from gearmbs.dae.kinematics import update_tables
 from gearmbs.dae.rereference import track
 from gearmbs.dae.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, PLAN_TYPE, analyse, factor, new_factors, solve
 
@@ -89,7 +90,7 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
     rows = records.force.shape[1]
     size = records.solution.shape[1]
     base = size - rows
-    multipliers = np.zeros((2, max(rows, 1)))
+    tab = T.unpack(idata, rdata, work)
     rhs, moved, pushed = np.zeros(size), np.zeros(size), np.zeros(size)
     at = np.zeros(y.shape[1])
     only_assemble = last < first or idata[T.H_MODE] != NUMBERS
@@ -99,19 +100,20 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
         phi, loads = records.phi[k], records.loads[k]
         if idata[T.H_MODE] == NUMBERS:
             vals[:] = 0.0
+        update_tables(t[k], at, idata, tab)
         if only_assemble:
-            count = index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, np.int64(1))
+            count = index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
             records.solution[k, :] = rhs
             if idata[T.H_MODE] == COUNT:
                 vals[0] = count
             return last
-        track(t[k], at, idata, rdata, work)
+        track(t[k], at, tab)
         if rows > 0:
             # the nearest position and velocity, in the metric of the masses, that satisfy the constraints; the
             # factors of the row before serve while the bodies have hardly turned since
-            spin = index1.violations(t[k], at, phi, idata, rdata, work)
+            spin = index1.violations(t[k], at, phi, idata, tab)
             if k == first or spin * (t[k] - t[k - 1]) > SAME_POSITION:
-                index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, np.int64(0))
+                index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(0))
                 if not factor(plan, factors, vals) <= growth:
                     return k
                 vals[:] = 0.0
@@ -122,16 +124,14 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
             for r in range(rows):
                 rhs[base + r] = -phi[3 * r + 1]
             solve(plan, factors, rhs, pushed)
-            index1.displace(at, moved, pushed, idata, rdata, work)
-        index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, rdata, work, np.int64(1))
+            index1.displace(at, moved, pushed, idata, tab)
+            update_tables(t[k], at, idata, tab)
+        index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
         if not factor(plan, factors, vals) <= growth:
             return k
         solve(plan, factors, rhs, records.solution[k])
-        for r in range(rows):
-            multipliers[0, r] = records.solution[k, base + r]
-        multipliers[1, 0] = t[k]
-        index1.joint_loads(at, idata, rdata, work, multipliers, records.force[k], records.moment[k])
-        index1.pose_record(at, idata, rdata, work, records.pose[k])
+        index1.loads_of_rows(records.solution[k, base:], idata, tab, records.force[k], records.moment[k])
+        index1.poses(tab.kin, records.pose[k])
     return last
 
 

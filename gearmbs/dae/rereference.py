@@ -47,19 +47,23 @@ def rewrite_point(y, b, old, new, idata, kin, s):
 
 
 @njit(cache=True, error_model="numpy")
-def track_angles(t, y, idata, tab):
-    """Move the reference of each counted angle to its present value."""
-    any_angle = False
+def counts_angles(tab):
+    """Return whether any constraint or expression counts an angle."""
     for k in range(tab.tape.shape[0]):
         if tab.tape[k, T.TAPE_REFERENCE_SIZE] > 0:
-            any_angle = True
+            return True
     for k in range(tab.term.shape[0]):
         if tab.term[k, T.TERM_TYPE] == ANGLE:
-            any_angle = True
-    if not any_angle:
-        return
-    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
-    update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def track(t, y, tab):
+    """Count the turns of all counted angles up to a later point, less than half a turn away.
+
+    The kinematics and marker tables must be those of that point.
+    """
     tapes.update_references(t, y, tab)
     for k in range(tab.term.shape[0]):
         if tab.term[k, T.TERM_TYPE] == ANGLE:
@@ -67,12 +71,6 @@ def track_angles(t, y, idata, tab):
             x = T.MK_AXES
             turn = np.arctan2(dot3(fi, x, fj, x + 3), dot3(fi, x, fj, x)) - tab.reference[k]
             tab.reference[k] += turn - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
-
-
-@njit("void(float64, float64[::1], int64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy")
-def track(t, y, idata, rdata, work):
-    """Count the turns of all counted angles up to a later point, less than half a turn away."""
-    track_angles(t, y, idata, T.unpack(idata, rdata, work))
 
 
 @njit(HOOK_SIG, cache=True, error_model="numpy")
@@ -99,5 +97,8 @@ def hook(t, hist, npast, idata, rdata, work):
                     turns = np.round((hist[row, th + k + c] - hist[row - 1, th + k + c]) / (2.0 * np.pi))
                     hist[row, th + k + c] -= 2.0 * np.pi * turns
         tab.code[b] = new
-    track_angles(t, hist[0], idata, tab)
+    if counts_angles(tab):
+        update_bodies(idata, hist[0], tab.code, tab.body, tab.kin, tab.scratch)
+        update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+        track(t, hist[0], tab)
     return changed
