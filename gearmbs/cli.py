@@ -53,6 +53,21 @@ def case_bars(names: list[str]) -> Iterator[Callable[[str, float], None]]:
         yield lambda name, fraction: progress.update(tasks[name], completed=fraction)
 
 
+@contextmanager
+def stage_bar(name: str) -> Iterator[Callable[[float, str], None]]:
+    """Show one bar with the stage it is in, on a terminal; yield the function that moves it."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description:>24}"), BarColumn(), TextColumn("{task.fields[stage]}"))
+    with Progress(
+        *columns, TimeElapsedColumn(), console=console, transient=True, disable=not console.is_terminal
+    ) as progress:
+        task = progress.add_task(name, total=1.0, stage="reading")
+        yield lambda fraction, stage: progress.update(task, completed=fraction, stage=stage)
+
+
 def _raise_interrupt(*_args) -> None:
     raise KeyboardInterrupt
 
@@ -162,70 +177,145 @@ def run(
 @app.command()
 def analyse(
     file: Annotated[Path, typer.Argument(help="CSV, CSV.GZ, MAT, UFF, WAV, NetCDF, HDF5 or TDMS.")],
-    teeth: Annotated[int | None, typer.Option(help="Teeth of the wheel on the reference shaft.")] = None,
+    teeth: Annotated[str | None, typer.Option(help='Teeth of the wheel on the reference shaft; or "32,80".')] = None,
     rate: Annotated[float | None, typer.Option(help="Sampling rate in Hz, if the file does not name it.")] = None,
     speed: Annotated[str | None, typer.Option(help='Shaft speed, e.g. "1780 rpm"; default: from the GMF line.')] = None,
     units: Annotated[str | None, typer.Option(help='Units of the samples, e.g. "m/s^2".')] = None,
     channel: Annotated[list[str] | None, typer.Option(help="Channel to use; repeat for several; default: all.")] = None,
+    tacho: Annotated[str | None, typer.Option(help="Channel with the tacho pulses.")] = None,
+    pulses: Annotated[float, typer.Option(help="Tacho pulses a revolution.")] = 1.0,
+    wheel: Annotated[int, typer.Option(help="Whose shaft the averages follow: 1, or 2 for the mate.")] = 1,
     harmonics: Annotated[int, typer.Option(help="Mesh harmonics to evaluate.")] = 3,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Write the report here instead of printing it.")
-    ] = None,
+    format: Annotated[str | None, typer.Option(help="Format of the file, if its name does not say.")] = None,
+    tables: Annotated[Path | None, typer.Option(help="Folder for the tables as CSV.")] = None,
+    figures: Annotated[Path | None, typer.Option(help="Folder for spectrum and average as PNG and SVG.")] = None,
+    out: ReportFile = None,
 ) -> None:
-    """Analyse a measured vibration file: mesh frequency, harmonics, sidebands, indicators."""
-    with guarded():
-        from gearmbs.signals import analyse_file
-        from gearmbs.studies.store import write_text
+    """Analyse a vibration record, measured or simulated: mesh frequency, harmonics, sidebands, indicators."""
+    with guarded(), stage_bar(file.name) as move:
+        from gearmbs.signals import analyse as analyse_signal
+        from gearmbs.studies.exchange import read_any
         from gearmbs.units import to_si
 
-        report = analyse_file(
-            file,
-            teeth=teeth,
-            rate=rate,
-            speed=None if speed is None else to_si(speed, "angular speed", "--speed"),
-            units=units,
-            channels=channel,
-            harmonics=harmonics,
+        names = None if channel is None else [*channel, *([tacho] if tacho and tacho not in channel else [])]
+        given: dict[str, Any] = {
+            "teeth": None if teeth is None else tooth_counts(teeth),
+            "speed": None if speed is None else to_si(speed, "angular speed", "--speed"),
+        }
+        signal = read_any(
+            file, rate=rate, units=units, channels=names, format=format, progress=lambda f, s: move(0.3 * f, s), **given
         )
-        if out is None:
-            typer.echo(report.to_markdown())
-        else:
-            write_text(out, report.to_markdown())
-            typer.echo(f"wrote {out}")
+        report = analyse_signal(
+            signal,
+            tacho=tacho,
+            pulses_per_rev=pulses,
+            wheel=wheel,
+            harmonics=harmonics,
+            progress=lambda f, s: move(0.3 + 0.7 * f, s),
+        )
+        files = _save_tables(report.tables(), tables)
+        if figures is not None:
+            from gearmbs.view import analysis_figures
+
+            files += _save_figures(analysis_figures(report, signal), figures)
+    _hand_over(report.to_markdown(), out, files)
 
 
 @app.command()
 def compare(
     experiment: Annotated[list[str], typer.Option(help="Measured file as load:state=path; repeat.")],
-    model: Annotated[Path | None, typer.Option(help="paper.nc of `gearmbs paper`.")] = None,
+    model: Annotated[
+        list[str] | None,
+        typer.Option(help="paper.nc of `gearmbs paper`, or load:state=path of `gearmbs run` records; repeat."),
+    ] = None,
     component: Annotated[str, typer.Option(help="Force component of the model.")] = "line_of_action",
-    teeth: Annotated[int | None, typer.Option(help="Teeth of the measured wheel.")] = None,
+    teeth: Annotated[str | None, typer.Option(help='Teeth of the measured wheel; or both, "32,80".')] = None,
     rate: Annotated[float | None, typer.Option(help="Sampling rate of the measured files, Hz.")] = None,
+    speed: Annotated[
+        str | None, typer.Option(help="Shaft speed of the measured files; default: from the line.")
+    ] = None,
     units: Annotated[str | None, typer.Option(help="Units of the measured samples.")] = None,
     channel: Annotated[str | None, typer.Option(help="Measured channel.")] = None,
     reference: Annotated[str, typer.Option(help="State the others are held against.")] = "healthy",
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Write the report here instead of printing it.")
-    ] = None,
+    scope: Annotated[str, typer.Option(help="What sets the scaling: load, all or each.")] = "load",
+    wheel: Annotated[int, typer.Option(help="Whose shaft the indicators follow: 1, or 2 for the mate.")] = 1,
+    tables: Annotated[Path | None, typer.Option(help="Folder for the tables as CSV.")] = None,
+    figures: Annotated[Path | None, typer.Option(help="Folder for the bars as PNG and SVG.")] = None,
+    out: ReportFile = None,
 ) -> None:
     """Compare measured states with each other and with the model, as in the paper's section 4."""
-    with guarded():
+    with guarded(), stage_bar("comparison") as move:
         from gearmbs.signals import compare as compare_signals
-        from gearmbs.signals import read_signal
-        from gearmbs.studies.exchange import model_signals, parse_states
-        from gearmbs.studies.store import write_text
+        from gearmbs.studies.exchange import parse_models, parse_states, read_any
+        from gearmbs.units import to_si
 
+        given: dict[str, Any] = {
+            "teeth": None if teeth is None else tooth_counts(teeth),
+            "speed": None if speed is None else to_si(speed, "angular speed", "--speed"),
+            "rate": rate,
+            "units": units,
+        }
         measured = {
-            load: {state: read_signal(path, teeth=teeth, rate=rate, units=units) for state, path in states.items()}
+            load: {state: read_any(path, **given) for state, path in states.items()}
             for load, states in parse_states(experiment).items()
         }
-        simulated = None if model is None else model_signals(model, component)
-        report = compare_signals(measured, simulated, reference=reference, channel=channel)
-        if out is None:
-            typer.echo(report.to_markdown())
-        else:
-            write_text(out, report.to_markdown())
-            typer.echo(f"wrote {out}")
+        report = compare_signals(
+            measured,
+            parse_models(model, component) if model else None,
+            reference=reference,
+            scope=scope,  # type: ignore[arg-type]
+            channel=channel,
+            wheel=wheel,
+            progress=move,
+        )
+        files = _save_tables(report.tables(), tables)
+        if figures is not None:
+            from gearmbs.view import comparison_figures
+
+            files += _save_figures(comparison_figures(report), figures)
+    _hand_over(report.to_markdown(), out, files)
+
+
+def tooth_counts(text: str) -> tuple[int, ...]:
+    """Return the counts of a text such as "32" or "32,80"."""
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise ValueError(f"--teeth is {text!r}; give a count, or both with a comma, for instance 32,80") from None
+
+
+def _save_tables(tables: dict[str, Any], folder: Path | None) -> list[Path]:
+    """Write each table as CSV into the folder, if one is given."""
+    from gearmbs.studies.store import write_text
+
+    written = []
+    for name, table in tables.items() if folder is not None else ():
+        assert folder is not None
+        path = folder / f"{name}.csv"
+        write_text(path, table.to_csv(index=False))
+        written.append(path)
+    return written
+
+
+def _save_figures(figures: dict[str, Any], folder: Path) -> list[Path]:
+    """Write each figure as PNG and SVG into the folder."""
+    from gearmbs.view import save_figure
+
+    return [path for name, figure in figures.items() for path in save_figure(figure, folder / name.replace(" ", "_"))]
+
+
+def _hand_over(report: str, out: Path | None, files: list[Path]) -> None:
+    """Print a report or write it, and name the files written."""
+    if out is None:
+        typer.echo(report)
+    else:
+        from gearmbs.studies.store import write_text
+
+        with guarded():
+            write_text(out, report)
+        files = [out, *files]
+    if files:
+        typer.echo("\n".join(f"wrote {path}" for path in files), err=out is None)
 
 
 @app.command()

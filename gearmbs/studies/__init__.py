@@ -1,6 +1,7 @@
 """Studies: pure functions from a validated case to a result."""
 
 from gearmbs.studies.case import Case, CaseError, load_case, make_case
+from gearmbs.studies.exchange import record_signal
 from gearmbs.studies.paper import Claim, PaperStudy, paper_cases, run_paper
 from gearmbs.studies.parallel import run_cases
 from gearmbs.studies.rig import gear_rig
@@ -16,6 +17,7 @@ __all__ = [
     "load_case",
     "make_case",
     "paper_cases",
+    "record_signal",
     "run_case",
     "run_cases",
     "run_paper",

@@ -24,6 +24,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from gearmbs.gears import ContactLaw, Friction, GearPair, GearSpec
+from gearmbs.studies.tooth_faults import fault_tables, tooth_fault
 from gearmbs.units import to_si
 
 
@@ -84,8 +85,15 @@ class Operation(_Section):
     duration: Time = Field(default=1.0, gt=0)
 
 
+ToothFaults = Annotated[tuple[dict[str, Any], ...], BeforeValidator(fault_tables)]
+
+
 class Fault(_Section):
-    """Deviations of the pair: axes, distance, backlash."""
+    """Deviations of the pair: axes, distance, backlash; and ``teeth``, faults of teeth by name or as tables.
+
+    In a case file a fault of a tooth is a table ``[[fault.teeth]]`` with ``kind = "broken tooth"`` and the parameters
+    of that class of :mod:`gearmbs.gears.faults`.
+    """
 
     misalignment: Angle = 0.0
     plane: Literal["skew", "inclination"] = "skew"
@@ -93,6 +101,7 @@ class Fault(_Section):
     centre_distance_error: Length = 0.0
     axial_shift: Length = 0.0
     backlash: Length = 0.0001
+    teeth: ToothFaults = ()
 
 
 class Contact(_Section):
@@ -196,6 +205,7 @@ class Case(_Section):
             friction=friction,
             torque=self.operation.torque,
             slices=c.slices,
+            faults=tuple(tooth_fault(table) for table in f.teeth),
         )
 
     @property

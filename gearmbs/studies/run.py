@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import platform
 from collections.abc import Callable
 from importlib.metadata import version
@@ -168,6 +169,8 @@ def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any
                 name = f"{section}_{key}"
                 if value is None:
                     out[name] = "default"
+                elif name == "fault_teeth":
+                    out[name] = json.dumps(value)
                 elif isinstance(value, bool):
                     out[name] = int(value)
                 else:

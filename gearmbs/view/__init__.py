@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from gearmbs.view.motion import PairMotion, solution_motion, static_motion
     from gearmbs.view.outline import gear_outline, profile_area
     from gearmbs.view.page import Page
+    from gearmbs.view.reports import analysis_figures, comparison_figures
+    from gearmbs.view.revolution import average_plot
     from gearmbs.view.scene import Part, Scene
     from gearmbs.view.scenes import gear_scene, mechanism_scene, solution_scene
     from gearmbs.view.signals import order_plot, spectrum_plot, time_plot
@@ -38,7 +40,10 @@ _HOMES = {
     "PairMotion": "motion",
     "Part": "scene",
     "Scene": "scene",
+    "analysis_figures": "reports",
+    "average_plot": "revolution",
     "comparison_bars": "bars",
+    "comparison_figures": "reports",
     "contact_pattern_plot": "curves",
     "gear_outline": "outline",
     "gear_scene": "scenes",
@@ -76,7 +81,10 @@ __all__ = [
     "PairMotion",
     "Part",
     "Scene",
+    "analysis_figures",
+    "average_plot",
     "comparison_bars",
+    "comparison_figures",
     "contact_pattern_plot",
     "gear_outline",
     "gear_scene",

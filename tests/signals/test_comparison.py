@@ -82,7 +82,26 @@ def test_expectations_of_the_paper():
     reverse = {"low": {"healthy": tone((1, 1, 1)), "misaligned": tone((1, 0.5, 1))}}
     report = compare(reverse)
     assert not report.expectations()["as_expected"].any()
-    assert "Not everything moved as expected of misaligned: 1 of 1 did not." in report.to_markdown()
+    # half the amplitude is -6.0 dB
+    assert report.summary() == [
+        "misaligned: at load low 2 x GMF falls on acc (-6.0 dB).",
+        "misaligned: expected is that 2 x GMF rises, which 0 of 1 values do: not as expected.",
+    ]
+    assert "## In short\n\n- misaligned: at load low" in report.to_markdown()
+
+
+def test_summary_says_what_repeats_at_every_load():
+    """x 2 is +6.0 dB at both loads, x 0.5 then x 2 does not repeat; 1.2 is +1.6 dB, within 3 dB."""
+    states = {
+        "low": {"healthy": tone((1, 1, 1)), "broken": tone((2, 0.5, 1))},
+        "high": {"healthy": tone((1, 1, 1)), "broken": tone((2, 2, 1.2))},
+    }
+    report = compare(states, scope="each")
+    found, verdict = report.summary()
+    assert found == "broken: at every load 1 x GMF rises on acc (+6.0, +6.0 dB)."
+    assert "1 x GMF, 2 x GMF and 3 x GMF stay within 3 dB, which 2 of 6 values do: not as expected" in verdict
+    with_model = compare(states, states)
+    assert with_model.summary()[0] == "broken: at every load 1 x GMF rises (+6.0, +6.0 dB)."
 
 
 def test_channels_that_contradict_each_other_are_named():

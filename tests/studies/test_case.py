@@ -91,3 +91,33 @@ def test_paper_cases():
     assert {c.operation.torque for c in cases} == {100.0, 200.0}
     with pytest.raises(CaseError, match="low and a high torque"):
         paper_cases(torques=(200.0, 100.0))
+
+
+def test_faults_of_teeth_by_name_table_and_file(tmp_path):
+    from gearmbs.gears.faults import BrokenTooth, Pit
+
+    path = tmp_path / "broken.toml"
+    path.write_text(
+        '[[fault.teeth]]\nkind = "broken tooth"\nlost = 0.4\n[[fault.teeth]]\nkind = "Pit"\ndepth = "30 um"\n'
+    )
+    case = load_case(path)
+    assert case.pair().faults == (BrokenTooth(lost=0.4), Pit(depth="30 um"))
+    assert make_case(json.loads(case.model_dump_json())) == case
+    assert Case(fault={"teeth": Pit(depth="30 um")}).fault.teeth == case.fault.teeth[1:]
+    changed = Case().changed(fault={"teeth": "chipped corner"})
+    assert [fault.label for fault in changed.pair().faults] == ["chipped corner"]
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("chip", "kind 'chip' is unknown; known ones are chipped corner"),
+        ({"kind": "pitting", "deep": 1}, "pitting: unknown key 'deep'; known ones are wheel, depth"),
+        ({"kind": "pitting", "depth": "1 N"}, "Pit.depth: '1 N' is in N"),
+        ({"lost": 0.3}, "write its name or a table with 'kind'"),
+        (3, "3 is no fault"),
+    ],
+)
+def test_wrong_faults_of_teeth(fault, words):
+    with pytest.raises(CaseError, match=words):
+        make_case({"fault": {"teeth": fault}})

@@ -6,6 +6,7 @@ from gearmbs import signals
 from gearmbs.gears import GearPair, loaded_transmission_error
 from gearmbs.gears.pattern import contact_pattern
 from gearmbs.view import (
+    average_plot,
     contact_pattern_plot,
     load_sharing_plot,
     order_plot,
@@ -60,6 +61,21 @@ def test_order_plot_marks_the_mesh_orders(signal):
     assert_readable(figure)
 
 
+def test_averages_share_their_axes_and_count_teeth(signal):
+    phase = signals.phase_from_speed(signal, signal.attrs["speed"])
+    average = signals.time_synchronous_average(signal, phase)[:, [0]]
+    figure = average_plot({"healthy": average, "chipped": 2.0 * average}, teeth=29, title="One revolution")
+    one, two = figure.axes
+    assert one.get_ylim() == two.get_ylim()
+    assert one.get_ylabel() == "acceleration, m/s²"
+    assert two.get_xlabel() == "tooth of the wheel, 29 a revolution"
+    # the last sample lies one step before the full turn
+    assert two.lines[0].get_xdata()[-1] == pytest.approx(29 * (1 - 1 / average.sizes["angle"]))
+    assert abs(two.lines[0].get_ydata().mean()) < 1e-12
+    assert_readable(figure)
+    assert average_plot(average).axes[0].get_xlabel() == "revolution"
+
+
 def test_thinning_keeps_the_extremes():
     y = np.random.default_rng(5).standard_normal(1_000_003)
     x, z = thinned(np.arange(y.size) * 1.0, y, 10_000)
@@ -77,6 +93,9 @@ def test_thinning_keeps_the_extremes():
         (lambda s: time_plot(s[:1]), "at least 2"),
         (lambda s: time_plot(s.values), "ndarray"),
         (lambda s: order_plot(signals.spectrum(s), teeth=29), "order"),
+        (lambda s: average_plot(s), "angle"),
+        (lambda s: average_plot({}), "empty"),
+        (lambda s: average_plot(signals.angular_resample(s, signals.phase_from_speed(s, 100.0))), "several channels"),
     ],
 )
 def test_wrong_signals_are_named(signal, call, message):

@@ -1,0 +1,70 @@
+"""Faults of teeth in a case: texts and tables as a person writes them, and as the gears know them.
+
+A fault is a name, such as ``"chipped corner"``, or a table ``{"kind": "chipped corner", "height": "2 mm"}``, or an
+object of :mod:`gearmbs.gears.faults`. A case holds it as a table of plain numbers in SI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from typing import Any
+
+from gearmbs.gears import faults
+
+
+def kinds() -> dict[str, type[faults.Fault]]:
+    """Return the faults a case can hold by their labels, such as "broken tooth"."""
+    found = (value for value in vars(faults).values() if isinstance(value, type) and issubclass(value, faults.Fault))
+    return {kind.label: kind for kind in found if kind is not faults.Fault}
+
+
+def tooth_fault(value: Any) -> faults.Fault:
+    """Return the fault that a name, a table or a fault stands for.
+
+    Raises
+    ------
+    ValueError
+        For an unknown kind or key, or a value of the wrong unit; the message names what would do.
+
+    Examples
+    --------
+    >>> tooth_fault({"kind": "broken_tooth", "lost": 0.5, "wheel": "driven"}).severity
+    0.5
+    """
+    if isinstance(value, faults.Fault):
+        return value
+    table = {"kind": value} if isinstance(value, str) else value
+    if not isinstance(table, Mapping) or not isinstance(table.get("kind"), str):
+        raise ValueError(f"{value!r} is no fault; write its name or a table with 'kind', one of {', '.join(kinds())}")
+    wanted = _plain(table["kind"])
+    kind = next((k for label, k in kinds().items() if wanted in (_plain(label), _plain(k.__name__))), None)
+    if kind is None:
+        raise ValueError(f"kind {table['kind']!r} is unknown; known ones are {', '.join(kinds())}")
+    settings: dict[str, Any] = {str(key): item for key, item in table.items() if key != "kind"}
+    known = [field.name for field in fields(kind)]
+    for key in settings:
+        if key not in known:
+            raise ValueError(f"{kind.label}: unknown key {key!r}; known ones are {', '.join(known)}")
+    return kind(**settings)
+
+
+def fault_table(fault: faults.Fault) -> dict[str, Any]:
+    """Return a fault as a table of its kind and its values in SI, from which `tooth_fault` makes it again."""
+    return {"kind": fault.label, **asdict(fault)}
+
+
+def fault_tables(value: Any) -> tuple[dict[str, Any], ...]:
+    """Return the tables of one fault or several.
+
+    Raises
+    ------
+    ValueError
+        As `tooth_fault`.
+    """
+    several = value if isinstance(value, (list, tuple)) else (value,)
+    return tuple(fault_table(tooth_fault(one)) for one in several)
+
+
+def _plain(name: str) -> str:
+    return "".join(c for c in name.lower() if c.isalnum())

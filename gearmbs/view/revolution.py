@@ -1,0 +1,89 @@
+"""One revolution of a shaft: the time-synchronous averages of several states above each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from gearmbs.view.bars import state_colour
+from gearmbs.view.canvas import GREY, drawn_on, label, look, new_figure
+from gearmbs.view.signals import KINDS
+
+MOST_TICKS = 60
+"""More teeth than this are not marked one by one."""
+
+
+def average_plot(
+    averages: xr.DataArray | Mapping[str, xr.DataArray],
+    *,
+    teeth: int | None = None,
+    title: str | None = None,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw time-synchronous averages over a revolution, one panel for each state, all with the same axes.
+
+    A local fault shows as a disturbance at one place of the revolution, which a healthy pair does not have.
+
+    Parameters
+    ----------
+    averages : xarray.DataArray or mapping of name to xarray.DataArray
+        Dimension angle (revolutions), optionally channel of length one, as
+        `gearmbs.signals.time_synchronous_average` makes them and an `AnalysisReport` holds them.
+    teeth : int, optional
+        Teeth of the wheel on that shaft: the axis counts them. Default: revolutions.
+    title : str, optional
+    ax : matplotlib axes, optional
+        For a single average.
+
+    Raises
+    ------
+    ValueError
+        If there is no average, no angle, or more than one channel.
+    """
+    named = averages if isinstance(averages, Mapping) else {"": averages}
+    if not named:
+        raise ValueError("averages: empty; give at least one average")
+    curves = {str(name): _curve(str(name), average) for name, average in named.items()}
+    if ax is not None and len(curves) > 1:
+        raise ValueError(f"ax: one panel for {len(curves)} averages; give one or leave ax away")
+    with look():
+        if ax is not None:
+            figure, panel = drawn_on(ax)
+            panels = [panel]
+        else:
+            figure = new_figure(7.2, 1.0 + 1.7 * len(curves))
+            panels = list(figure.subplots(len(curves), 1, sharex=True, sharey=True, squeeze=False)[:, 0])
+        for k, (panel, (name, (angle, values, unit))) in enumerate(zip(panels, curves.items())):
+            panel.plot(angle * (teeth or 1), values, color=state_colour(name, k), linewidth=0.9)
+            panel.set_ylabel(label(KINDS.get(unit, "average"), unit))
+            if name:
+                panel.set_title(name, fontsize=10)
+            panel.margins(x=0)
+            if teeth is not None and teeth * angle[-1] <= MOST_TICKS:
+                panel.set_xticks(np.arange(0, round(teeth * angle[-1]) + 1), minor=True)
+                panel.grid(visible=True, axis="x", which="minor", color=GREY, alpha=0.25, linewidth=0.5)
+        panels[-1].set_xlabel("revolution" if teeth is None else f"tooth of the wheel, {teeth} a revolution")
+        if title and len(panels) == 1:
+            panels[0].set_title(title, wrap=True)
+        elif title:
+            figure.suptitle(title)
+    return figure
+
+
+def _curve(name: str, average: xr.DataArray) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return angle in revolutions, values without their mean, and unit."""
+    if not isinstance(average, xr.DataArray) or "angle" not in average.dims:
+        found = average.dims if isinstance(average, xr.DataArray) else type(average).__name__
+        raise ValueError(f"averages: {name or 'it'} needs a DataArray with the dimension 'angle', got {found}")
+    if average.size != average.sizes["angle"]:
+        names = [str(c) for c in average["channel"].values] if "channel" in average.coords else average.dims
+        raise ValueError(f"averages: {name or 'it'} has several channels {names}; select one, average[:, [0]]")
+    values = np.asarray(average.values, dtype=float).ravel()
+    unit = str(average.attrs.get("units", ""))
+    if "units" in average.coords and average.coords["units"].size == 1:
+        unit = str(np.ravel(average.coords["units"].values)[0])
+    return np.asarray(average["angle"].values, dtype=float), values - values.mean(), unit

@@ -1,0 +1,86 @@
+"""The commands that go from files to reports."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from gearmbs.cli import app, tooth_counts
+from gearmbs.signals import make_signal, write_signal
+
+RATE, SHAFT, TEETH = 12800.0, 30.0, 32
+
+
+def write(folder, name, second=0.5, **metadata):
+    """Write 4 s of a mesh with sidebands and a tacho, all turning at 30 Hz."""
+    angle = 2 * np.pi * SHAFT * np.arange(4 * int(RATE)) / RATE
+    x = (1 + 0.2 * np.cos(angle)) * (np.cos(TEETH * angle) + second * np.cos(2 * TEETH * angle))
+    x = x + 0.05 * np.random.default_rng(3).standard_normal(angle.size)
+    signal = make_signal({"housing": x, "pulse": (np.sin(angle) > 0.9) * 5.0}, RATE, units=["m/s^2", "V"], **metadata)
+    return write_signal(signal, folder / name)
+
+
+def run(*words):
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def test_one_command_from_csv_to_a_gmf_table(tmp_path):
+    path = write(tmp_path, "x.csv")
+    result = run("analyse", path, "--teeth", TEETH, "--channel", "housing")
+    assert result.exit_code == 0, result.output
+    assert "Gear mesh frequency: 960.0" in result.output
+    assert "| 1 x GMF |" in result.output
+
+
+def test_report_tables_and_figures_go_where_they_are_told(tmp_path):
+    path = write(tmp_path, "x.mat")
+    options = ("--tacho", "pulse", "--tables", tmp_path / "tables", "--figures", tmp_path / "figures")
+    result = run("analyse", path, "--teeth", "32,80", "--wheel", 2, *options, "--out", tmp_path / "report.md")
+    assert result.exit_code == 0, result.output
+    assert "from the tacho 'pulse'" in (tmp_path / "report.md").read_text()
+    table = pd.read_csv(tmp_path / "tables" / "harmonics.csv")
+    # the tacho is not analysed; its line at 960 Hz has the RMS 1 / sqrt(2)
+    assert table["channel"].unique().tolist() == ["housing"]
+    assert table["orders"][0] == pytest.approx(1 / np.sqrt(2), rel=0.02)
+    assert (tmp_path / "figures" / "spectrum.png").stat().st_size > 10_000
+    assert (tmp_path / "figures" / "average.svg").exists()
+    assert "wrote" in result.output
+
+
+def test_compare_writes_bars_for_measured_states(tmp_path):
+    files = {state: write(tmp_path, f"{state}.csv.gz", second) for state, second in (("healthy", 0.5), ("worn", 1.0))}
+    words = [word for state, path in files.items() for word in ("--experiment", f"low:{state}={path}")]
+    result = run(
+        "compare", *words, "--teeth", TEETH, "--channel", "housing", "--figures", tmp_path, "--tables", tmp_path
+    )
+    assert result.exit_code == 0, result.output
+    assert "worn: at load low 2 x GMF rises on housing (+6.0 dB)" in result.output
+    assert (tmp_path / "bars.png").exists()
+    assert pd.read_csv(tmp_path / "changes.csv")["change_db"].round(1).tolist() == [0.0, 6.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["analyse", "none.csv", "--teeth", "32"], "none.csv: cannot be opened"),
+        (["analyse", "x.csv"], "teeth is missing"),
+        (["analyse", "x.csv", "--teeth", "thirty"], "--teeth is 'thirty'"),
+        (["analyse", "x.csv", "--teeth", "32", "--speed", "30 mm"], "--speed"),
+        (["analyse", "x.csv", "--teeth", "32", "--channel", "roof"], "has no channel"),
+        (["analyse", "x.csv", "--teeth", "32", "--tacho", "roof"], "roof"),
+        (["compare", "--experiment", "x.csv", "--teeth", "32"], "load:state=path"),
+        (["compare", "--experiment", "a:healthy=x.csv", "--teeth", "32", "--scope", "some"], "scope"),
+    ],
+)
+def test_wrong_calls_end_with_one_message(tmp_path, monkeypatch, words, said):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path, "x.csv")
+    result = run(*words)
+    assert result.exit_code == 1
+    assert said in " ".join(result.output.split())
+    assert "Traceback" not in result.output
+
+
+def test_tooth_counts():
+    assert tooth_counts("32") == (32,)
+    assert tooth_counts("32, 80") == (32, 80)
