@@ -31,6 +31,7 @@ KINDS: dict[type, str] = {
     st.Joint: "joint", st.Jprim: "jprim", st.Motion: "motion", st.Sforce: "sforce", st.Vforce: "vforce",
     st.Vtorque: "vtorque", st.Gforce: "gforce", st.Bushing: "bushing", st.Field: "field",
     st.SpringDamper: "springdamper", st.Gcon: "gcon", st.Coupler: "coupler", st.Gear: "gear",
+    st.Beam: "beam", st.Friction: "friction",
 }  # fmt: skip
 """Kinds under which functions such as JOINT and SFORCE ask for an element's force."""
 
@@ -84,16 +85,14 @@ class AdamsModel:
             if m.number is not None:
                 markers[m.number] = marker_index[id(m)]
         variables = {v.id: v.function or "" for v in deck.of(st.Variable).values()}
-        plants = {("pinput", p.id): p.variables for p in deck.of(st.PlantInput).values()}
-        plants |= {("poutput", p.id): p.variables for p in deck.of(st.PlantOutput).values()}
         return Scope(
             markers=markers,
             marker_body=marker_body,
             variables=variables,  # type: ignore[arg-type]
             diffs={d.id: None if d.implicit else d.function for d in deck.of(st.Diff).values()},
             splines={s.id: spline_data(s) for s in deck.of(st.Spline).values()},
-            arrays={a.id: a.numbers for a in deck.of(st.Array).values()},
-            plants=plants,  # type: ignore[arg-type]
+            arrays=self.mechanism.arrays,
+            plants=self.mechanism.plants,
             forces=dict(self.pairs),  # type: ignore[arg-type]
             units=deck.units,
         )
@@ -235,6 +234,9 @@ class Builder:
         if isinstance(s, st.Motion) and s.joint is not None:
             joint = self.deck.of(st.Joint)[s.joint]
             return joint.i or 0, joint.j
+        if isinstance(s, st.Friction):
+            joint = self.deck.of(st.Joint)[s.joint or 0]
+            return joint.i or 0, joint.j
         if isinstance(s, (st.Coupler, st.Gear)):
             joint = self.deck.of(st.Joint)[s.joints[0]]
             return joint.i or 0, joint.j
@@ -336,6 +338,11 @@ class Builder:
         m = self.mechanism
         for variable in self.deck.of(st.Variable).values():
             m.variables[variable.id] = self.text(variable.function or "0")
+        for array in self.deck.of(st.Array).values():
+            m.arrays[array.id] = array.numbers
+        for kind, group in (("pinput", st.PlantInput), ("poutput", st.PlantOutput)):
+            for plant in self.deck.of(group).values():
+                m.plants[kind, plant.id] = plant.variables
         for spline in self.deck.of(st.Spline).values():
             if spline.data_file is None:
                 m.splines[spline.id] = spline_data(spline)

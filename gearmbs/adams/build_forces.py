@@ -9,6 +9,7 @@ import numpy as np
 
 from gearmbs.adams import statements as st
 from gearmbs.adams.build import Builder
+from gearmbs.mechanism.friction import INPUTS, KINDS
 from gearmbs.mechanism.parts import Marker
 
 COMPONENTS = ("fx", "fy", "fz", "tx", "ty", "tz")
@@ -123,6 +124,64 @@ def add_field(b: Builder, s: st.Field) -> None:
     _matrix_load(b, name, "field", s, k, c, s.length or [0.0] * 6, s.force or [0.0] * 6)
 
 
+def beam_stiffness(s: st.Beam) -> np.ndarray:
+    """Return the 6x6 stiffness of the beam's I end with the J end held, Timoshenko's with the shear ratios given."""
+    length, e, g, area = s.length or 0.0, s.emodulus or 0.0, s.gmodulus or 0.0, s.area or 0.0
+    k = np.zeros((6, 6))
+    k[0, 0], k[3, 3] = e * area / length, g * (s.ixx or 0.0) / length
+    for shift, turn, inertia, ratio, sign in ((1, 5, s.izz or 0.0, s.asy, -1.0), (2, 4, s.iyy or 0.0, s.asz, 1.0)):
+        shear = 12.0 * e * inertia * ratio / (g * area * length**2)
+        bending = e * inertia / (1.0 + shear)
+        k[shift, shift] = 12.0 * bending / length**3
+        k[shift, turn] = k[turn, shift] = sign * 6.0 * bending / length**2
+        k[turn, turn] = (4.0 + shear) * bending / length
+    return k
+
+
+def add_beam(b: Builder, s: st.Beam) -> None:
+    """BEAM: a FIELD with the stiffness of a beam, free at the length along x of J."""
+    k = beam_stiffness(s)
+    c = (s.cratio or 0.0) * k
+    if s.cmatrix is not None:
+        c = np.zeros((6, 6))
+        rows, columns = np.triu_indices(6)
+        # the lower triangle by columns is the upper one by rows
+        c[rows, columns] = c[columns, rows] = s.cmatrix
+    free = [s.length or 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    _matrix_load(b, b.model.names["beam", s.id], "beam", s, k, c, free, [0.0] * 6)
+
+
+def add_friction(b: Builder, s: st.Friction) -> None:
+    """FRICTION of a joint; without its joint it is absent."""
+    joint = b.joints.get(s.joint or 0)
+    if joint is None:
+        if ("JOINT", s.joint) in b.inactive:
+            return
+        raise ValueError(f"JOINT/{s.joint} has no friction; it must be {', '.join(KINDS)}")
+    given = tuple(i.lower() for i in s.inputs)
+    inputs = INPUTS if not given or "all" in given else tuple(i for i in given if i != "none")
+    b.mechanism.friction(
+        b.model.names["friction", s.id],
+        joint,
+        s.mu_static or 0.0,
+        s.mu_dynamic or 0.0,
+        stiction_transition_velocity=s.transition,
+        max_stiction_deformation=s.deformation,
+        effect=s.effect.lower(),
+        inputs=inputs,
+        preload_force=s.force_preload,
+        preload_torque=s.torque_preload,
+        pin_radius=s.pin_radius,
+        friction_arm=s.friction_arm,
+        bending_arm=s.bending_arm,
+        reaction_arm=s.reaction_arm,
+        ball_radius=s.ball_radius,
+        overlap=s.overlap,
+        overlap_change=s.overlap_delta.lower(),
+        yoke=s.yoke[0].lower(),
+    )
+
+
 FORCES: dict[type, Callable[[Builder, Any], None]] = {
     st.Sforce: add_sforce,
     st.Vforce: add_vforce,
@@ -131,4 +190,6 @@ FORCES: dict[type, Callable[[Builder, Any], None]] = {
     st.SpringDamper: add_spring_damper,
     st.Bushing: add_bushing,
     st.Field: add_field,
+    st.Beam: add_beam,
+    st.Friction: add_friction,
 }

@@ -28,6 +28,8 @@ REQUIRED: dict[type, tuple[str, ...]] = {
     st.Field: ("i", "j"),
     st.Variable: ("function",),
     st.Diff: ("function",),
+    st.Beam: ("i", "j", "length", "ixx", "iyy", "izz", "area", "emodulus", "gmodulus"),
+    st.Friction: ("joint", "mu_static", "mu_dynamic"),
 }
 MEASURES = frozenset(
     """DX DY DZ DM AX AY AZ PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
@@ -40,6 +42,7 @@ UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
     st.Marker: ("flex_body", "point_mass", "node_id", "curve"),
     st.Joint: ("delta_v", "max_friction", "mu_dyn_rot", "mu_dyn_trans", "mu_stat_rot", "mu_stat_trans"),
     st.Coupler: ("function",),
+    st.Friction: ("max_force", "max_torque"),
     st.Field: ("function",),
     st.Spline: ("data_file",),
     st.Request: ("function",),
@@ -181,6 +184,13 @@ def _check_forces(deck: Deck, fail: Fail) -> None:
         for force in deck.of(kind).values():
             if all(getattr(force, name) is None for name in names.split()):
                 fail(force, f"give at least one of {', '.join(names.upper().split())}")
+    for beam in deck.of(st.Beam).values():
+        for name in ("length", "area", "emodulus", "gmodulus"):
+            if not (getattr(beam, name) or 0.0) > 0.0:
+                fail(beam, f"{name.upper()} = {getattr(beam, name)}; it must be positive", name)
+    for friction in deck.of(st.Friction).values():
+        if friction.joint is not None and friction.joint not in deck.of(st.Joint):
+            fail(friction, f"there is no JOINT/{friction.joint}", "joint")
     for field in deck.of(st.Field).values():
         if field.kmatrix is None and field.cmatrix is None and field.function is None:
             fail(field, "give KMATRIX or CMATRIX")

@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from gearmbs.dae import forces
 from gearmbs.dae import tables as T
+from gearmbs.dae.reactions import REACTION
 
 if TYPE_CHECKING:
     from gearmbs.dae.solution import Solution
@@ -63,7 +64,7 @@ def _powers(solution: Solution) -> dict[str, np.ndarray]:
     motion = np.einsum("tr,tr->t", solution.multipliers, solution._phi[:, :, 2])
     applied = np.zeros(solution.t.size)
     for k, row in enumerate(solution.system.builder.forces):
-        if row[T.FORCE_KIND] != forces.GEAR_CONTACT:
+        if row[T.FORCE_KIND] not in (forces.GEAR_CONTACT, REACTION):
             applied += _load_power(solution, k, row)
     return {
         "work_motion": motion,

@@ -17,6 +17,7 @@ from gearmbs.dae import tapes, terms
 from gearmbs.dae.forces import element_wrench
 from gearmbs.dae.jacobian import NUMBERS, put
 from gearmbs.dae.kinematics import inertia_times, update_bodies
+from gearmbs.dae.reactions import REACTION
 from gearmbs.dae.residual import S_DIAG, S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR, S_WRENCH, arm_to
 from gearmbs.dae.rotation import (
     KIN_A,
@@ -209,6 +210,11 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
             jac = tab.scratch[T.SCRATCH_FIXED : T.SCRATCH_FIXED + 6 * width].reshape(6, width)
             for c in range(8):
                 diag[c] = 0.0
+            if row[T.FORCE_KIND] == REACTION:
+                # it follows from the multipliers that this system is solved for; the integrator's is at hand
+                for c in range(3):
+                    loads[f, c], loads[f, 3 + c] = y[row[T.FORCE_F] + c], y[row[T.FORCE_N] + c]
+                continue
             element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(0))
             for c in range(6):
                 loads[f, c] = wrench[c]

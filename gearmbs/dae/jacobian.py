@@ -14,6 +14,7 @@ from gearmbs.dae import tapes, terms
 from gearmbs.dae.forces import element_wrench
 from gearmbs.dae.kinematics import euler_component, inertia_times, update_tables
 from gearmbs.dae.problem import JACOBIAN_SIG
+from gearmbs.dae.reactions import REACTION, reaction_wrench
 from gearmbs.dae.residual import (
     S_DIAG,
     S_GRADIENT,
@@ -328,15 +329,26 @@ def load_entries(mode, b, sign, row, y, idata, tab, slot, vals, k):
 
 
 @njit(cache=True, error_model="numpy")
-def element_entries(mode, t, row, y, idata, tab, slot, vals, k):
+def element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k):
     """Entries of the rows F - F(q, q', t) and N - N(q, q', t) of one force element."""
     wrench = tab.scratch[S_WRENCH : S_WRENCH + 6]
     diag = tab.scratch[S_DIAG : S_DIAG + 8]
     width = row[T.FORCE_WIDTH]
     jac = tab.scratch[T.SCRATCH_FIXED : T.SCRATCH_FIXED + 6 * width].reshape(6, width)
-    element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(1))
     depends = row[T.FORCE_DEPENDS]
     bodies = tab.extra_i[depends]
+    if row[T.FORCE_KIND] == REACTION:
+        si1 = idata[T.H_FORMULATION] == T.SI1
+        source = yp if si1 else y
+        lam = idata[T.H_LAMBDA]
+        room = tab.scratch[0:64]
+        reaction_wrench(row, source[lam : lam + idata[T.H_ROWS]], lam, tab, room, wrench, jac, np.int64(1))
+        if si1:
+            for c in range(12 * bodies, width):
+                for r in range(6):
+                    jac[r, c] *= cj
+    else:
+        element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(1))
     unknowns = tab.extra_i[depends + 1 + bodies]
     for block in range(2):
         base = row[T.FORCE_F + block]
@@ -387,9 +399,10 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
             k = tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k)
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]
-        k = load_entries(mode, tab.marker_body[row[T.FORCE_I]], 1.0, row, y, idata, tab, slot, vals, k)
-        k = load_entries(mode, tab.marker_body[row[T.FORCE_J]], -1.0, row, y, idata, tab, slot, vals, k)
-        k = element_entries(mode, t, row, y, idata, tab, slot, vals, k)
+        if row[T.FORCE_KIND] != REACTION:
+            k = load_entries(mode, tab.marker_body[row[T.FORCE_I]], 1.0, row, y, idata, tab, slot, vals, k)
+            k = load_entries(mode, tab.marker_body[row[T.FORCE_J]], -1.0, row, y, idata, tab, slot, vals, k)
+        k = element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k)
     for s in range(idata[T.H_STATES]):
         k = state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k)
     if mode == COUNT:

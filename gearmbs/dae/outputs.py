@@ -11,6 +11,7 @@ from gearmbs.dae import index1
 from gearmbs.dae import tables as T
 from gearmbs.dae.jacobian import COUNT, NUMBERS, PLACES, compressed
 from gearmbs.dae.kinematics import update_tables
+from gearmbs.dae.reactions import renew_reactions
 from gearmbs.dae.rereference import track
 from gearmbs.dae.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, PLAN_TYPE, analyse, factor, new_factors, solve
 
@@ -30,6 +31,10 @@ accident and the pivots would not serve their neighbours."""
 
 SAME_POSITION = 0.05
 """Rotation, rad, after which the factors of one output no longer serve to project the next."""
+
+
+REACTION_PASSES = 30
+"""Most corrections of loads that depend on reactions, such as joint friction, to the multipliers of one output."""
 
 
 class Records(NamedTuple):
@@ -130,6 +135,12 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
         if not factor(plan, factors, vals) <= growth:
             return k
         solve(plan, factors, rhs, records.solution[k])
+        for _ in range(REACTION_PASSES):
+            # loads that depend on reactions change the right-hand side only
+            if renew_reactions(at, records.solution[k, base:], idata, tab) <= 1e-12:
+                break
+            index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
+            solve(plan, factors, rhs, records.solution[k])
         index1.loads_of_rows(records.solution[k, base:], idata, tab, records.force[k], records.moment[k])
         index1.poses(tab.kin, records.pose[k])
     return last

@@ -8,7 +8,8 @@ With y = [u, p, eps, R, theta, lambda, F, N, z, mu] the rows are, in the same or
     u - R' - Phi_R^T mu                                       (6), first, stabilised
     eps - theta' - Phi_theta^T mu                             (6), second, stabilised
     Phi(q, t)                                                 (7)
-    F - F(q, q', t),  N - N(q, q', t)                         definitions of the applied loads
+    F - F(q, q', t),  N - N(q, q', t)                         definitions of the applied loads (and, where a load
+                                                              depends on them, of joints' reactions by lambda)
     z' - f  or  z - f                                         user-defined states, if any
     Phi_q q' + Phi_t   (with q' = [u, eps])                   the derivative of (7)
 
@@ -26,6 +27,7 @@ from gearmbs.dae import tapes, terms
 from gearmbs.dae.forces import element_wrench
 from gearmbs.dae.kinematics import euler_component, update_tables
 from gearmbs.dae.problem import RESIDUAL_SIG
+from gearmbs.dae.reactions import REACTION, reaction_wrench
 from gearmbs.dae.rotation import KIN_ADOT, KIN_AXES, KIN_H, KIN_R, KIN_V, KIN_W
 
 S_GRADIENT = 0
@@ -237,18 +239,26 @@ def residual(t, y, yp, out, idata, rdata, work):
     add_constraints(t, y, yp, idata, tab, out)
     wrench = tab.scratch[S_WRENCH : S_WRENCH + 6]
     diag = tab.scratch[S_DIAG : S_DIAG + 8]
+    room = tab.scratch[0:64]
+    lam0 = idata[T.H_LAMBDA]
+    source = yp if idata[T.H_FORMULATION] == T.SI1 else y
+    multipliers = source[lam0 : lam0 + idata[T.H_ROWS]]
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]
         width = row[T.FORCE_WIDTH]
         jac = tab.scratch[T.SCRATCH_FIXED : T.SCRATCH_FIXED + 6 * width].reshape(6, width)
-        element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(0))
+        if row[T.FORCE_KIND] == REACTION:
+            reaction_wrench(row, multipliers, lam0, tab, room, wrench, jac, np.int64(0))
+        else:
+            element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(0))
         for c in range(3):
             if row[T.FORCE_F] >= 0:
                 out[row[T.FORCE_F] + c] = y[row[T.FORCE_F] + c] - wrench[c]
             if row[T.FORCE_N] >= 0:
                 out[row[T.FORCE_N] + c] = y[row[T.FORCE_N] + c] - wrench[3 + c]
-        add_load(tab.marker_body[row[T.FORCE_I]], 1.0, row, y, idata, tab, out)
-        add_load(tab.marker_body[row[T.FORCE_J]], -1.0, row, y, idata, tab, out)
+        if row[T.FORCE_KIND] != REACTION:
+            add_load(tab.marker_body[row[T.FORCE_I]], 1.0, row, y, idata, tab, out)
+            add_load(tab.marker_body[row[T.FORCE_J]], -1.0, row, y, idata, tab, out)
     for k in range(idata[T.H_STATES]):
         z = idata[T.H_Z] + k
         left = yp[z] if tab.state[k, T.STATE_KIND] == T.STATE_DIFFERENTIAL else y[z]

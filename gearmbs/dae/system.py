@@ -15,6 +15,7 @@ from gearmbs.dae import tables as T
 from gearmbs.dae.errors import ModelError, SingularModelError
 from gearmbs.dae.kinematics import inertia_times
 from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.reactions import reactions_from
 from gearmbs.dae.rereference import hook
 from gearmbs.dae.rotation import (
     KIN_A,
@@ -27,6 +28,9 @@ from gearmbs.dae.rotation import (
 )
 from gearmbs.dae.tables import TableBuilder
 from gearmbs.dae.terms import dot3
+
+MAX_LOAD_ITERATIONS = 200
+"""Of loads that depend on each other, at the start; friction converges like a power of the friction coefficient."""
 
 FORMULATIONS = {"I3": T.I3, "SI2": T.SI2, "SI1": T.SI1}
 
@@ -160,13 +164,18 @@ class System:
         pose[:, 3:12] = turned.reshape(-1, 9)
         return pose
 
-    def _evaluate(self, pose: np.ndarray, t: float):
-        """Assemble the index-1 system at a pose; return (matrix, rhs, phi, loads, y, idata, rdata, work)."""
+    def _evaluate(self, pose: np.ndarray, t: float, inner: np.ndarray | None = None):
+        """Assemble the index-1 system at a pose; return (matrix, rhs, phi, loads, y, idata, rdata, work).
+
+        ``inner`` holds loads and states, F to z of y; default: no loads, states at their start.
+        """
         self.choose_references(pose)
         idata, rdata, size = self.builder.pack(T.I3)
         work = np.zeros(size)
         y = np.zeros(int(idata[T.H_UNKNOWNS]))
         y[int(idata[T.H_Z]) : int(idata[T.H_Z]) + self.state_start.size] = self.state_start
+        if inner is not None:
+            y[int(idata[T.H_F]) :] = inner
         state_from_pose(np.ascontiguousarray(pose), idata, rdata, work, y)
         key = len(self.builder.rows)
         if self._plan[0] != key:
@@ -200,7 +209,12 @@ class System:
             terms.extend(old.terms[span])
             coef.extend(old.coef[span])
             reference.extend(old.reference[span])
+        lam, after = old.layout(T.I3)["lambda"], old.layout(T.I3)["F"]
+        end = old.layout(T.I3)["n"]
         old.rows, old.terms, old.coef, old.reference = rows, terms, coef, reference
+        moved = {lam + int(i): lam + k for k, i in enumerate(kept)}
+        moved |= {k: k - after + old.layout(T.I3)["F"] for k in range(after, end)}
+        old.renumber_unknowns(moved)
         self.row_names = [self.row_names[i] for i in kept]
         self.row_index = [self.row_index[i] for i in kept]
 
@@ -223,16 +237,49 @@ class System:
         return self.report
 
     def accelerations(self, pose: np.ndarray, t: float):
-        """Return (a, alpha) a row per body, lambda, force records, and the evaluated state at a pose."""
-        matrix, rhs, _, loads, y, idata, rdata, work = self._evaluate(pose, t)
-        try:
-            solution = splu(matrix).solve(rhs)
-        except RuntimeError:
-            solution = np.full(rhs.size, np.nan)
+        """Return (a, alpha) a row per body, lambda, force records, and y with its loads at a pose.
+
+        Loads that depend on other loads or on reactions are iterated until they agree.
+        """
         base = 6 * pose.shape[0]
-        if not np.all(np.isfinite(solution)) or self._massless(matrix, base):
-            raise SingularModelError(self._singular_message(matrix, base))
+        inner: np.ndarray | None = None
+        for attempt in range(MAX_LOAD_ITERATIONS if self._coupled() else 1):
+            matrix, rhs, _, loads, y, idata, rdata, work = self._evaluate(pose, t, inner)
+            try:
+                solution = splu(matrix).solve(rhs)
+            except RuntimeError:
+                solution = np.full(rhs.size, np.nan)
+            if not np.all(np.isfinite(solution)) or (attempt == 0 and self._massless(matrix, base)):
+                raise SingularModelError(self._singular_message(matrix, base))
+            last, inner = inner, self._inner(y, loads, idata)
+            y[int(idata[T.H_F]) :] = inner
+            reactions_from(solution[base:].copy(), y, idata, rdata, work)
+            inner = y[int(idata[T.H_F]) :].copy()
+            if last is not None and np.abs(inner - last).max() <= 1e-13 * (1e-3 + np.abs(inner).max()):
+                break
         return solution[:base].reshape(-1, 6), solution[base:], loads, y, idata, rdata, work
+
+    def _coupled(self) -> bool:
+        """Whether some load depends on unknowns other than positions, velocities and states."""
+        first, end = self.builder.layout(T.I3)["lambda"], self.builder.layout(T.I3)["z"]
+        for row in self.builder.forces:
+            at = row[T.FORCE_DEPENDS]
+            at += 1 + self.builder.extra_i[at]
+            count = self.builder.extra_i[at]
+            if any(first <= k < end for k in self.builder.extra_i[at + 1 : at + 1 + count]):
+                return True
+        return False
+
+    def _inner(self, y: np.ndarray, loads: np.ndarray, idata: np.ndarray) -> np.ndarray:
+        """Return F, N and z of y with the loads of the force records."""
+        out = y[int(idata[T.H_F]) :].copy()
+        table = idata[int(idata[T.H_I_FORCE]) : int(idata[T.H_I_FUNCTION])].reshape(-1, T.FORCE_COLUMNS)
+        for f, row in enumerate(table):
+            for column, part in ((T.FORCE_F, loads[f, 0:3]), (T.FORCE_N, loads[f, 3:6])):
+                if row[column] >= 0:
+                    at = int(row[column] - idata[T.H_F])
+                    out[at : at + 3] = part
+        return out
 
     def _massless(self, matrix: csc_array, base: int) -> bool:
         """True when some motion allowed by the constraints has no inertia."""
@@ -281,15 +328,9 @@ class System:
         y, yp = np.zeros(n), np.zeros(n)
         y[: int(idata[T.H_LAMBDA])] = y_small[: int(idata[T.H_LAMBDA])]
         z = slice(int(idata[T.H_Z]), int(idata[T.H_Z]) + self.state_start.size)
-        y[z] = self.state_start
+        y[int(idata[T.H_F]) : int(idata[T.H_MU])] = y_small[int(idata[T.H_F]) :]
         rows = slice(int(idata[T.H_LAMBDA]), int(idata[T.H_LAMBDA]) + len(lam))
         (yp if form == T.SI1 else y)[rows] = lam
-        forces = idata[int(idata[T.H_I_FORCE]) : int(idata[T.H_I_FUNCTION])].reshape(-1, T.FORCE_COLUMNS)
-        for f, row in enumerate(forces):
-            if row[T.FORCE_F] >= 0:
-                y[row[T.FORCE_F] : row[T.FORCE_F] + 3] = loads[f, 0:3]
-            if row[T.FORCE_N] >= 0:
-                y[row[T.FORCE_N] : row[T.FORCE_N] + 3] = loads[f, 3:6]
         work = np.zeros(size)
         self._settle_states(y, yp, z, idata, rdata, work)
         self._rates(y, yp, acc, idata, rdata, work)

@@ -314,6 +314,24 @@ class TableBuilder:
         )
         return len(self.forces) - 1
 
+    def renumber_unknowns(self, new: dict[int, int]) -> None:
+        """Point everything that depends on an unknown to its new place in y; those missing in ``new`` are dropped.
+
+        Only reactions depend on multipliers, and only multipliers are ever dropped.
+        """
+        for row in self.forces:
+            at = row[FORCE_DEPENDS]
+            bodies = self.extra_i[at]
+            first = at + 2 + bodies
+            kept = [new[k] for k in self.extra_i[first : first + self.extra_i[first - 1]] if k in new]
+            self.extra_i[first - 1] = len(kept)
+            self.extra_i[first : first + len(kept)] = kept
+            row[FORCE_WIDTH] = 12 * bodies + len(kept)
+        for tape in self.tape_rows:
+            codes, bodies, count = tape[TAPE_I], tape[TAPE_BODIES] + tape[TAPE_N_BODIES], tape[TAPE_N_UNKNOWNS]
+            for at in (bodies, codes + self.extra_i[codes + HEAD_ALGEBRAIC_LIST]):
+                self.extra_i[at : at + count] = [new[k] for k in self.extra_i[at : at + count]]
+
     def layout(self, formulation: int) -> dict[str, int]:
         """Return the offsets of the blocks of y = [u, p, eps, R, theta, lambda, F, N, mu]."""
         n3 = 3 * (len(self.bodies) - 1)

@@ -23,60 +23,39 @@ LOAD_TAPES = 1
 
 
 @njit(cache=True, error_model="numpy")
-def value(k, t, y, tab):
-    """Return the value of tape k."""
+def parts(k, tab):
+    """Return the integers, the reals and the angle references of tape k."""
     row = tab.tape[k]
     i, r, a = row[T.TAPE_I], row[T.TAPE_R], row[T.TAPE_REFERENCE]
-    return value_at(tab.address[linkage.VALUE])(
+    return (
         tab.extra_i[i : i + row[T.TAPE_I_SIZE]],
         tab.extra_r[r : r + row[T.TAPE_R_SIZE]],
-        t,
-        tab.kin,
-        tab.marker_body,
-        tab.marker,
-        y,
         tab.extra_r[a : a + row[T.TAPE_REFERENCE_SIZE]],
-        tab.tape_work,
     )
+
+
+@njit(cache=True, error_model="numpy")
+def value(k, t, y, tab):
+    """Return the value of tape k."""
+    ints, floats, ref = parts(k, tab)
+    evaluate = value_at(tab.address[linkage.VALUE])
+    return evaluate(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, tab.tape_work)
 
 
 @njit(cache=True, error_model="numpy")
 def gradient(k, t, y, tab, grad):
     """Return the value of tape k; write its spatial gradient to ``grad``."""
-    row = tab.tape[k]
-    i, r, a = row[T.TAPE_I], row[T.TAPE_R], row[T.TAPE_REFERENCE]
-    return gradient_at(tab.address[linkage.GRADIENT])(
-        tab.extra_i[i : i + row[T.TAPE_I_SIZE]],
-        tab.extra_r[r : r + row[T.TAPE_R_SIZE]],
-        t,
-        tab.kin,
-        tab.marker_body,
-        tab.marker,
-        y,
-        tab.extra_r[a : a + row[T.TAPE_REFERENCE_SIZE]],
-        grad,
-        tab.tape_work,
-    )
+    ints, floats, ref = parts(k, tab)
+    evaluate = gradient_at(tab.address[linkage.GRADIENT])
+    return evaluate(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, grad, tab.tape_work)
 
 
 @njit(cache=True, error_model="numpy")
 def second(k, t, y, tab, grad, hess):
     """Return the value of tape k with gradient and Hessian over [R, theta] of its bodies and time."""
-    row = tab.tape[k]
-    i, r, a = row[T.TAPE_I], row[T.TAPE_R], row[T.TAPE_REFERENCE]
-    return second_at(tab.address[linkage.SECOND])(
-        tab.extra_i[i : i + row[T.TAPE_I_SIZE]],
-        tab.extra_r[r : r + row[T.TAPE_R_SIZE]],
-        t,
-        tab.kin,
-        tab.marker_body,
-        tab.marker,
-        y,
-        tab.extra_r[a : a + row[T.TAPE_REFERENCE_SIZE]],
-        grad,
-        hess,
-        tab.tape_work,
-    )
+    ints, floats, ref = parts(k, tab)
+    evaluate = second_at(tab.address[linkage.SECOND])
+    return evaluate(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, grad, hess, tab.tape_work)
 
 
 @njit(cache=True, error_model="numpy")
@@ -94,20 +73,10 @@ def tail(tab, size):
 def update_references(t, y, tab):
     """Move the reference of every counted angle to its present value; the tables must be up to date."""
     for k in range(tab.tape.shape[0]):
-        row = tab.tape[k]
-        if row[T.TAPE_REFERENCE_SIZE] > 0:
-            i, r, a = row[T.TAPE_I], row[T.TAPE_R], row[T.TAPE_REFERENCE]
-            angles_at(tab.address[linkage.ANGLES])(
-                tab.extra_i[i : i + row[T.TAPE_I_SIZE]],
-                tab.extra_r[r : r + row[T.TAPE_R_SIZE]],
-                t,
-                tab.kin,
-                tab.marker_body,
-                tab.marker,
-                y,
-                tab.extra_r[a : a + row[T.TAPE_REFERENCE_SIZE]],
-                tab.tape_work,
-            )
+        if tab.tape[k, T.TAPE_REFERENCE_SIZE] > 0:
+            ints, floats, ref = parts(k, tab)
+            update = angles_at(tab.address[linkage.ANGLES])
+            update(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, tab.tape_work)
 
 
 @njit(cache=True, error_model="numpy")
@@ -163,30 +132,34 @@ def turn_columns(jac, first, q, fx, fy, fz):
 
 
 @njit(cache=True, error_model="numpy")
+def add_projector_columns(jac, q, factor, ex, ey, ez, frame, marker):
+    """Add ``factor`` (1 - e e^T) dP to the force rows, P the origin of a marker on the body of block q."""
+    sx, sy, sz = frame[marker, 0], frame[marker, 1], frame[marker, 2]
+    for r in range(3):
+        er = ex if r == 0 else (ey if r == 1 else ez)
+        px = factor * ((1.0 if r == 0 else 0.0) - er * ex)
+        py = factor * ((1.0 if r == 1 else 0.0) - er * ey)
+        pz = factor * ((1.0 if r == 2 else 0.0) - er * ez)
+        c = 12 * q
+        jac[r, c] += px
+        jac[r, c + 1] += py
+        jac[r, c + 2] += pz
+        # p . (dpi x s) = dpi . (s x p)
+        jac[r, c + 3] += sy * pz - sz * py
+        jac[r, c + 4] += sz * px - sx * pz
+        jac[r, c + 5] += sx * py - sy * px
+
+
+@njit(cache=True, error_model="numpy")
 def line_direction_columns(row, f, ex, ey, ez, length, tab, jac):
     """Add f d(e) for e = (P_I - P_J)/|P_I - P_J|: f/length times the projector normal to e."""
-    depends = row[T.FORCE_DEPENDS]
     for side in range(2):
         marker = row[T.FORCE_I + side]
         body = tab.marker_body[marker]
-        if body == 0:
-            continue
-        q = slot_of(tab, depends, body)
-        sign = (1.0 if side == 0 else -1.0) * f / length
-        sx, sy, sz = tab.frame[marker, 0], tab.frame[marker, 1], tab.frame[marker, 2]
-        for r in range(3):
-            er = ex if r == 0 else (ey if r == 1 else ez)
-            px = sign * ((1.0 if r == 0 else 0.0) - er * ex)
-            py = sign * ((1.0 if r == 1 else 0.0) - er * ey)
-            pz = sign * ((1.0 if r == 2 else 0.0) - er * ez)
-            c = 12 * q
-            jac[r, c] += px
-            jac[r, c + 1] += py
-            jac[r, c + 2] += pz
-            # p . (dpi x s) = dpi . (s x p)
-            jac[r, c + 3] += sy * pz - sz * py
-            jac[r, c + 4] += sz * px - sx * pz
-            jac[r, c + 5] += sx * py - sy * px
+        if body > 0:
+            q = slot_of(tab, row[T.FORCE_DEPENDS], body)
+            factor = (f if side == 0 else -f) / length
+            add_projector_columns(jac, q, factor, ex, ey, ez, tab.frame, marker)
 
 
 @njit(cache=True, error_model="numpy")

@@ -3,6 +3,7 @@
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
 from gearmbs.mechanism.analyses import kinematic, linear_modes, static_equilibrium
 from gearmbs.mechanism.elements import GearContact, Load, State, Torque
+from gearmbs.mechanism.friction import Friction
 from gearmbs.mechanism.functions import TimeFunction, constant, expression, harmonic, polynomial, ramp, step
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.mechanism import Mechanism
@@ -12,6 +13,7 @@ from gearmbs.mechanism.simulate import simulate
 __all__ = [
     "AssemblyError",
     "Body",
+    "Friction",
     "GearContact",
     "Joint",
     "Load",

@@ -12,6 +12,7 @@ from gearmbs.dae import terms, timefunctions
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.expressions import ExpressionError, Tape
 from gearmbs.dae.expressions.tape import LEVEL_ACCELERATION, LEVEL_TIME
+from gearmbs.dae.reactions import REACTION
 from gearmbs.dae.system import System
 from gearmbs.dae.tables import TableBuilder
 from gearmbs.mechanism import elements as el
@@ -24,17 +25,35 @@ from gearmbs.mechanism.parts import Body, Marker
 if TYPE_CHECKING:
     from gearmbs.mechanism.mechanism import Mechanism
 
+REACTION_KINDS = {
+    "rotation": ("motion",),
+    "translation": ("motion",),
+    "coupler": ("coupler", "gear"),
+    "distance": ("gcon", "joint"),
+}
+"""Functions under which the reactions of joints, of the kind given, can be asked for; others are JOINT and JPRIM."""
+REACTION_KEYS = ("joint", "jprim", "motion", "coupler", "gear", "gcon")
+
 
 def compile_mechanism(mechanism: Mechanism, t0: float) -> System:
     """Return the System of a mechanism; see :meth:`gearmbs.mechanism.Mechanism.compile`."""
     if not mechanism.bodies:
         raise ModelError(f"mechanism '{mechanism.name}': it has no bodies; add one with .body(...)")
-    return _Compiler(mechanism).run(t0)
+    measured: list[str] = []
+    while True:
+        compiler = _Compiler(mechanism, measured)
+        system = compiler.run(t0)
+        if not compiler.missing:
+            return system
+        # an expression asks for a joint's reaction: it becomes an unknown, and all places in y move
+        measured = [*measured, *compiler.missing]
 
 
 class _Compiler:
-    def __init__(self, mechanism: Mechanism) -> None:
+    def __init__(self, mechanism: Mechanism, measured: list[str]) -> None:
         self.mechanism = mechanism
+        self.measured = measured
+        self.missing: dict[str, None] = {}
         self.builder = TableBuilder()
         self.builder.gravity = mechanism.gravity
         self.body_index: dict[int, int] = {id(mechanism.ground): 0}
@@ -61,12 +80,15 @@ class _Compiler:
             self.row_names.append(f"{name}: expression")
         for element in m.elements.values():
             self.add_element(element)
+        for name in self.measured:
+            self.add_reaction(m.joints[name])
         for state in m.states.values():
             tape = self.tape(state.expression, f"state '{state.name}'", "number")
             self.builder.add_state(
                 T.STATE_ALGEBRAIC if state.algebraic else T.STATE_DIFFERENTIAL, self.builder.add_tape(tape)
             )
-        system = System(self.builder, pose, list(m.bodies), self.row_names, list(m.elements), t0)
+        elements = [*m.elements, *(f"reaction of {name}" for name in self.measured)]
+        system = System(self.builder, pose, list(m.bodies), self.row_names, elements, t0)
         system.mechanism = m
         system.marker_index = self.marker_index
         system.state_names = [str(s) for s in m.states]
@@ -131,9 +153,16 @@ class _Compiler:
                     if marker.number is not None:
                         markers[marker.number] = self.index(marker)
             forces: dict[tuple[str, int | str], tuple[int | str, int | str | None]] = {}
+            for joint in m.joints.values():
+                for kind in REACTION_KINDS.get(joint.kind, ("joint", "jprim")):
+                    forces[(kind, _upper(joint.name))] = (joint.i.name.upper(), joint.j.name.upper())
+            absent: set[tuple[str, int | str, int]] = set()
             for load in m.elements.values():
                 if isinstance(load, Load):
                     forces[(load.kind, _upper(load.name))] = (load.i.name.upper(), load.j.name.upper())
+                    for base, there in ((0, load.has_force), (3, load.has_torque)):
+                        if not there:
+                            absent.add((load.kind, _upper(load.name), base))
             self._scope = Scope(
                 markers=markers,
                 marker_body=tuple(self.builder.marker_body),
@@ -141,8 +170,12 @@ class _Compiler:
                 states=frozenset(_upper(k) for k, s in m.states.items() if s.algebraic),
                 diffs={_upper(k): s.expression for k, s in m.states.items() if not s.algebraic},
                 splines={_upper(k): v for k, v in m.splines.items()},
+                arrays={_upper(k): v for k, v in m.arrays.items()},
+                plants={(kind, _upper(k)): v for (kind, k), v in m.plants.items()},
                 forces=forces,
+                absent=frozenset(absent),
                 units=m.units,
+                one_sided=True,
             )
         return self._scope
 
@@ -174,17 +207,26 @@ class _Compiler:
                     return n_n + component - 3
             n_f += 3 * force
             n_n += 3 * torque
+        if key[0] in REACTION_KEYS:
+            name = next((n for n in m.joints if _upper(n) == _upper(key[1])), None)
+            if name in self.measured:
+                k = self.measured.index(name)
+                return (n_f + 3 * k + key[2]) if key[2] < 3 else (n_n + 3 * k + key[2] - 3)
+            if name is not None:
+                self.missing[name] = None
+                # any place in y serves until the next attempt, which knows of the reaction
+                return at["F"]
         raise ModelError(
-            f"{label}: the value {key} is not an unknown of the equations; a force may depend on the force or torque "
-            "an element exerts at its I marker and on states, not on joint reactions"
+            f"{label}: the value {key} is not an unknown of the equations; a load may depend on what joints, motions "
+            "and loads exert and on states, not on the reaction of a constraint given by an expression"
         )
 
     def offsets(self) -> dict[str, int]:
         """Block offsets of y; the elements' and states' numbers are known before they are added."""
         m = self.mechanism
         n3, rows = 3 * len(m.bodies), sum(len(j.rows) for j in m.joints.values()) + len(m.constraints)
-        n_f = 3 * sum(_blocks(e)[0] for e in m.elements.values())
-        n_n = 3 * sum(_blocks(e)[1] for e in m.elements.values())
+        n_f = 3 * (sum(_blocks(e)[0] for e in m.elements.values()) + len(self.measured))
+        n_n = 3 * (sum(_blocks(e)[1] for e in m.elements.values()) + len(self.measured))
         at = {"F": 5 * n3 + rows}
         at["N"] = at["F"] + n_f
         at["z"] = at["N"] + n_n
@@ -224,6 +266,22 @@ class _Compiler:
             self.add_load(element, i, j)
         else:
             raise ModelError(f"force element {element!r}: its type is unknown to the mechanism")
+
+    def add_reaction(self, joint: jt.Joint) -> None:
+        """Make the force and moment of a joint on its I marker's body unknowns."""
+        names = list(self.mechanism.joints)
+        before = sum(len(self.mechanism.joints[n].rows) for n in names[: names.index(joint.name)])
+        first = 5 * 3 * len(self.mechanism.bodies) + before
+        bodies = {self.body_index[id(m.body)] for row in joint.rows for t in row.terms for m in (t.i, t.j)} - {0}
+        self.builder.add_force(
+            REACTION,
+            self.index(joint.i),
+            self.index(joint.j),
+            force=True,
+            torque=True,
+            bodies=sorted(bodies),
+            unknowns=list(range(first, first + len(joint.rows))),
+        )
 
     def add_load(self, load: Load, i: int, j: int) -> None:
         label = f"{load.kind} '{load.name}'"

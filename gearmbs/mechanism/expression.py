@@ -137,7 +137,12 @@ class Scope:
     plants : mapping of ("pinput" | "poutput", ref) to VARIABLE refs
     forces : mapping of (kind, ref) to (I marker ref, J marker ref or None)
         Elements whose forces JOINT, SFORCE, FX ... can ask for.
+    absent : set of (kind, ref, 0 or 3)
+        Elements without a force (0) or without a torque (3): it is zero.
     units : Units
+    one_sided : bool
+        Only what elements exert at their I markers are unknowns; the J side follows from action and reaction at one
+        point.
     """
 
     markers: Mapping[Ref, int] = field(default_factory=dict)
@@ -149,7 +154,9 @@ class Scope:
     arrays: Mapping[Ref, Sequence[float]] = field(default_factory=dict)
     plants: Mapping[tuple[str, Ref], Sequence[Ref]] = field(default_factory=dict)
     forces: Mapping[tuple[str, Ref], tuple[Ref, Ref | None]] = field(default_factory=dict)
+    absent: frozenset[tuple[str, Ref, int]] = frozenset()
     units: Units = Units()
+    one_sided: bool = False
 
 
 _TOKEN = re.compile(

@@ -34,12 +34,12 @@ BINARY = {"ATAN2": op.ATAN2, "MOD": op.MOD, "SIGN": op.SIGN, "DIM": op.DIM}
 ELEMENT_FORCES = {
     "JOINT": "joint", "JPRIM": "jprim", "MOTION": "motion", "SFORCE": "sforce", "VFORCE": "vforce",
     "VTORQ": "vtorque", "GFORCE": "gforce", "BUSH": "bushing", "FIELD": "field", "SPDP": "springdamper",
-    "GCON": "gcon", "COUPLER": "coupler", "GEAR": "gear",
+    "GCON": "gcon", "COUPLER": "coupler", "GEAR": "gear", "BEAM": "beam",
 }  # fmt: skip
 EULER_SEQUENCES = ("123", "231", "312", "132", "213", "321", "121", "131", "212", "232", "313", "323")
 """Body-fixed sequences of ORIENT's systems 1 to 12."""
 UNSUPPORTED = frozenset(
-    "BEAM NFORCE CONTACT CVCV PTCV CURVE INTERP INVPSD DELAY USER SENVAL MODE INCANG FXFREQ FXMODE FRICTION "
+    "NFORCE CONTACT CVCV PTCV CURVE INTERP INVPSD DELAY USER SENVAL MODE INCANG FXFREQ FXMODE FRICTION "
     "UVX UVY UVZ DXYZ VXYZ WXYZ FXYZ TXYZ TRANS ARYSUM RANDOM".split()
 )
 """Functions of ADAMS that exist but are not evaluated here."""
@@ -200,9 +200,34 @@ class Lowering:
 
     def force(self, kind: str, ref: Ref, base: int, rm: int, axis: int) -> int:
         """Return a component of an element's force (base 0 or 6) or torque (base 3 or 9)."""
+        b = self.builder
+        if base >= 6 and self.scope.one_sided:
+            if axis == op.MAGNITUDE:
+                return self.length([self.force(kind, ref, base, rm, a) for a in range(3)])
+            opposite = b.unary(op.NEG, self.force(kind, ref, base - 6, rm, axis))
+            return opposite if base == 6 else b.binary(op.SUB, opposite, self.shifted(kind, ref, rm, axis))
+        if (kind, ref, base % 6) in self.scope.absent:
+            return b.constant(0.0)
         keys = [(kind, ref, base + c) for c in range(3)]
-        register = self.builder.force(keys, rm, axis)
-        return self.scaled(register, "torque" if base % 6 else "force")
+        return self.scaled(b.force(keys, rm, axis), "torque" if base % 6 else "force")
+
+    def shifted(self, kind: str, ref: Ref, rm: int, axis: int) -> int:
+        """Return a component of (P_I - P_J) x F, F on the I marker: the torque of -F at P_I about J is its opposite."""
+        b = self.builder
+        i, j = (op.GLOBAL if m is None else self.scope.markers[m] for m in self.scope.forces[kind, ref])
+        if i == j:
+            return b.constant(0.0)
+        arm = [self.scaled(b.vector(op.DISPLACEMENT, i, j, op.GLOBAL, rm, a), "length") for a in range(3)]
+        force = [self.force(kind, ref, 0, rm, a) for a in range(3)]
+        m, n = (axis + 1) % 3, (axis + 2) % 3
+        return b.binary(op.SUB, b.binary(op.MUL, arm[m], force[n]), b.binary(op.MUL, arm[n], force[m]))
+
+    def length(self, parts: list[int]) -> int:
+        """Return the length of a vector of components."""
+        result = parts[0]
+        for other in parts[1:]:
+            result = self.builder.binary(op.HYPOT, result, other)
+        return result
 
     def _element_force(self, node: Call) -> int:
         self.count(node, 3, 4)
@@ -239,7 +264,4 @@ class Lowering:
             for kind, ref, base in found:
                 total = self.builder.binary(op.ADD, total, self.force(kind, ref, base, rm, a))
             sums.append(total)
-        result = sums[0]
-        for other in sums[1:]:
-            result = self.builder.binary(op.HYPOT, result, other)
-        return result
+        return self.length(sums)

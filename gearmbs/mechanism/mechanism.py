@@ -15,6 +15,7 @@ from gearmbs.mechanism import elements as el
 from gearmbs.mechanism import joints as jt
 from gearmbs.mechanism.elements import ContactTables, GearContact, Load, State, Torque
 from gearmbs.mechanism.expression import Units
+from gearmbs.mechanism.friction import add_friction, friction_of
 from gearmbs.mechanism.functions import TimeFunction, as_function, constant
 from gearmbs.mechanism.geometry import Vector, frame_along, vector
 from gearmbs.mechanism.parts import Body, Marker, make_body
@@ -52,6 +53,8 @@ class Mechanism:
         self.variables: dict[Any, str] = {}
         self.states: dict[Any, State] = {}
         self.splines: dict[Any, SplineData] = {}
+        self.arrays: dict[Any, tuple[float, ...]] = {}
+        self.plants: dict[tuple[str, Any], tuple[Any, ...]] = {}
         self.units = Units()
 
     # --- bodies -----------------------------------------------------------------------------------
@@ -355,6 +358,28 @@ class Mechanism:
             raise ModelError(f"bushing '{name}': all stiffnesses and dampings are zero")
         return self._add_load(Load(name, "bushing", i, j, j, el.COMPONENTS, tuple(parts)))
 
+    def friction(self, name: str, joint: jt.Joint, mu_static: float, mu_dynamic: float, **parameters) -> list[Load]:
+        """Add dry friction to a revolute, translational, cylindrical, spherical or universal joint.
+
+        It depends on the joint's reaction and its slip speed as in ADAMS.
+
+        Parameters
+        ----------
+        mu_static, mu_dynamic : float
+            Coefficients of friction.
+        **parameters
+            Radii, arms, preloads, transition velocity: see :class:`gearmbs.mechanism.Friction`.
+
+        Raises
+        ------
+        ModelError
+            For a joint without friction of this kind, or a parameter that is wrong or missing.
+        """
+        self._check_name(name)
+        if self.joints.get(getattr(joint, "name", "")) is not joint:
+            raise ModelError(f"friction '{name}': {joint!r} is not a joint of mechanism '{self.name}'")
+        return add_friction(self, name, joint, friction_of(name, mu_static, mu_dynamic, parameters))
+
     def general_constraint(self, name: str, expression: str) -> None:
         """Demand that an expression of positions and time vanish (ADAMS's GCON)."""
         self._check_name(name)
@@ -373,6 +398,10 @@ class Mechanism:
         """Name a table of points for CUBSPL and AKISPL."""
         points = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         self.splines[name] = SplineData(*points)  # type: ignore[arg-type]
+
+    def array(self, name: str, numbers: npt.ArrayLike) -> None:
+        """Name a list of numbers; expressions use them as ARYVAL(name, position), counted from 1."""
+        self.arrays[name] = tuple(float(v) for v in np.asarray(numbers, dtype=float).ravel())
 
     # --- translation into tables ------------------------------------------------------------------
 

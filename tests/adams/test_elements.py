@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gearmbs.adams import parse_deck, parse_script
+from gearmbs.adams.run import run_deck
+
 from .test_run import model, run
 
 G = 9.80665
@@ -104,6 +107,20 @@ def test_gear_and_coupler_agree():
         np.testing.assert_allclose(result.request(1)[:, 2], -angle(result.t) / 3, atol=1e-6)
 
 
+@pytest.mark.parametrize("friction", [0.6, 0.5])
+def test_friction_statement_holds_or_lets_slide(friction):
+    """Rail 30 degrees down, deck in mm: tan 30 = 0.577 lies between the coefficients."""
+    body = "PART/2,MASS=2,CM=20,IP=1000,1000,1000\nMARKER/20,PART=2,REULER=90D,120D,0\nACCGRAV/KGRAV=-9806.65\n"
+    body += "MARKER/11,PART=1,REULER=90D,120D,0\nJOINT/1,TRANSLATIONAL,I=20,J=11\n"
+    body += f"FRICTION/1, JOINT=1, MU_STATIC={friction}, MU_DYN=0.3, INPUTS=REACTION_FORCE\nREQUEST/1,F2=DZ(20,11,11)"
+    text = model(body).replace("UNITS/SYSTEM=MKS", "UNITS/FORCE=NEWTON,MASS=KILOGRAM,LENGTH=MILLIMETER,TIME=SECOND")
+    moved = run(text, 1.0).request(1)[-1, 1]
+    if friction == 0.6:
+        assert 0.0 < moved < 0.1
+    else:
+        assert moved == pytest.approx(500 * G * (0.5 - 0.3 * np.cos(np.pi / 6)), rel=0.01)
+
+
 def test_primitives_and_planar_joint():
     """INPLANE plus PARALLEL_AXES is PLANAR: a body pushed off its centre moves in the plane only."""
     push = "MARKER/21,PART=2,QP=0.3,0,0\nMARKER/12,PART=1,FLOATING\n"
@@ -192,6 +209,23 @@ def test_field_matrix_is_stored_by_columns():
     body = BLOCK.replace("MARKER/20,PART=2", "MARKER/20,PART=2,QP=0.1,0,0") + f"FIELD/1,I=20,J=10,KMATRIX={listed}\n"
     result = run(model(body + "REQUEST/1,F,I=20,J=10"), 0.01, 1)
     np.testing.assert_allclose(result.request(1)[0, 1:4], [0, -5, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("shear", [0.0, 1.2])
+def test_beam_bends_like_timoshenko(shear):
+    """Cantilever of 1 m with a small load at its end: u = F L^3/(3 E I) + shear F L/(G A), slope F L^2/(2 E I)."""
+    body = "PART/2,MASS=1E-9,CM=20,IP=1,1,1\nMARKER/20,PART=2,QP=1,0,0\nMARKER/12,PART=1,FLOATING\n"
+    body += "BEAM/1,I=20,J=10,LENGTH=1,IXX=2E-8,IYY=1E-8,IZZ=3E-8,AREA=1E-4,EMODULUS=2E11,GMODULUS=8E10,CRATIO=0.01\n"
+    body = body.replace("CRATIO", f"ASY={shear},ASZ={shear},CRATIO")
+    body += "GFORCE/1,I=20,JFLOAT=12,RM=10,FX=20\\FY=0.6\\FZ=0.2\\TX=0.01\\TY=0\\TZ=0\n"
+    body += "REQUEST/1,D,I=20,J=10\nREQUEST/2,F2=AX(20,10)\\F3=AY(20,10)\\F4=AZ(20,10)\\F6=BEAM(1,0,2,0)\n"
+    result = run_deck(parse_deck(model(body)), parse_script("m\np\nsim/statics\n"))
+    moved, turned = result.request(1)[0, 1:4] - [1, 0, 0], result.request(2)[0, 1:4]
+    slide = shear / (8e10 * 1e-4)
+    # the axial force adds F u to the moments: a part in 1e4
+    np.testing.assert_allclose(moved, [20 / 2e7, 0.6 / 18000 + 0.6 * slide, 0.2 / 6000 + 0.2 * slide], rtol=1e-3)
+    np.testing.assert_allclose(turned, [0.01 / 1600, -0.2 / 4000, 0.6 / 12000], rtol=1e-3)
+    assert result.request(2)[0, 5] == pytest.approx(-20.0, rel=1e-6)
 
 
 def test_single_component_forces():

@@ -152,8 +152,8 @@ def test_two_simulations_with_a_released_joint():
 
 
 def test_messages_name_what_a_modeller_can_mend():
-    with pytest.raises(DeckError, match="BEAM/1 is not supported"):
-        run(model("PART/2,MASS=1,CM=20,IP=1,1,1\nMARKER/20,PART=2\nBEAM/1,I=20,J=10"), 1.0)
+    with pytest.raises(DeckError, match="TIRE/1 is not supported"):
+        run(model("PART/2,MASS=1,CM=20,IP=1,1,1\nMARKER/20,PART=2\nTIRE/1,I=20,J=10"), 1.0)
     # two pins at different places of one body
     body = "PART/2,MASS=1,CM=20,IP=1,1,1\nMARKER/20,PART=2\nMARKER/21,PART=2,QP=1,0,0\nMARKER/11,PART=1,QP=5,0,0\n"
     with pytest.raises(DeckError, match=r"JOINT_1|JOINT_2"):

@@ -106,7 +106,7 @@ def test_what_a_script_cannot_do_is_named_with_its_line(commands, line, message)
 
 
 def test_unsupported_parts_stop_the_run_unless_allowed():
-    deck = parse_deck(PENDULUM.replace("OUTPUT/", "CONTACT/1, IGEOM=1, JGEOM=2\nFRICTION/1, JOINT=1\nOUTPUT/"))
+    deck = parse_deck(PENDULUM.replace("OUTPUT/", "CONTACT/1, IGEOM=1, JGEOM=2\nSENSOR/1, VALUE=1\nOUTPUT/"))
     with pytest.raises(DeckError, match="CONTACT/1 is not supported") as caught:
         run_deck(deck, end=0.1)
     assert len(caught.value.diagnostics) == 2

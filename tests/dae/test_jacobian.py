@@ -62,13 +62,28 @@ def build(kind: str) -> Mechanism:
         m.load("joint", i, j, rm=random_marker(two, rng), fx=f"DX({a},{b})**2", fz=f"VY({a},{b},{a})", ty="DIF(lag)")
     elif kind == "bushing":
         m.bushing("joint", i, j, stiffness=(10, 20, 30), damping=(1, 2, 3), torsional_stiffness=(4, 5, 6))
+    elif kind.startswith("reaction"):
+        joints = {
+            "reaction of a revolute joint": lambda: m.revolute("pin", i, j),
+            "reaction of a translational joint": lambda: m.translational("pin", i, j),
+            "reaction of a distance": lambda: m.distance("pin", i, j),
+            "reaction of a screw": lambda: m.screw("pin", i, j, pitch=0.3),
+            "reaction of a motion": lambda: m.rotation("pin", m.revolute("axle", i, j), ramp(3.0, over=0.7)),
+        }
+        joints[kind]()
+        function = {"distance": "GCON", "motion": "MOTION"}.get(kind.split()[-1], "JOINT")
+        third = random_marker(two, rng)
+        parts = [f'{function}(pin,{side},{c},"{third.name}")' for side, c in ((0, 1), (0, 3), (0, 8), (1, 4), (1, 6))]
+        m.axis_torque("joint", random_marker(one, rng), third, " + ".join(parts))
     elif kind == "grounded revolute":
         m.revolute("joint", i, random_marker(m.ground, rng))
     return m
 
 
 LOADS = ["general constraint", "line force", "axis force", "axis torque", "load", "bushing"]
-KINDS = [*JOINTS, *LOADS, "screw", "distance", "rotation", "translation", "coupler", "torque", "grounded revolute"]
+REACTIONS = [f"reaction of a {k}" for k in ("revolute joint", "translational joint", "distance", "screw", "motion")]
+OTHERS = ["screw", "distance", "rotation", "translation", "coupler", "torque", "grounded revolute"]
+KINDS = [*JOINTS, *LOADS, *REACTIONS, *OTHERS]
 
 
 def unassembled_problem(m: Mechanism, formulation: str):
