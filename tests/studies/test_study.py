@@ -184,10 +184,13 @@ def test_start_one_tooth_later_and_other_output_rate_change_nothing():
         np.testing.assert_allclose(values.values, reference.values, rtol=5e-3)
 
 
-def test_energy_balance_of_the_healthy_pair():
+@pytest.mark.parametrize("fault", [{}, {"misalignment": "1 deg"}, {"centre_distance_error": "3 mm"}])
+def test_energy_balance(fault):
+    """Work in less dissipation less stored, within 1e-6 of the work, once the powers are sampled finely enough."""
     case = Case(
-        operation={"run_up": 0.02, "settling": 0.0, "duration": 0.02},
-        solver={"tolerance": 1e-9, "output_rate": 409600.0},
+        operation={"run_up": 0.05, "settling": 0.0, "duration": 0.1},
+        solver={"tolerance": 1e-8, "output_rate": 204800.0},
+        fault=fault,
     )
     balance = simulate_case(case).energy_balance()
     assert balance.attrs["relative_imbalance"] < 1e-6
