@@ -14,6 +14,7 @@ from gearmbs.dae import state as s
 from gearmbs.dae.bdf import HISTORY, error_constant, predict, step_coefficients
 from gearmbs.dae.controller import after_error_failure, after_success
 from gearmbs.dae.crossings import RECORD, STOP, interpolate, locate_events, write_outputs
+from gearmbs.dae.functions import FUNCTIONS_TYPE
 from gearmbs.dae.newton import (
     CONVERGED,
     NOT_FINITE,
@@ -23,7 +24,7 @@ from gearmbs.dae.newton import (
     weighted_argmax,
     weighted_max,
 )
-from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, JACOBIAN_SIG, RESIDUAL_SIG
+from gearmbs.dae.problem import JACOBIAN_SIG
 from gearmbs.dae.sparse_lu import FACTORS_TYPE, PLAN_TYPE, factor
 from gearmbs.dae.state import STATE_TYPE
 
@@ -161,10 +162,7 @@ def _fit_step(real, count, t, stop):
 
 @njit(
     int64(
-        types.FunctionType(RESIDUAL_SIG),
-        types.FunctionType(JACOBIAN_SIG),
-        types.FunctionType(HOOK_SIG),
-        types.FunctionType(EVENTS_SIG),
+        FUNCTIONS_TYPE,
         STATE_TYPE,
         PLAN_TYPE,
         FACTORS_TYPE,
@@ -174,13 +172,13 @@ def _fit_step(real, count, t, stop):
     nogil=True,
     error_model="numpy",
 )
-def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
+def advance(functions, st, plan, factors, max_accepted):
     """Take at most ``max_accepted`` accepted steps.
 
     Parameters
     ----------
-    residual, jacobian, hook, events : compiled functions
-        With the signatures of `gearmbs.dae.problem`.
+    functions : Functions
+        Residual, Jacobian, hook and events.
     st : RunState
         State, read and written.
     plan, factors : LUPlan, LUFactors
@@ -192,6 +190,10 @@ def advance(residual, jacobian, hook, events, st, plan, factors, max_accepted):
     code : int
         RUNNING, DONE, TERMINAL, PAUSED, REPIVOT, BUFFER_FULL or a failure of `gearmbs.dae.state`.
     """
+    residual = functions.residual
+    jacobian = functions.jacobian
+    hook = functions.hook
+    events = functions.events
     real = st.real
     count = st.count
     times = st.times

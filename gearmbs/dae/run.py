@@ -19,6 +19,7 @@ from gearmbs.dae import state as s
 from gearmbs.dae.arguments import check_choices, event_rules, output_times
 from gearmbs.dae.bdf import HISTORY
 from gearmbs.dae.core import SLOPE_MAX_AGE, advance
+from gearmbs.dae.functions import bind
 from gearmbs.dae.newton import set_weights
 from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, SolverStats, Status
@@ -174,8 +175,12 @@ class Run:
         self.indptr = np.asarray(problem.indptr, dtype=np.int64)
         self.indices = np.asarray(problem.indices, dtype=np.int64)
         self.scale = np.asarray(problem.scale, dtype=float)
-        self.hook = problem.hook if problem.hook is not None else no_hook
-        self.events = problem.events if n_events else no_events
+        self.functions = bind(
+            problem.residual,
+            problem.jacobian,
+            problem.hook if problem.hook is not None else no_hook,
+            problem.events if n_events else no_events,
+        )
         self.plan: LUPlan | None = None
         self.factors: LUFactors | None = None
 
@@ -336,7 +341,7 @@ class Run:
         return self._result(status, message)
 
     def _loop(self, interrupt: InterruptFlag) -> tuple[Status, str]:
-        st, problem = self.state, self.problem
+        st = self.state
         if not self.started:
             failure = self._start()
             if failure is not None:
@@ -345,9 +350,7 @@ class Run:
         chunk = FIRST_CHUNK
         while True:
             tic = time.perf_counter()
-            code = advance(
-                problem.residual, problem.jacobian, self.hook, self.events, st, self.plan, self.factors, chunk
-            )
+            code = advance(self.functions, st, self.plan, self.factors, chunk)
             if self._user_exception() is not None:
                 return self._user_failure()
             if code == s.DONE:

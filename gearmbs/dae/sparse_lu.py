@@ -88,6 +88,115 @@ class SingularMatrixError(ValueError):
         self.cols = cols
 
 
+@njit(types.void(_UVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
+def _sort_lines(places, ptr):
+    """Sort each of the short lists ``places[ptr[k] : ptr[k + 1]]``."""
+    for k in range(ptr.shape[0] - 1):
+        for p in range(ptr[k] + 1, ptr[k + 1]):
+            value = places[p]
+            q = p - 1
+            while q >= ptr[k] and places[q] > value:
+                places[q + 1] = places[q]
+                q -= 1
+            places[q + 1] = value
+
+
+@njit(
+    types.Tuple((int64, _IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _VEC, _VEC, _VEC))(
+        _IVEC, _IVEC, _VEC, _VEC, float64
+    ),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def _plan(indptr, indices, vals, scale, drop):
+    """Return the rank and the fields of an `LUPlan`."""
+    n = indptr.shape[0] - 1
+    nnz = indices.shape[0]
+    row_scale = np.ones(n)
+    col_scale = scale.copy()
+    equilibrate(indptr, indices, vals, row_scale, col_scale)
+    scaled = np.empty(nnz)
+    for j in range(n):
+        for p in range(indptr[j], indptr[j + 1]):
+            scaled[p] = vals[p] * row_scale[indices[p]] * col_scale[j]
+    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(indptr, indices, scaled, drop)
+
+    row_place = np.empty(n, dtype=np.int64)
+    col_place = np.empty(n, dtype=np.int64)
+    row_from = np.empty(n, dtype=np.uint32)
+    col_to = np.empty(n, dtype=np.uint32)
+    row_scale_out = np.empty(n)
+    col_scale_out = np.empty(n)
+    kept = np.zeros(n)
+    for k in range(n):
+        row_place[rows[k]] = k
+        col_place[cols[k]] = k
+        row_from[k] = rows[k]
+        col_to[k] = cols[k]
+        row_scale_out[k] = row_scale[rows[k]]
+        col_scale_out[k] = col_scale[cols[k]]
+        if k < rank:
+            kept[k] = 1.0
+
+    # entries of the matrix, column by column in pivot order, rows ascending
+    a_ptr = np.zeros(n + 1, dtype=np.int64)
+    a_pos = np.empty(nnz, dtype=np.uint32)
+    a_src = np.empty(nnz, dtype=np.uint32)
+    a_scale = np.empty(nnz)
+    at = np.empty(n, dtype=np.int64)
+    for k in range(n):
+        j = cols[k]
+        end = a_ptr[k]
+        for p in range(indptr[j], indptr[j + 1]):
+            a_pos[end] = row_place[indices[p]]
+            end += 1
+        a_ptr[k + 1] = end
+    _sort_lines(a_pos, a_ptr)
+    for k in range(n):
+        j = cols[k]
+        for p in range(indptr[j], indptr[j + 1]):
+            at[row_place[indices[p]]] = p
+        for e in range(a_ptr[k], a_ptr[k + 1]):
+            p = at[a_pos[e]]
+            a_src[e] = p
+            a_scale[e] = row_scale[indices[p]] * col_scale[j]
+
+    # rows of U come out pivot by pivot, so that each column's pivots ascend
+    u_by_col = np.zeros(n + 1, dtype=np.int64)
+    for e in range(u_cols.shape[0]):
+        u_by_col[col_place[u_cols[e]] + 1] += 1
+    for k in range(n):
+        u_by_col[k + 1] += u_by_col[k]
+        at[k] = u_by_col[k]
+    u_pos = np.empty(u_cols.shape[0], dtype=np.uint32)
+    for k in range(n):
+        for e in range(u_ptr[k], u_ptr[k + 1]):
+            m = col_place[u_cols[e]]
+            u_pos[at[m]] = k
+            at[m] += 1
+    l_pos = np.empty(l_rows.shape[0], dtype=np.uint32)
+    for e in range(l_rows.shape[0]):
+        l_pos[e] = row_place[l_rows[e]]
+    _sort_lines(l_pos, l_ptr)
+    return (
+        rank,
+        a_ptr,
+        a_pos,
+        a_src,
+        a_scale,
+        u_by_col,
+        u_pos,
+        l_ptr,
+        l_pos,
+        row_from,
+        col_to,
+        row_scale_out,
+        col_scale_out,
+        kept,
+    )
+
+
 def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np.ndarray, drop: float = 0.0) -> LUPlan:
     """Choose pivots for a matrix and lay down the plan to factor every matrix of its pattern.
 
@@ -116,48 +225,11 @@ def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np
     """
     if not np.isfinite(vals).all():
         raise ValueError("the matrix has entries that are not finite")
-    n = len(indptr) - 1
-    row_scale = np.ones(n)
-    col_scale = np.array(scale, dtype=float)
-    equilibrate(indptr, indices, vals, row_scale, col_scale)
-    column = np.repeat(np.arange(n), np.diff(indptr))
-    entry_scale = row_scale[indices] * col_scale[column]
-    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(
-        indptr, indices, vals * entry_scale, max(drop, CANCELLED)
-    )
-    if rank < n and drop == 0.0:
-        raise SingularMatrixError(rows[rank:], cols[rank:])
-
-    row_place = np.empty(n, dtype=np.int64)
-    row_place[rows] = np.arange(n)
-    col_place = np.empty(n, dtype=np.int64)
-    col_place[cols] = np.arange(n)
-
-    a_count = np.diff(indptr)[cols]
-    a_ptr = np.concatenate(([0], np.cumsum(a_count))).astype(np.int64)
-    a_src = np.lexsort((row_place[indices], col_place[column]))
-    # rows of U come out pivot by pivot; a stable sort by column leaves each column's pivots ascending
-    u_row = np.repeat(np.arange(n), np.diff(u_ptr))
-    u_col = col_place[u_cols]
-    by_column = np.argsort(u_col, kind="stable")
-    u_by_col = np.concatenate(([0], np.cumsum(np.bincount(u_col, minlength=n)))).astype(np.int64)
-    l_pos = row_place[l_rows]
-    l_pos = l_pos[np.lexsort((l_pos, np.repeat(np.arange(n), np.diff(l_ptr))))]
-    return LUPlan(
-        a_ptr,
-        row_place[indices[a_src]].astype(np.uint32),
-        a_src.astype(np.uint32),
-        entry_scale[a_src],
-        u_by_col,
-        u_row[by_column].astype(np.uint32),
-        l_ptr,
-        l_pos.astype(np.uint32),
-        rows.astype(np.uint32),
-        cols.astype(np.uint32),
-        row_scale[rows],
-        col_scale[cols],
-        (np.arange(n) < rank).astype(float),
-    )
+    rank, *plan = _plan(indptr, indices, vals, np.asarray(scale, dtype=float), max(drop, CANCELLED))
+    if rank < len(indptr) - 1 and drop == 0.0:
+        rows, cols = (np.asarray(plan[i], dtype=np.int64)[rank:] for i in (8, 9))
+        raise SingularMatrixError(rows, cols)
+    return LUPlan(*plan)
 
 
 def new_factors(plan: LUPlan) -> LUFactors:
