@@ -1,17 +1,14 @@
-"""Cost of the gear contact kernel: per call and per evaluated pair-slice. Run ``python -m benchmarks.contact``."""
+"""Cost of the gear contact kernel: per call and per evaluated pair-slice."""
 
 from __future__ import annotations
 
-import json
-import platform
-import sys
 import time
-from pathlib import Path
+from collections.abc import Callable
 
-import numba
 import numpy as np
 from numba import njit
 
+from benchmarks.markdown import number, table
 from gearmbs.contact import gear_contact
 from gearmbs.gears import Friction, GearPair
 from gearmbs.gears.faults import GradedFlanks
@@ -28,6 +25,7 @@ CASES = {
 }
 SPEED = 1000 * 2 * np.pi / 60
 REPEATS = 200
+TITLE = "Gear contact kernel"
 CALLS = 10
 POSITIONS = 7
 
@@ -76,23 +74,32 @@ def measure(pair: GearPair, slices: int | None) -> dict[str, float]:
     }
 
 
-def main(out: str | None = None) -> None:
-    """Print the table, and store it as JSON when given a path."""
-    results = {name: measure(GearPair.paper(**changes), slices) for name, (changes, slices) in CASES.items()}
-    print(f"| case | value us | with derivatives us | touching pair-slices | ns per pair-slice |\n|{'---|' * 5}")
-    for name, r in results.items():
-        print(
-            f"| {name} | {r['value_us']:.2f} | {r['jacobian_us']:.2f} | {r['touching_pair_slices']:.1f} "
-            f"| {r['ns_per_pair_slice']:.0f} |"
-        )
-    if out is not None:
-        machine = {
-            "machine": platform.processor() or platform.machine(),
-            "python": platform.python_version(),
-            "numba": numba.__version__,
-        }
-        Path(out).write_text(json.dumps({"machine": machine, "results": results}, indent=2))
+def cells(quick: bool) -> list[tuple[str, Callable[[], dict]]]:
+    """Return name and measurement of each part."""
+    chosen = list(CASES.items())[: 2 if quick else None]
+    return [
+        (name, lambda name=name, a=(changes, slices): {"case": name, **measure(GearPair.paper(**a[0]), a[1])})
+        for name, (changes, slices) in chosen
+    ]
 
 
-if __name__ == "__main__":
-    main(*sys.argv[1:2])
+def finish(results: list[dict]) -> dict:
+    """Return nothing: the parts say it all."""
+    return {}
+
+
+def render(extra: dict) -> str:
+    """Return the table in Markdown."""
+    results = extra["results"]
+    header = ["case", "value us", "with derivatives us", "touching pair-slices", "ns per pair-slice"]
+    rows = [
+        [
+            r["case"],
+            number(r["value_us"]),
+            number(r["jacobian_us"]),
+            number(r["touching_pair_slices"]),
+            number(r["ns_per_pair_slice"]),
+        ]
+        for r in results
+    ]
+    return "One evaluation of a gear pair at 100 N m, averaged over a mesh cycle.\n\n" + table(header, rows)

@@ -1,0 +1,1 @@
+"""Integrators to compare: ours, and the peers that are installed."""
