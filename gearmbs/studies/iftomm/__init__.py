@@ -1,0 +1,25 @@
+"""Benchmark problems of the IFToMM technical committee for multibody dynamics, as mechanisms.
+
+``python -m gearmbs.studies.iftomm`` runs all of them and prints deviations from independent solutions, from published
+numbers, and the energy drift.
+"""
+
+from gearmbs.studies.iftomm.models import andrews, bricard, four_bars, governor, pendulum, slider_crank
+from gearmbs.studies.iftomm.references import PUBLISHED, Published
+from gearmbs.studies.iftomm.run import PROBLEMS, Outcome, Problem, run, table
+
+__all__ = [
+    "PROBLEMS",
+    "PUBLISHED",
+    "Outcome",
+    "Problem",
+    "Published",
+    "andrews",
+    "bricard",
+    "four_bars",
+    "governor",
+    "pendulum",
+    "run",
+    "slider_crank",
+    "table",
+]
