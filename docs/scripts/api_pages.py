@@ -25,6 +25,28 @@ ROOMS = {
 EVERYTHING = ["*"]
 """All public functions and classes that a module defines itself."""
 
+EXPORTED = ["__all__"]
+"""All names that a module lists as its own."""
+
+CONSTANTS = {
+    "gearmbs.signals": {
+        "COMPONENTS": "gearmbs.signals.newton",
+        "EXPECTED": "gearmbs.signals.comparison_report",
+        "FORMATS": "gearmbs.signals.io",
+        "INDICATORS": "gearmbs.signals.indicators",
+    },
+    "gearmbs.view": {"COLOURS": "gearmbs.view.canvas"},
+}
+"""Exported values that are no functions or classes, with the module that defines and describes them."""
+
+DESCRIBED = {
+    "gearmbs.contact": {
+        "GAP_COLUMNS": "Names of the columns of the rows that ``pair_gaps`` fills.",
+        "GEAR_CONTACT_SIG": "Numba signature of ``gear_contact``.",
+    },
+}
+"""Exported values of the kernels, described here."""
+
 MORE = {
     "gearmbs.gears": {
         "gearmbs.gears.faults": EVERYTHING,
@@ -38,6 +60,7 @@ MORE = {
     },
     "gearmbs.dae": {
         "gearmbs.dae.solve": ["solve_dae", "as_problem"],
+        "gearmbs.dae.expressions": EXPORTED,
         "gearmbs.dae.wstiff": ["solve_wstiff", "resume"],
         "gearmbs.dae.ida": ["solve_ida"],
         "gearmbs.dae.result": ["DAEResult", "SolverStats", "Status"],
@@ -87,10 +110,15 @@ def entries(room: str) -> list[str]:
     names = [f"{room}.{name}" for name in getattr(module, "__all__", ()) if _documented(getattr(module, name))]
     for home, more in MORE.get(room, {}).items():
         source = importlib.import_module(home)
-        for name in _own(source) if more is EVERYTHING else more:
+        for name in _own(source) if more is EVERYTHING else source.__all__ if more is EXPORTED else more:
             getattr(source, name)
             names.append(f"{home}.{name}")
     return names
+
+
+def constants(room: str) -> list[str]:
+    """Return where the exported constants of a room are defined, by their full names there."""
+    return [f"{home}.{name}" for name, home in CONSTANTS.get(room, {}).items()]
 
 
 def _own(module) -> list[str]:
@@ -115,6 +143,12 @@ def write(folder: Path) -> None:
         lines = [title, "=" * len(title), "", f"Module ``{room}``.", "", about, ""]
         lines += [".. autosummary::", "   :toctree: objects", "   :nosignatures:", ""]
         lines += [f"   {name}" for name in entries(room)]
+        if room in CONSTANTS or room in DESCRIBED:
+            lines += ["", "Constants", "---------"]
+        for name in constants(room):
+            lines += ["", f".. autodata:: {name}", "   :no-value:"]
+        for name, text in DESCRIBED.get(room, {}).items():
+            lines += ["", f".. py:data:: {room}.{name}", "", f"   {text}"]
         _write(folder / f"{room.rpartition('.')[2]}.rst", "\n".join(lines) + "\n")
 
 

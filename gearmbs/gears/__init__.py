@@ -1,5 +1,6 @@
 """Wheels and pairs: geometry, mass, placement in space, faults, and analyses that need no dynamics."""
 
+import gearmbs._announce  # noqa: F401
 from gearmbs.gears import faults
 from gearmbs.gears.laws import ContactLaw, Friction
 from gearmbs.gears.pair import GearPair, Placement

@@ -1,5 +1,7 @@
 """What a person builds: bodies, markers, joints, motions, forces."""
 
+import gearmbs._announce
+import gearmbs.mechanism.expression  # noqa: F401  (first, so that the function of that name below takes its place)
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
 from gearmbs.mechanism.analyses import kinematic, linear_modes, static_equilibrium
 from gearmbs.mechanism.elements import GearContact, Load, State, Torque

@@ -23,6 +23,7 @@ EXPECTED: dict[str, dict[int | str, int]] = {
     "broken": {1: 0, 2: 0, 3: 0, "sideband_level": 1, "energy_ratio": 1, "fm4": 1, "kurtosis": 1},
     "chipped": {1: 0, 2: 0, 3: 0, "sideband_level": 1, "energy_ratio": 1, "fm4": 1, "kurtosis": 1},
 }
+"""What each fault is expected to do; see `ComparisonReport.expectations`."""
 CHANGE_DB = 1.0
 STAYS_DB = 3.0
 INDICATOR_TIE = 0.05
@@ -166,6 +167,7 @@ class ComparisonReport:
         found = []
         units = "channels" if not self.has_model else "channel"
         change = self.changes()
+        other = self.changes("model") if self.has_model else None
         for state in self.faults:
             for load in self.data["load"].values:
                 clauses = []
@@ -175,8 +177,11 @@ class ComparisonReport:
                         continue
                     up, down = int((values > CHANGE_DB).sum()), int((values < -CHANGE_DB).sum())
                     middle = float(np.nanmedian(values))
-                    if self.has_model:
-                        clauses.append(f"{k} x GMF {_moves(middle)} ({middle:+.1f} dB)")
+                    if other is not None:
+                        simulated = float(other.sel(load=load, state=state, harmonic=k))
+                        clauses.append(
+                            f"{k} x GMF {_moves(middle)} ({middle:+.1f} dB, in the model {simulated:+.1f} dB)"
+                        )
                     else:
                         spread = f"{np.nanmin(values):+.1f} to {np.nanmax(values):+.1f} dB"
                         clauses.append(

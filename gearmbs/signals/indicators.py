@@ -39,6 +39,7 @@ INDICATORS = (
     "sideband_index",
     "sideband_level",
 )
+"""Names of all condition indicators, in the order of `condition_indicators`."""
 
 
 def rms(x: np.ndarray) -> float:

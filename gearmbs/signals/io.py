@@ -20,6 +20,7 @@ from .record import Progress, Record, record_of, signal_from
 from .signal import as_signal
 
 FORMATS = ("csv", "csv.gz", "mat5", "mat7.3", "uff58", "wav", "netcdf", "hdf5", "tdms")
+"""Formats of files that are read and written."""
 SUFFIXES = {
     ".csv": "csv",
     ".txt": "csv",

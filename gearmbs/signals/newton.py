@@ -12,6 +12,7 @@ from .errors import SignalError
 from .signal import common_unit, like, make_signal, rate_of
 
 COMPONENTS = ("line_of_centres", "tangential", "line_of_action", "resultant")
+"""Components of a force between gear and shaft; see `force_components`."""
 
 
 def force_components(

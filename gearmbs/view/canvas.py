@@ -41,6 +41,9 @@ LOOK: Any = {
     "svg.fonttype": "path",
 }
 
+LEGEND_LETTERS, LEGEND_HANDLE = 84, 8
+"""Letters that fit side by side under axes of the usual width, and the room a line before each name takes."""
+
 UNITS = {
     "m/s^2": "m/s²",
     "m s^-2": "m/s²",
@@ -100,7 +103,9 @@ def legend_below(ax: Axes, columns: int = 3) -> None:
     """Put the legend under the axes where it hides no data."""
     handles, labels = ax.get_legend_handles_labels()
     if handles:
-        ax.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=columns)
+        longest = max(len(str(text)) for text in labels) + LEGEND_HANDLE
+        fitting = max(1, min(columns, LEGEND_LETTERS // longest))
+        ax.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=fitting)
 
 
 def png_bytes(figure: Figure, dpi: float = DPI) -> bytes:

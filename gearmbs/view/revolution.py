@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from gearmbs.view.bars import state_colour
 from gearmbs.view.canvas import GREY, drawn_on, label, look, new_figure
@@ -63,6 +64,8 @@ def average_plot(
             if name:
                 panel.set_title(name, fontsize=10)
             panel.margins(x=0)
+            if teeth is not None:
+                panel.xaxis.set_major_locator(MaxNLocator(integer=True))
             if teeth is not None and teeth * angle[-1] <= MOST_TICKS:
                 panel.set_xticks(np.arange(0, round(teeth * angle[-1]) + 1), minor=True)
                 panel.grid(visible=True, axis="x", which="minor", color=GREY, alpha=0.25, linewidth=0.5)

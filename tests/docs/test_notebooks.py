@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import time
-
 import matplotlib as mpl
+import matplotlib.pyplot as plt
 import pytest
 
 from tests.docs.support import DOCS, notebooks, run_blocks
 
-MINUTE = 60.0
 BY_THEIR_BUILD = ("cli.md", "benchmarks.md")
 """Pages that display things in a notebook only; the build of the documentation runs them."""
 
@@ -21,7 +19,5 @@ BY_THEIR_BUILD = ("cli.md", "benchmarks.md")
 def test_notebook(path, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     mpl.use("Agg")
-    start = time.perf_counter()
     run_blocks(path, "code-cell")
-    mpl.pyplot.close("all")
-    assert time.perf_counter() - start < MINUTE
+    plt.close("all")

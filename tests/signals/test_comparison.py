@@ -71,7 +71,8 @@ def test_disagreement_is_counted():
     assert not found["same_direction"].sel(load="low", state="misaligned", harmonic=2).item()
     assert found["same_direction"].sel(load="low", state="distance", harmonic=2).item()
     text = report.to_markdown()
-    assert "misaligned against healthy at load low: 1 x GMF stays (+0.8 dB); 2 x GMF rises (+9.5 dB)" in text
+    # 1.1 is +0.8 dB, 0.5 to 1.5 is +9.5 dB, 0.5 to 0.1 is -14.0 dB
+    assert "1 x GMF stays (+0.8 dB, in the model +0.8 dB); 2 x GMF rises (+9.5 dB, in the model -14.0 dB)" in text
     assert "Agreement of model and experiment" in text
 
 

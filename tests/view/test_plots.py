@@ -177,6 +177,12 @@ def test_transmission_error_and_stiffness_over_cycles(pair):
         stiffness_plot({})
 
 
+def test_long_names_of_curves_stay_in_the_figure(pair):
+    error = loaded_transmission_error(pair, torque=100.0)
+    names = {f"centre distance +{k} mm, contact ratio 1.{k}4": error for k in range(3)}
+    assert_readable(transmission_error_plot(names))
+
+
 def test_load_sharing_and_contact_pattern(pair):
     tilted = pair.with_changes(misalignment=np.deg2rad(1.0))
     patterns = {n: contact_pattern(p, points=21, stations=11) for n, p in (("healthy", pair), ("misaligned", tilted))}
