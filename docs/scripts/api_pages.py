@@ -160,6 +160,8 @@ def _write(path: Path, text: str) -> None:
 def unwrap_compiled() -> None:
     """Put the Python functions in the place of numba's dispatchers, for this process only."""
     names = [info.name for info in pkgutil.walk_packages(gearmbs.__path__, "gearmbs.")]
+    # a module that runs when imported is nobody's reference
+    names = [name for name in names if not name.endswith("__main__")]
     # all are imported first: compiling one needs the compiled others
     for module in [importlib.import_module(name) for name in names]:
         for name, value in list(vars(module).items()):
