@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from gearmbs.adams.result import AdamsResult, Segment
 
 RULE = "-" * 79
+TITLES = {"KINEMATICS": "Kinematic", "STATICS": "Static", "INITIAL_CONDITIONS": "Initial Conditions"}
 TABLE_HEAD = """\
    Simulation      Step        Function    Cumulative   Integration     CPU
       Time         Size       Evaluations  Steps Taken    Order        time
@@ -36,7 +37,9 @@ def _segment(result: AdamsResult, segment: Segment) -> list[str]:
     out += _initial_conditions(segment, t[0])
     options = segment.options
     name, form = options["integrator"].capitalize(), options["formulation"]
-    title = {"KINEMATICS": "Kinematic", "STATICS": "Static"}.get(segment.kind, "Dynamic")
+    title = {"KINEMATICS": "Kinematic", "STATICS": "Static", "INITIAL_CONDITIONS": "Initial Conditions"}.get(
+        segment.kind, "Dynamic"
+    )
     index = {"I3": "INDEX-3", "SI2": "stabilized INDEX-2", "SI1": "stabilized INDEX-1"}[form]
     out += [
         "",

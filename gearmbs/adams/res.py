@@ -24,6 +24,7 @@ ENTITY_TYPES = {
     "springdamper": "SpringDamper", "gcon": "GCon", "coupler": "Coupler", "gear": "Gear",
 }  # fmt: skip
 PER_LINE = 6
+STEP_TYPES = {"KINEMATICS": "kinematic", "STATICS": "static", "INITIAL_CONDITIONS": "initialConditions"}
 
 
 class _Entity:
@@ -123,7 +124,7 @@ def results_text(result: AdamsResult, now: datetime | None = None) -> str:
     out.append("</StepMap>")
     row = 0
     for k, segment in enumerate(result.segments, 1):
-        kind = {"KINEMATICS": "kinematic", "STATICS": "static"}.get(segment.kind, "dynamic")
+        kind = STEP_TYPES.get(segment.kind, "dynamic")
         out.append(f'<Data name="{kind}_{k:03d}" id="{k}">')
         for _ in range(segment.solution.t.size):
             out.append(f'<Step type="{kind}">')

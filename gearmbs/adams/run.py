@@ -20,9 +20,10 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.dae.expressions import ExpressionError
 from gearmbs.dae.kinematic import kinematic
 from gearmbs.dae.modes import Modes
+from gearmbs.dae.sequence import initial_conditions
 from gearmbs.dae.solution import Solution
 from gearmbs.dae.tables import STATE_ALGEBRAIC
-from gearmbs.mechanism.analyses import linear_modes, static_equilibrium
+from gearmbs.mechanism.analyses import linear_modes, quasi_static, static_equilibrium
 from gearmbs.mechanism.functions import polynomial
 
 DEFAULT_TOLERANCE = 1e-8
@@ -209,11 +210,10 @@ def _simulate(
 ) -> Segment:
     """Carry out one SIMULATE."""
     kind = command.kind or "DYNAMICS"
-    if kind not in ("DYNAMICS", "KINEMATICS", "TRANSIENT", "STATICS"):
+    if kind not in ("DYNAMICS", "KINEMATICS", "TRANSIENT", "STATICS", "INITIAL_CONDITIONS"):
         raise _unsupported(command, f"SIMULATE/{kind} is not supported")
-    if kind == "STATICS" and (command.end is not None or command.duration is not None):
-        raise _unsupported(command, "a sequence of static positions (STATICS with END or DURATION) is not supported")
-    times = np.array([session.time]) if kind == "STATICS" else _times(session, command)
+    sequence = kind not in ("STATICS", "INITIAL_CONDITIONS") or command.end is not None or command.duration is not None
+    times = _times(session, command) if sequence else np.array([session.time])
     model = None
     try:
         model = _model(session, allow_unsupported, (session.time, float(times[-1])))
@@ -246,8 +246,12 @@ def _solve(
     """Solve one analysis at the output times, given in the deck's unit."""
     scale = session.deck.units.time
     times = times * scale
+    if kind == "INITIAL_CONDITIONS":
+        return initial_conditions(model.mechanism.compile(float(times[0])))
     if kind == "STATICS":
         options.update(integrator="Newton", formulation="I3", tol=STATIC_TOLERANCE)
+        if times.size > 1:
+            return quasi_static(model.mechanism, times, tol=STATIC_TOLERANCE)
         return static_equilibrium(model.mechanism, t=float(times[0]), tol=STATIC_TOLERANCE).solution
     if kind == "KINEMATICS":
         system = model.mechanism.compile(float(times[0]))

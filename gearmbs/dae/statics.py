@@ -12,19 +12,16 @@ positions from afar, for sigma = 0 Newton's method. sigma follows how well the l
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import block_diag, csc_array, diags_array
 from scipy.sparse.linalg import splu
 
-from gearmbs.dae import index1
-from gearmbs.dae import tables as T
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
 from gearmbs.dae.linearised import Instant, free_directions, noise, normalised, reduce
-from gearmbs.dae.result import DAEResult, SolverStats, Status
-from gearmbs.dae.solution import Solution
+from gearmbs.dae.standstill import Snapshot, Standstill
 
 if TYPE_CHECKING:
     from gearmbs.dae.system import System
@@ -73,7 +70,7 @@ class StaticResult:
     residual: float
     neutral: list[str] = field(default_factory=list)
     stable: bool | None = None
-    solution: Solution = field(repr=False, default=None)  # type: ignore[assignment]
+    solution: Standstill = field(repr=False, default=None)  # type: ignore[assignment]
 
     def position(self, body: str) -> np.ndarray:
         """Return the centre of mass of a body, shape (3,), m."""
@@ -114,13 +111,13 @@ def static_equilibrium(system: System, *, tol: float = 1e-10, max_iterations: in
     system.pose[:, 12:18] = 0.0
     instant = Instant(system, "I3")
     instant.y = instant.settle(instant.stop(instant.y))
-    iterations, size = _Relaxation(instant, tol).run(max_iterations)
+    iterations, size = Relaxation(instant, tol).run(max_iterations)
     system.pose = instant.pose()
     system.state_start = instant.y[instant.block("z", "mu")].copy()
     return _result(instant, iterations, size)
 
 
-class _Relaxation:
+class Relaxation:
     """The iteration, with its step control."""
 
     def __init__(self, instant: Instant, tol: float) -> None:
@@ -231,6 +228,25 @@ class _Relaxation:
                 polished, sigma = True, lowest
         raise self._failure(rest)
 
+    def newton(self, max_iterations: int = 20) -> int | None:
+        """Iterate by Newton's method from a position nearby; return the number of iterations, None when it fails."""
+        instant = self.instant
+        polished = False
+        for iteration in range(1, max_iterations + 1):
+            rest, stiffness, mass = self._parts(instant.y)
+            size = float(np.abs(rest / self.sizes).max(initial=0.0))
+            if polished or not np.isfinite(size):
+                return iteration if np.isfinite(size) and size <= self.tol else None
+            polished = size <= self.tol
+            step = self._solve(stiffness, mass, self._first_sigma(rest, stiffness, mass)[1], rest)
+            if step is None or self._too_far(step, self.length):
+                return None
+            instant.y = instant.y.copy()
+            instant.y[self.columns] += step
+            instant.y = instant.settle(instant.y)
+            instant.hook()
+        return None
+
     def _too_far(self, step: np.ndarray, limit: float) -> bool:
         moved = np.abs(step[: 3 * self.bodies]).max(initial=0.0)
         turned = np.abs(step[3 * self.bodies : self.coordinates]).max(initial=0.0)
@@ -292,34 +308,10 @@ def _unresisted(instant: Instant) -> tuple[bool, np.ndarray]:
 
 def _result(instant: Instant, iterations: int, size: float) -> StaticResult:
     system = instant.system
-    at, y = instant.at, instant.y
-    pose = instant.pose()
-    rows = len(system.row_names)
-    multipliers = np.zeros((2, max(rows, 1)))
-    multipliers[0, :rows] = y[at["lambda"] : at["F"]]
-    multipliers[1, 0] = instant.t
-    force, moment = np.zeros((rows, 3)), np.zeros((rows, 3))
-    instant.residual(y)
-    index1.joint_loads(y, instant.idata, instant.rdata, instant.work, multipliers, force, moment)
-    owners = [name.rsplit(": ", 1)[0] for name in system.row_names]
-    reactions = {
-        joint: (
-            force[[k for k, o in enumerate(owners) if o == joint]].sum(axis=0),
-            moment[[k for k, o in enumerate(owners) if o == joint]].sum(axis=0),
-        )
-        for joint in dict.fromkeys(owners)
-    }
-    loads: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    next_f, next_n = at["F"], at["N"]
-    for name, row in zip(system.force_names, system.builder.forces):
-        pair = [np.zeros(3), np.zeros(3)]
-        if row[T.FORCE_F]:
-            pair[0] = y[next_f : next_f + 3].copy()
-            next_f += 3
-        if row[T.FORCE_N]:
-            pair[1] = y[next_n : next_n + 3].copy()
-            next_n += 3
-        loads[name] = (pair[0], pair[1])
+    solution = Standstill.of([Snapshot.of(instant)], f"static equilibrium found in {iterations} iterations", iterations)
+    joints = dict.fromkeys(name.rsplit(": ", 1)[0] for name in system.row_names)
+    reactions = {joint: (solution.reaction(joint)[0][0], solution.reaction(joint)[1][0]) for joint in joints}
+    loads = {name: (solution.load(name)[0][0], solution.load(name)[1][0]) for name in system.force_names}
     neutral: list[str] = []
     stable = None
     if 6 * len(system.body_names) <= DENSE_LIMIT:
@@ -329,27 +321,13 @@ def _result(instant: Instant, iterations: int, size: float) -> StaticResult:
     return StaticResult(
         instant.t,
         system.body_names,
-        pose,
-        multipliers[0, :rows].copy(),
+        instant.pose(),
+        solution.multipliers[0].copy(),
         reactions,
         loads,
         iterations,
         size,
         neutral,
         stable,
-        _solution(instant, iterations),
+        solution,
     )
-
-
-def _solution(instant: Instant, iterations: int) -> Solution:
-    result = DAEResult(
-        t=np.array([instant.t]),
-        y=instant.y[None, :].copy(),
-        yp=np.zeros((1, instant.y.size)),
-        status=Status.SUCCESS,
-        message=f"static equilibrium found in {iterations} iterations",
-        stats=SolverStats(steps=iterations),
-        epochs=[(0, instant.idata.copy())],
-        t_last=instant.t,
-    )
-    return Solution(instant.system, replace(instant.problem, rdata=instant.rdata.copy()), result)

@@ -3,7 +3,7 @@
 import gearmbs._announce
 import gearmbs.mechanism.expression  # noqa: F401  (first, so that the function of that name below takes its place)
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
-from gearmbs.mechanism.analyses import kinematic, linear_modes, static_equilibrium
+from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
 from gearmbs.mechanism.elements import GearContact, Load, State, Torque
 from gearmbs.mechanism.friction import Friction
 from gearmbs.mechanism.functions import TimeFunction, constant, expression, harmonic, polynomial, ramp, step
@@ -32,6 +32,7 @@ __all__ = [
     "kinematic",
     "linear_modes",
     "polynomial",
+    "quasi_static",
     "ramp",
     "simulate",
     "static_equilibrium",

@@ -8,6 +8,7 @@ import numpy as np
 
 from gearmbs.dae import kinematic as _kinematic
 from gearmbs.dae import modes as _modes
+from gearmbs.dae import sequence as _sequence
 from gearmbs.dae import statics as _statics
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.modes import Modes
@@ -63,6 +64,33 @@ def place(mechanism: Mechanism, equilibrium: StaticResult) -> None:
     states = equilibrium.solution.result.y[0]
     for value, state in zip(states[states.size - len(mechanism.states) :], mechanism.states.values()):
         state.start = float(value)
+
+
+def quasi_static(mechanism: Mechanism, t_eval: np.ndarray, *, tol: float = 1e-10) -> Solution:
+    """Follow the position in which a mechanism rests while its functions of time change slowly.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    t_eval : ndarray, shape (m,)
+        Increasing times at which functions of time are frozen, s.
+    tol : float
+        As in :func:`static_equilibrium`.
+
+    Returns
+    -------
+    Solution
+        Positions, reactions and loads; velocities are zero.
+
+    Raises
+    ------
+    SingularModelError, ModelError
+        As :func:`static_equilibrium`.
+    """
+    times = np.asarray(t_eval, dtype=float)
+    if times.ndim != 1 or times.size == 0 or not np.all(np.isfinite(times)):
+        raise ModelError("t_eval: give a sequence of finite times")
+    return _sequence.quasi_static(mechanism.compile(float(times[0])), times, tol=tol)
 
 
 def linear_modes(mechanism: Mechanism, *, t: float = 0.0, at: StaticResult | str = "initial") -> Modes:

@@ -89,10 +89,26 @@ def test_times_are_in_the_decks_unit():
     assert result.segments[0].solution.t[-1] == pytest.approx(0.1)
 
 
+def test_a_sequence_of_equilibria():
+    """A pendulum pulled aside by 2 t N hangs at tan a = 2 t/(m g); then the start of a swing is reported."""
+    body = "PART/2,MASS=2,CM=20,IP=1,1,1\nMARKER/20,PART=2,QP=0,0,-1\nMARKER/21,PART=2,REULER=0,90D,0\n"
+    body += "MARKER/11,PART=1,REULER=0,90D,0\nMARKER/12,PART=1,FLOATING\nJOINT/1,REVOLUTE,I=21,J=11\n"
+    body += "VFORCE/1,I=20,JFLOAT=12,RM=10,FX=2*TIME\nACCGRAV/KGRAV=-10\n"
+    body += "REQUEST/1,F2=DX(20,10)\\F3=DZ(20,10)\\F4=JOINT(1,0,1)\\F6=ACCX(20)\n"
+    result = run_deck(parse_deck(model(body)), script("SIM/STATICS, END=20, STEPS=40", "SIM/INITIAL"))
+    assert result.success
+    t, values = result.t[:41], result.request(1)
+    np.testing.assert_allclose(values[:41, 1] / -values[:41, 2], t / 10, atol=1e-9)
+    np.testing.assert_allclose(values[:41, 3], np.hypot(20, 2 * t), rtol=1e-9)
+    assert result.t.size == 42
+    assert abs(values[41, 5]) < 1e-8
+    assert "Performing Static Simulation" in message_text(result)
+
+
 @pytest.mark.parametrize(
     ("commands", "line", "message"),
     [
-        (("SIM/STATICS, END=1",), 3, "a sequence of static positions"),
+        (("SIM/VELOCITY",), 3, "SIMULATE/VELOCITY is not supported"),
         (("SIM/DYN, END=1, STEPS=2", "LINEAR/NOVECTOR"), 4, "LINEAR without EIGENSOL is not supported"),
         (("MOTION/7, FUNCTION=TIME",), 3, "there is no MOTION/7 to change"),
         (("SIM/DYN, END=1, STEPS=2", "SIM/DYN, END=1, STEPS=2"), 4, "the model is at time 1.0 already"),

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from gearmbs.mechanism import Mechanism, ModelError, SingularModelError, polynomial
-from gearmbs.mechanism.analyses import kinematic, linear_modes, static_equilibrium
+from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
 
 G = 9.81
 
@@ -271,3 +271,37 @@ def test_script_with_statics_then_dynamics_and_modes():
     assert result.request(1)[:, 1] == pytest.approx(np.full(6, -0.4), abs=1e-9)
     assert result.modes[0].eigenvalues == pytest.approx([5j], rel=1e-9)
     assert "Performing Static Simulation" in message_text(result)
+
+
+def test_quasi_static_sequence_follows_a_driven_crank():
+    """A weight hung from a crank that turns three times: it hangs below the crank's end; the drive carries m g cos."""
+    m = Mechanism("crane", gravity=(0, 0, -10.0))
+    crank = m.body("crank", 1.0, (0.1, 0.1, 0.1))
+    pin = m.revolute("pin", crank, m.ground, axis=(0, 1, 0))
+    m.rotation("drive", pin, "TIME")
+    weight = m.body("weight", 2.0, (0.1, 0.1, 0.1), position=(1, 0, -1))
+    m.revolute("hook", weight, crank, at=(1, 0, 0), axis=(0, 1, 0))
+    times = np.linspace(0.0, 20.0, 41)
+    solution = quasi_static(m, times)
+    np.testing.assert_allclose(solution.position("weight")[:, 2], -np.sin(times) - 1, atol=1e-9)
+    np.testing.assert_allclose(solution.reaction("drive")[1][:, 1], -20.0 * np.cos(times), atol=1e-8)
+    with pytest.raises(ModelError, match="increasing times"):
+        quasi_static(m, np.array([1.0, 0.0]))
+
+
+def test_quasi_static_snap_through():
+    """A weight on a spring between side walls, pushed down: past the flat position it snaps to the other side."""
+    m = Mechanism("snap")
+    block = m.body("block", 1.0, (1, 1, 1), position=(0, 0, 0.3))
+    m.translational("guide", block, m.ground, axis=(0, 0, 1))
+    eye, wall = block.marker(name="eye"), m.ground.marker((1, 0, 0), name="wall")
+    m.spring_damper("spring", eye, wall, stiffness=1000.0, length=float(np.hypot(1, 0.3)))
+    m.load("push", block.marker(name="top"), m.ground.marker(name="base"), fz="-TIME")
+    solution = quasi_static(m, np.linspace(0.0, 20.0, 41))
+    z = solution.position("block")[:, 2]
+    # k (1 - l0/l) z + t = 0 on both branches
+    length = np.hypot(1, z)
+    np.testing.assert_allclose(1000 * (1 - np.hypot(1, 0.3) / length) * z + solution.t, 0.0, atol=1e-6)
+    assert z[0] > 0.29
+    assert z[-1] < -0.3
+    assert np.diff(z).min() < -0.4

@@ -1,0 +1,41 @@
+"""The lists of the page on decks against the program."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from gearmbs.adams import commands
+from gearmbs.adams import statements as st
+from gearmbs.mechanism.expression_functions import BINARY, ELEMENT_FORCES, UNARY, UNSUPPORTED
+from gearmbs.mechanism.expression_library import FUNCTIONS
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "howto" / "adams.md").read_text(encoding="utf-8")
+
+
+def listed(heading: str, text: str = PAGE) -> set[str]:
+    """Return the capital words of the paragraph that starts with a bold heading."""
+    paragraph = text[text.index(f"**{heading}**") :].split("\n\n")[0]
+    return set(re.findall(r"\b[A-Z][A-Z0-9_]*\b", paragraph))
+
+
+@pytest.mark.parametrize(
+    ("heading", "known"),
+    [
+        ("Statements", set(st.STATEMENTS)),
+        ("Read over", set(st.IGNORED)),
+        ("Refused", set(st.UNSUPPORTED)),
+        ("Commands", set(commands.COMMANDS) | (set(st.STATEMENTS) - set(commands.CHANGEABLE))),
+    ],
+)
+def test_page_lists_what_the_program_knows(heading, known):
+    assert listed(heading) == known
+
+
+def test_expression_page_lists_all_functions():
+    text = (DOCS / "theory" / "expressions.md").read_text(encoding="utf-8")
+    assert listed("Functions", text) == {*UNARY, *BINARY, *ELEMENT_FORCES, *FUNCTIONS}
+    assert listed("Refused functions", text) == set(UNSUPPORTED)
