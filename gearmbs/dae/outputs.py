@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import float64, int64, njit, types
+from scipy.sparse import csc_array
 
 from gearmbs.dae import index1
 from gearmbs.dae import tables as T
@@ -13,6 +14,7 @@ from gearmbs.dae.jacobian import COUNT, NUMBERS, PLACES, compressed
 from gearmbs.dae.kinematics import update_tables
 from gearmbs.dae.reactions import renew_reactions
 from gearmbs.dae.rereference import track
+from gearmbs.dae.residual import update
 from gearmbs.dae.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, PLAN_TYPE, analyse, factor, new_factors, solve
 
 _VEC = float64[::1]
@@ -32,6 +34,9 @@ accident and the pivots would not serve their neighbours."""
 SAME_POSITION = 0.05
 """Rotation, rad, after which the factors of one output no longer serve to project the next."""
 
+
+SINGULAR = 1e-8
+"""Relative singular value of the index-1 matrix below which a direction counts as undetermined."""
 
 REACTION_PASSES = 30
 """Most corrections of loads that depend on reactions, such as joint friction, to the multipliers of one output."""
@@ -175,10 +180,7 @@ def assemble(t, y, slots, idata, rdata, work_size, vals) -> Records:
 def evaluate(t, y, epochs, idata, rdata, work_size, records: Records) -> None:
     """Fill ``records`` for all rows of ``y``; ``epochs`` names the integer tables valid from each row on.
 
-    Raises
-    ------
-    SingularMatrixError
-        If the equations of motion have no unique solution at an output time.
+    At a singular position, where constraints are dependent, the smallest accelerations and multipliers are taken.
     """
     indptr, indices, slots = pattern(idata, rdata, work_size)
     work, vals, rdata = np.zeros(work_size), np.zeros(indices.size), rdata.copy()
@@ -193,7 +195,10 @@ def evaluate(t, y, epochs, idata, rdata, work_size, records: Records) -> None:
         while first < last:
             if plan is None or attempt > 0:
                 if attempt > len(GENERIC_TURNS):
-                    raise ArithmeticError(f"the equations of motion are nearly singular at t = {t[first]:.6g} s")
+                    place = t[first : first + 1], y[first : first + 1]
+                    _least_squares_row(first, *place, (indptr, indices, slots), table, rdata, work_size, records)
+                    first, attempt, plan = first + 1, 0, None
+                    continue
                 near = _turned(y[first : first + 1], table, GENERIC_TURNS[max(attempt, 1) - 1])
                 vals[:] = 0.0
                 assemble(t[first : first + 1], near, slots, table, rdata, work_size, vals)
@@ -204,6 +209,27 @@ def evaluate(t, y, epochs, idata, rdata, work_size, records: Records) -> None:
             done = evaluate_rows(first, last, t, y, slots, table, rdata, work, vals, plan, factors, records, growth)
             attempt = attempt + 1 if done == first else 1 if done < last else 0
             first = done
+
+
+def _least_squares_row(k: int, t, y, matrix_pattern, idata, rdata, work_size, records: Records) -> None:
+    """Fill row k of the records at a singular position by least squares."""
+    indptr, indices, slots = matrix_pattern
+    vals, n = np.zeros(indices.size), indptr.size - 1
+    one = assemble(t, y, slots, idata, rdata, work_size, vals)
+    matrix = csc_array((vals, indices, indptr), shape=(n, n)).toarray()
+    # rows and columns to one size first, or masses and constraints would be told apart by their units
+    scale = 1.0 / np.sqrt(np.maximum(np.abs(matrix).max(axis=1), 1e-300))
+    scaled = scale[:, None] * matrix * scale
+    records.solution[k] = scale * np.linalg.lstsq(scaled, scale * one.solution[0], rcond=SINGULAR)[0]
+    records.loads[k], records.phi[k] = one.loads[0], one.phi[0]
+    work = np.zeros(work_size)
+    update(t[0], y[0], y[0], idata, rdata, work)
+    index1.pose_record(y[0], idata, rdata, work, records.pose[k])
+    rows = records.force.shape[1]
+    multipliers = np.zeros((2, max(rows, 1)))
+    multipliers[0, :rows] = records.solution[k, n - rows :]
+    multipliers[1, 0] = t[0]
+    index1.joint_loads(y[0], idata, rdata, work, multipliers, records.force[k], records.moment[k])
 
 
 def _turned(y: np.ndarray, idata: np.ndarray, angle: float) -> np.ndarray:
