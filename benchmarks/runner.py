@@ -5,15 +5,22 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
-from benchmarks import contact, gear_pair, plots, precision, size
+from benchmarks import contact, digits, gear_pair, plots, precision, size
 from benchmarks.machine import describe
 from benchmarks.store import Store
 from gearmbs.view.files import write_whole
 
-PARTS: dict[str, ModuleType] = {"gear": gear_pair, "precision": precision, "size": size, "contact": contact}
+PARTS: dict[str, ModuleType] = {
+    "gear": gear_pair,
+    "precision": precision,
+    "digits": digits,
+    "size": size,
+    "contact": contact,
+}
 
 
 def run_part(name: str, store: Store, quick: bool, only: str = "") -> dict:
@@ -90,5 +97,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
     unknown = [name for name in given.parts if name not in PARTS]
     if unknown:
         parser.error(f"unknown part {', '.join(unknown)}; choose from {', '.join(PARTS)}")
-    run(given.parts or list(PARTS), given.out, given.quick, given.fresh, print, given.only)
+    run(given.parts or list(PARTS), given.out, given.quick, given.fresh, partial(print, flush=True), given.only)
     print(f"\n{(given.out / 'results.md').read_text(encoding='utf-8')}\nwritten to {given.out}")

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.sparse import csc_array
 
 from benchmarks.machine import version_of
 from benchmarks.problems.reference import ReferenceProblem
@@ -124,6 +125,12 @@ class Callbacks:
         out = np.zeros(n * n)
         out[self.flat] = self.values(t, y, yp, cj)
         return out.reshape(n, n)
+
+    def sparse(self, t: float, y: np.ndarray, yp: np.ndarray, cj: float) -> csc_array:
+        """Return the Newton matrix as a new sparse matrix."""
+        n = self.problem.n
+        values = self.values(t, y, yp, cj).copy()
+        return csc_array((values, self.problem.indices, self.problem.indptr), shape=(n, n))
 
 
 def absolute_tolerances(problem: DAEProblem, tol: float, uncontrolled: float = UNCONTROLLED) -> np.ndarray:

@@ -15,6 +15,8 @@ from benchmarks.problems.reference import ReferenceProblem
 SOLVERS = ("generalized alpha", "trapezoidal index 2")
 SPARSE_FROM = 8
 """Bodies from which the sparse solver is the faster one."""
+SMALLEST_PART = 64
+"""Where its Newton iteration fails it may shorten a step so many times; left alone it goes on for minutes."""
 REASONS = {
     "car axis": "its moving base would need a Python function in every step",
     "Andrews": "no model of its relative angles is provided here",
@@ -44,6 +46,7 @@ def simulate(model: Model, t_end: float, steps: int, solver: str, sparse: bool) 
     integration = settings.timeIntegration
     integration.numberOfSteps = steps
     integration.endTime = t_end
+    integration.minimumStepSize = t_end / steps / SMALLEST_PART
     integration.newton.useModifiedNewton = True
     integration.verboseMode = 0
     settings.solution.file.write = False

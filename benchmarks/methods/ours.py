@@ -45,7 +45,7 @@ def _ida(formulation: str) -> Callable:
 
 def methods() -> list[Method]:
     """Return our integrators in their formulations."""
-    sweep = tolerances(-3, -10)
+    sweep = tolerances(-3, -12)
     return [
         *(Method(f"WSTIFF {form}", "WSTIFF", None, _bdf(form, "WSTIFF"), sweep) for form in ("SI2", "SI1", "I3")),
         Method("GSTIFF SI2", "GSTIFF", None, _bdf("SI2", "GSTIFF"), sweep),
