@@ -20,6 +20,12 @@ os.environ["PYTHONPATH"] = os.pathsep.join([str(SCRIPTS), str(HERE.parent), os.e
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
+# the kernels' remark about their transport is no fault of a page
+profile = HERE / "_build" / "ipython" / "profile_default"
+profile.mkdir(parents=True, exist_ok=True)
+(profile / "ipython_kernel_config.py").write_text("get_config().IPKernelApp.log_level = 40\n", encoding="utf-8")
+os.environ["IPYTHONDIR"] = str(profile.parent)
+
 
 def code_stamp() -> str:
     """Return a number of the code and data that executed pages depend on, so that none is kept beyond a change."""

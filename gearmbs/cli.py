@@ -222,6 +222,45 @@ def analyse(
 
 
 @app.command()
+def trend(
+    file: Annotated[Path, typer.Argument(help="A long record; see analyse for the formats.")],
+    section: Annotated[str, typer.Option(help='Length of the pieces, e.g. "10 s".')] = "10 s",
+    teeth: Annotated[str | None, typer.Option(help='Teeth of the wheel on the reference shaft; or "32,80".')] = None,
+    rate: Annotated[float | None, typer.Option(help="Sampling rate in Hz, if the file does not name it.")] = None,
+    speed: Annotated[str | None, typer.Option(help='Shaft speed, e.g. "1780 rpm"; default: from the GMF line.')] = None,
+    units: Annotated[str | None, typer.Option(help='Units of the samples, e.g. "m/s^2".')] = None,
+    channel: Annotated[list[str] | None, typer.Option(help="Channel to use; repeat for several; default: all.")] = None,
+    harmonics: Annotated[int, typer.Option(help="Mesh harmonics to evaluate.")] = 3,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="CSV file instead of the terminal.")] = None,
+) -> None:
+    """Follow the features of a long record over time, piece by piece, in memory for one piece."""
+    with guarded(), stage_bar(file.name) as move:
+        from gearmbs.signals import trend as follow
+        from gearmbs.signals import trend_table
+        from gearmbs.studies.store import write_text
+        from gearmbs.units import to_si
+
+        data = follow(
+            file,
+            to_si(section, "time", "--section"),
+            teeth=None if teeth is None else tooth_counts(teeth),
+            rate=rate,
+            speed=None if speed is None else to_si(speed, "angular speed", "--speed"),
+            units=units,
+            channels=channel,
+            harmonics=harmonics,
+            progress=move,
+        )
+        table = trend_table(data)
+        if out is not None:
+            write_text(out, table.to_csv(index=False))
+    if out is None:
+        typer.echo(table.to_csv(index=False, float_format="%.5g"), nl=False)
+    else:
+        typer.echo(f"wrote {out}")
+
+
+@app.command()
 def compare(
     experiment: Annotated[list[str], typer.Option(help="Measured file as load:state=path; repeat.")],
     model: Annotated[

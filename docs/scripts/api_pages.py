@@ -40,6 +40,10 @@ CONSTANTS = {
 """Exported values that are no functions or classes, with the module that defines and describes them."""
 
 DESCRIBED = {
+    "gearmbs.studies.iftomm": {
+        "PROBLEMS": "The benchmark problems by name.",
+        "PUBLISHED": "Numbers published for them, with their sources.",
+    },
     "gearmbs.contact": {
         "GAP_COLUMNS": "Names of the columns of the rows that ``pair_gaps`` fills.",
         "GEAR_CONTACT_SIG": "Numba signature of ``gear_contact``.",
@@ -97,6 +101,7 @@ MORE = {
         ],
         "gearmbs.studies.run": ["record", "transmission_error"],
         "gearmbs.studies.store": ["write_dataset", "write_text", "whole_file"],
+        "gearmbs.studies.iftomm": EXPORTED,
     },
     "gearmbs.adams": {"gearmbs.adams.run": ["run_deck"], "gearmbs.adams.result": ["AdamsResult"]},
     "gearmbs.units": {"gearmbs.units": ["to_si"], "gearmbs.compile": ["compile_all"]},
@@ -112,7 +117,8 @@ def entries(room: str) -> list[str]:
         source = importlib.import_module(home)
         for name in _own(source) if more is EVERYTHING else source.__all__ if more is EXPORTED else more:
             getattr(source, name)
-            names.append(f"{home}.{name}")
+            if _documented(getattr(source, name)):
+                names.append(f"{home}.{name}")
     return names
 
 
@@ -143,12 +149,13 @@ def write(folder: Path) -> None:
         lines = [title, "=" * len(title), "", f"Module ``{room}``.", "", about, ""]
         lines += [".. autosummary::", "   :toctree: objects", "   :nosignatures:", ""]
         lines += [f"   {name}" for name in entries(room)]
-        if room in CONSTANTS or room in DESCRIBED:
+        if room in CONSTANTS or any(home in DESCRIBED for home in (room, *MORE.get(room, {}))):
             lines += ["", "Constants", "---------"]
         for name in constants(room):
             lines += ["", f".. autodata:: {name}", "   :no-value:"]
-        for name, text in DESCRIBED.get(room, {}).items():
-            lines += ["", f".. py:data:: {room}.{name}", "", f"   {text}"]
+        for home in (room, *MORE.get(room, {})):
+            for name, text in DESCRIBED.get(home, {}).items():
+                lines += ["", f".. py:data:: {home}.{name}", "", f"   {text}"]
         _write(folder / f"{room.rpartition('.')[2]}.rst", "\n".join(lines) + "\n")
 
 

@@ -37,6 +37,7 @@ from .orders import harmonic_amplitudes
 from .ordinal import level_distance, ordinal_agreement
 from .phase import instantaneous_speed, phase_from_line, phase_from_speed, phase_from_tacho
 from .scaling import dynamic_rms, remove_mean, rms_factor, scale, scale_states
+from .sections import sections, trend, trend_table
 from .sensors import (
     FrfPath,
     ModalPath,
@@ -141,11 +142,14 @@ __all__ = [
     "sample",
     "scale",
     "scale_states",
+    "sections",
     "sideband_index",
     "sideband_level",
     "spectral_kurtosis",
     "spectrum",
     "time_synchronous_average",
+    "trend",
+    "trend_table",
     "trim",
     "units_of",
     "with_metadata",

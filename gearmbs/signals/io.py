@@ -112,14 +112,7 @@ def read_signal(
         If the sampling rate is known neither to the file nor to the caller.
     """
     path = Path(path)
-    format = _format(path, format)
-    content = _content(path)
-    if content not in ACCEPTED[format]:
-        raise SignalFileError(
-            path,
-            f"is named as {format} but holds {CONTENT_NAMES[content]}; rename it or pass format=... "
-            f"(one of {', '.join(FORMATS)})",
-        )
+    format, content = checked_format(path, format)
     record = _read(path, format, content, channels, progress)
     return signal_from(record, path, rate=rate, units=units, speed=speed, teeth=teeth, channels=channels)
 
@@ -170,6 +163,19 @@ def write_signal(
     finally:
         part.unlink(missing_ok=True)
     return path
+
+
+def checked_format(path: Path, format: str | None) -> tuple[str, str]:
+    """The format a file's name or the caller says, and what the file holds; SignalFileError if they do not agree."""
+    format = _format(path, format)
+    content = _content(path)
+    if content not in ACCEPTED[format]:
+        raise SignalFileError(
+            path,
+            f"is named as {format} but holds {CONTENT_NAMES[content]}; rename it or pass format=... "
+            f"(one of {', '.join(FORMATS)})",
+        )
+    return format, content
 
 
 def _read(path: Path, format: str, content: str, channels: Sequence[str] | None, progress: Progress | None) -> Record:

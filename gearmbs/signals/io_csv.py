@@ -12,7 +12,9 @@ import io
 import json
 import re
 import zlib
+from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -25,6 +27,8 @@ from .signal import UNKNOWN_UNITS, check_teeth
 
 CHUNK_ROWS = 1 << 17
 HEAD_LINES = 60
+# Times are written with few digits; beyond this many samples a gap is a gap.
+MAX_JUMP = 2.0
 COMMENT = re.compile(r"^\s*[#%]")
 KEY_VALUE = re.compile(r"^\s*[#%]*\s*([A-Za-z_][\w .]*?)\s*[:=]\s*(.+?)\s*$")
 NAME_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*$")
@@ -42,6 +46,24 @@ def _open_text(path: Path, packed: bool):
             yield text, raw
 
 
+@dataclass(frozen=True)
+class _Layout:
+    """How the table of a file is written: line of the first numbers, separators, and what stands above them."""
+
+    first: int
+    separator: str | None
+    decimal: str
+    names: list[str]
+    units: list[str]
+    meta: dict[str, Any]
+
+    @property
+    def clock(self) -> int | None:
+        """Index of the column that holds times."""
+        found = next((i for i, name in enumerate(self.names) if name.lower() in TIME_KEYS), None)
+        return found if len(self.names) > 1 else None
+
+
 def read_csv(path: Path, packed: bool, progress: Progress | None = None) -> Record:
     """Read a text table; `packed` for gzip.
 
@@ -50,23 +72,64 @@ def read_csv(path: Path, packed: bool, progress: Progress | None = None) -> Reco
     SignalFileError
         If the file is damaged, binary, has no numbers, or a row is short or not numeric (with its line number).
     """
+    with _damage_named(path):
+        layout = _layout(path, packed)
+        blocks = []
+        for values, fraction in _blocks(path, packed, layout):
+            blocks.append(values)
+            if progress is not None:
+                progress(fraction, "reading")
+    return _record(path, np.concatenate(blocks), layout)
+
+
+def csv_pieces(path: Path, packed: bool) -> Iterator[tuple[Record, float]]:
+    """Read a text table block by block: records in their order, each with the fraction read by then.
+
+    Raises
+    ------
+    SignalFileError
+        As `read_csv`, and if the times of a block do not go on where the last one ended.
+    """
+    with _damage_named(path):
+        layout = _layout(path, packed)
+        clock, first, count = layout.clock, None, 0
+        for values, fraction in _blocks(path, packed, layout):
+            if first is None:
+                first = record = _record(path, values, layout)
+            elif clock is not None and first.rate is not None:
+                time = float(values[0, clock]) * _time_factor(layout, clock)
+                strayed = abs(time - first.t0 - count / first.rate) * first.rate
+                if strayed > MAX_JUMP:
+                    raise SignalFileError(path, f"its times jump by {strayed:.3g} samples after row {count}")
+                record = replace(first, values=np.delete(values, clock, axis=1))
+            else:
+                record = replace(first, values=values)
+            count += len(values)
+            yield record, fraction
+
+
+@contextmanager
+def _damage_named(path: Path) -> Iterator[None]:
     try:
-        return _read(path, packed, progress)
+        yield
     except (EOFError, gzip.BadGzipFile, zlib.error) as exc:
         raise SignalFileError(path, f"its gzip data is damaged or cut short ({exc})") from exc
 
 
-def _read(path: Path, packed: bool, progress: Progress | None) -> Record:
+def _layout(path: Path, packed: bool) -> _Layout:
     with _open_text(path, packed) as (text, _):
         head = [line for line, _ in zip(text, range(HEAD_LINES))]
     if any("\x00" in line for line in head):
         raise SignalFileError(path, "holds binary data, not text; is it in another format or in UTF-16?")
     first, separator, decimal = _find_numbers(head, path)
-    width = len(_split(head[first], separator))
-    names, units = _names(head[:first], separator, width)
-    meta = _metadata(head[:first])
+    names, units = _names(head[:first], separator, len(_split(head[first], separator)))
+    return _Layout(first, separator, decimal, names, units, _metadata(head[:first]))
+
+
+def _blocks(path: Path, packed: bool, layout: _Layout) -> Iterator[tuple[np.ndarray, float]]:
+    """Tables of numbers, all columns, each with the fraction of the file that is read by then."""
+    width, first, separator = len(layout.names), layout.first, layout.separator
     size = path.stat().st_size
-    blocks = []
     try:
         with _open_text(path, packed) as (text, raw):
             for _ in range(first):
@@ -74,7 +137,7 @@ def _read(path: Path, packed: bool, progress: Progress | None) -> Record:
             table = pd.read_csv(
                 text,
                 sep=r"\s+" if separator is None else separator,
-                decimal=decimal,
+                decimal=layout.decimal,
                 header=None,
                 names=list(range(width)),
                 index_col=False,
@@ -88,22 +151,24 @@ def _read(path: Path, packed: bool, progress: Progress | None) -> Record:
                 values = block.to_numpy()
                 if np.isnan(values).any():
                     raise ValueError("missing values")
-                blocks.append(values)
-                if progress is not None:
-                    progress(min(1.0, raw.tell() / size), "reading")
+                yield values, min(1.0, raw.tell() / size)
     except (ValueError, pd.errors.ParserError) as exc:
-        raise SignalFileError(path, _first_bad_line(path, packed, first, separator, decimal, width, exc)) from exc
-    values = np.concatenate(blocks)
-    return _record(path, values, names, units, meta)
+        if isinstance(exc, SignalError):
+            raise
+        fault = _first_bad_line(path, packed, first, separator, layout.decimal, width, exc)
+        raise SignalFileError(path, fault) from exc
 
 
-def _record(path: Path, values: np.ndarray, names: list[str], units: list[str], meta: dict[str, Any]) -> Record:
+def _time_factor(layout: _Layout, clock: int) -> float:
+    return {"ms": 1e-3, "us": 1e-6}.get(layout.units[clock], 1.0)
+
+
+def _record(path: Path, values: np.ndarray, layout: _Layout) -> Record:
+    names, units, meta, clock = layout.names, layout.units, layout.meta, layout.clock
     rate = next((float(v) for k, v in meta.items() if k.lower().replace(" ", "_") in RATE_KEYS), None)
     t0 = float(meta.get("t0", 0.0))
-    clock = next((i for i, name in enumerate(names) if name.lower() in TIME_KEYS), None)
-    if clock is not None and len(names) > 1 and len(values) > 1:
-        factor = {"ms": 1e-3, "us": 1e-6}.get(units[clock], 1.0)
-        times = values[:, clock] * factor
+    if clock is not None and len(values) > 1:
+        times = values[:, clock] * _time_factor(layout, clock)
         t0 = float(times[0])
         rate = rate_from_times(times, path) if rate is None else rate
         values = np.delete(values, clock, axis=1)

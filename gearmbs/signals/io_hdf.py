@@ -6,7 +6,7 @@ Files written here are NetCDF-4, which is HDF5: the same bytes serve `.nc` and `
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from .record import RATE_KEYS, Record, assemble, plain, rate_from_times
 from .signal import UNKNOWN_UNITS, check_teeth
 
 LAYOUT = "gearmbs signal"
+BLOCK = 1 << 17
 
 
 def write_netcdf(record: Record, path: Path) -> None:
@@ -88,6 +89,53 @@ def read_hdf(path: Path, channels: Sequence[str] | None) -> Record:
         arrays = {key: arrays[key] for key in sorted(arrays, key=lambda key: order[key])}
         return _own(path, arrays, units, labels, scalars)
     return assemble(path, arrays, scalars, units, channels)
+
+
+def hdf_pieces(path: Path) -> Iterator[tuple[Record, float]] | None:
+    """Read a file of this package's layout block by block, or return None for any other.
+
+    Raises
+    ------
+    SignalFileError
+        If the file is damaged, or its channels differ in length.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            if _value(file.attrs.get("layout")) != LAYOUT or "sampling_rate" not in file.attrs:
+                return None
+    except OSError as exc:
+        raise SignalFileError(path, f"cannot be read as HDF5: it is damaged or cut short ({exc})") from exc
+    return _slices(path)
+
+
+def _slices(path: Path) -> Iterator[tuple[Record, float]]:
+    try:
+        with h5py.File(path, "r") as file:
+            columns = [v for k, v in file.items() if k != "time" and "channel_index" in v.attrs]
+            columns.sort(key=lambda column: int(_value(column.attrs["channel_index"])))
+            counts = {column.shape for column in columns}
+            if len(counts) != 1 or len(next(iter(counts))) != 1:
+                raise SignalFileError(path, f"its channels have the shapes {sorted(counts)}; they must be equal")
+            scalars = {k: _value(v) for k, v in file.attrs.items()}
+            teeth = scalars.get("teeth")
+            count = columns[0].shape[0]
+            for start in range(0, count, BLOCK):
+                stop = min(start + BLOCK, count)
+                yield (
+                    Record(
+                        np.stack([np.asarray(column[start:stop], dtype=float) for column in columns], axis=1),
+                        [str(_value(column.attrs["channel"])) for column in columns],
+                        [str(_value(column.attrs.get("units", UNKNOWN_UNITS))) for column in columns],
+                        float(scalars["sampling_rate"]),
+                        float(scalars.get("t0", 0.0)),
+                        scalars.get("speed"),
+                        None if teeth is None else check_teeth(teeth),
+                        json.loads(scalars.get("attrs", "{}")),
+                    ),
+                    stop / count,
+                )
+    except OSError as exc:
+        raise SignalFileError(path, f"cannot be read as HDF5: it is damaged or cut short ({exc})") from exc
 
 
 def read_netcdf3(path: Path, channels: Sequence[str] | None) -> Record:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from .record import Record, plain
 from .signal import UNKNOWN_UNITS, check_teeth
 
 GROUP = "signal"
+BLOCK = 1 << 17
 LEAD_IN = 28
 INCOMPLETE = 0xFFFFFFFFFFFFFFFF
 
@@ -27,30 +28,53 @@ def read_tdms(path: Path, channels: Sequence[str] | None) -> Record:
     SignalFileError
         If npTDMS is not installed, a segment is cut short, or the channels' lengths or rates differ.
     """
+    return next(_read(path, channels, None))[0]
+
+
+def tdms_pieces(path: Path, channels: Sequence[str] | None) -> Iterator[tuple[Record, float]]:
+    """Read the channels of a TDMS file block by block; see `read_tdms`."""
+    return _read(path, channels, BLOCK)
+
+
+def _read(path: Path, channels: Sequence[str] | None, block: int | None) -> Iterator[tuple[Record, float]]:
     nptdms = _library(path)
     _check_segments(path)
     try:
-        file = nptdms.TdmsFile.read(path)
-        found = [c for group in file.groups() for c in group.channels() if len(c) and np.issubdtype(c.dtype, np.number)]
-        columns = {c.name: np.asarray(c[:], dtype=float) for c in found if channels is None or c.name in channels}
+        with nptdms.TdmsFile.open(path) as file:
+            kept = _chosen(path, file, channels)
+            count = len(kept[0])
+            for start in range(0, count, block or count):
+                stop = min(start + (block or count), count)
+                values = np.stack([np.asarray(c[start:stop], dtype=float) for c in kept], axis=1)
+                yield _record(path, values, kept, dict(file.properties)), stop / count
+    except SignalFileError:
+        raise
     except Exception as exc:
         raise SignalFileError(path, f"cannot be read as TDMS ({exc})") from exc
-    if not columns:
+
+
+def _chosen(path: Path, file: Any, channels: Sequence[str] | None) -> list[Any]:
+    """The channels that become the record's; SignalFileError if they do not make one."""
+    found = [c for group in file.groups() for c in group.channels() if len(c) and np.issubdtype(c.dtype, np.number)]
+    kept = [c for c in found if channels is None or c.name in channels]
+    if not kept:
         raise SignalFileError(path, f"holds no samples{'' if channels is None else f' in {list(channels)}'}")
-    kept = [c for c in found if c.name in columns]
-    if len(kept) != len(columns):
+    if len({c.name for c in kept}) != len(kept):
         raise SignalFileError(path, "has channels of the same name in different groups; rename them")
     if len({len(c) for c in kept}) > 1:
         listed = ", ".join(f"{c.name} ({len(c)})" for c in kept)
         raise SignalFileError(path, f"holds records of different lengths: {listed}; choose with channels=[...]")
-    root = dict(file.properties)
+    return kept
+
+
+def _record(path: Path, values: np.ndarray, kept: Sequence[Any], root: dict) -> Record:
     rates = {_rate(c.properties, root) for c in kept}
     if len(rates) > 1:
         raise SignalFileError(path, f"its channels have different sampling rates {rates}; choose with channels=[...]")
     teeth = root.get("teeth")
     return Record(
-        np.stack(list(columns.values()), axis=1),
-        list(columns),
+        values,
+        [c.name for c in kept],
         [str(c.properties.get("unit_string") or UNKNOWN_UNITS) for c in kept],
         rates.pop(),
         float(kept[0].properties.get("wf_start_offset", 0.0)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import struct
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from scipy.io import wavfile
 from .errors import SignalFileError
 from .record import Record, metadata_json, record_from_json
 from .signal import UNKNOWN_UNITS
+
+BLOCK = 1 << 17
 
 
 def read_wav(path: Path) -> Record:
@@ -30,6 +33,32 @@ def read_wav(path: Path) -> Record:
             rate, data = wavfile.read(path)
     except Exception as exc:
         raise SignalFileError(path, f"cannot be read as WAV ({exc})") from exc
+    return _record(path, data, rate, comment)
+
+
+def wav_pieces(path: Path) -> Iterator[tuple[Record, float]] | None:
+    """Read a WAV file block by block, or return None for sample sizes that cannot be (24 bits).
+
+    Raises
+    ------
+    SignalFileError
+        As `read_wav`.
+    """
+    comment = _check_chunks(path)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", wavfile.WavFileWarning)
+            rate, data = wavfile.read(path, mmap=True)
+    except Exception:
+        return None
+    count = len(data)
+    return (
+        (_record(path, data[start : start + BLOCK], rate, comment), min(start + BLOCK, count) / count)
+        for start in range(0, count, BLOCK)
+    )
+
+
+def _record(path: Path, data: np.ndarray, rate: int, comment: str | None) -> Record:
     values = data[:, None] if data.ndim == 1 else data
     if values.dtype == np.uint8:
         values = (values.astype(float) - 128.0) / 128.0
