@@ -53,7 +53,7 @@ def simulate_case(case: Case, progress: bool | Callable[[float], None] = False, 
         rate=solver.output_rate,
         integrator=solver.integrator,
         formulation=solver.formulation,
-        tol=solver.tolerance,
+        tol=solver.used_tolerance,
         rate_scale=operation.speed * case.gears.teeth[0],
         progress=progress,
         **options,
@@ -175,6 +175,7 @@ def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any
                     out[name] = int(value)
                 else:
                     out[name] = list(value) if isinstance(value, tuple) else value
+    out["solver_tolerance"] = case.solver.used_tolerance
     out["mesh_frequency"] = case.mesh_frequency
     out["case_json"] = case.model_dump_json()
     out["gearmbs_version"] = gearmbs.__version__
