@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.cells import POINTS, WEIGHTS
 from gearmbs.contact.jit import kernel
 from gearmbs.contact.laws import normal_law
 
@@ -16,9 +17,6 @@ N_GAP, N_GRAD, N_RATE, N_DRATE, N_FORCE, N_FX, N_FV = (
     L.N_FV,
 )
 LO, HI = L.W_LIMIT, L.W_LIMIT + 43
-# Gauss's rule of three points: the overlap's cross-section is as delta^(3/2)
-POINTS = (0.1127016653792583, 0.5, 0.8872983346207417)
-WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
 
 @kernel

@@ -12,6 +12,8 @@ from gearmbs.contact import layout as L
 from gearmbs.contact.jit import kernel
 
 S_X, S_LENGTH, P_DEV = L.S_X, L.S_LENGTH, L.P_DEV
+P_DEV_2 = L.W_LIMIT  # the other wheel's lookup, in the limits' records, free between calls
+SHORTEST = 0.01  # string over base radius where the lookup ends towards the base circle
 N_GAP, N_GRAD, N_HESS = L.N_GAP, L.N_GRAD, L.N_HESS
 P_SOFT, P_SOFT_X, P_SOFT_XX = L.P_SOFT, L.P_SOFT_X, L.P_SOFT_XX
 RB, PSI, WHEEL = L.RB, L.PSI, L.WHEEL
@@ -30,18 +32,15 @@ def tooth_record(gi, wheel, side, tooth):
 
 
 @kernel
-def contact_string(gr, wk, wheel, kind, f1, f2, zeta, want):
-    """String length of the contact on one wheel, with gradient and Hessian by the pose, into ``wk[P_DEV:]``.
+def contact_string(gr, wk, wheel, kind, f1, f2, zeta, o, V, want):
+    """String length of the contact on one wheel, with gradient and Hessian by the pose, into ``wk[V:]``.
 
-    Flank on flank it is the place of parallel axes moved by the tilt to first order; under a corner it is where the
-    corner of the mate stands. The corner itself bears at its own, constant string.
+    The place is half-way between the surfaces. Flank on flank it is that of parallel axes moved by the tilt to first
+    order; under a corner it is where the corner stands, less half the gap of perfect profiles in the record at
+    ``wk[o:]``. Both agree where the one takes over from the other.
     """
-    V = P_DEV
     for i in range(1, 43 if want != 0 else 7):
         wk[V + i] = 0.0
-    if kind == wheel + 1:
-        wk[V] = wk[L.C_STRING]
-        return
     a = wk[S_X]
     rb1 = gr[RB]
     rb2 = gr[WHEEL + RB]
@@ -73,31 +72,43 @@ def contact_string(gr, wk, wheel, kind, f1, f2, zeta, want):
             wk[T + 3] = -turn / (a * a)
             wk[T + 18] = wk[T + 3]
         return
-    mate = gr[RB] if wheel == 0 else gr[WHEEL + RB]
+    half = 0.5 if kind == wheel + 1 else -0.5
+    wk[V] = half * wk[o + N_GAP]
+    for i in range(6):
+        wk[G + i] = half * wk[o + N_GRAD + i]
+        if want != 0:
+            for j in range(6):
+                wk[T + 6 * i + j] = half * wk[o + N_HESS + 6 * i + j]
+    if kind == wheel + 1:
+        wk[V] += wk[L.C_STRING]
+        return
+    mate = rb1 if wheel == 0 else rb2
     f = 5 if wheel == 0 else 4
     r = wk[L.C_R]
     se, ce = wk[L.C_SIN], wk[L.C_COS]
     Px = a - r * ce - 2.0 * wk[S_X + 2] * zeta
     Py = -r * se - 2.0 * wk[S_X + 3] * zeta
-    s = np.sqrt(max(Px * Px + Py * Py - mate * mate, 1e-12))
-    wk[V] = s - wk[L.C_ROUND]
-    i_s = 1.0 / s
-    wk[G] = Px * i_s
-    wk[G + 2] = -2.0 * zeta * Px * i_s
-    wk[G + 3] = -2.0 * zeta * Py * i_s
-    wk[G + f] = (Px * r * se - Py * r * ce) * i_s
-    if want == 0:
+    s2 = Px * Px + Py * Py - mate * mate
+    if s2 < SHORTEST * SHORTEST * mate * mate:
+        wk[V] += SHORTEST * mate - wk[L.C_ROUND]
         return
+    s = np.sqrt(s2)
+    wk[V] += s - wk[L.C_ROUND]
+    i_s = 1.0 / s
     for i in range(6):
         dx = 1.0 if i == 0 else (-2.0 * zeta if i == 2 else (r * se if i == f else 0.0))
         dy = -2.0 * zeta if i == 3 else (-r * ce if i == f else 0.0)
+        by_i = (Px * dx + Py * dy) * i_s
+        wk[G + i] += by_i
+        if want == 0:
+            continue
         for j in range(6):
             ex = 1.0 if j == 0 else (-2.0 * zeta if j == 2 else (r * se if j == f else 0.0))
             ey = -2.0 * zeta if j == 3 else (-r * ce if j == f else 0.0)
-            value = dx * ex + dy * ey - wk[G + i] * wk[G + j]
+            value = dx * ex + dy * ey - by_i * (Px * ex + Py * ey) * i_s
             if i == f and j == f:
                 value += r * (Px * ce + Py * se)
-            wk[T + 6 * i + j] = value * i_s
+            wk[T + 6 * i + j] += value * i_s
 
 
 @kernel
@@ -152,20 +163,36 @@ def shape_value(gi, gr, wheel, shape, s, z):
 
 
 @kernel
-def add_deviation(gi, gr, wk, wheel, record, kind, f1, f2, zeta, o, want):
-    """Add one wheel's deviation to the gap in the node record at ``wk[o:]`` and to its derivatives."""
-    wk[o + N_GAP] += gr[gi[L.O_OFFSET] + record]
-    shape = gi[gi[L.O_TOOTH] + L.TOOTH * record]
-    if shape < 0:
-        return
-    contact_string(gr, wk, wheel, kind, f1, f2, zeta, want)
+def add_deviations(gi, gr, wk, record1, record2, kind, f1, f2, zeta, o, want):
+    """Add both wheels' deviations to the gap in the node record at ``wk[o:]`` and to its derivatives."""
+    # both places on the profiles follow from the gap of perfect ones, so they are found before it changes
+    for wheel in range(2):
+        if tooth_shape(gi, record1 if wheel == 0 else record2) >= 0:
+            contact_string(gr, wk, wheel, kind, f1, f2, zeta, o, P_DEV if wheel == 0 else P_DEV_2, want)
+    for wheel in range(2):
+        record = record1 if wheel == 0 else record2
+        wk[o + N_GAP] += gr[gi[L.O_OFFSET] + record]
+        shape = tooth_shape(gi, record)
+        if shape >= 0:
+            add_shape(gi, gr, wk, wheel, shape, zeta, o, P_DEV if wheel == 0 else P_DEV_2, want)
+
+
+@kernel
+def tooth_shape(gi, record):
+    """Number of a tooth flank's deviation shape, -1 for a perfect one."""
+    return gi[gi[L.O_TOOTH] + L.TOOTH * record]
+
+
+@kernel
+def add_shape(gi, gr, wk, wheel, shape, zeta, o, V, want):
+    """Add a deviation shape at the place in ``wk[V:]`` to the gap in the node record at ``wk[o:]``."""
     sign = 1.0 if wheel == 0 else -1.0
     scale = 2.0 / gr[wheel * WHEEL + L.FACE]
     z = (zeta + sign * 0.5 * wk[S_X + 1]) * scale
-    value, by_s, by_z, by_ss, by_sz = shape_value(gi, gr, wheel, shape, wk[P_DEV], z)
+    value, by_s, by_z, by_ss, by_sz = shape_value(gi, gr, wheel, shape, wk[V], z)
     z_h = 0.5 * sign * scale
     wk[o + N_GAP] += value
-    G = P_DEV + 1
+    G = V + 1
     for i in range(6):
         wk[o + N_GRAD + i] += by_s * wk[G + i]
     wk[o + N_GRAD + 1] += by_z * z_h
@@ -173,7 +200,7 @@ def add_deviation(gi, gr, wk, wheel, record, kind, f1, f2, zeta, o, want):
         return
     for i in range(6):
         for j in range(6):
-            wk[o + N_HESS + 6 * i + j] += by_ss * wk[G + i] * wk[G + j] + by_s * wk[P_DEV + 7 + 6 * i + j]
+            wk[o + N_HESS + 6 * i + j] += by_ss * wk[G + i] * wk[G + j] + by_s * wk[V + 7 + 6 * i + j]
         mixed = by_sz * z_h * wk[G + i]
         wk[o + N_HESS + 6 * i + 1] += mixed
         wk[o + N_HESS + 6 + i] += mixed
@@ -230,7 +257,7 @@ def pair_softness(gi, gr, wk, record1, record2, f1, f2, want):
     """
     n = gi[L.N_COMPLIANCE]
     base = gi[L.O_COMPLIANCE]
-    contact_string(gr, wk, 0, 0, f1, f2, 0.0, want)
+    contact_string(gr, wk, 0, 0, f1, f2, 0.0, 0, P_DEV, want)
     ds = gr[L.COMPLIANCE_DS]
     u = (wk[P_DEV] - gr[L.COMPLIANCE_S0]) / ds
     total, slope, curve = cubic(gr, base, n, u)

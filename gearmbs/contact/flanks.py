@@ -7,9 +7,10 @@ import numpy as np
 from gearmbs.contact import layout as L
 from gearmbs.contact.cells import cell_force, end_force, plane_force
 from gearmbs.contact.centroid import centroid_force
-from gearmbs.contact.deviations import add_deviation, pair_softness, set_corner, tip_string, tooth_record
+from gearmbs.contact.deviations import add_deviations, pair_softness, set_corner, tip_string, tooth_record
 from gearmbs.contact.face import LIMIT, face_limit
 from gearmbs.contact.jit import kernel
+from gearmbs.contact.lines import corner_on_plane, line_offset
 from gearmbs.contact.node import contact_point, corner_normal, corner_start, flank_normal, section_gap, turn_normal
 from gearmbs.contact.sums import add_friction, add_normal, mirror
 
@@ -20,11 +21,12 @@ PITCH, FRICTION, N_SLICES = L.PITCH, L.FRICTION, L.N_SLICES
 ZETA_LO, ZETA_HI, GAP_MARGIN = L.ZETA_LO, L.ZETA_HI, L.GAP_MARGIN
 S_A, S_H, S_P, S_Q, S_F1, S_F2, S_XD = L.S_X, L.S_X + 1, L.S_X + 2, L.S_X + 3, L.S_X + 4, L.S_X + 5, L.S_XD
 S_W, S_A0, S_LENGTH, S_ALPHA, S_SIN, S_COS = L.S_W, L.S_A0, L.S_LENGTH, L.S_ALPHA, L.S_SIN, L.S_COS
-S_SLOPE, S_CURVE = L.S_SLOPE, L.S_CURVE
+S_SLOPE, S_CURVE, S_OVERHANG = L.S_SLOPE, L.S_CURVE, L.S_OVERHANG
 NODES, LO, HI = L.W_NODES, L.W_LIMIT, L.W_LIMIT + LIMIT
 TWO_PI = 2.0 * np.pi
-NO_CONTACT = 1.0  # a gap, m, for profiles that cannot meet
+NEAR_BASE = 0.01  # string over base radius below which an involute is too curved to bear on
 CORNER_SLACK = 0.45  # share of the corner gap's parabola taken as its lower bound
+STEEPEST = 3.0  # how much steeper the corner gap may grow than that bound
 
 
 @kernel
@@ -54,18 +56,33 @@ def set_normal(wk, alpha, sa, ca):
 def corner_section(gr, wk, kind, f1, f2, zeta, near, o, want):
     """Gap of the corner at work, the tip of wheel ``kind``, on the mate's flank.
 
-    ``near`` tells that the running normal is already close; else it starts from parallel axes.
+    Close to its base circle and inside it the mate's flank goes on as its tangent plane. ``near`` tells that the
+    running normal is already close; else it starts from parallel axes. Returns whether the running normal is the gap's.
     """
     mate = WHEEL if kind == 1 else 0
     rb = gr[mate + RB]
-    s0 = rb * ((f2 if kind == 1 else f1) + gr[mate + PSI])
-    if (near or corner_start(wk, rb)) and corner_normal(wk, s0, rb, zeta):
-        section_gap(gr, wk, kind, f1, f2, zeta, o, want)
-        return True
-    wk[o + N_GAP] = NO_CONTACT
+    start = (f2 if kind == 1 else f1) + gr[mate + PSI]
+    r = wk[L.C_R]
+    X, Y = line_offset(wk, -r * wk[L.C_COS], -r * wk[L.C_SIN], zeta)
+    lean = wk[S_P] * X + wk[S_Q] * Y
+    string2 = X * X + Y * Y - lean * lean - rb * rb
+    if string2 > NEAR_BASE * NEAR_BASE * rb * rb:
+        if not near:
+            corner_start(wk, X, Y, rb)
+        if corner_normal(wk, rb * start, rb, zeta):
+            section_gap(gr, wk, kind, f1, f2, zeta, o, want)
+            return True
+    turned = start - NEAR_BASE
+    corner_on_plane(wk, 2 - kind, turned, rb, NEAR_BASE * rb, zeta, o, want)
     wk[o + N_KIND] = kind
-    for i in range(o + N_GRAD, o + L.N_DALPHA):
-        wk[i] = 0.0
+    wk[o + L.N_ALPHA] = -turned
+    wk[o + L.N_SIN] = -np.sin(turned)
+    wk[o + L.N_COS] = np.cos(turned)
+    wk[o + N_S1] = wk[L.C_STRING] if kind == 1 else 0.0
+    wk[o + N_S2] = wk[L.C_STRING] if kind == 2 else 0.0
+    for i in range(6):
+        wk[o + L.N_DALPHA + i] = 0.0
+    wk[o + L.N_DALPHA + (5 if kind == 1 else 4)] = -1.0
     return False
 
 
@@ -181,7 +198,10 @@ def side_contacts(gi, gr, wk, side, diag, want):
         slope = 2.0 * (p * sa + q * ca) / w
         jb = slices
         step = (gr[ZETA_HI] - gr[ZETA_LO]) / slices
-        reach = 0.5 * (gr[ZETA_HI] - gr[ZETA_LO]) + step
+        # where a leaning or shifted wheel's end face goes beyond the slices, gaps are extrapolated
+        overhang = abs(p) * wk[S_A] + abs(q) * max(rb1, rb2) + 0.5 * abs(wk[S_H] - gr[L.AXIAL_SHIFT])
+        wk[S_OVERHANG] = overhang + gr[L.EDGE_BLEND]
+        reach = 0.5 * (gr[ZETA_HI] - gr[ZETA_LO]) + wk[S_OVERHANG]
         if deepest + abs(slope) * reach <= 0.0:
             return False
         if deepest - abs(slope) * reach < 0.0:
@@ -202,7 +222,11 @@ def side_contacts(gi, gr, wk, side, diag, want):
             section_gap(gr, wk, 0, f1, f2, zeta, o, want)
             gap_rate(wk, o, want)
             deepest = max(deepest, margin - wk[o + N_GAP])
-        if deepest <= 0.0 and ja > 0 and jb < slices:
+        if ja == 0:
+            deepest = max(deepest, margin - beyond_end(wk, NODES, NODE, step))
+        if jb == slices:
+            deepest = max(deepest, margin - beyond_end(wk, NODES + slices * NODE, -NODE, step))
+        if deepest <= 0.0:
             return False
         wander = max(rb1, rb2) * abs(turn) * (gr[ZETA_HI] - gr[ZETA_LO])
 
@@ -234,23 +258,41 @@ def side_contacts(gi, gr, wk, side, diag, want):
 
 
 @kernel
-def touching_range(gi, gr, wk, shift, ja, jb):
+def beyond_end(wk, o, inward, step):
+    """Lower bound of the flanks' gap from an end node outwards; ``inward`` leads to the record next to it."""
+    return wk[o + N_GAP] - max(0.0, wk[o + inward + N_GAP] - wk[o + N_GAP]) * wk[S_OVERHANG] / step
+
+
+@kernel
+def path_excess(gr, wk, o, shift):
+    """How far beyond the path of contact a pair stands in a section, and the parabola its gap grows by at least."""
+    x = max(wk[o + N_S1] + shift - gr[S_TIP], wk[o + N_S2] - shift - gr[WHEEL + S_TIP])
+    return wk[S_CURVE] * x * x if x > 0.0 else 0.0
+
+
+@kernel
+def touching_range(gi, gr, wk, shift, ja, jb, step):
     """Nodes that may touch, and one more on either side: the gap is at least that of the flanks plus a parabola."""
-    tip1 = gr[S_TIP]
-    tip2 = gr[WHEEL + S_TIP]
     margin = gr[GAP_MARGIN]
-    curve = wk[S_CURVE]
     first = jb + 1
     last = ja - 1
     for j in range(ja, jb + 1):
         o = NODES + j * NODE
-        bound = wk[o + N_GAP] - margin
-        x = max(wk[o + N_S1] + shift - tip1, wk[o + N_S2] - shift - tip2)
-        if x > 0.0:
-            bound += curve * x * x
-        if bound < 0.0:
+        if wk[o + N_GAP] + path_excess(gr, wk, o, shift) < margin:
             first = min(first, j)
             last = j
+    slices = gi[N_SLICES]
+    if slices > 1:
+        share = STEEPEST * wk[S_OVERHANG] / step
+        for end in range(2):
+            if (ja > 0) if end == 0 else (jb < slices):
+                continue
+            o = NODES + (0 if end == 0 else slices * NODE)
+            inward = NODE if end == 0 else -NODE
+            grown = path_excess(gr, wk, o + inward, shift) - path_excess(gr, wk, o, shift)
+            if beyond_end(wk, o, inward, step) - max(0.0, grown) * share < margin:
+                first = min(first, 0 if end == 0 else slices)
+                last = max(last, 0 if end == 0 else slices)
     return max(first - 1, ja), min(last + 1, jb)
 
 
@@ -303,9 +345,7 @@ def pair_sections(gi, gr, wk, side, i1, i2, f1, f2, ja, jb, step, alpha, sa, ca,
                 o = own + j * NODE
                 wk[o + N_S1] = s1
                 wk[o + N_S2] = s2
-            if wk[o + N_GAP] < NO_CONTACT:
-                add_deviation(gi, gr, wk, 0, record1, kind, f1, f2, zeta, o, want)
-                add_deviation(gi, gr, wk, 1, record2, kind, f1, f2, zeta, o, want)
+            add_deviations(gi, gr, wk, record1, record2, kind, f1, f2, zeta, o, want)
         if kind != 0 or teeth:
             gap_rate(wk, o, want)
         wk[sel + j] = o
@@ -319,7 +359,7 @@ def pair_sections(gi, gr, wk, side, i1, i2, f1, f2, ja, jb, step, alpha, sa, ca,
 def pair_contact(gi, gr, wk, side, i1, i2, f1, f2, ja, jb, step, alpha, sa, ca, diag, want):
     """Add the contact of one tooth pair over the nodes ``ja``..``jb``; returns its largest penetration."""
     slices = gi[N_SLICES]
-    ja, jb = touching_range(gi, gr, wk, gr[RB] * (f1 - wk[S_F1]), ja, jb)
+    ja, jb = touching_range(gi, gr, wk, gr[RB] * (f1 - wk[S_F1]), ja, jb, step)
     if jb < ja:
         return 0.0
     touching = pair_sections(gi, gr, wk, side, i1, i2, f1, f2, ja, jb, step, alpha, sa, ca, want)

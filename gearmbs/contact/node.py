@@ -26,7 +26,6 @@ C_SIN, C_COS, C_R, C_ROUND, C_STRING = L.C_SIN, L.C_COS, L.C_R, L.C_ROUND, L.C_S
 SUP1 = L.W_SUP
 SUP2 = L.W_SUP + 15
 NEWTON_STEPS = 20
-BASE_MARGIN = 1.0001  # on the squared base radius, below which an involute is too curved to bear on
 NEWTON_END = 1e-6  # a further step would change alpha by about the square of it
 
 
@@ -72,23 +71,18 @@ def flank_normal(wk, s0, rb, zeta):
 
 
 @kernel
-def corner_start(wk, rb):
-    """Turn the running normal onto the mate's involute under the corner at work, axes taken as parallel.
+def corner_start(wk, X, Y, rb):
+    """Turn the running normal onto the mate's involute under a corner that stands ``(X, Y)`` from the mate's axis.
 
-    Returns False, with the normal unchanged, when the corner is inside the mate's base circle.
+    Axes are taken as parallel; the corner is outside the base circle.
     """
-    X = wk[S_A] - wk[C_R] * wk[C_COS]
-    Y = -wk[C_R] * wk[C_SIN]
     R2 = X * X + Y * Y
-    if R2 < rb * rb * BASE_MARGIN:
-        return False
     string = np.sqrt(R2 - rb * rb)
     sa = (string * X - rb * Y) / R2
     ca = (rb * X + string * Y) / R2
     wk[S_ALPHA] += np.arctan2(sa * wk[S_COS] - ca * wk[S_SIN], ca * wk[S_COS] + sa * wk[S_SIN])
     wk[S_SIN] = sa
     wk[S_COS] = ca
-    return True
 
 
 @kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.deviations import add_deviation, pair_softness, set_corner, tip_string, tooth_record
+from gearmbs.contact.deviations import add_deviations, pair_softness, set_corner, tip_string, tooth_record
 from gearmbs.contact.face import LIMIT, face_limit
 from gearmbs.contact.flanks import corner_section, flank_pitch, open_side, set_normal
 from gearmbs.contact.jit import kernel
@@ -104,8 +104,7 @@ def pair_gaps(gi, gr, R1, A1, R2, A2, stations, rows, work):
                     set_corner(gr, work, kind - 1, f1 if kind == 1 else f2, tip1 if kind == 1 else tip2)
                     corner_section(gr, work, kind, f1, f2, zeta, False, o, 0)
                 if teeth:
-                    add_deviation(gi, gr, work, 0, record1, kind, f1, f2, zeta, o, 0)
-                    add_deviation(gi, gr, work, 1, record2, kind, f1, f2, zeta, o, 0)
+                    add_deviations(gi, gr, work, record1, record2, kind, f1, f2, zeta, o, 0)
                 contact_point(gr, work, kind, f1, zeta, o, 0)
                 rows[count, 0] = side
                 rows[count, 1] = (side * i) % gi[L.Z1]
