@@ -65,19 +65,21 @@ def _rack_and_pinion(b: Builder, s: st.Joint, name: str, i: Marker, j: Marker) -
     """RACKPIN: the pinion (I, about z_I) rolls on the rack's line (J, along z_J).
 
     The side on which the rack passes the pinion's axis tells the direction; the travel is PD/2 times the angle
-    counted from the start.
+    counted from the start. A line through the axis itself moves along z_J for a positive turn: ADAMS asks for x_I along
+    z_J, and the pitch point then lies towards -y_I.
     """
     zi, zj = i.global_orientation()[:, 2], j.global_orientation()[:, 2]
     apart = j.global_position() - i.global_position()
     foot = apart - zj * (zj @ apart)
     lever = np.cross(zi, foot) @ zj
-    if abs(lever) < 1e-9 * max(float(np.linalg.norm(apart)), 1e-12) or abs(zi @ zj) > 1e-6:
-        raise ValueError("z_J must pass the pinion's axis z_I at a distance and at a right angle")
+    if abs(zi @ zj) > 1e-6:
+        raise ValueError("z_J must be at a right angle to the pinion's axis z_I")
+    side = 1.0 if abs(lever) < 1e-9 * max(float(np.linalg.norm(apart)), b.units.length) else float(np.sign(lever))
     axes = np.column_stack([zj, np.cross(zi, zj), zi])
     fixed = j.body.marker_at(j.global_position(), axes, name=f"{name}.angle J")
     turned = i.body.marker_at(i.global_position(), axes, name=f"{name}.angle I")
     travel = float(zj @ apart) / b.units.length
-    rate = float(np.sign(lever)) * 0.5 * (s.pd or 0.0)
+    rate = side * 0.5 * (s.pd or 0.0)
     text = f'-DZ({s.i},{s.j},{s.j}) - ({travel!r}) - ({rate!r})*AZ("{turned.name}","{fixed.name}")'
     b.mechanism.general_constraint(name, text)
 
