@@ -308,6 +308,40 @@ class PitchError(Fault):
 
 
 @dataclass(frozen=True, kw_only=True)
+class CumulativePitchError(Fault):
+    """Teeth out of place along the whole wheel, as a wave: what an indexing gear or a shifted blank leaves.
+
+    Parameters
+    ----------
+    amount : float or str
+        Total cumulative pitch deviation F_p: largest displacement along the base tangent less the smallest.
+    order : int
+        Waves per revolution, 1 up to half the number of teeth.
+    phase : float or str
+        Of the wave at tooth 0; positive displacements let the drive flank stand out.
+    """
+
+    label: ClassVar[str] = "cumulative pitch error"
+    units: ClassVar[dict[str, str]] = {"amount": "length", "phase": "angle"}
+
+    amount: Quantity = 30e-6
+    order: int = 1
+    phase: Quantity = 0.0
+
+    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+        teeth = canvas.gear.teeth
+        require(self.amount >= 0, f"CumulativePitchError.amount is {self.amount} m; it must not be negative")
+        require(
+            isinstance(self.order, int) and 1 <= self.order <= teeth // 2,
+            f"CumulativePitchError.order is {self.order!r}; give 1 up to {teeth // 2} waves per revolution",
+        )
+        wave = np.sin(2 * math.pi * self.order * np.arange(teeth) / teeth + self.phase)
+        index = self.amount / np.ptp(wave) * wave
+        canvas.offset[canvas.drive] -= index
+        canvas.offset[1 - canvas.drive] += index
+
+
+@dataclass(frozen=True, kw_only=True)
 class GradedFlanks(Fault):
     """Random deviations that use up the tolerances of an ISO 1328-1:2013 grade.
 

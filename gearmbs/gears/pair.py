@@ -12,12 +12,14 @@ import numpy as np
 from gearmbs.gears.faults import Fault
 from gearmbs.gears.laws import ContactLaw, Friction
 from gearmbs.gears.spec import GearSpec, convert_fields, involute, require
-from gearmbs.gears.stiffness import pair_stiffness
+from gearmbs.gears.stiffness import iso_mesh_stiffness, iso_single_stiffness, pair_stiffness
 from gearmbs.gears.tables import compliance_stations, pack
 from gearmbs.units import Quantity
 
 TILTED_SLICES = 11
 FAULTY_SLICES = 41
+JAM_ROUNDING = 1e-12
+"""Overlap of parallel wheels, m, that is taken for rounding: standard teeth at their nominal distance have none."""
 
 
 @dataclass(frozen=True)
@@ -158,6 +160,30 @@ class GearPair:
         largest = float(pair_stiffness(self, compliance_stations(self)).max())
         law = ContactLaw.linear(largest, damping, depth)
         return replace(self, contact=law, stiffness_curve="potential-energy")
+
+    def with_iso_stiffness(
+        self, kind: Literal["single", "mesh"] = "single", damping: Quantity = 0.0, depth: Quantity = "0.1 mm"
+    ) -> GearPair:
+        """A copy with linear tooth pairs of ISO 6336-1's stiffness, constant along the path.
+
+        Parameters
+        ----------
+        kind : {"single", "mesh"}
+            ``single``: each pair has c' times the common face width. ``mesh``: each has c_gamma times that width over
+            the contact ratio, so that the mean over a mesh cycle is c_gamma.
+        damping, depth : float or str
+            See `ContactLaw.linear`.
+
+        Examples
+        --------
+        >>> pair = GearPair.paper().with_iso_stiffness()
+        >>> round(pair.contact.stiffness / 1e6, 1)
+        254.9
+        """
+        choices = {"single": iso_single_stiffness(self), "mesh": iso_mesh_stiffness(self) / self.contact_ratio}
+        require(kind in choices, f"kind is {kind!r}; choose 'single' or 'mesh'")
+        law = ContactLaw.linear(choices[kind] * self.common_face_width, damping, depth)
+        return replace(self, contact=law, stiffness_curve="constant")
 
     def _check(self) -> None:
         mm = 1e3
@@ -318,8 +344,10 @@ class GearPair:
 
     @property
     def jams(self) -> bool:
-        """Whether both flanks touch at once for want of backlash under the misalignment."""
-        return self.misalignment != 0 and self.normal_backlash < self.jam_backlash
+        """Whether both flanks touch at once for want of backlash, by the centre distance or under the misalignment."""
+        if self.misalignment == 0:
+            return self.normal_backlash < -JAM_ROUNDING
+        return self.normal_backlash < self.jam_backlash
 
     @property
     def tip_clearance(self) -> float:

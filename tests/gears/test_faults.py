@@ -10,6 +10,7 @@ from gearmbs.gears.faults import (
     BrokenTooth,
     ChippedCorner,
     Crowning,
+    CumulativePitchError,
     Eccentricity,
     Fault,
     GradedFlanks,
@@ -30,6 +31,7 @@ ALL = [
     BrokenTooth,
     ChippedCorner,
     Crowning,
+    CumulativePitchError,
     Eccentricity,
     GradedFlanks,
     LeadCorrection,
@@ -155,6 +157,22 @@ def test_pitch_error_moves_one_tooth():
     assert change[tooth & (plain[:, 0] == 1)] == pytest.approx(-12e-6)
     assert change[tooth & (plain[:, 0] == -1)] == pytest.approx(12e-6)
     assert np.all(change[~tooth] == 0)
+
+
+@pytest.mark.parametrize("rotation", [1, -1])
+def test_cumulative_pitch_error_is_a_wave_of_displaced_teeth(rotation):
+    pair = GearPair.paper(backlash="0.2 mm", rotation=rotation)
+    faulty = pair.with_faults(CumulativePitchError(amount="30 um", order=2, phase="25 deg"))
+    wave = np.sin(4 * math.pi * np.arange(29) / 29 + math.radians(25))
+    index = 30e-6 * wave / np.ptp(wave)
+    meshes = [StaticMesh(p) for p in (pair, faulty)]
+    for angle in np.arange(29) * TURN:
+        driven = meshes[0].touching_angle(angle)
+        plain, moved = (mesh.gaps(angle, driven, np.zeros(1)).copy() for mesh in meshes)
+        side = np.where(plain[:, 0] == rotation, 1.0, -1.0)
+        assert moved[:, 4] - plain[:, 4] == pytest.approx(-side * index[plain[:, 1].astype(int)], abs=1e-15)
+    with pytest.raises(ValueError, match="order"):
+        pair.with_faults(CumulativePitchError(order=20)).contact_tables()
 
 
 def test_broken_tooth_touches_lower_down():

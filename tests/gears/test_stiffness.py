@@ -106,6 +106,18 @@ def test_iso_6336():
     assert iso_mesh_stiffness(pair) / iso_single_stiffness(pair) == pytest.approx(0.75 * 1.64594 + 0.25, rel=1e-5)
 
 
+def test_iso_6336_as_the_stiffness_of_a_pair():
+    pair = GearPair.paper()
+    single = pair.with_iso_stiffness()
+    # one pair alone at the pitch point: F_n = c' b x
+    assert single.penetration(100.0) == pytest.approx(pair.normal_force / (iso_single_stiffness(pair) * 20e-3))
+    mesh = pair.with_iso_stiffness("mesh")
+    # over a cycle a contact ratio of pairs is in touch on average
+    assert mesh.contact.stiffness * pair.contact_ratio == pytest.approx(iso_mesh_stiffness(pair) * 20e-3)
+    with pytest.raises(ValueError, match="kind is 'both'"):
+        pair.with_iso_stiffness("both")
+
+
 def test_cracks_soften_with_depth():
     pair = GearPair.paper()
     string = np.linspace(9e-3, 20e-3, 30)
