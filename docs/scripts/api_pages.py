@@ -177,8 +177,8 @@ def unwrap_compiled() -> None:
 
 
 def escape_bars(app, what, name, obj, options, lines: list[str]) -> None:
-    """Keep ``|x|`` in docstrings from being read as a substitution, outside literals."""
+    """Keep ``|x|`` and ``x_`` in docstrings from being read as substitutions and references, outside literals."""
     for k, line in enumerate(lines):
         pieces = re.split(r"(``[^`]*``)", line)
-        pieces[::2] = [piece.replace("|", r"\|") for piece in pieces[::2]]
+        pieces[::2] = [re.sub(r"(\w)_(?!\w)", r"\1\_", piece.replace("|", r"\|")) for piece in pieces[::2]]
         lines[k] = "".join(pieces)

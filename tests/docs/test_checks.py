@@ -76,3 +76,22 @@ def test_speed_search_is_right_or_refuses(scripts):
     assert share.loc["usual", "right"] >= 80.0
     assert share.loc["usual", ["multiple", "wrong"]].sum() == 0.0
     assert share.loc["hard", ["multiple", "wrong"]].sum() <= 5.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("changes", [{}, {"depth_mm": 1.0}, {"speed_rpm": 3000}])
+def test_sensitivity_data_are_those_of_this_code(scripts, changes):
+    """Points simulated again: the preset, the least damped contact, the highest speed."""
+    import sensitivity
+
+    point = sensitivity.PRESET | changes
+    settings = list(sensitivity.SETTINGS)
+    stored = sensitivity.load()
+    stored = stored[(stored[settings] == pd.Series(point)[settings]).all(axis=1)]
+    again = pd.DataFrame(sensitivity.simulate_point(point, workers=1))
+    keys = ["state", "load", "component"]
+    one, two = (t.set_index(keys).sort_index()[["h1", "h2", "h3"]].astype(float) for t in (stored, again))
+    assert len(one) == 32
+    # against the largest harmonic: small ones may be differences of large ones
+    scale = one.max(axis=1).to_numpy()[:, None]
+    np.testing.assert_allclose(two.to_numpy() / scale, one.to_numpy() / scale, atol=0.02)
