@@ -65,7 +65,7 @@ def test_curve_of_ross():
     assert mesh_stiffness(pair, root_angles=(angle, angle)).maximum == pytest.approx(4.0966e8, rel=0.011)
 
 
-# one tooth's compliances from ROSS 2.3.0, m/N, against its pressure angle at the contact: bending, shear, axial, foundation
+# one tooth's compliances from ROSS 2.3.0, m/N, by pressure angle at the contact: bending, shear, axial, foundation
 ROSS_TOOTH = {
     0.30: (1.0843316777866684e-11, 2.533469047664536e-10, 6.175956348051072e-12, 1.3438956449833077e-09),
     0.35: (8.998101033081477e-11, 4.5112682379935374e-10, 1.6393151509663975e-11, 1.5790255852626135e-09),
