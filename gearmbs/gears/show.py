@@ -47,5 +47,7 @@ def pair_table(pair: GearPair) -> Table:
     ):
         table.add_row(label, value, "")
     if pair.jams:
-        table.add_row("jams", f"needs {pair.jam_backlash * mm:.4f} mm of normal backlash", "")
+        table.add_row(
+            "jams", f"needs {pair.jam_backlash * mm:.4f} mm of normal backlash, has {pair.normal_backlash * mm:.4f}", ""
+        )
     return table

@@ -242,11 +242,18 @@ def make_case(data: dict[str, Any], source: str = "case") -> Case:
     """
     try:
         case = Case.model_validate(data)
-        case.pair()
+        pair = case.pair()
     except ValidationError as error:
         raise CaseError(_explain(error, source)) from error
     except ValueError as error:
         raise CaseError(f"{source}: {error}") from error
+    if pair.misalignment == 0.0 and pair.jams:
+        fault, overlap = case.fault, -pair.normal_backlash
+        raise CaseError(
+            f"{source}: fault.centre_distance_error = {1e3 * fault.centre_distance_error:g} mm with fault.backlash = "
+            f"{1e3 * fault.backlash:g} mm: negative backlash, the teeth overlap by {1e3 * overlap:.4g} mm on both "
+            f"flanks; give at least {1e3 * (fault.backlash + overlap):.4g} mm of backlash"
+        )
     return case
 
 

@@ -7,27 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from gearmbs.studies.choices import choices
+
 if TYPE_CHECKING:
     from gearmbs.studies.paper import PaperStudy
-
-CHOICES = """\
-| what the paper leaves open | chosen here |
-|---|---|
-| speed | 1000 rpm: GMF 483.33 Hz, and three harmonics far below the 6.4 kHz limit of 12.8 kHz sampling |
-| penetration depth d of full damping | 0.1 mm, the default of ADAMS; d = 0.01 mm is stiffer and damps far more |
-| damping C = 0.001 K | read as 298.52 N s/mm, the number of K in N/mm^e times 0.001 |
-| unit of K | N/mm^1.3, since the exponent is 1.3; the printed N/mm^(3/2) contradicts it |
-| backlash | 0.1 mm normal backlash by thinning: the table's standard teeth have none, and no real pair runs without |
-| face width | 20 mm |
-| masses | steel discs of the pitch radius; shafts of 30 mm diameter and 200 mm length |
-| plane and pivot of the misalignment | skew (axes in parallel planes) about the middle of the driven face |
-| friction | ADAMS's velocity law, 0.1 static below 0.1 m/s, 0.05 dynamic above 1 m/s |
-| start | STEP of speed and torque over 0.05 s, then 0.05 s of settling, then the record |
-| which force | the fixed joint between driven gear and shaft; all components are stored and judged |
-| mean | removed before scaling; the band-pass removes it anyway |
-| scaling | one factor from the healthy signal at low load, kept for the other five |
-| filter band | +- a quarter of the GMF about each harmonic, zero phase |
-"""
 
 
 def paper_report(study: PaperStudy) -> str:
@@ -44,7 +27,8 @@ def paper_report(study: PaperStudy) -> str:
     parts = [
         "# The paper's study: GMF harmonics of a gear pair",
         "",
-        f"Six cases: healthy, misaligned by {np.rad2deg(_misalignment(records)):g} degree, centre distance +3 mm; "
+        f"Six cases: healthy, misaligned by {np.rad2deg(_largest(records, 'fault_misalignment')):g} degree, centre "
+        f"distance {1e3 * _largest(records, 'fault_centre_distance_error'):+g} mm; "
         f"{torques} N m. GMF {gmf:.2f} Hz. Acceleration of the driven gear from the force in its shaft joint, "
         f"scaled ({records.attrs['scaling']}).",
         "",
@@ -60,11 +44,20 @@ def paper_report(study: PaperStudy) -> str:
         row = " | ".join("held" if verdicts[str(c)][k].held else "**not held**" for c in records.component.values)
         parts.append(f"| {claim.name} | {row} |")
     parts += ["", "Numbers for the default component:", ""]
-    parts += [f"* {c.name}: **{'held' if c.held else 'not held'}**. {c.numbers}." for c in study.claims()]
+    parts += [
+        f"* {c.name}: **{'held' if c.held else 'not held'}** (held means: {c.rule}). {c.numbers}."
+        for c in study.claims()
+    ]
     parts += [
         "",
-        "A claim counts as held when it is true at both loads (and, for the third, in every state and harmonic).",
-        "It says that this model with these settings behaves as the paper reports; the settings matter, see below.",
+        "Held says that this model with these settings behaves as the paper reports; the settings matter, see below.",
+        "",
+        "## Contact",
+        "",
+        "A driving pair carries the torque with its drive flanks. Two-flank contact braces the wheels: the forces of",
+        "both flanks oppose each other, and their sum exceeds what the torque needs.",
+        "",
+        *_contact_table(study),
         "",
         "## RMS of the GMF harmonics",
         "",
@@ -76,7 +69,13 @@ def paper_report(study: PaperStudy) -> str:
         "",
         "## What the paper left open, and what was chosen",
         "",
-        CHOICES,
+        "| what the paper leaves open | chosen here | why |",
+        "|---|---|---|",
+    ]
+    for c in choices(study.cases, study.component):
+        chosen = f"**{c.chosen}** (preset: {c.preset})" if c.changed else c.chosen
+        parts.append(f"| {c.what} | {chosen} | {c.why} |")
+    parts += [
         "",
         "The claims depend on these choices, most of all on backlash (two-flank contact under misalignment), on the",
         "penetration depth, the speed and the force component. `gearmbs paper` takes each as an option; the",
@@ -116,8 +115,27 @@ def _table(study: PaperStudy, component: str) -> list[str]:
     return lines
 
 
-def _misalignment(records: xr.Dataset) -> float:
-    return float(records["fault_misalignment"].max())
+def _contact_table(study: PaperStudy) -> list[str]:
+    """Mean sum of normal forces against torque over base radius, shares of the record in each kind of contact."""
+    lines = [
+        "| load | state | mean normal force, N | torque / base radius, N | both flanks, % of time | no contact, % |",
+        "|---|---|---|---|---|---|",
+    ]
+    radius = study.cases[0].pair().wheels[1].base_radius
+    for load in study.records["load"].values:
+        for state in study.records["state"].values:
+            one = study.records.sel(load=load, state=state)
+            drive, back = one["pairs_drive"].values > 0, one["pairs_back"].values > 0
+            lines.append(
+                f"| {load} | {state} | {float(one['normal_force'].mean()):.5g} | {float(one.torque) / radius:.5g} "
+                f"| {100.0 * (drive & back).mean():.3g} | {100.0 * (~drive & ~back).mean():.3g} |"
+            )
+    return lines
+
+
+def _largest(records: xr.Dataset, name: str) -> float:
+    values = records[name].values
+    return float(values[np.argmax(np.abs(values))])
 
 
 def _plain(name: object) -> str:

@@ -10,8 +10,10 @@ from typer.testing import CliRunner
 from gearmbs.cli import app
 from gearmbs.studies import Case, SimulationFailed, run_case, run_paper, simulate_case
 from gearmbs.studies import rig as parts
+from gearmbs.studies.case import CaseError, make_case
+from gearmbs.studies.choices import choices
 from gearmbs.studies.exchange import model_signals, parse_states
-from gearmbs.studies.paper import judge
+from gearmbs.studies.paper import judge, paper_cases
 from gearmbs.studies.store import whole_file, write_dataset
 
 SHORT = {"run_up": 0.03, "settling": 0.01, "duration": 0.06}
@@ -36,6 +38,39 @@ def test_judgement_of_the_claims():
     assert [c.held for c in judge(rising, "x")] == [True, True, True]
     rising.loc[{"load": "high", "state": "distance", "harmonic": 3}] = 0.5
     assert [c.held for c in judge(rising, "x")] == [True, False, False]
+
+
+def test_much_smaller_is_more_than_smaller():
+    """1.4 times at high load is larger, not much larger."""
+    table = xr.DataArray(
+        np.ones((2, 3, 3)),
+        dims=("load", "state", "harmonic"),
+        coords={"load": ["low", "high"], "state": ["healthy", "misaligned", "distance"], "harmonic": [1, 2, 3]},
+    )
+    table.loc[{"load": "high"}] = 1.4
+    claim = judge(table, "x")[2]
+    assert not claim.held
+    assert "9 of 9 amplitudes are smaller at low load, 0 by 1.5 times or more" in claim.numbers
+
+
+def test_report_states_the_choices_made():
+    base = make_case(
+        {"contact": {"depth": "0.02 mm"}, "friction": {"enabled": False}, "fault": {"plane": "inclination"}}
+    )
+    rows = {c.what: c for c in choices(paper_cases(base=base), "tangential")}
+    assert rows["penetration d of full damping"].chosen == "0.02 mm"
+    assert rows["friction"].chosen == "none"
+    assert rows["misalignment"].chosen == "1 degree, inclination"
+    assert rows["which force"].chosen == "tangential"
+    changed = {c.what for c in rows.values() if c.changed}
+    assert changed == {"penetration d of full damping", "friction", "misalignment", "which force"}
+    assert not any(c.changed for c in choices(paper_cases(), "line_of_action"))
+
+
+def test_wheels_pushed_into_each_other_are_refused():
+    """-0.5 mm closes 2 x 0.5 sin(20 deg) = 0.342 mm of backlash, less the second-order 0.007 mm."""
+    with pytest.raises(CaseError, match=r"centre_distance_error = -0.5 mm .* overlap by 0.2346 mm"):
+        Case().changed(fault={"centre_distance_error": "-0.5 mm"})
 
 
 def test_files_appear_whole_or_not_at_all(tmp_path):
@@ -81,6 +116,7 @@ def test_study_on_short_records(short_study, tmp_path):
     for claim in short_study.claims():
         assert claim.name in text
     assert "what the paper leaves open" in text
+    assert re.search(r"\| low \| healthy \| 24\d\d(\.\d+)? \| 2394\.9 \| 0 \| 0 \|", text), text
     rows = (tmp_path / "gmf_rms.csv").read_text().splitlines()
     assert len(rows) == 1 + 2 * 3 * 4 * 2 * 3
 
