@@ -38,7 +38,9 @@ def guarded() -> Iterator[None]:
         typer.secho("gearmbs: interrupted; finished cases are kept, nothing is half-written", err=True)
         raise typer.Exit(130) from None
     except (ValueError, RuntimeError, OSError) as error:
-        fail(str(error))
+        # what a function asks for by keyword is asked for here by the option of that name
+        asked = getattr(error, "name", None) if type(error).__name__ == "MissingMetadataError" else None
+        fail(f"{error}\nOn the command line: --{asked} ..." if asked else str(error))
 
 
 @contextmanager
@@ -194,7 +196,7 @@ def analyse(
     """Analyse a vibration record, measured or simulated: mesh frequency, harmonics, sidebands, indicators."""
     with guarded(), stage_bar(file.name) as move:
         from gearmbs.signals import analyse as analyse_signal
-        from gearmbs.studies.exchange import read_any
+        from gearmbs.signals.simulated import read_any
         from gearmbs.units import to_si
 
         names = None if channel is None else [*channel, *([tacho] if tacho and tacho not in channel else [])]
@@ -237,8 +239,8 @@ def trend(
     with guarded(), stage_bar(file.name) as move:
         from gearmbs.signals import trend as follow
         from gearmbs.signals import trend_table
-        from gearmbs.studies.store import write_text
         from gearmbs.units import to_si
+        from gearmbs.view.files import write_whole
 
         data = follow(
             file,
@@ -253,7 +255,7 @@ def trend(
         )
         table = trend_table(data)
         if out is not None:
-            write_text(out, table.to_csv(index=False))
+            write_whole(out, table.to_csv(index=False))
     if out is None:
         typer.echo(table.to_csv(index=False, float_format="%.5g"), nl=False)
     else:
@@ -285,7 +287,7 @@ def compare(
     """Compare measured states with each other and with the model, as in the paper's section 4."""
     with guarded(), stage_bar("comparison") as move:
         from gearmbs.signals import compare as compare_signals
-        from gearmbs.studies.exchange import parse_models, parse_states, read_any
+        from gearmbs.signals.simulated import parse_models, parse_states, read_any
         from gearmbs.units import to_si
 
         given: dict[str, Any] = {
@@ -325,13 +327,13 @@ def tooth_counts(text: str) -> tuple[int, ...]:
 
 def _save_tables(tables: dict[str, Any], folder: Path | None) -> list[Path]:
     """Write each table as CSV into the folder, if one is given."""
-    from gearmbs.studies.store import write_text
+    from gearmbs.view.files import write_whole
 
     written = []
     for name, table in tables.items() if folder is not None else ():
         assert folder is not None
         path = folder / f"{name}.csv"
-        write_text(path, table.to_csv(index=False))
+        write_whole(path, table.to_csv(index=False))
         written.append(path)
     return written
 
@@ -348,10 +350,10 @@ def _hand_over(report: str, out: Path | None, files: list[Path]) -> None:
     if out is None:
         typer.echo(report)
     else:
-        from gearmbs.studies.store import write_text
+        from gearmbs.view.files import write_whole
 
         with guarded():
-            write_text(out, report)
+            write_whole(out, report)
         files = [out, *files]
     if files:
         typer.echo("\n".join(f"wrote {path}" for path in files), err=out is None)

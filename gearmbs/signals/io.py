@@ -63,6 +63,7 @@ CONTENT_NAMES = {
     "wav": "a WAV file",
     "netcdf3": "classic NetCDF",
     "tdms": "a TDMS file",
+    "utf16": "text in UTF-16 (save it as UTF-8)",
     "binary": "binary data of an unknown kind",
 }
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -230,6 +231,8 @@ def _content(path: Path) -> str:
         raise SignalFileError(path, f"cannot be opened ({exc.strerror})") from exc
     if not head:
         raise SignalFileError(path, "is empty")
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf16"
     if head.startswith(b"\x1f\x8b"):
         return "gzip"
     if head.startswith(HDF5_MAGIC) or head[512:520] == HDF5_MAGIC:

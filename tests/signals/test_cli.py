@@ -1,5 +1,8 @@
 """The commands that go from files to reports."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -63,7 +66,7 @@ def test_compare_writes_bars_for_measured_states(tmp_path):
     ("words", "said"),
     [
         (["analyse", "none.csv", "--teeth", "32"], "none.csv: cannot be opened"),
-        (["analyse", "x.csv"], "teeth is missing"),
+        (["analyse", "x.csv"], "On the command line: --teeth ..."),
         (["analyse", "x.csv", "--teeth", "thirty"], "--teeth is 'thirty'"),
         (["analyse", "x.csv", "--teeth", "32", "--speed", "30 mm"], "--speed"),
         (["analyse", "x.csv", "--teeth", "32", "--channel", "roof"], "has no channel"),
@@ -79,6 +82,19 @@ def test_wrong_calls_end_with_one_message(tmp_path, monkeypatch, words, said):
     assert result.exit_code == 1
     assert said in " ".join(result.output.split())
     assert "Traceback" not in result.output
+
+
+def test_commands_for_measurements_need_no_kernels(tmp_path):
+    """Whoever has a file and no wish to simulate does not wait for compilers."""
+    path = write(tmp_path, "x.csv")
+    words = ["analyse", str(path), "--teeth", "32", "--figures", str(tmp_path), "--out", str(tmp_path / "x.md")]
+    code = (
+        "import sys; from gearmbs.cli import app; app(sys.argv[1:], standalone_mode=False); "
+        "print(sorted({'numba', 'gearmbs.contact', 'gearmbs.gears'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True)
+    assert done.stdout.strip().endswith("[]"), done.stdout
+    assert (tmp_path / "x.md").exists()
 
 
 def test_tooth_counts():

@@ -158,6 +158,12 @@ def test_garbage_is_refused(tmp_path, suffix):
         read_signal(path)
 
 
+def test_text_of_a_spreadsheet_in_utf_16_is_told_from_binary(tmp_path):
+    (tmp_path / "x.csv").write_text("time,a\n0,1\n1,2\n", encoding="utf-16")
+    with pytest.raises(SignalFileError, match=r"x\.csv: is named as csv but holds text in UTF-16"):
+        read_signal(tmp_path / "x.csv")
+
+
 def test_missing_file_unknown_ending_and_missing_folder(tmp_path):
     with pytest.raises(SignalFileError, match="No such file"):
         read_signal(tmp_path / "none.csv")

@@ -2,8 +2,8 @@
 
 import pytest
 
-from gearmbs.signals import analyse, write_signal
-from gearmbs.studies import Case, CaseError, record_signal, run_case
+from gearmbs.signals import SignalError, analyse, write_signal
+from gearmbs.studies import Case, record_signal, run_case
 from gearmbs.studies.exchange import parse_models, read_any
 from gearmbs.studies.store import write_dataset
 
@@ -30,9 +30,9 @@ def test_record_signal_keeps_what_is_known(records):
     assert signal.attrs["teeth"] == (29, 29)
     assert signal.attrs["sampling_rate"] == 12800.0
     assert signal.attrs["units"] == "m/s^2"
-    with pytest.raises(CaseError, match="there is no 'up'"):
+    with pytest.raises(SignalError, match="there is no 'up'"):
         record_signal(records["healthy"], "up")
-    with pytest.raises(CaseError, match="not the record of a case"):
+    with pytest.raises(SignalError, match="not the record of a case"):
         record_signal(records["healthy"].drop_attrs())
 
 
@@ -44,5 +44,5 @@ def test_files_of_runs_and_measurements_are_read_alike(records, tmp_path):
     assert read_any(tmp_path / "measured.nc").equals(signal)
     models = parse_models(["low:broken=" + str(tmp_path / "run.nc")], "tangential")
     assert models["low"]["broken"].equals(signal)
-    with pytest.raises(CaseError, match="is_none"):
+    with pytest.raises(SignalError, match="is_none"):
         parse_models([str(tmp_path / "is_none.nc")], "tangential")

@@ -1,0 +1,136 @@
+"""Records that this package's simulations wrote, as signals, and the texts that name them on a command line.
+
+Nothing here needs the simulation itself: a record says all that is needed in its variables and attributes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from .errors import SignalError
+from .io import read_signal
+from .signal import make_signal
+
+
+def parse_states(items: Sequence[str], what: str = "experiment") -> dict[str, dict[str, Path]]:
+    """Read texts ``load:state=path`` into nested dictionaries, in the order given.
+
+    Raises
+    ------
+    SignalError
+        For a text of another form, or a state named twice.
+    """
+    out: dict[str, dict[str, Path]] = {}
+    for item in items:
+        name, equals, path = item.partition("=")
+        load, colon, state = name.partition(":")
+        if not (equals and colon and load and state and path):
+            raise SignalError(f"{what} {item!r}: write load:state=path, for instance low:healthy=h0.csv")
+        states = out.setdefault(load.strip(), {})
+        if state.strip() in states:
+            raise SignalError(f"{what} {item!r}: {load}:{state} is given twice")
+        states[state.strip()] = Path(path)
+    return out
+
+
+def record_signal(record: xr.Dataset, component: str | None = None) -> xr.DataArray:
+    """Return the acceleration of a simulated record as a signal, for everything that measured signals are good for.
+
+    Parameters
+    ----------
+    record : Dataset
+        From `run_case`, or its file.
+    component : str, optional
+        One component of the force only, such as "line_of_action"; default: each is a channel.
+
+    Returns
+    -------
+    DataArray
+        Dimensions (time, channel), m/s^2, with sampling rate, speed and teeth.
+
+    Raises
+    ------
+    SignalError
+        If this is no record of a case, or has no such component.
+    """
+    attributes = record.attrs
+    if "acceleration" not in record or "operation_speed" not in attributes:
+        raise SignalError("record: not the record of a case; pass what run_case returned or its file holds")
+    names = [str(c) for c in record.component.values]
+    if component is not None and component not in names:
+        raise SignalError(f"component: there is no {component!r}; choose one of {', '.join(names)}")
+    kept = names if component is None else [component]
+    return make_signal(
+        record["acceleration"].sel(component=kept).transpose("signal_time", "component").values,
+        float(attributes["solver_signal_rate"]),
+        units="m/s^2",
+        channels=kept,
+        t0=float(record.signal_time.values[0]),
+        speed=float(attributes["operation_speed"]),
+        teeth=tuple(int(z) for z in attributes["gears_teeth"]),
+        attrs={"source": str(attributes.get("case", "simulation"))},
+    )
+
+
+def read_any(path: str | Path, component: str | None = None, **settings: Any) -> xr.DataArray:
+    """Return a measured file, or the record that ``gearmbs run`` wrote, as a signal.
+
+    Parameters
+    ----------
+    path : path-like
+    component : str, optional
+        See `record_signal`; of no meaning for measured files.
+    **settings
+        For `gearmbs.signals.read_signal`.
+    """
+    if Path(path).suffix == ".nc":
+        try:
+            with xr.open_dataset(path, engine="h5netcdf") as data:
+                if "acceleration" in data and "case_json" in data.attrs and "load" not in data.dims:
+                    return record_signal(data[["acceleration"]].load(), component)
+        except (OSError, ValueError):
+            pass  # read_signal says what is wrong with it
+    return read_signal(path, **settings)
+
+
+def model_signals(path: str | Path, component: str) -> dict[str, dict[str, xr.DataArray]]:
+    """Return the accelerations of a ``paper.nc`` file by load and state, as signals.
+
+    Raises
+    ------
+    SignalError
+        If the file cannot be read, is not a study, or has no such component.
+    """
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as data:
+            records = data[["acceleration"]].load()
+            loads, states = records["load"].values, records.state.values
+    except (OSError, KeyError, ValueError, AttributeError) as error:
+        raise SignalError(f"{path}: not a result file of the paper's study ({error})") from error
+    try:
+        return {
+            str(load): {str(s): record_signal(records.sel(load=load, state=s), component) for s in states}
+            for load in loads
+        }
+    except SignalError as error:
+        raise SignalError(f"{path}: {error}") from error
+
+
+def parse_models(items: Sequence[str], component: str) -> dict[str, dict[str, xr.DataArray]]:
+    """Return models by load and state: of one ``paper.nc``, or of texts ``load:state=path`` of runs or signal files.
+
+    Raises
+    ------
+    SignalError
+        See `parse_states` and `model_signals`.
+    """
+    if len(items) == 1 and "=" not in items[0]:
+        return model_signals(items[0], component)
+    return {
+        load: {state: read_any(path, component) for state, path in states.items()}
+        for load, states in parse_states(items, "model").items()
+    }
