@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from gearmbs.gears import ContactLaw, Friction, GearPair, GearSpec
 from gearmbs.gears.transmission import StaticMesh
@@ -93,6 +94,27 @@ def test_jams_exactly_when_backlash_is_used_up(plane):
         touch = mesh.touching_angle(0.05)
         back = mesh.gaps(0.05, touch)
         assert bool(back[back[:, 0] == -1, 4].min() < 0) is jammed
+
+
+@pytest.mark.parametrize(("plane", "second_order"), [("skew", 0.72e-6), ("inclination", 5.3e-6)])
+def test_the_backlash_that_jams_found_from_gaps(plane, second_order):
+    # found without the formula: thinner teeth until the back flanks are free where the drive flanks touch
+    missing = []
+    for degrees in (0.1, 0.2, 1.0):
+        trial = GearPair.paper(misalignment=np.radians(degrees), plane=plane, centre_distance_error="0.01 mm")
+
+        def back_gap(backlash, trial=trial):
+            mesh = StaticMesh(trial.with_changes(backlash=backlash), 41)
+            rows = mesh.gaps(0.05, mesh.touching_angle(0.05))
+            return rows[rows[:, 0] == -1, 4].min()
+
+        needed = trial.jam_backlash - trial.normal_backlash
+        found = brentq(back_gap, 0.5 * max(needed, 1e-7), 2 * max(needed, 1e-6), xtol=1e-12)
+        missing.append(needed - found)
+    # the closed form is of first order in the tilt: what it misses grows with the square, to 0.7 or 5.3 um at 1 degree
+    assert missing[2] == pytest.approx(second_order, rel=0.03)
+    assert missing[2] / missing[1] == pytest.approx(25, rel=0.06)
+    assert missing[1] / missing[0] == pytest.approx(4, rel=0.06)
 
 
 def wheels_on_axes(pair, slices, driver_angle, depth):
@@ -228,7 +250,6 @@ def test_separating_flanks_never_pull():
     assert contact(state)[0] < 0
     state[7] = state[7] / 0.9 * 1.1  # runs ahead: full damping would pull
     assert np.all(contact(state) == 0)
-    assert contact.diag[1] <= 0 or contact.diag[1] > 0
 
 
 @pytest.mark.parametrize("slices", [1, 11])
