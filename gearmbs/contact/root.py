@@ -146,8 +146,8 @@ def root_contacts(gi, gr, wk, side, diag, want):
             f_root = wk[S_X + 4 + tip] + (n - middle - k) * pitch_root
             set_corner(gr, wk, 1 - tip, f_tip, gr[WHEEL * (1 - tip) + L.S_TIP])
             depth = 0.0
-            # the circle knows no sides
-            for part in range(ON_CIRCLE if side == 1 else ON_ARC, UNDER_ARC + 1):
+            # the circle knows no sides and counts on that of the drive
+            for part in range(ON_CIRCLE if side == gi[L.DRIVE] else ON_ARC, UNDER_ARC + 1):
                 depth = max(depth, root_part(gi, gr, wk, part, tip, f_tip, f_root, diag, want))
             if depth > 0.0:
                 place = 3 if side == gi[L.DRIVE] else 4
