@@ -1,7 +1,8 @@
 """Project Chrono's ADAMS decks with MSC ADAMS's own tables, where their folder is at hand.
 
 Set GEARMBS_ADAMS_CASES to a folder that holds the .adm files and the tables, directly or below it, for instance
-`data/testing/joints` of Project Chrono with its nineteen decks. The bounds are what was measured, rounded up; `-s` prints the deviations.
+`data/testing/joints` of Project Chrono with its nineteen decks. The bounds are what was measured, rounded up; `-s`
+prints the deviations.
 """
 
 from __future__ import annotations

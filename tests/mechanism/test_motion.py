@@ -50,6 +50,22 @@ def test_tumbling_body_keeps_energy_and_angular_momentum(integrator):
     assert np.abs(solution.kinetic_energy / solution.kinetic_energy[0] - 1).max() < limit
 
 
+@pytest.mark.slow
+def test_tumbling_through_thousands_of_singularities():
+    """Spin about the intermediate axis x: y and z pass the vertical in turn, and the Euler reference changes 5.7 times
+    a second; after 400 s energy and angular momentum are off by less than 1e-8."""
+    moments = np.diag([2.0, 1.0, 3.0])
+    m = Mechanism("tumbler")
+    m.body("t", 1.0, (2.0, 1.0, 3.0), angular_velocity=(10.0, 1e-3, 0.0))
+    solution = m.simulate(400.0, rate=100, tol=1e-11)
+    assert solution.success, solution.message
+    assert len(solution.result.epochs) > 2000
+    a, w = solution.orientation("t"), solution.angular_velocity("t")
+    h = np.einsum("tij,jk,tlk,tl->ti", a, moments, a, w)
+    assert np.abs(h - h[0]).max() < 1e-8 * np.linalg.norm(h[0])
+    assert np.abs(solution.kinetic_energy / solution.kinetic_energy[0] - 1).max() < 1e-8
+
+
 def test_wheel_spinning_about_its_own_axis_along_global_z():
     """Exactly on the singularity of the plain 3-1-3 angles; the angle is known: phi(t) = 100 t."""
     m = Mechanism("wheel")
