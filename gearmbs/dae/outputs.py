@@ -57,6 +57,8 @@ class Records(NamedTuple):
         Phi, its rate and its partial time derivative, row by row.
     force, moment : ndarray, shape (m, rows, 3)
         Reaction on I's body at marker I.
+    strayed : ndarray, shape (m,)
+        Largest |Phi| of the integrator's solution, before it is projected onto the constraints.
     """
 
     pose: np.ndarray
@@ -65,9 +67,10 @@ class Records(NamedTuple):
     phi: np.ndarray
     force: np.ndarray
     moment: np.ndarray
+    strayed: np.ndarray
 
 
-RECORDS_TYPE = types.NamedTuple((_MAT, _MAT, _CUBE, _MAT, _CUBE, _CUBE), Records)
+RECORDS_TYPE = types.NamedTuple((_MAT, _MAT, _CUBE, _MAT, _CUBE, _CUBE, _VEC), Records)
 
 
 def new_records(m: int, bodies: int, rows: int, elements: int) -> Records:
@@ -79,6 +82,7 @@ def new_records(m: int, bodies: int, rows: int, elements: int) -> Records:
         np.zeros((m, 3 * rows)),
         np.zeros((m, rows, 3)),
         np.zeros((m, rows, 3)),
+        np.zeros(m),
     )
 
 
@@ -128,7 +132,9 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
                     return k
                 vals[:] = 0.0
             rhs[:base] = 0.0
+            records.strayed[k] = 0.0
             for r in range(rows):
+                records.strayed[k] = max(records.strayed[k], abs(phi[3 * r]))
                 rhs[base + r] = 0.0 if abs(phi[3 * r]) > FARTHEST else -phi[3 * r]
             solve(plan, factors, rhs, moved)
             for r in range(rows):

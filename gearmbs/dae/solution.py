@@ -32,6 +32,10 @@ CONTACT_DIAGNOSTICS = (
 )
 
 
+CONFLICT_SAMPLES = 50
+"""Outputs at which constraints set aside as redundant are looked at."""
+
+
 class Solution:
     """Motion and forces of a mechanism over the output times.
 
@@ -51,21 +55,27 @@ class Solution:
         self.result = result
         self.t = result.t
         self._evaluate()
+        self._conflict = self._find_conflict()
 
     @property
     def success(self) -> bool:
-        """True when the run reached its end."""
-        return self.result.success
+        """True when the run reached its end and no constraint was found violated on the way."""
+        return self.result.success and self._conflict is None
 
     @property
     def status(self) -> Status:
         """How the run ended."""
-        return self.result.status
+        return self.result.status if self._conflict is None else Status.CONFLICTING_CONSTRAINTS
 
     @property
     def message(self) -> str:
-        """What happened, when, which unknown, what to try."""
-        return self.result.message
+        """What happened, when, which unknown, what to try; which constraints were set aside as redundant."""
+        if self._conflict is not None:
+            return self._conflict
+        aside = self.system.report.redundant if self.system.report is not None else []
+        if not aside:
+            return self.result.message
+        return f"{self.result.message} Set aside as redundant: {', '.join(aside)}."
 
     @property
     def stats(self):
@@ -86,6 +96,17 @@ class Solution:
         self._loads = records.loads
         self._phi = records.phi.reshape(m, rows, 3)
         self._force, self._moment = records.force, records.moment
+        self._strayed = records.strayed
+
+    def _find_conflict(self) -> str | None:
+        """Return what is wrong if a row set aside as redundant is violated by the motion, tried at some outputs."""
+        if not self.system.has_dropped_rows or self.t.size == 0:
+            return None
+        for k in np.unique(np.linspace(0, self.t.size - 1, min(self.t.size, CONFLICT_SAMPLES)).astype(int)):
+            found = self.system.conflict(self._pose[k], float(self.t[k]))
+            if found is not None:
+                return f"at t = {self.t[k]:.6g} s: {found}"
+        return None
 
     # --- access by name -----------------------------------------------------------------------------
 
@@ -150,8 +171,11 @@ class Solution:
 
     @property
     def constraint_violation(self) -> np.ndarray:
-        """Largest |Phi| over the rows at each output time, shape (m,), m or 1."""
-        return np.abs(self._phi[:, :, 0]).max(axis=1, initial=0.0)
+        """Largest |Phi| of the integrator's solution over the rows at each output time, shape (m,), m or 1.
+
+        Positions and all that follows from them are projected onto the constraints afterwards, to rounding.
+        """
+        return self._strayed
 
     # --- energy -------------------------------------------------------------------------------------
 
@@ -215,7 +239,9 @@ class Solution:
             data["reaction_moment"] = var(
                 joint, np.stack([r[1] for r in reactions], 1), "N m", "joint moment on I's body about marker I"
             )
-            data["constraint_violation"] = var(("time",), self.constraint_violation, "1", "largest |Phi|")
+            data["constraint_violation"] = var(
+                ("time",), self.constraint_violation, "1", "largest |Phi| before projection"
+            )
         if self.system.force_names:
             element = ("time", "element", "xyz")
             data["load_force"] = var(element, self._loads[:, :, 0:3], "N", "applied force on I's body")

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import splu
 
 from gearmbs.dae import initial, jacobian, outputs, residual
 from gearmbs.dae import tables as T
-from gearmbs.dae.errors import ModelError, SingularModelError
+from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
 from gearmbs.dae.kinematics import inertia_times
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.reactions import reactions_from
@@ -30,6 +30,8 @@ from gearmbs.dae.tables import TableBuilder
 from gearmbs.dae.terms import dot3
 
 MAX_LOAD_ITERATIONS = 200
+CONFLICT_SHARE = 1e-5
+"""Rate of a redundant constraint, of the sum of its terms, from which it is not redundant but in conflict."""
 """Of loads that depend on each other, at the start; friction converges like a power of the friction coefficient."""
 
 FORMULATIONS = {"I3": T.I3, "SI2": T.SI2, "SI1": T.SI1}
@@ -131,6 +133,7 @@ class System:
         self.t0 = t0
         self.report: initial.InitialReport | None = None
         self._plan: tuple = (None, None)
+        self._dropped: tuple | None = None
         self.mechanism: Any = None
         self.marker_index: dict[int, int] = {}
 
@@ -198,6 +201,7 @@ class System:
         if kept.size == len(self.builder.rows):
             return
         old = self.builder
+        whole = (old.rows, old.terms, old.coef, old.reference)
         bounds = [row[0] for row in old.rows] + [len(old.terms)]
         rows: list[tuple[int, int, int]] = []
         terms: list[tuple[int, ...]] = []
@@ -215,8 +219,41 @@ class System:
         moved = {lam + int(i): lam + k for k, i in enumerate(kept)}
         moved |= {k: k - after + old.layout(T.I3)["F"] for k in range(after, end)}
         old.renumber_unknowns(moved)
+        dropped = np.setdiff1d(np.arange(len(whole[0])), kept)
+        self._dropped = (whole, dropped, [self.row_names[i] for i in dropped])
         self.row_names = [self.row_names[i] for i in kept]
         self.row_index = [self.row_index[i] for i in kept]
+
+    @property
+    def has_dropped_rows(self) -> bool:
+        """Whether constraint rows were set aside as redundant."""
+        return self._dropped is not None
+
+    def conflict(self, pose: np.ndarray, t: float) -> str | None:
+        """Return which row set aside as redundant contradicts the motion at a pose, or None.
+
+        The rates are compared, which do not depend on counted turns.
+        """
+        if self._dropped is None:
+            return None
+        whole, dropped, names = self._dropped
+        builder = self.builder
+        kept = (builder.rows, builder.terms, builder.coef, builder.reference)
+        builder.rows, builder.terms, builder.coef, builder.reference = whole
+        try:
+            jacobian, _, rate = self.constraint_jacobian(pose, t)
+        finally:
+            builder.rows, builder.terms, builder.coef, builder.reference = kept
+        moving = jacobian[dropped] @ pose[:, 12:18].ravel()
+        size = abs(jacobian[dropped]) @ np.abs(pose[:, 12:18]).ravel() + np.abs(rate[dropped] - moving)
+        share = np.abs(rate[dropped]) / np.maximum(size, 1e-9)
+        worst = int(np.argmax(share))
+        if share[worst] <= CONFLICT_SHARE:
+            return None
+        return (
+            f"conflicting constraints: {names[worst]} is implied by the other joints and motions, but they leave it "
+            f"violated at a rate of {abs(rate[dropped][worst]):.3g} per second; remove it or correct its motion"
+        )
 
     def initialise(self) -> initial.InitialReport:
         """Make positions and velocities consistent; set redundant constraint rows aside.
@@ -234,6 +271,9 @@ class System:
         initial.check_inertia(self)
         pose, self.report = initial.assemble_position(self, self.pose, self.t0)
         self.pose = initial.consistent_velocity(self, pose, self.t0)
+        found = self.conflict(self.pose, self.t0)
+        if found is not None:
+            raise AssemblyError(found)
         return self.report
 
     def accelerations(self, pose: np.ndarray, t: float):

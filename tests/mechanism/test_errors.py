@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from gearmbs.mechanism import AssemblyError, Mechanism, ModelError, SingularModelError, ramp, step
+from gearmbs.dae.result import Status
+from gearmbs.mechanism import AssemblyError, Mechanism, ModelError, SingularModelError, polynomial, ramp, step
 
 UNIT = (1.0, 1.0, 1.0)
 
@@ -132,6 +133,38 @@ def test_conflicting_constraints():
     m.distance("stick", body.marker((0, 0, 0)), m.ground.marker((1, 0, 0)), length=2.0)
     with pytest.raises(AssemblyError, match="stick"):
         m.compile().initialise()
+
+
+@pytest.mark.parametrize(("first", "second", "words"), [(1.0, 2.0, "again"), (1.0, 1.0, None)])
+def test_two_motions_on_one_hinge(first, second, words):
+    """The second motion repeats the first or contradicts it from the start."""
+    m = Mechanism("two motors")
+    wheel = m.body("wheel", 1.0, UNIT)
+    hinge = m.revolute("hinge", wheel, m.ground)
+    m.rotation("motor", hinge, polynomial([0.0, first]))
+    m.rotation("again", hinge, polynomial([0.0, second]))
+    if words:
+        with pytest.raises(AssemblyError, match=words):
+            m.simulate(1.0)
+        return
+    solution = m.simulate(1.0)
+    assert solution.success
+    assert "Set aside as redundant: again" in solution.message
+
+
+def test_motions_that_part_later_are_a_conflict():
+    """Both start from rest with no acceleration; the second turns further. What was computed is kept."""
+    m = Mechanism("two motors")
+    wheel = m.body("wheel", 1.0, UNIT)
+    hinge = m.revolute("hinge", wheel, m.ground)
+    m.rotation("motor", hinge, polynomial([0.0, 0.0, 0.0, 1.0]))
+    m.rotation("again", hinge, polynomial([0.0, 0.0, 0.0, 1.5]))
+    solution = m.simulate(1.0)
+    assert not solution.success
+    assert solution.status is Status.CONFLICTING_CONSTRAINTS
+    assert "again" in solution.message
+    assert "violated at a rate" in solution.message
+    assert solution.t[-1] == 1.0
 
 
 def test_impossible_assembly():

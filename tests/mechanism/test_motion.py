@@ -77,7 +77,8 @@ def test_wheel_spinning_about_its_own_axis_along_global_z():
     angle = 100.0 * solution.t
     np.testing.assert_allclose(turned[:, 0], np.cos(angle), atol=1e-8)
     np.testing.assert_allclose(turned[:, 1], np.sin(angle), atol=1e-8)
-    assert solution.constraint_violation.max() < 1e-12
+    # of the integrator's own angle, 6000 rad in the end, of which rounding leaves 1e-12
+    assert solution.constraint_violation.max() < 1e-11
 
 
 def test_prescribed_rotation_needs_the_torque_j_alpha():
