@@ -432,11 +432,14 @@ class Run:
         else:
             m = int(st.count[s.NEXT_OUTPUT])
             t_out, y_out, yp_out = st.outputs[:m], st.y_out[:m], st.yp_out[:m]
+            if status is not Status.SUCCESS:
+                # the run may go on, or the arrays are mostly empty; those of a finished run are handed over as they are
+                t_out, y_out, yp_out = t_out.copy(), y_out.copy(), yp_out.copy()
         n_events = int(st.count[s.HAS_EVENTS])
         return DAEResult(
-            t=t_out.copy(),
-            y=y_out.copy(),
-            yp=yp_out.copy(),
+            t=t_out,
+            y=y_out,
+            yp=yp_out,
             status=status,
             message=message,
             stats=stats,
