@@ -145,6 +145,7 @@ def centroid_force(gi, gr, wk, sel, ja, jb, step, soft, diag, want):
             uk = centroid_slopes(gi, gr, wk, sel, ja, jb, step, centre, m0, k)
             g0 = wk[o0 + N_GRAD + k]
             g1 = wk[o1 + N_GRAD + k]
+            wk[L.P_MOVED + k] = width * elastic * slope * uk
             dd = slope * uk - (1.0 - u) * g0 - u * g1
             dr = rs * uk - (1.0 - u) * wk[o0 + N_DRATE + k] - u * wk[o1 + N_DRATE + k]
             df = width * (p_d * dd + p_r * dr)

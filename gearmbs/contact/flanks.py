@@ -386,7 +386,7 @@ def pair_contact(gi, gr, wk, side, i1, i2, f1, f2, ja, jb, step, alpha, sa, ca, 
     if depth <= 0.0:
         return 0.0
     if varying:
-        add_softness(wk, sel, ja, jb, diag[0] - energy, want)
+        add_softness(gi, wk, sel, ja, jb, diag[0] - energy, want)
     for j in range(ja, jb + 1):
         o = int(wk[sel + j])
         if wk[o + N_FORCE] != 0.0:
@@ -403,7 +403,7 @@ def pair_contact(gi, gr, wk, side, i1, i2, f1, f2, ja, jb, step, alpha, sa, ca, 
 
 
 @kernel
-def add_softness(wk, sel, ja, jb, energy, want):
+def add_softness(gi, wk, sel, ja, jb, energy, want):
     """Complete the derivatives of nodal forces, and add the force of a stiffness that varies along the path."""
     ratio = energy / wk[L.P_SOFT]
     for i in range(6):
@@ -412,6 +412,10 @@ def add_softness(wk, sel, ja, jb, energy, want):
         return
     for i in range(36):
         wk[L.H_ + i] -= ratio * wk[L.P_SOFT_XX + i]
+    if gi[L.LOAD] == L.LOAD_ADAMS and gi[N_SLICES] > 1:
+        for i in range(6):
+            for k in range(6):
+                wk[L.H_ + 6 * i + k] -= wk[L.P_MOVED + k] / wk[L.P_SOFT] * wk[L.P_SOFT_X + i]
     for j in range(ja, jb + 1):
         o = int(wk[sel + j])
         force = wk[o + N_FORCE] / wk[L.P_SOFT]

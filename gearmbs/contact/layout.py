@@ -141,6 +141,7 @@ S_MWW = 535
 S_SLOPE = 536  # d alpha / d zeta at the last solution
 S_CURVE = 537  # lower bound of the corner gap's growth beyond the path of contact, 1/m
 S_OVERHANG = 538  # how far the common face may reach beyond the slices, m
+P_MOVED = 539  # 6: derivative of a pair's elastic energy by the pose as its centroid moves along the face
 P_SOFT = 83  # stiffness factor of the tooth pair at work, and its gradient (6) and Hessian (36)
 P_SOFT_X = 84
 P_SOFT_XX = 90

@@ -82,11 +82,11 @@ def varied(state: list[np.ndarray], column: int, step: float) -> list[np.ndarray
     return new
 
 
-def differences(function, state: list[np.ndarray]) -> np.ndarray:
-    """Derivatives by the 24 spatial variations, central differences of sixth order."""
+def differences(function, state: list[np.ndarray], share: float = 1.0) -> np.ndarray:
+    """Derivatives by the 24 spatial variations, central differences of sixth order with a share of the usual step."""
     columns = []
     for j in range(24):
-        h = STEPS[(j % 12) // 3]
+        h = share * STEPS[(j % 12) // 3]
         f = [function(varied(state, j, m * h)) for m in (1, -1, 2, -2, 3, -3)]
         columns.append((45 * (f[0] - f[1]) - 9 * (f[2] - f[3]) + (f[4] - f[5])) / (60 * h))
     return np.array(columns).T
