@@ -10,6 +10,7 @@ import numpy as np
 from gearmbs.adams import statements as st
 from gearmbs.adams.build import Builder
 from gearmbs.mechanism.friction import INPUTS, KINDS
+from gearmbs.mechanism.load_methods import beam_stiffness, matrix_texts, weighted_sum
 from gearmbs.mechanism.parts import Marker
 
 COMPONENTS = ("fx", "fy", "fz", "tx", "ty", "tz")
@@ -62,26 +63,12 @@ def add_spring_damper(b: Builder, s: st.SpringDamper) -> None:
     name = b.model.names["springdamper", s.id]
     i, j = b.markers[s.i or 0], b.markers[s.j or 0]
     if s.type == "TRANSLATIONAL":
-        text = _sum((s.force, ""), (-s.k, f"(DM({s.i},{s.j}) - {s.length!r})"), (-s.c, f"VR({s.i},{s.j})"))
+        text = weighted_sum((s.force, ""), (-s.k, f"(DM({s.i},{s.j}) - {s.length!r})"), (-s.c, f"VR({s.i},{s.j})"))
         b.mechanism.line_force(name, i, j, text, kind="springdamper")
     else:
         turn = (-s.kt, f"(AZ({s.i},{s.j}) - ({s.angle!r}))")
-        text = _sum((s.torque, ""), turn, (-s.ct, f"WZ({s.i},{s.j},{s.j})"))
+        text = weighted_sum((s.torque, ""), turn, (-s.ct, f"WZ({s.i},{s.j},{s.j})"))
         b.mechanism.load(name, i, j, tz=text, rm=j, kind="springdamper")
-
-
-def _sum(*terms: tuple[float, str]) -> str:
-    """Return the terms with a factor other than zero, added up."""
-    parts = [f"({factor!r})" + (f"*{measure}" if measure else "") for factor, measure in terms if factor != 0.0]
-    return " + ".join(parts) if parts else "0"
-
-
-def _measures(i: int | None, j: int | None) -> tuple[list[str], list[str]]:
-    """Return the six displacements and six velocities of I in J."""
-    a, c = i, j
-    shifts = [f"D{x}({a},{c},{c})" for x in "XYZ"] + [f"A{x}({a},{c})" for x in "XYZ"]
-    rates = [f"V{x}({a},{c},{c},{c})" for x in "XYZ"] + [f"W{x}({a},{c},{c})" for x in "XYZ"]
-    return shifts, rates
 
 
 def _matrix_load(
@@ -89,20 +76,11 @@ def _matrix_load(
     preload: Sequence[float],
 ) -> None:  # fmt: skip
     """Add F = preload - K (q - free) - C q' in J's frame; every product in the deck's units."""
-    shifts, rates = _measures(s.i, s.j)
-    texts = {}
-    for row, component in enumerate(COMPONENTS):
-        terms = [(float(preload[row]), "")]
-        for c in range(6):
-            shift = shifts[c] if free[c] == 0.0 else f"({shifts[c]} - ({float(free[c])!r}))"
-            terms.append((-float(stiffness[row, c]), shift))
-            terms.append((-float(damping[row, c]), rates[c]))
-        text = _sum(*terms)
-        if text != "0":
-            texts[component] = text
-    if texts:
+    texts = matrix_texts(str(s.i), str(s.j), stiffness, damping, np.array(free), np.array(preload))
+    given = {c: t for c, t in zip(COMPONENTS, texts) if t is not None}
+    if given:
         i, j = b.markers[s.i], b.markers[s.j]
-        b.mechanism.load(name, i, j, rm=j, kind=kind, **texts)  # type: ignore[arg-type]
+        b.mechanism.load(name, i, j, rm=j, kind=kind, **given)  # type: ignore[arg-type]
 
 
 def add_bushing(b: Builder, s: st.Bushing) -> None:
@@ -124,23 +102,10 @@ def add_field(b: Builder, s: st.Field) -> None:
     _matrix_load(b, name, "field", s, k, c, s.length or [0.0] * 6, s.force or [0.0] * 6)
 
 
-def beam_stiffness(s: st.Beam) -> np.ndarray:
-    """Return the 6x6 stiffness of the beam's I end with the J end held, Timoshenko's with the shear ratios given."""
-    length, e, g, area = s.length or 0.0, s.emodulus or 0.0, s.gmodulus or 0.0, s.area or 0.0
-    k = np.zeros((6, 6))
-    k[0, 0], k[3, 3] = e * area / length, g * (s.ixx or 0.0) / length
-    for shift, turn, inertia, ratio, sign in ((1, 5, s.izz or 0.0, s.asy, -1.0), (2, 4, s.iyy or 0.0, s.asz, 1.0)):
-        shear = 12.0 * e * inertia * ratio / (g * area * length**2)
-        bending = e * inertia / (1.0 + shear)
-        k[shift, shift] = 12.0 * bending / length**3
-        k[shift, turn] = k[turn, shift] = sign * 6.0 * bending / length**2
-        k[turn, turn] = (4.0 + shear) * bending / length
-    return k
-
-
 def add_beam(b: Builder, s: st.Beam) -> None:
     """BEAM: a FIELD with the stiffness of a beam, free at the length along x of J."""
-    k = beam_stiffness(s)
+    length, area, ixx, iyy, izz = (v or 0.0 for v in (s.length, s.area, s.ixx, s.iyy, s.izz))
+    k = beam_stiffness(length, area, ixx, iyy, izz, s.emodulus or 0.0, s.gmodulus or 0.0, (s.asy, s.asz))
     c = (s.cratio or 0.0) * k
     if s.cmatrix is not None:
         c = np.zeros((6, 6))

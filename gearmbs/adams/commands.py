@@ -12,7 +12,7 @@ from gearmbs.adams import statements as st
 from gearmbs.adams.deck import GRAMMARS, read_statement, resolve_statement, unknown_statement
 from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.grammar import CHOICE, FLAG, ID, INT, REAL, TEXT, ArgumentReader, Grammar, StatementError, arg
-from gearmbs.adams.source import RawStatement, read_text, statements
+from gearmbs.adams.source import RawStatement, read_file, statements
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
 SIMULATIONS = "DYNAMICS KINEMATICS STATICS TRANSIENT INITIAL_CONDITIONS ACCELERATION DISPLACEMENT VELOCITY"
@@ -131,12 +131,7 @@ def read_script(path: str | Path) -> Script:
     DeckError
         Naming file and line of everything that is wrong.
     """
-    path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise DeckError([Diagnostic(ERROR, f"cannot be read: {error.strerror or error}", str(path), 0)]) from error
-    return parse_script(read_text(data), str(path))
+    return parse_script(read_file(Path(path)), str(path))
 
 
 def parse_script(text: str, file: str = "<script>") -> Script:

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from gearmbs.adams import statements as st
 from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.grammar import ArgumentReader, Grammar, StatementError
-from gearmbs.adams.source import RawStatement, read_text, statements
+from gearmbs.adams.source import RawStatement, read_file, statements
 from gearmbs.adams.units import deck_units
 from gearmbs.mechanism.expression import Units
 
@@ -91,12 +91,7 @@ def read_deck(path: str | Path) -> Deck:
     DeckError
         Naming file and line of everything that is wrong.
     """
-    path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise DeckError([Diagnostic(ERROR, f"cannot be read: {error.strerror or error}", str(path), 0)]) from error
-    return parse_deck(read_text(data), str(path))
+    return parse_deck(read_file(Path(path)), str(path))
 
 
 def parse_deck(text: str, file: str = "<deck>") -> Deck:

@@ -11,6 +11,9 @@ import re
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+
+from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
 
 CONTINUED = "\x01"
 _VIEW_NAME = re.compile(r"(?:adams_)?view_name\s*=\s*['\"]([^'\"]*)['\"]", re.IGNORECASE)
@@ -46,6 +49,21 @@ class RawStatement:
     def line_at(self, offset: int) -> int:
         """Return the source line of a place in the text."""
         return self.lines[max(0, bisect_right(self.starts, offset) - 1)]
+
+
+def read_file(path: Path) -> str:
+    """Return the text of a file.
+
+    Raises
+    ------
+    DeckError
+        When it cannot be read.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise DeckError([Diagnostic(ERROR, f"cannot be read: {error.strerror or error}", str(path), 0)]) from error
+    return read_text(data)
 
 
 def read_text(data: bytes) -> str:

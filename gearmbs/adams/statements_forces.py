@@ -23,42 +23,35 @@ class Sforce(Statement):
 
 
 @dataclass(frozen=True)
-class Vforce(Statement):
+class _Acting(Statement):
+    """Where a force of several components acts, and along which axes."""
+
+    i: int | None = arg("I", ID)
+    jfloat: int | None = arg("JFLOAT", ID)
+    rm: int | None = arg("RM", ID)
+
+
+@dataclass(frozen=True)
+class Vforce(_Acting):
     """VFORCE: three force components along the axes of RM."""
 
-    i: int | None = arg("I", ID)
-    jfloat: int | None = arg("JFLOAT", ID)
-    rm: int | None = arg("RM", ID)
     fx: str | None = arg("FX", EXPRESSION)
     fy: str | None = arg("FY", EXPRESSION)
     fz: str | None = arg("FZ", EXPRESSION)
 
 
 @dataclass(frozen=True)
-class Vtorque(Statement):
+class Vtorque(_Acting):
     """VTORQUE: three torque components along the axes of RM."""
 
-    i: int | None = arg("I", ID)
-    jfloat: int | None = arg("JFLOAT", ID)
-    rm: int | None = arg("RM", ID)
     tx: str | None = arg("TX", EXPRESSION)
     ty: str | None = arg("TY", EXPRESSION)
     tz: str | None = arg("TZ", EXPRESSION)
 
 
 @dataclass(frozen=True)
-class Gforce(Statement):
+class Gforce(Vtorque, Vforce):
     """GFORCE: force and torque components along the axes of RM."""
-
-    i: int | None = arg("I", ID)
-    jfloat: int | None = arg("JFLOAT", ID)
-    rm: int | None = arg("RM", ID)
-    fx: str | None = arg("FX", EXPRESSION)
-    fy: str | None = arg("FY", EXPRESSION)
-    fz: str | None = arg("FZ", EXPRESSION)
-    tx: str | None = arg("TX", EXPRESSION)
-    ty: str | None = arg("TY", EXPRESSION)
-    tz: str | None = arg("TZ", EXPRESSION)
 
 
 @dataclass(frozen=True)

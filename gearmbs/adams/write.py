@@ -10,7 +10,6 @@ import numpy as np
 
 from gearmbs.adams.build_constraints import JOINT_KINDS, JPRIM_KINDS
 from gearmbs.adams.units import TABLES
-from gearmbs.adams.write_functions import function_text
 from gearmbs.adams.write_gears import gear_statements, is_gear_contact
 from gearmbs.dae import terms
 from gearmbs.dae.errors import ModelError
@@ -19,6 +18,7 @@ from gearmbs.mechanism import Mechanism, Torque
 from gearmbs.mechanism.elements import AXIS_FORCE, AXIS_TORQUE, LINE, Load
 from gearmbs.mechanism.expression import Call, Name, Node, Number, parse, unparse
 from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
+from gearmbs.mechanism.function_text import function_text
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Body, Marker
 

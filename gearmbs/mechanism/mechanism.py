@@ -11,19 +11,18 @@ from gearmbs.dae import terms
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.expressions import SplineData
 from gearmbs.dae.system import System
-from gearmbs.mechanism import elements as el
 from gearmbs.mechanism import joints as jt
 from gearmbs.mechanism.elements import ContactTables, GearContact, Load, State, Torque
 from gearmbs.mechanism.expression import Units
 from gearmbs.mechanism.friction import add_friction, friction_of
+from gearmbs.mechanism.function_text import integrated
 from gearmbs.mechanism.functions import TimeFunction, as_function, constant
 from gearmbs.mechanism.geometry import Vector, frame_along, vector
+from gearmbs.mechanism.load_methods import Expression, LoadMethods
 from gearmbs.mechanism.parts import Body, Marker, make_body
 
-Expression = str | float | None
 
-
-class Mechanism:
+class Mechanism(LoadMethods):
     """A system of rigid bodies, joints, motions and forces.
 
     Every part has a name. Joints take two bodies with a point and an axis in global components at the
@@ -194,15 +193,52 @@ class Mechanism:
         row = jt.Row("coupled coordinates", row_terms, constant(offset))
         return self._add_joint(jt.Joint(name, "coupler", parts[0][0].i, parts[0][0].j, [row]))
 
-    def rotation(self, name: str, joint: jt.Joint, function: float | TimeFunction) -> jt.Joint:
-        """Prescribe the rotation of I about z_J of a joint as a function of time, rad."""
+    def gear(self, name: str, first: jt.Joint, second: jt.Joint, ratio: float) -> jt.Joint:
+        """Let the second joint turn ``ratio`` times as fast as the first, both about their own z_J (see coupler).
+
+        Two outside gears on parallel axes of one direction have ratio = -z1/z2.
+        """
+        return self.coupler(name, [(first, float(ratio)), (second, -1.0)])
+
+    def rack_pinion(self, name: str, pinion: jt.Joint, rack: jt.Joint, radius: float) -> jt.Joint:
+        """Let the rack's joint move ``radius`` metres along its z_J for each radian of the pinion's.
+
+        The radius is negative where a positive turn drives the rack against its z axis.
+        """
+        if rack.kind != "translational":
+            raise ModelError(f"rack and pinion '{name}': joint '{rack.name}' is {rack.kind}; it must be translational")
+        return self.coupler(name, [(pinion, float(radius)), (rack, -1.0)])
+
+    def rotation(
+        self, name: str, joint: jt.Joint, function: float | str | TimeFunction, *, level: str = "displacement",
+        start: float | None = None, rate: float = 0.0,
+    ) -> jt.Joint:  # fmt: skip
+        """Prescribe the rotation of I about z_J of a joint as a function of time.
+
+        Parameters
+        ----------
+        function : float, str or TimeFunction
+            rad, or rad/s, rad/s^2 for the other levels.
+        level : {"displacement", "velocity", "acceleration"}
+            What the function gives.
+        start : float, optional
+            Angle at time 0 for velocities and accelerations, rad; default: as the bodies are.
+        rate : float
+            Angular velocity at time 0 for accelerations, rad/s.
+        """
         self._check_joint(name, joint, ("revolute", "cylindrical"))
+        function = self._moved(name, joint, function, level, start, rate, jt.coordinate_term(joint, 1.0))
         row = jt.Row("angle", (jt.Term(terms.ROTATION, joint.i, joint.j),), None, as_function(function))
         return self._add_joint(jt.Joint(name, "rotation", joint.i, joint.j, [row]))
 
-    def translation(self, name: str, joint: jt.Joint, function: float | TimeFunction) -> jt.Joint:
-        """Prescribe the displacement of I along z_J of a joint as a function of time, m."""
+    def translation(
+        self, name: str, joint: jt.Joint, function: float | str | TimeFunction, *, level: str = "displacement",
+        start: float | None = None, rate: float = 0.0,
+    ) -> jt.Joint:  # fmt: skip
+        """Prescribe the displacement of I along z_J of a joint; as :meth:`rotation`, in m, m/s or m/s^2."""
         self._check_joint(name, joint, ("translational", "cylindrical"))
+        along = jt.Term(terms.DOT2, joint.i, joint.j, jt.Z)
+        function = self._moved(name, joint, function, level, start, rate, along)
         row = jt.Row("displacement", (jt.Term(terms.DOT2, joint.i, joint.j, jt.Z),), as_function(function))
         return self._add_joint(jt.Joint(name, "translation", joint.i, joint.j, [row]))
 
@@ -254,109 +290,6 @@ class Mechanism:
         element = GearContact(name, i, j, pair)
         self.elements[name] = element
         return element
-
-    def load(
-        self,
-        name: str,
-        i: Marker,
-        j: Marker,
-        *,
-        fx: Expression = None,
-        fy: Expression = None,
-        fz: Expression = None,
-        tx: Expression = None,
-        ty: Expression = None,
-        tz: Expression = None,
-        rm: Marker | None = None,
-        kind: str = "gforce",
-    ) -> Load:
-        """Apply forces and torques given by expressions, in the frame of marker ``rm`` (default: J).
-
-        They act on I's body at I; the reaction acts on J's body at the same point. Expressions are in the ADAMS
-        function language and SI units, for instance ``"-100*DX(tip, anchor, anchor) - STEP(TIME, 0, 0, 1, 5)"``;
-        markers go by their names (in quotes when they hold other characters than letters, digits, dot and underscore).
-        """
-        expressions = tuple(None if e is None else str(e) for e in (fx, fy, fz, tx, ty, tz))
-        if not any(expressions):
-            raise ModelError(f"load '{name}': give at least one of fx, fy, fz, tx, ty, tz")
-        return self._add_load(Load(name, kind, i, j, rm or j, el.COMPONENTS, expressions))
-
-    def line_force(self, name: str, i: Marker, j: Marker, expression: Expression, kind: str = "sforce") -> Load:
-        """Apply a force along the line between two markers; positive values push I and J apart."""
-        return self._add_load(Load(name, kind, i, j, j, el.LINE, (str(expression),)))
-
-    def axis_force(self, name: str, i: Marker, j: Marker, expression: Expression, rm: Marker | None = None) -> Load:
-        """Apply a force on I along z of ``rm`` (default: J), the reaction on J's body at the same point."""
-        return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_FORCE, (str(expression),)))
-
-    def axis_torque(self, name: str, i: Marker, j: Marker, expression: Expression, rm: Marker | None = None) -> Load:
-        """Apply a torque on I about z of ``rm`` (default: J), the reaction on J's body."""
-        return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_TORQUE, (str(expression),)))
-
-    def spring_damper(
-        self,
-        name: str,
-        i: Marker,
-        j: Marker,
-        *,
-        stiffness: float,
-        damping: float = 0.0,
-        length: float | None = None,
-        preload: float = 0.0,
-    ) -> Load:
-        """Connect two markers by a spring (N/m) and damper (N s/m) along the line between them.
-
-        ``length`` is the length at which the force is ``preload`` (default: the initial distance).
-        """
-        if length is None:
-            length = float(np.linalg.norm(i.global_position() - j.global_position()))
-        a, b = _ref(i), _ref(j)
-        k, c, free, start = float(stiffness), float(damping), float(length), float(preload)
-        text = f"{start!r} - {k!r}*(DM({a},{b}) - {free!r}) - {c!r}*VR({a},{b})"
-        return self.line_force(name, i, j, text, kind="springdamper")
-
-    def torsion_spring(
-        self,
-        name: str,
-        i: Marker,
-        j: Marker,
-        *,
-        stiffness: float,
-        damping: float = 0.0,
-        angle: float = 0.0,
-        preload: float = 0.0,
-    ) -> Load:
-        """Connect two markers by a rotational spring (N m/rad) and damper (N m s/rad) about z of J."""
-        a, b = _ref(i), _ref(j)
-        k, c, free, start = float(stiffness), float(damping), float(angle), float(preload)
-        text = f"{start!r} - {k!r}*(AZ({a},{b}) - {free!r}) - {c!r}*WZ({a},{b},{b})"
-        return self._add_load(Load(name, "springdamper", i, j, j, el.AXIS_TORQUE, (text,)))
-
-    def bushing(
-        self,
-        name: str,
-        i: Marker,
-        j: Marker,
-        *,
-        stiffness: Vector = (0.0, 0.0, 0.0),
-        damping: Vector = (0.0, 0.0, 0.0),
-        torsional_stiffness: Vector = (0.0, 0.0, 0.0),
-        torsional_damping: Vector = (0.0, 0.0, 0.0),
-    ) -> Load:
-        """Connect two markers by springs and dampers along and about the three axes of J (small rotations)."""
-        a, b = _ref(i), _ref(j)
-        label = f"bushing '{name}'"
-        k = vector(stiffness, f"{label}: stiffness").tolist()
-        c = vector(damping, f"{label}: damping").tolist()
-        kt = vector(torsional_stiffness, f"{label}: torsional_stiffness").tolist()
-        ct = vector(torsional_damping, f"{label}: torsional_damping").tolist()
-        force = [f"-{k[n]!r}*D{x}({a},{b},{b}) - {c[n]!r}*V{x}({a},{b},{b},{b})" for n, x in enumerate("XYZ")]
-        turn = [f"-{kt[n]!r}*A{x}({a},{b}) - {ct[n]!r}*W{x}({a},{b},{b})" for n, x in enumerate("XYZ")]
-        parts = [e if k[n] or c[n] else None for n, e in enumerate(force)]
-        parts += [e if kt[n] or ct[n] else None for n, e in enumerate(turn)]
-        if not any(parts):
-            raise ModelError(f"bushing '{name}': all stiffnesses and dampings are zero")
-        return self._add_load(Load(name, "bushing", i, j, j, el.COMPONENTS, tuple(parts)))
 
     def friction(self, name: str, joint: jt.Joint, mu_static: float, mu_dynamic: float, **parameters) -> list[Load]:
         """Add dry friction to a revolute, translational, cylindrical, spherical or universal joint.
@@ -454,6 +387,18 @@ class Mechanism:
         if not name or any(name in table for table in (self.joints, self.elements, self.constraints)):
             raise ModelError(f"name {name!r}: empty or in use; choose another")
 
+    def _moved(
+        self, name: str, joint: jt.Joint, function: float | str | TimeFunction, level: str, start: float | None,
+        rate: float, term: jt.Term,
+    ) -> TimeFunction:  # fmt: skip
+        """Return a motion's displacement, whatever its function gives."""
+        if level == "displacement":
+            return as_function(function)
+        if level not in ("velocity", "acceleration"):
+            raise ModelError(f"motion '{name}': level {level!r}; choose displacement, velocity or acceleration")
+        first = jt.initial_coordinate(term) if start is None else float(start)
+        return integrated(as_function(function), first, None if level == "velocity" else float(rate))
+
     def _check_joint(self, name: str, joint: jt.Joint, kinds: tuple[str, ...]) -> None:
         self._check_name(name)
         if self.joints.get(getattr(joint, "name", "")) is not joint:
@@ -483,7 +428,3 @@ class Mechanism:
         for part in (*self.bodies.values(), *self.joints.values(), *self.elements.values()):
             lines.append(f"  {part!r}")
         return "\n".join(lines)
-
-
-def _ref(marker: Marker) -> str:
-    return f'"{marker.name}"'

@@ -80,8 +80,8 @@ def test_every_joint_is_written_and_read(kind):
                  polynomial([1.0, -2.0, 3.0]), ramp(4.0, 0.3, 0.5), ramp(4.0, 0.3, 0.5, quintic=True)],
 )  # fmt: skip
 def test_functions_of_time_are_written_as_expressions(function):
-    from gearmbs.adams.write_functions import function_text
     from gearmbs.mechanism.expression import Scope, compile_expression
+    from gearmbs.mechanism.function_text import function_text
     from gearmbs.mechanism.functions import as_function
     from tests.expressions.support import time_series
 

@@ -1,0 +1,248 @@
+"""Loads of a Mechanism: forces and torques by expressions, springs, bushings, fields, beams."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from gearmbs.dae.errors import ModelError
+from gearmbs.mechanism import elements as el
+from gearmbs.mechanism.elements import Load
+from gearmbs.mechanism.geometry import Vector, vector
+from gearmbs.mechanism.parts import Marker
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.expression import Units
+
+Expression = str | float | None
+
+
+class LoadMethods:
+    """The part of :class:`gearmbs.mechanism.Mechanism` that adds loads."""
+
+    units: Units
+
+    def _add_load(self, load: Load) -> Load:
+        raise NotImplementedError
+
+    def load(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        fx: Expression = None,
+        fy: Expression = None,
+        fz: Expression = None,
+        tx: Expression = None,
+        ty: Expression = None,
+        tz: Expression = None,
+        rm: Marker | None = None,
+        kind: str = "gforce",
+    ) -> Load:
+        """Apply forces and torques given by expressions, in the frame of marker ``rm`` (default: J).
+
+        They act on I's body at I; the reaction acts on J's body at the same point. Expressions are in the ADAMS
+        function language and SI units, for instance ``"-100*DX(tip, anchor, anchor) - STEP(TIME, 0, 0, 1, 5)"``;
+        markers go by their names (in quotes when they hold other characters than letters, digits, dot and underscore).
+        """
+        expressions = tuple(None if e is None else str(e) for e in (fx, fy, fz, tx, ty, tz))
+        if not any(expressions):
+            raise ModelError(f"load '{name}': give at least one of fx, fy, fz, tx, ty, tz")
+        return self._add_load(Load(name, kind, i, j, rm or j, el.COMPONENTS, expressions))
+
+    def line_force(self, name: str, i: Marker, j: Marker, expression: Expression, kind: str = "sforce") -> Load:
+        """Apply a force along the line between two markers; positive values push I and J apart."""
+        return self._add_load(Load(name, kind, i, j, j, el.LINE, (str(expression),)))
+
+    def axis_force(self, name: str, i: Marker, j: Marker, expression: Expression, rm: Marker | None = None) -> Load:
+        """Apply a force on I along z of ``rm`` (default: J), the reaction on J's body at the same point."""
+        return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_FORCE, (str(expression),)))
+
+    def axis_torque(self, name: str, i: Marker, j: Marker, expression: Expression, rm: Marker | None = None) -> Load:
+        """Apply a torque on I about z of ``rm`` (default: J), the reaction on J's body."""
+        return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_TORQUE, (str(expression),)))
+
+    def spring_damper(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        stiffness: float,
+        damping: float = 0.0,
+        length: float | None = None,
+        preload: float = 0.0,
+    ) -> Load:
+        """Connect two markers by a spring (N/m) and damper (N s/m) along the line between them.
+
+        ``length`` is the length at which the force is ``preload`` (default: the initial distance).
+        """
+        if length is None:
+            length = float(np.linalg.norm(i.global_position() - j.global_position()))
+        a, b = _ref(i), _ref(j)
+        k, c, free, start = float(stiffness), float(damping), float(length), float(preload)
+        text = f"{start!r} - {k!r}*(DM({a},{b}) - {free!r}) - {c!r}*VR({a},{b})"
+        return self.line_force(name, i, j, text, kind="springdamper")
+
+    def torsion_spring(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        stiffness: float,
+        damping: float = 0.0,
+        angle: float = 0.0,
+        preload: float = 0.0,
+    ) -> Load:
+        """Connect two markers by a rotational spring (N m/rad) and damper (N m s/rad) about z of J."""
+        a, b = _ref(i), _ref(j)
+        k, c, free, start = float(stiffness), float(damping), float(angle), float(preload)
+        text = f"{start!r} - {k!r}*(AZ({a},{b}) - {free!r}) - {c!r}*WZ({a},{b},{b})"
+        return self._add_load(Load(name, "springdamper", i, j, j, el.AXIS_TORQUE, (text,)))
+
+    def bushing(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        stiffness: Vector = (0.0, 0.0, 0.0),
+        damping: Vector = (0.0, 0.0, 0.0),
+        torsional_stiffness: Vector = (0.0, 0.0, 0.0),
+        torsional_damping: Vector = (0.0, 0.0, 0.0),
+    ) -> Load:
+        """Connect two markers by springs and dampers along and about the three axes of J (small rotations)."""
+        a, b = _ref(i), _ref(j)
+        label = f"bushing '{name}'"
+        k = vector(stiffness, f"{label}: stiffness").tolist()
+        c = vector(damping, f"{label}: damping").tolist()
+        kt = vector(torsional_stiffness, f"{label}: torsional_stiffness").tolist()
+        ct = vector(torsional_damping, f"{label}: torsional_damping").tolist()
+        force = [f"-{k[n]!r}*D{x}({a},{b},{b}) - {c[n]!r}*V{x}({a},{b},{b},{b})" for n, x in enumerate("XYZ")]
+        turn = [f"-{kt[n]!r}*A{x}({a},{b}) - {ct[n]!r}*W{x}({a},{b},{b})" for n, x in enumerate("XYZ")]
+        parts = [e if k[n] or c[n] else None for n, e in enumerate(force)]
+        parts += [e if kt[n] or ct[n] else None for n, e in enumerate(turn)]
+        if not any(parts):
+            raise ModelError(f"bushing '{name}': all stiffnesses and dampings are zero")
+        return self._add_load(Load(name, "bushing", i, j, j, el.COMPONENTS, tuple(parts)))
+
+    def field(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        stiffness: npt.ArrayLike | None = None,
+        damping: npt.ArrayLike | None = None,
+        free: npt.ArrayLike = (0.0,) * 6,
+        preload: npt.ArrayLike = (0.0,) * 6,
+        kind: str = "field",
+    ) -> Load:
+        """Connect two markers by full matrices: F = preload - K (q - free) - C q'.
+
+        Parameters
+        ----------
+        stiffness, damping : array_like, shape (6, 6)
+            N/m, N/rad, N m/m, N m/rad and with s; zero when left out.
+        free, preload : array_like, shape (6,)
+            Displacements and rotations of I in J's frame (small rotations about its axes) without load, and the load
+            there.
+        """
+        k, c = (np.zeros((6, 6)) if m is None else np.array(m, dtype=float) for m in (stiffness, damping))
+        rest, start = np.array(free, dtype=float), np.array(preload, dtype=float)
+        if k.shape != (6, 6) or c.shape != (6, 6) or rest.shape != (6,) or start.shape != (6,):
+            raise ModelError(f"{kind} '{name}': stiffness and damping are 6x6, free and preload have 6 entries")
+        texts = matrix_texts(_ref(i), _ref(j), k, c, rest, start)
+        if not any(texts):
+            raise ModelError(f"{kind} '{name}': all stiffnesses, dampings and preloads are zero")
+        return self._add_load(Load(name, kind, i, j, j, el.COMPONENTS, texts))
+
+    def beam(
+        self,
+        name: str,
+        i: Marker,
+        j: Marker,
+        *,
+        length: float,
+        area: float,
+        second_moments: Vector,
+        modulus: float,
+        shear_modulus: float,
+        shear_ratios: tuple[float, float] = (0.0, 0.0),
+        damping_ratio: float = 0.0,
+    ) -> Load:
+        """Connect two markers by a massless Timoshenko beam from J to I along x of J.
+
+        Parameters
+        ----------
+        length, area : float
+            m, m^2.
+        second_moments : array_like
+            Torsion constant and second moments about y and z, m^4.
+        modulus, shear_modulus : float
+            N/m^2.
+        shear_ratios : tuple of float
+            Shear area ratios in y and z; 0: without shear.
+        damping_ratio : float
+            Damping over stiffness, s.
+        """
+        ixx, iyy, izz = vector(second_moments, f"beam '{name}': second_moments")
+        for field, value in (
+            ("length", length),
+            ("area", area),
+            ("modulus", modulus),
+            ("shear_modulus", shear_modulus),
+        ):
+            if not value > 0.0:
+                raise ModelError(f"beam '{name}': {field} = {value}; it must be positive")
+        k = beam_stiffness(length, area, ixx, iyy, izz, modulus, shear_modulus, shear_ratios)
+        free = (length, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return self.field(name, i, j, stiffness=k, damping=damping_ratio * k, free=free, kind="beam")
+
+
+def beam_stiffness(
+    length: float, area: float, ixx: float, iyy: float, izz: float, modulus: float, shear_modulus: float,
+    shear_ratios: tuple[float, float],
+) -> np.ndarray:  # fmt: skip
+    """Return the 6x6 stiffness of a beam's free end along x, the other end held; Timoshenko's with shear ratios."""
+    k = np.zeros((6, 6))
+    k[0, 0], k[3, 3] = modulus * area / length, shear_modulus * ixx / length
+    for shift, turn, inertia, ratio, sign in ((1, 5, izz, shear_ratios[0], -1.0), (2, 4, iyy, shear_ratios[1], 1.0)):
+        shear = 12.0 * modulus * inertia * ratio / (shear_modulus * area * length**2)
+        bending = modulus * inertia / (1.0 + shear)
+        k[shift, shift] = 12.0 * bending / length**3
+        k[shift, turn] = k[turn, shift] = sign * 6.0 * bending / length**2
+        k[turn, turn] = (4.0 + shear) * bending / length
+    return k
+
+
+def matrix_texts(
+    a: str, c: str, stiffness: np.ndarray, damping: np.ndarray, free: np.ndarray, preload: np.ndarray
+) -> tuple[str | None, ...]:
+    """Return the six components of preload - K (q - free) - C q' as expressions of the markers a and c."""
+    shifts = [f"D{x}({a},{c},{c})" for x in "XYZ"] + [f"A{x}({a},{c})" for x in "XYZ"]
+    rates = [f"V{x}({a},{c},{c},{c})" for x in "XYZ"] + [f"W{x}({a},{c},{c})" for x in "XYZ"]
+    texts: list[str | None] = []
+    for row in range(6):
+        parts = [(float(preload[row]), "")]
+        for k in range(6):
+            shift = shifts[k] if free[k] == 0.0 else f"({shifts[k]} - ({float(free[k])!r}))"
+            parts.append((-float(stiffness[row, k]), shift))
+            parts.append((-float(damping[row, k]), rates[k]))
+        text = weighted_sum(*parts)
+        texts.append(None if text == "0" else text)
+    return tuple(texts)
+
+
+def weighted_sum(*parts: tuple[float, str]) -> str:
+    """Return the terms with a factor other than zero, added up."""
+    shown = [f"({factor!r})" + (f"*{measure}" if measure else "") for factor, measure in parts if factor != 0.0]
+    return " + ".join(shown) if shown else "0"
+
+
+def _ref(marker: Marker) -> str:
+    return f'"{marker.name}"'
