@@ -83,7 +83,7 @@ def read_hdf(path: Path, channels: Sequence[str] | None) -> Record:
                 order[key] = int(_value(item.attrs.get("channel_index", len(order))))
 
             file.visititems(visit)
-    except OSError as exc:
+    except Exception as exc:
         raise SignalFileError(path, f"cannot be read as HDF5: it is damaged or cut short ({exc})") from exc
     if scalars.get("layout") == LAYOUT:
         arrays = {key: arrays[key] for key in sorted(arrays, key=lambda key: order[key])}
@@ -103,7 +103,7 @@ def hdf_pieces(path: Path) -> Iterator[tuple[Record, float]] | None:
         with h5py.File(path, "r") as file:
             if _value(file.attrs.get("layout")) != LAYOUT or "sampling_rate" not in file.attrs:
                 return None
-    except OSError as exc:
+    except Exception as exc:
         raise SignalFileError(path, f"cannot be read as HDF5: it is damaged or cut short ({exc})") from exc
     return _slices(path)
 
@@ -134,7 +134,9 @@ def _slices(path: Path) -> Iterator[tuple[Record, float]]:
                     ),
                     stop / count,
                 )
-    except OSError as exc:
+    except SignalFileError:
+        raise
+    except Exception as exc:
         raise SignalFileError(path, f"cannot be read as HDF5: it is damaged or cut short ({exc})") from exc
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -133,4 +134,6 @@ def _library(path: Path) -> Any:
         import nptdms
     except ImportError as exc:
         raise SignalFileError(path, "TDMS files need npTDMS; install it with: pip install 'gearmbs[formats]'") from exc
+    # it prints the bytes of damaged texts, pages of them; what is wrong is said by the errors here
+    logging.getLogger("nptdms").setLevel(logging.ERROR)
     return nptdms

@@ -18,6 +18,7 @@ from gearmbs.signals import (
     SignalFileError,
     make_signal,
     read_signal,
+    sections,
     units_of,
     write_signal,
 )
@@ -371,3 +372,29 @@ def test_reading_reports_progress(tmp_path):
     read_signal(path, progress=lambda fraction, stage: seen.append((fraction, stage)))
     assert seen[-1][1] == "reading"
     assert all(0.0 < f <= 1.0 for f, _ in seen)
+
+
+@pytest.mark.parametrize("format", NAMES)
+def test_damage_anywhere_is_named_or_harmless(tmp_path, format):
+    """Bytes cut off, taken out or changed, also in the header: a signal, or an error with the file's name."""
+    rng = np.random.default_rng(17)
+    raw = write_signal(example(2000), tmp_path / NAMES[format], format=format).read_bytes()
+    path = tmp_path / f"damaged{''.join((tmp_path / NAMES[format]).suffixes)}"
+    said = []
+    for k in range(32):
+        damaged = bytearray(raw)
+        start = int(rng.integers(0, min(len(raw), 700) if k % 2 else len(raw)))
+        if k % 4 == 0:
+            damaged = damaged[: max(1, start)]
+        elif k % 4 == 1:
+            damaged[start : start + 100] = b""
+        else:
+            damaged[start : start + 4] = rng.bytes(4)
+        path.write_bytes(damaged)
+        for read in (lambda: [read_signal(path, format=format)], lambda: list(sections(path, 0.05, format=format))):
+            try:
+                read()
+            except (MissingMetadataError, SignalFileError) as error:
+                said.append(str(error))
+    assert said
+    assert all(str(path) in text for text in said)
