@@ -155,6 +155,8 @@ def bars(
             ax.text(x, 0.02, "no data", rotation=90, ha="center", fontsize=8, transform=ax.get_xaxis_transform())
     if log:
         ax.set_yscale("log")
+        if top > 0:
+            ax.set_ylim(top=1.6 * top)
     else:
         ax.set_ylim(0.0, 1.12 * top if top > 0 else 1.0)
     ax.grid(visible=False, axis="x")
