@@ -82,8 +82,9 @@ def _solver(problem: DAEProblem, calls: _Callbacks, atol: np.ndarray, rtol: floa
 
 def solve_ida(
     problem: DAEProblem,
-    t_eval: np.ndarray,
+    t_eval: np.ndarray | None = None,
     *,
+    t_end: float | None = None,
     tol: float = 1e-6,
     rtol: float = 0.0,
     max_order: int = 5,
@@ -93,14 +94,16 @@ def solve_ida(
     max_iterations: int = 4,
     progress: Callable[[float], None] | None = None,
 ) -> DAEResult:
-    """Integrate a DAE with IDA and return it at the times ``t_eval``.
+    """Integrate a DAE with IDA and return it at the times ``t_eval``, or at every step IDA takes.
 
     Parameters
     ----------
     problem : DAEProblem
         With consistent initial values at ``t_eval[0]``.
-    t_eval : array_like, shape (m,)
-        Increasing output times, s; the first is the start.
+    t_eval : array_like, shape (m,), optional
+        Increasing output times, s; the first is the start. Default: the end of every step.
+    t_end : float, optional
+        End of the run when ``t_eval`` is not given, s.
     tol : float
         Absolute tolerance of unknown i is ``tol * problem.atol_scale[i]`` where the error mask is set.
     rtol : float
@@ -115,8 +118,11 @@ def solve_ida(
     DAEResult
         With ``status`` `SOLVER_FAILURE` or `INTERRUPTED` and what was computed so far if the run did not finish.
     """
-    t_eval = np.asarray(t_eval, dtype=float)
-    if t_eval.ndim != 1 or t_eval.size < 2 or np.any(np.diff(t_eval) <= 0.0):
+    every_step = t_eval is None
+    if every_step and t_end is None:
+        raise ValueError("t_end: give it when t_eval is left out")
+    times = np.asarray([problem.t0, t_end] if t_eval is None else t_eval, dtype=float)
+    if times.ndim != 1 or times.size < 2 or np.any(np.diff(times) <= 0.0):
         raise ValueError("t_eval: give at least two strictly increasing times")
     idata, rdata = problem.idata.copy(), problem.rdata.copy()
     calls = _Callbacks(problem, idata, rdata)
@@ -128,37 +134,32 @@ def solve_ida(
         "min_step": min_step,
         "max_nonlin_iters": max_iterations,
     }
-    out_y, out_yp = np.zeros((t_eval.size, problem.n)), np.zeros((t_eval.size, problem.n))
-    out_y[0], out_yp[0] = problem.y0, problem.yp0
+    rows = _Rows(times, problem, every_step)
     epochs = [(0, idata.copy())]
     hist = np.zeros((1, problem.n))
-    status, message, done = Status.SUCCESS, Status.SUCCESS.sentence, 1
-    every = max(1, t_eval.size // 200)
+    status, message = Status.SUCCESS, Status.SUCCESS.sentence
     start = time.perf_counter()
-    t = float(t_eval[0])
+    t, end = float(times[0]), float(times[-1])
     try:
         solver = _solver(problem, calls, atol, rtol, options)
         solver.init_step(t, problem.y0, problem.yp0)
         y = problem.y0
-        while done < t_eval.size:
-            target = float(t_eval[done])
-            if problem.hook_interval is not None:
+        while t < end:
+            target = rows.next_time
+            if problem.hook_interval is not None and not every_step:
                 target = min(target, t + problem.hook_interval(y))
-            answer = solver.step(target, tstop=float(t_eval[-1]))
+            answer = solver.step(target, method="onestep" if every_step else "normal", tstop=end)
             if not answer.success:
                 status = Status.SOLVER_FAILURE
                 message = _failure(problem, calls, float(answer.t), answer.message, atol)
                 break
-            t, y, yp = target, answer.y, answer.yp
-            if target == t_eval[done]:
-                out_y[done], out_yp[done] = y, yp
-                done += 1
-                if progress is not None and done % every == 0:
-                    progress(t)
+            t, y, yp = float(answer.t) if every_step else target, answer.y, answer.yp
+            if rows.take(t, y, yp) and progress is not None:
+                progress(t)
             if problem.hook is not None:
                 hist[0] = y
                 if problem.hook(t, hist, 1, idata, rdata, calls.work):
-                    epochs.append((done, idata.copy()))
+                    epochs.append((rows.done, idata.copy()))
                     y = hist[0].copy()
                     yp = np.array(yp)
                     if problem.restart_rates is not None:
@@ -177,15 +178,49 @@ def solve_ida(
         wall_time=time.perf_counter() - start,
     )
     return DAEResult(
-        t=t_eval[:done],
-        y=out_y[:done],
-        yp=out_yp[:done],
+        t=rows.t[: rows.done],
+        y=rows.y[: rows.done],
+        yp=rows.yp[: rows.done],
         status=status,
         message=message,
         stats=stats,
         epochs=epochs,
         t_last=t,
     )
+
+
+class _Rows:
+    """Output rows, at given times or at every step."""
+
+    def __init__(self, times: np.ndarray, problem: DAEProblem, every_step: bool) -> None:
+        self.every_step = every_step
+        self.end = float(times[-1])
+        self.t = np.zeros(4096) if every_step else times
+        self.y, self.yp = np.zeros((self.t.size, problem.n)), np.zeros((self.t.size, problem.n))
+        self.t[0], self.y[0], self.yp[0] = times[0], problem.y0, problem.yp0
+        self.done = 1
+        self.told = float(times[0])
+        self.span = (self.end - self.told) / 200.0
+
+    @property
+    def next_time(self) -> float:
+        """Time to integrate to next."""
+        return self.end if self.every_step else float(self.t[self.done])
+
+    def take(self, t: float, y: np.ndarray, yp: np.ndarray) -> bool:
+        """Store a row if ``t`` is an output; return whether it is time for a word on progress."""
+        if not self.every_step and t != self.t[self.done]:
+            return False
+        if self.done == self.t.size:
+            more = self.t.size // 2
+            self.t = np.concatenate([self.t, np.zeros(more)])
+            self.y, self.yp = (np.concatenate([a, np.zeros((more, a.shape[1]))]) for a in (self.y, self.yp))
+        self.t[self.done], self.y[self.done], self.yp[self.done] = t, y, yp
+        self.done += 1
+        if t < self.told + self.span:
+            return False
+        self.told = t
+        return True
 
 
 def _failure(problem: DAEProblem, calls: _Callbacks, t: float, why: str, atol: np.ndarray) -> str:

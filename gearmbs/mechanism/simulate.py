@@ -21,6 +21,7 @@ def simulate(
     *,
     rate: float | None = None,
     t_eval: np.ndarray | None = None,
+    every_step: bool = False,
     t_start: float = 0.0,
     integrator: str = "WSTIFF",
     formulation: str = "SI2",
@@ -41,6 +42,10 @@ def simulate(
         Outputs a second; default: 500 outputs over the span.
     t_eval : ndarray, optional
         Output times instead of ``rate``; the first is the start.
+    every_step : bool
+        Outputs at the end of every accepted step instead: uneven times, dense where much happens.
+    t_start : float
+        Start of the simulation, s.
     integrator : {"WSTIFF", "GSTIFF", "IDA"}
     formulation : {"SI2", "SI1", "I3"}
     tol : float
@@ -64,6 +69,8 @@ def simulate(
     ModelError
         If the model or an option is wrong, or the mechanism cannot be assembled.
     """
+    if every_step and (rate is not None or t_eval is not None):
+        raise ModelError("every_step: outputs are at the integrator's own steps; leave rate and t_eval away")
     if t_eval is None:
         if not np.isfinite(t_end) or t_end <= t_start:
             raise ModelError(f"t_end = {t_end} s; it must be later than the start {t_start} s")
@@ -78,15 +85,17 @@ def simulate(
         raise ModelError(f"integrator: {integrator!r} is unknown; choose one of {', '.join(INTEGRATORS)}")
     system = mechanism.compile(t_start)
     problem = system.problem(formulation, rate_scale)
-    with _reporter(progress, float(t_eval[0]), float(t_eval[-1])) as report:
+    first, last = float(t_eval[0]), float(t_eval[-1])
+    times = None if every_step else t_eval
+    with _reporter(progress, first, last) as report:
         if name == "IDA":
-            result = solve_ida(problem, t_eval, tol=tol, progress=report, **options)
+            result = solve_ida(problem, times, t_end=last, tol=tol, progress=report, **options)
         else:
             from gearmbs.dae.wstiff import solve_wstiff
 
             # errors are controlled on positions and velocities, and so is the corrector
             options.setdefault("corrector", "modified")
-            result = solve_wstiff(problem, t_eval, tol=tol, method=name, progress=report, **options)
+            result = solve_wstiff(problem, times, t_end=last, tol=tol, method=name, progress=report, **options)
     return Solution(system, problem, result)
 
 

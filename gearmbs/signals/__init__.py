@@ -64,6 +64,7 @@ from .signal import (
 from .spectra import spectrum
 from .speed import SpeedEstimate, estimate_speed
 from .tsa import difference_signal, regular_signal, remove_orders, residual_signal
+from .uneven import even_signal
 
 __all__ = [
     "COMPONENTS",
@@ -100,6 +101,7 @@ __all__ = [
     "envelope",
     "envelope_spectrum",
     "estimate_speed",
+    "even_signal",
     "fm0",
     "fm4",
     "force_components",

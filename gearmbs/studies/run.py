@@ -10,11 +10,20 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.interpolate import PchipInterpolator
 
 import gearmbs
 from gearmbs.dae.solution import Solution
 from gearmbs.mechanism.simulate import simulate
-from gearmbs.signals import decimate, force_components, force_to_acceleration, gmf_rms, make_signal, trim
+from gearmbs.signals import (
+    decimate,
+    even_signal,
+    force_components,
+    force_to_acceleration,
+    gmf_rms,
+    make_signal,
+    trim,
+)
 from gearmbs.studies import rig
 from gearmbs.studies.case import Case
 
@@ -36,13 +45,16 @@ class SimulationFailed(RuntimeError):
         self.solution = solution
 
 
-def simulate_case(case: Case, progress: bool | Callable[[float], None] = False, **options) -> Solution:
+def simulate_case(
+    case: Case, progress: bool | Callable[[float], None] = False, *, every_step: bool = False, **options
+) -> Solution:
     """Integrate the mechanism of a case from rest to the end of its record.
 
     Returns
     -------
     Solution
-        Sampled at the case's output rate; see its ``status``.
+        Sampled at the case's output rate, or at the integrator's own steps, from which :func:`record` makes signals
+        without aliases; see its ``status``.
     """
     mechanism = case_mechanism(case)
     operation, solver = case.operation, case.solver
@@ -50,7 +62,8 @@ def simulate_case(case: Case, progress: bool | Callable[[float], None] = False, 
     return simulate(
         mechanism,
         t_end,
-        rate=solver.output_rate,
+        rate=None if every_step else solver.output_rate,
+        every_step=every_step,
         integrator=solver.integrator,
         formulation=solver.formulation,
         tol=solver.used_tolerance,
@@ -90,30 +103,33 @@ def run_case(case: Case, progress: bool | Callable[[float], None] = False) -> xr
     SimulationFailed
         If the integrator stops early; the exception carries the solution so far.
     """
-    solution = simulate_case(case, progress)
+    solution = simulate_case(case, progress, every_step=True)
     if not solution.success:
         raise SimulationFailed(f"case '{case.name}': {solution.message}", solution)
     return record(case, solution)
 
 
 def record(case: Case, solution: Solution) -> xr.Dataset:
-    """Return the record of a simulated case; see :func:`run_case`."""
+    """Return the record of a simulated case; see :func:`run_case`.
+
+    Forces at uneven times are brought to the output rate through an anti-alias filter, the other series interpolated.
+    """
     pair = case.pair()
     operation, solver = case.operation, case.solver
     start = operation.run_up + operation.settling
     stop = start + operation.duration
-    keep = solution.t >= start - EDGE - 0.5 / solver.output_rate
-    t = solution.t[keep]
-    forces = [solution.reaction(seat)[0][keep] for seat in rig.SEATS]
-    signal = make_signal(
-        forces[1],
-        solver.output_rate,
-        units="N",
-        channels=["x", "y", "z"],
-        t0=float(t[0]),
-        speed=operation.speed,
-        teeth=case.gears.teeth,
-    )
+    rate = solver.output_rate
+    labels: dict[str, Any] = {"units": "N", "speed": operation.speed, "teeth": case.gears.teeth}
+    both = np.concatenate([solution.reaction(seat)[0] for seat in rig.SEATS], axis=1)
+    names = [f"{k}{axis}" for k in (1, 2) for axis in "xyz"]
+    known = solution.t
+    if _is_even(known, rate):
+        keep = known >= start - EDGE - 0.5 / rate
+        forces = make_signal(both[keep], rate, channels=names, t0=float(known[keep][0]), **labels)
+    else:
+        forces = even_signal(known, both, rate, start=start - EDGE, stop=stop + EDGE, channels=names, **labels)
+    t = forces["time"].values
+    signal = forces.isel(channel=slice(3, 6)).assign_coords(channel=["x", "y", "z"])
     components = force_components(signal, pressure_angle=pair.working_pressure_angle, sense=pair.rotation)
     acceleration = force_to_acceleration(components, pair.wheels[1].mass)
     if solver.signal_rate < solver.output_rate:
@@ -121,31 +137,38 @@ def record(case: Case, solution: Solution) -> xr.Dataset:
     acceleration = trim(acceleration, start, stop)
     levels = gmf_rms(acceleration)
     contact = solution.contact(rig.MESH)
-    inside = (t >= start - 0.5 / solver.output_rate) & (t < stop - 0.5 / solver.output_rate)
-    data = {
-        "force_1": (("time", "xyz"), forces[0][inside], {"units": "N", "long_name": "force of shaft 1 on gear 1"}),
-        "force_2": (("time", "xyz"), forces[1][inside], {"units": "N", "long_name": "force of shaft 2 on gear 2"}),
+    inside = (t >= start - 0.5 / rate) & (t < stop - 0.5 / rate)
+    t = t[inside]
+    each = [forces.values[inside, k : k + 3] for k in (0, 3)]
+    data: dict[str, Any] = {
+        "force_1": (("time", "xyz"), each[0], {"units": "N", "long_name": "force of shaft 1 on gear 1"}),
+        "force_2": (("time", "xyz"), each[1], {"units": "N", "long_name": "force of shaft 2 on gear 2"}),
         "transmission_error": (
             "time",
-            transmission_error(case, solution)[keep][inside],
+            PchipInterpolator(known, transmission_error(case, solution))(t),
             {"units": "m", "long_name": "lag of the driven wheel at its base circle"},
         ),
     }
-    units = {"normal_force": "N", "penetration_drive": "m", "penetration_back": "m"}
-    for name in ("normal_force", "penetration_drive", "penetration_back", "pairs_drive", "pairs_back"):
-        attributes = {"units": units.get(name, "1"), "long_name": name.replace("_", " ")}
-        data[name] = ("time", contact[name][keep][inside], attributes)
-    dataset = xr.Dataset(data, coords={"time": ("time", t[inside], {"units": "s"}), "xyz": ["x", "y", "z"]})
+    for name, unit in (("normal_force", "N"), ("penetration_drive", "m"), ("penetration_back", "m")):
+        data[name] = ("time", np.interp(t, known, contact[name]), {"units": unit, "long_name": name.replace("_", " ")})
+    latest = np.clip(np.searchsorted(known, t, side="right") - 1, 0, known.size - 1)
+    for name in ("pairs_drive", "pairs_back"):
+        data[name] = ("time", contact[name][latest], {"units": "1", "long_name": name.replace("_", " ")})
+    dataset = xr.Dataset(data, coords={"time": ("time", t, {"units": "s"}), "xyz": ["x", "y", "z"]})
     plain = acceleration.drop_vars(["channel_units", "units"], errors="ignore")
     dataset["acceleration"] = plain.rename(time="signal_time", channel="component")
     dataset["acceleration"].attrs.update(
         units="m/s^2", long_name="force on the driven gear over its mass (Newton's second law)"
     )
-    both = xr.concat([levels["band"], levels["orders"]], dim="way").assign_coords(way=["band", "orders"])
-    dataset["gmf_rms"] = both.drop_vars(["channel_units", "units"], errors="ignore").rename(channel="component")
+    ways = xr.concat([levels["band"], levels["orders"]], dim="way").assign_coords(way=["band", "orders"])
+    dataset["gmf_rms"] = ways.drop_vars(["channel_units", "units"], errors="ignore").rename(channel="component")
     dataset["gmf_rms"].attrs = {"units": "m/s^2", "long_name": "RMS of the gear mesh frequency harmonics"}
     dataset.attrs = attributes_of(case, solution)
     return dataset
+
+
+def _is_even(t: np.ndarray, rate: float) -> bool:
+    return bool(np.allclose(np.diff(t) * rate, 1.0, atol=1e-6))
 
 
 def transmission_error(case: Case, solution: Solution) -> np.ndarray:
