@@ -72,10 +72,13 @@ class Solution:
         """What happened, when, which unknown, what to try; which constraints were set aside as redundant."""
         if self._conflict is not None:
             return self._conflict
+        parts = [self.result.message]
+        if not self.result.success and self.t.size:
+            parts.append(self.system.locking(self._pose[-1], float(self.t[-1])) or "")
         aside = self.system.report.redundant if self.system.report is not None else []
-        if not aside:
-            return self.result.message
-        return f"{self.result.message} Set aside as redundant: {', '.join(aside)}."
+        if aside:
+            parts.append(f"Set aside as redundant: {', '.join(aside)}.")
+        return " ".join(part for part in parts if part)
 
     @property
     def stats(self):

@@ -34,6 +34,9 @@ CONFLICT_SHARE = 1e-5
 """Rate of a redundant constraint, of the sum of its terms, from which it is not redundant but in conflict."""
 """Of loads that depend on each other, at the start; friction converges like a power of the friction coefficient."""
 
+LARGEST_LOCK = 600
+"""Constraint rows up to which the cause of a failure is sought in a locking position."""
+
 FORMULATIONS = {"I3": T.I3, "SI2": T.SI2, "SI1": T.SI1}
 
 BLOCKS = {
@@ -246,13 +249,39 @@ class System:
             builder.rows, builder.terms, builder.coef, builder.reference = kept
         moving = jacobian[dropped] @ pose[:, 12:18].ravel()
         size = abs(jacobian[dropped]) @ np.abs(pose[:, 12:18]).ravel() + np.abs(rate[dropped] - moving)
-        share = np.abs(rate[dropped]) / np.maximum(size, 1e-9)
+        # a row whose own rate is rounding, as across the plane of a planar linkage, is held against all speeds
+        floor = max(1e-3 * float(np.abs(pose[:, 12:18]).max(initial=0.0)), 1e-9)
+        share = np.abs(rate[dropped]) / np.maximum(size, floor)
         worst = int(np.argmax(share))
         if share[worst] <= CONFLICT_SHARE:
             return None
         return (
             f"conflicting constraints: {names[worst]} is implied by the other joints and motions, but they leave it "
             f"violated at a rate of {abs(rate[dropped][worst]):.3g} per second; remove it or correct its motion"
+        )
+
+    def locking(self, pose: np.ndarray, t: float) -> str | None:
+        """Return which constraint rows are about to depend on each other at a pose, None when they are not.
+
+        At a position where a mechanism locks the constraint Jacobian loses rank; near it, its smallest singular value
+        is well below that of the initial position.
+        """
+        if not self.row_names or len(self.row_names) > LARGEST_LOCK:
+            return None
+        scale = 1.0 / np.sqrt(self.coordinate_weights())
+
+        def smallest(at: np.ndarray, time: float) -> tuple[float, np.ndarray]:
+            left, values, _ = np.linalg.svd(self.constraint_jacobian(at, time)[0].toarray() * scale)
+            return float(values[-1]), left[:, -1]
+
+        value, direction = smallest(pose, t)
+        if not np.isfinite(value) or value > 0.25 * smallest(self.pose, self.t0)[0]:
+            return None
+        rows = np.argsort(-np.abs(direction))[:3]
+        named = ", ".join(self.row_names[r] for r in rows if abs(direction[r]) > 0.1 * np.abs(direction).max())
+        return (
+            f"The mechanism is near a position where it locks, or can branch: {named} come to depend on each other. "
+            "Check the lengths, and whether the motions ask for more than the mechanism can reach."
         )
 
     def initialise(self) -> initial.InitialReport:

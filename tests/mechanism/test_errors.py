@@ -126,6 +126,36 @@ def test_redundant_constraints_are_named_and_set_aside():
     assert solution.constraint_violation.max() < 1e-9
 
 
+@pytest.mark.parametrize("integrator", ["WSTIFF", "IDA"])
+def test_locking_is_named(integrator):
+    """A crank of 1 m on a rod of 0.8 m cannot turn past asin 0.8 = 0.927 rad."""
+    m = Mechanism("slider crank", gravity=(0, -9.81, 0))
+    crank = m.body("crank", 1.0, UNIT, position=(0.5, 0, 0))
+    rod, slider = m.body("rod", 1.0, UNIT, position=(1.4, 0, 0)), m.body("slider", 1.0, UNIT, position=(1.8, 0, 0))
+    main = m.revolute("main", crank, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    m.revolute("big end", rod, crank, at=(1, 0, 0), axis=(0, 0, 1))
+    m.revolute("small end", slider, rod, at=(1.8, 0, 0), axis=(0, 0, 1))
+    m.translational("bore", slider, m.ground, at=(1.8, 0, 0), axis=(1, 0, 0))
+    m.rotation("drive", main, "TIME")
+    solution = m.simulate(2.0, integrator=integrator)
+    assert not solution.success
+    assert solution.t[-1] == pytest.approx(np.arcsin(0.8), abs=5e-3)
+    assert "near a position where it locks" in solution.message
+    assert "bore" in solution.message or "end" in solution.message
+    assert "drive" in solution.message or "motions" in solution.message
+
+
+def test_planar_linkages_are_no_conflict():
+    """Rows across the plane have rates of rounding only; they do not contradict the motion."""
+    m = Mechanism("four-bar", gravity=(0, -9.81, 0))
+    points = [(0, 0, 0), (0, 1, 0), (2, 1, 0), (2, 0, 0)]
+    bars = [m.body(f"bar{k}", 1.0, UNIT, position=(np.array(points[k]) + points[k + 1]) / 2) for k in range(3)]
+    for k, (i, j) in enumerate(zip([*bars, m.ground], [m.ground, *bars])):
+        m.revolute(f"pin{k}", i, j, at=points[k], axis=(0, 0, 1))
+    m.rotation("drive", m.joints["pin0"], "2*TIME")
+    assert m.simulate(3.0, tol=1e-8).success
+
+
 def test_conflicting_constraints():
     m = Mechanism("conflict")
     body = m.body("b", 1.0, UNIT)
