@@ -147,7 +147,6 @@ PERFECT = {
     ),
     "broken teeth": (GearPair.paper(faults=[BrokenTooth(tooth=k, lost=0.4) for k in range(0, 29, 3)], **ELASTIC), 1),
     "chipped teeth": (GearPair.paper(faults=[ChippedCorner(tooth=k) for k in range(0, 29, 3)], **ELASTIC), 11),
-    "pits": (GearPair.paper(faults=[Pit(tooth=k) for k in range(29)], **ELASTIC), 11),
 }
 
 
@@ -163,7 +162,7 @@ def test_no_jumps(name):
 @pytest.mark.parametrize("name", PERFECT)
 def test_no_jumps_on_many_paths(name):
     pair, slices = PERFECT[name]
-    assert worst_jump(pair, slices, 5000, seed=2)[0] < 1e-5
+    assert worst_jump(pair, slices, 4000, seed=2)[0] < 1e-5
 
 
 @pytest.mark.parametrize(("z1", "z2", "slices"), [(17, 38, 1), (17, 38, 7), (18, 120, 1)])
@@ -174,12 +173,13 @@ def test_corners_inside_the_base_circle(z1, z2, slices):
     assert jump < 6e-3
 
 
-@pytest.mark.parametrize("fault", [Eccentricity(), GradedFlanks(grade=7)])
-def test_deviating_flanks_kink_where_a_corner_takes_over(fault):
-    # the gap of a flank with a deviation is continuous; its slope steps by that of the deviation, a few 1e-3
+@pytest.mark.parametrize(("fault", "slope"), [(Eccentricity(), 1e-3), (GradedFlanks(grade=7), 6e-3), (Pit(), 0.1)])
+def test_deviating_flanks_kink_where_a_corner_takes_over(fault, slope):
+    # the gap of a flank with a deviation is continuous; its slope steps by that of the deviation along the profile:
+    # 20 um of eccentricity over 22 mm, waves of 5 um, the rim of a pit 50 um deep and 2 mm high
     jump, touched = worst_jump(GearPair.paper(faults=[fault], **ELASTIC), 1, 1500, lean=0.003)
     assert touched >= 50
-    assert jump < 6e-3
+    assert jump < slope
 
 
 @pytest.mark.parametrize(("slices", "bound"), [(1, 1e-4), (9, 5e-2)])
