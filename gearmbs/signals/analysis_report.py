@@ -93,7 +93,7 @@ class AnalysisReport:
         parts = [
             f"# Analysis of {self.source}",
             "",
-            f"- Record: {len(channels)} channels, {self.duration:.3f} s at {self.rate:g} Hz",
+            f"- Record: {len(channels)} channel{'s' * (len(channels) > 1)}, {self.duration:.3f} s at {self.rate:g} Hz",
             f"- Gear mesh frequency: {self.gmf:.2f} Hz = {self.teeth[0]} teeth x {self.speed / (2 * math.pi):.4f} Hz "
             f"({rpm:.1f} rpm), {self.speed_origin}",
             *(f"- {note}" for note in self.notes),
