@@ -148,6 +148,12 @@ class Solution:
         rows = [k for k, name in enumerate(self.system.row_names) if name.rsplit(": ", 1)[0] == joint]
         if not rows:
             known = sorted({name.rsplit(": ", 1)[0] for name in self.system.row_names})
+            aside = self.system.report.redundant if self.system.report is not None else []
+            if any(name.rsplit(": ", 1)[0] == joint for name in aside):
+                raise KeyError(
+                    f"joint {joint!r} was set aside as redundant, so its share of the load is not determined: "
+                    f"{', '.join(known)} carry all of it"
+                )
             raise KeyError(f"joint {joint!r}; the joints are {', '.join(known)}")
         return self._force[:, rows].sum(axis=1), self._moment[:, rows].sum(axis=1)
 

@@ -452,6 +452,24 @@ class GearPair:
 
         return touching_angle(self, driver_angle)
 
+    def __repr__(self) -> str:
+        one, two = self.driver, self.driven
+        parts = [
+            f"{one.teeth}/{two.teeth} teeth",
+            f"module {1e3 * one.module:.4g} mm",
+            f"centre distance {1e3 * self.centre_distance:.4f} mm",
+            f"backlash {1e3 * self.normal_backlash:.4g} mm",
+        ]
+        if self.misalignment:
+            parts.append(f"{self.plane} {math.degrees(self.misalignment):.4g} deg")
+        parts += [fault.label for fault in self.faults]
+        return f"GearPair({', '.join(parts)})"
+
+    def _repr_html_(self) -> str:
+        from gearmbs.gears.show import pair_html
+
+        return pair_html(self)
+
     def __rich__(self) -> object:
         from gearmbs.gears.show import pair_table
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import math
 from typing import TYPE_CHECKING
 
@@ -51,3 +52,15 @@ def pair_table(pair: GearPair) -> Table:
             "jams", f"needs {pair.jam_backlash * mm:.4f} mm of normal backlash, has {pair.normal_backlash * mm:.4f}", ""
         )
     return table
+
+
+def pair_html(pair: GearPair) -> str:
+    """Return the table as HTML for a notebook."""
+    table = pair_table(pair)
+    columns = [list(column.cells) for column in table.columns]
+    head = "".join(f"<th>{html.escape(str(c.header))}</th>" for c in table.columns)
+    rows = "".join(
+        "<tr>" + "".join(f"<td>{html.escape(str(cell))}</td>" for cell in row) + "</tr>" for row in zip(*columns)
+    )
+    title = html.escape(str(table.title))
+    return f"<table><caption>{title}</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -71,9 +72,17 @@ def inertia_matrix(value: float | Sequence[float] | np.ndarray, field: str) -> n
     Raises
     ------
     ModelError
-        If the matrix is not symmetric, not finite, has a negative moment or violates the triangle inequality.
+        If the matrix is not symmetric, not finite or has a negative moment.
+
+    Warns
+    -----
+    UserWarning
+        If a moment exceeds the sum of the other two, which no rigid body can do; the equations can.
     """
-    raw = np.array(value, dtype=float)
+    try:
+        raw = np.array(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ModelError(f"{field}: {value!r} is not made of numbers; give moments in kg m^2") from error
     if raw.shape == (3,):
         out = np.diag(raw)
     elif raw.shape == (6,):
@@ -90,4 +99,9 @@ def inertia_matrix(value: float | Sequence[float] | np.ndarray, field: str) -> n
     moments = np.linalg.eigvalsh(out)
     if moments[0] < -1e-9 * max(moments[2], 1e-300):
         raise ModelError(f"{field}: principal moments {moments} kg m^2; none may be negative")
+    if moments[2] > (1.0 + 1e-6) * (moments[0] + moments[1]):
+        warnings.warn(
+            f"{field}: principal moments {moments} kg m^2; the largest exceeds the sum of the others, as in no body",
+            stacklevel=4,
+        )
     return 0.5 * (out + out.T)

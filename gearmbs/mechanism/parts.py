@@ -141,6 +141,8 @@ def make_body(
         If mass or inertia is negative or not finite, or a vector is malformed.
     """
     label = f"body '{name}'"
+    if not isinstance(mass, (int, float, np.number)):
+        raise ModelError(f"{label}: mass = {mass!r} is not a number; give it in kg")
     if not np.isfinite(mass) or mass < 0.0:
         raise ModelError(f"{label}: mass = {mass} kg; it must be a positive number")
     return Body(

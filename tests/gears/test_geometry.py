@@ -175,3 +175,11 @@ def test_pairs_of_any_size(z1, z2, module, error, thinning):
     assert pair.normal_backlash == pytest.approx(expected, abs=1e-12)
     assert one.half_angle(one.tip_radius) > 0
     assert pair.path_of_contact < pair.line_of_action
+
+
+def test_pair_shows_itself():
+    pair = GearPair.paper(misalignment="1 deg", backlash="0.1 mm")
+    assert repr(pair) == (
+        "GearPair(29/29 teeth, module 3.065 mm, centre distance 88.8710 mm, backlash 0.1 mm, skew 1 deg)"
+    )
+    assert "<td>contact ratio</td><td>1.6" in pair._repr_html_()

@@ -20,6 +20,8 @@ def pendulum() -> Mechanism:
     ("options", "words"),
     [
         ({"mass": -1.0}, "body 'b': mass = -1.0 kg"),
+        ({"mass": "2 lb"}, "body 'b': mass = '2 lb' is not a number; give it in kg"),
+        ({"inertia": ("a", 1, 1)}, "body 'b': inertia"),
         ({"mass": float("nan")}, "body 'b': mass = nan"),
         ({"inertia": (1, -1, 1)}, "body 'b': inertia"),
         ({"inertia": (1, 2)}, "give 3 moments"),
@@ -165,6 +167,11 @@ def test_conflicting_constraints():
         m.compile().initialise()
 
 
+def test_moments_no_body_can_have():
+    with pytest.warns(UserWarning, match="exceeds the sum of the others"):
+        Mechanism("m").body("b", 1.0, (1.0, 1.0, 5.0))
+
+
 @pytest.mark.parametrize(("first", "second", "words"), [(1.0, 2.0, "again"), (1.0, 1.0, None)])
 def test_two_motions_on_one_hinge(first, second, words):
     """The second motion repeats the first or contradicts it from the start."""
@@ -180,6 +187,8 @@ def test_two_motions_on_one_hinge(first, second, words):
     solution = m.simulate(1.0)
     assert solution.success
     assert "Set aside as redundant: again" in solution.message
+    with pytest.raises(KeyError, match="set aside as redundant"):
+        solution.reaction("again")
 
 
 def test_motions_that_part_later_are_a_conflict():
