@@ -175,6 +175,55 @@ def test_cumulative_pitch_error_is_a_wave_of_displaced_teeth(rotation):
         pair.with_faults(CumulativePitchError(order=20)).contact_tables()
 
 
+def removed(fault, places, stations):
+    """Material a fault takes from the driver's drive flank of tooth 0, where the flanks touch at these strings, m."""
+    pair = GearPair.paper(backlash="0.2 mm")
+    gear = pair.wheels[0]
+    meshes = [StaticMesh(pair, 41), StaticMesh(pair.with_faults(fault), 41)]
+    found = np.empty((len(places), len(stations)))
+    for k, string in enumerate(places):
+        # tooth 0 touches at a string s when the driver stands at s / r_b - psi - alpha
+        angle = string / gear.base_radius - gear.base_half_angle - pair.working_pressure_angle
+        driven = meshes[0].touching_angle(angle)
+        rows = [mesh.gaps(angle, driven, np.array(stations)).copy() for mesh in meshes]
+        mine = [r[(r[:, 0] == 1) & (r[:, 1] == 0)] for r in rows]
+        found[k] = mine[1][:, 4] - mine[0][:, 4]
+    return found
+
+
+def test_shapes_stand_where_they_were_put():
+    pair = GearPair.paper(backlash="0.2 mm")
+    tip, pitch = pair.driver.tip_string, pair.driver.base_radius * math.tan(pair.working_pressure_angle)
+    start = pair.line_of_action - pair.driven.tip_string
+    micron = 1e-6
+    # 20 um at the tip, parabola over 3 mm: a quarter of it half-way, nothing below
+    relief = removed(TipRelief(amount="20 um", power=2.0), [tip - 1e-9, tip - 1.5e-3, tip - 4e-3], [0.0])[:, 0]
+    assert relief == pytest.approx([20 * micron, 5 * micron, 0.0], abs=0.1 * micron)
+    # the same from the start of the active profile upwards, where the curve through the stations rounds the bend
+    relief = removed(RootRelief(amount="20 um", power=2.0), [start + 1e-9, start + 1.5e-3, start + 4e-3], [0.0])[:, 0]
+    assert relief == pytest.approx([20 * micron, 5 * micron, 0.0], abs=0.3 * micron)
+    # parabola over the face: 10 um at its ends, a quarter of it half-way
+    crown = removed(Crowning(amount="10 um"), [pitch], [-9.999e-3, -5e-3, 0.0, 5e-3])[0]
+    assert crown == pytest.approx([10 * micron, 2.5 * micron, 0.0, 2.5 * micron], abs=0.05 * micron)
+    # a pit 50 um deep, 5 mm wide, at 3 mm from mid-face on the pitch circle
+    pit = removed(Pit(position="3 mm"), [pitch], [3e-3, 3e-3 + 1.25e-3, 6e-3, -3e-3])[0]
+    assert pit == pytest.approx([50 * micron, 37.5 * micron, 0.0, 0.0], abs=2 * micron)
+    # wear: nothing where nothing slides, all of it where most does
+    worn = removed(Wear(depth="20 um"), [pitch, start + 1e-9], [0.0])[:, 0]
+    assert worn == pytest.approx([0.0, 20 * micron], abs=0.7 * micron)
+
+
+def test_chipped_corner_shortens_one_end():
+    # 2 mm of height missing at +z, nothing from 5 mm on: the corner bears lower there
+    fault = ChippedCorner(height="2 mm", length="5 mm", tooth=0)
+    canvas = canvases(GearPair.paper().with_faults(fault))[0]
+    gear = GearPair.paper().driver
+    radius = np.hypot(gear.base_radius, canvas.tip[:, 0])
+    expected = gear.tip_radius - 2e-3 * np.maximum(0.0, 1 - (10e-3 - canvas.station) / 5e-3)
+    assert radius == pytest.approx(np.tile(expected, (2, 1)), abs=1e-12)
+    assert np.all(canvas.tip[:, 1:] == gear.tip_string)
+
+
 def test_broken_tooth_touches_lower_down():
     pair = GearPair.paper()
     faulty = pair.with_faults(BrokenTooth(lost=0.25, tooth=0))
