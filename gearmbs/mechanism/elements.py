@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
+from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.functions import TimeFunction
 from gearmbs.mechanism.parts import Marker
 
@@ -44,6 +46,39 @@ class GearContact:
 
     def __repr__(self) -> str:
         return f"GearContact({self.name!r}, {self.i.body.name!r} with {self.j.body.name!r})"
+
+
+def check_wheels(contact: GearContact) -> None:
+    """Look at where two wheels stand at the start.
+
+    Raises
+    ------
+    ModelError
+        If they stand in each other: closer than the sum of their base radii.
+
+    Warns
+    -----
+    UserWarning
+        If they are out of each other's reach.
+    """
+    wheels = getattr(contact.pair, "wheels", None)
+    if wheels is None:
+        return
+    axis = contact.i.global_orientation()[:, 2]
+    apart = contact.j.global_position() - contact.i.global_position()
+    distance = float(np.linalg.norm(apart - axis * (axis @ apart)))
+    label = f"gear contact '{contact.name}': the axes are {1e3 * distance:.4g} mm apart"
+    least = sum(wheel.base_radius for wheel in wheels)
+    most = sum(wheel.tip_radius for wheel in wheels)
+    if distance <= least:
+        raise ModelError(
+            f"{label}, less than the sum of the base radii, {1e3 * least:.4g} mm; place the wheels as the pair's "
+            "placement() says"
+        )
+    if distance > most:
+        warnings.warn(
+            f"{label}, more than the tip radii together, {1e3 * most:.4g} mm: the teeth cannot touch", stacklevel=3
+        )
 
 
 LINE, AXIS_FORCE, AXIS_TORQUE, COMPONENTS = 0, 1, 2, 3

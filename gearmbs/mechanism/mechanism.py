@@ -12,7 +12,7 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.dae.expressions import SplineData
 from gearmbs.dae.system import System
 from gearmbs.mechanism import joints as jt
-from gearmbs.mechanism.elements import ContactTables, GearContact, Load, State, Torque
+from gearmbs.mechanism.elements import ContactTables, GearContact, Load, State, Torque, check_wheels
 from gearmbs.mechanism.expression import Units
 from gearmbs.mechanism.friction import add_friction, friction_of
 from gearmbs.mechanism.function_text import integrated
@@ -281,6 +281,11 @@ class Mechanism(LoadMethods):
             for its own frame.
         pair : ContactTables
             Usually a :class:`gearmbs.gears.GearPair`.
+
+        Raises
+        ------
+        ModelError
+            If the wheels stand in each other. Wheels out of reach give a warning.
         """
         self._check_name(name)
         i = wheel_1 if isinstance(wheel_1, Marker) else wheel_1.marker(name=f"{name}.I")
@@ -288,6 +293,7 @@ class Mechanism(LoadMethods):
         for marker in (i, j):
             self._check_body(f"gear contact '{name}'", marker.body)
         element = GearContact(name, i, j, pair)
+        check_wheels(element)
         self.elements[name] = element
         return element
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gearmbs.dae.result import Status
+from gearmbs.gears import GearPair
 from gearmbs.mechanism import AssemblyError, Mechanism, ModelError, SingularModelError, polynomial, ramp, step
 
 UNIT = (1.0, 1.0, 1.0)
@@ -252,3 +253,15 @@ def test_table_of_unknowns():
     assert "theta_psi(rod)" in table
     assert "lambda(pin: coincident x)" in table
     assert "(5), (7)" in table
+
+
+def test_wheels_in_each_other_or_out_of_reach():
+    pair = GearPair.paper()
+    m = Mechanism("wheels")
+    one = m.body("one", 1.0, UNIT)
+    same = m.body("same", 1.0, UNIT)
+    far = m.body("far", 1.0, UNIT, position=(0.2, 0.0, 0.0))
+    with pytest.raises(ModelError, match="gear contact 'mesh': the axes are 0 mm apart, less than the sum of the base"):
+        m.gear_contact("mesh", one, same, pair)
+    with pytest.warns(UserWarning, match="the teeth cannot touch"):
+        m.gear_contact("far mesh", one, far, pair)
