@@ -88,7 +88,8 @@ def read_signal(
     path : path-like
         The file; its format follows from its name and is checked against its content.
     rate : float, optional
-        Sampling rate in Hz, needed if the file does not say. If both do, they must agree.
+        Sampling rate in Hz, needed if the file does not say. If both do, they must agree. It also stands in for the
+        times of a text file that are so rounded that they look uneven.
     units : str, sequence or mapping, optional
         Units of the channels; wins over the file's.
     speed, teeth : optional
@@ -114,7 +115,7 @@ def read_signal(
     """
     path = Path(path)
     format, content = checked_format(path, format)
-    record = _read(path, format, content, channels, progress)
+    record = _read(path, format, content, channels, progress, rate)
     return signal_from(record, path, rate=rate, units=units, speed=speed, teeth=teeth, channels=channels)
 
 
@@ -179,9 +180,16 @@ def checked_format(path: Path, format: str | None) -> tuple[str, str]:
     return format, content
 
 
-def _read(path: Path, format: str, content: str, channels: Sequence[str] | None, progress: Progress | None) -> Record:
+def _read(
+    path: Path,
+    format: str,
+    content: str,
+    channels: Sequence[str] | None,
+    progress: Progress | None,
+    rate: float | None,
+) -> Record:
     if format in ("csv", "csv.gz"):
-        return read_csv(path, format == "csv.gz", progress)
+        return read_csv(path, format == "csv.gz", progress, rate)
     if format in ("mat5", "mat7.3"):
         return read_mat(path, channels)
     if format == "uff58":

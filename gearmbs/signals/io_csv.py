@@ -29,6 +29,7 @@ CHUNK_ROWS = 1 << 17
 HEAD_LINES = 60
 # Times are written with few digits; beyond this many samples a gap is a gap.
 MAX_JUMP = 2.0
+ROUNDED_TIMES = 0.01
 COMMENT = re.compile(r"^\s*[#%]")
 KEY_VALUE = re.compile(r"^\s*[#%]*\s*([A-Za-z_][\w .]*?)\s*[:=]\s*(.+?)\s*$")
 NAME_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*$")
@@ -64,8 +65,8 @@ class _Layout:
         return found if len(self.names) > 1 else None
 
 
-def read_csv(path: Path, packed: bool, progress: Progress | None = None) -> Record:
-    """Read a text table; `packed` for gzip.
+def read_csv(path: Path, packed: bool, progress: Progress | None = None, rate: float | None = None) -> Record:
+    """Read a text table; `packed` for gzip. A known `rate` (Hz) stands in for times that are only rounded.
 
     Raises
     ------
@@ -79,10 +80,10 @@ def read_csv(path: Path, packed: bool, progress: Progress | None = None) -> Reco
             blocks.append(values)
             if progress is not None:
                 progress(fraction, "reading")
-    return _record(path, np.concatenate(blocks), layout)
+    return _record(path, np.concatenate(blocks), layout, rate)
 
 
-def csv_pieces(path: Path, packed: bool) -> Iterator[tuple[Record, float]]:
+def csv_pieces(path: Path, packed: bool, rate: float | None = None) -> Iterator[tuple[Record, float]]:
     """Read a text table block by block: records in their order, each with the fraction read by then.
 
     Raises
@@ -95,11 +96,12 @@ def csv_pieces(path: Path, packed: bool) -> Iterator[tuple[Record, float]]:
         clock, first, count = layout.clock, None, 0
         for values, fraction in _blocks(path, packed, layout):
             if first is None:
-                first = record = _record(path, values, layout)
+                first = record = _record(path, values, layout, rate)
             elif clock is not None and first.rate is not None:
                 time = float(values[0, clock]) * _time_factor(layout, clock)
                 strayed = abs(time - first.t0 - count / first.rate) * first.rate
-                if strayed > MAX_JUMP:
+                # the mean rate of rounded times is as good as the given one, and drifts from it as much
+                if strayed > (MAX_JUMP if rate is None else max(MAX_JUMP, ROUNDED_TIMES * count)):
                     raise SignalFileError(path, f"its times jump by {strayed:.3g} samples after row {count}")
                 record = replace(first, values=np.delete(values, clock, axis=1))
             else:
@@ -159,17 +161,26 @@ def _blocks(path: Path, packed: bool, layout: _Layout) -> Iterator[tuple[np.ndar
         raise SignalFileError(path, fault) from exc
 
 
+def _only_rounded(times: np.ndarray, rate: float) -> bool:
+    """True for times that never go back and whose mean rate is the given one, whatever their steps."""
+    span = float(times[-1] - times[0])
+    mean = (times.size - 1) / span if span > 0.0 else 0.0
+    return bool(np.all(np.diff(times) >= 0.0)) and abs(mean - rate) <= ROUNDED_TIMES * rate
+
+
 def _time_factor(layout: _Layout, clock: int) -> float:
     return {"ms": 1e-3, "us": 1e-6}.get(layout.units[clock], 1.0)
 
 
-def _record(path: Path, values: np.ndarray, layout: _Layout) -> Record:
+def _record(path: Path, values: np.ndarray, layout: _Layout, given: float | None = None) -> Record:
     names, units, meta, clock = layout.names, layout.units, layout.meta, layout.clock
     rate = next((float(v) for k, v in meta.items() if k.lower().replace(" ", "_") in RATE_KEYS), None)
     t0 = float(meta.get("t0", 0.0))
     if clock is not None and len(values) > 1:
         times = values[:, clock] * _time_factor(layout, clock)
         t0 = float(times[0])
+        if rate is None and given is not None and _only_rounded(times, given):
+            rate = given
         rate = rate_from_times(times, path) if rate is None else rate
         values = np.delete(values, clock, axis=1)
         names = [n for i, n in enumerate(names) if i != clock]

@@ -196,7 +196,7 @@ def _pieces(path: Path, format: str | None, settings: Mapping[str, Any]) -> Piec
     kind, content = checked_format(path, format)
     streamed: Pieces | None = None
     if kind in ("csv", "csv.gz"):
-        streamed = csv_pieces(path, kind == "csv.gz")
+        streamed = csv_pieces(path, kind == "csv.gz", settings["rate"])
     elif kind == "wav":
         streamed = wav_pieces(path)
     elif kind == "tdms":

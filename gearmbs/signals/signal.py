@@ -203,7 +203,7 @@ def uniform_rate(times: np.ndarray) -> float:
     if deviation > CLOCK_TOLERANCE * step + resolution:
         raise SignalError(
             f"time: is not uniform, it strays {deviation / step:.3g} steps from a constant rate; "
-            "resample the record first"
+            "pass rate=... if the times of a file are only rounded, resample the record otherwise"
         )
     return nice_rate(1.0 / step, step, times.size)
 

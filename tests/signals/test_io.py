@@ -398,3 +398,21 @@ def test_damage_anywhere_is_named_or_harmless(tmp_path, format):
                 said.append(str(error))
     assert said
     assert all(str(path) in text for text in said)
+
+
+def test_rounded_times_are_no_uneven_clock_if_the_rate_is_known(tmp_path):
+    """Times in whole milliseconds at 12.8 kHz repeat 12 or 13 times each."""
+    t = np.round(np.arange(200_000) / 12800.0, 3)
+    x = np.sin(np.arange(t.size))
+    np.savetxt(tmp_path / "x.csv", np.column_stack([t, x]), delimiter=",", header="time,a", comments="", fmt="%.17g")
+    with pytest.raises(SignalFileError, match="if the times of a file are only rounded"):
+        read_signal(tmp_path / "x.csv")
+    signal = read_signal(tmp_path / "x.csv", rate=12800.0)
+    assert signal.attrs["sampling_rate"] == 12800.0
+    np.testing.assert_array_equal(signal.values[:, 0], x)
+    # 15.6 s: three sections of 5 s and a rest that is left out
+    parts = list(sections(tmp_path / "x.csv", 5.0, rate=12800.0))
+    np.testing.assert_array_equal(np.concatenate([p.values[:, 0] for p in parts]), x[:192_000])
+    # another rate than the mean of the times is a contradiction, not a rounding
+    with pytest.raises(SignalFileError, match="strays"):
+        read_signal(tmp_path / "x.csv", rate=10000.0)
