@@ -69,7 +69,7 @@ def sweep(reference: ReferenceProblem, method: Method, knobs: tuple[float, ...] 
             timing, result = measure(lambda knob=knob: run(knob), REPEATS, BUDGET)
         except RunFailed as why:
             rows.append({method.knob: knob, "failed": str(why)})
-            if len(rows) > 1 and "failed" in rows[-2]:
+            if any("error" in row for row in rows) and "failed" in rows[-2]:
                 break
             continue
         error = error_of(reference, result.values)
@@ -175,7 +175,8 @@ def points(results: list[dict]) -> dict[str, dict[str, list[tuple[float, float]]
     for r in results:
         if r.get("rows"):
             rows.setdefault(r["problem"], {}).setdefault(r["family"], []).extend(r["rows"])
-    return {problem: {family: front(all_rows) for family, all_rows in by.items()} for problem, by in rows.items()}
+    fronts = {problem: {family: front(mine) for family, mine in by.items()} for problem, by in rows.items()}
+    return {problem: {family: best for family, best in by.items() if best} for problem, by in fronts.items()}
 
 
 def finish(results: list[dict]) -> dict:
@@ -210,7 +211,8 @@ def render(extra: dict) -> str:
     """Return the tables in Markdown."""
     lines = [
         "Milliseconds of processor time, medians of repeated warm runs; the best formulation of each family. "
-        "The ratio is to WSTIFF: above one the method is slower.\n"
+        "The ratio is to WSTIFF: above one the method is slower. A sweep ends where a run takes more than "
+        f"{SLOWEST:g} s.\n"
     ]
     header = ["method"]
     for target in TARGETS:
@@ -227,9 +229,12 @@ def render(extra: dict) -> str:
         lines.append(f"{text}: {'; '.join(near) if near else 'none'}.\n")
     if extra["failures"]:
         lines.append("Runs that failed:\n")
+        grouped: dict[tuple[str, str], list[dict]] = {}
         for f in extra["failures"]:
-            knob, value = f["setting"]
-            lines.append(f"* {f['problem']}, {f['method']}, {knob} {value:g}: {_first_sentence(f['why'])}")
+            grouped.setdefault((f["problem"], f["method"]), []).append(f)
+        for (problem, method), mine in grouped.items():
+            values = ", ".join(f"{f['setting'][1]:g}" for f in mine)
+            lines.append(f"* {problem}, {method}, {mine[0]['setting'][0]} {values}: {_first_sentence(mine[0]['why'])}")
         lines.append("")
     if extra["skipped"]:
         lines.append("Left out:\n")
