@@ -11,6 +11,7 @@ import pytest
 import typer
 
 from gearmbs.cli import app
+from gearmbs.studies import load_case
 from tests.docs.support import DOCS, ROOT, blocks, links, notebooks, pages, run_blocks
 
 ALL = [ROOT / "README.md", *pages()]
@@ -93,9 +94,11 @@ def test_readme_picture_is_small():
 
 
 def _examples(path, folder):
-    for block in blocks(path):
-        if block.language == "toml":
-            (folder / "case.toml").write_text(block.code, encoding="utf-8")
+    cases = [block.code for block in blocks(path) if block.language == "toml"]
+    # the first is the one that the page works with
+    for code in reversed(cases):
+        (folder / "case.toml").write_text(code, encoding="utf-8")
+        load_case(folder / "case.toml")
     run_blocks(path, "python")
 
 
