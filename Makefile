@@ -10,6 +10,7 @@ export OPENBLAS_NUM_THREADS := 1
 .PHONY: paper test quick lint types bench docs clean
 
 paper: $(VENV)/.installed
+	$(BIN)/python -m gearmbs.compile
 	$(BIN)/gearmbs paper --out $(OUT)/paper
 
 test: $(VENV)/.installed-dev

@@ -7,9 +7,12 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
+
+if TYPE_CHECKING:
+    from gearmbs.studies.run import SimulationFailed
 
 app = typer.Typer(
     name="gearmbs",
@@ -34,6 +37,8 @@ def guarded() -> Iterator[None]:
     """Turn the library's errors into messages and Ctrl-C into exit status 130."""
     try:
         yield
+    except typer.Exit:
+        raise
     except KeyboardInterrupt:
         typer.secho("gearmbs: interrupted; finished cases are kept, nothing is half-written", err=True)
         raise typer.Exit(130) from None
@@ -70,8 +75,32 @@ def stage_bar(name: str) -> Iterator[Callable[[float, str], None]]:
         yield lambda fraction, stage: progress.update(task, completed=fraction, stage=stage)
 
 
-def _raise_interrupt(*_args) -> None:
-    raise KeyboardInterrupt
+def keep_partial(failure: SimulationFailed, path: Path) -> NoReturn:
+    """Write what a run has computed before it stopped, and end: with status 130 if the user interrupted it."""
+    from gearmbs.studies.run import SimulationInterrupted
+    from gearmbs.studies.store import write_dataset
+
+    partial = failure.partial()
+    if partial is None:
+        raise failure
+    write_dataset(path, partial)
+    if isinstance(failure, SimulationInterrupted):
+        end = float(partial.time[-1])
+        typer.secho(f"gearmbs: interrupted at t = {end:.6g} s; what was computed until then is in {path}", err=True)
+        raise typer.Exit(130) from None
+    raise RuntimeError(f"{failure}\nWhat was computed until then is in {path}") from failure
+
+
+def file_stem(name: str) -> str:
+    """Return the name of a case as part of a file's name."""
+    return name.replace(", ", "_").replace("/", "_")
+
+
+def _interrupt(*_args) -> None:
+    """Take a request to end like Ctrl-C, also where Ctrl-C is ignored, as in a background job."""
+    if signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None):
+        raise KeyboardInterrupt
+    signal.raise_signal(signal.SIGINT)
 
 
 @app.callback(invoke_without_command=True)
@@ -79,7 +108,7 @@ def main(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
     """Multibody gear dynamics."""
-    signal.signal(signal.SIGTERM, _raise_interrupt)
+    signal.signal(signal.SIGTERM, _interrupt)
     if version:
         import gearmbs
 
@@ -106,11 +135,14 @@ def paper(
 ) -> None:
     """Reproduce the paper: six cases, GMF table, figures 5 and 7, report."""
     with guarded():
-        from gearmbs.studies.case import make_case
-        from gearmbs.studies.paper import LOADS, paper_cases, run_paper
-        from gearmbs.studies.store import write_dataset
+        # nothing that compiles is imported before all options are known to be right
+        from gearmbs.signals import COMPONENTS
+        from gearmbs.studies.case import CaseError, make_case
+        from gearmbs.studies.limits import check_record
         from gearmbs.units import to_si
 
+        if component not in COMPONENTS:
+            raise CaseError(f"--component is {component!r}; choose one of {', '.join(COMPONENTS)}")
         data: dict = {"solver": {"integrator": integrator.upper()}, "fault": {"plane": misalignment}}
         for section, key, value in (
             ("operation", "speed", speed),
@@ -123,21 +155,33 @@ def paper(
             if value is not None:
                 data.setdefault(section, {})[key] = value
         data["friction"] = {"enabled": friction}
+        if torque is not None:
+            data.setdefault("operation", {})["torque"] = torque
         base = make_case(data, "options")
-        low = to_si(torque, "torque", "--torque") if torque is not None else LOADS[0]
+        low = base.operation.torque
         tilt = to_si(angle, "angle", "--angle")
+        check_record(base.changed(operation={"torque": 2.0 * low}, fault={"misalignment": tilt}), "options")
+
+        from gearmbs.studies.paper import paper_cases, run_paper
+        from gearmbs.studies.run import SimulationFailed
+        from gearmbs.studies.store import write_dataset
+
         settings: dict[str, Any] = {"torques": (low, 2.0 * low), "misalignment": tilt}
         names = [case.name for case in paper_cases(base=base, **settings)]
         single = out / "cases"
         with case_bars(names) as move:
-            study = run_paper(
-                base,
-                component=component,
-                workers=workers,
-                progress=move,
-                done=lambda case, record: write_dataset(single / f"{case.name.replace(', ', '_')}.nc", record),
-                **settings,
-            )
+            try:
+                study = run_paper(
+                    base,
+                    component=component,
+                    workers=workers,
+                    progress=move,
+                    done=lambda case, record: write_dataset(single / f"{file_stem(case.name)}.nc", record),
+                    **settings,
+                )
+            except SimulationFailed as failure:
+                name = file_stem(failure.case.name) if failure.case is not None else "failed"
+                keep_partial(failure, single / f"{name}.partial.nc")
         paths = study.save(out)
         for claim in study.claims():
             mark = "held    " if claim.held else "NOT HELD"
@@ -153,10 +197,14 @@ def run(
     """Simulate one case file and write its record as NetCDF."""
     with guarded():
         from gearmbs.studies.case import load_case
+        from gearmbs.studies.limits import check_record, remarks
+
+        case = load_case(case_file)
+        check_record(case, str(case_file))
+
         from gearmbs.studies.run import SimulationFailed, run_case
         from gearmbs.studies.store import write_dataset
 
-        case = load_case(case_file)
         target = out or case_file.with_suffix(".nc")
         operation = case.operation
         span = operation.run_up + operation.settling + operation.duration
@@ -164,15 +212,15 @@ def run(
             try:
                 data = run_case(case, lambda t: move(case.name, min(t / span, 1.0)))
             except SimulationFailed as failure:
-                part = target.with_name(f"{target.stem}.partial.nc")
-                write_dataset(part, failure.solution.to_dataset())
-                raise RuntimeError(f"{failure}\nWhat was computed until then is in {part}") from failure
+                keep_partial(failure, target.with_name(f"{target.stem}.partial.nc"))
         write_dataset(target, data)
         levels = data["gmf_rms"].sel(way="band")
         typer.echo(f"{'component':<18}" + "".join(f"{h:>4} x GMF" for h in levels.harmonic.values) + "   RMS, m/s^2")
         for component in levels.component.values:
             row = levels.sel(component=component).values
             typer.echo(f"{component!s:<18}" + "".join(f"{v:10.4g}" for v in row))
+        for remark in remarks(case):
+            typer.echo(f"note: {remark}", err=True)
         typer.echo(f"wrote {target}")
 
 

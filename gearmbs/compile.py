@@ -12,10 +12,10 @@ import sys
 import time
 
 STAGES = (
-    ("gearmbs.contact", "gearmbs.dae.expressions", "gearmbs.dae.wstiff"),
+    ("gearmbs.gears.transmission", "gearmbs.dae.expressions", "gearmbs.dae.wstiff"),
     ("gearmbs.dae.jacobian", "gearmbs.dae.residual"),
     ("gearmbs.dae.outputs", "gearmbs.dae.rereference"),
-    ("gearmbs.studies", "gearmbs.signals"),
+    ("gearmbs.studies.paper", "gearmbs.signals"),
 )
 """Modules whose kernels do not depend on each other within a stage."""
 

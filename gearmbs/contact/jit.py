@@ -7,6 +7,8 @@ from typing import Any
 
 from numba import njit, types
 
+import gearmbs._announce  # noqa: F401
+
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function for use inside other kernels.

@@ -9,6 +9,30 @@ from gearmbs.dae.result import Status
 
 NAMES_SHOWN = 6
 
+ADVICE = {
+    Status.NOT_FINITE: (
+        "Look for a division by zero, the root or logarithm of a negative number, or a table that ends there."
+    ),
+    Status.STEP_TOO_SMALL: "Look for a discontinuity there, loosen its tolerance, or lower min_step (HMIN).",
+    Status.NEWTON_FAILURE: (
+        "Check the Jacobian if it is your own, look for a discontinuity, or try corrector='modified'."
+    ),
+    Status.TOO_MANY_REJECTIONS: (
+        "The equations may jump there: use an event or a breakpoint at the jump, or loosen the tolerance of that "
+        "unknown."
+    ),
+    Status.TOO_MANY_STEPS: "Raise max_steps or loosen the tolerance.",
+    Status.SOLVER_FAILURE: (
+        "Try a looser tolerance, a smaller maximum step, a smoother start, or the WSTIFF integrator."
+    ),
+}
+"""What to try, for those who write the equations; others bring their own in `DAEProblem.advice`."""
+
+
+def advice(problem: DAEProblem, status: Status) -> str:
+    """Return what to try after a failure, in the words of whoever states the problem."""
+    return problem.advice.get(status, ADVICE[status])
+
 
 def unknown_name(problem: DAEProblem, index: int) -> str:
     """Return the name of unknown ``index``, or ``y[index]``."""
@@ -50,7 +74,7 @@ def not_finite(problem: DAEProblem, t: float, row: int, what: str = "equation") 
     """Explain NaN or infinity out of a user's function."""
     return (
         f"{Status.NOT_FINITE.sentence} Near t = {t:.9g} {what} {row} is NaN or infinite, and smaller steps did not "
-        "help. Look for a division by zero, the root or logarithm of a negative number, or a table that ends there."
+        f"help. {advice(problem, Status.NOT_FINITE)}"
     )
 
 
@@ -58,8 +82,7 @@ def step_too_small(problem: DAEProblem, t: float, h: float, worst: int, error: f
     """Explain a run that would need steps below HMIN."""
     return (
         f"{Status.STEP_TOO_SMALL.sentence} At t = {t:.9g} with h = {h:.3g}; the error is dominated by "
-        f"{unknown_name(problem, worst)} ({error:.3g} times its tolerance). Look for a discontinuity there, loosen its "
-        "tolerance, or lower min_step (HMIN)."
+        f"{unknown_name(problem, worst)} ({error:.3g} times its tolerance). {advice(problem, Status.STEP_TOO_SMALL)}"
     )
 
 
@@ -67,8 +90,7 @@ def newton(problem: DAEProblem, t: float, h: float, worst: int) -> str:
     """Explain a corrector that fails at the smallest step."""
     return (
         f"{Status.NEWTON_FAILURE.sentence} At t = {t:.9g} with h = {h:.3g}; the largest correction is in "
-        f"{unknown_name(problem, worst)}. Check the Jacobian if it is your own, look for a discontinuity, or try "
-        "corrector='modified'."
+        f"{unknown_name(problem, worst)}. {advice(problem, Status.NEWTON_FAILURE)}"
     )
 
 
@@ -76,16 +98,15 @@ def too_many_rejections(problem: DAEProblem, t: float, h: float, worst: int) -> 
     """Explain a step that was refused again and again."""
     return (
         f"{Status.TOO_MANY_REJECTIONS.sentence} At t = {t:.9g} with h = {h:.3g}, mostly because of "
-        f"{unknown_name(problem, worst)}. The equations may jump there: use an event or a breakpoint at the jump, or "
-        "loosen the tolerance of that unknown."
+        f"{unknown_name(problem, worst)}. {advice(problem, Status.TOO_MANY_REJECTIONS)}"
     )
 
 
-def too_many_steps(t: float, steps: int) -> str:
+def too_many_steps(problem: DAEProblem, t: float, steps: int) -> str:
     """Explain that the limit on steps was reached."""
     return (
-        f"{Status.TOO_MANY_STEPS.sentence} {steps} steps took the run to t = {t:.9g}. Raise max_steps or loosen the "
-        "tolerance."
+        f"{Status.TOO_MANY_STEPS.sentence} {steps} steps took the run to t = {t:.9g}. "
+        f"{advice(problem, Status.TOO_MANY_STEPS)}"
     )
 
 

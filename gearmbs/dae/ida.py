@@ -15,6 +15,7 @@ import numpy as np
 from scipy.sparse import csc_array
 from sksundae.ida import IDA
 
+from gearmbs.dae.failures import advice, unknown_name
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 
@@ -23,6 +24,8 @@ SMALLEST_RTOL = 1e-14
 DENSE_LIMIT = 150
 """Unknowns up to which the dense factorisation is used: SuperLU_MT waits busily and stalls on a loaded machine."""
 HISTORY_GROWTH = 1024
+MAX_STEPS = 100_000
+"""Steps allowed between two outputs: 15 s of a gear pair's run, which takes some tens of steps a mesh period."""
 
 
 class _Callbacks:
@@ -74,7 +77,6 @@ def _solver(problem: DAEProblem, calls: _Callbacks, atol: np.ndarray, rtol: floa
             rtol=max(rtol, SMALLEST_RTOL),
             atol=atol,
             algebraic_idx=np.flatnonzero(~problem.differential),
-            max_num_steps=1_000_000,
             **linear,
             **options,
         )
@@ -92,6 +94,7 @@ def solve_ida(
     first_step: float = 0.0,
     min_step: float = 0.0,
     max_iterations: int = 4,
+    max_steps: int = MAX_STEPS,
     progress: Callable[[float], None] | None = None,
 ) -> DAEResult:
     """Integrate a DAE with IDA and return it at the times ``t_eval``, or at every step IDA takes.
@@ -110,6 +113,8 @@ def solve_ida(
         Relative tolerance of all unknowns; 0 gives the smallest IDA accepts (see the module's text).
     max_order, max_step, first_step, min_step, max_iterations
         Handed to IDA; 0 leaves a size to IDA.
+    max_steps : int
+        Steps allowed between two outputs, so that a run that gets stuck ends.
     progress : callable, optional
         Called with the time reached, at most a few hundred times a run.
 
@@ -133,6 +138,7 @@ def solve_ida(
         "first_step": first_step,
         "min_step": min_step,
         "max_nonlin_iters": max_iterations,
+        "max_num_steps": max_steps,
     }
     rows = _Rows(times, problem, every_step)
     epochs = [(0, idata.copy())]
@@ -230,14 +236,12 @@ def _failure(problem: DAEProblem, calls: _Callbacks, t: float, why: str, atol: n
     if not np.all(np.isfinite(out)):
         worst = int(np.flatnonzero(~np.isfinite(out))[0])
         return (
-            f"IDA stopped at t = {t:.6g} s: the equation of {problem.names[worst]} is not a finite number. "
-            "Check the forces and functions of time acting there for NaN or division by zero."
+            f"IDA stopped at t = {t:.6g} s: the equation of {unknown_name(problem, worst)} is not a finite number. "
+            f"{advice(problem, Status.NOT_FINITE)}"
         )
     moving = np.where(problem.error_mask, np.abs(calls.yp) / np.maximum(atol, 1e-300), 0.0)
     worst = int(np.argmax(moving))
-    name = problem.names[worst] if problem.names else f"y[{worst}]"
     return (
-        f"IDA stopped at t = {t:.6g} s ({why}). The unknown that changes fastest for its tolerance is {name}. "
-        "Try a looser tolerance, a smaller maximum step, a smoother start of motions and torques, "
-        "or the WSTIFF integrator."
+        f"IDA stopped at t = {t:.6g} s ({why}). The unknown that changes fastest for its tolerance is "
+        f"{unknown_name(problem, worst)}. {advice(problem, Status.SOLVER_FAILURE)}"
     )

@@ -6,8 +6,9 @@ integrator serves all of them through typed function pointers.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numba import types
@@ -59,6 +60,8 @@ class DAEProblem:
         call it after each step.
     restart_rates : callable, optional
         ``restart_rates(t, y, yp, idata, rdata)`` returns y' consistent with y after ``hook`` has rewritten y.
+    advice : mapping of Status to str
+        What to try after a failure, in the words of whoever states the problem; default: in those of `solve_dae`.
     """
 
     n: int
@@ -82,3 +85,4 @@ class DAEProblem:
     n_events: int = 0
     hook_interval: Callable[[np.ndarray], float] | None = None
     restart_rates: Callable | None = None
+    advice: Mapping[Any, str] = field(default_factory=dict)

@@ -399,7 +399,7 @@ class Run:
         if status is Status.NEWTON_FAILURE:
             return status, failures.newton(problem, t, h, worst)
         if status is Status.TOO_MANY_STEPS:
-            return status, failures.too_many_steps(t, int(st.count[s.STEPS]))
+            return status, failures.too_many_steps(problem, t, int(st.count[s.STEPS]))
         return status, failures.too_many_rejections(problem, t, h, worst)
 
     def _stats(self, wall_time: float) -> SolverStats:

@@ -1,15 +1,19 @@
 """Wheels and pairs: geometry, mass, placement in space, faults, and analyses that need no dynamics."""
 
-import gearmbs._announce  # noqa: F401
+from typing import TYPE_CHECKING
+
+from gearmbs._lazy import late
 from gearmbs.gears import faults
 from gearmbs.gears.laws import ContactLaw, Friction
 from gearmbs.gears.pair import GearPair, Placement
 from gearmbs.gears.spec import GearSpec, Material, involute
-from gearmbs.gears.transmission import (
-    TransmissionError,
-    kinematic_transmission_error,
-    loaded_transmission_error,
-)
+
+if TYPE_CHECKING:
+    from gearmbs.gears.transmission import (
+        TransmissionError,
+        kinematic_transmission_error,
+        loaded_transmission_error,
+    )
 
 __all__ = [
     "ContactLaw",
@@ -24,3 +28,13 @@ __all__ = [
     "kinematic_transmission_error",
     "loaded_transmission_error",
 ]
+
+# the contact kernels are compiled for these
+__getattr__ = late(
+    __name__,
+    {
+        "TransmissionError": "gearmbs.gears.transmission",
+        "kinematic_transmission_error": "gearmbs.gears.transmission",
+        "loaded_transmission_error": "gearmbs.gears.transmission",
+    },
+)

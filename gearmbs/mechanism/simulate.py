@@ -2,17 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.ida import solve_ida
+from gearmbs.dae.result import Status
 from gearmbs.dae.solution import Solution
 from gearmbs.mechanism.mechanism import Mechanism
 
 INTEGRATORS = ("WSTIFF", "GSTIFF", "IDA")
+ADVICE = {
+    Status.NOT_FINITE: (
+        "Look at the forces and functions of time acting there: a division by zero, a root of a negative number, a "
+        "table that ends, a load without limit."
+    ),
+    Status.STEP_TOO_SMALL: (
+        "Look for a force or motion that jumps there and smooth it (STEP) or give its time in breakpoints; loosen tol."
+    ),
+    Status.NEWTON_FAILURE: (
+        "Look for a force or motion that jumps there and smooth it (STEP) or give its time in breakpoints; try another "
+        "formulation or integrator."
+    ),
+    Status.TOO_MANY_REJECTIONS: (
+        "Something jumps there: smooth the force or motion (STEP), give its time in breakpoints, or loosen tol."
+    ),
+    Status.TOO_MANY_STEPS: "Raise max_steps or loosen tol.",
+    Status.SOLVER_FAILURE: ("Loosen tol, let motions and torques start more smoothly, or take the WSTIFF integrator."),
+}
+"""What the modeller of a mechanism can try against a failing integration."""
 
 
 def simulate(
@@ -28,6 +48,7 @@ def simulate(
     tol: float = 1e-6,
     rate_scale: float = 1.0,
     progress: bool | Callable[[float], None] = False,
+    advice: Mapping[Status, str] | None = None,
     **options,
 ) -> Solution:
     """Integrate a mechanism and return its motion and forces.
@@ -56,6 +77,8 @@ def simulate(
         motion one is interested in; 1 is ADAMS's practice.
     progress : bool or callable
         True shows a bar; a callable is given the time reached.
+    advice : mapping, optional
+        What messages of failures recommend, by status, where it should be something else than for a mechanism.
     **options
         Handed to the integrator.
 
@@ -85,6 +108,7 @@ def simulate(
         raise ModelError(f"integrator: {integrator!r} is unknown; choose one of {', '.join(INTEGRATORS)}")
     system = mechanism.compile(t_start)
     problem = system.problem(formulation, rate_scale)
+    problem.advice = {**ADVICE, **(advice or {})}
     first, last = float(t_eval[0]), float(t_eval[-1])
     times = None if every_step else t_eval
     with _reporter(progress, first, last) as report:

@@ -1,11 +1,16 @@
 """Studies: pure functions from a validated case to a result."""
 
+from typing import TYPE_CHECKING
+
+from gearmbs._lazy import late
 from gearmbs.studies.case import Case, CaseError, load_case, make_case
-from gearmbs.studies.exchange import record_signal
-from gearmbs.studies.paper import Claim, PaperStudy, paper_cases, run_paper
-from gearmbs.studies.parallel import run_cases
-from gearmbs.studies.rig import gear_rig
-from gearmbs.studies.run import SimulationFailed, run_case, simulate_case
+
+if TYPE_CHECKING:
+    from gearmbs.studies.exchange import record_signal
+    from gearmbs.studies.paper import Claim, PaperStudy, paper_cases, run_paper
+    from gearmbs.studies.parallel import run_cases
+    from gearmbs.studies.rig import gear_rig
+    from gearmbs.studies.run import SimulationFailed, SimulationInterrupted, run_case, simulate_case
 
 __all__ = [
     "Case",
@@ -13,6 +18,7 @@ __all__ = [
     "Claim",
     "PaperStudy",
     "SimulationFailed",
+    "SimulationInterrupted",
     "gear_rig",
     "load_case",
     "make_case",
@@ -23,3 +29,21 @@ __all__ = [
     "run_paper",
     "simulate_case",
 ]
+
+# what simulates compiles; a case can be made and checked without
+__getattr__ = late(
+    __name__,
+    {
+        "record_signal": "gearmbs.studies.exchange",
+        "Claim": "gearmbs.studies.paper",
+        "PaperStudy": "gearmbs.studies.paper",
+        "paper_cases": "gearmbs.studies.paper",
+        "run_paper": "gearmbs.studies.paper",
+        "run_cases": "gearmbs.studies.parallel",
+        "gear_rig": "gearmbs.studies.rig",
+        "SimulationFailed": "gearmbs.studies.run",
+        "SimulationInterrupted": "gearmbs.studies.run",
+        "run_case": "gearmbs.studies.run",
+        "simulate_case": "gearmbs.studies.run",
+    },
+)

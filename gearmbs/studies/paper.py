@@ -259,10 +259,14 @@ def combine(cases: list[Case], records: list[xr.Dataset], component: str) -> xr.
     together.attrs = {
         k: v for k, v in records[0].attrs.items() if k not in statistics and k not in ("case", "case_json")
     }
-    together.attrs.pop("operation_torque")
-    for key in ("fault_misalignment", "fault_centre_distance_error"):
+    for key in ("operation_torque", "operation_torque_units"):
         together.attrs.pop(key)
-        together = together.assign_coords({key: ("state", [r.attrs[key] for r in rows[0]])})
+    for key in ("fault_misalignment", "fault_centre_distance_error", "contact_ratio"):
+        together.attrs.pop(key)
+        units = {"units": together.attrs.pop(f"{key}_units", "1")}
+        together = together.assign_coords({key: ("state", [r.attrs[key] for r in rows[0]], units)})
+    said = [f"{state}: {r.attrs['remarks']}" for state, r in zip(STATES, rows[0]) if r.attrs["remarks"] != "none"]
+    together.attrs["remarks"] = "; ".join(said) or "none"
     together.attrs["title"] = "gear pair: the paper's six cases"
     together.attrs["scaling"] = (
         f"factor {factor:.8g}: healthy at low load, {component}, to an RMS of {TARGET_RMS} m/s^2; kept for all"

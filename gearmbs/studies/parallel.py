@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import threading
+import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 
 import xarray as xr
 
 from gearmbs.studies.case import Case
+from gearmbs.studies.limits import check_record
+from gearmbs.studies.processes import run_jobs
 from gearmbs.studies.run import run_case
 
-ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+REPORT_SECONDS = 0.2
+"""Shortest time between two reports of a process."""
 
 
 class Cancelled(RuntimeError):
@@ -41,20 +44,22 @@ def run_cases(
     workers : int, optional
         Default: the cores available.
     progress : callable, optional
-        ``progress(name, fraction)`` from time to time; only at the end of each case when it runs in a process.
+        ``progress(name, fraction)`` from time to time.
     done : callable, optional
         ``done(case, record)`` as soon as a case is finished, so that nothing computed is lost if a later one fails.
 
     Raises
     ------
     ValueError
-        If two cases share a name.
+        If two cases share a name, or the record of one could not be evaluated; nothing is simulated then.
     SimulationFailed
-        If a case fails; the others are stopped.
+        If a case fails; the others are stopped. What was computed of it is in its ``partial()``.
     """
     names = [case.name for case in cases]
     if len(set(names)) != len(names):
         raise ValueError(f"cases: the names {names} are not all different; name each case")
+    for case in cases:
+        check_record(case)
     workers = max(1, min(workers or available_cores(), len(cases)))
     compiled = all(case.solver.integrator != "IDA" for case in cases)
     if workers == 1 or compiled:
@@ -62,62 +67,67 @@ def run_cases(
     return _in_processes(cases, workers, progress, done)
 
 
+def _span(case: Case) -> float:
+    """Simulated time of a case up to the end of its record, s."""
+    return case.operation.run_up + case.operation.settling + case.operation.duration
+
+
 def _in_threads(cases, workers, progress, done) -> list[xr.Dataset]:
     stop = threading.Event()
 
     def one(case: Case) -> xr.Dataset:
-        operation = case.operation
-        span = operation.run_up + operation.settling + operation.duration
-
         def report(t: float) -> None:
             if stop.is_set():
                 raise Cancelled(f"case '{case.name}' was stopped")
             if progress is not None:
-                progress(case.name, min(t / span, 1.0))
+                progress(case.name, min(t / _span(case), 1.0))
 
         return run_case(case, report)
 
+    records: dict[str, xr.Dataset] = {}
     with ThreadPoolExecutor(workers) as pool:
+        futures = {pool.submit(one, case): case for case in cases}
+        pending = set(futures)
         try:
-            return _collect(pool, {pool.submit(one, case): case for case in cases}, cases, progress, done)
+            while pending:
+                finished, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
+                for future in finished:
+                    case = futures[future]
+                    records[case.name] = future.result()
+                    _finished(case, records[case.name], progress, done)
         except BaseException:
             stop.set()
+            pool.shutdown(wait=False, cancel_futures=True)
             raise
+    return [records[case.name] for case in cases]
 
 
 def _in_processes(cases, workers, progress, done) -> list[xr.Dataset]:
-    saved = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
-    try:
-        with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-            try:
-                return _collect(pool, {pool.submit(run_case, case): case for case in cases}, cases, progress, done)
-            except BaseException:
-                for process in list((pool._processes or {}).values()):
-                    process.terminate()
-                raise
-    finally:
-        for name, value in saved.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+    return run_jobs(
+        _run_reporting,
+        cases,
+        workers,
+        progress=None if progress is None else lambda case, fraction: progress(case.name, fraction),
+        done=lambda case, record: _finished(case, record, progress, done),
+    )
 
 
-def _collect(pool: Executor, futures: dict[Future, Case], cases, progress, done) -> list[xr.Dataset]:
-    records: dict[str, xr.Dataset] = {}
-    pending = set(futures)
-    try:
-        while pending:
-            finished, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
-            for future in finished:
-                case = futures[future]
-                records[case.name] = future.result()
-                if progress is not None:
-                    progress(case.name, 1.0)
-                if done is not None:
-                    done(case, records[case.name])
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
-    return [records[case.name] for case in cases]
+def _run_reporting(case: Case, report: Callable[[float], None]) -> xr.Dataset:
+    """Run a case and report the fraction of it that is done, not too often."""
+    last = -REPORT_SECONDS
+
+    def progress(t: float) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= REPORT_SECONDS:
+            last = now
+            report(min(t / _span(case), 1.0))
+
+    return run_case(case, progress)
+
+
+def _finished(case: Case, record: xr.Dataset, progress, done) -> None:
+    if progress is not None:
+        progress(case.name, 1.0)
+    if done is not None:
+        done(case, record)

@@ -88,8 +88,8 @@ def paper_report(study: PaperStudy) -> str:
     ]
     skip = ("solver_healthy", "solver_misaligned", "solver_distance", "case_", "title", "scaling")
     for key, value in records.attrs.items():
-        if not key.startswith(skip):
-            parts.append(f"| {key} | {_value(value)} |")
+        if not key.startswith(skip) and not key.endswith("_units"):
+            parts.append(f"| {key} | {_value(value)} {records.attrs.get(f'{key}_units', '')}".rstrip() + " |")
     parts += [
         "",
         "## Integration",

@@ -13,6 +13,7 @@ import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
 import gearmbs
+from gearmbs.dae.result import Status
 from gearmbs.dae.solution import Solution
 from gearmbs.mechanism.simulate import simulate
 from gearmbs.signals import (
@@ -25,24 +26,57 @@ from gearmbs.signals import (
     trim,
 )
 from gearmbs.studies import rig
-from gearmbs.studies.case import Case
+from gearmbs.studies.case import Case, units_of_fields
+from gearmbs.studies.limits import check_record, edge, remarks, slip
 
-EDGE = 0.01
-"""Simulated beyond both ends of the record, s, for the filters to settle."""
+SMOOTH = {"normal_force": "N", "penetration_drive": "m", "penetration_back": "m"}
+COUNTS = {"pairs_drive": "1", "pairs_back": "1"}
+"""What a record tells of the contact, with units; numbers of pairs cannot be interpolated."""
+
+ADVICE = {
+    Status.STEP_TOO_SMALL: "Loosen solver.tolerance, raise contact.depth, or try another solver.integrator.",
+    Status.NEWTON_FAILURE: "Raise contact.depth, lower contact.stiffness, or try another solver.integrator.",
+    Status.TOO_MANY_REJECTIONS: "Loosen solver.tolerance, raise contact.depth, or make operation.run_up longer.",
+    Status.NOT_FINITE: "Lower operation.torque or operation.speed, or make operation.run_up longer.",
+    Status.SOLVER_FAILURE: "Loosen solver.tolerance, make operation.run_up longer, or take the WSTIFF integrator.",
+}
+"""What the settings of a case offer against a failing integration."""
 
 
 class SimulationFailed(RuntimeError):
-    """The integrator stopped early.
+    """The integrator stopped early, or what it computed is no motion of meshing gears.
 
     Attributes
     ----------
-    solution : Solution
-        What was computed until then.
+    solution : Solution or None
+        What was computed until then; None if the case ran in another process.
+    case : Case or None
     """
 
-    def __init__(self, message: str, solution: Solution) -> None:
+    def __init__(
+        self,
+        message: str,
+        solution: Solution | None = None,
+        case: Case | None = None,
+        partial: xr.Dataset | None = None,
+    ) -> None:
         super().__init__(message)
         self.solution = solution
+        self.case = case
+        self._partial = partial
+
+    def partial(self) -> xr.Dataset | None:
+        """Return what was computed until then; see `partial_record`."""
+        if self._partial is None and self.case is not None and self.solution is not None:
+            self._partial = partial_record(self.case, self.solution)
+        return self._partial
+
+    def __reduce__(self) -> tuple:
+        return type(self), (str(self), None, self.case, self.partial())
+
+
+class SimulationInterrupted(SimulationFailed):
+    """The run was interrupted by the user; what was computed until then is kept."""
 
 
 def simulate_case(
@@ -58,7 +92,7 @@ def simulate_case(
     """
     mechanism = case_mechanism(case)
     operation, solver = case.operation, case.solver
-    t_end = operation.run_up + operation.settling + operation.duration + EDGE
+    t_end = operation.run_up + operation.settling + operation.duration + edge(case)
     return simulate(
         mechanism,
         t_end,
@@ -69,6 +103,7 @@ def simulate_case(
         tol=solver.used_tolerance,
         rate_scale=operation.speed * case.gears.teeth[0],
         progress=progress,
+        advice=ADVICE,
         **options,
     )
 
@@ -100,13 +135,51 @@ def run_case(case: Case, progress: bool | Callable[[float], None] = False) -> xr
 
     Raises
     ------
+    CaseError
+        If the record could not be evaluated; see :func:`gearmbs.studies.limits.check_record`. Nothing is simulated.
     SimulationFailed
-        If the integrator stops early; the exception carries the solution so far.
+        If the integrator stops early or teeth slip past each other; the exception carries the solution so far.
     """
+    check_record(case)
     solution = simulate_case(case, progress, every_step=True)
     if not solution.success:
-        raise SimulationFailed(f"case '{case.name}': {solution.message}", solution)
+        kind = SimulationInterrupted if solution.status is Status.INTERRUPTED else SimulationFailed
+        raise kind(f"case '{case.name}': {solution.message}", solution, case)
+    slipped = slip(case, solution.t, transmission_error(case, solution))
+    if slipped is not None:
+        raise SimulationFailed(f"case '{case.name}': {slipped}", solution, case)
     return record(case, solution)
+
+
+def partial_record(case: Case, solution: Solution) -> xr.Dataset:
+    """Return the quantities of a record that need no filter, from the start to where the solution ends.
+
+    Returns
+    -------
+    Dataset
+        As of :func:`run_case` without ``acceleration`` and ``gmf_rms``; status and message in the attributes.
+    """
+    forces = [solution.reaction(seat)[0] for seat in rig.SEATS]
+    dataset = _time_series(solution.t, forces, transmission_error(case, solution), solution.contact(rig.MESH))
+    attributes = attributes_of(case, solution)
+    dataset.attrs = {**attributes, "status": solution.status.name, "message": solution.message}
+    return dataset
+
+
+def _time_series(t, forces, error, contact) -> xr.Dataset:
+    """Return the dataset of forces, transmission error and contact over time."""
+    data = {
+        "force_1": (("time", "xyz"), forces[0], {"units": "N", "long_name": "force of shaft 1 on gear 1"}),
+        "force_2": (("time", "xyz"), forces[1], {"units": "N", "long_name": "force of shaft 2 on gear 2"}),
+        "transmission_error": (
+            "time",
+            error,
+            {"units": "m", "long_name": "lag of the driven wheel at its base circle"},
+        ),
+    }
+    for name, unit in {**SMOOTH, **COUNTS}.items():
+        data[name] = ("time", contact[name], {"units": unit, "long_name": name.replace("_", " ")})
+    return xr.Dataset(data, coords={"time": ("time", t, {"units": "s"}), "xyz": ["x", "y", "z"]})
 
 
 def record(case: Case, solution: Solution) -> xr.Dataset:
@@ -118,16 +191,16 @@ def record(case: Case, solution: Solution) -> xr.Dataset:
     operation, solver = case.operation, case.solver
     start = operation.run_up + operation.settling
     stop = start + operation.duration
-    rate = solver.output_rate
+    rate, ahead = solver.output_rate, edge(case)
     labels: dict[str, Any] = {"units": "N", "speed": operation.speed, "teeth": case.gears.teeth}
     both = np.concatenate([solution.reaction(seat)[0] for seat in rig.SEATS], axis=1)
     names = [f"{k}{axis}" for k in (1, 2) for axis in "xyz"]
     known = solution.t
     if _is_even(known, rate):
-        keep = known >= start - EDGE - 0.5 / rate
+        keep = known >= start - ahead - 0.5 / rate
         forces = make_signal(both[keep], rate, channels=names, t0=float(known[keep][0]), **labels)
     else:
-        forces = even_signal(known, both, rate, start=start - EDGE, stop=stop + EDGE, channels=names, **labels)
+        forces = even_signal(known, both, rate, start=start - ahead, stop=stop + ahead, channels=names, **labels)
     t = forces["time"].values
     signal = forces.isel(channel=slice(3, 6)).assign_coords(channel=["x", "y", "z"])
     components = force_components(signal, pressure_angle=pair.working_pressure_angle, sense=pair.rotation)
@@ -139,22 +212,14 @@ def record(case: Case, solution: Solution) -> xr.Dataset:
     contact = solution.contact(rig.MESH)
     inside = (t >= start - 0.5 / rate) & (t < stop - 0.5 / rate)
     t = t[inside]
-    each = [forces.values[inside, k : k + 3] for k in (0, 3)]
-    data: dict[str, Any] = {
-        "force_1": (("time", "xyz"), each[0], {"units": "N", "long_name": "force of shaft 1 on gear 1"}),
-        "force_2": (("time", "xyz"), each[1], {"units": "N", "long_name": "force of shaft 2 on gear 2"}),
-        "transmission_error": (
-            "time",
-            PchipInterpolator(known, transmission_error(case, solution))(t),
-            {"units": "m", "long_name": "lag of the driven wheel at its base circle"},
-        ),
-    }
-    for name, unit in (("normal_force", "N"), ("penetration_drive", "m"), ("penetration_back", "m")):
-        data[name] = ("time", np.interp(t, known, contact[name]), {"units": unit, "long_name": name.replace("_", " ")})
+    between = {name: np.interp(t, known, contact[name]) for name in SMOOTH}
     latest = np.clip(np.searchsorted(known, t, side="right") - 1, 0, known.size - 1)
-    for name in ("pairs_drive", "pairs_back"):
-        data[name] = ("time", contact[name][latest], {"units": "1", "long_name": name.replace("_", " ")})
-    dataset = xr.Dataset(data, coords={"time": ("time", t, {"units": "s"}), "xyz": ["x", "y", "z"]})
+    dataset = _time_series(
+        t,
+        [forces.values[inside, k : k + 3] for k in (0, 3)],
+        PchipInterpolator(known, transmission_error(case, solution))(t),
+        {**between, **{name: contact[name][latest] for name in COUNTS}},
+    )
     plain = acceleration.drop_vars(["channel_units", "units"], errors="ignore")
     dataset["acceleration"] = plain.rename(time="signal_time", channel="component")
     dataset["acceleration"].attrs.update(
@@ -184,22 +249,32 @@ def transmission_error(case: Case, solution: Solution) -> np.ndarray:
 
 
 def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any]:
-    """Return every parameter of a case, the versions and the solver's statistics as flat attributes."""
+    """Return every parameter of a case, the versions and the solver's statistics as flat attributes.
+
+    The unit of a quantity is beside it: ``operation_speed`` has ``operation_speed_units``. What is unusual about the
+    case is said in ``remarks``.
+    """
     out: dict[str, Any] = {"title": f"gear pair: {case.name}", "case": case.name}
-    for section, values in case.model_dump().items():
-        if isinstance(values, dict):
-            for key, value in values.items():
-                name = f"{section}_{key}"
-                if value is None:
-                    out[name] = "default"
-                elif name == "fault_teeth":
-                    out[name] = json.dumps(value)
-                elif isinstance(value, bool):
-                    out[name] = int(value)
-                else:
-                    out[name] = list(value) if isinstance(value, tuple) else value
+    for section in ("gears", "shafts", "operation", "fault", "contact", "friction", "solver"):
+        settings = getattr(case, section)
+        units = units_of_fields(settings)
+        for key, value in settings.model_dump().items():
+            name = f"{section}_{key}"
+            if value is None:
+                out[name] = "default"
+            elif name == "fault_teeth":
+                out[name] = json.dumps(value)
+            elif isinstance(value, bool):
+                out[name] = int(value)
+            else:
+                out[name] = list(value) if isinstance(value, tuple) else value
+                if key in units and not isinstance(value, str):
+                    out[f"{name}_units"] = units[key]
     out["solver_tolerance"] = case.solver.used_tolerance
+    out["contact_ratio"] = case.pair().contact_ratio
+    out["remarks"] = "; ".join(remarks(case)) or "none"
     out["mesh_frequency"] = case.mesh_frequency
+    out["mesh_frequency_units"] = "Hz"
     out["case_json"] = case.model_dump_json()
     out["gearmbs_version"] = gearmbs.__version__
     for package in ("numpy", "scipy", "numba", "scikit-sundae", "xarray"):

@@ -1,0 +1,118 @@
+"""Quantities of a case: texts with units or plain numbers in SI, within a range that gears can have.
+
+The ranges are wide. They are there because a plain number is in SI: ``module = 3`` is three metres, and a pair of
+wheels of that size would be simulated without complaint.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from gearmbs.units import DIMENSIONS, to_si
+
+SHOWN = {"mm": 1e-3, "deg": math.pi / 180.0, "rpm": math.pi / 30.0, "GPa": 1e9}
+"""Units of messages that are not SI, and what they are in SI."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What a field of a case measures, between which limits.
+
+    Attributes
+    ----------
+    dimension : str
+        One of `gearmbs.units.DIMENSIONS`.
+    low, high : float, optional
+        Limits, included, in ``shown``.
+    shown : str
+        Unit of the limits and of messages; default the SI unit.
+    each : bool
+        Whether driver and driven may have values of their own, as a list of two.
+    """
+
+    dimension: str
+    low: float | None = None
+    high: float | None = None
+    shown: str = ""
+    each: bool = False
+
+    @property
+    def unit(self) -> str:
+        """The SI unit the field holds."""
+        return "1" if self.dimension == "dimensionless" else DIMENSIONS[self.dimension].replace("*", " ")
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+    def read(self, value: Any) -> Any:
+        """Return the value in SI, or for a list of two both.
+
+        Raises
+        ------
+        ValueError
+            For a wrong unit or a value outside the limits.
+        """
+        if value is None:
+            return None
+        if self.each and isinstance(value, Sequence) and not isinstance(value, str):
+            if len(value) != 2:
+                raise ValueError(f"{len(value)} values; give one for both wheels, or those of driver and driven")
+            return tuple(self._one(item) for item in value)
+        return self._one(value)
+
+    def _one(self, value: Any) -> float:
+        try:
+            number = to_si(value, self.dimension, "value")
+        except (TypeError, ValueError) as error:
+            raise ValueError(str(error).removeprefix("value: ")) from None
+        shown = self.shown or self.unit
+        factor = SHOWN.get(shown, 1.0)
+        low, high = (None if limit is None else limit * factor for limit in (self.low, self.high))
+        if (low is None or number >= low * (1.0 - 1e-12)) and (high is None or number <= high * (1.0 + 1e-12)):
+            return number
+        span = f"{_plain(self.low)} to {_plain(self.high)}" if self.high is not None else f"{_plain(self.low)} or more"
+        if self.low is None:
+            span = f"up to {_plain(self.high)}"
+        if shown == "1":
+            raise ValueError(f"give {span}")
+        text = f"this is {number / factor:.6g} {shown}; give {span} {shown}"
+        if isinstance(value, str):
+            raise ValueError(text)
+        raise ValueError(f"{text} (a plain number is in {self.unit}; write '{value} {shown}' if that is meant)")
+
+
+def _plain(value: float | None) -> str:
+    return "" if value is None else f"{value:g}"
+
+
+Module = Annotated[float, Measure("length", 0.05, 100, "mm")]
+FaceWidth = Annotated[float | tuple[float, float], Measure("length", 0.01, 2000, "mm", each=True)]
+ToothLength = Annotated[float | tuple[float, float] | None, Measure("length", None, 300, "mm", each=True)]
+WheelRadius = Annotated[float | tuple[float, float] | None, Measure("length", 0.1, 5000, "mm", each=True)]
+BoreRadius = Annotated[float | tuple[float, float], Measure("length", 0, 5000, "mm", each=True)]
+TipRounding = Annotated[float | tuple[float, float], Measure("length", 0, 100, "mm", each=True)]
+ShaftRadius = Annotated[float, Measure("length", 0.1, 5000, "mm")]
+ShaftLength = Annotated[float, Measure("length", 0.1, 50000, "mm")]
+Shift = Annotated[float, Measure("length", -2000, 2000, "mm")]
+DistanceError = Annotated[float, Measure("length", -100, 100, "mm")]
+Backlash = Annotated[float, Measure("length", None, 20, "mm")]
+Depth = Annotated[float, Measure("length", 1e-6, 10, "mm")]
+PressureAngle = Annotated[float, Measure("angle", 5, 40, "deg")]
+Misalignment = Annotated[float, Measure("angle", -10, 10, "deg")]
+Density = Annotated[float, Measure("density", 10, 30000)]
+WheelDensity = Annotated[float | tuple[float, float], Measure("density", 10, 30000, each=True)]
+Modulus = Annotated[float | tuple[float, float], Measure("pressure", 0.001, 2000, "GPa", each=True)]
+PoissonRatio = Annotated[float | tuple[float, float], Measure("dimensionless", 0, 0.499, each=True)]
+AngularSpeed = Annotated[float, Measure("angular speed", 0.01, 1e6, "rpm")]
+TorqueValue = Annotated[float, Measure("torque", 1e-6, 1e8)]
+RunUp = Annotated[float, Measure("time", 1e-5, 1000)]
+Settling = Annotated[float, Measure("time", 0, 1000)]
+Duration = Annotated[float, Measure("time", 1e-5, 10000)]
+Frequency = Annotated[float, Measure("frequency", 1, 1e7)]
+SlidingSpeed = Annotated[float, Measure("speed", 1e-6, 1000)]

@@ -1,0 +1,25 @@
+"""Jobs for worker processes, in a module that imports nothing else."""
+
+import os
+import threading
+
+
+def square(job, report):
+    report(0.5)
+    return job**2
+
+
+def fail_or_wait(job, report):
+    report(os.getpid())
+    if job == "fail":
+        raise ValueError("the job failed")
+    if job == "die":
+        os._exit(3)
+    threading.Event().wait()
+
+
+def raise_what_cannot_travel(job, report):
+    class Local(Exception):
+        pass
+
+    raise Local("only here")

@@ -1,0 +1,109 @@
+"""Cases side by side: order, progress from processes, and an end at once after a failure or Ctrl-C."""
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from gearmbs.studies import Case, SimulationFailed, run_case, run_cases
+from gearmbs.studies.processes import WorkerDied, run_jobs
+from gearmbs.studies.run import simulate_case
+from tests.studies.jobs import fail_or_wait, raise_what_cannot_travel, square
+
+SHORT = {"run_up": 0.02, "settling": 0.0, "duration": 0.07}
+
+
+def gone(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return True
+    return False
+
+
+def test_results_in_order_with_progress():
+    told, finished = [], {}
+    results = run_jobs(
+        square,
+        [3, 1, 2],
+        2,
+        progress=lambda job, x: told.append((job, x)),
+        done=lambda job, x: finished.update({job: x}),
+    )
+    assert results == [9, 1, 4]
+    assert sorted(told) == [(1, 0.5), (2, 0.5), (3, 0.5)]
+    assert finished == {3: 9, 1: 1, 2: 4}
+
+
+@pytest.mark.parametrize(("job", "kind", "words"), [("fail", ValueError, "job failed"), ("die", WorkerDied, "memory")])
+def test_a_failure_ends_the_others(job, kind, words):
+    """The other job would never end; its process is gone when the error arrives."""
+    pids = []
+    with pytest.raises(kind, match=words):
+        run_jobs(fail_or_wait, ["wait", job], 2, progress=lambda job, pid: pids.append(pid))
+    assert all(gone(pid) for pid in pids)
+
+
+def test_an_error_that_cannot_be_sent_arrives_as_text():
+    with pytest.raises(RuntimeError, match="Local: only here"):
+        run_jobs(raise_what_cannot_travel, [0], 1)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals to process groups are POSIX")
+@pytest.mark.parametrize("everyone", [True, False], ids=["from the terminal", "to the parent"])
+def test_ctrl_c_ends_all_processes(everyone):
+    """Both workers wait for ever. Ctrl-C in a terminal reaches all processes of the group, kill only the parent."""
+    code = (
+        "from gearmbs.studies.processes import run_jobs\n"
+        "from tests.studies.jobs import fail_or_wait\n"
+        "if __name__ == '__main__':\n"
+        "    try:\n"
+        "        run_jobs(fail_or_wait, ['a', 'b'], 2, progress=lambda job, pid: print(pid, flush=True))\n"
+        "    except KeyboardInterrupt:\n"
+        "        raise SystemExit(130)\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+    )
+    pids = [int(process.stdout.readline()) for _ in range(2)]
+    if everyone:
+        os.killpg(process.pid, signal.SIGINT)
+    else:
+        process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors == ""
+    assert all(gone(pid) for pid in pids)
+
+
+def test_processes_and_threads_give_the_same_records():
+    """IDA runs in processes when there is more than one worker; bars move before a case ends."""
+    cases = [
+        Case(name=f"{z}", gears={"teeth": (z, 29)}, operation=SHORT, solver={"integrator": "IDA"}) for z in (25, 31)
+    ]
+    told = []
+    records = run_cases(cases, workers=2, progress=lambda name, fraction: told.append((name, fraction)))
+    assert [record.attrs["case"] for record in records] == ["25", "31"]
+    assert {name for name, fraction in told if 0.0 < fraction < 1.0} == {"25", "31"}
+    alone = run_case(cases[0])
+    assert records[0].gmf_rms.equals(alone.gmf_rms)
+
+
+def test_a_failing_case_brings_what_it_computed_out_of_its_process():
+    """The solution stays in the process, its record travels."""
+    case = Case(operation=SHORT)
+    solution = simulate_case(case)
+    failure = pickle.loads(pickle.dumps(SimulationFailed("stopped", solution, case)))
+    assert str(failure) == "stopped"
+    assert failure.solution is None
+    assert failure.case == case
+    assert failure.partial().time.size == solution.t.size
+    assert failure.partial().attrs["status"] == "SUCCESS"
