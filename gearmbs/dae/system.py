@@ -27,7 +27,7 @@ from gearmbs.dae.rotation import (
     euler_rates,
 )
 from gearmbs.dae.tables import TableBuilder
-from gearmbs.dae.terms import dot3
+from gearmbs.dae.terms import ANGLE, dot3
 
 MAX_LOAD_ITERATIONS = 200
 CONFLICT_SHARE = 1e-5
@@ -444,13 +444,18 @@ class System:
             restart_rates=_restart_rates,
         )
 
-    @staticmethod
-    def _hook_interval(at: dict[str, int]):
-        """Time in which no Euler angle turns far enough to reach its singularity from the switching limit."""
+    def _hook_interval(self, at: dict[str, int]):
+        """Time in which no Euler angle comes near its singularity, and no counted angle turns by half a turn."""
         rates = slice(at["eps"], at["R"])
+        counted = any(term[T.TERM_TYPE] == ANGLE for term in self.builder.terms)
+        counted = counted or any(tape.n_angles for tape in self.builder.tapes)
 
         def interval(y: np.ndarray) -> float:
-            return 0.2 / max(float(np.abs(y[rates][1::3]).max(initial=0.0)), 1e-12)
+            rate = np.abs(y[rates]).reshape(-1, 3)
+            nearing = float(rate[:, 1].max(initial=0.0)) / 0.2
+            # two bodies may turn against each other: at most 2 rad between them
+            turning = float(rate.sum(axis=1).max(initial=0.0)) if counted else 0.0
+            return 1.0 / max(nearing, turning, 1e-12)
 
         return interval
 

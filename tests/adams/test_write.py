@@ -112,6 +112,19 @@ def test_rotation_coupler_screw_and_distance_survive():
     assert "DM(" in again.constraints["rod"]
 
 
+def test_friction_fields_and_loads_of_reactions_survive():
+    m = Mechanism("dry", gravity=(0, 0, -9.81))
+    bob = m.body("bob", 1.0, (0.01, 0.01, 0.01), position=(0.5, 0, -0.8))
+    pin = m.revolute("pin", bob, m.ground, at=(0, 0, 0), axis=(0, -1, 0))
+    m.friction("dry", pin, 0.3, 0.2, pin_radius=0.05)
+    i, j = bob.marker(name="i"), m.ground.marker((0, 0, -1.2), name="j")
+    m.field("pad", i, j, stiffness=np.diag([5, 5, 5, 0.1, 0.1, 0.1]))
+    m.axis_torque("brake", pin.i, pin.j, "-0.01*JOINT(pin, 0, 1)")
+    again = parse_deck(write_deck(m)).to_mechanism()
+    one, two = (x.simulate(1.0, rate=100, tol=1e-8).position("bob") for x in (m, again))
+    np.testing.assert_allclose(two, one, atol=1e-9)
+
+
 def test_gear_contact_becomes_impact_expressions():
     """The deck's gear rig follows the contact kernel: same mesh force while no corner is in contact."""
     from gearmbs.gears import ContactLaw, Friction, GearPair

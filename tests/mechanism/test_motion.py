@@ -132,6 +132,16 @@ def test_screw_advances_by_its_pitch():
     assert solution.position("nut")[-1, 2] == pytest.approx(0.05, abs=1e-8)
 
 
+@pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF", "IDA"])
+def test_turns_are_counted_between_few_outputs(integrator):
+    """32 free turns of a screw with nothing but the counted angle to hold its steps short."""
+    m = Mechanism("screw")
+    nut = m.body("nut", 1.0, (1, 1, 1), angular_velocity=(0, 0, 10.0), velocity=(0, 0, 0.05 / np.pi))
+    m.screw("thread", nut, m.ground, pitch=0.01)
+    solution = m.simulate(20.0, t_eval=(0.0, 10.0, 20.0), integrator=integrator, tol=1e-8)
+    np.testing.assert_allclose(solution.position("nut")[:, 2], [0, 0.5 / np.pi, 1 / np.pi], atol=1e-6)
+
+
 def test_coupler_is_a_gear():
     """Two wheels coupled -2 : 1; J1 a1 = T - 2 ... gives a1 = T / (J1 + 4 J2)."""
     m = Mechanism("gears")
