@@ -30,7 +30,9 @@ os.environ["IPYTHONDIR"] = str(profile.parent)
 def code_stamp() -> str:
     """Return a number of the code and data that executed pages depend on, so that none is kept beyond a change."""
     digest = hashlib.sha256()
-    for folder, ending in ((HERE.parent / "gearmbs", "*.py"), (SCRIPTS, "*.py"), (HERE / "data", "*.csv")):
+    root = HERE.parent
+    sources = ((root / "gearmbs", "*.py"), (root / "benchmarks", "*.py"), (SCRIPTS, "*.py"), (HERE / "data", "*.*"))
+    for folder, ending in sources:
         for path in sorted(folder.rglob(ending)):
             digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
