@@ -38,6 +38,14 @@ def marker_pose(m, marker_body, kin, frame, out):
 
 
 @njit(cache=True, error_model="numpy")
+def torque(row, fval, frame, wrench):
+    """Write the torque f(t) z_RM to ``wrench[3:6]``."""
+    f, axis = fval[row[T.FORCE_FUNCTION], 0], frame[row[T.FORCE_RM]]
+    for c in range(3):
+        wrench[3 + c] = f * axis[T.MK_AXES + 6 + c]
+
+
+@njit(cache=True, error_model="numpy")
 def contact_wrench(row, tab, wrench, jac, diag, want_jac):
     """Evaluate a gear contact on the frames of its two markers; columns of ``jac`` are the markers' variations."""
     i, j = row[T.FORCE_I], row[T.FORCE_J]
@@ -105,12 +113,7 @@ def element_wrench(row, t, y, tab, wrench, jac, diag, want_jac):
             for c in range(jac.shape[1]):
                 jac[r, c] = 0.0
     if kind == TORQUE:
-        fun = row[T.FORCE_FUNCTION]
-        rm = row[T.FORCE_RM]
-        f = tab.fval[fun, 0]
-        z = T.MK_AXES + 6
-        for c in range(3):
-            wrench[3 + c] = f * tab.frame[rm, z + c]
+        torque(row, tab.fval, tab.frame, wrench)
         if want_jac != 0:
             # d(f z) = f dpi x z
             zx, zy, zz = wrench[3], wrench[4], wrench[5]

@@ -14,7 +14,7 @@ from numba import njit
 
 from gearmbs.dae import tables as T
 from gearmbs.dae import tapes, terms
-from gearmbs.dae.forces import element_wrench
+from gearmbs.dae.forces import TORQUE, element_wrench, torque
 from gearmbs.dae.jacobian import NUMBERS, put
 from gearmbs.dae.kinematics import inertia_times, update_bodies
 from gearmbs.dae.reactions import REACTION
@@ -37,11 +37,11 @@ FORCE_RECORD = 14
 
 
 @njit(cache=True, error_model="numpy")
-def apply_load(b, sign, row, wrench, tab, rhs):
+def apply_load(b, sign, row, wrench, marker_body, kin, frame, scratch, rhs):
     if b == 0:
         return
-    s = tab.scratch[S_VECTOR : S_VECTOR + 12]
-    arm_to(b, row[T.FORCE_I], tab.marker_body, tab.kin, tab.frame, s, 0)
+    s = scratch[S_VECTOR : S_VECTOR + 12]
+    arm_to(b, row[T.FORCE_I], marker_body, kin, frame, s, 0)
     terms.cross3(s, 0, wrench, 0, s, 3)
     k = 6 * (b - 1)
     for c in range(3):
@@ -215,13 +215,19 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
                 for c in range(3):
                     loads[f, c], loads[f, 3 + c] = y[row[T.FORCE_F] + c], y[row[T.FORCE_N] + c]
                 continue
-            element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(0))
+            if row[T.FORCE_KIND] == TORQUE:
+                for c in range(3):
+                    wrench[c] = 0.0
+                torque(row, tab.fval, tab.frame, wrench)
+            else:
+                element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(0))
             for c in range(6):
                 loads[f, c] = wrench[c]
             for c in range(8):
                 loads[f, 6 + c] = diag[c]
-            apply_load(tab.marker_body[row[T.FORCE_I]], 1.0, row, wrench, tab, rhs)
-            apply_load(tab.marker_body[row[T.FORCE_J]], -1.0, row, wrench, tab, rhs)
+            for side in range(2):
+                b = tab.marker_body[row[T.FORCE_I + side]]
+                apply_load(b, 1.0 - 2.0 * side, row, wrench, tab.marker_body, tab.kin, tab.frame, tab.scratch, rhs)
     return k
 
 

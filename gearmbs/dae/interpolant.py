@@ -7,6 +7,7 @@ from numba import float64, int64, njit, types
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
+_IVEC = int64[::1]
 
 
 @njit(types.void(float64, _VEC, int64, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
@@ -51,6 +52,17 @@ def combine(value, slope, count, rows, first, y, yp):
         for i in range(n):
             y[i] += a * rows[first + j, i]
             yp[i] += b * rows[first + j, i]
+
+
+@njit(types.void(_VEC, _IVEC, _IVEC, _VEC, _MAT, _MAT, _MAT), cache=True, nogil=True, error_model="numpy")
+def evaluate_many(times, ends, orders, nodes, rows, y, yp):
+    """Write value and slope at each of ``times``, on the polynomial of the step that ends in row ``ends[i]``."""
+    value = np.empty(8)
+    slope = np.empty(8)
+    for i in range(times.shape[0]):
+        k = orders[ends[i]]
+        lagrange_weights(times[i], nodes[ends[i] - k : ends[i] + 1], k + 1, value, slope)
+        combine(value, slope, k + 1, rows, ends[i] - k, y[i], yp[i])
 
 
 class DenseOutput:
@@ -109,18 +121,13 @@ class DenseOutput:
                 "integrate further to evaluate there"
             )
         y = np.empty((times.size, self._y.shape[1]))
-        yp = np.zeros_like(y)
-        value = np.empty(8)
-        slope = np.empty(8)
+        yp = np.empty_like(y)
         if not len(self._steps):
             y[:] = self._y[0]
+            yp[:] = 0.0
         else:
             pieces = np.minimum(np.searchsorted(self._ends, times, side="left"), len(self._steps) - 1)
-            for row, piece in enumerate(pieces):
-                end = self._steps[piece]
-                k = self._orders[end]
-                lagrange_weights(times[row], self._t[end - k : end + 1], k + 1, value, slope)
-                combine(value, slope, k + 1, self._y, end - k, y[row], yp[row])
+            evaluate_many(times, self._steps[pieces], self._orders, self._t, self._y, y, yp)
         if np.ndim(t) == 0:
             return y[0], yp[0]
         return y, yp

@@ -24,7 +24,7 @@ from numba import njit
 
 from gearmbs.dae import tables as T
 from gearmbs.dae import tapes, terms
-from gearmbs.dae.forces import element_wrench
+from gearmbs.dae.forces import TORQUE, element_wrench, torque
 from gearmbs.dae.kinematics import euler_component, update_tables
 from gearmbs.dae.problem import RESIDUAL_SIG
 from gearmbs.dae.reactions import REACTION, reaction_wrench
@@ -58,16 +58,16 @@ def arm_to(b, point_marker, marker_body, kin, frame, out, k):
 
 
 @njit(cache=True, error_model="numpy")
-def add_load(b, sign, row, y, idata, tab, out):
+def add_load(b, sign, row, y, idata, marker_body, kin, frame, scratch, out):
     """Subtract the generalised loads of one force element on body b (eq. (5), H_F^T F and H_N^T N)."""
     if b == 0:
         return
-    s = tab.scratch[S_VECTOR : S_VECTOR + 12]
+    s = scratch[S_VECTOR : S_VECTOR + 12]
     for c in range(6):
         s[3 + c] = 0.0
     k = 3 * (b - 1)
     if row[T.FORCE_F] >= 0:
-        arm_to(b, row[T.FORCE_I], tab.marker_body, tab.kin, tab.frame, s, 0)
+        arm_to(b, row[T.FORCE_I], marker_body, kin, frame, s, 0)
         for c in range(3):
             s[3 + c] = sign * y[row[T.FORCE_F] + c]
             out[idata[T.H_U] + k + c] -= s[3 + c]
@@ -76,7 +76,7 @@ def add_load(b, sign, row, y, idata, tab, out):
         for c in range(3):
             s[6 + c] += sign * y[row[T.FORCE_N] + c]
     for m in range(3):
-        out[idata[T.H_P] + k + m] -= euler_component(tab.kin[b], m, s, 6)
+        out[idata[T.H_P] + k + m] -= euler_component(kin[b], m, s, 6)
 
 
 @njit(cache=True, error_model="numpy")
@@ -247,7 +247,12 @@ def residual(t, y, yp, out, idata, rdata, work):
         row = tab.force[f]
         width = row[T.FORCE_WIDTH]
         jac = tab.scratch[T.SCRATCH_FIXED : T.SCRATCH_FIXED + 6 * width].reshape(6, width)
-        if row[T.FORCE_KIND] == REACTION:
+        if row[T.FORCE_KIND] == TORQUE:
+            # handing over the tables would cost more than the torque
+            for c in range(3):
+                wrench[c] = 0.0
+            torque(row, tab.fval, tab.frame, wrench)
+        elif row[T.FORCE_KIND] == REACTION:
             reaction_wrench(row, multipliers, lam0, tab, room, wrench, jac, np.int64(0))
         else:
             element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(0))
@@ -257,8 +262,9 @@ def residual(t, y, yp, out, idata, rdata, work):
             if row[T.FORCE_N] >= 0:
                 out[row[T.FORCE_N] + c] = y[row[T.FORCE_N] + c] - wrench[3 + c]
         if row[T.FORCE_KIND] != REACTION:
-            add_load(tab.marker_body[row[T.FORCE_I]], 1.0, row, y, idata, tab, out)
-            add_load(tab.marker_body[row[T.FORCE_J]], -1.0, row, y, idata, tab, out)
+            for side in range(2):
+                b = tab.marker_body[row[T.FORCE_I + side]]
+                add_load(b, 1.0 - 2.0 * side, row, y, idata, tab.marker_body, tab.kin, tab.frame, tab.scratch, out)
     for k in range(idata[T.H_STATES]):
         z = idata[T.H_Z] + k
         left = yp[z] if tab.state[k, T.STATE_KIND] == T.STATE_DIFFERENTIAL else y[z]
