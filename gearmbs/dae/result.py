@@ -109,7 +109,7 @@ class DAEResult:
     t : ndarray, shape (m,)
         Output times reached. When the run fails these are the ones computed until then.
     y, yp : ndarray, shape (m, n)
-        Unknowns and their derivatives at ``t``, one row per time.
+        Unknowns and their derivatives at ``t``, one row per time; ``yp`` is empty when it was not wanted.
     status : Status
         How the run ended.
     message : str

@@ -85,6 +85,7 @@ class Run:
         event_direction: Sequence[int] | None,
         event_action: Sequence[int] | None,
         dense_output: bool,
+        slopes: bool,
         max_steps: int | None,
         progress: Callable[[float], None] | None,
         check_start: bool,
@@ -95,6 +96,7 @@ class Run:
         self.error_probe = error_probe
         self.check_start = check_start
         self.dense_output = dense_output
+        self.slopes = slopes
         self.wall_time = 0.0
         self.repivots = 0
         self.first_pivots = 0
@@ -422,13 +424,16 @@ class Run:
         is_step = order > 0
         stats = self._stats(self.wall_time)
         stats.t_steps, stats.h_steps, stats.orders = t[is_step], h[is_step], order[is_step]
-        sol = DenseOutput(t, np.concatenate(self.row_blocks), order) if self.row_blocks else None
+        rows = np.concatenate(self.row_blocks) if self.row_blocks else None
+        sol = DenseOutput(t, rows, order) if rows is not None else None
         if self.every_step:
             t_out = np.concatenate((t[:1], t[is_step]))
-            if sol is None:
+            if sol is None or rows is None:
                 raise AssertionError("every step was to be kept")
-            y_out, yp_out = sol.evaluate(t_out)
-            yp_out[0] = problem.yp0
+            y_out, yp_out = rows[np.concatenate(([0], np.flatnonzero(is_step)))], np.empty((0, problem.n))
+            if self.slopes:
+                yp_out = sol.derivative(t_out)
+                yp_out[0] = problem.yp0
         else:
             m = int(st.count[s.NEXT_OUTPUT])
             t_out, y_out, yp_out = st.outputs[:m], st.y_out[:m], st.yp_out[:m]

@@ -36,6 +36,7 @@ def solve_wstiff(
     event_direction: Sequence[int] | None = None,
     event_action: Sequence[int] | None = None,
     dense_output: bool = False,
+    slopes: bool = True,
     max_steps: int | None = None,
     progress: Callable[[float], None] | None = None,
     check_start: bool = True,
@@ -70,6 +71,8 @@ def solve_wstiff(
         1 stop, 2 land on the crossing and start afresh).
     dense_output : bool
         Keep every step, for ``result.sol``.
+    slopes : bool
+        Without ``t_eval``: whether y' is wanted too; it costs as much memory as y.
     max_steps : int, optional
         Limit on accepted steps.
     progress : callable, optional
@@ -107,6 +110,7 @@ def solve_wstiff(
         event_direction=event_direction,
         event_action=event_action,
         dense_output=dense_output,
+        slopes=slopes,
         max_steps=max_steps,
         progress=progress,
         check_start=check_start,

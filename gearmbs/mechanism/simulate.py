@@ -119,6 +119,7 @@ def simulate(
 
             # errors are controlled on positions and velocities, and so is the corrector
             options.setdefault("corrector", "modified")
+            options.setdefault("slopes", not every_step)
             result = solve_wstiff(problem, times, t_end=last, tol=tol, method=name, progress=report, **options)
     return Solution(system, problem, result)
 

@@ -84,7 +84,7 @@ def test_wheel_spinning_about_its_own_axis_along_global_z():
 def test_prescribed_rotation_needs_the_torque_j_alpha():
     """Reaction of the drive is J f''(t) about z; f is the integral of STEP, closed form."""
     m = Mechanism("drive")
-    wheel = m.body("w", 1.0, (0.5, 0.5, 2.0))
+    wheel = m.body("w", 1.0, (1.2, 1.2, 2.0))
     pin = m.revolute("pin", wheel, m.ground)
     function = ramp(30.0, over=0.5)
     m.rotation("drive", pin, function)
