@@ -99,11 +99,26 @@ def update_functions(t, tab):
 
 
 @njit(cache=True, error_model="numpy")
+def predict_angles(t, tab):
+    """Set the references of all counted angles to what their last values and rates let expect at time t."""
+    n = tab.reference.size
+    past = t - tab.winding[0]
+    for k in range(n):
+        tab.reference[k] = tab.winding[1 + k] + past * tab.winding[1 + n + k]
+    for k in range(tab.tape.shape[0]):
+        m = tab.tape[k, T.TAPE_REFERENCE_SIZE]
+        first = tab.tape[k, T.TAPE_REFERENCE]
+        for a in range(first, first + m):
+            tab.extra_r[a] = tab.extra_r[a + m] + past * tab.extra_r[a + 2 * m]
+
+
+@njit(cache=True, error_model="numpy")
 def update_tables(t, y, idata, tab):
-    """Bring bodies, markers and functions of time up to date with t and y."""
+    """Bring bodies, markers, functions of time and expected angles up to date with t and y."""
     update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
     update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
     update_functions(t, tab)
+    predict_angles(t, tab)
 
 
 @njit("float64(float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")

@@ -20,7 +20,7 @@ IVEC = types.int64[::1]
 F8 = types.float64
 I8 = types.int64
 
-CONTACT, VALUE, GRADIENT, SECOND, TIME, ANGLES = range(6)
+CONTACT, VALUE, GRADIENT, SECOND, TIME, ANGLES, ANGLE_RATES = range(7)
 
 _TABLES = (IVEC, VEC)
 _STATE = (F8, MAT, IVEC, MAT, VEC, VEC)
@@ -32,6 +32,7 @@ SIGNATURES = (
     F8(*_TABLES, *_STATE, VEC, VEC, VEC),
     types.void(*_TABLES, F8, VEC, VEC),
     types.void(*_TABLES, *_STATE, VEC),
+    types.void(*_TABLES, *_STATE, VEC, VEC, VEC),
 )
 
 NAMES = (
@@ -41,6 +42,7 @@ NAMES = (
     ("gearmbs.dae.expressions", "eval_second"),
     ("gearmbs.dae.expressions", "eval_time"),
     ("gearmbs.dae.expressions", "update_angles"),
+    ("gearmbs.dae.expressions", "angle_rates"),
 )
 
 
@@ -68,6 +70,7 @@ gradient_at = _caller(SIGNATURES[GRADIENT])
 second_at = _caller(SIGNATURES[SECOND])
 time_at = _caller(SIGNATURES[TIME])
 angles_at = _caller(SIGNATURES[ANGLES])
+angle_rates_at = _caller(SIGNATURES[ANGLE_RATES])
 
 
 def addresses() -> list[int]:

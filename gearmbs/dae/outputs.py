@@ -121,7 +121,7 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
             if idata[T.H_MODE] == COUNT:
                 vals[0] = count
             return last
-        track(t[k], at, tab)
+        track(t[k], at, tab, False)
         if rows > 0:
             # the nearest position and velocity, in the metric of the masses, that satisfy the constraints; the
             # factors of the row before serve while the bodies have hardly turned since

@@ -12,7 +12,7 @@ from numba import njit
 
 from gearmbs.dae import tables as T
 from gearmbs.dae import tapes
-from gearmbs.dae.kinematics import update_bodies, update_markers
+from gearmbs.dae.kinematics import predict_angles, update_bodies, update_markers
 from gearmbs.dae.problem import HOOK_SIG
 from gearmbs.dae.rotation import (
     KIN_A,
@@ -25,7 +25,7 @@ from gearmbs.dae.rotation import (
     momentum_from_conjugate,
     rotation_matrix,
 )
-from gearmbs.dae.terms import ANGLE, dot3
+from gearmbs.dae.terms import ANGLE, dot3, gradient
 
 
 @njit(cache=True, error_model="numpy")
@@ -59,18 +59,29 @@ def counts_angles(tab):
 
 
 @njit(cache=True, error_model="numpy")
-def track(t, y, tab):
-    """Count the turns of all counted angles up to a later point, less than half a turn away.
+def track(t, y, tab, moving):
+    """Count the turns of all counted angles up to a later point, less than half a turn from where it is expected.
 
-    The kinematics and marker tables must be those of that point.
+    That is where the last point's rates lead, if it was tracked as ``moving``, else the last point itself. The
+    kinematics and marker tables must be those of the new point.
     """
-    tapes.update_references(t, y, tab)
-    for k in range(tab.term.shape[0]):
+    predict_angles(t, tab)
+    tapes.update_references(t, y, tab, moving)
+    n = tab.reference.size
+    tab.winding[0] = t
+    for k in range(n):
         if tab.term[k, T.TERM_TYPE] == ANGLE:
-            fi, fj = tab.frame[tab.term[k, T.TERM_I]], tab.frame[tab.term[k, T.TERM_J]]
-            x = T.MK_AXES
-            turn = np.arctan2(dot3(fi, x, fj, x + 3), dot3(fi, x, fj, x)) - tab.reference[k]
-            tab.reference[k] += turn - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
+            bi, bj = tab.marker_body[tab.term[k, T.TERM_I]], tab.marker_body[tab.term[k, T.TERM_J]]
+            g, gt = tab.scratch[0:12], tab.scratch[12:24]
+            angle, _ = gradient(
+                k, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, tab.scratch[24:], g, gt
+            )
+            rate = 0.0
+            for c in range(3):
+                rate += g[3 + c] * tab.kin[bi, KIN_W + c] + g[9 + c] * tab.kin[bj, KIN_W + c]
+            tab.reference[k] = angle
+            tab.winding[1 + k] = angle
+            tab.winding[1 + n + k] = rate if moving else 0.0
 
 
 @njit(HOOK_SIG, cache=True, error_model="numpy")
@@ -100,5 +111,5 @@ def hook(t, hist, npast, idata, rdata, work):
     if counts_angles(tab):
         update_bodies(idata, hist[0], tab.code, tab.body, tab.kin, tab.scratch)
         update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
-        track(t, hist[0], tab)
+        track(t, hist[0], tab, True)
     return changed

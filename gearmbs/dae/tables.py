@@ -74,7 +74,7 @@ H_MODE = 48
 """What `jacobian` and `saddle` do with the entries: add up numbers, note places, count."""
 H_ADDRESS = 49
 """Addresses of the kernels called from outside, in the order of `gearmbs.dae.linkage.NAMES`."""
-H_SIZE = 55
+H_SIZE = 56
 
 BODY_MASS = 0
 BODY_INERTIA = 1
@@ -153,7 +153,7 @@ SCRATCH_FIXED = 512
 Tables = namedtuple(
     "Tables",
     "address code marker_body row term force function extra_i slot state tape "
-    "gravity body marker coef function_r extra_r reference kin frame fval scratch tape_work",
+    "gravity body marker coef function_r extra_r reference winding kin frame fval scratch tape_work",
 )
 
 
@@ -187,6 +187,7 @@ def unpack(idata, rdata, work):
         r[i[H_R_FUNCTION] : i[H_R_FUNCTION] + i[H_N_FUNCTION_R]],
         r[i[H_R_EXTRA] : i[H_R_EXTRA] + i[H_N_EXTRA_R]],
         r[i[H_R_REFERENCE] : i[H_R_REFERENCE] + terms],
+        r[i[H_R_REFERENCE] + terms : i[H_R_REFERENCE] + 3 * terms + 1],
         work[i[H_W_KIN] : i[H_W_KIN] + bodies * KIN_COLUMNS].reshape(bodies, KIN_COLUMNS),
         work[i[H_W_MARKER] : i[H_W_MARKER] + markers * MK_COLUMNS].reshape(markers, MK_COLUMNS),
         work[i[H_W_FUNCTION] : i[H_W_FUNCTION] + 3 * functions].reshape(functions, 3),
@@ -259,7 +260,7 @@ class TableBuilder:
         r = len(self.extra_r)
         self.extra_r.extend(float(v) for v in tape.floats)
         reference = len(self.extra_r)
-        self.extra_r.extend([0.0] * tape.n_angles)
+        self.extra_r.extend([0.0] * (3 * tape.n_angles))
         row = (i, len(tape.ints), r, len(tape.floats), reference, tape.n_angles)
         self.tape_rows.append((*row, bodies, len(tape.bodies), len(tape.algebraic)))
         self.tapes.append(tape)
@@ -389,7 +390,7 @@ class TableBuilder:
             (H_R_COEF, np.array(self.coef)),
             (H_R_FUNCTION, np.array(self.function_r)),
             (H_R_EXTRA, np.array(self.extra_r)),
-            (H_R_REFERENCE, np.array(self.reference)),
+            (H_R_REFERENCE, np.array([*self.reference, 0.0, *self.reference, *np.zeros(len(self.reference))])),
         ]
         head[H_ADDRESS : H_ADDRESS + len(NAMES)] = addresses()
         head[H_N_EXTRA_I], head[H_N_EXTRA_R] = len(self.extra_i), len(self.extra_r)

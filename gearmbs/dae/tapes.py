@@ -6,7 +6,7 @@ from numba import njit
 
 from gearmbs.dae import linkage
 from gearmbs.dae import tables as T
-from gearmbs.dae.linkage import angles_at, gradient_at, second_at, value_at
+from gearmbs.dae.linkage import angle_rates_at, angles_at, gradient_at, second_at, value_at
 
 LINE = 0
 """Force f along the line from J to I."""
@@ -70,13 +70,22 @@ def tail(tab, size):
 
 
 @njit(cache=True, error_model="numpy")
-def update_references(t, y, tab):
-    """Move the reference of every counted angle to its present value; the tables must be up to date."""
+def update_references(t, y, tab, moving):
+    """Keep the present value of every counted angle, and its rate if ``moving``; the tables must be up to date."""
     for k in range(tab.tape.shape[0]):
         if tab.tape[k, T.TAPE_REFERENCE_SIZE] > 0:
             ints, floats, ref = parts(k, tab)
             update = angles_at(tab.address[linkage.ANGLES])
             update(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, tab.tape_work)
+            m = ref.size
+            a = tab.tape[k, T.TAPE_REFERENCE] + m
+            tab.extra_r[a : a + m] = ref
+            rates = tab.extra_r[a + m : a + 2 * m]
+            rates[:] = 0.0
+            if moving:
+                grad = tail(tab, gradient_size(tab.tape[k]))
+                find = angle_rates_at(tab.address[linkage.ANGLE_RATES])
+                find(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, rates, grad, tab.tape_work)
 
 
 @njit(cache=True, error_model="numpy")

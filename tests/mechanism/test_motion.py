@@ -132,14 +132,31 @@ def test_screw_advances_by_its_pitch():
     assert solution.position("nut")[-1, 2] == pytest.approx(0.05, abs=1e-8)
 
 
+@pytest.mark.parametrize("speed", [10.0, 100.0])
 @pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF", "IDA"])
-def test_turns_are_counted_between_few_outputs(integrator):
-    """32 free turns of a screw with nothing but the counted angle to hold its steps short."""
+def test_turns_are_counted_in_steps_of_many_turns(integrator, speed):
+    """Free turns of a screw, with nothing that holds the integrator's steps short."""
     m = Mechanism("screw")
-    nut = m.body("nut", 1.0, (1, 1, 1), angular_velocity=(0, 0, 10.0), velocity=(0, 0, 0.05 / np.pi))
+    nut = m.body("nut", 1.0, (1, 1, 1), angular_velocity=(0, 0, speed), velocity=(0, 0, 0.005 * speed / np.pi))
     m.screw("thread", nut, m.ground, pitch=0.01)
     solution = m.simulate(20.0, t_eval=(0.0, 10.0, 20.0), integrator=integrator, tol=1e-8)
-    np.testing.assert_allclose(solution.position("nut")[:, 2], [0, 0.5 / np.pi, 1 / np.pi], atol=1e-6)
+    expected = 0.005 * speed / np.pi * solution.t
+    np.testing.assert_allclose(solution.position("nut")[:, 2], expected, atol=1e-6)
+    if integrator != "IDA":
+        assert solution.stats.steps < 100
+
+
+def test_counted_angle_of_a_force_in_steps_of_many_turns():
+    """A shaft against a torque of 1e-3 AZ: J w' = 0.5 - 1e-3 angle, w(0) = 60."""
+    m = Mechanism("shaft")
+    shaft = m.body("shaft", 1.0, (1, 1, 2.0), angular_velocity=(0, 0, 60.0))
+    i, j = shaft.marker(name="i"), m.ground.marker(name="j")
+    m.axis_torque("brake", i, j, "0.5 - 1e-3*AZ(i, j)")
+    solution = m.simulate(30.0, t_eval=(0.0, 30.0), tol=1e-9)
+    s = np.sqrt(1e-3 / 2.0)
+    expected = 60.0 * np.cos(30.0 * s) + 500.0 * s * np.sin(30.0 * s)
+    np.testing.assert_allclose(solution.angular_velocity("shaft")[-1, 2], expected, rtol=1e-6)
+    assert solution.stats.steps < 2000
 
 
 def test_coupler_is_a_gear():
