@@ -94,13 +94,24 @@ def put_pair(mode, slot, vals, k, row, col, value):
 def put_point(mode, slot, vals, k, row, coef, term, marker_body, frame):
     """Hand over the gradient of a POINT term; return the number of the next entry."""
     c = term[T.TERM_AXES]
-    c1, c2 = (c + 1) % 3, (c + 2) % 3
+    c1 = c + 1 if c < 2 else 0
+    c2 = c - 1 if c > 0 else 2
     for side in range(2):
         marker = term[T.TERM_I + side]
         if marker_body[marker] == 0:
             continue
-        q = 6 * (marker_body[marker] - 1)
         sign = coef if side == 0 else -coef
+        if mode == NUMBERS:
+            arm_2, arm_1 = sign * frame[marker, T.MK_ARM + c2], -sign * frame[marker, T.MK_ARM + c1]
+            vals[slot[k]] += sign
+            vals[slot[k + 1]] += sign
+            vals[slot[k + 2]] += arm_2
+            vals[slot[k + 3]] += arm_2
+            vals[slot[k + 4]] += arm_1
+            vals[slot[k + 5]] += arm_1
+            k += 6
+            continue
+        q = 6 * (marker_body[marker] - 1)
         k = put_pair(mode, slot, vals, k, row, q + c, sign)
         k = put_pair(mode, slot, vals, k, row, q + 3 + c1, sign * frame[marker, T.MK_ARM + c2])
         k = put_pair(mode, slot, vals, k, row, q + 3 + c2, -sign * frame[marker, T.MK_ARM + c1])
@@ -115,6 +126,12 @@ def put_dot(mode, slot, vals, k, row, coef, term, marker_body, cross):
         if body == 0:
             continue
         sign = coef if side == 0 else -coef
+        if mode == NUMBERS:
+            for c in range(3):
+                vals[slot[k]] += sign * cross[c]
+                vals[slot[k + 1]] += sign * cross[c]
+                k += 2
+            continue
         for c in range(3):
             k = put_pair(mode, slot, vals, k, row, 6 * (body - 1) + 3 + c, sign * cross[c])
     return k

@@ -104,7 +104,8 @@ def add_tape_row(k, t, lam, mu, y, idata, tab, out):
 def add_point_term(k, coef, lam, mu, idata, term, marker_body, kin, frame, out):
     """As the general path of `add_constraints` for a POINT term, whose gradient is a unit vector."""
     c = term[k, T.TERM_AXES]
-    c1, c2 = (c + 1) % 3, (c + 2) % 3
+    c1 = c + 1 if c < 2 else 0
+    c2 = c - 1 if c > 0 else 2
     value, rate = 0.0, 0.0
     for side in range(2):
         marker = term[k, T.TERM_I + side]

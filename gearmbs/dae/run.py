@@ -430,7 +430,9 @@ class Run:
             t_out = np.concatenate((t[:1], t[is_step]))
             if sol is None or rows is None:
                 raise AssertionError("every step was to be kept")
-            y_out, yp_out = rows[np.concatenate(([0], np.flatnonzero(is_step)))], np.empty((0, problem.n))
+            ends = np.concatenate(([0], np.flatnonzero(is_step)))
+            # the rows themselves where nothing but steps was stored
+            y_out, yp_out = rows if ends.size == len(rows) else rows[ends], np.empty((0, problem.n))
             if self.slopes:
                 yp_out = sol.derivative(t_out)
                 yp_out[0] = problem.yp0

@@ -17,7 +17,8 @@ from gearmbs.dae.terms import cross3, dot3
 def point_motion(k, term, marker_body, kin, frame):
     """Return phi of POINT term k, its rate, and its second rate without the terms in accelerations."""
     c = term[k, T.TERM_AXES]
-    c1, c2 = (c + 1) % 3, (c + 2) % 3
+    c1 = c + 1 if c < 2 else 0
+    c2 = c - 1 if c > 0 else 2
     phi, rate, quadratic = 0.0, 0.0, 0.0
     for side in range(2):
         marker = term[k, T.TERM_I + side]
