@@ -24,7 +24,7 @@ from gearmbs.dae.newton import (
     weighted_argmax,
     weighted_max,
 )
-from gearmbs.dae.problem import JACOBIAN_SIG
+from gearmbs.dae.problem import HISTORY_CHANGED, JACOBIAN_SIG
 from gearmbs.dae.sparse_lu import FACTORS_TYPE, PLAN_TYPE, factor
 from gearmbs.dae.state import STATE_TYPE
 
@@ -440,8 +440,12 @@ def advance(functions, st, plan, factors, max_accepted):
                 real[s.H] = min(h_wish, 2.0 * real[s.H]) if count[s.INTERPOLATE] else h_wish
         if real[s.T] >= real[s.T_END]:
             return s.DONE
-        if count[s.HAS_HOOK] and hook(times[0], hist, min(count[s.NPAST], HISTORY), idata, rdata, work) != 0:
+        told = 0
+        if count[s.HAS_HOOK]:
+            told = hook(times[0], hist, min(count[s.NPAST], HISTORY), idata, rdata, work)
+        if told != 0:
             count[s.JAC_WANTED] = 1
+        if told == HISTORY_CHANGED:
             count[s.SLOPE_AGE] = SLOPE_MAX_AGE
             for i in range(n):
                 y[i] = hist[0, i]

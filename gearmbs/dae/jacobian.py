@@ -387,6 +387,8 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
     if mode == NUMBERS:
         for k in range(vals.size):
             vals[k] = 0.0
+        for k in range(3 * (idata[T.H_BODIES] - 1)):
+            tab.seen[k] = y[idata[T.H_THETA] + k]
     # a literal 0 would make numba compile every callee once more
     k = np.int64(0)
     for b in range(1, idata[T.H_BODIES]):

@@ -21,6 +21,8 @@ IVEC = types.int64[::1]
 
 RESIDUAL_SIG = types.void(F8, VEC, VEC, VEC, IVEC, VEC, VEC)
 JACOBIAN_SIG = types.void(F8, VEC, VEC, F8, VEC, IVEC, VEC, VEC)
+KEPT, HISTORY_CHANGED, MATRIX_OUTDATED = range(3)
+"""What a hook tells the integrator."""
 HOOK_SIG = types.int64(F8, MAT, I8, IVEC, VEC, VEC)
 EVENTS_SIG = types.void(F8, VEC, VEC, VEC, IVEC, VEC, VEC)
 

@@ -13,7 +13,7 @@ from numba import njit
 from gearmbs.dae import tables as T
 from gearmbs.dae import tapes
 from gearmbs.dae.kinematics import predict_angles, update_bodies, update_markers
-from gearmbs.dae.problem import HOOK_SIG
+from gearmbs.dae.problem import HISTORY_CHANGED, HOOK_SIG, KEPT, MATRIX_OUTDATED
 from gearmbs.dae.rotation import (
     KIN_A,
     KIN_W,
@@ -44,6 +44,10 @@ def rewrite_point(y, b, old, new, idata, kin, s):
     euler_rates(kin, b, s, 0, y, e)
     for m in range(3):
         y[p + m] = dot3(row, 18 + 3 * m, s, 3)
+
+
+TURN_OF_MATRIX = 0.3
+"""Turn (rad) after which Newton's method with the old matrix would let deviations from the constraints grow."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -86,11 +90,15 @@ def track(t, y, tab, moving):
 
 @njit(HOOK_SIG, cache=True, error_model="numpy")
 def hook(t, hist, npast, idata, rdata, work):
-    """Switch references where due; update the reference of each counted angle. Return 1 if hist changed."""
+    """Switch references where due; update the reference of each counted angle.
+
+    Return ``HISTORY_CHANGED`` after a switch, ``MATRIX_OUTDATED`` if with one more step like the last some body will
+    have turned too far for the Newton matrix.
+    """
     tab = T.unpack(idata, rdata, work)
     th = idata[T.H_THETA]
     s = tab.scratch[0:24]
-    changed = 0
+    told = KEPT
     for b in range(1, idata[T.H_BODIES]):
         k = 3 * (b - 1)
         if abs(np.sin(hist[0, th + k + 1])) >= SWITCH_SINE:
@@ -100,7 +108,7 @@ def hook(t, hist, npast, idata, rdata, work):
         new = best_reference(tab.kin[b], KIN_A)
         if new == old:
             continue
-        changed = 1
+        told = HISTORY_CHANGED
         for row in range(npast):
             rewrite_point(hist[row], b, old, new, idata, tab.kin, s)
             if row > 0:
@@ -112,4 +120,9 @@ def hook(t, hist, npast, idata, rdata, work):
         update_bodies(idata, hist[0], tab.code, tab.body, tab.kin, tab.scratch)
         update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
         track(t, hist[0], tab, True)
-    return changed
+    if told == KEPT and npast > 1:
+        for k in range(3 * (idata[T.H_BODIES] - 1)):
+            now = hist[0, th + k]
+            if abs(now - tab.seen[k]) + abs(now - hist[1, th + k]) > TURN_OF_MATRIX:
+                return MATRIX_OUTDATED
+    return told

@@ -153,7 +153,7 @@ SCRATCH_FIXED = 512
 Tables = namedtuple(
     "Tables",
     "address code marker_body row term force function extra_i slot state tape "
-    "gravity body marker coef function_r extra_r reference winding kin frame fval scratch tape_work",
+    "gravity body marker coef function_r extra_r reference winding seen kin frame fval scratch tape_work",
 )
 
 
@@ -188,6 +188,7 @@ def unpack(idata, rdata, work):
         r[i[H_R_EXTRA] : i[H_R_EXTRA] + i[H_N_EXTRA_R]],
         r[i[H_R_REFERENCE] : i[H_R_REFERENCE] + terms],
         r[i[H_R_REFERENCE] + terms : i[H_R_REFERENCE] + 3 * terms + 1],
+        r[i[H_R_REFERENCE] + 3 * terms + 1 : i[H_R_REFERENCE] + 3 * (terms + bodies) + 1],
         work[i[H_W_KIN] : i[H_W_KIN] + bodies * KIN_COLUMNS].reshape(bodies, KIN_COLUMNS),
         work[i[H_W_MARKER] : i[H_W_MARKER] + markers * MK_COLUMNS].reshape(markers, MK_COLUMNS),
         work[i[H_W_FUNCTION] : i[H_W_FUNCTION] + 3 * functions].reshape(functions, 3),
@@ -383,6 +384,7 @@ class TableBuilder:
             (H_I_STATE, np.array(self.states)),
             (H_I_TAPE, np.array(self.tape_rows)),
         ]
+        unseen = np.zeros(len(self.reference) + 3 * bodies)
         tables_r = [
             (H_R_GRAVITY, self.gravity),
             (H_R_BODY, np.array(self.bodies)),
@@ -390,7 +392,7 @@ class TableBuilder:
             (H_R_COEF, np.array(self.coef)),
             (H_R_FUNCTION, np.array(self.function_r)),
             (H_R_EXTRA, np.array(self.extra_r)),
-            (H_R_REFERENCE, np.array([*self.reference, 0.0, *self.reference, *np.zeros(len(self.reference))])),
+            (H_R_REFERENCE, np.array([*self.reference, 0.0, *self.reference, *unseen])),
         ]
         head[H_ADDRESS : H_ADDRESS + len(NAMES)] = addresses()
         head[H_N_EXTRA_I], head[H_N_EXTRA_R] = len(self.extra_i), len(self.extra_r)

@@ -146,6 +146,21 @@ def test_turns_are_counted_in_steps_of_many_turns(integrator, speed):
         assert solution.stats.steps < 100
 
 
+@pytest.mark.parametrize("formulation", ["SI2", "SI1", "I3"])
+@pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF", "IDA"])
+def test_fast_shaft_in_a_bearing_takes_long_steps(integrator, formulation):
+    """A Newton matrix of another orientation would let deviations grow, and fail the run or hold its steps short."""
+    if (integrator, formulation) == ("IDA", "I3"):
+        pytest.skip("IDA does not take index 3")
+    m = Mechanism("shaft")
+    shaft = m.body("shaft", 1.0, (1, 1, 2.0), angular_velocity=(0, 0, 60.0))
+    m.revolute("bearing", shaft, m.ground, at=(0, 0, 0))
+    m.torque("motor", shaft, 0.5)
+    solution = m.simulate(30.0, t_eval=(0.0, 30.0), integrator=integrator, formulation=formulation, tol=1e-9)
+    assert solution.angular_velocity("shaft")[-1, 2] == pytest.approx(67.5, rel=1e-6)
+    assert solution.stats.steps < 200
+
+
 def test_counted_angle_of_a_force_in_steps_of_many_turns():
     """A shaft against a torque of 1e-3 AZ: J w' = 0.5 - 1e-3 angle, w(0) = 60."""
     m = Mechanism("shaft")
