@@ -7,13 +7,14 @@ combine by addition. Lengths are in m or text with a unit, angles in rad or text
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 from gearmbs.gears.canvas import Canvas
 from gearmbs.gears.iso1328 import random_pitch, tolerances
+from gearmbs.gears.settings import choice, real, switch, tooth_numbers, whole
 from gearmbs.gears.spec import convert_fields, require
 from gearmbs.gears.stiffness import Crack, pair_stiffness
 from gearmbs.units import Quantity
@@ -24,6 +25,12 @@ if TYPE_CHECKING:
 Wheel = Literal["driver", "driven"]
 Flank = Literal["drive", "back", "both"]
 
+CHOICES: dict[str, tuple[Any, ...]] = {
+    "wheel": ("driver", "driven"),
+    "flank": ("drive", "back", "both"),
+    "end": (1, -1),
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Fault:
@@ -33,21 +40,45 @@ class Fault:
     ----------
     wheel : {"driver", "driven"}
         The wheel that has it.
+
+    Raises
+    ------
+    ValueError
+        For a setting of the wrong kind; the message names the field, its value and what would do. What a wheel must
+        fit, such as a length along its face, is found when the fault is drawn.
     """
 
     label: ClassVar[str] = "fault"
     units: ClassVar[dict[str, str]] = {}
+    least: ClassVar[dict[str, int]] = {}
     along_face: ClassVar[bool] = False
 
     wheel: Wheel = "driver"
 
     def __post_init__(self) -> None:
         name = type(self).__name__
-        convert_fields(self, self.units, name)
-        require(self.wheel in ("driver", "driven"), f"{name}.wheel is {self.wheel!r}; choose 'driver' or 'driven'")
+        for item in fields(self):
+            value, place = getattr(self, item.name), f"{name}.{item.name}"
+            if item.name in self.units:
+                require(value is not None or item.default is None, f"{place} is None; give a number")
+            elif item.name in CHOICES:
+                value = choice(value, place, CHOICES[item.name])
+            elif item.name == "teeth":
+                value = tooth_numbers(value, place)
+            elif isinstance(item.default, bool):
+                value = switch(value, place)
+            elif isinstance(item.default, int):
+                value = whole(value, place, self.least.get(item.name))
+            elif isinstance(item.default, float):
+                value = real(value, place)
+            object.__setattr__(self, item.name, value)
+        try:
+            convert_fields(self, self.units, name)
+        except TypeError as error:
+            raise ValueError(str(error)) from None
         for key in self.units:
             value = getattr(self, key)
-            require(math.isfinite(value), f"{name}.{key} is {value}; give a finite number")
+            require(value is None or math.isfinite(value), f"{name}.{key} is {value}; give a finite number")
 
     @property
     def severity(self) -> float:
@@ -91,7 +122,8 @@ class ChippedCorner(Fault):
     def draw(self, canvas: Canvas, pair: GearPair) -> None:
         gear = canvas.gear
         require(
-            0 < self.length <= gear.face_width, f"ChippedCorner.length is {self.length} m; give 0 up to the face width"
+            0 < self.length <= gear.face_width,
+            f"ChippedCorner.length is {self.length} m; give more than 0 up to the face width, {gear.face_width:.6g} m",
         )
         most = gear.tip_radius - gear.root_radius
         require(0 < self.height <= most, f"ChippedCorner.height is {self.height} m; the tooth is {most:.6f} m high")
@@ -177,6 +209,7 @@ class Pit(Fault):
         "height": "length",
         "width": "length",
         "position": "length",
+        "radius": "length",
     }
     along_face: ClassVar[bool] = True
 
@@ -192,7 +225,6 @@ class Pit(Fault):
         for name in ("depth", "height", "width"):
             value = getattr(self, name)
             require(value > 0, f"Pit.{name} is {value} m; it must be positive")
-        convert_fields(self, {"radius": "length"}, "Pit")
         centre = canvas.gear.pitch_radius if self.radius is None else self.radius
         u = (canvas.radius - centre) / (0.5 * self.height)
         v = (canvas.station - self.position) / (0.5 * self.width)
@@ -332,7 +364,7 @@ class CumulativePitchError(Fault):
         teeth = canvas.gear.teeth
         require(self.amount >= 0, f"CumulativePitchError.amount is {self.amount} m; it must not be negative")
         require(
-            isinstance(self.order, int) and 1 <= self.order <= teeth // 2,
+            1 <= self.order <= teeth // 2,
             f"CumulativePitchError.order is {self.order!r}; give 1 up to {teeth // 2} waves per revolution",
         )
         wave = np.sin(2 * math.pi * self.order * np.arange(teeth) / teeth + self.phase)
@@ -357,6 +389,7 @@ class GradedFlanks(Fault):
 
     label: ClassVar[str] = "manufacturing grade"
     units: ClassVar[dict[str, str]] = {"grade": "dimensionless"}
+    least: ClassVar[dict[str, int]] = {"seed": 0}
     along_face: ClassVar[bool] = True
 
     grade: Quantity = 6
@@ -364,6 +397,11 @@ class GradedFlanks(Fault):
     pitch: bool = True
     profile: bool = True
     lead: bool = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        good = self.grade in range(1, 12)
+        require(good, f"GradedFlanks.grade is {self.grade}; ISO 1328-1 has the whole grades 1 to 11")
 
     def draw(self, canvas: Canvas, pair: GearPair) -> None:
         gear = canvas.gear

@@ -346,6 +346,13 @@ def make_case(data: dict[str, Any], source: str = "case") -> Case:
         raise CaseError(_explain(error, source)) from error
     except ValueError as error:
         raise CaseError(f"{source}: {error}") from error
+    if pair.faults:
+        from gearmbs.studies.tooth_faults import draw_alone
+
+        try:
+            draw_alone(pair)
+        except ValueError as error:
+            raise CaseError(f"{source}: fault.teeth{error}") from error
     if pair.misalignment == 0.0 and pair.jams:
         fault, overlap = case.fault, -pair.normal_backlash
         raise CaseError(
@@ -385,6 +392,9 @@ def _explain(error: ValidationError, source: str) -> str:
             model: Any = Case.model_fields[section].annotation if section in Case.model_fields else Case
             message = f"unknown key; known ones are {', '.join(model.model_fields)}"
             lines.append(f"{source}: {field}: {message}")
+        elif message.startswith("["):
+            # one of several, named by its place
+            lines.append(f"{source}: {field}{message}")
         else:
             # what is wrong with a section as a whole begins with the name of the field
             whole = isinstance(item["input"], (dict, BaseModel))

@@ -8,9 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gearmbs.gears import faults
+from gearmbs.gears.tables import canvases
+
+if TYPE_CHECKING:
+    from gearmbs.gears.pair import GearPair
 
 
 def kinds() -> dict[str, type[faults.Fault]]:
@@ -60,10 +64,41 @@ def fault_tables(value: Any) -> tuple[dict[str, Any], ...]:
     Raises
     ------
     ValueError
-        As `tooth_fault`.
+        As `tooth_fault`, beginning with the fault's place: ``[0].tooth is 1.5; ...``.
     """
     several = value if isinstance(value, (list, tuple)) else (value,)
-    return tuple(fault_table(tooth_fault(one)) for one in several)
+    return tuple(fault_table(_placed(one, place)) for place, one in enumerate(several))
+
+
+def draw_alone(pair: GearPair) -> None:
+    """Draw every fault of a pair by itself, to find those that do not fit their wheel before anything is run.
+
+    Raises
+    ------
+    ValueError
+        Naming the fault by its place, ``[0].lost``, with its value and what would do.
+    """
+    for place, fault in enumerate(pair.faults):
+        try:
+            canvases(pair.with_changes(faults=(fault,)))
+        except ValueError as error:
+            raise ValueError(_at(place, fault, error)) from error
+
+
+def _placed(value: Any, place: int) -> faults.Fault:
+    try:
+        return tooth_fault(value)
+    except ValueError as error:
+        raise ValueError(_at(place, None, error)) from error
+
+
+def _at(place: int, fault: faults.Fault | None, error: ValueError) -> str:
+    text = str(error)
+    names = [type(fault).__name__] if fault is not None else [kind.__name__ for kind in kinds().values()]
+    for name in names:
+        if text.startswith(f"{name}."):
+            return f"[{place}]{text.removeprefix(name)}"
+    return f"[{place}]: {text}"
 
 
 def _plain(name: str) -> str:

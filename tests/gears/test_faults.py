@@ -111,6 +111,48 @@ def test_nonsense_is_named(kind, name, bad):
         kind(wheel="third")
 
 
+@pytest.mark.parametrize(
+    ("kind", "name", "bad"),
+    [
+        (BrokenTooth, "tooth", 1.5),
+        (BrokenTooth, "tooth", "a"),
+        (BrokenTooth, "tooth", True),
+        (BrokenTooth, "lost", [0.5]),
+        (BrokenTooth, "lost", None),
+        (TipRelief, "power", "two"),
+        (TipRelief, "teeth", 2.5),
+        (TipRelief, "teeth", [1, 2.5]),
+        (TipRelief, "teeth", []),
+        (TipRelief, "teeth", "some"),
+        (TipRelief, "flank", "top"),
+        (TipRelief, "wheel", 3),
+        (ChippedCorner, "end", 0),
+        (ChippedCorner, "end", 2),
+        (GradedFlanks, "seed", -1),
+        (GradedFlanks, "seed", 1.0),
+        (GradedFlanks, "grade", 6.7),
+        (GradedFlanks, "pitch", "no"),
+        (CumulativePitchError, "order", 1.5),
+        (Pit, "radius", "3 kg"),
+    ],
+)
+def test_settings_are_checked_at_once(kind, name, bad):
+    with pytest.raises(ValueError, match=rf"{kind.__name__}\.{name}"):
+        kind(**{name: bad})
+
+
+def test_numbers_of_numpy_will_do():
+    order = CumulativePitchError(order=np.int64(2))
+    worn = Wear(teeth=np.arange(3))
+    assert order == CumulativePitchError(order=2)
+    assert worn == Wear(teeth=[0, 1, 2])
+    assert TipRelief(power=np.float64(2), teeth=np.int64(4)) == TipRelief(power=2.0, teeth=4)
+    assert ChippedCorner(end=np.int64(-1)).end == -1
+    assert Pit(radius="44 mm").radius == pytest.approx(44e-3)
+    assert GradedFlanks(grade="6", pitch=np.bool_(False)).pitch is False
+    GearPair.paper().with_faults(order, worn).contact_tables()
+
+
 def test_eccentricity_is_a_shifted_wheel():
     # moving the driver's toothing by e in its own frame is the same as drawing the fault, to e^2 / rho
     amount, phase = 20e-6, 0.7

@@ -113,7 +113,7 @@ def test_faults_of_teeth_by_name_table_and_file(tmp_path):
     [
         ("chip", "kind 'chip' is unknown; known ones are chipped corner"),
         ({"kind": "pitting", "deep": 1}, "pitting: unknown key 'deep'; known ones are wheel, depth"),
-        ({"kind": "pitting", "depth": "1 N"}, "Pit.depth: '1 N' is in N"),
+        ({"kind": "pitting", "depth": "1 N"}, r"fault.teeth\[0\].depth: '1 N' is in N"),
         ({"lost": 0.3}, "write its name or a table with 'kind'"),
         (3, "3 is no fault"),
     ],
@@ -121,3 +121,20 @@ def test_faults_of_teeth_by_name_table_and_file(tmp_path):
 def test_wrong_faults_of_teeth(fault, words):
     with pytest.raises(CaseError, match=words):
         make_case({"fault": {"teeth": fault}})
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ({"kind": "broken tooth", "lost": 1.5}, r"fault\.teeth\[1\]\.lost is 1\.5; give"),
+        ({"kind": "broken tooth", "tooth": 1.5}, r"fault\.teeth\[1\]\.tooth is 1\.5; give"),
+        ({"kind": "cumulative pitch error", "order": 20}, r"fault\.teeth\[1\]\.order is 20; give 1 up to 14"),
+        ({"kind": "wear", "teeth": "some"}, r"fault\.teeth\[1\]\.teeth is 'some'; give 'all'"),
+        ({"kind": "chipped corner", "length": "50 mm"}, r"fault\.teeth\[1\]\.length is 0\.05 m"),
+        ({"kind": "pitting", "depth": "3 kg"}, r"fault\.teeth\[1\]\.depth"),
+        ({"kind": "wear", "size": 1}, r"fault\.teeth\[1\]: wear: unknown key 'size'"),
+    ],
+)
+def test_faults_that_do_not_fit_are_named_by_their_place(fault, words):
+    with pytest.raises(CaseError, match=words):
+        make_case({"fault": {"teeth": ["eccentricity", fault]}})
