@@ -14,13 +14,14 @@ from gearmbs.dae import difference_jacobian as dj
 from gearmbs.dae.ida import solve_ida
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, Status
-from gearmbs.dae.sparse_lu import SingularMatrixError, analyse, factor, new_factors, solve
+from gearmbs.dae.sparse_lu import LUFactors, LUPlan, SingularMatrixError, analyse, factor, new_factors, solve
 from gearmbs.dae.wstiff import solve_wstiff
 
 METHODS = ("WSTIFF", "GSTIFF", "IDA")
 IDA_DEFAULT_OUTPUTS = 201
 SETTLING_STEP = 1e-12
 SETTLING_SWEEPS = 3
+SETTLING_RATIO = 10.0
 
 
 def _takes(function: Callable, fewest: int, what: str) -> bool:
@@ -127,26 +128,52 @@ def _pattern(jac_sparsity: Any, n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _settle_rates(problem: DAEProblem, span: float) -> None:
-    """Set y' of differential unknowns by a few Newton sweeps on a vanishing implicit Euler step."""
-    gamma = 1.0 / (SETTLING_STEP * span)
-    vals = np.empty(len(problem.indices))
+    """Set y' of differential unknowns by a few Newton sweeps on a vanishing implicit Euler step.
+
+    Where the values are off the constraints, the sweeps take the jump onto them for a rate, which would hide the
+    inconsistency from the check of the start: then the rates stay zero.
+    """
     work = np.zeros(problem.work_size)
-    out = np.empty(problem.n)
     tables = (problem.idata, problem.rdata, work)
+    moving = problem.differential
+    gamma = 1.0 / (SETTLING_STEP * span)
+    out = np.empty(problem.n)
+
+    def sweep(gamma: float, factored: tuple[LUPlan, LUFactors]) -> np.ndarray:
+        problem.residual(problem.t0, problem.y0, problem.yp0, out, *tables)
+        delta = np.empty(problem.n)
+        solve(*factored, out, delta)
+        return delta[moving]
+
+    factored = _settling_factors(problem, gamma, tables)
+    if factored is None:
+        return
+    jump = sweep(gamma, factored)
+    large = np.abs(jump) > problem.atol_scale[moving]
+    if large.any():
+        # the move of a rate shrinks with the step, a jump does not
+        shorter = _settling_factors(problem, SETTLING_RATIO * gamma, tables)
+        if shorter is None or (np.abs(sweep(SETTLING_RATIO * gamma, shorter)) > 0.5 * np.abs(jump))[large].any():
+            return
+    problem.yp0[moving] -= gamma * jump
+    for _ in range(SETTLING_SWEEPS - 1):
+        problem.yp0[moving] -= gamma * sweep(gamma, factored)
+
+
+def _settling_factors(problem: DAEProblem, gamma: float, tables: tuple) -> tuple[LUPlan, LUFactors] | None:
+    """Factor the Newton matrix at the start for a step of size 1 / ``gamma``; None if that cannot be done."""
+    out, vals = np.empty(problem.n), np.empty(len(problem.indices))
     problem.residual(problem.t0, problem.y0, problem.yp0, out, *tables)
     problem.jacobian(problem.t0, problem.y0, problem.yp0, gamma, vals, *tables)
     if not (np.isfinite(out).all() and np.isfinite(vals).all()):
-        return
+        return None
     try:
         plan = analyse(problem.indptr, problem.indices, vals, problem.scale)
     except SingularMatrixError:
-        return
+        return None
     factors = new_factors(plan)
     factor(plan, factors, vals)
-    for _ in range(SETTLING_SWEEPS):
-        problem.residual(problem.t0, problem.y0, problem.yp0, out, *tables)
-        solve(plan, factors, out, out)
-        problem.yp0[problem.differential] -= gamma * out[problem.differential]
+    return plan, factors
 
 
 def as_problem(

@@ -60,6 +60,48 @@ def test_velocity_off_the_constraint_is_inconsistent_too():
     assert " u " in result.message
 
 
+def driven(t, y, yp, out):
+    """Index two: y[0] follows sin t, y[1] is its rate."""
+    out[0] = yp[0] - y[1]
+    out[1] = y[0] - np.sin(t)
+
+
+def test_inconsistent_start_without_rates():
+    """The rates that are worked out must not swallow the jump, here from 0.5 to sin 0 = 0."""
+    result = solve_dae(driven, (0.0, 1.0), [0.5, 1.0], names=["place", "speed"])
+    assert result.status is Status.INCONSISTENT_START
+    assert "place" in result.message
+    assert "0.5" in result.message
+
+
+def test_pendulum_off_its_circle_without_rates():
+    """Stabilised index 2, 10 % too long."""
+
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - y[2] + y[0] * y[5]
+        out[1] = yp[1] - y[3] + y[1] * y[5]
+        out[2] = yp[2] + y[0] * y[4]
+        out[3] = yp[3] + y[1] * y[4] + 9.81
+        out[4] = 0.5 * (y[0] ** 2 + y[1] ** 2 - 1.0)
+        out[5] = y[0] * y[2] + y[1] * y[3]
+
+    result = solve_dae(residual, (0.0, 1.0), [1.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert result.status is Status.INCONSISTENT_START
+    assert "y[0]" in result.message
+
+
+def test_fast_rates_are_not_taken_for_a_jump():
+    """A decay at 1e8 / s moves by 1e-4 in the step that settles the rates, far beyond its tolerance."""
+
+    def residual(t, y, yp, out):
+        out[0] = yp[0] + 1e8 * (y[0] - 2.0)
+
+    result = solve_dae(residual, (0.0, 1.0), [1.0])
+    assert result.success
+    assert result.yp[0, 0] == pytest.approx(1e8, rel=1e-3)
+    assert result.y[-1, 0] == pytest.approx(2.0, abs=1e-6)
+
+
 def test_inconsistent_start_may_be_let_through():
     problem = pendulum()
     problem.y0[0] = 1.0001
@@ -175,6 +217,26 @@ def test_exception_in_a_python_function():
     assert result.status is Status.USER_ERROR
     assert "valve stuck" in result.message
     assert 0.0 < result.t_last <= 0.5
+
+
+@pytest.mark.parametrize("place", ["event", "jacobian"])
+def test_exception_at_the_start_outside_the_residual(place):
+    def residual(t, y, yp, out):
+        out[0] = yp[0] + y[0]
+
+    def broken(*arguments):
+        raise KeyError("stiffness")
+
+    def jacobian(t, y, yp, cj, out):
+        broken()
+
+    def event(t, y, yp):
+        return broken()
+
+    own = {"events": event} if place == "event" else {"jac": jacobian}
+    result = solve_dae(residual, (0.0, 1.0), [1.0], [-1.0], **own)
+    assert result.status is Status.USER_ERROR
+    assert "KeyError: 'stiffness'" in result.message
 
 
 def test_every_status_has_a_sentence():
