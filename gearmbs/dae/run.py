@@ -346,6 +346,8 @@ class Run:
         st = self.state
         if not self.started:
             failure = self._start()
+            if self._user_exception() is not None:
+                return self._user_failure()
             if failure is not None:
                 return failure
             self.started = True
@@ -365,6 +367,8 @@ class Run:
                 self.epochs.append((first, st.idata.copy()))
             elif code == s.REPIVOT:
                 failure = self._repivot()
+                if self._user_exception() is not None:
+                    return self._user_failure()
                 if failure is not None:
                     return failure
             elif code == s.BUFFER_FULL:
