@@ -37,6 +37,17 @@ DIMENSIONS = {
 }
 
 
+USUAL = {"m": "mm", "rad": "deg", "rad/s": "rpm"}
+"""Units that hints show instead of SI's, which hardly anybody means who leaves the unit away."""
+
+SPELLINGS = (
+    (r"\b([kM]?)Nm\b", r"\1N*m"),
+    (r"\bNmm\b", "N*mm"),
+    (r"\b(?:RPM|[Uu]/min)\b", "rpm"),
+)
+"""Usual ways of writing that the parser of units does not know."""
+
+
 @functools.cache
 def _registry() -> Any:
     import pint
@@ -97,24 +108,49 @@ def _parse(text: str, target: str, field: str) -> float:
 
     registry = _registry()
     clean = re.sub(r"(?<=\d)\s*°", " deg", text.strip()).replace("·", "*").replace("µ", "u").replace("μ", "u")
+    for pattern, written in SPELLINGS:
+        clean = re.sub(pattern, written, clean)
     try:
         quantity = registry.Quantity(clean)
     except Exception as error:
         raise ValueError(
-            f"{field}: cannot read {text!r} as a number with a unit ({error}); write for example '1 {target}'"
+            f"{field}: cannot read {text!r} as a number with a unit ({error}); write for example "
+            f"'1 {USUAL.get(target, target)}'"
         ) from None
+    example = USUAL.get(target, target)
     if not isinstance(quantity, registry.Quantity):
         quantity = registry.Quantity(quantity, "dimensionless")
     if not isinstance(quantity.magnitude, Real):
-        raise ValueError(f"{field}: cannot read {text!r} as a number with a unit; write for example '1 {target}'")
+        raise ValueError(f"{field}: cannot read {text!r} as a number with a unit; write for example '1 {example}'")
     wanted = registry.Quantity(1.0, target)
     if quantity.dimensionless and not wanted.dimensionless:
-        raise ValueError(f"{field}: {text!r} has no unit; write for example '{text.strip()} {target}'")
+        raise ValueError(f"{field}: {text!r} has no unit; write for example '{text.strip()} {example}'")
     if wanted.units == registry.radian and quantity.dimensionless and quantity.unitless:
         raise ValueError(f"{field}: {text!r} has no unit; write 'deg' or 'rad'")
+    turns = _turns(quantity, registry, text, target, field)
+    if turns is not None:
+        return turns
     try:
         return float(quantity.to(target).magnitude)
     except pint.DimensionalityError:
         raise ValueError(
             f"{field}: {text!r} is in {quantity.units:~} where a quantity in {target} is expected"
         ) from None
+
+
+def _turns(quantity: Any, registry: Any, text: str, target: str, field: str) -> float | None:
+    """Tell turns from radians, which the parser takes for the same: 30 Hz are 30 turns a second, not 30 rad/s.
+
+    None where it does not matter.
+    """
+    if target not in ("rad/s", "Hz") or not quantity.check("1/[time]"):
+        return None
+    names = str(quantity.units)
+    angular = any(word in names for word in ("radian", "degree", "turn", "revolution", "rpm", "rps"))
+    if target == "Hz":
+        return float(quantity.to("rad/s").magnitude) / math.tau if angular else None
+    if angular:
+        return None
+    if "hertz" in names or "minute" in names:
+        return float(quantity.to("1/s").magnitude) * math.tau
+    raise ValueError(f"{field}: {text!r} may be turns or radians; write 'rpm', 'Hz' or 'rad/s'")

@@ -24,6 +24,10 @@ def convert_fields(obj: object, units: dict[str, str], owner: str) -> None:
             object.__setattr__(obj, name, to_si(value, unit, f"{owner}.{name}"))
 
 
+LARGEST_MODULE = 0.2
+"""m; the largest gears made have a third of it, and a forgotten unit is far above."""
+
+
 def require(condition: bool, message: str) -> None:
     """Raise ValueError with the message unless the condition holds."""
     if not condition:
@@ -116,6 +120,10 @@ class GearSpec:
             if isinstance(value, float) and not math.isfinite(value):
                 raise ValueError(f"{self.name}.{item.name} is {value}; give a finite number")
         require(self.module > 0, f"{self.name}.module is {self.module} m; it must be positive")
+        require(
+            self.module <= LARGEST_MODULE,
+            f"{self.name}.module is {self.module:g} m; a plain number is in m, write '{self.module:g} mm'",
+        )
         defaults = {
             "addendum": (1.0 + self.profile_shift) * self.module,
             "dedendum": (1.25 - self.profile_shift) * self.module,

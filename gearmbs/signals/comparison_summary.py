@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from .comparison_report import ComparisonReport
 
 
+MOSTLY = 0.75
+"""Share of values from which "mostly" is said."""
+
+
 def summary(report: ComparisonReport, change_db: float) -> list[str]:
     """Two sentences for each fault: which harmonics move the same way at every load, and how much of it was expected.
 
@@ -76,12 +80,23 @@ def _verdict(report: ComparisonReport, state: str) -> str:
     table = report.expectations()
     table = table[table["state"] == state]
     if not len(table):
-        return ""
+        from .comparison_report import EXPECTED
+
+        return f"no expectation is known for {state!r}; it is for {', '.join(EXPECTED)}."
     parts = []
     for word, rows in table.groupby("expected", sort=False):
         features = list(dict.fromkeys(rows["feature"]))
         met, total = int(rows["met"].sum()), int(rows["of"].sum())
-        verdict = "as expected" if met == total else "mostly as expected" if 2 * met > total else "not as expected"
+        share = met / total
+        verdict = (
+            "as expected"
+            if met == total
+            else "mostly as expected"
+            if share >= MOSTLY
+            else "in part as expected"
+            if share > 0.5
+            else "not as expected"
+        )
         first, space, rest = str(word).partition(" ")
         verb = str(word) if len(features) == 1 else f"{first.removesuffix('s')}{space}{rest}"
         parts.append(f"{_listed(features)} {verb}, which {met} of {total} values do: {verdict}")

@@ -1,8 +1,10 @@
 """Text with units becomes SI; everything else is refused by name."""
 
+import math
+
 import pytest
 
-from gearmbs.gears import ContactLaw, Friction
+from gearmbs.gears import ContactLaw, Friction, GearSpec
 from gearmbs.units import to_si
 
 
@@ -78,3 +80,35 @@ def test_hertz_line_contact():
     # Palmgren: 1000 N on 20 mm of steel: 3.84e-5 * 1000^0.9 / 20^0.8 = 1.752e-3 mm
     law = ContactLaw.hertz_line("20 mm", "206 GPa", 0.3)
     assert (1000 / law.stiffness) ** 0.9 == pytest.approx(3.84e-8 * 1000**0.9 / 20**0.8, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "value"),
+    [
+        ("30 Hz", "angular speed", 60.0 * math.pi),
+        ("1800 1/min", "angular speed", 60.0 * math.pi),
+        ("1800 U/min", "angular speed", 60.0 * math.pi),
+        ("1800 RPM", "angular speed", 60.0 * math.pi),
+        ("180 deg/s", "angular speed", math.pi),
+        ("60 rpm", "frequency", 1.0),
+        ("6.283185307179586 rad/s", "frequency", 1.0),
+        ("50 1/s", "frequency", 50.0),
+        ("30 Nm", "torque", 30.0),
+        ("1.5 kNm", "torque", 1500.0),
+        ("30 Nmm", "torque", 0.03),
+    ],
+)
+def test_turns_are_not_radians_and_usual_spellings(text, dimension, value):
+    assert to_si(text, dimension) == pytest.approx(value, rel=1e-12)
+
+
+def test_a_reciprocal_second_may_be_either():
+    with pytest.raises(ValueError, match="may be turns or radians; write 'rpm', 'Hz' or 'rad/s'"):
+        to_si("30 1/s", "angular speed", "speed")
+
+
+def test_a_module_of_metres_is_a_forgotten_unit():
+    with pytest.raises(ValueError, match="a plain number is in m, write '3 mm'"):
+        GearSpec(teeth=20, module=3)
+    with pytest.raises(ValueError, match="write for example '3 mm'"):
+        GearSpec(teeth=20, module="3")

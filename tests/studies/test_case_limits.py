@@ -23,7 +23,7 @@ from gearmbs.studies.limits import check_record, edge, remarks, slip
         ({"gears": {"tip_radius": "47 mm", "addendum": "3 mm"}}, r"tip_radius and addendum say the same"),
         ({"shafts": {"density": "7850 kg"}}, r"shafts.density = '7850 kg': '7850 kg' is in kg"),
         ({"fault": {"misalignment": 1}}, r"fault.misalignment = 1: this is 57.2958 deg; .*write '1 deg'"),
-        ({"operation": {"speed": "1000"}}, r"operation.speed = '1000': '1000' has no unit; write .*'1000 rad/s'"),
+        ({"operation": {"speed": "1000"}}, r"operation.speed = '1000': '1000' has no unit; write .*'1000 rpm'"),
         ({"operation": {"speed": True}}, r"operation.speed = True: got True; give a number in rad/s"),
         ({"operation": {"torque": "1e9 N m"}}, r"operation.torque = '1e9 N m': this is 1e\+09 N m"),
         ({"contact": {"stiffness": "3 N/mm"}}, r"contact.stiffness: '3 N/mm' is in N / mm where"),
