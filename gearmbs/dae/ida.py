@@ -27,6 +27,13 @@ HISTORY_GROWTH = 1024
 MAX_STEPS = 100_000
 """Steps allowed between two outputs: 15 s of a gear pair's run, which takes some tens of steps a mesh period."""
 
+NOT_FINITE_LIMIT = 100
+"""Evaluations without a finite result, at times it never gets past, after which a run is given up."""
+
+
+class _NotFiniteError(ArithmeticError):
+    """The residual is not finite beyond some time, whatever the step."""
+
 
 class _Callbacks:
     """The residual and Jacobian as scikit-sundae calls them: read-only arrays in, values written in place."""
@@ -41,7 +48,7 @@ class _Callbacks:
         self.vals = np.zeros(problem.indices.size)
         self.last_t = np.nan
         self.steps = self.residuals = self.jacobians = 0
-        self.bad: str | None = None
+        self.bad_count, self.bad_t, self.bad_row = 0, -np.inf, 0
 
     def residual(self, t, y, yp, out):
         self.y[:] = y
@@ -51,6 +58,15 @@ class _Callbacks:
             self.steps += 1
             self.last_t = t
         self.residuals += 1
+        finite = np.isfinite(out)
+        if not finite.all():
+            # IDA tries a smaller step; where that never helps it creeps on in ever smaller ones
+            self.bad_count += 1
+            self.bad_t, self.bad_row = max(self.bad_t, t), int(np.argmin(finite))
+            if self.bad_count >= NOT_FINITE_LIMIT:
+                raise _NotFiniteError
+        elif t > self.bad_t:
+            self.bad_count, self.bad_t = 0, -np.inf
 
     def jacobian(self, t, y, yp, res, cj, out):
         self.y[:] = y
@@ -121,7 +137,8 @@ def solve_ida(
     Returns
     -------
     DAEResult
-        With ``status`` `SOLVER_FAILURE` or `INTERRUPTED` and what was computed so far if the run did not finish.
+        With ``status`` `SOLVER_FAILURE`, `NOT_FINITE` or `INTERRUPTED`, and what was computed so far, if the run did
+        not finish.
     """
     every_step = t_eval is None
     if every_step and t_end is None:
@@ -156,8 +173,7 @@ def solve_ida(
                 target = min(target, t + problem.hook_interval(y))
             answer = solver.step(target, method="onestep" if every_step else "normal", tstop=end)
             if not answer.success:
-                status = Status.SOLVER_FAILURE
-                message = _failure(problem, calls, float(answer.t), answer.message, atol)
+                status, message = _failure(problem, calls, float(answer.t), answer.message, atol)
                 break
             t, y, yp = float(answer.t) if every_step else target, answer.y, answer.yp
             if rows.take(t, y, yp) and progress is not None:
@@ -174,8 +190,8 @@ def solve_ida(
                     solver.init_step(t, y, yp)
     except KeyboardInterrupt:
         status, message = Status.INTERRUPTED, f"{Status.INTERRUPTED.sentence} Reached t = {t:.6g} s."
-    except RuntimeError as error:
-        status, message = Status.SOLVER_FAILURE, _failure(problem, calls, t, str(error), atol)
+    except (_NotFiniteError, RuntimeError) as error:
+        status, message = _failure(problem, calls, max(t, calls.last_t), str(error), atol)
     stats = SolverStats(
         steps=calls.steps,
         residuals=calls.residuals,
@@ -229,19 +245,16 @@ class _Rows:
         return True
 
 
-def _failure(problem: DAEProblem, calls: _Callbacks, t: float, why: str, atol: np.ndarray) -> str:
+def _failure(problem: DAEProblem, calls: _Callbacks, t: float, why: str, atol: np.ndarray) -> tuple[Status, str]:
     """Say when the run failed, which unknown is the least satisfied, and what to try."""
-    out = np.zeros(problem.n)
-    problem.residual(t, calls.y, calls.yp, out, calls.idata, calls.rdata, calls.work)
-    if not np.all(np.isfinite(out)):
-        worst = int(np.flatnonzero(~np.isfinite(out))[0])
-        return (
-            f"IDA stopped at t = {t:.6g} s: the equation of {unknown_name(problem, worst)} is not a finite number. "
-            f"{advice(problem, Status.NOT_FINITE)}"
+    if calls.bad_count:
+        return Status.NOT_FINITE, (
+            f"{Status.NOT_FINITE.sentence} IDA stopped at t = {t:.6g} s: the equation of "
+            f"{unknown_name(problem, calls.bad_row)} is not a finite number. {advice(problem, Status.NOT_FINITE)}"
         )
     moving = np.where(problem.error_mask, np.abs(calls.yp) / np.maximum(atol, 1e-300), 0.0)
     worst = int(np.argmax(moving))
-    return (
+    return Status.SOLVER_FAILURE, (
         f"IDA stopped at t = {t:.6g} s ({why}). The unknown that changes fastest for its tolerance is "
         f"{unknown_name(problem, worst)}. {advice(problem, Status.SOLVER_FAILURE)}"
     )

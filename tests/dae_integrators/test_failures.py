@@ -142,6 +142,30 @@ def test_nan_at_the_start():
     assert result.stats.steps == 0
 
 
+def test_ida_gives_up_where_the_equations_are_not_finite():
+    """The root ends at t = 1, which IDA would approach in ever smaller steps: y = 1 + 2/3 there."""
+
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - np.sqrt(1.0 - t if t <= 1.0 else np.nan)
+
+    result = solve_dae(residual, (0.0, 2.0), [1.0], [1.0], method="IDA", names=["level"])
+    assert result.status is Status.NOT_FINITE
+    assert "t = 1 s: the equation of level is not a finite number" in result.message
+    assert result.y[-1, 0] == pytest.approx(5.0 / 3.0, abs=2e-3)
+    assert result.stats.residuals < 1000
+
+
+def test_ida_reports_an_exception_of_the_residual():
+    def residual(t, y, yp, out):
+        if t > 0.5:
+            raise KeyError("stiffness")
+        out[0] = yp[0] + y[0]
+
+    result = solve_dae(residual, (0.0, 1.0), [1.0], [-1.0], method="IDA")
+    assert result.status is Status.USER_ERROR
+    assert "KeyError: 'stiffness'" in result.message
+
+
 def test_step_at_hmin_names_the_dominating_unknown():
     @njit
     def residual(t, y, yp, out):
