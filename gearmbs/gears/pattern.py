@@ -13,7 +13,10 @@ from gearmbs.gears.transmission import StaticMesh
 if TYPE_CHECKING:
     from gearmbs.gears.pair import GearPair
 
-SIDE, TOOTH_1, STATION, GAP, STRING_1, SOFT = 0, 1, 3, 4, 6, 11
+SIDE, STATION, GAP, STRING_1, SOFT = 0, 3, 4, 6, 11
+TEETH = slice(1, 3)
+FINE = 8
+MAX_STATIONS = 300
 
 
 @dataclass(frozen=True)
@@ -55,9 +58,14 @@ class ContactPattern:
 
 
 def contact_pattern(
-    pair: GearPair, torque: float | None = None, points: int = 81, stations: int = 41, side: str = "drive"
+    pair: GearPair,
+    torque: float | None = None,
+    points: int = 81,
+    stations: int = 41,
+    side: str = "drive",
+    tooth: int = 0,
 ) -> ContactPattern:
-    """Follow tooth 0 of the driver through the mesh at rest under load.
+    """Follow a tooth of the driver through the mesh at rest under load.
 
     Parameters
     ----------
@@ -67,28 +75,41 @@ def contact_pattern(
     points : int
         Positions over the engagement.
     stations : int
-        Along the face.
+        Along the face, up to 300.
     side : {"drive", "back"}
         Flank to look at; the back flanks are loaded when misalignment jams the teeth.
+    tooth : int
+        Of the driver; numbers wrap around the wheel.
 
     Returns
     -------
     ContactPattern
+
+    Notes
+    -----
+    The load of a pair of teeth is integrated between the ends of its own common face by the midpoint rule, eight points
+    to a station, over gaps that are straight between the stations. With ``load="adams"`` it is the one force of the
+    overlap, spread as its cross-section, depth^1.5. The totals of drive less back times r_b are the torque within 0.2 %
+    while involutes touch; a corner that bears has another arm than r_b: 1.3 % were seen, of jammed teeth, which carry
+    much more on both sides, 3 % of the drive side's load.
     """
     if side not in ("drive", "back"):
         raise ValueError(f"side is {side!r}; choose 'drive' or 'back'")
+    if not 1 <= stations <= MAX_STATIONS:
+        raise ValueError(f"stations is {stations!r}; give 1 up to {MAX_STATIONS}")
     load = pair.torque if torque is None else torque
+    tooth %= pair.driver.teeth
     mesh = StaticMesh(pair)
     low, high = pair.common_face
     width = (high - low) / stations
     station = low + (np.arange(stations) + 0.5) * width
-    law = pair.contact
     flank = pair.rotation * (1 if side == "drive" else -1)
     gear = pair.wheels[0]
     alpha = pair.working_pressure_angle
     middle = gear.base_radius * math.tan(alpha)
     # tooth 0 touches at string s when the driver stands at s / r_b - psi - alpha, on the side that turns with the drive
     offset = pair.rotation * (math.tan(alpha) - gear.base_half_angle - alpha)
+    offset -= 2 * math.pi * tooth / gear.teeth
     reach = 0.5 * gear.base_pitch
     begin = pair.line_of_action - pair.wheels[1].tip_string - middle - reach
     end = gear.tip_string - middle + reach
@@ -102,12 +123,46 @@ def contact_pattern(
         ideal = mesh.ideal_angle(angle)
         driven = mesh.loaded_angle(angle, load, ideal + lag)
         lag = driven - ideal
-        rows = mesh.gaps(angle, driven, station)
-        rows = rows[(rows[:, SIDE] == flank) & (rows[:, GAP] < 0)]
-        loads = law.stiffness / pair.common_face_width * rows[:, SOFT] * (-rows[:, GAP]) ** law.exponent
-        total[k] = loads.sum() * width
-        mine = rows[:, TOOTH_1] == 0
-        at = np.rint((rows[mine, STATION] - station[0]) / width).astype(int)
-        pressure[k, at] = loads[mine]
-        string[k, at] = rows[mine, STRING_1]
+        rows = mesh.gaps(angle, driven, station).copy()
+        ends = mesh.gaps(angle, driven)
+        rows, ends = (found[found[:, SIDE] == flank] for found in (rows, ends))
+        both = np.concatenate([rows, ends])
+        for one in np.unique(both[both[:, GAP] < 0][:, TEETH], axis=0):
+            mine, limits = (found[(found[:, TEETH] == one).all(axis=1)] for found in (rows, ends))
+            loads = _pair_load(pair, mine, limits, low, width)
+            total[k] += loads.sum() * width
+            if one[0] == tooth:
+                pressure[k] += loads
+                string[k] = np.where(loads > 0, mine[:, STRING_1], string[k])
     return ContactPattern(roll, station, pressure, string, pressure.sum(axis=1) * width, total)
+
+
+def _pair_load(pair: GearPair, rows: np.ndarray, ends: np.ndarray, low: float, width: float) -> np.ndarray:
+    """Load of a pair of teeth per unit face width at the stations of its gap rows, N/m.
+
+    What a face tilted sideways carries beyond the outermost stations counts to these.
+    """
+    place, gap = rows[:, STATION], rows[:, GAP]
+    bounds = (low, low + rows.shape[0] * width)
+    if len(ends) == 2:
+        bounds = (ends[0, STATION], ends[1, STATION])
+        inside = (place > bounds[0]) & (place < bounds[1])
+        place = np.concatenate([bounds[:1], place[inside], bounds[1:]])
+        gap = np.concatenate([ends[:1, GAP], gap[inside], ends[1:, GAP]])
+    edges = low + np.arange(rows.shape[0] * FINE + 1) * width / FINE
+    edges[0], edges[-1] = min(edges[0], bounds[0]), max(edges[-1], bounds[1])
+    edges = np.clip(edges, *bounds)
+    share = np.diff(edges)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    depth = np.maximum(0.0, -np.interp(middle, place, gap))
+    law, soft = pair.contact, rows[0, SOFT]
+    if pair.load == "adams":
+        section = share * depth**1.5
+        if not section.sum() > 0:
+            return np.zeros(rows.shape[0])
+        centre = (section * middle).sum() / section.sum()
+        force = law.stiffness * soft * max(0.0, -float(np.interp(centre, place, gap))) ** law.exponent
+        loads = force * section / section.sum()
+    else:
+        loads = law.stiffness / pair.common_face_width * soft * depth**law.exponent * share
+    return loads.reshape(-1, FINE).sum(axis=1) / width

@@ -41,6 +41,41 @@ def test_skew_loads_the_ends_of_the_face():
     assert drive.face_load_factor > 2
 
 
+@pytest.mark.parametrize("load", ["slices", "adams"])
+@pytest.mark.parametrize(
+    ("placed", "most"),
+    [
+        ({}, 0.0),
+        ({"axial_shift": "4 mm"}, 0.0),
+        ({"misalignment": "0.1 deg", "backlash": "0.1 mm"}, 0.0),
+        ({"misalignment": "0.3 deg", "pivot": "10 mm", "backlash": "0.2 mm"}, 0.0),
+        ({"misalignment": "1 deg", "plane": "inclination", "backlash": "0.15 mm"}, 0.0),
+        ({"misalignment": "1 deg", "backlash": "0.1 mm"}, 0.03),
+    ],
+)
+def test_totals_carry_the_torque(load, placed, most):
+    # T = (F_drive - F_back) r_b, but for corners, whose arm differs: 1 % here, more of the forces of jammed teeth
+    pair = GearPair.paper(load=load, **placed)
+    drive, back = (contact_pattern(pair, 100.0, points=15, side=side) for side in ("drive", "back"))
+    miss = (drive.total - back.total) * pair.driven.base_radius - 100.0
+    assert abs(miss).max() < 1.5 + most * drive.total.max() * pair.driven.base_radius
+    if most == 0:
+        assert abs(np.median(miss)) < 0.2
+    assert np.all(drive.force <= drive.total * (1 + 1e-12))
+
+
+def test_any_tooth_can_be_followed():
+    faulty = GearPair.paper(faults=[RootCrack(depth="3 mm", tooth=7)])
+    healthy, sound, cracked = (
+        contact_pattern(pair, 100.0, points=21, tooth=tooth)
+        for pair, tooth in ((GearPair.paper(), 7), (faulty, 0), (faulty, 7))
+    )
+    assert sound.force == pytest.approx(healthy.force, abs=1e-6 * healthy.force.max())
+    assert cracked.force.sum() < 0.99 * healthy.force.sum()
+    same = contact_pattern(GearPair.paper(faults=[RootCrack(depth="3 mm", tooth=0)]), 100.0, points=21)
+    assert cracked.force == pytest.approx(same.force, abs=1e-6 * healthy.force.max())
+
+
 def test_crowning_loads_the_middle():
     pattern = contact_pattern(GearPair.paper(faults=[Crowning(amount="40 um")]), 100.0)
     assert abs(pattern.station[pattern.pressure.sum(axis=0).argmax()]) < 1e-3
