@@ -290,7 +290,11 @@ def solve_dae(
     names: Sequence[str] = (),
     **options: Any,
 ) -> DAEResult:
-    """Solve an implicit system G(t, y, y') = 0 of index up to three.
+    """Solve an implicit system G(t, y, y') = 0 of index one or two, or three with an ``error_mask``.
+
+    Mechanical systems with constraints on positions only (index three) fail with the default error control, since the
+    error of their velocities does not shrink with the step: put the positions alone under control, or better, write
+    the stabilised index-2 form, with the constraints on velocities too and a second set of multipliers.
 
     Parameters
     ----------
@@ -308,7 +312,8 @@ def solve_dae(
     tol : float
         For a `DAEProblem`: its ``atol_scale`` times this is the absolute tolerance (ADAMS: ERROR).
     error_mask : ndarray of bool, optional
-        Unknowns under error control; default those whose derivative appears (multipliers are left out).
+        Unknowns under error control; default those whose derivative appears (multipliers are left out). For a system
+        of index three only the positions.
     differential : ndarray of bool, optional
         Unknowns whose derivative appears in G; found by probing G at the start if not given.
     jac : callable, optional
