@@ -70,6 +70,16 @@ def inconsistent(problem: DAEProblem, t: float, worst: int, row: int, jump: floa
     )
 
 
+def replaced_start(problem: DAEProblem, unknowns: np.ndarray) -> str:
+    """Say which algebraic unknowns did not start on their equations, or nothing if there are none."""
+    if not len(unknowns):
+        return ""
+    return (
+        f" Initial values of algebraic unknowns did not satisfy the equations: {_list_names(problem, unknowns)}. The "
+        "run replaced them in its first step; the output at the start holds them as they were given."
+    )
+
+
 def not_finite(problem: DAEProblem, t: float, row: int, what: str = "equation") -> str:
     """Explain NaN or infinity out of a user's function."""
     return (

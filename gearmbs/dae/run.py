@@ -41,6 +41,7 @@ RECORD_BYTES = 8_000_000
 EVENT_BUFFER = 64
 START_JUMP_LIMIT = 100.0
 CHECK_STEP = 1e-10
+ROUNDED_RESIDUAL = 1e-10
 SINGULAR_RETRIES = 8
 DROP_ROUNDS_ALLOWED = 3
 REPAIR_SWEEPS = 4
@@ -101,6 +102,7 @@ class Run:
         self.repivots = 0
         self.first_pivots = 0
         self.started = False
+        self.start_note = ""
         t0 = float(problem.t0)
         outputs, t_end = output_times(t_eval, t0, t_end)
         self.every_step = t_eval is None
@@ -241,7 +243,20 @@ class Run:
             row = int(np.argmax(np.abs(res[self.plan.row_from]) * self.plan.row_scale))
             message = failures.inconsistent(problem, t0, worst, int(self.plan.row_from[row]), float(abs(delta[worst])))
             return Status.INCONSISTENT_START, message
+        if self.error_probe is not None and h_check < st.real[s.H]:
+            self.start_note = self._algebraic_note(res, delta)
         return self._choose_first_pivots(st.real[s.H]) if h_check < st.real[s.H] else None
+
+    def _algebraic_note(self, res: np.ndarray, delta: np.ndarray) -> str:
+        """Name the algebraic unknowns whose starting values the first step has to replace."""
+        st = self.state
+        y = st.vec[s.Y]
+        allowed = START_JUMP_LIMIT * (st.vec[s.ATOL] + st.real[s.RTOL] * np.abs(y))
+        replaced = (np.abs(delta) > allowed) & ~self.problem.differential
+        # over a vanishing step an equation that is satisfied up to rounding can move an unknown of a high index too
+        if not np.max(np.abs(res)) > ROUNDED_RESIDUAL * (1.0 + np.max(np.abs(y))):
+            replaced[:] = False
+        return failures.replaced_start(self.problem, np.flatnonzero(replaced))
 
     def _repair_start(self) -> tuple[Status, str] | None:
         """Move the initial values onto the constraints by Newton's method over the first step."""
@@ -359,9 +374,12 @@ class Run:
                 return self._user_failure()
             if code == s.DONE:
                 self._report()
-                return Status.SUCCESS, f"{Status.SUCCESS.sentence}"
+                return Status.SUCCESS, f"{Status.SUCCESS.sentence}{self.start_note}"
             if code == s.TERMINAL:
-                return Status.TERMINAL_EVENT, f"{Status.TERMINAL_EVENT.sentence} t = {st.real[s.T]:.9g}."
+                return (
+                    Status.TERMINAL_EVENT,
+                    f"{Status.TERMINAL_EVENT.sentence} t = {st.real[s.T]:.9g}.{self.start_note}",
+                )
             if code == s.PAUSED:
                 first = self._accepted_so_far() if self.every_step else int(st.count[s.NEXT_OUTPUT])
                 self.epochs.append((first, st.idata.copy()))

@@ -110,6 +110,21 @@ def test_inconsistent_start_may_be_let_through():
     assert abs(result.y[-1, 0] ** 2 + result.y[-1, 1] ** 2 - 1) < 1e-5
 
 
+@pytest.mark.parametrize(("start", "told"), [(0.3, True), (1.0, False)])
+def test_replaced_algebraic_unknowns_are_told(start, told):
+    """0 = fast - slow: from slow = 1 only fast = 1 is consistent; it is no state, so the run goes on all the same."""
+
+    def residual(t, y, yp, out):
+        out[0] = yp[0] + y[1]
+        out[1] = y[0] - y[1]
+
+    result = solve_dae(residual, (0.0, 1.0), [1.0, start], names=["slow", "fast"])
+    assert result.success
+    assert result.y[0, 1] == start
+    assert result.y[-1] == pytest.approx([np.exp(-1.0)] * 2, rel=1e-5)
+    assert ("did not satisfy the equations: fast." in result.message) is told
+
+
 def test_wrong_rates_and_multipliers_are_not_inconsistent():
     problem = pendulum()
     problem.yp0[:] = 0.0
