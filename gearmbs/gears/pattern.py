@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.gears.transmission import StaticMesh
+from gearmbs.gears.transmission import StaticMesh, warn_of_unseen
 
 if TYPE_CHECKING:
     from gearmbs.gears.pair import GearPair
@@ -85,6 +85,11 @@ def contact_pattern(
     -------
     ContactPattern
 
+    Warns
+    -----
+    UserWarning
+        If faults sit on teeth that do not pass the mesh meanwhile.
+
     Notes
     -----
     The load of a pair of teeth is integrated between the ends of its own common face by the midpoint rule, eight points
@@ -114,6 +119,9 @@ def contact_pattern(
     begin = pair.line_of_action - pair.wheels[1].tip_string - middle - reach
     end = gear.tip_string - middle + reach
     roll = np.linspace(begin, end, points) / gear.base_radius
+    pitch_angle = 2 * math.pi / gear.teeth
+    passed = [(pair.rotation * offset + turn) / pitch_angle for turn in (roll[0], roll[-1])]
+    warn_of_unseen(pair, passed[0], passed[1], "give the number of another driver tooth to follow, tooth=...")
     pressure = np.zeros((points, stations))
     string = np.full((points, stations), np.nan)
     total = np.zeros(points)

@@ -14,6 +14,7 @@ References
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -227,7 +228,20 @@ def mesh_stiffness(
     points: int = 400,
     root_angles: tuple[float | None, float | None] = (None, None),
 ) -> MeshStiffness:
-    """Time-varying mesh stiffness of perfect wheels by the potential-energy method."""
+    """Time-varying mesh stiffness of perfect wheels by the potential-energy method.
+
+    Warns
+    -----
+    UserWarning
+        If teeth of the pair are cracked: that is left out here. `pair_stiffness` takes cracks, and
+        ``loaded_transmission_error(...).stiffness`` knows all faults.
+    """
+    if any(fault.label == "root crack" for fault in pair.faults):
+        warnings.warn(
+            "mesh_stiffness is that of perfect wheels and leaves the pair's root cracks out; use pair_stiffness with a "
+            "Crack, or loaded_transmission_error(pair, cycles=...).stiffness",
+            stacklevel=2,
+        )
     begin = pair.line_of_action - pair.driven.tip_string
     pitch, ratio = pair.driver.base_pitch, pair.contact_ratio
     phase = np.arange(points) / points

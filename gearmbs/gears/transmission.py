@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
 
@@ -17,16 +20,17 @@ MAX_ROWS = 4000
 NEWTON_STEPS = 100
 PHASE_STEPS = 50
 TOUCH_TOLERANCE = 1e-15  # m
+SEARCHED_FROM = 1e-11  # m
 
 
 @dataclass(frozen=True)
 class TransmissionError:
-    """Transmission error over one mesh cycle.
+    """Transmission error over one mesh cycle or several.
 
     Attributes
     ----------
     phase : ndarray
-        Driver angle over the pitch angle, 0 up to 1.
+        Driver angle over the pitch angle, from the start, 0 up to 1 by default.
     error : ndarray
         Lag of the driven wheel behind the ratio, at its base circle, m. Zero is kinematic contact of perfect flanks.
     load : float
@@ -37,6 +41,10 @@ class TransmissionError:
         Tooth pairs touching on the drive flanks.
     stiffness : ndarray
         Tangent mesh stiffness along the line of action, N/m.
+    cycles : int
+        Mesh cycles covered.
+    extremes : tuple of float, optional
+        Smallest and largest error where they are known better than from the points, m.
     """
 
     phase: np.ndarray
@@ -45,6 +53,8 @@ class TransmissionError:
     forces: np.ndarray
     pairs: np.ndarray
     stiffness: np.ndarray
+    cycles: int = 1
+    extremes: tuple[float, float] | None = None
 
     @property
     def mean(self) -> float:
@@ -53,12 +63,13 @@ class TransmissionError:
 
     @property
     def peak_to_peak(self) -> float:
-        """Peak to peak, m."""
-        return float(np.ptp(self.error))
+        """Peak to peak, m; between the extremes if they are known."""
+        return float(np.ptp(self.error if self.extremes is None else self.extremes))
 
     def harmonics(self, count: int = 5) -> np.ndarray:
         """Amplitudes of the first mesh harmonics, m."""
-        return 2 * np.abs(np.fft.rfft(self.error))[1 : count + 1] / self.error.size
+        lines = 2 * np.abs(np.fft.rfft(self.error)) / self.error.size
+        return lines[self.cycles : (count + 1) * self.cycles : self.cycles]
 
 
 class StaticMesh:
@@ -152,8 +163,13 @@ def touching_angle(pair: GearPair, driver_angle: float = 0.0) -> float:
     return StaticMesh(pair).touching_angle(driver_angle)
 
 
-def kinematic_transmission_error(pair: GearPair, points: int = 400, slices: int | None = None) -> TransmissionError:
+def kinematic_transmission_error(
+    pair: GearPair, points: int = 400, slices: int | None = None, *, start: float = 0.0, cycles: int = 1
+) -> TransmissionError:
     """Transmission error at vanishing load: the wheels touch without pressing.
+
+    Its peaks are cusps where a corner hands over to the next; between the points they are searched for, and
+    ``extremes`` holds them.
 
     Parameters
     ----------
@@ -162,23 +178,114 @@ def kinematic_transmission_error(pair: GearPair, points: int = 400, slices: int 
         Positions over one mesh cycle.
     slices : int, optional
         Slices along the face, default the pair's own.
+    start : float
+        Driver angle to begin with, in pitch angles of the driver.
+    cycles : int
+        Mesh cycles; as many as the driver's teeth for a turn of it, to see faults of all teeth.
+
+    Warns
+    -----
+    UserWarning
+        If faults sit on teeth that do not pass the mesh.
     """
     mesh = StaticMesh(pair, slices)
-    phase = np.arange(points) / points
-    error = np.empty(points)
-    pairs = np.empty(points)
+    phase = _phases(pair, points, start, cycles)
+    error = np.empty(phase.size)
+    pairs = np.empty(phase.size)
     rb = pair.driven.base_radius
+    pitch_angle = pair.rotation * 2 * math.pi / pair.driver.teeth
+
+    def lag(step: float) -> float:
+        angle = step * pitch_angle
+        return pair.rotation * (mesh.touching_angle(angle) - mesh.ideal_angle(angle)) * rb
+
     for k, step in enumerate(phase):
-        angle = pair.rotation * step * 2 * math.pi / pair.driver.teeth
-        error[k] = pair.rotation * (mesh.touching_angle(angle) - mesh.ideal_angle(angle)) * rb
+        error[k] = lag(step)
+        angle = step * pitch_angle
         rows = mesh.gaps(angle, mesh.touching_angle(angle))
         touching = rows[(rows[:, 0] == pair.rotation) & (rows[:, 4] < 1e-9)]
         pairs[k] = np.unique(touching[:, 1]).size
-    return TransmissionError(phase, error, 0.0, np.zeros(points), pairs, np.zeros(points))
+    none = np.zeros(phase.size)
+    extremes = _extremes(lag, phase, error, points)
+    return TransmissionError(phase, error, 0.0, none, pairs, none.copy(), cycles, extremes)
+
+
+def _phases(pair: GearPair, points: int, start: float, cycles: int) -> np.ndarray:
+    if cycles < 1 or cycles != int(cycles):
+        raise ValueError(f"cycles is {cycles!r}; give a whole number of mesh cycles from 1 up")
+    warn_of_unseen(pair, start, start + cycles, "give cycles={turn} for a whole turn, or another start", 4)
+    return start + np.arange(points * int(cycles)) / points
+
+
+def _extremes(
+    lag: Callable[[float], float], phase: np.ndarray, error: np.ndarray, points: int
+) -> tuple[float, float] | None:
+    """Smallest and largest error, searched for around the extreme points of every mesh cycle."""
+    if np.ptp(error) < SEARCHED_FROM:
+        return None
+    ends = []
+    for sign, found in ((1.0, float(error.min())), (-1.0, -float(error.max()))):
+        for part in range(0, phase.size, points):
+            at = phase[part + int(np.argmin(sign * error[part : part + points]))]
+            bounds = (at - 1 / points, at + 1 / points)
+            best = minimize_scalar(
+                lambda x, sign: sign * lag(x), bounds=bounds, args=(sign,), method="bounded", options={"xatol": 1e-9}
+            )
+            found = min(found, float(best.fun))
+        ends.append(sign * found)
+    return ends[0], ends[1]
+
+
+def warn_of_unseen(pair: GearPair, begin: float, end: float, remedy: str, level: int = 3) -> None:
+    """Warn of faults on teeth that do not pass the mesh between two driver angles, in its pitch angles.
+
+    ``{turn}`` in the remedy stands for the teeth of the faulty wheel, ``level`` for the callers up to the user's line.
+    """
+    faulty = [f for f in pair.faults if getattr(f, "tooth", None) is not None or getattr(f, "teeth", "all") != "all"]
+    if not faulty:
+        return
+    passing = _passing(pair, begin, end)
+    for fault in faulty:
+        wheel = int(fault.wheel == "driven")
+        z = (pair.driver, pair.driven)[wheel].teeth
+        teeth = getattr(fault, "tooth", None)
+        numbers = {n % z for n in np.atleast_1d(getattr(fault, "teeth", 0) if teeth is None else teeth).tolist()}
+        unseen = sorted(numbers - passing[wheel])
+        if unseen:
+            names = ", ".join(map(str, unseen))
+            warnings.warn(
+                f"{fault.label} on tooth {names} of the {fault.wheel} wheel does not pass the mesh in the range looked "
+                f"at; {remedy.format(turn=z)}",
+                stacklevel=level,
+            )
+
+
+def _passing(pair: GearPair, begin: float, end: float) -> tuple[set[int], set[int]]:
+    """Numbers of the teeth of both wheels that are on the path of contact at some time in the range."""
+    gear, mate = pair.wheels
+    alpha = pair.working_pressure_angle
+    middle = gear.base_radius * math.tan(alpha)
+    centre = (math.tan(alpha) - gear.base_half_angle - alpha) * gear.teeth / (2 * math.pi)
+    first = (pair.line_of_action - mate.tip_string - middle) / gear.base_pitch
+    last = (gear.tip_string - middle) / gear.base_pitch
+    # the tooth of the driven wheel that tooth 0 of the driver meets
+    mesh = StaticMesh(pair)
+    angle = pair.rotation * centre * 2 * math.pi / gear.teeth
+    rows = mesh.gaps(angle, mesh.ideal_angle(angle))
+    met = int(rows[(rows[:, 0] == pair.rotation) & (rows[:, 1] == 0)][0, 2])
+    turns = range(math.ceil(begin - centre - last), math.floor(end - centre - first) + 1)
+    side = pair.rotation
+    return {-side * m % gear.teeth for m in turns}, {(met + side * m) % mate.teeth for m in turns}
 
 
 def loaded_transmission_error(
-    pair: GearPair, torque: float | None = None, points: int = 400, slices: int | None = None
+    pair: GearPair,
+    torque: float | None = None,
+    points: int = 400,
+    slices: int | None = None,
+    *,
+    start: float = 0.0,
+    cycles: int = 1,
 ) -> TransmissionError:
     """Quasi-static transmission error under load: rigid wheels, contact compliance only, no friction.
 
@@ -191,13 +298,22 @@ def loaded_transmission_error(
         Positions over one mesh cycle.
     slices : int, optional
         Slices along the face, default the pair's own.
+    start : float
+        Driver angle to begin with, in pitch angles of the driver.
+    cycles : int
+        Mesh cycles; as many as the driver's teeth for a turn of it, to see faults of all teeth.
+
+    Warns
+    -----
+    UserWarning
+        If faults sit on teeth that do not pass the mesh.
     """
     load = pair.torque if torque is None else torque
     if not load > 0:
         raise ValueError(f"torque is {load} N m; give a positive load, or use kinematic_transmission_error for none")
     mesh = StaticMesh(pair, slices)
-    phase = np.arange(points) / points
-    error, forces, pairs, stiffness = (np.empty(points) for _ in range(4))
+    phase = _phases(pair, points, start, cycles)
+    error, forces, pairs, stiffness = (np.empty(phase.size) for _ in range(4))
     rb = pair.driven.base_radius
     lag = pair.penetration(load) * pair.rotation / rb
     for k, step in enumerate(phase):
@@ -210,4 +326,4 @@ def loaded_transmission_error(
         forces[k] = mesh.diag[7]
         pairs[k] = mesh.diag[5]
         stiffness[k] = -slope / rb**2
-    return TransmissionError(phase, error, load, forces, pairs, stiffness)
+    return TransmissionError(phase, error, load, forces, pairs, stiffness, cycles)

@@ -66,10 +66,10 @@ def test_totals_carry_the_torque(load, placed, most):
 
 def test_any_tooth_can_be_followed():
     faulty = GearPair.paper(faults=[RootCrack(depth="3 mm", tooth=7)])
-    healthy, sound, cracked = (
-        contact_pattern(pair, 100.0, points=21, tooth=tooth)
-        for pair, tooth in ((GearPair.paper(), 7), (faulty, 0), (faulty, 7))
-    )
+    healthy = contact_pattern(GearPair.paper(), 100.0, points=21, tooth=7)
+    with pytest.warns(UserWarning, match=r"root crack on tooth 7 of the driver wheel .* tooth="):
+        sound = contact_pattern(faulty, 100.0, points=21)
+    cracked = contact_pattern(faulty, 100.0, points=21, tooth=7)
     assert sound.force == pytest.approx(healthy.force, abs=1e-6 * healthy.force.max())
     assert cracked.force.sum() < 0.99 * healthy.force.sum()
     same = contact_pattern(GearPair.paper(faults=[RootCrack(depth="3 mm", tooth=0)]), 100.0, points=21)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gearmbs.gears import GearPair, GearSpec, Material
+from gearmbs.gears.faults import RootCrack
 from gearmbs.gears.stiffness import (
     Crack,
     hertz_stiffness,
@@ -163,3 +164,10 @@ def test_pair_with_potential_energy_stiffness_carries_the_load():
     error = loaded_transmission_error(pair, 100.0, 50)
     curve = mesh_stiffness(pair, 50)
     assert error.error.max() == pytest.approx(pair.normal_force / curve.stiffness.min(), rel=0.02)
+
+
+def test_mesh_stiffness_tells_that_it_leaves_cracks_out():
+    pair = GearPair.paper()
+    with pytest.warns(UserWarning, match="leaves the pair's root cracks out"):
+        curve = mesh_stiffness(pair.with_faults(RootCrack()), 20)
+    assert np.array_equal(curve.stiffness, mesh_stiffness(pair, 20).stiffness)

@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from gearmbs.gears import GearPair, GearSpec, kinematic_transmission_error, loaded_transmission_error
+from gearmbs.gears.faults import BrokenTooth, PitchError, Wear
 from gearmbs.gears.transmission import StaticMesh
 
 UM = 1e-6
@@ -43,6 +44,51 @@ def test_kinematic_error_without_overlap(error, value):
     at = grid[np.argmin([lag(p) for p in grid])]
     peak = minimize_scalar(lag, bounds=(at - 0.01, at + 0.01), method="bounded", options={"xatol": 1e-9})
     assert -peak.fun / UM == pytest.approx(value, abs=6e-3)
+
+
+@pytest.mark.parametrize(("error", "value"), [(2.5e-3, 2.992), (3e-3, 17.91)])
+def test_peaks_between_the_points_are_found(error, value):
+    # the points alone see 2.93 and 17.65 um; 4000 points 2.991 and 17.895
+    te = kinematic_transmission_error(GearPair.paper(centre_distance_error=error))
+    assert te.peak_to_peak / UM == pytest.approx(value, abs=2e-3)
+    assert te.extremes[0] <= te.error.min()
+    assert te.extremes[1] >= te.error.max()
+
+
+@pytest.mark.parametrize("rotation", [1, -1])
+@pytest.mark.parametrize("wheel", ["driver", "driven"])
+def test_faults_out_of_sight_are_told(rotation, wheel):
+    pair = GearPair(GearSpec(17, "2 mm"), GearSpec(23, "2 mm"), rotation=rotation)
+    healthy = loaded_transmission_error(pair, 20.0, 8)
+    faulty = pair.with_faults(PitchError(wheel=wheel, tooth=8, amount="-40 um"))
+    teeth = getattr(pair, wheel).teeth
+    with pytest.warns(UserWarning, match=rf"tooth 8 of the {wheel} wheel .* cycles={teeth}"):
+        hidden = loaded_transmission_error(faulty, 20.0, 8)
+    assert hidden.error == pytest.approx(healthy.error, abs=1e-12)
+    turn = loaded_transmission_error(faulty, 20.0, 8, cycles=teeth)
+    change = abs(turn.error.reshape(teeth, 8) - healthy.error).max(axis=1)
+    assert change.max() > 1e-6
+    assert np.count_nonzero(change > 1e-9) <= 4
+    # a cycle by itself where the tooth meshes, without a warning
+    start = int(change.argmax())
+    alone = loaded_transmission_error(faulty, 20.0, 8, start=start)
+    assert alone.error == pytest.approx(turn.error[8 * start : 8 * start + 8], abs=1e-12)
+    with pytest.raises(ValueError, match="cycles is 0"):
+        loaded_transmission_error(faulty, 20.0, 8, cycles=0)
+
+
+def test_mesh_harmonics_of_a_whole_turn():
+    pair = GearPair.paper(centre_distance_error="3 mm")
+    one, turn = (kinematic_transmission_error(pair, 40, cycles=n) for n in (1, 29))
+    assert turn.harmonics() == pytest.approx(one.harmonics(), abs=1e-12)
+    assert turn.peak_to_peak == pytest.approx(one.peak_to_peak, abs=1e-10)
+    with pytest.warns(UserWarning, match="broken tooth on tooth 10"):
+        kinematic_transmission_error(pair.with_faults(BrokenTooth(tooth=10)), 4)
+
+
+def test_faults_everywhere_are_not_warned_of(recwarn):
+    loaded_transmission_error(GearPair.paper(faults=[Wear(), BrokenTooth(tooth=0)]), 100.0, 4)
+    assert not recwarn.list
 
 
 @pytest.mark.parametrize(("z1", "z2"), [(17, 38), (62, 62), (20, 53)])
