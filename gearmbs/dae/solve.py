@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,8 @@ from gearmbs.dae.wstiff import solve_wstiff
 
 METHODS = ("WSTIFF", "GSTIFF", "IDA")
 IDA_DEFAULT_OUTPUTS = 201
+IDA_MAX_ORDER = 5
+SET_HERE = ("problem", "t_end", "error_probe")
 SETTLING_STEP = 1e-12
 SETTLING_SWEEPS = 3
 SETTLING_RATIO = 10.0
@@ -61,7 +63,12 @@ class _UserFunctions:
         extra = (self.parameters,) if takes_p else ()
 
         def call(t, y, yp, _unused, out):
-            fun(t, y, yp, out, *extra)
+            answer = fun(t, y, yp, out, *extra)
+            if answer is not None and answer is not out:
+                raise TypeError(
+                    f"the residual returned {type(answer).__name__}; it must write G into its argument out and return "
+                    "nothing"
+                )
 
         self._register(dj.RESIDUAL_ADDRESS, call, self.n)
         return dj.python_residual
@@ -264,6 +271,23 @@ def _event_rules(events: Sequence[Callable]) -> tuple[list[int], list[int]]:
     return direction, action
 
 
+def _check_options(method: str, options: Mapping[str, Any], max_order: int | None, rtol: float) -> None:
+    """Refuse options the integrator does not have, and what IDA would pass over or reject in words of its own."""
+    solver = solve_ida if method == "IDA" else solve_wstiff
+    named = {*inspect.signature(solve_dae).parameters, *SET_HERE}
+    known = [name for name in inspect.signature(solver).parameters if name not in named]
+    unknown = sorted(set(options) - set(known))
+    if unknown:
+        raise ValueError(
+            f"method={method!r} does not know {', '.join(unknown)}; beside the arguments of solve_dae it takes "
+            f"{', '.join(known)}"
+        )
+    if method == "IDA" and max_order is not None and not 1 <= max_order <= IDA_MAX_ORDER:
+        raise ValueError(f"max_order (KMAX) must be 1 to {IDA_MAX_ORDER} for IDA, is {max_order!r}")
+    if not (np.isfinite(rtol) and rtol >= 0):
+        raise ValueError(f"rtol must not be negative, is {rtol!r}")
+
+
 def solve_dae(
     fun: Callable | DAEProblem,
     t_span: tuple[float, float],
@@ -364,6 +388,7 @@ def solve_dae(
     t0, t_end = (float(t) for t in t_span)
     if not (np.isfinite([t0, t_end]).all() and t_end > t0):
         raise ValueError(f"t_span is ({t0:g}, {t_end:g}); it must be two increasing, finite times")
+    _check_options(method, options, max_order, rtol)
     probe = None
     if isinstance(fun, DAEProblem):
         if y0 is not None or jac is not None or events is not None:
@@ -398,7 +423,7 @@ def solve_dae(
         if dense_output or problem.n_events:
             raise ValueError("method='IDA' has neither dense output nor events here; use WSTIFF or GSTIFF")
         limits = {
-            "max_order": 5 if max_order is None else min(max_order, 5),
+            "max_order": IDA_MAX_ORDER if max_order is None else max_order,
             "max_step": 0.0 if np.isinf(max_step) else max_step,
             "first_step": first_step or 0.0,
             "min_step": min_step or 0.0,
@@ -429,10 +454,9 @@ def _dispatch_ida(
     **options: Any,
 ) -> DAEResult:
     """Run IDA over ``t_span``; without ``t_eval`` at evenly spaced times."""
-    unknown = set(options) - set(inspect.signature(solve_ida).parameters)
-    if unknown:
-        raise ValueError(f"method='IDA' does not know {', '.join(sorted(unknown))}")
     times = np.linspace(*t_span, IDA_DEFAULT_OUTPUTS) if t_eval is None else np.asarray(t_eval, dtype=float)
+    if times.ndim != 1 or not times.size:
+        raise ValueError(f"t_eval has shape {times.shape}; it must be a list of at least one time")
     if times[0] < t_span[0] or times[-1] > t_span[1]:
         raise ValueError(f"t_eval {times[0]:g} .. {times[-1]:g} leaves t_span")
     padded = times if times[0] == t_span[0] else np.concatenate((t_span[:1], times))

@@ -258,6 +258,16 @@ def test_exception_in_a_python_function():
     assert 0.0 < result.t_last <= 0.5
 
 
+@pytest.mark.parametrize("method", ["WSTIFF", "IDA"])
+def test_a_residual_that_returns_its_values_is_told_where_to_write_them(method):
+    def residual(t, y, yp, out):
+        return yp + y
+
+    result = solve_dae(residual, (0.0, 1.0), [1.0], [-1.0], method=method)
+    assert result.status is Status.USER_ERROR
+    assert "the residual returned ndarray; it must write G into its argument out" in result.message
+
+
 @pytest.mark.parametrize("place", ["event", "jacobian"])
 def test_exception_at_the_start_outside_the_residual(place):
     def residual(t, y, yp, out):

@@ -226,6 +226,10 @@ def test_problem_with_its_own_tolerances():
         ({"fun": lambda t, y: None}, "arguments"),
         ({"method": "IDA", "dense_output": True}, "IDA"),
         ({"method": "IDA", "corrector": "modified"}, "corrector"),
+        ({"corector": "modified"}, "corector; .* corrector, "),
+        ({"method": "IDA", "max_order": 6}, "max_order"),
+        ({"method": "IDA", "rtol": -1e-6}, "rtol"),
+        ({"method": "IDA", "t_eval": []}, "t_eval"),
     ],
 )
 def test_wrong_arguments_are_named(change, names):
