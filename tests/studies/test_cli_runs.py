@@ -16,6 +16,8 @@ CASE = "[operation]\nrun_up = '30 ms'\nsettling = '10 ms'\nduration = '200 ms'\n
 def keep_handlers():
     """The commands take SIGTERM over; give it back."""
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    # a job in the background starts with it ignored
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     for number, handler in before.items():
         signal.signal(number, handler)

@@ -56,7 +56,10 @@ def test_an_error_that_cannot_be_sent_arrives_as_text():
 @pytest.mark.parametrize("everyone", [True, False], ids=["from the terminal", "to the parent"])
 def test_ctrl_c_ends_all_processes(everyone):
     """Both workers wait for ever. Ctrl-C in a terminal reaches all processes of the group, kill only the parent."""
+    # a job in the background starts with the signal ignored
     code = (
+        "import signal\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from gearmbs.studies.processes import run_jobs\n"
         "from tests.studies.jobs import fail_or_wait\n"
         "if __name__ == '__main__':\n"
