@@ -16,7 +16,7 @@ def two_bodies(rng) -> tuple[Mechanism, object, object]:
     bodies = []
     for name in ("one", "two"):
         half = rng.standard_normal((3, 3))
-        inertia = half @ half.T + 5.0 * np.eye(3)
+        inertia = half @ half.T + 12.0 * np.eye(3)
         body = m.body(
             name, 1.0 + rng.random(), inertia, position=rng.standard_normal(3), orientation=rng.random(3) + 0.8
         )
