@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,9 +24,7 @@ class LoadMethods:
     """The part of :class:`gearmbs.mechanism.Mechanism` that adds loads."""
 
     units: Units
-
-    def _add_load(self, load: Load) -> Load:
-        raise NotImplementedError
+    _add_load: Callable[[Load], Load]
 
     def load(
         self,

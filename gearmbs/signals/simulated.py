@@ -5,6 +5,7 @@ Nothing here needs the simulation itself: a record says all that is needed in it
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -88,12 +89,10 @@ def read_any(path: str | Path, component: str | None = None, **settings: Any) ->
         For `gearmbs.signals.read_signal`.
     """
     if Path(path).suffix == ".nc":
-        try:
-            with xr.open_dataset(path, engine="h5netcdf") as data:
-                if "acceleration" in data and "case_json" in data.attrs and "load" not in data.dims:
-                    return record_signal(data[["acceleration"]].load(), component)
-        except (OSError, ValueError):
-            pass  # read_signal says what is wrong with it
+        # of a damaged file read_signal says what is wrong with it
+        with contextlib.suppress(OSError, ValueError), xr.open_dataset(path, engine="h5netcdf") as data:
+            if "acceleration" in data and "case_json" in data.attrs and "load" not in data.dims:
+                return record_signal(data[["acceleration"]].load(), component)
     return read_signal(path, **settings)
 
 
