@@ -24,7 +24,7 @@ DIAGNOSTICS = 8
 """Length of the diagnostics record of a gear contact (see `gearmbs.contact`)."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def marker_pose(m, marker_body, kin, frame, out):
     """Write position (3), orientation (3x3 row-major), velocity (3), angular velocity (3) of marker m."""
     row = kin[marker_body[m]]
@@ -37,7 +37,7 @@ def marker_pose(m, marker_body, kin, frame, out):
         out[15 + c] = row[KIN_W + c]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def torque(row, fval, frame, wrench):
     """Write the torque f(t) z_RM to ``wrench[3:6]``."""
     f, axis = fval[row[T.FORCE_FUNCTION], 0], frame[row[T.FORCE_RM]]
@@ -45,7 +45,7 @@ def torque(row, fval, frame, wrench):
         wrench[3 + c] = f * axis[T.MK_AXES + 6 + c]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def contact_wrench(row, tab, wrench, jac, diag, want_jac):
     """Evaluate a gear contact on the frames of its two markers; columns of ``jac`` are the markers' variations."""
     i, j = row[T.FORCE_I], row[T.FORCE_J]

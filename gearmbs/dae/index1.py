@@ -36,7 +36,7 @@ from gearmbs.dae.simple_terms import dot_motion, point_motion
 FORCE_RECORD = 14
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def apply_load(b, sign, row, wrench, marker_body, kin, frame, scratch, rhs):
     if b == 0:
         return
@@ -90,7 +90,7 @@ def put_pair(mode, slot, vals, k, row, col, value):
     return put(mode, slot, vals, k, col, row, value)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def put_point(mode, slot, vals, k, row, coef, term, marker_body, frame):
     """Hand over the gradient of a POINT term; return the number of the next entry."""
     c = term[T.TERM_AXES]
@@ -118,7 +118,7 @@ def put_point(mode, slot, vals, k, row, coef, term, marker_body, frame):
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def put_dot(mode, slot, vals, k, row, coef, term, marker_body, cross):
     """Hand over the gradient of a DOT1 term, given that of its first side; return the number of the next entry."""
     for side in range(2):
@@ -248,7 +248,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def loads_of_rows(multipliers, idata, tab, force, moment):
     """Write the reaction of each constraint row on I's body: force, and moment about the origin of marker I, global.
 
@@ -298,7 +298,7 @@ def joint_loads(y, idata, rdata, work, multipliers, force, moment):
     loads_of_rows(multipliers[0], idata, T.unpack(idata, rdata, work), force, moment)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def poses(kin, out):
     """Write R, A (row-major), v, omega of each body (18 values, the ground left out) from an up-to-date table."""
     for b in range(1, kin.shape[0]):
@@ -319,7 +319,7 @@ def pose_record(y, idata, rdata, work, out):
     poses(tab.kin, out)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def violations(t, y, phi, idata, tab):
     """Write Phi and Phi_q v + Phi_t of each row to ``phi`` (three places a row); return the fastest body's |omega|.
 
@@ -363,7 +363,7 @@ def violations(t, y, phi, idata, tab):
     return np.sqrt(spin)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def displace(y, d, w, idata, tab):
     """Move the bodies of y by the spatial displacements ``d`` and change their spatial velocities by ``w``.
 

@@ -38,7 +38,7 @@ def inertia_times(kin_row, body_row, v, i, out, k, s):
         out[k + c] = kin_row[a] * x + kin_row[a + 1] * y + kin_row[a + 2] * z
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_ground(kin):
     """Set the ground's row: the global frame at rest, with no Euler axes."""
     row = kin[0]
@@ -47,7 +47,7 @@ def update_ground(kin):
     row[KIN_A] = row[KIN_A + 4] = row[KIN_A + 8] = 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_bodies(idata, y, code, body, kin, scratch):
     """Fill the kinematics table from u, eps, R, theta in y."""
     update_ground(kin)
@@ -64,7 +64,7 @@ def update_bodies(idata, y, code, body, kin, scratch):
         inertia_times(row, body[b], row, KIN_W, row, KIN_H, scratch)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_markers(marker_body, marker, kin, frame):
     """Fill the marker table: arms and axes in global components."""
     for m in range(marker_body.size):
@@ -78,7 +78,7 @@ def update_markers(marker_body, marker, kin, frame):
                 )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_functions(t, tab):
     """Evaluate every function of time with two derivatives into the function table."""
     for k in range(tab.function.shape[0]):
@@ -98,7 +98,7 @@ def update_functions(t, tab):
             tab.fval[k, 0], tab.fval[k, 1], tab.fval[k, 2] = f, f1, f2
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def predict_angles(t, tab):
     """Set the references of all counted angles to what their last values and rates let expect at time t."""
     n = tab.reference.size
@@ -112,7 +112,7 @@ def predict_angles(t, tab):
             tab.extra_r[a] = tab.extra_r[a + m] + past * tab.extra_r[a + 2 * m]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_tables(t, y, idata, tab):
     """Bring bodies, markers, functions of time and expected angles up to date with t and y."""
     update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)

@@ -15,7 +15,17 @@ from gearmbs.dae.kinematics import update_tables
 from gearmbs.dae.reactions import renew_reactions
 from gearmbs.dae.rereference import track
 from gearmbs.dae.residual import update
-from gearmbs.dae.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, PLAN_TYPE, analyse, factor, new_factors, solve
+from gearmbs.dae.sparse_lu import (
+    FACTORS_TYPE,
+    GROWTH_LIMIT,
+    PLAN_TYPE,
+    LUFactors,
+    LUPlan,
+    analyse,
+    factor,
+    new_factors,
+    solve,
+)
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
@@ -68,6 +78,31 @@ class Records(NamedTuple):
     force: np.ndarray
     moment: np.ndarray
     strayed: np.ndarray
+
+    @property
+    def by_body(self) -> np.ndarray:
+        """`pose` as (m, bodies, 18)."""
+        return self.pose.reshape(len(self.pose), self.pose.shape[1] // 18, 18)
+
+    @property
+    def accelerations(self) -> np.ndarray:
+        """a and alpha, shape (m, bodies, 6)."""
+        m, bodies = len(self.pose), self.pose.shape[1] // 18
+        return self.solution[:, : 6 * bodies].reshape(m, bodies, 6)
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """Lambda, shape (m, rows)."""
+        return self.solution[:, self.solution.shape[1] - self.force.shape[1] :]
+
+    @property
+    def by_row(self) -> np.ndarray:
+        """`phi` as (m, rows, 3)."""
+        return self.phi.reshape(len(self.phi), self.phi.shape[1] // 3, 3)
+
+    def first(self, m: int) -> Records:
+        """Return views of the first m rows."""
+        return Records(*(part[:m] for part in self))
 
 
 RECORDS_TYPE = types.NamedTuple((_MAT, _MAT, _CUBE, _MAT, _CUBE, _CUBE, _VEC), Records)
@@ -183,38 +218,55 @@ def assemble(t, y, slots, idata, rdata, work_size, vals) -> Records:
     return records
 
 
-def evaluate(t, y, epochs, idata, rdata, work_size, records: Records) -> None:
-    """Fill ``records`` for all rows of ``y``; ``epochs`` names the integer tables valid from each row on.
+class Evaluator:
+    """Fills records piece by piece: what is found for one piece (pattern, pivots, counted turns) serves the next.
 
-    At a singular position, where constraints are dependent, the smallest accelerations and multipliers are taken.
+    Pieces are to be handed over in the order of time.
     """
-    indptr, indices, slots = pattern(idata, rdata, work_size)
-    work, vals, rdata = np.zeros(work_size), np.zeros(indices.size), rdata.copy()
-    bounds = [row for row, _ in epochs] + [t.size]
-    ones = np.ones(indptr.size - 1)
-    y = np.ascontiguousarray(y)
-    plan = factors = None
-    growth = GROWTH_LIMIT
-    for (first, table), last in zip(epochs, bounds[1:]):
-        table = np.ascontiguousarray(table)
-        attempt = 0
-        while first < last:
-            if plan is None or attempt > 0:
-                if attempt > len(GENERIC_TURNS):
+
+    def __init__(self, idata: np.ndarray, rdata: np.ndarray, work_size: int) -> None:
+        self.pattern = pattern(idata, rdata, work_size)
+        self.rdata = rdata.copy()
+        self.work = np.zeros(work_size)
+        self.vals = np.zeros(self.pattern[1].size)
+        self.plan: LUPlan | None = None
+        self.factors: LUFactors | None = None
+        self.growth = GROWTH_LIMIT
+
+    def fill(self, t: np.ndarray, y: np.ndarray, epochs, records: Records) -> None:
+        """Fill ``records`` for all rows of ``y``; ``epochs`` names the integer tables valid from each row on.
+
+        At a singular position, where constraints are dependent, the smallest accelerations and multipliers are taken.
+        """
+        y = np.ascontiguousarray(y)
+        bounds = [row for row, _ in epochs] + [t.size]
+        slots, rdata, work, vals = self.pattern[2], self.rdata, self.work, self.vals
+        for (first, table), last in zip(epochs, bounds[1:]):
+            table = np.ascontiguousarray(table)
+            attempt = 0
+            while first < last:
+                if self.plan is None or attempt > 0:
                     place = t[first : first + 1], y[first : first + 1]
-                    _least_squares_row(first, *place, (indptr, indices, slots), table, rdata, work_size, records)
-                    first, attempt, plan = first + 1, 0, None
-                    continue
-                near = _turned(y[first : first + 1], table, GENERIC_TURNS[max(attempt, 1) - 1])
-                vals[:] = 0.0
-                assemble(t[first : first + 1], near, slots, table, rdata, work_size, vals)
-                plan = analyse(indptr, indices, vals, ones)
-                factors = new_factors(plan)
-                # an ill-scaled mechanism may grow with the best of pivots
-                growth = max(GROWTH_LIMIT, 100.0 * factor(plan, factors, vals))
-            done = evaluate_rows(first, last, t, y, slots, table, rdata, work, vals, plan, factors, records, growth)
-            attempt = attempt + 1 if done == first else 1 if done < last else 0
-            first = done
+                    if attempt > len(GENERIC_TURNS):
+                        _least_squares_row(first, *place, self.pattern, table, rdata, work.size, records)
+                        first, attempt, self.plan = first + 1, 0, None
+                        continue
+                    self._choose_pivots(*place, table, GENERIC_TURNS[max(attempt, 1) - 1])
+                done = evaluate_rows(
+                    first, last, t, y, slots, table, rdata, work, vals, self.plan, self.factors, records, self.growth
+                )
+                attempt = attempt + 1 if done == first else 1 if done < last else 0
+                first = done
+
+    def _choose_pivots(self, t: np.ndarray, y: np.ndarray, table: np.ndarray, turn: float) -> None:
+        """Choose pivots near one row, every angle turned off it so that no entry is zero by accident."""
+        indptr, indices, slots = self.pattern
+        self.vals[:] = 0.0
+        assemble(t, _turned(y, table, turn), slots, table, self.rdata, self.work.size, self.vals)
+        self.plan = analyse(indptr, indices, self.vals, np.ones(indptr.size - 1))
+        self.factors = new_factors(self.plan)
+        # an ill-scaled mechanism may grow with the best of pivots
+        self.growth = max(GROWTH_LIMIT, 100.0 * factor(self.plan, self.factors, self.vals))
 
 
 def _least_squares_row(k: int, t, y, matrix_pattern, idata, rdata, work_size, records: Records) -> None:

@@ -49,7 +49,7 @@ def update(t, y, yp, idata, rdata, work):
     update_tables(t, y, idata, tab)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def arm_to(b, point_marker, marker_body, kin, frame, out, k):
     """Write the vector from body b's centre of mass to the origin of a marker, global components."""
     owner = marker_body[point_marker]
@@ -57,7 +57,7 @@ def arm_to(b, point_marker, marker_body, kin, frame, out, k):
         out[k + c] = kin[owner, KIN_R + c] + frame[point_marker, c] - kin[b, KIN_R + c]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_load(b, sign, row, y, idata, marker_body, kin, frame, scratch, out):
     """Subtract the generalised loads of one force element on body b (eq. (5), H_F^T F and H_N^T N)."""
     if b == 0:
@@ -100,7 +100,7 @@ def add_tape_row(k, t, lam, mu, y, idata, tab, out):
     return value, rate
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_point_term(k, coef, lam, mu, idata, term, marker_body, kin, frame, out):
     """As the general path of `add_constraints` for a POINT term, whose gradient is a unit vector."""
     c = term[k, T.TERM_AXES]
@@ -128,7 +128,7 @@ def add_point_term(k, coef, lam, mu, idata, term, marker_body, kin, frame, out):
     return value, rate
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_dot_term(k, coef, lam, mu, idata, term, marker_body, kin, frame, s, out):
     """As the general path of `add_constraints` for a DOT1 term, which has no translations."""
     i, j = term[k, T.TERM_I], term[k, T.TERM_J]
@@ -151,7 +151,7 @@ def add_dot_term(k, coef, lam, mu, idata, term, marker_body, kin, frame, s, out)
     return coef * terms.dot3(frame[i], a, frame[j], b), rate
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_constraints(t, y, yp, idata, tab, out):
     """Constraint rows, their derivatives, and the constraint forces of lambda and mu."""
     form = idata[T.H_FORMULATION]

@@ -13,7 +13,7 @@ from gearmbs.dae.rotation import KIN_R, KIN_V, KIN_W
 from gearmbs.dae.terms import cross3, dot3
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def point_motion(k, term, marker_body, kin, frame):
     """Return phi of POINT term k, its rate, and its second rate without the terms in accelerations."""
     c = term[k, T.TERM_AXES]
@@ -31,7 +31,7 @@ def point_motion(k, term, marker_body, kin, frame):
     return phi, rate, quadratic
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def dot_motion(k, term, marker_body, kin, frame, s):
     """Return phi of DOT1 term k, its rate, and its second rate without the terms in accelerations.
 

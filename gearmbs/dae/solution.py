@@ -6,6 +6,9 @@ of the integrator's noise.
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -32,6 +35,9 @@ CONTACT_DIAGNOSTICS = (
 )
 
 
+PART_SIZE = 512
+"""Output times whose records fit the processor's cache."""
+
 CONFLICT_SAMPLES = 50
 """Outputs at which constraints set aside as redundant are looked at."""
 
@@ -54,7 +60,6 @@ class Solution:
         self.problem = problem
         self.result = result
         self.t = result.t
-        self._evaluate()
         self._conflict = self._find_conflict()
 
     @property
@@ -85,21 +90,81 @@ class Solution:
         """Counts of steps, evaluations and times."""
         return self.result.stats
 
-    def _evaluate(self) -> None:
+    @cached_property
+    def _records(self) -> outputs.Records:
+        """Everything at every output time, once somebody asks."""
+        return self._evaluate()
+
+    def _evaluate(self) -> outputs.Records:
         """Solve the index-1 system at every output time."""
-        m, bodies, rows = self.t.size, len(self.system.body_names), len(self.system.row_names)
+        records = self._new_records(self.t.size)
+        self._evaluator().fill(self.t, self.result.y, self.result.epochs, records)
+        return records
+
+    def _evaluator(self) -> outputs.Evaluator:
         problem = self.problem
-        records = outputs.new_records(m, bodies, rows, len(self.system.force_names))
-        outputs.evaluate(
-            self.t, self.result.y, self.result.epochs, problem.idata, problem.rdata, problem.work_size, records
-        )
-        self._pose = records.pose.reshape(m, bodies, 18)
-        self._acc = records.solution[:, : 6 * bodies].reshape(m, bodies, 6)
-        self._lam = records.solution[:, 6 * bodies :]
-        self._loads = records.loads
-        self._phi = records.phi.reshape(m, rows, 3)
-        self._force, self._moment = records.force, records.moment
-        self._strayed = records.strayed
+        return outputs.Evaluator(problem.idata, problem.rdata, problem.work_size)
+
+    def _new_records(self, m: int) -> outputs.Records:
+        system = self.system
+        return outputs.new_records(m, len(system.body_names), len(system.row_names), len(system.force_names))
+
+    @property
+    def _pose(self) -> np.ndarray:
+        return self._records.by_body
+
+    @property
+    def _acc(self) -> np.ndarray:
+        return self._records.accelerations
+
+    @property
+    def _lam(self) -> np.ndarray:
+        return self._records.multipliers
+
+    @property
+    def _loads(self) -> np.ndarray:
+        return self._records.loads
+
+    @property
+    def _phi(self) -> np.ndarray:
+        return self._records.by_row
+
+    def parts(self, rows: np.ndarray | None = None, *, size: int = PART_SIZE) -> Iterator[Solution]:
+        """Yield the solution piece by piece, for what is wanted of a long one to be collected in little memory.
+
+        Forces and accelerations are evaluated for each part in turn, which is also faster than for all at once.
+
+        Parameters
+        ----------
+        rows : ndarray of int, optional
+            Increasing numbers of the output times wanted, the first ones included if angles are counted; default all.
+        size : int
+            Most output times in a part.
+
+        Yields
+        ------
+        Solution
+            Valid until the next one is asked for: they share their memory.
+        """
+        rows = np.arange(self.t.size) if rows is None else np.asarray(rows)
+        known = self.__dict__.get("_records")
+        room = self._new_records(min(size, rows.size)) if known is None else None
+        evaluator = self._evaluator() if known is None else None
+        for k in range(0, rows.size, size):
+            wanted = rows[k : k + size]
+            part = copy.copy(self)
+            part.__dict__.pop("kinetic_energy", None)
+            part.t = self.t[wanted]
+            places = [int(np.searchsorted(wanted, row)) for row, _ in self.result.epochs]
+            epochs = [(place, table) for place, (_, table) in zip(places, self.result.epochs)]
+            yp = self.result.yp[wanted] if len(self.result.yp) else self.result.yp
+            part.result = replace(self.result, t=part.t, y=self.result.y[wanted], yp=yp, epochs=epochs)
+            if evaluator is not None and room is not None:
+                part._records = room.first(wanted.size)
+                evaluator.fill(part.t, part.result.y, epochs, part._records)
+            elif known is not None:
+                part._records = outputs.Records(*(column[wanted] for column in known))
+            yield part
 
     def _find_conflict(self) -> str | None:
         """Return what is wrong if a row set aside as redundant is violated by the motion, tried at some outputs."""
@@ -155,7 +220,7 @@ class Solution:
                     f"{', '.join(known)} carry all of it"
                 )
             raise KeyError(f"joint {joint!r}; the joints are {', '.join(known)}")
-        return self._force[:, rows].sum(axis=1), self._moment[:, rows].sum(axis=1)
+        return self._records.force[:, rows].sum(axis=1), self._records.moment[:, rows].sum(axis=1)
 
     def load(self, element: str) -> tuple[np.ndarray, np.ndarray]:
         """Return force F (N) and torque N (N m) of a force element on I's body at marker I, each (m, 3), global."""
@@ -184,7 +249,7 @@ class Solution:
 
         Positions and all that follows from them are projected onto the constraints afterwards, to rounding.
         """
-        return self._strayed
+        return self._records.strayed
 
     # --- energy -------------------------------------------------------------------------------------
 

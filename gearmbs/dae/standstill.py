@@ -10,6 +10,7 @@ import numpy as np
 from gearmbs.dae import index1
 from gearmbs.dae import tables as T
 from gearmbs.dae.linearised import Instant
+from gearmbs.dae.outputs import Records
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 from gearmbs.dae.solution import Solution
@@ -58,17 +59,19 @@ class Standstill(Solution):
     def __init__(self, rows: Sequence[Snapshot], result: DAEResult) -> None:
         self._rows = rows
         super().__init__(rows[0].system, rows[0].problem, result)
+        # at once, for a part of it is none
+        self._records = self._evaluate()
 
     @classmethod
     def of(cls, rows: Sequence[Snapshot], message: str, iterations: int) -> Standstill:
         """Return the solution of snapshots of equilibria."""
         return cls(rows, Snapshot.result(message, iterations, rows))
 
-    def _evaluate(self) -> None:
+    def _evaluate(self) -> Records:
         """Take multipliers and loads from the unknowns; the diagnostics of contacts as in a motion."""
-        super()._evaluate()
-        self._pose[:, :, 12:18] = 0.0
-        self._acc[:] = 0.0
+        records = super()._evaluate()
+        records.by_body[:, :, 12:18] = 0.0
+        records.accelerations[:] = 0.0
         rows = len(self.system.row_names)
         multipliers = np.zeros((2, max(rows, 1)))
         for k, row in enumerate(self._rows):
@@ -78,12 +81,13 @@ class Standstill(Solution):
             lam = int(idata[T.H_LAMBDA])
             multipliers[0, :rows] = y[lam : lam + rows]
             multipliers[1, 0] = row.t
-            self._lam[k] = y[lam : lam + rows]
-            self._phi[k] = 0.0
-            self._phi[k, :, 0] = out[lam : lam + rows]
-            index1.joint_loads(y, idata, row.rdata, work, multipliers, self._force[k], self._moment[k])
+            records.multipliers[k] = y[lam : lam + rows]
+            records.phi[k] = 0.0
+            records.by_row[k, :, 0] = out[lam : lam + rows]
+            index1.joint_loads(y, idata, row.rdata, work, multipliers, records.force[k], records.moment[k])
             table = idata[int(idata[T.H_I_FORCE]) : int(idata[T.H_I_FUNCTION])].reshape(-1, T.FORCE_COLUMNS)
             for f, force in enumerate(table):
                 for column, first in ((T.FORCE_F, 0), (T.FORCE_N, 3)):
                     at = int(force[column])
-                    self._loads[k, f, first : first + 3] = y[at : at + 3] if at >= 0 else 0.0
+                    records.loads[k, f, first : first + 3] = y[at : at + 3] if at >= 0 else 0.0
+        return records

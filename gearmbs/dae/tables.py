@@ -157,9 +157,13 @@ Tables = namedtuple(
 )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def unpack(idata, rdata, work):
-    """Return the named views of the flat tables; nothing is copied."""
+    """Return the named views of the flat tables; nothing is copied.
+
+    The views are some 1.6 kB of addresses and sizes, which every call that is handed them would copy. So this and the
+    small kernels of the residual are inlined by force, and what they do not look at is never made.
+    """
     bodies = idata[H_BODIES]
     markers = idata[H_MARKERS]
     rows = idata[H_ROWS]

@@ -6,7 +6,7 @@ import json
 import platform
 from collections.abc import Callable
 from importlib.metadata import version
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -25,6 +25,7 @@ from gearmbs.signals import (
     make_signal,
     trim,
 )
+from gearmbs.signals.uneven import MARGIN
 from gearmbs.studies import rig
 from gearmbs.studies.case import Case, units_of_fields
 from gearmbs.studies.limits import check_record, edge, remarks, slip
@@ -32,6 +33,9 @@ from gearmbs.studies.limits import check_record, edge, remarks, slip
 SMOOTH = {"normal_force": "N", "penetration_drive": "m", "penetration_back": "m"}
 COUNTS = {"pairs_drive": "1", "pairs_back": "1"}
 """What a record tells of the contact, with units; numbers of pairs cannot be interpolated."""
+
+TURN_BEFORE = 0.02
+"""Turns of the faster wheel between the steps that are looked at before the span of a record's filters."""
 
 ADVICE = {
     Status.STEP_TOO_SMALL: "Loosen solver.tolerance, raise contact.depth, or try another solver.integrator.",
@@ -145,9 +149,6 @@ def run_case(case: Case, progress: bool | Callable[[float], None] = False) -> xr
     if not solution.success:
         kind = SimulationInterrupted if solution.status is Status.INTERRUPTED else SimulationFailed
         raise kind(f"case '{case.name}': {solution.message}", solution, case)
-    slipped = slip(case, solution.t, transmission_error(case, solution))
-    if slipped is not None:
-        raise SimulationFailed(f"case '{case.name}': {slipped}", solution, case)
     return record(case, solution)
 
 
@@ -159,8 +160,8 @@ def partial_record(case: Case, solution: Solution) -> xr.Dataset:
     Dataset
         As of :func:`run_case` without ``acceleration`` and ``gmf_rms``; status and message in the attributes.
     """
-    forces = [solution.reaction(seat)[0] for seat in rig.SEATS]
-    dataset = _time_series(solution.t, forces, transmission_error(case, solution), solution.contact(rig.MESH))
+    known = measure(case, solution)
+    dataset = _time_series(known.t, known.forces, known.error, known.contact)
     attributes = attributes_of(case, solution)
     dataset.attrs = {**attributes, "status": solution.status.name, "message": solution.message}
     return dataset
@@ -169,8 +170,8 @@ def partial_record(case: Case, solution: Solution) -> xr.Dataset:
 def _time_series(t, forces, error, contact) -> xr.Dataset:
     """Return the dataset of forces, transmission error and contact over time."""
     data = {
-        "force_1": (("time", "xyz"), forces[0], {"units": "N", "long_name": "force of shaft 1 on gear 1"}),
-        "force_2": (("time", "xyz"), forces[1], {"units": "N", "long_name": "force of shaft 2 on gear 2"}),
+        "force_1": (("time", "xyz"), forces[:, :3], {"units": "N", "long_name": "force of shaft 1 on gear 1"}),
+        "force_2": (("time", "xyz"), forces[:, 3:], {"units": "N", "long_name": "force of shaft 2 on gear 2"}),
         "transmission_error": (
             "time",
             error,
@@ -186,21 +187,30 @@ def record(case: Case, solution: Solution) -> xr.Dataset:
     """Return the record of a simulated case; see :func:`run_case`.
 
     Forces at uneven times are brought to the output rate through an anti-alias filter, the other series interpolated.
+
+    Raises
+    ------
+    SimulationFailed
+        If teeth slipped past each other.
     """
+    known = measure(case, solution, rows_of_record(case, solution.t))
+    slipped = slip(case, known.t, known.error)
+    if slipped is not None:
+        raise SimulationFailed(f"case '{case.name}': {slipped}", solution, case)
     pair = case.pair()
     operation, solver = case.operation, case.solver
     start = operation.run_up + operation.settling
     stop = start + operation.duration
     rate, ahead = solver.output_rate, edge(case)
     labels: dict[str, Any] = {"units": "N", "speed": operation.speed, "teeth": case.gears.teeth}
-    both = np.concatenate([solution.reaction(seat)[0] for seat in rig.SEATS], axis=1)
     names = [f"{k}{axis}" for k in (1, 2) for axis in "xyz"]
-    known = solution.t
-    if _is_even(known, rate):
-        keep = known >= start - ahead - 0.5 / rate
-        forces = make_signal(both[keep], rate, channels=names, t0=float(known[keep][0]), **labels)
+    if _is_even(solution.t, rate):
+        keep = known.t >= start - ahead - 0.5 / rate
+        forces = make_signal(known.forces[keep], rate, channels=names, t0=float(known.t[keep][0]), **labels)
     else:
-        forces = even_signal(known, both, rate, start=start - ahead, stop=stop + ahead, channels=names, **labels)
+        forces = even_signal(
+            known.t, known.forces, rate, start=start - ahead, stop=stop + ahead, channels=names, **labels
+        )
     t = forces["time"].values
     signal = forces.isel(channel=slice(3, 6)).assign_coords(channel=["x", "y", "z"])
     components = force_components(signal, pressure_angle=pair.working_pressure_angle, sense=pair.rotation)
@@ -209,16 +219,15 @@ def record(case: Case, solution: Solution) -> xr.Dataset:
         acceleration = decimate(acceleration, solver.signal_rate)
     acceleration = trim(acceleration, start, stop)
     levels = gmf_rms(acceleration)
-    contact = solution.contact(rig.MESH)
     inside = (t >= start - 0.5 / rate) & (t < stop - 0.5 / rate)
     t = t[inside]
-    between = {name: np.interp(t, known, contact[name]) for name in SMOOTH}
-    latest = np.clip(np.searchsorted(known, t, side="right") - 1, 0, known.size - 1)
+    between = {name: np.interp(t, known.t, known.contact[name]) for name in SMOOTH}
+    latest = np.clip(np.searchsorted(known.t, t, side="right") - 1, 0, known.t.size - 1)
     dataset = _time_series(
         t,
-        [forces.values[inside, k : k + 3] for k in (0, 3)],
-        PchipInterpolator(known, transmission_error(case, solution))(t),
-        {**between, **{name: contact[name][latest] for name in COUNTS}},
+        forces.values[inside],
+        PchipInterpolator(known.t, known.error)(t),
+        {**between, **{name: known.contact[name][latest] for name in COUNTS}},
     )
     plain = acceleration.drop_vars(["channel_units", "units"], errors="ignore")
     dataset["acceleration"] = plain.rename(time="signal_time", channel="component")
@@ -236,16 +245,61 @@ def _is_even(t: np.ndarray, rate: float) -> bool:
     return bool(np.allclose(np.diff(t) * rate, 1.0, atol=1e-6))
 
 
-def transmission_error(case: Case, solution: Solution) -> np.ndarray:
-    """Return the lag of the driven wheel behind the driver at the driven base circle, m, shape (m,)."""
+def rows_of_record(case: Case, t: np.ndarray) -> np.ndarray:
+    """Return the numbers of the output times a record is made from.
+
+    Before the span of its filters only a few are needed, to follow the turning wheels.
+    """
+    operation, teeth = case.operation, case.gears.teeth
+    begin = operation.run_up + operation.settling - edge(case) - (MARGIN + 1) / case.solver.output_rate
+    first = int(np.searchsorted(t, begin))
+    turn = 2.0 * np.pi / (operation.speed * max(1.0, teeth[0] / teeth[1]))
+    interval = np.floor(t[: first + 1] / (TURN_BEFORE * turn))
+    return np.concatenate([np.flatnonzero(np.diff(interval) > 0.0), np.arange(first, t.size)])
+
+
+class Measured(NamedTuple):
+    """What a record is made from, at the output times of a solution or some of them.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+    forces : ndarray, shape (m, 6)
+        Force of shaft 1 on gear 1, then of shaft 2 on gear 2, N.
+    error : ndarray, shape (m,)
+        Lag of the driven wheel behind the driver at the driven base circle, m.
+    contact : dict of ndarray
+        The quantities of `SMOOTH` and `COUNTS`.
+    """
+
+    t: np.ndarray
+    forces: np.ndarray
+    error: np.ndarray
+    contact: dict[str, np.ndarray]
+
+
+def measure(case: Case, solution: Solution, rows: np.ndarray | None = None) -> Measured:
+    """Return what a record is made from at the output times ``rows`` of a solution, default all."""
     pair = case.pair()
     place = pair.placement(0.0)
-    angles = []
-    for gear, axes in zip(rig.GEARS, (place.axes_1, place.axes_2)):
-        x_axis = solution.orientation(gear)[:, :, 0] @ axes
-        angles.append(np.unwrap(np.arctan2(x_axis[:, 1], x_axis[:, 0])))
+    t = solution.t if rows is None else solution.t[rows]
+    forces, angles = np.empty((t.size, 6)), np.empty((t.size, 2))
+    contact = {name: np.empty(t.size) for name in (*SMOOTH, *COUNTS)}
+    k = 0
+    for part in solution.parts(rows):
+        here = slice(k, k + len(part))
+        k += len(part)
+        forces[here, :3], forces[here, 3:] = (part.reaction(seat)[0] for seat in rig.SEATS)
+        for wheel, (gear, axes) in enumerate(zip(rig.GEARS, (place.axes_1, place.axes_2))):
+            x_axis = part.orientation(gear)[:, :, 0] @ axes
+            angles[here, wheel] = np.arctan2(x_axis[:, 1], x_axis[:, 0])
+        diagnostics = part.contact(rig.MESH)
+        for name, column in contact.items():
+            column[here] = diagnostics[name]
+    turned = np.unwrap(angles, axis=0)
     ratio = case.gears.teeth[0] / case.gears.teeth[1]
-    return pair.rotation * pair.wheels[1].base_radius * (angles[0] * ratio + angles[1])
+    error = pair.rotation * pair.wheels[1].base_radius * (turned[:, 0] * ratio + turned[:, 1])
+    return Measured(t, forces, error, contact)
 
 
 def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any]:
