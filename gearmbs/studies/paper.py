@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -116,23 +117,14 @@ class PaperStudy:
         """Return the GMF table of all components as CSV."""
         lines = ["load,state,component,way,harmonic,frequency_hz,rms_m_s2,scaled_rms_m_s2"]
         raw, scaled = self.records["gmf_rms"], self.records["gmf_rms_scaled"]
-        for load in raw["load"].values:
-            for state in raw.state.values:
-                for component in raw.component.values:
-                    for way in raw.way.values:
-                        for harmonic in raw.harmonic.values:
-                            at = {
-                                "load": load,
-                                "state": state,
-                                "component": component,
-                                "way": way,
-                                "harmonic": harmonic,
-                            }
-                            lines.append(
-                                f"{load},{state},{component},{way},{harmonic},"
-                                f"{float(raw.frequency.sel(harmonic=harmonic)):.6f},"
-                                f"{float(raw.sel(at)):.8g},{float(scaled.sel(at)):.8g}"
-                            )
+        order = ("load", "state", "component", "way", "harmonic")
+        raw, scaled = raw.transpose(*order), scaled.transpose(*order)
+        frequency = dict(zip(raw.harmonic.values, raw.frequency.values))
+        places = product(*(raw[name].values for name in order))
+        for place, level, in_scale in zip(places, raw.values.ravel(), scaled.values.ravel()):
+            lines.append(
+                f"{','.join(str(part) for part in place)},{frequency[place[-1]]:.6f},{level:.8g},{in_scale:.8g}"
+            )
         return "\n".join(lines) + "\n"
 
     def save(self, folder: str | Path) -> list[Path]:

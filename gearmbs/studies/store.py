@@ -15,7 +15,7 @@ __all__ = ["whole_file", "write_dataset", "write_text"]
 def write_dataset(path: str | Path, dataset: xr.Dataset) -> None:
     """Write a dataset as compressed NetCDF, as a whole."""
     encoding = {
-        name: {"zlib": True, "complevel": 4}
+        name: {"zlib": True, "complevel": 1, "shuffle": True}
         for name, variable in dataset.data_vars.items()
         if variable.dtype.kind == "f" and variable.size > 1000
     }
