@@ -17,12 +17,12 @@ from gearmbs.adams import statements as st
 from gearmbs.adams.build_data import spline_data
 from gearmbs.adams.check import measured_markers
 from gearmbs.adams.deck import Deck
-from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
+from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
 from gearmbs.adams.frames import inertia_about_cm, marker_orientation, part_orientation
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.elements import State
-from gearmbs.mechanism.expression import Call, Name, Number, Scope, parse, unparse
+from gearmbs.mechanism.expression import Call, Name, Node, Number, Scope, parse, unparse
 from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Marker
@@ -80,7 +80,7 @@ class AdamsModel:
         """Return what the deck's expressions may name, for requests."""
         deck = self.deck
         markers: dict[Any, int] = {}
-        for m in _markers(self.mechanism):
+        for m in markers_of(self.mechanism):
             markers[m.name.upper()] = marker_index[id(m)]
             if m.number is not None:
                 markers[m.number] = marker_index[id(m)]
@@ -94,6 +94,7 @@ class AdamsModel:
             arrays=self.mechanism.arrays,
             plants=self.mechanism.plants,
             forces=dict(self.pairs),  # type: ignore[arg-type]
+            absent=frozenset((*key, base) for key in self.pairs if key not in self.names for base in (0, 3)),
             units=deck.units,
         )
 
@@ -140,13 +141,15 @@ def build_model(
     model = builder.run()
     left_out = [d for d in builder.problems if d.severity == UNSUPPORTED]
     errors = [d for d in builder.problems if d.severity == ERROR]
+    remarks = [d for d in builder.problems if d.severity == WARNING]
     if errors or (left_out and not allow_unsupported):
         raise DeckError(errors + left_out)
-    deck.diagnostics.extend(d for d in left_out if d not in deck.diagnostics)
+    deck.diagnostics.extend(d for d in left_out + remarks if d not in deck.diagnostics)
     return model
 
 
-def _markers(mechanism: Mechanism) -> list[Marker]:
+def markers_of(mechanism: Mechanism) -> list[Marker]:
+    """Return all markers of a mechanism."""
     return [m for body in (mechanism.ground, *mechanism.bodies.values()) for m in body.markers]
 
 
@@ -198,7 +201,17 @@ class Builder:
 
     def active(self, kind: type[Any]) -> list[Any]:
         keyword = st.KEYWORD_OF[kind]
-        return [s for s in self.deck.of(kind).values() if (keyword, s.id) not in self.inactive]
+        group = self.deck.of(kind).values()
+        return [s for s in group if (keyword, s.id) not in self.inactive and self.resting_joint(s) is None]
+
+    def resting_joint(self, s: st.Statement) -> int | None:
+        """Return an inactive joint without which an element cannot act, None when there is none."""
+        refs: tuple[int, ...] = ()
+        if isinstance(s, (st.Motion, st.Friction)) and s.joint is not None:
+            refs = (s.joint,)
+        elif isinstance(s, (st.Coupler, st.Gear)):
+            refs = s.joints
+        return next((ref for ref in refs if ("JOINT", ref) in self.inactive), None)
 
     def attempt(self, statement: st.Statement, add: Callable[[Any], None]) -> None:
         """Add one statement; what is wrong with it gets its line."""
@@ -228,7 +241,12 @@ class Builder:
         for cls, kind in KINDS.items():
             for statement in self.active(cls):
                 self.claim(statement, kind)
+            for statement in self.deck.of(cls).values():
                 self.model.pairs[kind, statement.id] = self.marker_pair(statement)
+                joint = self.resting_joint(statement)
+                if joint is not None and (st.KEYWORD_OF[cls], statement.id) not in self.inactive:
+                    message = f"{statement.label()} rests while JOINT/{joint} is inactive"
+                    self.problems.append(Diagnostic(WARNING, message, self.deck.file, statement.line))
 
     def marker_pair(self, s: Any) -> tuple[int, int | None]:
         if isinstance(s, st.Motion) and s.joint is not None:
@@ -258,14 +276,15 @@ class Builder:
     def text(self, source: str) -> str:
         """Return an expression with element ids replaced by the mechanism's names."""
 
-        def rename(call: Call) -> Call:
+        def rename(call: Call) -> Node:
             kind = ELEMENT_FORCES.get(call.name)
             first = call.args[0] if call.args else None
             if kind is None or not isinstance(first, Number) or first.integer is None:
                 return call
             name = self.model.names.get((kind, first.integer))
             if name is None:
-                return call
+                # an inactive element exerts nothing
+                return Number(0.0, call.at) if (kind, first.integer) in self.model.pairs else call
             return replaced(call, args=(Name(name, first.at), *call.args[1:]))
 
         return unparse(parse(source), rename)

@@ -117,11 +117,9 @@ def add_beam(b: Builder, s: st.Beam) -> None:
 
 
 def add_friction(b: Builder, s: st.Friction) -> None:
-    """FRICTION of a joint; without its joint it is absent."""
+    """FRICTION of a joint."""
     joint = b.joints.get(s.joint or 0)
     if joint is None:
-        if ("JOINT", s.joint) in b.inactive:
-            return
         raise ValueError(f"JOINT/{s.joint} has no friction; it must be {', '.join(KINDS)}")
     given = tuple(i.lower() for i in s.inputs)
     inputs = INPUTS if not given or "all" in given else tuple(i for i in given if i != "none")

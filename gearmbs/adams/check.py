@@ -49,6 +49,26 @@ UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
     st.Part: ("planar",),
 }
 
+WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
+    st.Integrator: ("hratio", "pattern", "fixit", "adaptivity", "beta", "gamma", "alpha", "scale"),
+    st.InitialConditions: tuple(specs_of(st.InitialConditions)),
+    st.Kinematics: tuple(specs_of(st.Kinematics)),
+    st.Equilibrium: tuple(specs_of(st.Equilibrium)),
+    st.Output: ("dscale", "vscale", "ascale", "fscale", "dzero", "vzero", "azero", "fzero", "chart"),
+    st.Results: tuple(n for n in specs_of(st.Results) if n.startswith("no")),
+    st.Part: ("exact",),
+    st.Friction: ("formulation",),
+    st.Variable: ("ic",),
+}
+"""Arguments that are read and change nothing: each is remarked on."""
+WHY = {
+    st.Output: "values are written as they are",
+    st.Results: "everything is written",
+    st.Part: "the parts are moved as little as the joints allow",
+    st.Friction: "friction follows one law, see the documentation",
+    st.Variable: "variables need no starting value",
+}
+
 
 def check(deck: Deck) -> list[Diagnostic]:
     """Return everything that makes a deck unusable; add warnings to the deck.
@@ -82,6 +102,12 @@ def check(deck: Deck) -> list[Diagnostic]:
             if name in statement.given:
                 message = f"{statement.label()}: {name.upper()} is not supported"
                 deck.diagnostics.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.given[name]))
+        idle = [name for name in WITHOUT_EFFECT.get(cls, ()) if name in statement.given]
+        if idle:
+            names = ", ".join(specs_of(cls)[name].keyword for name in idle)
+            why = WHY.get(cls, "the program's own settings are tight enough")
+            message = f"{statement.label()}: {names} without effect: {why}"
+            deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, statement.given[idle[0]]))
         _check_markers(deck, statement, fail)
     for part in deck.of(st.Part).values():
         _check_part(deck, part, fail)

@@ -16,7 +16,12 @@ from gearmbs.adams.source import RawStatement, read_file, statements
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
 SIMULATIONS = "DYNAMICS KINEMATICS STATICS TRANSIENT INITIAL_CONDITIONS ACCELERATION DISPLACEMENT VELOCITY"
-ELEMENTS = "ACCGRAV BUSHING COUPLER DIFF FIELD GCON GEAR GFORCE JOINT JPRIM MOTION SFORCE SPRINGDAMPER VFORCE VTORQUE"
+ELEMENTS = (
+    "ACCGRAV BEAM BUSHING COUPLER DIFF FIELD FRICTION GCON GEAR GFORCE JOINT JPRIM MOTION SFORCE SPRINGDAMPER VFORCE "
+    "VTORQUE"
+)
+DEEPEST = 10
+"""Command files that may call each other."""
 
 
 @dataclass(frozen=True)
@@ -134,10 +139,11 @@ def read_script(path: str | Path) -> Script:
     return parse_script(read_file(Path(path)), str(path))
 
 
-def parse_script(text: str, file: str = "<script>") -> Script:
+def parse_script(text: str, file: str = "<script>", depth: int = 0) -> Script:
     """Parse the text of an .acf file.
 
-    The first lines may hold the name of the deck and the prefix of the output files.
+    The first lines may hold the name of the deck and the prefix of the output files. The commands of a file named by
+    FILE/COMMAND, which is looked for beside this one, take that command's place.
 
     Raises
     ------
@@ -164,11 +170,34 @@ def parse_script(text: str, file: str = "<script>") -> Script:
             if isinstance(command, FileCommand):
                 script.model = command.model or script.model
                 script.prefix = command.output_prefix or script.prefix
-            if isinstance(command, Stop):
+                if command.command is not None:
+                    _include(script, command, errors, depth)
+            if any(isinstance(c, Stop) for c in script.commands[-1:]):
                 break
     if errors:
         raise DeckError(errors)
     return script
+
+
+def _include(script: Script, command: FileCommand, errors: list[Diagnostic], depth: int) -> None:
+    """Append the commands of another file."""
+    name = command.command or ""
+    path = Path(script.file).parent / (name if Path(name).suffix else f"{name}.acf")
+    try:
+        if depth >= DEEPEST:
+            raise DeckError([Diagnostic(ERROR, f"files call each other more than {DEEPEST} deep", script.file, 0)])
+        if not path.is_file():
+            raise DeckError([Diagnostic(ERROR, "there is no such file", script.file, 0)])
+        other = parse_script(read_file(path), str(path), depth + 1)
+    except (DeckError, ValueError, OSError) as error:
+        places = error.diagnostics if isinstance(error, DeckError) else ()
+        inner = [d for d in places if d.file == str(path)]
+        message = f"FILE: COMMAND = {name[:80]}: {places[0].message if places else error}"
+        errors.extend(inner or [Diagnostic(ERROR, message, script.file, command.line)])
+        return
+    script.commands.extend(other.commands)
+    script.diagnostics.extend(other.diagnostics)
+    script.model = script.model or other.model
 
 
 def _is_command(body: str) -> bool:
@@ -241,7 +270,7 @@ def _check(command: Command) -> None:
     StatementError
     """
     if isinstance(command, Switch):
-        if command.element is None or command.id is None:
+        if command.element is None or (command.id is None and command.element not in st.WITHOUT_ID):
             raise StatementError("give an element and its id, for instance DEACTIVATE/JOINT, ID=3")
     if not isinstance(command, Simulate):
         return

@@ -8,12 +8,14 @@ import numpy as np
 from numba import njit
 
 from gearmbs.adams import statements as st
-from gearmbs.adams.build import AdamsModel
+from gearmbs.adams.build import AdamsModel, markers_of
 from gearmbs.dae import tables
 from gearmbs.dae.expressions import angle_rates, eval_gradient, eval_request, update_angles
 from gearmbs.dae.expressions.kinematics import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
-from gearmbs.dae.expressions.tape import ExpressionError
+from gearmbs.dae.expressions.tape import ExpressionError, Tape
 from gearmbs.dae.solution import Solution
+from gearmbs.dae.standstill import Standstill
+from gearmbs.mechanism.compile import starting_angles
 from gearmbs.mechanism.expression import Scope, compile_expression
 
 COLUMNS = {
@@ -45,8 +47,12 @@ class RequestSeries:
     values: np.ndarray
 
 
-def request_texts(request: st.Request) -> tuple[str | None, ...]:
-    """Return the expressions of a request's eight columns."""
+CARDAN = {"PSI": "YAW", "THETA": "PITCH", "PHI": "ROLL"}
+"""Angles of displacements with OUTPUT/YPR."""
+
+
+def request_texts(request: st.Request, ypr: bool = False) -> tuple[str | None, ...]:
+    """Return the expressions of a request's eight columns; ``ypr`` asks for yaw, pitch and roll."""
     if request.type is None:
         return request.functions()
     i, j, k = request.i or 0, request.j or 0, request.rm or 0
@@ -55,15 +61,17 @@ def request_texts(request: st.Request) -> tuple[str | None, ...]:
         if not name:
             texts.append(None)
         elif name in ("PSI", "THETA", "PHI", "DM", "VM", "ACCM", "WM", "WDTM", "FM", "TM"):
-            texts.append(f"{name}({i},{j})")
+            texts.append(f"{CARDAN[name] if ypr and name in CARDAN else name}({i},{j})")
         else:
             texts.append(f"{name}({i},{j},{k})")
     return tuple(texts)
 
 
-def column_names(request: st.Request) -> tuple[str, ...]:
+def column_names(request: st.Request, ypr: bool = False) -> tuple[str, ...]:
     """Return the names of a request's columns: CNAMES, TITLE, or the functions'."""
-    standard = COLUMNS[request.type] if request.type else NAMES
+    standard: tuple[str, ...] = COLUMNS[request.type] if request.type else NAMES
+    if ypr:
+        standard = tuple(CARDAN.get(name, name) for name in standard)
     given = request.cnames or request.title
     return tuple(given[k] if k < len(given) and given[k] else (standard[k] or NAMES[k]) for k in range(8))
 
@@ -80,12 +88,24 @@ class RequestEvaluator:
     def __init__(self, model: AdamsModel, solution: Solution) -> None:
         self.model = model
         self.solution = solution
+        output = model.deck.only(st.Output)
+        self._ypr = output is not None and output.ypr
         system = solution.system
         builder = system.builder
         self.marker_body = np.array(builder.marker_body, dtype=np.int64)
         self.marker_frame = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float)
         self.kin, self.acc = _tables(solution)
-        self.scope: Scope = model.scope(system.marker_index, builder.marker_body)  # type: ignore[attr-defined]
+        index: dict[int, int] = system.marker_index  # type: ignore[attr-defined]
+        self.scope: Scope = model.scope(index, builder.marker_body)
+        self._names = {index[id(m)]: m.name for m in markers_of(model.mechanism)}
+        self._turns = dict(model.mechanism.turns)
+        if isinstance(solution, Standstill):
+            # the way to an equilibrium may have wound or unwound a spring
+            for (function, i, j), angle in solution.counted().items():
+                self._turns[function, self._marker_named(i), self._marker_named(j)] = angle
+        self._counted: dict[tuple[str, str, str], None] = dict.fromkeys(self._turns)
+        for tape in builder.tapes:
+            self._note(tape)
         self._wrenches: dict[tuple[str, int], np.ndarray] = {}
 
     def request(self, request: st.Request) -> RequestSeries:
@@ -97,7 +117,7 @@ class RequestEvaluator:
             When a column names something that does not exist.
         """
         values = np.zeros((self.solution.t.size, 8))
-        for column, text in enumerate(request_texts(request)):
+        for column, text in enumerate(request_texts(request, self._ypr)):
             if text is None:
                 continue
             try:
@@ -106,7 +126,7 @@ class RequestEvaluator:
                 if request.type == "FORCE" and "no force or joint acts" in str(error):
                     continue
                 raise ExpressionError(f"{request.label()}: {NAMES[column]}: {error}") from error
-        return RequestSeries(request, column_names(request), values)
+        return RequestSeries(request, column_names(request, self._ypr), values)
 
     def expression(self, text: str) -> np.ndarray:
         """Return the values of an expression over time, in the deck's units, shape (m,)."""
@@ -116,12 +136,33 @@ class RequestEvaluator:
         for q, key in enumerate(tape.algebraic):
             y[:, q] = self._unknown(key)
         tape = tape.bind(tape.algebraic.index)
+        self._note(tape)
+        angles = np.zeros((3, max(1, tape.n_angles)))
+        angles[0, : tape.n_angles] = starting_angles(tape, self._turns, self._marker_named)
         out = np.zeros(m)
         _series(
             tape.ints, tape.floats, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
-            np.zeros((3, max(1, tape.n_angles))), np.zeros(max(1, tape.gradient_size)), np.zeros(tape.work_size), out,
+            angles, np.zeros(max(1, tape.gradient_size)), np.zeros(tape.work_size), out,
         )  # fmt: skip
         return out
+
+    def turns(self) -> dict[tuple[str, str, str], float]:
+        """Return where the angles counted so far between markers of the deck end, rad."""
+        numbered = {m.name for m in markers_of(self.model.mechanism) if m.number is not None}
+        found = {}
+        for function, i, j in self._counted:
+            if {i, j} <= numbered | {""}:
+                arguments = ", ".join(f'"{name}"' for name in (i, j) if name)
+                found[function, i, j] = float(self.expression(f"{function}({arguments})")[-1])
+        return found
+
+    def _note(self, tape: Tape) -> None:
+        """Remember the angles an expression counts."""
+        for function, i, j in tape.angles:
+            self._counted[function, self._marker_named(i), self._marker_named(j)] = None
+
+    def _marker_named(self, index: int) -> str:
+        return self._names.get(index, "")
 
     def _unknown(self, key: tuple) -> np.ndarray:
         if key[0] == "diff":
@@ -142,9 +183,12 @@ class RequestEvaluator:
         """
         if (kind, ref) in self._wrenches:
             return self._wrenches[kind, ref]
-        name = self.model.names[kind, ref]
         i, j = self.model.pairs[kind, ref]
         out = np.zeros((self.solution.t.size, 12))
+        name = self.model.names.get((kind, ref))
+        if name is None:
+            # inactive
+            return out
         if kind == "gcon" or name in self.model.mechanism.constraints:
             out[:, :6] = self._constraint_wrench(name, i)
         elif kind in ("joint", "jprim", "motion", "coupler", "gear"):

@@ -21,7 +21,8 @@ NAMESPACE = "http://www.mscsoftware.com/:xrf10"
 ENTITY_TYPES = {
     "joint": "Joint", "jprim": "Primitive_Joint", "motion": "Motion", "sforce": "SForce", "vforce": "VForce",
     "vtorque": "VTorque", "gforce": "GForce", "bushing": "Bushing", "field": "Field",
-    "springdamper": "SpringDamper", "gcon": "GCon", "coupler": "Coupler", "gear": "Gear",
+    "springdamper": "SpringDamper", "gcon": "GCon", "coupler": "Coupler", "gear": "Gear", "beam": "Beam",
+    "friction": "Friction",
 }  # fmt: skip
 PER_LINE = 6
 STEP_TYPES = {"KINEMATICS": "kinematic", "STATICS": "static", "INITIAL_CONDITIONS": "initialConditions"}

@@ -11,6 +11,7 @@ import numpy as np
 
 from gearmbs.adams import statements as st
 from gearmbs.adams.build import AdamsModel, BodyState, build_model
+from gearmbs.adams.check import UNSUPPORTED_ARGUMENTS, check
 from gearmbs.adams.commands import Change, Linear, Script, Simulate, Stop, Switch, apply_change, read_script
 from gearmbs.adams.deck import Deck, read_deck
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
@@ -46,6 +47,7 @@ class _Session:
     inactive: set[tuple[str, int]] = field(default_factory=set)
     state: dict[int, BodyState] | None = None
     states: dict[int, float] = field(default_factory=dict)
+    turns: dict[tuple[str, str, str], float] = field(default_factory=dict)
     time: float = 0.0
 
 
@@ -102,10 +104,9 @@ def run_deck(
         if isinstance(command, Stop):
             break
         if isinstance(command, Change):
-            _change(session, command)
+            _change(session, command, allow_unsupported)
         elif isinstance(command, Switch):
-            element = (command.element or "", command.id or 0)
-            (session.inactive.discard if command.on else session.inactive.add)(element)
+            _switch(session, command)
         elif isinstance(command, Linear):
             result.modes.append(_linear(session, command, allow_unsupported))
         elif isinstance(command, Simulate):
@@ -138,10 +139,35 @@ def _unsupported(command: Any, message: str) -> DeckError:
     return DeckError([Diagnostic(UNSUPPORTED, message, command.file, command.line)])
 
 
-def _change(session: _Session, command: Change) -> None:
-    """Put a command's arguments into the session's deck."""
+def _switch(session: _Session, command: Switch) -> None:
+    """Activate or deactivate an element."""
+    keyword, number = command.element or "", command.id or 0
+    if number not in session.deck.of(st.STATEMENTS[keyword]):
+        label = f"{keyword}/{number}" if number else keyword
+        raise DeckError([Diagnostic(ERROR, f"there is no {label} in the deck", command.file, command.line)])
+    (session.inactive.discard if command.on else session.inactive.add)((keyword, number))
+
+
+AT_START: dict[type, frozenset[str]] = {
+    st.Part: frozenset("qg reuler zg xg vx vy vz wx wy wz vm wm exact".split()),
+    st.Joint: frozenset(["ic", "ictran", "icrot"]),
+    st.Motion: frozenset(["icdisp", "icvel"]),
+    st.Diff: frozenset(["ic"]),
+}
+"""Arguments that say how the first analysis starts."""
+
+
+def _change(session: _Session, command: Change, allow_unsupported: bool) -> None:
+    """Put a command's arguments into the session's deck, which must hold together with them."""
     change = command.statement
     assert change is not None
+    late = AT_START.get(type(change), frozenset()) & set(change.given)
+    if late and session.state is not None and not allow_unsupported:
+        what = ", ".join(sorted(name.upper() for name in late))
+        raise _unsupported(
+            command,
+            f"{change.label()}: {what} after the first analysis; the mechanism goes on from where it is",
+        )
     group = session.deck.items.setdefault(type(change), {})
     old = group.get(change.id)
     if old is None:
@@ -149,9 +175,16 @@ def _change(session: _Session, command: Change) -> None:
             message = f"there is no {change.label()} to change"
             raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
         group[0] = change
-        return
-    group[change.id] = apply_change(old, change)
+    else:
+        group[change.id] = apply_change(old, change)
     session.deck.__dict__.pop("units", None)
+    trial = replace(session.deck, diagnostics=[])
+    wrong = check(trial)
+    refused = [n for n in UNSUPPORTED_ARGUMENTS.get(type(change), ()) if n in change.given]
+    if refused and not allow_unsupported:
+        raise _unsupported(command, f"{change.label()}: {', '.join(refused).upper()} is not supported")
+    if wrong:
+        raise DeckError([Diagnostic(d.severity, d.message, command.file, command.line) for d in wrong])
 
 
 def _times(session: _Session, command: Simulate) -> np.ndarray:
@@ -194,6 +227,10 @@ def _settings(session: _Session, tol: float | None) -> tuple[dict[str, Any], str
     for key, value in (("max_step", integrator.hmax), ("first_step", integrator.hinit), ("min_step", integrator.hmin)):
         if value is not None:
             options[key] = scale * value
+    if integrator.maxit is not None:
+        options["max_iterations"] = max(integrator.maxit, 1)
+    if integrator.interpolate is not None:
+        options["interpolate"] = integrator.interpolate in ("ON", "TRUE", "YES")
     if integrator.kmax is not None:
         options["max_order"] = min(max(integrator.kmax, 1), 6)
     if integrator.corrector is not None:
@@ -210,8 +247,9 @@ def _simulate(
 ) -> Segment:
     """Carry out one SIMULATE."""
     kind = command.kind or "DYNAMICS"
-    if kind not in ("DYNAMICS", "KINEMATICS", "TRANSIENT", "STATICS", "INITIAL_CONDITIONS"):
-        raise _unsupported(command, f"SIMULATE/{kind} is not supported")
+    if kind in ("DISPLACEMENT", "VELOCITY", "ACCELERATION"):
+        # parts of the analysis of initial conditions, which is always done to the end
+        kind = "INITIAL_CONDITIONS"
     sequence = kind not in ("STATICS", "INITIAL_CONDITIONS") or command.end is not None or command.duration is not None
     times = _times(session, command) if sequence else np.array([session.time])
     model = None
@@ -230,7 +268,7 @@ def _simulate(
             raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, request.line)]) from error
     for kind_id in model.pairs:
         segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
-    _remember(session, model, segment)
+    _remember(session, model, segment, evaluator)
     return segment
 
 
@@ -298,6 +336,7 @@ def _model(session: _Session, allow_unsupported: bool, span: tuple[float, float]
             return model
         session.state = _with_initial_motions(model)
     model = build_model(session.deck, allow_unsupported, inactive, session.state, span)
+    model.mechanism.turns.update(session.turns)
     for number, value in session.states.items():
         if number in model.mechanism.states:
             model.mechanism.states[number].start = value
@@ -333,7 +372,7 @@ def _states(model: AdamsModel, pose: np.ndarray) -> dict[int, BodyState]:
     return found
 
 
-def _remember(session: _Session, model: AdamsModel, segment: Segment) -> None:
+def _remember(session: _Session, model: AdamsModel, segment: Segment, evaluator: RequestEvaluator) -> None:
     """Keep the final state as the start of the next analysis."""
     s = segment.solution
     names = s.system.body_names
@@ -342,7 +381,7 @@ def _remember(session: _Session, model: AdamsModel, segment: Segment) -> None:
         for n in names
     ]
     session.state = _states(model, np.array(last))
-    evaluator = RequestEvaluator(model, s)
+    session.turns = evaluator.turns()
     for number in model.mechanism.states:
         session.states[number] = float(evaluator.state(number)[-1])
     session.time = float(s.t[-1]) / session.deck.units.time

@@ -67,6 +67,16 @@ class Standstill(Solution):
         """Return the solution of snapshots of equilibria."""
         return cls(rows, Snapshot.result(message, iterations, rows))
 
+    def counted(self, row: int = 0) -> dict[tuple[str, int, int], float]:
+        """Return the counted angles of all expressions at one time, rad, by function and markers I and J."""
+        snapshot, builder = self._rows[row], self.system.builder
+        first = int(snapshot.idata[T.H_R_EXTRA])
+        found: dict[tuple[str, int, int], float] = {}
+        for tape, where in zip(builder.tapes, builder.tape_rows):
+            at = first + where[T.TAPE_REFERENCE] + tape.n_angles
+            found.update(zip(tape.angles, snapshot.rdata[at : at + tape.n_angles].tolist()))
+        return found
+
     def _evaluate(self) -> Records:
         """Take multipliers and loads from the unknowns; the diagnostics of contacts as in a motion."""
         records = super()._evaluate()

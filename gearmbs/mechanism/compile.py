@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,6 +59,7 @@ class _Compiler:
         self.builder.gravity = mechanism.gravity
         self.body_index: dict[int, int] = {id(mechanism.ground): 0}
         self.marker_index: dict[int, int] = {}
+        self.marker_names: list[str] = []
         self.row_names: list[str] = []
         self._scope: Scope | None = None
 
@@ -76,7 +78,7 @@ class _Compiler:
                     f"general constraint '{name}': {text!r} must depend on positions and TIME only; "
                     "velocities and forces cannot enter a constraint"
                 )
-            self.builder.add_tape_row(self.builder.add_tape(tape))
+            self.builder.add_tape_row(self.add_tape(tape))
             self.row_names.append(f"{name}: expression")
         for element in m.elements.values():
             self.add_element(element)
@@ -84,9 +86,7 @@ class _Compiler:
             self.add_reaction(m.joints[name])
         for state in m.states.values():
             tape = self.tape(state.expression, f"state '{state.name}'", "number")
-            self.builder.add_state(
-                T.STATE_ALGEBRAIC if state.algebraic else T.STATE_DIFFERENTIAL, self.builder.add_tape(tape)
-            )
+            self.builder.add_state(T.STATE_ALGEBRAIC if state.algebraic else T.STATE_DIFFERENTIAL, self.add_tape(tape))
         elements = [*m.elements, *(f"reaction of {name}" for name in self.measured)]
         system = System(self.builder, pose, list(m.bodies), self.row_names, elements, t0)
         system.mechanism = m
@@ -115,9 +115,14 @@ class _Compiler:
                 self.marker_index[id(marker)] = self.builder.add_marker(
                     self.body_index[id(body)], marker.position - body.com, marker.orientation
                 )
+                self.marker_names.append(marker.name)
 
     def index(self, marker: Marker) -> int:
         return self.marker_index[id(marker)]
+
+    def marker_named(self, index: int) -> str:
+        """Return the name of a marker of the table, "" for the global frame."""
+        return self.marker_names[index] if index >= 0 else ""
 
     # --- constraints --------------------------------------------------------------------------------
 
@@ -128,7 +133,7 @@ class _Compiler:
         self.builder.add_row(packed, function)
         for k, term in enumerate(row.terms):
             if term.kind == terms.ANGLE:
-                self.builder.reference[len(self.builder.terms) - len(row.terms) + k] = jt.initial_coordinate(term)
+                self.builder.reference[len(self.builder.terms) - len(row.terms) + k] = jt.initial_angle(row, term)
 
     def function(self, function: TimeFunction, label: str) -> int:
         if not function.is_expression:
@@ -136,11 +141,20 @@ class _Compiler:
         tape = self.tape(function.text, label, "number")
         if tape.level > LEVEL_TIME:
             raise ModelError(f"{label}: {function.text!r} must be a function of TIME alone")
-        number = self.builder.add_tape(tape)
+        number = self.add_tape(tape)
         self.builder.functions.append((timefunctions.TAPE, number))
         return len(self.builder.functions) - 1
 
     # --- expressions --------------------------------------------------------------------------------
+
+    def add_tape(self, tape: Tape) -> int:
+        """Add a tape; its counted angles start where the mechanism says."""
+        number = self.builder.add_tape(tape)
+        at, n = self.builder.tape_rows[-1][T.TAPE_REFERENCE], tape.n_angles
+        for k, start in enumerate(starting_angles(tape, self.mechanism.turns, self.marker_named)):
+            # the reference, and the value of the last point that was tracked
+            self.builder.extra_r[at + k] = self.builder.extra_r[at + n + k] = start
+        return number
 
     def scope(self) -> Scope:
         """Names an expression may use; markers by name, elements by kind and name."""
@@ -295,7 +309,7 @@ class _Compiler:
                 continue
             torque = load.mode == el.AXIS_TORQUE or (load.mode == el.COMPONENTS and c >= 3)
             tape = self.tape(text, label, "torque" if torque else "force")
-            numbers.append(self.builder.add_tape(tape))
+            numbers.append(self.add_tape(tape))
             bodies.extend(tape.bodies)
             *_, at, n_bodies, n_unknowns = self.builder.tape_rows[-1]
             unknowns.extend(self.builder.extra_i[at + n_bodies : at + n_bodies + n_unknowns])
@@ -312,6 +326,16 @@ class _Compiler:
             bodies=sorted(set(bodies) - {0}),
             unknowns=sorted(set(unknowns)),
         )
+
+
+def starting_angles(
+    tape: Tape, turns: Mapping[tuple[str, str, str], float], marker_named: Callable[[int], str]
+) -> list[float]:
+    """Return where the counted angles of a tape start, given by function and names of the markers I and J; 0 else."""
+    found = []
+    for function, i, j in tape.angles:
+        found.append(float(turns.get((function, marker_named(i), marker_named(j)), 0.0)))
+    return found
 
 
 def _blocks(element) -> tuple[bool, bool]:

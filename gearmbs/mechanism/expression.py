@@ -316,14 +316,14 @@ def parse(text: str) -> Node:
     return _Parser(text).whole()
 
 
-def unparse(node: Node, rename: Callable[[Call], Call] = lambda call: call) -> str:
+def unparse(node: Node, rename: Callable[[Call], Node] = lambda call: call) -> str:
     """Write a syntax tree as text again.
 
     Parameters
     ----------
     node : Node
     rename : callable
-        Given every function call before it is written; returns the call to write instead.
+        Given every function call before it is written; returns what to write instead.
     """
     if isinstance(node, Number):
         return str(node.integer) if node.integer is not None else repr(node.value)
@@ -337,6 +337,8 @@ def unparse(node: Node, rename: Callable[[Call], Call] = lambda call: call) -> s
         rest = "".join(f" {symbol} {unparse(operand, rename)}" for symbol, operand in node.rest)
         return f"({unparse(node.first, rename)}{rest})"
     call = rename(node)
+    if not isinstance(call, Call):
+        return unparse(call, rename)
     return f"{call.name}({', '.join(unparse(a, rename) for a in call.args)})"
 
 

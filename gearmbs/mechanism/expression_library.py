@@ -70,7 +70,7 @@ def _axis_angle(axis: int, low: Lowering, call: Call) -> int:
         angle = b.binary(op.ATAN2, b.cosine(i, 2, j, 0), b.cosine(i, 2, j, 2))
     else:
         angle = b.binary(op.ATAN2, b.cosine(i, 0, j, 1), b.cosine(i, 0, j, 0))
-    return b.wound(angle)
+    return b.wound(angle, ("AXAYAZ"[2 * axis : 2 * axis + 2], i, j))
 
 
 def _orient(low: Lowering, call: Call) -> int:

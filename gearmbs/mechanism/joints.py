@@ -114,6 +114,16 @@ def coordinate_term(joint: Joint, coefficient: float) -> Term:
     return Term(terms.ANGLE, joint.i, joint.j, 0, coefficient)
 
 
+def initial_angle(row: Row, term: Term) -> float:
+    """Return the angle an angle term starts with: of a screw with as many turns as its displacement says."""
+    angle = initial_coordinate(term)
+    if row.function is not None or term.coefficient == 0.0:
+        return angle
+    rest = sum(t.coefficient * initial_coordinate(t) for t in row.terms if t is not term)
+    turns = (-rest / term.coefficient - angle) / (2.0 * np.pi)
+    return angle + 2.0 * np.pi * float(np.round(turns))
+
+
 def initial_coordinate(term: Term) -> float:
     """Return the value at the initial position of an angle (principal value) or displacement term."""
     ai, aj = term.i.global_orientation(), term.j.global_orientation()

@@ -39,6 +39,12 @@ class Mechanism(LoadMethods):
         Title used in messages and results.
     gravity : array_like of 3 floats
         Acceleration of gravity, m/s^2.
+
+    Attributes
+    ----------
+    turns : dict of (str, str, str) to float
+        About which angle, in rad, AX, AY and AZ start to count, by function and names of the markers:
+        ``m.turns["AZ", "shaft.I", "shaft.J"] = 4 * np.pi`` winds a torsion spring twice. Default: 0.
     """
 
     def __init__(self, name: str = "mechanism", gravity: Vector = (0.0, 0.0, 0.0)) -> None:
@@ -55,6 +61,7 @@ class Mechanism(LoadMethods):
         self.arrays: dict[Any, tuple[float, ...]] = {}
         self.plants: dict[tuple[str, Any], tuple[Any, ...]] = {}
         self.units = Units()
+        self.turns: dict[tuple[str, str, str], float] = {}
 
     # --- bodies -----------------------------------------------------------------------------------
 

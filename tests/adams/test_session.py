@@ -108,7 +108,6 @@ def test_a_sequence_of_equilibria():
 @pytest.mark.parametrize(
     ("commands", "line", "message"),
     [
-        (("SIM/VELOCITY",), 3, "SIMULATE/VELOCITY is not supported"),
         (("SIM/DYN, END=1, STEPS=2", "LINEAR/NOVECTOR"), 4, "LINEAR without EIGENSOL is not supported"),
         (("MOTION/7, FUNCTION=TIME",), 3, "there is no MOTION/7 to change"),
         (("SIM/DYN, END=1, STEPS=2", "SIM/DYN, END=1, STEPS=2"), 4, "the model is at time 1.0 already"),

@@ -40,6 +40,9 @@ _LEAF_LEVEL = {
 AlgebraicKey = tuple[Hashable, ...]
 """Name of an algebraic unknown, for instance ("joint", 1, 3) or ("diff", 2)."""
 
+AngleKey = tuple[str, int, int]
+"""Name of a counted angle: function and indices of the markers I and J."""
+
 
 class ExpressionError(ValueError):
     """A function expression that cannot be read or evaluated; says where and what to do."""
@@ -67,6 +70,8 @@ class Tape:
         The source.
     integrates : bool
         Whether the value holds an integral over time.
+    angles : tuple
+        Names of the counted angles, in the order of the array of reference angles.
     """
 
     ints: np.ndarray
@@ -78,6 +83,7 @@ class Tape:
     second_order: bool
     text: str = ""
     integrates: bool = False
+    angles: tuple[AngleKey, ...] = ()
 
     @property
     def length(self) -> int:
@@ -132,7 +138,7 @@ class TapeBuilder:
         self._constants: dict[tuple[float, float], int] = {}
         self._spline_at: dict[tuple[SplineData, str], int] = {}
         self._algebraic: dict[AlgebraicKey, int] = {}
-        self._angles = 0
+        self._angles: list[AngleKey] = []
 
     def _emit(self, *instruction: int) -> int:
         key = tuple(instruction)
@@ -250,13 +256,13 @@ class TapeBuilder:
             raise ExpressionError(f"the components {keys} are not stored together")
         return self._emit(op.FORCE, slots[0], 0, 0, k, axis)
 
-    def wound(self, a: int) -> int:
-        """Return the register of an angle continued through full turns."""
+    def wound(self, a: int, key: AngleKey) -> int:
+        """Return the register of an angle continued through full turns; ``key`` goes to ``Tape.angles``."""
         for register, code in enumerate(self._code):
             if code[0] == op.UNWRAP and code[1] == a:
                 return register
-        self._angles += 1
-        return self._emit(op.UNWRAP, a, self._angles - 1)
+        self._angles.append(key)
+        return self._emit(op.UNWRAP, a, len(self._angles) - 1)
 
     def integral(self, a: int, start: float, end: float) -> int:
         """Return the register of the integral of a function of time from ``start`` to t.
@@ -328,6 +334,7 @@ class TapeBuilder:
             second_order=all(c[0] in smooth for c in used if c[0] <= op.LAST_LEAF),
             text=text,
             integrates=any(c[0] == op.INTEGRAL for c in used),
+            angles=tuple(self._angles[a] for a in angle_slot),
         )
 
     def _needed(self, result: int) -> list[int]:
