@@ -104,7 +104,7 @@ def _greedy_rows(dense: np.ndarray, rank: int) -> np.ndarray:
     return np.array(kept, dtype=np.int64)
 
 
-def _least_correction(jacobian: csc_array, weights: np.ndarray, violation: np.ndarray) -> np.ndarray:
+def least_correction(jacobian: csc_array, weights: np.ndarray, violation: np.ndarray) -> np.ndarray:
     """Solve min |x|_W subject to jacobian x = -violation."""
     n = jacobian.shape[1]
     kkt = csc_array(block_array([[diags_array(weights), jacobian.T], [jacobian, None]]))
@@ -140,7 +140,7 @@ def assemble_position(system: System, pose: np.ndarray, t: float) -> tuple[np.nd
             raise AssemblyError("the constraint values are not finite: check the markers' positions for NaN")
         if size <= POSITION_TOLERANCE * max(1.0, length):
             break
-        step = _least_correction(csc_array(jacobian[kept]), weights, phi[kept])
+        step = least_correction(csc_array(jacobian[kept]), weights, phi[kept])
         turn = np.abs(step.reshape(-1, 6)[:, 3:]).max(initial=0.0)
         pose = system.displaced(pose, step * min(1.0, 0.5 / max(turn, 1e-300)))
         jacobian, phi, _ = system.constraint_jacobian(pose, t)
@@ -171,7 +171,7 @@ def consistent_velocity(system: System, pose: np.ndarray, t: float) -> np.ndarra
     jacobian, _, rate = system.constraint_jacobian(pose, t)
     if jacobian.shape[0] == 0:
         return pose
-    step = _least_correction(jacobian, weights, rate)
+    step = least_correction(jacobian, weights, rate)
     pose = pose.copy()
     pose[:, 12:18] += step.reshape(-1, 6)
     return pose

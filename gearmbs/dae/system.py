@@ -30,8 +30,6 @@ from gearmbs.dae.tables import TableBuilder
 from gearmbs.dae.terms import ANGLE, dot3
 
 MAX_LOAD_ITERATIONS = 200
-CONFLICT_SHARE = 1e-5
-"""Rate of a redundant constraint, of the sum of its terms, from which it is not redundant but in conflict."""
 """Of loads that depend on each other, at the start; friction converges like a power of the friction coefficient."""
 
 LARGEST_LOCK = 600
@@ -232,13 +230,9 @@ class System:
         """Whether constraint rows were set aside as redundant."""
         return self._dropped is not None
 
-    def conflict(self, pose: np.ndarray, t: float) -> str | None:
-        """Return which row set aside as redundant contradicts the motion at a pose, or None.
-
-        The rates are compared, which do not depend on counted turns.
-        """
-        if self._dropped is None:
-            return None
+    def dropped_rates(self, pose: np.ndarray, t: float) -> tuple[csc_array, np.ndarray, list[str]]:
+        """Return Phi_q, Phi_q v + Phi_t and the names of the rows set aside as redundant, at a pose."""
+        assert self._dropped is not None
         whole, dropped, names = self._dropped
         builder = self.builder
         kept = (builder.rows, builder.terms, builder.coef, builder.reference)
@@ -247,18 +241,13 @@ class System:
             jacobian, _, rate = self.constraint_jacobian(pose, t)
         finally:
             builder.rows, builder.terms, builder.coef, builder.reference = kept
-        moving = jacobian[dropped] @ pose[:, 12:18].ravel()
-        size = abs(jacobian[dropped]) @ np.abs(pose[:, 12:18]).ravel() + np.abs(rate[dropped] - moving)
-        # a row whose own rate is rounding, as across the plane of a planar linkage, is held against all speeds
-        floor = max(1e-3 * float(np.abs(pose[:, 12:18]).max(initial=0.0)), 1e-9)
-        share = np.abs(rate[dropped]) / np.maximum(size, floor)
-        worst = int(np.argmax(share))
-        if share[worst] <= CONFLICT_SHARE:
-            return None
-        return (
-            f"conflicting constraints: {names[worst]} is implied by the other joints and motions, but they leave it "
-            f"violated at a rate of {abs(rate[dropped][worst]):.3g} per second; remove it or correct its motion"
-        )
+        return csc_array(jacobian[dropped]), rate[dropped], names
+
+    def conflict(self, pose: np.ndarray, t: float) -> str | None:
+        """Return which row set aside as redundant contradicts the motion at a pose, or None."""
+        from gearmbs.dae.conflicts import conflict
+
+        return conflict(self, pose, t) if self.has_dropped_rows else None
 
     def locking(self, pose: np.ndarray, t: float) -> str | None:
         """Return which constraint rows are about to depend on each other at a pose, None when they are not.

@@ -159,6 +159,35 @@ def test_planar_linkages_are_no_conflict():
     assert m.simulate(3.0, tol=1e-8).success
 
 
+@pytest.mark.parametrize(("omega", "rate", "tol"), [(8.0, 400, 1e-6), (30.0, 170, 1e-4), (3.0, 1500, 1e-8)])
+def test_errors_of_the_integrator_are_no_conflict(omega, rate, tol):
+    """A crank-rocker of four parallel hinges: the redundant rows are off by the tolerance, not by a contradiction."""
+    a, b, c, d, start = 0.1, 0.3, 0.25, 0.3, np.pi / 3
+    p = a * np.array([np.cos(start), np.sin(start), 0.0])
+    far = np.array([d, 0.0, 0.0])
+    # the elbow of the coupler b and the rocker c
+    q = np.linalg.norm(far - p)
+    turn = np.arctan2(-p[1], d - p[0]) + np.arccos((q * q + b * b - c * c) / (2 * q * b))
+    elbow = p + b * np.array([np.cos(turn), np.sin(turn), 0.0])
+    m = Mechanism("crank-rocker", gravity=(0, -9.81, 0))
+
+    def bar(name, first, last):
+        x = (last - first) / np.linalg.norm(last - first)
+        axes = np.column_stack([x, np.cross([0, 0, 1], x), [0, 0, 1]])
+        return m.body(name, 1.0, (1e-5, 1e-2, 1e-2), position=(first + last) / 2, orientation=axes)
+
+    crank, coupler, rocker = bar("crank", 0 * p, p), bar("coupler", p, elbow), bar("rocker", far, elbow)
+    where = {"axis": (0, 0, 1)}
+    main = m.revolute("A", crank, m.ground, at=(0, 0, 0), **where)
+    m.revolute("B", coupler, crank, at=p, **where)
+    m.revolute("C", rocker, coupler, at=elbow, **where)
+    m.revolute("D", rocker, m.ground, at=far, **where)
+    m.rotation("motor", main, f"{omega}*TIME", level="displacement")
+    solution = m.simulate(1.5, rate=rate, tol=tol)
+    assert solution.success, solution.message
+    assert "Set aside as redundant" in solution.message
+
+
 def test_conflicting_constraints():
     m = Mechanism("conflict")
     body = m.body("b", 1.0, UNIT)
