@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import signal
@@ -57,7 +58,8 @@ def case_bars(names: list[str]) -> Iterator[Callable[[str, float], None]]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description:>24}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True)) as progress:
+    console = Console(stderr=True)
+    with Progress(*columns, TimeElapsedColumn(), console=console, refresh_per_second=4) as progress:
         tasks = {name: progress.add_task(name, total=1.0) for name in names}
         yield lambda name, fraction: progress.update(tasks[name], completed=fraction)
 
@@ -114,8 +116,10 @@ def main(
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     signal.signal(signal.SIGTERM, _interrupt)
-    # a command makes many objects and drops few: looking for cycles at every 700 of them costs a tenth of its start
+    # a command makes many objects and drops few: looking for cycles at every 700 of them costs a tenth of its start,
+    # looking for them once more at the end, among all modules, half a second
     gc.set_threshold(50_000, 20, 20)
+    atexit.register(gc.freeze)
     if version:
         import gearmbs
 
