@@ -21,9 +21,23 @@ if TYPE_CHECKING:
 
 POSITION_TOLERANCE = 1e-12
 RANK_TOLERANCE = 1e-9
+LEAST = 1e-6
+"""Distance of a constraint row of length 1 from the others above which it is independent."""
+NEARLY = 1e-4
+"""The same where an assembly has stopped short of its end."""
+CONFLICT = 1e-7
+"""Violation of a redundant row, in m or of 1, above which it contradicts the others."""
 MAX_POSITION_ITERATIONS = 50
-DENSE_RANK_LIMIT = 3000
-"""Rows above which only the sparse factorisation looks for redundancy."""
+DENSE_ROWS = 400
+"""Rows up to which redundancy is looked for by a dense factorisation."""
+SURE = 1e-12
+"""Squared distance of a row from the others, all of length 1, above which it is independent beyond rounding."""
+DOUBTFUL = 1e-6
+"""Squared distance of a row from those before it below which it is looked at again."""
+CHUNK = 200
+"""Doubtful rows that are looked at together."""
+SELECTIONS = 3
+"""How often other rows are set aside when those set aside at first turn out to be violated."""
 
 
 @dataclass
@@ -62,10 +76,11 @@ class InitialReport:
         return "\n".join(lines)
 
 
-def independent_rows(jacobian: csc_array, weights: np.ndarray) -> np.ndarray:
+def independent_rows(jacobian: csc_array, weights: np.ndarray, least: float = LEAST) -> np.ndarray:
     """Return the indices of a largest set of independent rows of the constraint Jacobian, in order.
 
-    Earlier rows are preferred, so that a redundancy is blamed on the joint added last.
+    Earlier rows are preferred, so that a redundancy is blamed on the joint added last. ``least`` is the distance of a
+    row of length 1 from those before below which it counts as redundant.
     """
     m = jacobian.shape[0]
     if m == 0:
@@ -74,23 +89,58 @@ def independent_rows(jacobian: csc_array, weights: np.ndarray) -> np.ndarray:
     norms = np.sqrt(np.asarray((scaled.multiply(scaled)).sum(axis=1)).ravel())
     norms[norms == 0.0] = 1.0
     scaled = csc_array(diags_array(1.0 / norms) @ scaled)
-    if m > DENSE_RANK_LIMIT or m > 400:
-        gram = csc_array(scaled @ scaled.T)
-        try:
-            pivots = np.abs(splu(gram, diag_pivot_thresh=0.0, options={"SymmetricMode": True}).U.diagonal())
-            if pivots.min() > RANK_TOLERANCE:
-                return np.arange(m)
-        except RuntimeError:
-            pass
+    if m > DENSE_ROWS:
+        return _sparse_rows(scaled, least)
     dense = scaled.toarray()
     r_diagonal = np.abs(np.diag(qr(dense.T, mode="r", pivoting=True)[0]))
     rank = int(np.sum(r_diagonal > RANK_TOLERANCE * max(1.0, r_diagonal[0])))
-    if rank == m:
+    if rank == m and least <= LEAST:
         return np.arange(m)
-    return _greedy_rows(dense, rank)
+    return _greedy_rows(dense, rank, least)
 
 
-def _greedy_rows(dense: np.ndarray, rank: int) -> np.ndarray:
+def _pivots(gram: csc_array, order: str) -> np.ndarray | None:
+    """Return the pivots of a symmetric factorisation: in the order NATURAL, squared distances to the rows before."""
+    try:
+        factors = splu(gram, permc_spec=order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except RuntimeError:
+        return None
+    return np.abs(factors.U.diagonal())
+
+
+def _sparse_rows(scaled: csc_array, least: float = LEAST) -> np.ndarray:
+    """Independent rows of a large sparse matrix whose rows have length 1, earlier ones preferred."""
+    m = scaled.shape[0]
+    gram = csc_array(scaled @ scaled.T)
+    pivots = _pivots(gram, "MMD_AT_PLUS_A")
+    if pivots is not None and least <= LEAST and pivots.min() > SURE:
+        return np.arange(m)
+    # a little on the diagonal keeps the elimination going past dependent rows
+    pivots = _pivots(csc_array(gram + diags_array(np.full(m, SURE))), "NATURAL")
+    if pivots is None:
+        return _greedy_rows(scaled.toarray(), min(scaled.shape), least)
+    doubtful = np.flatnonzero(pivots < DOUBTFUL)
+    sure = np.setdiff1d(np.arange(m), doubtful)
+    rows = csc_array(scaled[sure])
+    factors = splu(csc_array(rows @ rows.T), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    added: list[int] = []
+    directions = np.zeros((0, scaled.shape[1]))
+    for first in range(0, doubtful.size, CHUNK):
+        part = doubtful[first : first + CHUNK]
+        rest = scaled[part].toarray()
+        for _ in range(2):
+            rest -= (rows.T @ factors.solve(rows @ rest.T)).T
+            rest -= (rest @ directions.T) @ directions
+        for k, row in zip(part, rest):
+            row = row - directions.T @ (directions @ row)
+            size = np.linalg.norm(row)
+            if size > least:
+                added.append(int(k))
+                directions = np.vstack([directions, row / size])
+    return np.sort(np.concatenate([sure, np.array(added, dtype=np.int64)]))
+
+
+def _greedy_rows(dense: np.ndarray, rank: int, least: float = LEAST) -> np.ndarray:
     """Gram-Schmidt through the rows in order, keeping those that add a direction."""
     basis = np.zeros((rank, dense.shape[1]))
     kept: list[int] = []
@@ -98,7 +148,7 @@ def _greedy_rows(dense: np.ndarray, rank: int) -> np.ndarray:
         rest = row - basis[: len(kept)].T @ (basis[: len(kept)] @ row)
         rest -= basis[: len(kept)].T @ (basis[: len(kept)] @ rest)
         size = np.linalg.norm(rest)
-        if size > 1e3 * RANK_TOLERANCE and len(kept) < rank:
+        if size > least and len(kept) < rank:
             basis[len(kept)] = rest / size
             kept.append(i)
     return np.array(kept, dtype=np.int64)
@@ -130,39 +180,63 @@ def assemble_position(system: System, pose: np.ndarray, t: float) -> tuple[np.nd
     jacobian, phi, _ = system.constraint_jacobian(pose, t)
     kept = independent_rows(jacobian, weights)
     report = InitialReport(degrees_of_freedom=jacobian.shape[1] - kept.size)
-    dropped = np.setdiff1d(np.arange(jacobian.shape[0]), kept)
-    report.redundant = [system.row_names[i] for i in dropped]
-    start = pose.copy()
+    start = pose
     length = np.sqrt(weights[3]) if weights.size else 1.0
-    for iteration in range(MAX_POSITION_ITERATIONS):
-        size = np.abs(phi[kept]).max(initial=0.0)
-        if not np.isfinite(size):
-            raise AssemblyError("the constraint values are not finite: check the markers' positions for NaN")
-        if size <= POSITION_TOLERANCE * max(1.0, length):
+    for _ in range(SELECTIONS):
+        pose, jacobian, phi, iterations = _closed(system, pose, t, kept, length)
+        report.position_iterations += iterations
+        dropped = np.setdiff1d(np.arange(jacobian.shape[0]), kept)
+        if not dropped.size or np.abs(phi[dropped]).max() <= CONFLICT * max(1.0, length):
             break
-        step = least_correction(csc_array(jacobian[kept]), weights, phi[kept])
-        turn = np.abs(step.reshape(-1, 6)[:, 3:]).max(initial=0.0)
-        pose = system.displaced(pose, step * min(1.0, 0.5 / max(turn, 1e-300)))
-        jacobian, phi, _ = system.constraint_jacobian(pose, t)
-        report.position_iterations = iteration + 1
+        # rows that are redundant where the assembly began need not be so where it ends
+        others = independent_rows(jacobian, weights, NEARLY)
+        if np.array_equal(others, kept):
+            raise _conflict(system, dropped, phi)
+        kept = others
+        report.degrees_of_freedom = jacobian.shape[1] - kept.size
     else:
-        if size > 1e-9 * max(1.0, length):
-            worst = kept[np.argmax(np.abs(phi[kept]))]
-            raise AssemblyError(
-                f"the mechanism cannot be assembled: after {MAX_POSITION_ITERATIONS} iterations "
-                f"{system.row_names[worst]} is still violated by {abs(phi[worst]):.3g}; "
-                "check the lengths and the markers of that joint"
-            )
-    if dropped.size and np.abs(phi[dropped]).max() > 1e-7 * max(1.0, length):
-        worst = dropped[np.argmax(np.abs(phi[dropped]))]
-        raise AssemblyError(
-            f"conflicting constraints: {system.row_names[worst]} is implied by the other joints but they leave it "
-            f"violated by {abs(phi[worst]):.3g}; correct the markers or remove one of the joints"
-        )
+        raise _conflict(system, dropped, phi)
+    report.redundant = [system.row_names[i] for i in dropped]
     report.violation = float(np.abs(phi).max(initial=0.0))
     report.largest_correction = float(np.abs(pose - start)[:, :12].max(initial=0.0))
     system.keep_rows(kept)
     return pose, report
+
+
+def _closed(
+    system: System, pose: np.ndarray, t: float, kept: np.ndarray, length: float
+) -> tuple[np.ndarray, csc_array, np.ndarray, int]:
+    """Solve the kept rows for the pose nearest; return it with the Jacobian, Phi and the iterations taken."""
+    weights = system.coordinate_weights()
+    jacobian, phi, _ = system.constraint_jacobian(pose, t)
+    size = 0.0
+    for iteration in range(MAX_POSITION_ITERATIONS):
+        size = float(np.abs(phi[kept]).max(initial=0.0))
+        if not np.isfinite(size):
+            raise AssemblyError("the constraint values are not finite: check the markers' positions for NaN")
+        if size <= POSITION_TOLERANCE * max(1.0, length):
+            return pose, jacobian, phi, iteration
+        step = least_correction(csc_array(jacobian[kept]), weights, phi[kept])
+        turn = np.abs(step.reshape(-1, 6)[:, 3:]).max(initial=0.0)
+        pose = system.displaced(pose, step * min(1.0, 0.5 / max(turn, 1e-300)))
+        jacobian, phi, _ = system.constraint_jacobian(pose, t)
+    if size > 1e-9 * max(1.0, length):
+        worst = kept[np.argmax(np.abs(phi[kept]))]
+        raise AssemblyError(
+            f"the mechanism cannot be assembled: after {MAX_POSITION_ITERATIONS} iterations "
+            f"{system.row_names[worst]} is still violated by {abs(phi[worst]):.3g}; "
+            "check the lengths and the markers of that joint"
+        )
+    return pose, jacobian, phi, MAX_POSITION_ITERATIONS
+
+
+def _conflict(system: System, dropped: np.ndarray, phi: np.ndarray) -> AssemblyError:
+    """Say which redundant row contradicts the others most."""
+    worst = dropped[np.argmax(np.abs(phi[dropped]))]
+    return AssemblyError(
+        f"conflicting constraints: {system.row_names[worst]} is implied by the other joints but they leave it "
+        f"violated by {abs(phi[worst]):.3g}; correct the markers or remove one of the joints"
+    )
 
 
 def consistent_velocity(system: System, pose: np.ndarray, t: float) -> np.ndarray:
