@@ -99,11 +99,10 @@ MORE = {
             "FrictionSettings",
             "Solver",
         ],
-        "gearmbs.studies.run": ["record", "transmission_error"],
+        "gearmbs.studies.run": ["record"],
         "gearmbs.studies.store": ["write_dataset", "write_text", "whole_file"],
         "gearmbs.studies.iftomm": EXPORTED,
     },
-    "gearmbs.adams": {"gearmbs.adams.run": ["run_deck"], "gearmbs.adams.result": ["AdamsResult"]},
     "gearmbs.units": {"gearmbs.units": ["to_si"], "gearmbs.compile": ["compile_all"]},
 }
 """Names worth a page that their room does not export; names that do not exist are an error."""

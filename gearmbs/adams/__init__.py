@@ -1,7 +1,22 @@
-"""ADAMS decks in and out: .adm and .acf read, .res, .req and .msg written."""
+"""ADAMS decks in and out: .adm and .acf read and run, .res, .req and .msg written, mechanisms written as .adm."""
 
 from gearmbs.adams.commands import Script, parse_script, read_script
 from gearmbs.adams.deck import Deck, parse_deck, read_deck
 from gearmbs.adams.errors import DeckError, Diagnostic
+from gearmbs.adams.result import AdamsResult
+from gearmbs.adams.run import run_deck
+from gearmbs.adams.write import write_deck
 
-__all__ = ["Deck", "DeckError", "Diagnostic", "Script", "parse_deck", "parse_script", "read_deck", "read_script"]
+__all__ = [
+    "AdamsResult",
+    "Deck",
+    "DeckError",
+    "Diagnostic",
+    "Script",
+    "parse_deck",
+    "parse_script",
+    "read_deck",
+    "read_script",
+    "run_deck",
+    "write_deck",
+]

@@ -24,6 +24,8 @@ JPRIM_KINDS = {
 X_TO_Z = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]).T
 """Columns y, z, x: the old x axis becomes the new z axis."""
 Y_TO_Z = X_TO_Z.T
+SHORTEST = 1e-3
+"""Span over which motions by velocity or acceleration are integrated at least, in units of time."""
 
 
 def add_joint(b: Builder, s: st.Joint) -> None:
@@ -196,6 +198,8 @@ def _displacement(b: Builder, s: st.Motion, text: str, start: tuple[float, float
     if s.level not in ("VELOCITY", "ACCELERATION"):
         return text
     first, last = b.span
+    # an analysis at one time needs no more of the integral than its rate there
+    last = max(last, first + SHORTEST * max(1.0, abs(first)))
     where = s.icdisp if s.icdisp is not None and not b.state else start[0]
     once = f"INTEGRAL({text}, {first!r}, {last!r})"
     if s.level == "VELOCITY":

@@ -12,7 +12,7 @@ from gearmbs.adams import statements as st
 from gearmbs.adams.deck import GRAMMARS, read_statement, resolve_statement, unknown_statement
 from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.grammar import CHOICE, FLAG, ID, INT, REAL, TEXT, ArgumentReader, Grammar, StatementError, arg
-from gearmbs.adams.source import RawStatement, read_file, statements
+from gearmbs.adams.source import CONTINUED, RawStatement, read_file, statements
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
 SIMULATIONS = "DYNAMICS KINEMATICS STATICS TRANSIENT INITIAL_CONDITIONS ACCELERATION DISPLACEMENT VELOCITY"
@@ -26,11 +26,12 @@ DEEPEST = 10
 
 @dataclass(frozen=True)
 class Command:
-    """What all commands have: place in the script."""
+    """What all commands have: place in the script and, as it stands there, text."""
 
     file: str = ""
     line: int = 0
     given: dict[str, int] = field(default_factory=dict, compare=False)
+    text: str = field(default="", compare=False, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -121,6 +122,11 @@ class Script:
 
     def __iter__(self) -> Iterator[Command]:
         return iter(self.commands)
+
+    def output(self, model: str | Path) -> Path:
+        """Return the prefix of the output files: the script's own beside the model, else the model's name."""
+        model = Path(model)
+        return model.parent / self.prefix if self.prefix else model.with_suffix("")
 
     @property
     def unsupported(self) -> list[Diagnostic]:
@@ -240,14 +246,15 @@ def _read(script: Script, raw: RawStatement, errors: list[Diagnostic]) -> Comman
 
 def _typed(name: str, match: re.Match[str], raw: RawStatement, script: Script) -> Command:
     file, line = script.file, raw.line
+    text = " ".join(raw.text.replace(CONTINUED, ",").split())
     if name == "STOP":
-        return Stop(file, line)
+        return Stop(file, line, text=text)
     number = int(match.group(3)) if match.group(3) else 0
     if name in st.STATEMENTS:
         statement = read_statement(name, number, raw, match.end(), script.file)
         if not statement.given:
             raise StatementError("no argument is given")
-        return Change(file, line, statement.given, statement=statement)
+        return Change(file, line, statement.given, statement=statement, text=text)
     if match.group(2) is None:
         raise StatementError(f"a slash is missing; write {name}/")
     if number:
@@ -257,7 +264,7 @@ def _typed(name: str, match: re.Match[str], raw: RawStatement, script: Script) -
     values = reader.read()
     if name == "DEACTIVATE":
         values["on"] = False
-    command = cls(file, line, reader.lines, **values)
+    command = cls(file, line, reader.lines, text=text, **values)
     _check(command)
     return command
 

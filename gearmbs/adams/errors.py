@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gearmbs.adams.result import AdamsResult
 
 ERROR = "error"
 UNSUPPORTED = "unsupported"
@@ -25,6 +29,7 @@ class Diagnostic:
         here, such as graphics) or "warning".
     message : str
     file : str
+        "" for what stands in no file.
     line : int
         Counted from 1; 0 for the whole file.
     """
@@ -35,7 +40,8 @@ class Diagnostic:
     line: int
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}: {self.severity}: {self.message}"
+        place = f"{self.file}:{self.line}: " if self.line else f"{self.file}: " if self.file else ""
+        return f"{place}{self.severity}: {self.message}"
 
 
 class DeckError(ValueError):
@@ -45,7 +51,11 @@ class DeckError(ValueError):
     ----------
     diagnostics : tuple of Diagnostic
         Every place that is wrong.
+    result : AdamsResult or None
+        The analyses of a script that were carried out before, when it was being run.
     """
+
+    result: AdamsResult | None = None
 
     def __init__(self, diagnostics: Sequence[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)

@@ -12,7 +12,7 @@ import numpy as np
 
 from gearmbs.adams import statements as st
 from gearmbs.adams.build import KINDS
-from gearmbs.adams.result import PART_COLUMNS, PART_DIMENSIONS
+from gearmbs.adams.result import FORCE_COLUMNS, PART_COLUMNS, PART_DIMENSIONS
 
 if TYPE_CHECKING:
     from gearmbs.adams.result import AdamsResult
@@ -48,33 +48,18 @@ def _entities(result: AdamsResult) -> Iterator[_Entity]:
         units = tuple(result.unit(d) for d in PART_DIMENSIONS)
         yield _Entity(attributes, PART_COLUMNS, units, result.part(number))
     wrench_units = (result.unit("force"),) * 3 + (result.unit("torque"),) * 3
-    scale = np.array([deck.units.factor("force")] * 3 + [deck.units.factor("torque")] * 3)
     kinds = {kind: cls for cls, kind in KINDS.items()}
-    for kind, number in dict.fromkeys(key for s in result.segments for key in s.wrenches):
+    for kind, number in result.elements:
         name = deck.of(kinds[kind])[number].name or f"{kind.upper()}_{number}"
         attributes = (
             f'name={quoteattr(name)} entity={quoteattr(name)} entType="{ENTITY_TYPES[kind]}" objectId="{number}"'
         )
-        rows = [s.wrenches.get((kind, number), np.zeros((s.solution.t.size, 6))) for s in result.segments]
-        yield _Entity(attributes, ("FX", "FY", "FZ", "TX", "TY", "TZ"), wrench_units, np.concatenate(rows) / scale)
+        yield _Entity(attributes, FORCE_COLUMNS, wrench_units, result.force(kind, number))
     for number, request in deck.of(st.Request).items():
         name = request.results_name or request.name or f"REQUEST_{number}"
         names = result.segments[0].requests[number].names if result.segments else ()
         attributes = f'name={quoteattr(name)} entity={quoteattr(name)} entType="Request" objectId="{number}"'
-        yield _Entity(attributes, names, _request_units(result, request), result.request(number))
-
-
-def _request_units(result: AdamsResult, request: st.Request) -> tuple[str, ...]:
-    if request.type is None:
-        given = request.cunits
-        return tuple(given[k] if k < len(given) and given[k] else "no_units" for k in range(8))
-    first, second = {
-        "DISPLACEMENT": ("length", "angle"),
-        "VELOCITY": ("velocity", "angular_velocity"),
-        "ACCELERATION": ("acceleration", "angular_acceleration"),
-        "FORCE": ("force", "torque"),
-    }[request.type]
-    return (result.unit(first),) * 4 + (result.unit(second),) * 4
+        yield _Entity(attributes, names, result.request_units(number), result.request(number))
 
 
 def _package_version() -> str:

@@ -10,16 +10,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.adams import statements as st
+from gearmbs.adams.assembly import Assembly
 from gearmbs.adams.build import AdamsModel
-from gearmbs.adams.commands import Script, Simulate
+from gearmbs.adams.commands import Command, Script, Simulate
 from gearmbs.adams.deck import Deck
+from gearmbs.adams.errors import Diagnostic
 from gearmbs.adams.requests import RequestSeries
 from gearmbs.adams.units import RESULT_NAMES, unit_names
 from gearmbs.dae.modes import Modes
 from gearmbs.dae.solution import Solution
+from gearmbs.dae.statics import StaticResult
 
 if TYPE_CHECKING:
     import xarray as xr
+
+NEWTON = "Newton"
+"""What solves analyses in which nothing is integrated."""
 
 
 @dataclass
@@ -36,6 +42,10 @@ class Segment:
     options : dict
         What the integrator was given.
     note : str or None
+    equilibrium : StaticResult or None
+        Of a single static analysis.
+    assembly : Assembly or None
+        How far the parts were moved at the start; None for statics, which moves them anyway.
     requests : dict of int to RequestSeries
         Values in the deck's units.
     wrenches : dict
@@ -50,6 +60,8 @@ class Segment:
     note: str | None = None
     requests: dict[int, RequestSeries] = field(default_factory=dict)
     wrenches: dict[tuple[str, int], np.ndarray] = field(default_factory=dict)
+    equilibrium: StaticResult | None = None
+    assembly: Assembly | None = None
 
     @property
     def success(self) -> bool:
@@ -65,30 +77,50 @@ class AdamsResult:
     ----------
     deck : Deck
     script : Script
-    segments : list of Segment
-    modes : list of Modes
-        Of each LINEAR/EIGENSOL, in rad/s and Hz.
+    log : list of (Command, Segment or Modes or None)
+        The commands that were carried out, with what they gave.
+    errors : list of Diagnostic
+        What ended the script.
     """
 
     deck: Deck
     script: Script
-    segments: list[Segment] = field(default_factory=list)
-    modes: list[Modes] = field(default_factory=list)
+    log: list[tuple[Command, Segment | Modes | None]] = field(default_factory=list)
+    errors: list[Diagnostic] = field(default_factory=list)
+
+    @property
+    def segments(self) -> list[Segment]:
+        """The analyses by SIMULATE, in order."""
+        return [outcome for _, outcome in self.log if isinstance(outcome, Segment)]
+
+    @property
+    def modes(self) -> list[Modes]:
+        """What each LINEAR/EIGENSOL gave, in rad/s and Hz."""
+        return [outcome for _, outcome in self.log if isinstance(outcome, Modes)]
 
     @property
     def success(self) -> bool:
-        """True when every analysis reached its end."""
-        return all(s.success for s in self.segments)
+        """True when the script was carried out and every analysis reached its end."""
+        return not self.errors and all(s.success for s in self.segments)
 
     @property
     def messages(self) -> list[str]:
         """What was left out, ignored or went wrong, one sentence each."""
         found = [str(d) for d in (*self.deck.diagnostics, *self.script.diagnostics)]
         for segment in self.segments:
-            if segment.note:
-                found.append(segment.note)
+            found.extend(self.remarks(segment))
             if not segment.success:
                 found.append(segment.solution.message)
+        return found + [str(d) for d in self.errors]
+
+    def remarks(self, segment: Segment) -> list[str]:
+        """Return what is to be said about an analysis: settings, parts that were moved, an equilibrium that is none."""
+        found = [segment.note] if segment.note else []
+        time = float(segment.solution.t[0] / self.deck.units.time)
+        if segment.assembly is not None and segment.assembly.far:
+            found.append(segment.assembly.remark(time, self.unit("length")))
+        if segment.equilibrium is not None and segment.equilibrium.stable is False:
+            found.append(f"the equilibrium at TIME = {time:g} is unstable: the parts leave it when they are touched")
         return found
 
     @cached_property
@@ -115,7 +147,42 @@ class AdamsResult:
 
         Columns: X Y Z PSI THETA PHI VX VY VZ WX WY WZ ACCX ACCY ACCZ WDX WDY WDZ.
         """
-        return np.concatenate([part_motion(s, number) for s in self.segments])
+        return np.concatenate([part_motion(s, number) for s in self.segments] or [np.zeros((0, 18))])
+
+    def force(self, kind: str, number: int) -> np.ndarray:
+        """Return what an element exerts on the part of its I marker, shape (m, 6), deck units.
+
+        Columns: FX FY FZ TX TY TZ, global components, the torque about the I marker; zero while it is inactive.
+
+        Parameters
+        ----------
+        kind : str
+            Such as "joint", "motion", "sforce", "bushing".
+        number : int
+        """
+        units = self.deck.units
+        scale = np.array([units.factor("force")] * 3 + [units.factor("torque")] * 3)
+        rows = [s.wrenches.get((kind, number), np.zeros((s.solution.t.size, 6))) for s in self.segments]
+        return np.concatenate(rows or [np.zeros((0, 6))]) / scale
+
+    @property
+    def elements(self) -> list[tuple[str, int]]:
+        """Kind and id of everything whose force is known."""
+        return list(dict.fromkeys(key for s in self.segments for key in s.wrenches))
+
+    def request_units(self, number: int) -> tuple[str, ...]:
+        """Return the units of the eight columns of REQUEST/number: CUNITS, or those of the quantities."""
+        request = self.deck.of(st.Request)[number]
+        if request.type is None:
+            given = request.cunits
+            return tuple(given[k] if k < len(given) and given[k] else "no_units" for k in range(8))
+        first, second = {
+            "DISPLACEMENT": ("length", "angle"),
+            "VELOCITY": ("velocity", "angular_velocity"),
+            "ACCELERATION": ("acceleration", "angular_acceleration"),
+            "FORCE": ("force", "torque"),
+        }[request.type]
+        return (self.unit(first),) * 4 + (self.unit(second),) * 4
 
     def unit(self, dimension: str) -> str:
         """Return how result files spell the unit of a dimension."""
@@ -136,29 +203,40 @@ class AdamsResult:
         }.get(dimension, "no_units")
 
     def to_dataset(self) -> xr.Dataset:
-        """Return requests and parts as an :class:`xarray.Dataset`, deck units in the attributes."""
+        """Return requests, parts and forces as an :class:`xarray.Dataset` in the deck's units.
+
+        The columns of ``part_2`` (X, Y, ...), ``joint_1`` (FX, FY, ...) and ``request_3`` stand along dimensions with
+        their names; coordinates such as ``part_unit`` hold their units: ``data.part_2.sel(part_column="X")``.
+        """
         import xarray as xr
 
         data: dict[str, Any] = {}
-        for number, request in self.deck.of(st.Request).items():
-            series = self.segments[0].requests[number] if self.segments else None
-            attributes = {
-                "long_name": request.comment or request.name or request.label(),
-                "columns": " ".join(series.names) if series else "",
-            }
-            data[f"request_{number}"] = (("time", "column"), self.request(number), attributes)
-        for number, part in self.deck.of(st.Part).items():
-            if not part.ground and self.segments:
-                attributes = {"long_name": part.name or part.label(), "columns": " ".join(PART_COLUMNS)}
-                data[f"part_{number}"] = (("time", "state"), self.part(number), attributes)
-        coords = {"time": ("time", self.t, {"units": self.unit("time")})}
+        coords: dict[str, Any] = {"time": ("time", self.t, {"units": self.unit("time")})}
+
+        def columns(dimension: str, names: tuple[str, ...], units: tuple[str, ...]) -> tuple[str, str]:
+            coords[f"{dimension}_column"] = (f"{dimension}_column", np.array(names, dtype=object))
+            coords[f"{dimension}_unit"] = (f"{dimension}_column", np.array(units, dtype=object))
+            return ("time", f"{dimension}_column")
+
+        for number, request in self.deck.of(st.Request).items() if self.segments else ():
+            names = self.segments[0].requests[number].names
+            along = columns(f"request_{number}", unique(names), self.request_units(number))
+            title = request.comment or request.name or request.label()
+            data[f"request_{number}"] = (along, self.request(number), {"long_name": title})
+        for number, part in self.deck.of(st.Part).items() if self.segments else ():
+            if not part.ground:
+                along = columns("part", PART_COLUMNS, tuple(self.unit(d) for d in PART_DIMENSIONS))
+                data[f"part_{number}"] = (along, self.part(number), {"long_name": part.name or part.label()})
+        for kind, number in self.elements:
+            along = columns("force", FORCE_COLUMNS, (self.unit("force"),) * 3 + (self.unit("torque"),) * 3)
+            data[f"{kind}_{number}"] = (along, self.force(kind, number), {"long_name": f"{kind.upper()}/{number}"})
         out = xr.Dataset(data, coords=coords)
         out.attrs["title"] = self.deck.title
         out.attrs["units"] = ", ".join(f"{d}: {self.unit(d)}" for d in ("length", "mass", "time", "force", "angle"))
         return out
 
     def write(self, prefix: str | Path) -> list[Path]:
-        """Write .req, .res, .msg and .nc files.
+        """Write .req, .res, .msg and .nc files; the message file alone when no analysis was carried out.
 
         Parameters
         ----------
@@ -175,14 +253,16 @@ class AdamsResult:
 
         prefix = Path(prefix)
         prefix.parent.mkdir(parents=True, exist_ok=True)
-        files = []
-        for suffix, text in ((".req", request_text(self)), (".res", results_text(self)), (".msg", message_text(self))):
-            path = prefix.with_name(prefix.name + suffix)
+        texts = {".msg": message_text(self)}
+        if self.segments:
+            texts |= {".req": request_text(self), ".res": results_text(self)}
+        files = [prefix.with_name(prefix.name + suffix) for suffix in texts]
+        for path, text in zip(files, texts.values()):
             path.write_text(text, encoding="utf-8", newline="\n")
-            files.append(path)
-        path = prefix.with_name(prefix.name + ".nc")
-        self.to_dataset().to_netcdf(path, engine="h5netcdf")
-        return [*files, path]
+        if self.segments:
+            files.append(prefix.with_name(prefix.name + ".nc"))
+            self.to_dataset().to_netcdf(files[-1], engine="h5netcdf")
+        return files
 
     def __repr__(self) -> str:
         span = f"{self.t[0]:g} to {self.t[-1]:g}" if self.t.size else "nothing simulated"
@@ -198,6 +278,19 @@ PART_DIMENSIONS = (
     + ("acceleration",) * 3
     + ("angular_acceleration",) * 3
 )
+FORCE_COLUMNS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
+
+
+def unique(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return names of columns in which none stands twice: a second A becomes A_2."""
+    found: list[str] = []
+    for name in names:
+        other, n = name, 1
+        while other in found:
+            n += 1
+            other = f"{name}_{n}"
+        found.append(other)
+    return tuple(found)
 
 
 def part_motion(segment: Segment, number: int) -> np.ndarray:

@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gearmbs.adams import statements as st
+from gearmbs.adams.assembly import assembly_of
 from gearmbs.adams.build import AdamsModel, BodyState, build_model
-from gearmbs.adams.check import UNSUPPORTED_ARGUMENTS, check
-from gearmbs.adams.commands import Change, Linear, Script, Simulate, Stop, Switch, apply_change, read_script
+from gearmbs.adams.commands import Change, Command, Linear, Script, Simulate, Stop, Switch, read_script
 from gearmbs.adams.deck import Deck, read_deck
-from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
+from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
+from gearmbs.adams.rehearse import check_linear, is_sequence, rehearse
 from gearmbs.adams.requests import RequestEvaluator
-from gearmbs.adams.result import AdamsResult, Segment
+from gearmbs.adams.result import NEWTON, AdamsResult, Segment
+from gearmbs.adams.session import Session, change, output_times, switch
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.expressions import ExpressionError
 from gearmbs.dae.kinematic import kinematic
 from gearmbs.dae.modes import Modes
 from gearmbs.dae.sequence import initial_conditions
 from gearmbs.dae.solution import Solution
+from gearmbs.dae.statics import StaticResult
 from gearmbs.dae.tables import STATE_ALGEBRAIC
 from gearmbs.mechanism.analyses import linear_modes, quasi_static, static_equilibrium
 from gearmbs.mechanism.functions import polynomial
@@ -37,18 +39,6 @@ STATIC_TOLERANCE = 1e-10
 """Unbalanced load allowed at an equilibrium, relative to the heaviest weight or largest load."""
 
 METHODS = {"GSTIFF": "GSTIFF", "WSTIFF": "WSTIFF", "SI2_GSTIFF": "GSTIFF"}
-
-
-@dataclass
-class _Session:
-    """What changes while a script is carried out."""
-
-    deck: Deck
-    inactive: set[tuple[str, int]] = field(default_factory=set)
-    state: dict[int, BodyState] | None = None
-    states: dict[int, float] = field(default_factory=dict)
-    turns: dict[tuple[str, str, str], float] = field(default_factory=dict)
-    time: float = 0.0
 
 
 def run_deck(
@@ -92,31 +82,61 @@ def run_deck(
     Raises
     ------
     DeckError
-        Naming file and line of what is wrong or not supported.
+        Naming file and line of what is wrong or not supported. Most of it is found before anything is run; what only
+        a run can tell (a position without equilibrium, for instance) comes with the ``result`` of the commands before,
+        whose files are written.
     """
     deck = adm if isinstance(adm, Deck) else read_deck(adm)
     script = _script(acf, end, steps, dtout)
     if script.unsupported and not allow_unsupported:
         raise DeckError(script.unsupported)
     result = AdamsResult(deck, script)
-    session = _Session(replace(deck, items={k: dict(v) for k, v in deck.items.items()}))
-    for command in script:
-        if isinstance(command, Stop):
-            break
-        if isinstance(command, Change):
-            _change(session, command, allow_unsupported)
-        elif isinstance(command, Switch):
-            _switch(session, command)
-        elif isinstance(command, Linear):
-            result.modes.append(_linear(session, command, allow_unsupported))
-        elif isinstance(command, Simulate):
-            segment = _simulate(session, command, tol, allow_unsupported, progress)
-            result.segments.append(segment)
-            if not segment.success:
+    session = Session.of(deck)
+    command = Command(script.file)
+    try:
+        rehearse(deck, script, allow_unsupported)
+        for command in script:
+            if isinstance(command, Stop):
                 break
-    if out is not None:
-        result.write(out)
+            if not _carry_out(command, session, result, tol, allow_unsupported, progress):
+                break
+    except DeckError as error:
+        result.errors.extend(error.diagnostics)
+        error.result = result
+        raise
+    except BaseException as error:
+        message = str(error) or type(error).__name__
+        result.errors.append(Diagnostic(ERROR, message, command.file, command.line))
+        raise
+    finally:
+        # whatever ends a script, what it has computed is kept
+        if out is not None:
+            result.write(out)
     return result
+
+
+def _carry_out(
+    command: Command,
+    session: Session,
+    result: AdamsResult,
+    tol: float | None,
+    allow_unsupported: bool,
+    progress: bool | Callable[[float], None],
+) -> bool:
+    """Carry out one command of a script; return whether the next may follow."""
+    result.log.append((command, None))
+    if isinstance(command, Change):
+        change(session, command, allow_unsupported)
+    elif isinstance(command, Switch):
+        switch(session, command)
+    elif isinstance(command, Linear):
+        modes = _linear(session, command, allow_unsupported)
+        result.log[-1] = (command, modes)
+    elif isinstance(command, Simulate):
+        segment = _simulate(session, command, tol, allow_unsupported, progress)
+        result.log[-1] = (command, segment)
+        return segment.success
+    return True
 
 
 def _script(acf: str | Path | Script | None, end: float | None, steps: int | None, dtout: float | None) -> Script:
@@ -125,83 +145,17 @@ def _script(acf: str | Path | Script | None, end: float | None, steps: int | Non
     if acf is not None:
         return read_script(acf)
     if end is None:
-        message = "there is no script and no end time; give an .acf file, or end (and steps or dtout)"
-        raise DeckError([Diagnostic(ERROR, message, "<run>", 0)])
+        message = "there is no script and no end time; give an .acf file, or end= and steps= (or dtout=)"
+        raise DeckError([Diagnostic(ERROR, message, "", 0)])
     if not end > 0.0 or (dtout is not None and not dtout > 0.0) or (steps is not None and steps < 1):
         message = f"end = {end}, steps = {steps}, dtout = {dtout}; they must be positive"
-        raise DeckError([Diagnostic(ERROR, message, "<run>", 0)])
+        raise DeckError([Diagnostic(ERROR, message, "", 0)])
     if steps is None and dtout is None:
         steps = 100
     return Script(commands=[Simulate(kind="DYNAMICS", end=end, steps=steps, dtout=dtout)])
 
 
-def _unsupported(command: Any, message: str) -> DeckError:
-    return DeckError([Diagnostic(UNSUPPORTED, message, command.file, command.line)])
-
-
-def _switch(session: _Session, command: Switch) -> None:
-    """Activate or deactivate an element."""
-    keyword, number = command.element or "", command.id or 0
-    if number not in session.deck.of(st.STATEMENTS[keyword]):
-        label = f"{keyword}/{number}" if number else keyword
-        raise DeckError([Diagnostic(ERROR, f"there is no {label} in the deck", command.file, command.line)])
-    (session.inactive.discard if command.on else session.inactive.add)((keyword, number))
-
-
-AT_START: dict[type, frozenset[str]] = {
-    st.Part: frozenset("qg reuler zg xg vx vy vz wx wy wz vm wm exact".split()),
-    st.Joint: frozenset(["ic", "ictran", "icrot"]),
-    st.Motion: frozenset(["icdisp", "icvel"]),
-    st.Diff: frozenset(["ic"]),
-}
-"""Arguments that say how the first analysis starts."""
-
-
-def _change(session: _Session, command: Change, allow_unsupported: bool) -> None:
-    """Put a command's arguments into the session's deck, which must hold together with them."""
-    change = command.statement
-    assert change is not None
-    late = AT_START.get(type(change), frozenset()) & set(change.given)
-    if late and session.state is not None and not allow_unsupported:
-        what = ", ".join(sorted(name.upper() for name in late))
-        raise _unsupported(
-            command,
-            f"{change.label()}: {what} after the first analysis; the mechanism goes on from where it is",
-        )
-    group = session.deck.items.setdefault(type(change), {})
-    old = group.get(change.id)
-    if old is None:
-        if change.id:
-            message = f"there is no {change.label()} to change"
-            raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
-        group[0] = change
-    else:
-        group[change.id] = apply_change(old, change)
-    session.deck.__dict__.pop("units", None)
-    trial = replace(session.deck, diagnostics=[])
-    wrong = check(trial)
-    refused = [n for n in UNSUPPORTED_ARGUMENTS.get(type(change), ()) if n in change.given]
-    if refused and not allow_unsupported:
-        raise _unsupported(command, f"{change.label()}: {', '.join(refused).upper()} is not supported")
-    if wrong:
-        raise DeckError([Diagnostic(d.severity, d.message, command.file, command.line) for d in wrong])
-
-
-def _times(session: _Session, command: Simulate) -> np.ndarray:
-    """Return the output times in the deck's unit."""
-    end = command.end if command.end is not None else session.time + (command.duration or 0.0)
-    if not end > session.time:
-        message = f"END = {end}, but the model is at time {session.time} already"
-        raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
-    span = end - session.time
-    if command.dtout is None:
-        return session.time + span * np.arange((command.steps or 100) + 1) / (command.steps or 100)
-    count = int(np.floor(span / command.dtout * (1.0 + 1e-12) + 1e-9))
-    times = session.time + command.dtout * np.arange(count + 1)
-    return times if end - times[-1] < 1e-9 * command.dtout else np.append(times, end)
-
-
-def _settings(session: _Session, tol: float | None) -> tuple[dict[str, Any], str | None]:
+def _settings(session: Session, tol: float | None) -> tuple[dict[str, Any], str | None]:
     """Return the integrator options and a remark when the method is another than asked for."""
     integrator = session.deck.only(st.Integrator) or st.Integrator()
     options: dict[str, Any] = {
@@ -239,7 +193,7 @@ def _settings(session: _Session, tol: float | None) -> tuple[dict[str, Any], str
 
 
 def _simulate(
-    session: _Session,
+    session: Session,
     command: Simulate,
     tol: float | None,
     allow_unsupported: bool,
@@ -250,17 +204,18 @@ def _simulate(
     if kind in ("DISPLACEMENT", "VELOCITY", "ACCELERATION"):
         # parts of the analysis of initial conditions, which is always done to the end
         kind = "INITIAL_CONDITIONS"
-    sequence = kind not in ("STATICS", "INITIAL_CONDITIONS") or command.end is not None or command.duration is not None
-    times = _times(session, command) if sequence else np.array([session.time])
+    times = output_times(session, command) if is_sequence(command) else np.array([session.time])
     model = None
     try:
         model = _model(session, allow_unsupported, (session.time, float(times[-1])))
         options, note = _settings(session, tol)
-        solution = _solve(session, command, kind, model, times, options, progress)
+        solution, equilibrium = _solve(session, command, kind, model, times, options, progress)
     except (ModelError, ArithmeticError) as error:
         raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, _line(model, str(error)))]) from error
     evaluator = RequestEvaluator(model, solution)
-    segment = Segment(command, kind, model, solution, options, note)
+    segment = Segment(command, kind, model, solution, options, note, equilibrium=equilibrium)
+    if kind != "STATICS":
+        segment.assembly = assembly_of(model, solution)
     for request in session.deck.of(st.Request).values():
         try:
             segment.requests[request.id] = evaluator.request(request)
@@ -273,24 +228,27 @@ def _simulate(
 
 
 def _solve(
-    session: _Session,
+    session: Session,
     command: Simulate,
     kind: str,
     model: AdamsModel,
     times: np.ndarray,
     options: dict[str, Any],
     progress: bool | Callable[[float], None],
-) -> Solution:
-    """Solve one analysis at the output times, given in the deck's unit."""
+) -> tuple[Solution, StaticResult | None]:
+    """Solve one analysis at the output times, given in the deck's unit; of a single equilibrium return it, too."""
     scale = session.deck.units.time
     times = times * scale
+    options_without = {"integrator": NEWTON, "formulation": "I3"}
     if kind == "INITIAL_CONDITIONS":
-        return initial_conditions(model.mechanism.compile(float(times[0])))
+        options.update(options_without)
+        return initial_conditions(model.mechanism.compile(float(times[0]))), None
     if kind == "STATICS":
-        options.update(integrator="Newton", formulation="I3", tol=STATIC_TOLERANCE)
+        options.update(options_without, tol=STATIC_TOLERANCE)
         if times.size > 1:
-            return quasi_static(model.mechanism, times, tol=STATIC_TOLERANCE)
-        return static_equilibrium(model.mechanism, t=float(times[0]), tol=STATIC_TOLERANCE).solution
+            return quasi_static(model.mechanism, times, tol=STATIC_TOLERANCE), None
+        equilibrium = static_equilibrium(model.mechanism, t=float(times[0]), tol=STATIC_TOLERANCE)
+        return equilibrium.solution, equilibrium
     if kind == "KINEMATICS":
         system = model.mechanism.compile(float(times[0]))
         report = system.initialise()
@@ -298,19 +256,20 @@ def _solve(
             message = f"a kinematic analysis needs zero degrees of freedom; the model has {report.degrees_of_freedom}"
             raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
         if all(k == STATE_ALGEBRAIC for k, _ in system.builder.states):
-            return kinematic(system, times)
+            options.update(options_without)
+            return kinematic(system, times), None
     output_step = float(times[1] - times[0])
     options.setdefault("first_step", FIRST_STEP * output_step)
     options.setdefault("max_step", output_step)
-    return model.mechanism.simulate(
+    solution = model.mechanism.simulate(
         float(times[-1]), t_start=session.time * scale, t_eval=times, progress=progress, **options
     )
+    return solution, None
 
 
-def _linear(session: _Session, command: Linear, allow_unsupported: bool) -> Modes:
+def _linear(session: Session, command: Linear, allow_unsupported: bool) -> Modes:
     """Carry out LINEAR/EIGENSOL at the present position."""
-    if not command.eigensol:
-        raise _unsupported(command, "LINEAR without EIGENSOL is not supported")
+    check_linear(command)
     model = None
     try:
         model = _model(session, allow_unsupported, (session.time, session.time))
@@ -326,7 +285,7 @@ def _line(model: AdamsModel | None, message: str) -> int:
     return min(named, default=0)
 
 
-def _model(session: _Session, allow_unsupported: bool, span: tuple[float, float]) -> AdamsModel:
+def _model(session: Session, allow_unsupported: bool, span: tuple[float, float]) -> AdamsModel:
     """Build the mechanism of the session's present state."""
     inactive = frozenset(session.inactive)
     if session.state is None:
@@ -372,7 +331,7 @@ def _states(model: AdamsModel, pose: np.ndarray) -> dict[int, BodyState]:
     return found
 
 
-def _remember(session: _Session, model: AdamsModel, segment: Segment, evaluator: RequestEvaluator) -> None:
+def _remember(session: Session, model: AdamsModel, segment: Segment, evaluator: RequestEvaluator) -> None:
     """Keep the final state as the start of the next analysis."""
     s = segment.solution
     names = s.system.body_names
