@@ -100,8 +100,13 @@ class AdamsModel:
 
 
 def build(deck: Deck, allow_unsupported: bool = False, inactive: frozenset[tuple[str, int]] = frozenset()) -> Mechanism:
-    """Return the mechanism a deck describes; see :func:`build_model`."""
-    return build_model(deck, allow_unsupported, inactive).mechanism
+    """Return the mechanism a deck describes, its joints with the initial conditions given; see :func:`build_model`."""
+    from gearmbs.adams.start import with_initial_motions
+
+    model = build_model(deck, allow_unsupported, inactive)
+    if model.initial_motions:
+        model = build_model(deck, allow_unsupported, inactive, with_initial_motions(model))
+    return model.mechanism
 
 
 def build_model(

@@ -10,7 +10,7 @@ import numpy as np
 from gearmbs.adams import statements as st
 from gearmbs.adams.build import Builder
 from gearmbs.mechanism.functions import expression
-from gearmbs.mechanism.joints import Joint
+from gearmbs.mechanism.joints import Joint, Prescribed
 from gearmbs.mechanism.parts import Marker
 
 JOINT_KINDS = {
@@ -168,11 +168,14 @@ def add_motion(b: Builder, s: st.Motion) -> None:
     rotational = joint.kind == "revolute" or (joint.kind == "cylindrical" and s.direction == "ROTATIONAL")
     if joint.kind == "cylindrical" and s.direction is None:
         raise ValueError("give ROTATION or TRANSLATION for a motion of a cylindrical joint")
-    text = _displacement(b, s, text, _start(b, joint.i, joint.j, 2, rotational))
+    start = _start(b, joint.i, joint.j, 2, rotational)
+    moved = _displacement(b, s, text, start)
     if rotational:
-        b.mechanism.rotation(name, joint, expression(text))
+        motion = b.mechanism.rotation(name, joint, expression(moved))
     else:
-        b.mechanism.translation(name, joint, expression(_scaled(text, b.units.length)))
+        motion = b.mechanism.translation(name, joint, expression(_scaled(moved, b.units.length)))
+    if s.level in ("VELOCITY", "ACCELERATION"):
+        motion.prescribed = _given(b, s, text, start, rotational)
 
 
 def _start(b: Builder, i: Marker, j: Marker, axis: int, rotational: bool) -> tuple[float, float]:
@@ -200,14 +203,29 @@ def _displacement(b: Builder, s: st.Motion, text: str, start: tuple[float, float
     first, last = b.span
     # an analysis at one time needs no more of the integral than its rate there
     last = max(last, first + SHORTEST * max(1.0, abs(first)))
-    where = s.icdisp if s.icdisp is not None and not b.state else start[0]
+    where, speed = _at_start(b, s, start)
     once = f"INTEGRAL({text}, {first!r}, {last!r})"
     if s.level == "VELOCITY":
         return f"({where!r}) + {once}"
-    speed = s.icvel if s.icvel is not None and not b.state else start[1]
     # the second integral of f is (t - t0) int f - int (t - t0) f
     since = f"(TIME - ({first!r}))"
     return f"({where!r}) + ({speed!r})*{since} + {since}*{once} - INTEGRAL({since}*({text}), {first!r}, {last!r})"
+
+
+def _at_start(b: Builder, s: st.Motion, start: tuple[float, float]) -> tuple[float, float]:
+    """Return displacement and rate a motion by velocity or acceleration starts with, in the deck's units."""
+    where = s.icdisp if s.icdisp is not None and not b.state else start[0]
+    speed = s.icvel if s.icvel is not None and not b.state else start[1]
+    return where, speed
+
+
+def _given(b: Builder, s: st.Motion, text: str, start: tuple[float, float], rotational: bool) -> Prescribed:
+    """Return what a motion is given by, in SI."""
+    level = (s.level or "").lower()
+    dimensions = ("angle", "angular_velocity", f"angular_{level}") if rotational else ("length", "velocity", level)
+    size, rate, change = (b.units.factor(d) for d in dimensions)
+    where, speed = _at_start(b, s, start)
+    return Prescribed(level, expression(_scaled(text, change)), where * size, speed * rate)
 
 
 def _scaled(text: str, factor: float) -> str:

@@ -142,6 +142,8 @@ def add_friction(b: Builder, s: st.Friction) -> None:
         overlap=s.overlap,
         overlap_change=s.overlap_delta.lower(),
         yoke=s.yoke[0].lower(),
+        max_force=s.max_force,
+        max_torque=s.max_torque,
     )
 
 

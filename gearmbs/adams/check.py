@@ -42,7 +42,6 @@ UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
     st.Marker: ("flex_body", "point_mass", "node_id", "curve"),
     st.Joint: ("delta_v", "max_friction", "mu_dyn_rot", "mu_dyn_trans", "mu_stat_rot", "mu_stat_trans"),
     st.Coupler: ("function",),
-    st.Friction: ("max_force", "max_torque"),
     st.Field: ("function",),
     st.Spline: ("data_file",),
     st.Request: ("function",),

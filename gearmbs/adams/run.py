@@ -10,7 +10,7 @@ import numpy as np
 
 from gearmbs.adams import statements as st
 from gearmbs.adams.assembly import assembly_of
-from gearmbs.adams.build import AdamsModel, BodyState, build_model
+from gearmbs.adams.build import AdamsModel, build_model
 from gearmbs.adams.commands import Change, Command, Linear, Script, Simulate, Stop, Switch, read_script
 from gearmbs.adams.deck import Deck, read_deck
 from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
@@ -18,16 +18,16 @@ from gearmbs.adams.rehearse import check_linear, is_sequence, rehearse
 from gearmbs.adams.requests import RequestEvaluator
 from gearmbs.adams.result import NEWTON, AdamsResult, Segment
 from gearmbs.adams.session import Session, change, output_times, switch
+from gearmbs.adams.start import part_states, with_initial_motions
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.expressions import ExpressionError
 from gearmbs.dae.kinematic import kinematic
 from gearmbs.dae.modes import Modes
-from gearmbs.dae.sequence import initial_conditions
+from gearmbs.dae.sequence import initial_conditions, quasi_static
 from gearmbs.dae.solution import Solution
-from gearmbs.dae.statics import StaticResult
+from gearmbs.dae.statics import StaticResult, static_equilibrium
 from gearmbs.dae.tables import STATE_ALGEBRAIC
-from gearmbs.mechanism.analyses import linear_modes, quasi_static, static_equilibrium
-from gearmbs.mechanism.functions import polynomial
+from gearmbs.mechanism.analyses import frozen_friction, linear_modes
 
 DEFAULT_TOLERANCE = 1e-8
 """Local error where a deck gives no ERROR, tighter than ADAMS's 1e-3 so that results do not depend on it."""
@@ -209,6 +209,8 @@ def _simulate(
     try:
         model = _model(session, allow_unsupported, (session.time, float(times[-1])))
         options, note = _settings(session, tol)
+        if kind == "STATICS":
+            note = _frozen(session, model)
         solution, equilibrium = _solve(session, command, kind, model, times, options, progress)
     except (ModelError, ArithmeticError) as error:
         raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, _line(model, str(error)))]) from error
@@ -225,6 +227,12 @@ def _simulate(
         segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
     _remember(session, model, segment, evaluator)
     return segment
+
+
+def _frozen(session: Session, model: AdamsModel) -> str | None:
+    """Return a remark on friction in a static analysis, unless the deck itself leaves it out there."""
+    active = [f for f in session.deck.of(st.Friction).values() if ("friction", f.id) in model.names]
+    return frozen_friction(model.mechanism) if any(f.inactive != "STATIC" for f in active) else None
 
 
 def _solve(
@@ -245,9 +253,10 @@ def _solve(
         return initial_conditions(model.mechanism.compile(float(times[0]))), None
     if kind == "STATICS":
         options.update(options_without, tol=STATIC_TOLERANCE)
+        system = model.mechanism.compile(float(times[0]))
         if times.size > 1:
-            return quasi_static(model.mechanism, times, tol=STATIC_TOLERANCE), None
-        equilibrium = static_equilibrium(model.mechanism, t=float(times[0]), tol=STATIC_TOLERANCE)
+            return quasi_static(system, times, tol=STATIC_TOLERANCE), None
+        equilibrium = static_equilibrium(system, tol=STATIC_TOLERANCE)
         return equilibrium.solution, equilibrium
     if kind == "KINEMATICS":
         system = model.mechanism.compile(float(times[0]))
@@ -293,42 +302,13 @@ def _model(session: Session, allow_unsupported: bool, span: tuple[float, float])
         model = build_model(session.deck, allow_unsupported, inactive, span=span)
         if not model.initial_motions:
             return model
-        session.state = _with_initial_motions(model)
+        session.state = with_initial_motions(model)
     model = build_model(session.deck, allow_unsupported, inactive, session.state, span)
     model.mechanism.turns.update(session.turns)
     for number, value in session.states.items():
         if number in model.mechanism.states:
             model.mechanism.states[number].start = value
     return model
-
-
-def _with_initial_motions(model: AdamsModel) -> dict[int, BodyState]:
-    """Return the state in which every joint with initial conditions has them."""
-    units = model.deck.units
-    mechanism = model.mechanism
-    for k, (joint, kind, value) in enumerate(model.initial_motions):
-        rate = value[1] if len(value) > 1 else 0.0
-        name = f"initial condition {k + 1} of {joint.name}"
-        if kind == "rotation":
-            mechanism.rotation(name, joint, polynomial([value[0], rate / units.time]))
-        else:
-            start, speed = value[0] * units.length, rate * units.factor("velocity")
-            mechanism.translation(name, joint, polynomial([start, speed]))
-    system = mechanism.compile(0.0)
-    system.initialise()
-    return _states(model, system.pose)
-
-
-def _states(model: AdamsModel, pose: np.ndarray) -> dict[int, BodyState]:
-    """Return the parts' states from R, A, v, omega of their centres of mass."""
-    found = {}
-    for row, (name, body) in zip(pose, model.mechanism.bodies.items()):
-        axes = row[3:12].reshape(3, 3)
-        arm = axes @ body.com
-        spin = row[15:18].copy()
-        number = model.sources[name].id
-        found[number] = BodyState(row[0:3] - arm, axes.copy(), row[12:15] - np.cross(spin, arm), spin)
-    return found
 
 
 def _remember(session: Session, model: AdamsModel, segment: Segment, evaluator: RequestEvaluator) -> None:
@@ -339,7 +319,7 @@ def _remember(session: Session, model: AdamsModel, segment: Segment, evaluator: 
         np.concatenate([s.position(n)[-1], s.orientation(n)[-1].ravel(), s.velocity(n)[-1], s.angular_velocity(n)[-1]])
         for n in names
     ]
-    session.state = _states(model, np.array(last))
+    session.state = part_states(model, np.array(last))
     session.turns = evaluator.turns()
     for number in model.mechanism.states:
         session.states[number] = float(evaluator.state(number)[-1])

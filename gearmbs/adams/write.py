@@ -16,7 +16,7 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.dae.rotation import euler_from_matrix
 from gearmbs.mechanism import Mechanism, Torque
 from gearmbs.mechanism.elements import AXIS_FORCE, AXIS_TORQUE, LINE, Load
-from gearmbs.mechanism.expression import Call, Name, Node, Number, parse, unparse
+from gearmbs.mechanism.expression import Call, Name, Node, Number, parse, shown, unparse
 from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
 from gearmbs.mechanism.function_text import function_text
 from gearmbs.mechanism.joints import Joint
@@ -25,6 +25,7 @@ from gearmbs.mechanism.parts import Body, Marker
 WIDTH = 78
 STATEMENT_OF = {v: k for k, v in JOINT_KINDS.items()}
 PRIMITIVE_OF = {v: k for k, v in JPRIM_KINDS.items()}
+PLANTS = {"PINVAL": "pinput", "POUVAL": "poutput"}
 COMPONENTS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
 
 
@@ -66,6 +67,8 @@ class DeckWriter:
         self.variables = {_upper(k): n for n, k in enumerate(mechanism.variables, 1)}
         self.states = {_upper(k): n for n, k in enumerate(mechanism.states, 1)}
         self.splines = {_upper(k): n for n, k in enumerate(mechanism.splines, 1)}
+        self.arrays = {_upper(k): n for n, k in enumerate(mechanism.arrays, 1)}
+        self.plants = {(kind, _upper(k)): n for n, (kind, k) in enumerate(mechanism.plants, 1)}
         self._next_marker = 1
 
     def text(self, title: str | None) -> str:
@@ -123,6 +126,11 @@ class DeckWriter:
         """Return an expression with names replaced by ids."""
 
         def rename(call: Call) -> Call:
+            if call.name == "INTEGRAL":
+                raise ModelError(
+                    f"{shown(text)}: ADAMS has no function INTEGRAL; give a motion by its velocity to a joint, "
+                    "or use a differential state"
+                )
             call = replace(call, args=tuple(self._argument(call, k, a) for k, a in enumerate(call.args)))
             return self._element_call(call) if call.name in ELEMENT_FORCES else call
 
@@ -138,6 +146,10 @@ class DeckWriter:
             table = self.states
         elif call.name in ("CUBSPL", "AKISPL") and position == 2:
             table = self.splines
+        elif call.name == "ARYVAL" and position == 0:
+            table = self.arrays
+        elif call.name in PLANTS and position == 0:
+            table = {k: n for (kind, k), n in self.plants.items() if kind == PLANTS[call.name]}
         elif isinstance(arg, Name) and (call.name not in ELEMENT_FORCES or position > 0):
             table = self.marker_names
         return Number(float(table[key]), arg.at, table[key]) if key in table else arg
@@ -264,9 +276,16 @@ class DeckWriter:
         function = row.rotation if rotational else row.function
         assert function is not None
         scale = 1.0 if rotational else self.units.length
-        text = self.expression(function_text(function, self.units.time, scale))
-        kind = "ROTATIONAL" if rotational else "TRANSLATIONAL"
-        return [f"JOINT = {self._joint_id(joint.i, joint.j)}", kind, f"FUNCTION = {text}"]
+        head = [f"JOINT = {self._joint_id(joint.i, joint.j)}", "ROTATIONAL" if rotational else "TRANSLATIONAL"]
+        given = joint.prescribed
+        if given is None:
+            return [*head, f"FUNCTION = {self.expression(function_text(function, self.units.time, scale))}"]
+        rate, change = scale / self.units.time, scale / self.units.time ** (1 if given.level == "velocity" else 2)
+        text = self.expression(function_text(given.function, self.units.time, change))
+        starts = [f"ICDISP = {number(given.start / scale)}"]
+        if given.level == "acceleration":
+            starts.append(f"ICVEL = {number(given.rate / rate)}")
+        return [*head, given.level.upper(), *starts, f"FUNCTION = {text}"]
 
     def _data(self) -> None:
         m = self.mechanism
@@ -279,6 +298,11 @@ class DeckWriter:
             text = _times(self.expression(state.expression), self.units.time)
             arguments = [f"IC = {number(state.start)}", f"FUNCTION = {text}"]
             self.statement(f"DIFF/{self.states[_upper(key)]}", arguments, str(key))
+        for key, values in m.arrays.items():
+            self.statement(f"ARRAY/{self.arrays[_upper(key)]}", ["IC", f"NUMBERS = {listed(values)}"], str(key))
+        for (kind, key), members in m.plants.items():
+            ids = ", ".join(str(self.variables[_upper(member)]) for member in members)
+            self.statement(f"{kind.upper()}/{self.plants[kind, _upper(key)]}", [f"VARIABLES = {ids}"], str(key))
         for key, data in m.splines.items():
             arguments = [f"X = {listed(data.x)}"]
             if data.z:

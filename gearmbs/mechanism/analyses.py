@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,11 +46,34 @@ def static_equilibrium(
         If a body is free to move and its loads do not balance.
     ModelError
         If the mechanism cannot be assembled or no equilibrium is found.
+
+    Warns
+    -----
+    UserWarning
+        If joints have friction: it does not help to find the equilibrium.
     """
+    _warn_of_friction(mechanism)
     result = _statics.static_equilibrium(mechanism.compile(t), tol=tol, max_iterations=max_iterations)
     if move:
         place(mechanism, result)
     return result
+
+
+def frozen_friction(mechanism: Mechanism) -> str | None:
+    """Return what static analyses make of friction, None without any."""
+    names = [n for n, e in mechanism.elements.items() if getattr(e, "kind", "") == "friction"]
+    if not names:
+        return None
+    return (
+        f"friction does not take part in static analyses ({', '.join(names)}): at rest it exerts what its stiction "
+        "deformation was before, nothing at the start; simulate with damping to find where it holds the mechanism"
+    )
+
+
+def _warn_of_friction(mechanism: Mechanism) -> None:
+    remark = frozen_friction(mechanism)
+    if remark is not None:
+        warnings.warn(remark, stacklevel=3)
 
 
 def place(mechanism: Mechanism, equilibrium: StaticResult) -> None:
@@ -90,6 +114,7 @@ def quasi_static(mechanism: Mechanism, t_eval: np.ndarray, *, tol: float = 1e-10
     times = np.asarray(t_eval, dtype=float)
     if times.ndim != 1 or times.size == 0 or not np.all(np.isfinite(times)):
         raise ModelError("t_eval: give a sequence of finite times")
+    _warn_of_friction(mechanism)
     return _sequence.quasi_static(mechanism.compile(float(times[0])), times, tol=tol)
 
 

@@ -69,7 +69,7 @@ class _Compiler:
         self.index_all_markers()
         for joint in m.joints.values():
             for row in joint.rows:
-                self.add_row(row)
+                self.add_row(row, f"{joint.name}: {row.label}")
                 self.row_names.append(f"{joint.name}: {row.label}")
         for name, text in m.constraints.items():
             tape = self.tape(text, f"general constraint '{name}'", "number")
@@ -126,9 +126,9 @@ class _Compiler:
 
     # --- constraints --------------------------------------------------------------------------------
 
-    def add_row(self, row: jt.Row) -> None:
-        function = -1 if row.function is None else self.function(row.function, row.label)
-        rotation = -1 if row.rotation is None else self.function(row.rotation, row.label)
+    def add_row(self, row: jt.Row, label: str) -> None:
+        function = -1 if row.function is None else self.function(row.function, label)
+        rotation = -1 if row.rotation is None else self.function(row.rotation, label)
         packed = [(t.kind, self.index(t.i), self.index(t.j), t.axes, rotation, t.coefficient) for t in row.terms]
         self.builder.add_row(packed, function)
         for k, term in enumerate(row.terms):

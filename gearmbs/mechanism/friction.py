@@ -79,6 +79,8 @@ class Friction:
         Spherical.
     yoke : {"i", "j"}
         Universal: the arm with friction.
+    max_force, max_torque : float, optional
+        The most the friction can be: force of translational, torque of the other joints, both of cylindrical ones.
     """
 
     mu_static: float
@@ -97,6 +99,8 @@ class Friction:
     overlap_change: str = "constant"
     ball_radius: float = 0.0
     yoke: str = "i"
+    max_force: float | None = None
+    max_torque: float | None = None
 
     def check(self, name: str) -> None:
         """Raise a ModelError that names a wrong parameter."""
@@ -113,6 +117,9 @@ class Friction:
                 raise ModelError(f"{label}: inputs has {item!r}; choose from {', '.join(INPUTS)}")
         if not self.stiction_transition_velocity > 0.0:
             raise ModelError(f"{label}: stiction_transition_velocity must be positive")
+        for field in ("max_force", "max_torque"):
+            if getattr(self, field) == 0.0:
+                raise ModelError(f"{label}: {field} must be positive; leave it out for no limit")
         if not self.mu_dynamic > 0.0:
             raise ModelError(f"{label}: mu_dynamic = {self.mu_dynamic}; it must be positive")
         if self.mu_static < self.mu_dynamic and self.effect != "sliding":
@@ -180,7 +187,7 @@ class _Writer:
         moment = self._variable("moment", " + ".join(parts) or "0")
         slip = f"{radius!r}*WZ({_ref(self.i)},{_ref(self.j)},{_ref(frame)})"
         mu = self._coefficients([slip])[0]
-        text = self._resisting(mu, moment, self.f.preload_torque)
+        text = _at_most(self._resisting(mu, moment, self.f.preload_torque), self.f.max_torque)
         return [self._load(el.AXIS_TORQUE, (text,), frame)]
 
     def _translational(self) -> list[Load]:
@@ -191,7 +198,8 @@ class _Writer:
         normal = self._variable("normal", " + ".join(parts) or "0")
         a, c = _ref(self.i), _ref(self.j)
         mu = self._coefficients([f"VZ({a},{c},{c},{c})"])[0]
-        return [self._load(el.AXIS_FORCE, (self._resisting(mu, normal, self.f.preload_force),), self.j)]
+        text = _at_most(self._resisting(mu, normal, self.f.preload_force), self.f.max_force)
+        return [self._load(el.AXIS_FORCE, (text,), self.j)]
 
     def _cylindrical(self) -> list[Load]:
         """Slip along and about the axis: one surface, so both share the coefficient."""
@@ -199,8 +207,8 @@ class _Writer:
         normal = self._variable("normal", " + ".join(self._across()) or "0")
         a, c = _ref(self.i), _ref(self.j)
         along, about = self._coefficients([f"VZ({a},{c},{c},{c})", f"{radius!r}*WZ({a},{c},{c})"])
-        force = self._resisting(along, normal, self.f.preload_force)
-        torque = self._resisting(about, f"{radius!r}*{normal}", self.f.preload_torque)
+        force = _at_most(self._resisting(along, normal, self.f.preload_force), self.f.max_force)
+        torque = _at_most(self._resisting(about, f"{radius!r}*{normal}", self.f.preload_torque), self.f.max_torque)
         return [self._load(el.COMPONENTS, (None, None, force, None, None, torque), self.j)]
 
     def _spherical(self) -> list[Load]:
@@ -210,6 +218,12 @@ class _Writer:
         a, c = _ref(self.i), _ref(self.j)
         mu = self._coefficients([f"{radius!r}*W{x}({a},{c},{c})" for x in "XYZ"])
         torque = [self._resisting(m, f"{radius!r}*{normal}", self.f.preload_torque) for m in mu]
+        if self.f.max_torque is not None:
+            parts = [self._variable(f"torque{k + 1}", text) for k, text in enumerate(torque)]
+            most = float(self.f.max_torque)
+            size = f"SQRT({' + '.join(f'{p}**2' for p in parts)} + {(TINY * most) ** 2!r})"
+            share = self._variable("share", f"MIN(1, {most!r}/{size})")
+            torque = [f"{p}*{share}" for p in parts]
         return [self._load(el.COMPONENTS, (None, None, None, *torque), self.j)]
 
     # --- pieces -------------------------------------------------------------------------------------
@@ -299,6 +313,11 @@ class _Writer:
 
     def _load(self, mode: int, expressions: tuple[str | None, ...], frame: Marker) -> Load:
         return self.mechanism._add_load(Load(self.name, "friction", self.i, self.j, frame, mode, expressions))
+
+
+def _at_most(text: str, most: float | None) -> str:
+    """Return an expression kept between -most and most."""
+    return text if most is None else f"MAX({-float(most)!r}, MIN({float(most)!r}, {text}))"
 
 
 def _ref(marker: Marker) -> str:

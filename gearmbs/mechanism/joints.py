@@ -39,6 +39,24 @@ class Row:
     rotation: TimeFunction | None = None
 
 
+@dataclass(frozen=True)
+class Prescribed:
+    """What a motion was given by, where it is not its displacement: SI values.
+
+    Attributes
+    ----------
+    level : {"velocity", "acceleration"}
+    function : TimeFunction
+    start, rate : float
+        Displacement and its rate at the start.
+    """
+
+    level: str
+    function: TimeFunction
+    start: float
+    rate: float
+
+
 @dataclass(eq=False)
 class Joint:
     """A joint, primitive, coupler or motion: a name and its constraint rows."""
@@ -48,6 +66,7 @@ class Joint:
     i: Marker
     j: Marker
     rows: list[Row] = field(default_factory=list)
+    prescribed: Prescribed | None = None
 
     def __repr__(self) -> str:
         return f"Joint({self.name!r}, {self.kind}, I={self.i.name!r}, J={self.j.name!r}, {len(self.rows)} rows)"

@@ -234,9 +234,9 @@ class Mechanism(LoadMethods):
             Angular velocity at time 0 for accelerations, rad/s.
         """
         self._check_joint(name, joint, ("revolute", "cylindrical"))
-        function = self._moved(name, joint, function, level, start, rate, jt.coordinate_term(joint, 1.0))
-        row = jt.Row("angle", (jt.Term(terms.ROTATION, joint.i, joint.j),), None, as_function(function))
-        return self._add_joint(jt.Joint(name, "rotation", joint.i, joint.j, [row]))
+        given = self._prescribed(name, function, level, start, rate, jt.coordinate_term(joint, 1.0))
+        row = jt.Row("angle", (jt.Term(terms.ROTATION, joint.i, joint.j),), None, _displacement(function, given))
+        return self._add_joint(jt.Joint(name, "rotation", joint.i, joint.j, [row], given))
 
     def translation(
         self, name: str, joint: jt.Joint, function: float | str | TimeFunction, *, level: str = "displacement",
@@ -245,9 +245,9 @@ class Mechanism(LoadMethods):
         """Prescribe the displacement of I along z_J of a joint; as :meth:`rotation`, in m, m/s or m/s^2."""
         self._check_joint(name, joint, ("translational", "cylindrical"))
         along = jt.Term(terms.DOT2, joint.i, joint.j, jt.Z)
-        function = self._moved(name, joint, function, level, start, rate, along)
-        row = jt.Row("displacement", (jt.Term(terms.DOT2, joint.i, joint.j, jt.Z),), as_function(function))
-        return self._add_joint(jt.Joint(name, "translation", joint.i, joint.j, [row]))
+        given = self._prescribed(name, function, level, start, rate, along)
+        row = jt.Row("displacement", (along,), _displacement(function, given))
+        return self._add_joint(jt.Joint(name, "translation", joint.i, joint.j, [row], given))
 
     # --- forces -----------------------------------------------------------------------------------
 
@@ -400,17 +400,17 @@ class Mechanism(LoadMethods):
         if not name or any(name in table for table in (self.joints, self.elements, self.constraints)):
             raise ModelError(f"name {name!r}: empty or in use; choose another")
 
-    def _moved(
-        self, name: str, joint: jt.Joint, function: float | str | TimeFunction, level: str, start: float | None,
-        rate: float, term: jt.Term,
-    ) -> TimeFunction:  # fmt: skip
-        """Return a motion's displacement, whatever its function gives."""
+    def _prescribed(
+        self, name: str, function: float | str | TimeFunction, level: str, start: float | None, rate: float,
+        term: jt.Term,
+    ) -> jt.Prescribed | None:  # fmt: skip
+        """Return what a motion is given by, None for its displacement."""
         if level == "displacement":
-            return as_function(function)
+            return None
         if level not in ("velocity", "acceleration"):
             raise ModelError(f"motion '{name}': level {level!r}; choose displacement, velocity or acceleration")
         first = jt.initial_coordinate(term) if start is None else float(start)
-        return integrated(as_function(function), first, None if level == "velocity" else float(rate))
+        return jt.Prescribed(level, as_function(function), first, float(rate))
 
     def _check_joint(self, name: str, joint: jt.Joint, kinds: tuple[str, ...]) -> None:
         self._check_name(name)
@@ -441,3 +441,10 @@ class Mechanism(LoadMethods):
         for part in (*self.bodies.values(), *self.joints.values(), *self.elements.values()):
             lines.append(f"  {part!r}")
         return "\n".join(lines)
+
+
+def _displacement(function: float | str | TimeFunction, given: jt.Prescribed | None) -> TimeFunction:
+    """Return the displacement of a motion, whatever its function gives."""
+    if given is None:
+        return as_function(function)
+    return integrated(given.function, given.start, None if given.level == "velocity" else given.rate)

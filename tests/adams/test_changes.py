@@ -99,6 +99,15 @@ def test_every_part_of_the_initial_conditions_can_be_asked_for():
     np.testing.assert_allclose(result.request(1)[:, 1], -10 / 1.1, rtol=1e-12)
 
 
+def test_motions_by_their_rate_in_analyses_of_one_instant():
+    body = "MOTION/1,JOINT=1,VELOCITY,FUNCTION=3*COS(TIME)\nREQUEST/1,F2=AZ(21,11)\\F3=WZ(21,11,11)\n"
+    script = ("SIM/INITIAL", "LINEAR/EIGENSOL", "SIM/STATICS", "SIM/KIN, END=1, STEPS=2")
+    result = run(body, *script)
+    np.testing.assert_allclose(result.request(1)[2:, 1], 3 * np.sin(result.t[2:]), atol=1e-9)
+    assert result.request(1)[0, 2] == pytest.approx(3.0)
+    assert len(result.modes[0]) == 0
+
+
 def test_settings_without_effect_are_remarked_on():
     body = "INTEGRATOR/GSTIFF,MAXIT=3,INTERPOLATE=ON,HRATIO=5,PATTERN=T:F\nEQUILIBRIUM/STABILITY=1E-3\n"
     body += "OUTPUT/DSCALE=1000,1\nRESULTS/NOREQUESTS\nPART/3,MASS=1,CM=30,IP=1,1,1,EXACT=X:Y\nMARKER/30,PART=3\n"
@@ -107,6 +116,17 @@ def test_settings_without_effect_are_remarked_on():
     assert (options["max_iterations"], options["interpolate"]) == (3, True)
     for words in ("HRATIO, PATTERN", "STABILITY", "DSCALE", "NOREQUESTS", "EXACT"):
         assert any(f": {words} without effect" in m for m in result.messages), words
+
+
+@pytest.mark.parametrize(("argument", "words"), [("", ["does not take part in static"]), (",INACTIVE=STATIC", [])])
+def test_static_analyses_of_friction_are_remarked_on(argument, words):
+    """A pendulum held aside by a stiff dry pin in a dynamic analysis stays there in a static one."""
+    body = f"ACCGRAV/KGRAV=-10\nFRICTION/1,JOINT=1,MU_STATIC=0.9,MU_DYNAMIC=0.9,PIN_RADIUS=1.2{argument}\n"
+    script = ("SIM/DYN, END=3, STEPS=3", "SIM/STATICS")
+    result = run(body, *script)
+    assert [m for m in result.messages if any(w in m for w in words)] or not words
+    assert not words or len(result.messages) == 1
+    np.testing.assert_allclose(result.part(2)[-1, :3], result.part(2)[-2, :3], atol=1e-6)
 
 
 def test_yaw_pitch_and_roll_where_asked_for():

@@ -125,6 +125,56 @@ def test_friction_fields_and_loads_of_reactions_survive():
     np.testing.assert_allclose(two, one, atol=1e-9)
 
 
+def test_arrays_and_plants_survive():
+    m = Mechanism("data")
+    block = m.body("block", 2.0, (1, 1, 1))
+    i, j = block.marker(name="i"), m.ground.marker(axis=(1, 0, 0), name="j")
+    m.array("steps", [1.0, 3.0])
+    m.variable("input", "ARYVAL(steps, 2)*TIME")
+    m.plants["poutput", "out"] = ("input",)
+    m.axis_force("push", i, j, "POUVAL(out, 1) + ARYVAL(steps, 1)")
+    again = parse_deck(write_deck(m)).to_mechanism()
+    solution = again.simulate(1.0, rate=4, tol=1e-9)
+    # a = (1 + 3 t)/2
+    np.testing.assert_allclose(solution.position("block")[:, 0], solution.t**2 / 4 + solution.t**3 / 4, atol=1e-8)
+
+
+@pytest.mark.parametrize("units", [Units(), Units(length=1e-3, time=1e-3)])
+def test_motions_by_their_rates_are_written_as_such(units):
+    """ADAMS integrates them itself: MOTION/.., VELOCITY and ACCELERATION, with the values at the start."""
+    m = Mechanism("driven")
+    wheel, slide = m.body("wheel", 1, (1, 1, 1)), m.body("slide", 1, (1, 1, 1))
+    m.rotation("spin", m.revolute("pin", wheel, m.ground), step(0, 0, 1, 2), level="velocity", start=0.3)
+    m.translation("push", m.translational("rail", slide, m.ground), 0.5, level="acceleration", start=0.2, rate=-0.1)
+    m.units = units
+    text = write_deck(m)
+    assert "INTEGRAL" not in text
+    assert ", VELOCITY" in text
+    assert ", ACCELERATION" in text
+    deck = parse_deck(text.replace("\nEND", "\nREQUEST/1,F2=AZ(1,2)\nEND"))
+    result = run_deck(deck, end=1.0 / units.time, steps=4)
+    t = result.t * units.time
+    spin = result.segments[0].solution.orientation("wheel")
+    np.testing.assert_allclose(np.arctan2(spin[:, 1, 0], spin[:, 0, 0]), 0.3 + 2 * (t**3 - t**4 / 2), atol=1e-8)
+    place = result.segments[0].solution.position("slide")[:, 2]
+    np.testing.assert_allclose(place, 0.2 - 0.1 * t + 0.25 * t**2, atol=1e-8)
+    again = write_deck(deck.to_mechanism())
+    assert "INTEGRAL" not in again
+    assert again.count("ICDISP") == 2
+    m.general_constraint("odd", "DX(x) - INTEGRAL(TIME, 0, 1)")
+    with pytest.raises(ModelError, match="ADAMS has no function INTEGRAL"):
+        write_deck(m)
+
+
+def test_initial_conditions_of_joints_are_in_the_mechanism():
+    text = PENDULUM.replace("REVOLUTE", "REVOLUTE, IC = 0.5, 2")
+    assert text != PENDULUM
+    deck = parse_deck(text)
+    one = run_deck(deck, end=1.0, steps=10)
+    two = run_deck(parse_deck(write_deck(deck.to_mechanism())), end=1.0, steps=10)
+    np.testing.assert_allclose(two.part(2)[:, :3], one.part(2)[:, :3], atol=1e-9)
+
+
 def test_gear_contact_becomes_impact_expressions():
     """The deck's gear rig follows the contact kernel: same mesh force while no corner is in contact."""
     from gearmbs.gears import ContactLaw, Friction, GearPair

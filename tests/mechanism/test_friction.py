@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gearmbs.mechanism import Mechanism, ModelError
+from gearmbs.mechanism import Mechanism, ModelError, static_equilibrium
 
 G = 9.81
 SLIDING = {"effect": "sliding", "stiction_transition_velocity": 1e-4}
@@ -144,6 +144,38 @@ def test_spherical_joint_brakes_a_spinning_body():
     np.testing.assert_allclose(solution.angular_velocity("ball"), speed[:, None] * axis, atol=2e-4)
 
 
+@pytest.mark.parametrize("kind", ["translational", "cylindrical"])
+def test_friction_force_has_a_limit(kind):
+    """mu m g = 5.9 N, but at most 2 N: the body stops with 1 m/s^2."""
+    m = Mechanism("rail", gravity=(0, 0, -G))
+    body = m.body("body", 2.0, (0.1, 0.1, 0.1), velocity=(0.5, 0, 0))
+    rail = m.joint(kind, "rail", body, m.ground, axis=(1, 0, 0))
+    radius = {"pin_radius": 0.1} if kind == "cylindrical" else {}
+    m.friction("friction", rail, 0.3, 0.3, max_force=2.0, **radius, **SLIDING)
+    solution = m.simulate(0.4, rate=100, tol=1e-8)
+    np.testing.assert_allclose(solution.velocity("body")[:, 0], 0.5 - solution.t, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "spherical"])
+def test_friction_torque_has_a_limit(kind):
+    """mu r m g = 0.18 N m, but at most 0.05: w falls by 0.5 rad/s^2 about its own axis."""
+    m = Mechanism("ball", gravity=(0, 0, -G))
+    axis = np.array([1.0, 2.0, -2.0]) / 3.0
+    body = m.body("ball", 3.0, (0.1, 0.1, 0.1), angular_velocity=4.0 * axis)
+    joint = m.joint(kind, "joint", body, m.ground, axis=axis)
+    m.friction("friction", joint, 0.2, 0.2, ball_radius=0.03, pin_radius=0.03, max_torque=0.05, **SLIDING)
+    solution = m.simulate(1.0, rate=100, tol=1e-8)
+    np.testing.assert_allclose(solution.angular_velocity("ball"), (4.0 - 0.5 * solution.t)[:, None] * axis, atol=1e-5)
+
+
+def test_static_analyses_warn_of_friction():
+    """A block held by friction alone has no equilibrium without; one that friction holds already stays."""
+    held = block(0.4)
+    with pytest.warns(UserWarning, match=r"friction does not take part in static analyses \(friction\)"):
+        with pytest.raises(ModelError, match="free to move"):
+            static_equilibrium(held)
+
+
 @pytest.mark.parametrize("yoke", ["i", "j"])
 def test_universal_joint_brakes_one_of_its_arms(yoke):
     """A body hung at its centre turns about one arm: torque mu (r F_radial + a F_axial) against it."""
@@ -237,6 +269,7 @@ def test_a_load_may_depend_on_a_reaction():
         ("revolute", {"effect": "none"}, "effect = 'none'; choose one of all"),
         ("revolute", {"inputs": ("weight",)}, "inputs has 'weight'"),
         ("revolute", {"stiction_transition_velocity": 0.0}, "must be positive"),
+        ("revolute", {"max_torque": 0.0}, "max_torque must be positive"),
     ],
 )
 def test_errors_name_the_parameter(kind, options, words):
