@@ -34,7 +34,9 @@ def energy_balance(solution: Solution) -> xr.Dataset:
         In J over ``time``: ``kinetic``, ``gravity`` (potential), ``elastic`` (contacts); ``work_motion`` (done by
         prescribed motions), ``work_applied`` (done by torques and expression loads, springs included),
         ``dissipated_damping``, ``dissipated_friction``; ``imbalance``: work in less dissipation less change of
-        stored energy; ``work``: sum of |power| over time, the measure the imbalance is held against.
+        stored energy; ``work``: sum of |power| over time. Attribute ``relative_imbalance``: the largest imbalance over
+        all the work or, where more is exchanged than worked, over the largest change of a stored energy; NaN when
+        there is neither.
     """
     t = solution.t
     powers = _powers(solution)
@@ -49,7 +51,9 @@ def energy_balance(solution: Solution) -> xr.Dataset:
     size = _integral(t, np.abs(powers["work_motion"])) + _integral(t, np.abs(powers["work_applied"]))
     data = {**stored, **works, "imbalance": net - change, "work": size}
     out = xr.Dataset({name: ("time", values, {"units": "J"}) for name, values in data.items()}, {"time": t})
-    out.attrs["relative_imbalance"] = float(np.abs(out.imbalance).max() / max(float(size[-1]), 1e-300))
+    turned_over = max(float(size[-1]), *(float(np.ptp(e)) for e in stored.values()))
+    largest = float(np.abs(out.imbalance).max())
+    out.attrs["relative_imbalance"] = largest / turned_over if turned_over > 0.0 else float("nan")
     return out
 
 

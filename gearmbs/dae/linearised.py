@@ -6,21 +6,20 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import null_space
+from scipy.linalg import qr, solve_triangular
 from scipy.sparse import csc_array
 
 from gearmbs.dae import index1
 from gearmbs.dae import tables as T
-from gearmbs.dae.errors import ModelError, SingularModelError
+from gearmbs.dae.errors import ModelError
 from gearmbs.dae.rotation import KIN_AXES
 
 if TYPE_CHECKING:
     from gearmbs.dae.system import System
 
 SETTLE_PASSES = 50
-NULL_TOLERANCE = 1e-10
-SLOWEST = 1e-6
-"""Angular frequency, rad/s, below which a motion counts as free of stiffness."""
+DEPENDENT = 1e-10
+"""Pivot, of the largest, below which constraints count as dependent."""
 
 
 class Instant:
@@ -102,8 +101,8 @@ class Instant:
     def spatial(self, coordinates: np.ndarray) -> np.ndarray:
         """Turn changes of (R, theta), shape (6 bodies, k), into displacements and rotations, (k, bodies, 6)."""
         bodies = len(self.system.body_names)
-        moved = coordinates[: 3 * bodies].reshape(bodies, 3, -1)
-        angles = coordinates[3 * bodies :].reshape(bodies, 3, -1)
+        moved = coordinates[: 3 * bodies].reshape(bodies, 3, coordinates.shape[1])
+        angles = coordinates[3 * bodies :].reshape(bodies, 3, coordinates.shape[1])
         turned = np.einsum("bmc,bmk->bck", self.axes(), angles)
         return np.moveaxis(np.concatenate([moved, turned], axis=1), 2, 0)
 
@@ -116,16 +115,34 @@ class Instant:
         return csc_array(block_diag([diags_array(masses), -matrix[eps][:, eps]], format="csc"))
 
 
+def allowed_motions(constraint: np.ndarray) -> np.ndarray:
+    """Return a basis of the null space of the constraints: some coordinates move by one each, the others follow.
+
+    Unlike an orthonormal one it keeps parts that have nothing to do with each other apart, exactly.
+    """
+    rows, n = constraint.shape
+    if rows == 0:
+        return np.eye(n)
+    upper, order = qr(constraint, mode="r", pivoting=True)
+    pivots = np.abs(np.diag(upper))
+    rank = int(np.sum(pivots > DEPENDENT * pivots[0]))
+    basis = np.zeros((n, n - rank))
+    basis[order[rank:]] = np.eye(n - rank)
+    basis[order[:rank]] = -solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
+    return basis
+
+
 @dataclass
 class Reduced:
     """M x'' + C x' + K x + H z = 0 and z' = P x + Q x' + S z in the motions the constraints allow.
 
-    ``basis`` has a column of changes of (R, theta) for each entry of x; ``stiffness_size`` is the largest entry of the
-    stiffness before the projection.
+    ``basis`` has a column of changes of (R, theta) for each entry of x; ``stiffness_terms`` and ``damping_terms`` are
+    the sums of the absolute values of the terms each coefficient is made of, against which rounding is to be held.
     """
 
     basis: np.ndarray
-    stiffness_size: float
+    stiffness_terms: np.ndarray
+    damping_terms: np.ndarray
     mass: np.ndarray
     damping: np.ndarray
     stiffness: np.ndarray
@@ -147,7 +164,6 @@ def reduce(instant: Instant) -> Reduced:
     matrix = instant.matrix(y)
     mass = instant.mass_matrix(matrix).toarray()
     full = matrix.toarray()
-    at = instant.at
     q, v = instant.block("R", "lambda"), np.concatenate([instant.block("u", "p"), instant.block("eps", "R")])
     force = instant.block("u", "eps")
     half = force.size // 2
@@ -157,30 +173,33 @@ def reduce(instant: Instant) -> Reduced:
     kept[inner.size - instant.differential.size :] = instant.differential
     loads, z = inner[~kept], inner[kept]
 
-    def eliminate(target: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Derivative of the target rows with the loads following their definitions."""
+    def eliminate(target: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivative of the target rows with the loads following their definitions, and the size of its terms."""
         direct = full[np.ix_(target, columns)]
         if not loads.size:
-            return direct
-        return direct - full[np.ix_(target, loads)] @ np.linalg.solve(
-            full[np.ix_(loads, loads)], full[np.ix_(loads, columns)]
-        )
+            return direct, np.abs(direct)
+        on = full[np.ix_(target, loads)]
+        followed = np.linalg.solve(full[np.ix_(loads, loads)], full[np.ix_(loads, columns)])
+        return direct - on @ followed, np.abs(direct) + np.abs(on) @ np.abs(followed)
 
     try:
-        stiffness, damping = eliminate(force, q), eliminate(force, v)
-        state_force = eliminate(force, z)
-        state_q, state_v, state_z = -eliminate(z, q), -eliminate(z, v), -eliminate(z, z)
+        (stiffness, stiffness_terms), (damping, damping_terms) = eliminate(force, q), eliminate(force, v)
+        state_force = eliminate(force, z)[0]
+        state_q, state_v, state_z = (-eliminate(z, columns)[0] for columns in (q, v, z))
     except np.linalg.LinAlgError as error:
         raise ModelError("the applied loads and variables depend on each other in a singular way") from error
     # delta p' = d/dt of -(dG_eps/d theta) delta theta - ...: its velocity part is a damping
-    damping[half:, half:] -= full[np.ix_(eps, instant.block("theta", "lambda"))]
+    moved = full[np.ix_(eps, instant.block("theta", "lambda"))]
+    damping[half:, half:] -= moved
+    damping_terms[half:, half:] += np.abs(moved)
     constraint = full[np.ix_(rows, q)]
     weight = np.concatenate([np.ones(half), np.full(half, max(min(instant.system.length, 1.0), 1e-3))])
-    basis = null_space(constraint / weight) if at["F"] > at["lambda"] else np.eye(q.size)
-    basis = basis / weight[:, None]
+    basis = allowed_motions(constraint / weight) / weight[:, None]
+    absolute = np.abs(basis)
     return Reduced(
         basis,
-        float(np.abs(stiffness).max(initial=0.0)),
+        absolute.T @ stiffness_terms @ absolute,
+        absolute.T @ damping_terms @ absolute,
         basis.T @ mass @ basis,
         basis.T @ damping @ basis,
         basis.T @ stiffness @ basis,
@@ -189,31 +208,3 @@ def reduce(instant: Instant) -> Reduced:
         state_v @ basis,
         state_z,
     )
-
-
-def normalised(reduced: Reduced) -> tuple[np.ndarray, np.ndarray]:
-    """Return (L, K') with K' = L^T K L the stiffness in coordinates of unit mass.
-
-    Raises
-    ------
-    SingularModelError
-        If a free motion has no inertia.
-    """
-    values, vectors = np.linalg.eigh(0.5 * (reduced.mass + reduced.mass.T))
-    if values.size and values[0] <= 1e-14 * max(values[-1], 1e-300):
-        raise SingularModelError("a motion left free by the constraints has no inertia")
-    scale = vectors / np.sqrt(values)
-    return scale, scale.T @ reduced.stiffness @ scale
-
-
-def noise(reduced: Reduced, scale: np.ndarray) -> float:
-    """Return the rounding error of a normalised stiffness, 1/s^2."""
-    return 1e-14 * reduced.stiffness_size * float(np.abs(scale).max(initial=0.0)) ** 2
-
-
-def free_directions(stiffness: np.ndarray, rounding: float = 0.0) -> np.ndarray:
-    """Return an orthonormal basis of the directions a normalised stiffness matrix does not resist."""
-    if not stiffness.size:
-        return np.zeros((0, 0))
-    _, values, right = np.linalg.svd(stiffness)
-    return right[values <= max(NULL_TOLERANCE * values[0], rounding, SLOWEST**2)].T

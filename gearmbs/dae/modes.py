@@ -13,18 +13,20 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import eig
 
-from gearmbs.dae.linearised import Instant, Reduced, free_directions, noise, normalised, reduce
+from gearmbs.dae.linearised import Instant, reduce
+from gearmbs.dae.spectrum import spectrum
 
 if TYPE_CHECKING:
     from gearmbs.dae.system import System
 
 RIGID, OSCILLATING, REAL = "rigid", "oscillating", "real"
 REAL_TOLERANCE = 1e-9
+GROWTH_TOLERANCE = 1e-8
+"""Rounding of a real part, of the eigenvalue's own magnitude, that does not count as growth."""
 
 
-@dataclass
+@dataclass(repr=False)
 class Modes:
     """Eigenvalues and mode shapes; one entry for each conjugate pair, real eigenvalue or rigid motion.
 
@@ -53,11 +55,12 @@ class Modes:
     @property
     def stable(self) -> bool:
         """True when no mode grows; rigid motions count as stable."""
-        size = np.abs(self.eigenvalues).max(initial=0.0)
-        return bool(np.all(self.eigenvalues.real <= REAL_TOLERANCE * max(size, 1e-300)))
+        return bool(np.all(self.eigenvalues.real <= GROWTH_TOLERANCE * np.abs(self.eigenvalues)))
 
     def table(self) -> str:
         """Return the modes as text: number, kind, frequency, damping ratio, eigenvalue, body that moves most."""
+        if not len(self):
+            return "no modes: there are no degrees of freedom and no states"
         lines = [f"{'mode':>4}  {'kind':<11} {'frequency/Hz':>14} {'damping':>11}  {'eigenvalue/(rad/s)':<30} largest"]
         for k, s in enumerate(self.eigenvalues):
             body = self.body_names[int(np.argmax(np.abs(self.shapes[k]).max(axis=1)))]
@@ -66,19 +69,28 @@ class Modes:
                 f"{k + 1:>4}  {self.kinds[k]:<11} {self.frequencies[k]:>14.8g} {self.damping_ratios[k]:>11.4g}  "
                 f"{value:<30} {body}"
             )
-        if not self.eigenvalues.size:
-            lines.append("   none: all motion is prescribed")
         return "\n".join(lines)
 
     def __len__(self) -> int:
         return self.eigenvalues.size
+
+    def __str__(self) -> str:
+        return self.table()
+
+    def __repr__(self) -> str:
+        counts = {kind: self.kinds.count(kind) for kind in (RIGID, OSCILLATING, REAL)}
+        parts = ", ".join(f"{n} {kind}" for kind, n in counts.items() if n) or "none"
+        moving = self.frequencies[self.frequencies > 0.0]
+        span = f", {moving.min():.6g} to {moving.max():.6g} Hz" if moving.size else ""
+        return f"Modes({parts}{span}, {'stable' if self.stable else 'unstable'})"
 
 
 def linear_modes(system: System) -> Modes:
     """Return the linear modes of a system at its present pose and velocity, time functions frozen at ``system.t0``.
 
     At a position of equilibrium they are the small vibrations. Elsewhere they are the instantaneous eigenvalues
-    with the loads' own changes; of a moving point the coefficients are frozen.
+    with the loads' own changes; of a moving point the coefficients are frozen. Without degrees of freedom and states
+    there are none.
 
     Raises
     ------
@@ -90,52 +102,25 @@ def linear_modes(system: System) -> Modes:
     instant = Instant(system, "I3")
     instant.y = instant.settle(instant.y)
     reduced = reduce(instant)
-    scale, stiffness = normalised(reduced)
-    n, states = stiffness.shape[0], reduced.state_state.shape[0]
-    damping = scale.T @ reduced.damping @ scale
-    free = free_directions(stiffness, noise(reduced, scale))
-    values, vectors = _eigen(reduced, scale, stiffness, damping)
-    damped = np.linalg.norm(damping @ free, axis=0) > 1e-10 * max(np.abs(damping).max(initial=0.0), 1e-300)
-    zeros = 2 * free.shape[1] - int(damped.sum())
-    if states and free.shape[1]:
-        zeros = min(zeros, int(np.sum(np.abs(values) <= 1e-6 * np.abs(values).max(initial=0.0))))
-    order = np.argsort(np.abs(values), kind="stable")[zeros:]
-    values, vectors = values[order], vectors[:, order]
+    found = spectrum(reduced)
+    values, vectors = found.values, found.vectors
     kept = values.imag >= -REAL_TOLERANCE * np.abs(values)
     values, vectors = values[kept], vectors[:, kept]
     real = np.abs(values.imag) <= REAL_TOLERANCE * np.abs(values)
     values = np.where(real, values.real + 0j, values)
-    eigenvalues = np.concatenate([np.zeros(free.shape[1], dtype=complex), values])
-    motions = np.hstack([free.astype(complex), vectors[:n]])
-    kinds = [RIGID] * free.shape[1] + [REAL if r else OSCILLATING for r in real]
+    rigid, held = found.rigid.shape[1], found.held.shape[1]
+    eigenvalues = np.concatenate([np.zeros(rigid + held, dtype=complex), values])
+    motions = np.hstack([found.rigid.astype(complex), found.held.astype(complex), vectors])
     size = np.abs(eigenvalues)
-    ratios = np.divide(-eigenvalues.real, size, out=np.zeros(size.size), where=size > 0.0)
+    ratios = np.divide(-eigenvalues.real, size, out=np.zeros(size.size), where=size > 0.0) + 0.0
     return Modes(
         eigenvalues,
         size / (2.0 * np.pi),
         ratios,
-        kinds,
-        _unit(instant.spatial(reduced.basis @ scale @ motions)),
+        [RIGID] * rigid + [REAL] * held + [REAL if r else OSCILLATING for r in real],
+        _unit(instant.spatial(reduced.basis @ motions)),
         system.body_names,
     )
-
-
-def _eigen(reduced: Reduced, scale: np.ndarray, stiffness: np.ndarray, damping: np.ndarray):
-    """Solve the first-order eigenproblem with time scaled so that stiffness and rates are of one size."""
-    n, states = stiffness.shape[0], reduced.state_state.shape[0]
-    rate = np.sqrt(np.abs(stiffness).max(initial=0.0)) or 1.0
-    first = np.zeros((2 * n + states, 2 * n + states))
-    first[:n, n : 2 * n] = np.eye(n)
-    first[n : 2 * n, :n] = -stiffness / rate**2
-    first[n : 2 * n, n : 2 * n] = -damping / rate
-    first[n : 2 * n, 2 * n :] = -scale.T @ reduced.state_force / rate**2
-    first[2 * n :, :n] = reduced.state_position @ scale / rate
-    first[2 * n :, n : 2 * n] = reduced.state_velocity @ scale
-    first[2 * n :, 2 * n :] = reduced.state_state / rate
-    if not first.size:
-        return np.zeros(0, dtype=complex), np.zeros((0, 0), dtype=complex)
-    values, vectors = eig(first)
-    return values * rate, vectors
 
 
 def _unit(shapes: np.ndarray) -> np.ndarray:

@@ -20,7 +20,8 @@ from scipy.sparse import block_diag, csc_array, diags_array
 from scipy.sparse.linalg import splu
 
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
-from gearmbs.dae.linearised import Instant, free_directions, noise, normalised, reduce
+from gearmbs.dae.linearised import Instant, reduce
+from gearmbs.dae.spectrum import free_motions
 from gearmbs.dae.standstill import Snapshot, Standstill
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ FARTHEST = 1e6
 DENSE_LIMIT = 600
 
 
-@dataclass
+@dataclass(repr=False)
 class StaticResult:
     """A position of equilibrium.
 
@@ -79,6 +80,29 @@ class StaticResult:
     def orientation(self, body: str) -> np.ndarray:
         """Return the rotation matrix of a body, shape (3, 3)."""
         return self.pose[self._index(body), 3:12].reshape(3, 3)
+
+    def table(self) -> str:
+        """Return the equilibrium as text: how good and stable it is, where the bodies are, what joints carry."""
+        lines = [repr(self), f"{'body':<24} {'x/m':>12} {'y/m':>12} {'z/m':>12}"]
+        for name, row in zip(self.body_names, self.pose):
+            lines.append(f"{name:<24} " + " ".join(f"{value + 0.0:>12.6g}" for value in row[0:3]))
+        for title, table in (("joint", self.reactions), ("load", self.loads)):
+            if table:
+                lines.append(f"{title:<24} {'force/N':>12} {'moment/N m':>12}")
+            for name, (force, moment) in table.items():
+                lines.append(f"{name:<24} {np.linalg.norm(force):>12.6g} {np.linalg.norm(moment):>12.6g}")
+        return "\n".join(lines)
+
+    def __str__(self) -> str:
+        return self.table()
+
+    def __repr__(self) -> str:
+        known = {True: "stable", False: "unstable", None: "stability not examined"}[self.stable]
+        neutral = f", free to move: {', '.join(self.neutral)}" if self.neutral else ""
+        return (
+            f"StaticResult({len(self.body_names)} bodies at t = {self.t:g} s, {known}{neutral}; "
+            f"{self.iterations} iterations, residual {self.residual:.1e})"
+        )
 
     def _index(self, body: str) -> int:
         if body not in self.body_names:
@@ -263,7 +287,7 @@ class Relaxation:
         """Say which body is free to move, or where forces do not balance."""
         names, n = self.instant.system.body_names, self.coordinates
         if n <= DENSE_LIMIT:
-            _, motion = _unresisted(self.instant)
+            _, motion = free_motions(reduce(self.instant))
             driven = motion @ (motion.T @ rest[:n])
             if np.abs(driven).max(initial=0.0) > 0.0:
                 shape = self.instant.spatial(driven[:, None])[0]
@@ -292,20 +316,6 @@ def describe(shape: np.ndarray, names: list[str], length: float) -> tuple[str, s
     return names[body], f"{'rotation about' if turning else 'translation along'} ({text})"
 
 
-def _unresisted(instant: Instant) -> tuple[bool, np.ndarray]:
-    """Return whether all other motions are stable, and the motions of (R, theta) without stiffness."""
-    reduced = reduce(instant)
-    if not reduced.basis.shape[1]:
-        return True, np.zeros((reduced.basis.shape[0], 0))
-    try:
-        scale, stiffness = normalised(reduced)
-    except SingularModelError:
-        scale, stiffness = np.eye(reduced.mass.shape[0]), reduced.stiffness
-    values = np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))
-    stable = bool(values[0] >= -1e-9 * max(np.abs(values).max(), 1e-300))
-    return stable, reduced.basis @ scale @ free_directions(stiffness, noise(reduced, scale))
-
-
 def _result(instant: Instant, iterations: int, size: float) -> StaticResult:
     system = instant.system
     solution = Standstill.of([Snapshot.of(instant)], f"static equilibrium found in {iterations} iterations", iterations)
@@ -315,7 +325,7 @@ def _result(instant: Instant, iterations: int, size: float) -> StaticResult:
     neutral: list[str] = []
     stable = None
     if 6 * len(system.body_names) <= DENSE_LIMIT:
-        stable, motion = _unresisted(instant)
+        stable, motion = free_motions(reduce(instant))
         shapes = instant.spatial(motion)
         neutral = list(dict.fromkeys(describe(s, system.body_names, system.length)[0] for s in shapes))
     return StaticResult(

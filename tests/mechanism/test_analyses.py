@@ -171,13 +171,98 @@ def test_free_body_has_six_rigid_modes():
     assert np.all(found.frequencies == 0.0)
 
 
-def test_driven_mechanism_has_no_modes():
-    m = Mechanism("driven")
-    wheel = m.body("wheel", 1.0, (1, 1, 1))
-    m.rotation("drive", m.revolute("pin", wheel, m.ground), "3*TIME")
-    modes = linear_modes(m)
-    assert len(modes) == 0
-    assert "none" in modes.table()
+@pytest.mark.parametrize("stiffness", [1e6, 1e9, 1e12])
+def test_a_slow_mode_is_found_beside_fast_ones(stiffness):
+    """A pendulum and 10 g on a bushing of up to 1.6 MHz: a ratio of the squares of 1e13."""
+    m = pendulum(0.0)
+    small = m.body("small", 0.01, (1e-6,) * 3, position=(1, 0, 0))
+    here, there = small.marker(name="here"), m.ground.marker((1, 0, 0), name="there")
+    m.bushing("seat", here, there, stiffness=[stiffness] * 3, torsional_stiffness=[1e-4 * stiffness] * 3)
+    found = linear_modes(m)
+    # omega^2 = m g l / (m l^2 + J), k / m, kt / J = 1e-4 k / 1e-6
+    slow = np.sqrt(1.5 * G * 0.8 / (1.5 * 0.64 + 0.02))
+    fast = np.sqrt(100.0 * stiffness)
+    assert found.eigenvalues == pytest.approx([1j * slow] + [1j * fast] * 6, rel=1e-9)
+    assert found.kinds == ["oscillating"] * 7
+    assert found.stable
+
+
+def cantilever(count: int, rotary: float, *, held: bool) -> tuple[Mechanism, float]:
+    """A steel bar of 1 m x 10 mm x 20 mm as beams between lumps; EI of the easy direction."""
+    modulus, b, h = 2.1e11, 0.01, 0.02
+    area, easy, hard = b * h, h * b**3 / 12, b * h**3 / 12
+    m = Mechanism("bar")
+    before = m.ground.marker(name="root") if held else None
+    for k in range(count):
+        mass = 7800 * area / count * (0.5 if k == count - 1 else 1.0)
+        lump = m.body(f"lump{k}", mass, (rotary,) * 3, position=((k + 1) / count, 0, 0))
+        here = lump.marker(name=f"m{k}")
+        if before is not None:
+            moments = (0.229 * h * b**3, hard, easy)
+            sizes = {"length": 1 / count, "area": area, "second_moments": moments}
+            m.beam(f"beam{k}", here, before, modulus=modulus, shear_modulus=8e10, **sizes)
+        before = here
+    return m, float(np.sqrt(modulus * easy / (7800 * area)))
+
+
+@pytest.mark.parametrize("rotary", [1e-6, 1e-9, 1e-12])
+def test_cantilever_of_beams_has_no_rigid_mode(rotary):
+    """The lumps' rotary inertia makes modes of up to 90 MHz beside the first bending mode of 8.4 Hz."""
+    m, wave = cantilever(20, rotary, held=True)
+    found = linear_modes(m)
+    assert found.kinds == ["oscillating"] * 120
+    # Euler and Bernoulli: omega = (1.8751 / l)^2 sqrt(EI / rho A); twice that in the other direction (h = 2 b);
+    # 20 lumps are off by their (1 / 20)^2
+    first = 1.8751**2 * wave / (2 * np.pi)
+    assert found.frequencies[:2] == pytest.approx([first, 2 * first], rel=2.5e-3)
+    assert found.stable
+
+
+def test_free_bar_of_beams_has_six_rigid_modes():
+    m, wave = cantilever(20, 1e-9, held=False)
+    found = linear_modes(m)
+    assert found.kinds == ["rigid"] * 6 + ["oscillating"] * 114
+    # free-free: (4.7300 / l)^2, a bar of 19 intervals with a light end
+    assert found.frequencies[6] == pytest.approx(4.73**2 * wave / (2 * np.pi), rel=0.06)
+
+
+def test_rigid_motions_of_damped_and_joined_bodies():
+    m = Mechanism("pair")
+    a = m.body("a", 1.0, (0.1,) * 3)
+    b = m.body("b", 2.0, (0.1,) * 3, position=(1, 0, 0))
+    i, j = b.marker((-0.5, 0, 0), name="i"), a.marker((0.5, 0, 0), name="j")
+    m.bushing("link", i, j, stiffness=(6e8, 0, 0), damping=(0, 0, 0))
+    m.bushing("oil", a.marker(name="k"), m.ground.marker(name="l"), damping=(0, 0.3, 0))
+    found = linear_modes(m)
+    # stretching: omega^2 = k (1/m_a + 1/m_b) = 9e8; oil: c / m_a = 0.3; all other eleven motions are free
+    assert found.kinds == ["rigid"] * 11 + ["real", "oscillating"]
+    assert found.eigenvalues[-2:] == pytest.approx([-0.3, 30000j], rel=1e-9)
+
+
+def test_spin_of_rounding_size_is_none():
+    """A released body that turns at 1e-15 rad/s is as free as one at rest."""
+    m = Mechanism("released", gravity=(0, 0, -G))
+    m.body("b", 1.0, (0.1, 0.2, 0.25), velocity=(0, 0, -3), angular_velocity=(1e-15, 3e-15, 0))
+    assert linear_modes(m).kinds == ["rigid"] * 6
+
+
+def test_no_degrees_of_freedom_no_modes():
+    found = linear_modes(four_bar())
+    assert len(found) == 0
+    assert found.shapes.shape == (0, 3, 6)
+    assert found.stable
+    assert "no modes" in str(found)
+
+
+def test_results_print_what_they_hold():
+    rest = static_equilibrium(hanging())
+    assert "stable" in repr(rest)
+    assert len(repr(rest)) < 120
+    assert "block" in str(rest)
+    assert "-0.0981" in str(rest)
+    modes = linear_modes(hanging())
+    assert str(modes) == modes.table()
+    assert repr(modes) == "Modes(1 oscillating, 1.59155 to 1.59155 Hz, stable)"
 
 
 def test_filter_state_adds_its_eigenvalue():

@@ -186,6 +186,25 @@ def test_coupler_is_a_gear():
     np.testing.assert_allclose(solution.angular_velocity("two")[-1, 2], -4.0, rtol=1e-7)
 
 
+def test_energy_balance_of_a_conservative_mechanism():
+    """Nothing works on a pendulum: its imbalance is held against the exchanged energy, m g (z_max - z_min)."""
+    m = Mechanism("pendulum", gravity=(0, 0, -9.81))
+    rod = m.body("rod", 1.0, (0.1, 0.1, 0.1), position=(0.5, 0, 0))
+    m.revolute("pin", rod, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+    solution = m.simulate(2.0, rate=500, tol=1e-8)
+    balance = solution.energy_balance()
+    exchanged = 9.81 * np.ptp(solution.position("rod")[:, 2])
+    expected = float(np.abs(balance.imbalance).max()) / exchanged
+    assert balance.attrs["relative_imbalance"] == pytest.approx(expected, rel=1e-3)
+    assert balance.attrs["relative_imbalance"] < 1e-6
+
+
+def test_energy_balance_of_a_body_at_rest_is_no_number():
+    m = Mechanism("rest")
+    m.body("block", 1.0, (0.1, 0.1, 0.1))
+    assert np.isnan(m.simulate(0.1).energy_balance().attrs["relative_imbalance"])
+
+
 def test_energy_balance_of_a_driven_oscillator():
     m = Mechanism("driven", gravity=(0, 0, -9.81))
     arm = m.body("arm", 1.0, (0.1, 0.1, 0.1), position=(0.5, 0, 0))
