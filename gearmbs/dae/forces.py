@@ -13,6 +13,7 @@ from gearmbs.dae import tables as T
 from gearmbs.dae.linkage import contact_at
 from gearmbs.dae.rotation import KIN_R, KIN_V, KIN_W
 from gearmbs.dae.terms import cross3
+from gearmbs.dae.views import matrix_at, vector_at
 
 TORQUE = 0
 """Torque f(t) about the z axis of marker RM."""
@@ -49,28 +50,28 @@ def torque(row, fval, frame, wrench):
 def contact_wrench(row, tab, wrench, jac, diag, want_jac):
     """Evaluate a gear contact on the frames of its two markers; columns of ``jac`` are the markers' variations."""
     i, j = row[T.FORCE_I], row[T.FORCE_J]
-    first = tab.scratch[row[T.FORCE_WORK] : row[T.FORCE_WORK] + 18]
-    second = tab.scratch[row[T.FORCE_WORK] + 18 : row[T.FORCE_WORK] + 36]
+    work = row[T.FORCE_WORK]
+    first, second = vector_at(tab.scratch, work, 18), vector_at(tab.scratch, work + 18, 18)
     marker_pose(i, tab.marker_body, tab.kin, tab.frame, first)
     marker_pose(j, tab.marker_body, tab.kin, tab.frame, second)
     gi0, gr0 = row[T.FORCE_IEXTRA], row[T.FORCE_REXTRA]
     ni, nr = tab.extra_i[gi0], tab.extra_i[gi0 + 1]
     contact_at(tab.address[linkage.CONTACT])(
-        tab.extra_i[gi0 + 2 : gi0 + 2 + ni],
-        tab.extra_r[gr0 : gr0 + nr],
-        first[0:3],
-        first[3:12].reshape(3, 3),
-        first[12:15],
-        first[15:18],
-        second[0:3],
-        second[3:12].reshape(3, 3),
-        second[12:15],
-        second[15:18],
+        vector_at(tab.extra_i, gi0 + 2, ni),
+        vector_at(tab.extra_r, gr0, nr),
+        vector_at(first, 0, 3),
+        matrix_at(first, 3, 3, 3),
+        vector_at(first, 12, 3),
+        vector_at(first, 15, 3),
+        vector_at(second, 0, 3),
+        matrix_at(second, 3, 3, 3),
+        vector_at(second, 12, 3),
+        vector_at(second, 15, 3),
         wrench,
         jac,
         diag,
         want_jac,
-        tab.scratch[row[T.FORCE_WORK] + 36 :],
+        vector_at(tab.scratch, work + 36, tab.scratch.size - work - 36),
     )
 
 
@@ -98,7 +99,7 @@ def shift_to_body(m, marker_body, kin, frame, jac, first):
         jac[r, first + 11] += sx * vy - sy * vx
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def element_wrench(row, t, y, tab, wrench, jac, diag, want_jac):
     """Fill F in ``wrench[0:3]`` and N in ``wrench[3:6]`` and, if wanted, their derivatives in ``jac``.
 

@@ -31,6 +31,7 @@ from gearmbs.dae.rotation import (
     momentum_from_conjugate,
 )
 from gearmbs.dae.simple_terms import dot_motion, point_motion
+from gearmbs.dae.views import matrix_at, vector_at
 
 """Per force element: F, N, then eight diagnostics of a contact."""
 FORCE_RECORD = 14
@@ -150,7 +151,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
     mode = idata[T.H_MODE]
     bodies, rows = idata[T.H_BODIES], idata[T.H_ROWS]
     base = 6 * (bodies - 1)
-    s = tab.scratch[S_TERM : S_TERM + 100]
+    s = vector_at(tab.scratch, S_TERM, 100)
     for c in range(rhs.size):
         rhs[c] = 0.0
     k = np.int64(0)
@@ -167,8 +168,8 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
             for d in range(3):
                 k = put(mode, slot, vals, k, i + 3 + d, i + 3 + c, s[3 + d])
         terms.cross3(kin, KIN_H, kin, KIN_W, rhs, i + 3)
-    g = tab.scratch[S_GRADIENT : S_GRADIENT + 12]
-    gt = tab.scratch[S_GRADIENT_T : S_GRADIENT_T + 12]
+    g = vector_at(tab.scratch, S_GRADIENT, 12)
+    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
     for r in range(rows):
         value, rate, partial, gamma = 0.0, 0.0, 0.0, 0.0
         if tab.row[r, T.ROW_FUNCTION] >= 0:
@@ -219,12 +220,12 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
         rhs[base + r] = -gamma
         phi[3 * r], phi[3 * r + 1], phi[3 * r + 2] = value, rate, partial
     if mode == NUMBERS and with_loads != 0:
-        wrench = tab.scratch[S_WRENCH : S_WRENCH + 6]
-        diag = tab.scratch[S_DIAG : S_DIAG + 8]
+        wrench = vector_at(tab.scratch, S_WRENCH, 6)
+        diag = vector_at(tab.scratch, S_DIAG, 8)
         for f in range(idata[T.H_FORCES]):
             row = tab.force[f]
             width = row[T.FORCE_WIDTH]
-            jac = tab.scratch[T.SCRATCH_FIXED : T.SCRATCH_FIXED + 6 * width].reshape(6, width)
+            jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, width)
             for c in range(8):
                 diag[c] = 0.0
             if row[T.FORCE_KIND] == REACTION:
@@ -255,9 +256,9 @@ def loads_of_rows(multipliers, idata, tab, force, moment):
     The kinematics tables must be up to date. Of a row that couples several joints, the part that acts through the
     first one's marker I.
     """
-    g = tab.scratch[S_GRADIENT : S_GRADIENT + 12]
-    gt = tab.scratch[S_GRADIENT_T : S_GRADIENT_T + 12]
-    s = tab.scratch[S_TERM : S_TERM + 100]
+    g = vector_at(tab.scratch, S_GRADIENT, 12)
+    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
+    s = vector_at(tab.scratch, S_TERM, 100)
     for r in range(idata[T.H_ROWS]):
         for c in range(3):
             force[r, c] = 0.0
@@ -325,9 +326,9 @@ def violations(t, y, phi, idata, tab):
 
     The kinematics, marker and function tables must be up to date.
     """
-    g = tab.scratch[S_GRADIENT : S_GRADIENT + 12]
-    gt = tab.scratch[S_GRADIENT_T : S_GRADIENT_T + 12]
-    s = tab.scratch[S_TERM : S_TERM + 100]
+    g = vector_at(tab.scratch, S_GRADIENT, 12)
+    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
+    s = vector_at(tab.scratch, S_TERM, 100)
     for r in range(idata[T.H_ROWS]):
         value, rate = 0.0, 0.0
         if tab.row[r, T.ROW_FUNCTION] >= 0:

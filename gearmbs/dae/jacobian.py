@@ -27,6 +27,7 @@ from gearmbs.dae.residual import (
     arm_to,
 )
 from gearmbs.dae.rotation import KIN_ADOT, KIN_AXES, KIN_DW, KIN_H
+from gearmbs.dae.views import matrix_at, vector_at
 
 NUMBERS, PLACES, COUNT = 0, 1, 2
 
@@ -44,7 +45,7 @@ def put(mode, slot, vals, k, row, col, value):
     return k + 1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def body_entries(mode, b, cj, idata, tab, slot, vals, k):
     """Entries of one body's inertia terms in eq. (5) and (6)."""
     i = 3 * (b - 1)
@@ -56,7 +57,7 @@ def body_entries(mode, b, cj, idata, tab, slot, vals, k):
         idata[T.H_THETA] + i,
     )
     kin = tab.kin[b]
-    s = tab.scratch[S_TERM : S_TERM + 100]
+    s = vector_at(tab.scratch, S_TERM, 100)
     mass = tab.body[b, T.BODY_MASS]
     # J a_k in s[0:9], J adot_k in s[9:18], dh/dtheta_m = a_m x h + J adot_m in s[18:27]
     for m in range(3):
@@ -97,7 +98,7 @@ def body_entries(mode, b, cj, idata, tab, slot, vals, k):
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
     """Entries of one constraint row, its derivative, and the forces of its multipliers."""
     form = idata[T.H_FORMULATION]
@@ -111,11 +112,11 @@ def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
         mu_value = y[mu]
     elif form == T.SI1:
         mu_value = yp[mu]
-    g = tab.scratch[S_GRADIENT : S_GRADIENT + 12]
-    gt = tab.scratch[S_GRADIENT_T : S_GRADIENT_T + 12]
-    s = tab.scratch[S_TERM : S_TERM + 100]
-    hess = tab.scratch[S_HESSIAN : S_HESSIAN + 144].reshape(12, 12)
-    w = tab.scratch[S_VECTOR : S_VECTOR + 12]
+    g = vector_at(tab.scratch, S_GRADIENT, 12)
+    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
+    s = vector_at(tab.scratch, S_TERM, 100)
+    hess = matrix_at(tab.scratch, S_HESSIAN, 12, 12)
+    w = vector_at(tab.scratch, S_VECTOR, 12)
     for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
         coef = tab.coef[j]
         terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
@@ -280,7 +281,7 @@ def load_entries(mode, b, sign, row, y, idata, tab, slot, vals, k):
     kin = tab.kin[b]
     point = row[T.FORCE_I]
     owner = tab.marker_body[point]
-    s = tab.scratch[S_VECTOR : S_VECTOR + 30]
+    s = vector_at(tab.scratch, S_VECTOR, 30)
     for c in range(3):
         s[3 + c] = 0.0
         s[6 + c] = 0.0
@@ -328,20 +329,20 @@ def load_entries(mode, b, sign, row, y, idata, tab, slot, vals, k):
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k):
     """Entries of the rows F - F(q, q', t) and N - N(q, q', t) of one force element."""
-    wrench = tab.scratch[S_WRENCH : S_WRENCH + 6]
-    diag = tab.scratch[S_DIAG : S_DIAG + 8]
+    wrench = vector_at(tab.scratch, S_WRENCH, 6)
+    diag = vector_at(tab.scratch, S_DIAG, 8)
     width = row[T.FORCE_WIDTH]
-    jac = tab.scratch[T.SCRATCH_FIXED : T.SCRATCH_FIXED + 6 * width].reshape(6, width)
+    jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, width)
     depends = row[T.FORCE_DEPENDS]
     bodies = tab.extra_i[depends]
     if row[T.FORCE_KIND] == REACTION:
         si1 = idata[T.H_FORMULATION] == T.SI1
         source = yp if si1 else y
         lam = idata[T.H_LAMBDA]
-        room = tab.scratch[0:64]
+        room = vector_at(tab.scratch, 0, 64)
         reaction_wrench(row, source[lam : lam + idata[T.H_ROWS]], lam, tab, room, wrench, jac, np.int64(1))
         if si1:
             for c in range(12 * bodies, width):

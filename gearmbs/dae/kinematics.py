@@ -18,6 +18,7 @@ from gearmbs.dae.rotation import (
     rotation_matrix,
 )
 from gearmbs.dae.terms import dot3
+from gearmbs.dae.views import vector_at
 
 
 @njit(
@@ -87,8 +88,8 @@ def update_functions(t, tab):
             row = tab.tape[at]
             i, r = row[T.TAPE_I], row[T.TAPE_R]
             time_at(tab.address[linkage.TIME])(
-                tab.extra_i[i : i + row[T.TAPE_I_SIZE]],
-                tab.extra_r[r : r + row[T.TAPE_R_SIZE]],
+                vector_at(tab.extra_i, i, row[T.TAPE_I_SIZE]),
+                vector_at(tab.extra_r, r, row[T.TAPE_R_SIZE]),
                 t,
                 tab.fval[k],
                 tab.tape_work,

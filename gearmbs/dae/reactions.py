@@ -16,6 +16,7 @@ from numba import njit
 
 from gearmbs.dae import tables as T
 from gearmbs.dae import tapes, terms
+from gearmbs.dae.views import matrix_at, vector_at
 
 REACTION = 3
 """Kind of the element, next to those of `gearmbs.dae.forces`."""
@@ -151,13 +152,13 @@ def reaction_wrench(row, multipliers, first_multiplier, tab, room, wrench, jac, 
 def renew_reactions(y, multipliers, idata, tab):
     """Put the reactions that belong to ``multipliers`` into y; return the largest relative change."""
     change, size = 0.0, 1e-9
-    room, wrench = tab.scratch[0:64], tab.scratch[64:70]
+    room, wrench = vector_at(tab.scratch, 0, 64), vector_at(tab.scratch, 64, 6)
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]
         if row[T.FORCE_KIND] != REACTION:
             continue
         width = row[T.FORCE_WIDTH]
-        jac = tab.scratch[T.SCRATCH_FIXED : T.SCRATCH_FIXED + 6 * width].reshape(6, width)
+        jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, width)
         reaction_wrench(row, multipliers, idata[T.H_LAMBDA], tab, room, wrench, jac, np.int64(0))
         for c in range(6):
             at = row[T.FORCE_F] + c if c < 3 else row[T.FORCE_N] + c - 3

@@ -26,6 +26,7 @@ from gearmbs.dae.rotation import (
     rotation_matrix,
 )
 from gearmbs.dae.terms import ANGLE, dot3, gradient
+from gearmbs.dae.views import vector_at
 
 
 @njit(cache=True, error_model="numpy")
@@ -76,9 +77,18 @@ def track(t, y, tab, moving):
     for k in range(n):
         if tab.term[k, T.TERM_TYPE] == ANGLE:
             bi, bj = tab.marker_body[tab.term[k, T.TERM_I]], tab.marker_body[tab.term[k, T.TERM_J]]
-            g, gt = tab.scratch[0:12], tab.scratch[12:24]
+            g, gt = vector_at(tab.scratch, 0, 12), vector_at(tab.scratch, 12, 12)
             angle, _ = gradient(
-                k, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, tab.scratch[24:], g, gt
+                k,
+                tab.term,
+                tab.fval,
+                tab.reference,
+                tab.marker_body,
+                tab.kin,
+                tab.frame,
+                vector_at(tab.scratch, 24, tab.scratch.size - 24),
+                g,
+                gt,
             )
             rate = 0.0
             for c in range(3):
@@ -97,7 +107,7 @@ def hook(t, hist, npast, idata, rdata, work):
     """
     tab = T.unpack(idata, rdata, work)
     th = idata[T.H_THETA]
-    s = tab.scratch[0:24]
+    s = vector_at(tab.scratch, 0, 24)
     told = KEPT
     for b in range(1, idata[T.H_BODIES]):
         k = 3 * (b - 1)

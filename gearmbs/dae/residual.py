@@ -29,6 +29,7 @@ from gearmbs.dae.kinematics import euler_component, update_tables
 from gearmbs.dae.problem import RESIDUAL_SIG
 from gearmbs.dae.reactions import REACTION, reaction_wrench
 from gearmbs.dae.rotation import KIN_ADOT, KIN_AXES, KIN_H, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.views import matrix_at, vector_at
 
 S_GRADIENT = 0
 S_GRADIENT_T = 12
@@ -157,9 +158,9 @@ def add_constraints(t, y, yp, idata, tab, out):
     form = idata[T.H_FORMULATION]
     u0, p0, r0, t0 = idata[T.H_U], idata[T.H_P], idata[T.H_R], idata[T.H_THETA]
     lam0, mu0 = idata[T.H_LAMBDA], idata[T.H_MU]
-    g = tab.scratch[S_GRADIENT : S_GRADIENT + 12]
-    gt = tab.scratch[S_GRADIENT_T : S_GRADIENT_T + 12]
-    s = tab.scratch[S_TERM : S_TERM + 100]
+    g = vector_at(tab.scratch, S_GRADIENT, 12)
+    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
+    s = vector_at(tab.scratch, S_TERM, 100)
     for r in range(idata[T.H_ROWS]):
         value, rate = 0.0, 0.0
         if tab.row[r, T.ROW_FUNCTION] >= 0:
@@ -238,16 +239,16 @@ def residual(t, y, yp, out, idata, rdata, work):
             out[r0 + k + c] = y[u0 + k + c] - yp[r0 + k + c]
             out[t0 + k + c] = y[e0 + k + c] - yp[t0 + k + c]
     add_constraints(t, y, yp, idata, tab, out)
-    wrench = tab.scratch[S_WRENCH : S_WRENCH + 6]
-    diag = tab.scratch[S_DIAG : S_DIAG + 8]
-    room = tab.scratch[0:64]
+    wrench = vector_at(tab.scratch, S_WRENCH, 6)
+    diag = vector_at(tab.scratch, S_DIAG, 8)
+    room = vector_at(tab.scratch, 0, 64)
     lam0 = idata[T.H_LAMBDA]
     source = yp if idata[T.H_FORMULATION] == T.SI1 else y
-    multipliers = source[lam0 : lam0 + idata[T.H_ROWS]]
+    multipliers = vector_at(source, lam0, idata[T.H_ROWS])
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]
         width = row[T.FORCE_WIDTH]
-        jac = tab.scratch[T.SCRATCH_FIXED : T.SCRATCH_FIXED + 6 * width].reshape(6, width)
+        jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, width)
         if row[T.FORCE_KIND] == TORQUE:
             # handing over the tables would cost more than the torque
             for c in range(3):

@@ -15,6 +15,7 @@ from numba import njit
 from gearmbs.dae.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.linkage import NAMES, addresses
 from gearmbs.dae.rotation import KIN_COLUMNS
+from gearmbs.dae.views import matrix_at, vector_at
 
 I3 = 0
 SI2 = 1
@@ -172,32 +173,33 @@ def unpack(idata, rdata, work):
     functions = idata[H_FUNCTIONS]
     i = idata
     r = rdata
+    reference = i[H_R_REFERENCE]
     return Tables(
-        i[H_ADDRESS:H_SIZE],
-        i[i[H_I_CODE] : i[H_I_CODE] + bodies],
-        i[i[H_I_MARKER_BODY] : i[H_I_MARKER_BODY] + markers],
-        i[i[H_I_ROW] : i[H_I_ROW] + (rows + 1) * ROW_COLUMNS].reshape(rows + 1, ROW_COLUMNS),
-        i[i[H_I_TERM] : i[H_I_TERM] + terms * TERM_COLUMNS].reshape(terms, TERM_COLUMNS),
-        i[i[H_I_FORCE] : i[H_I_FORCE] + forces * FORCE_COLUMNS].reshape(forces, FORCE_COLUMNS),
-        i[i[H_I_FUNCTION] : i[H_I_FUNCTION] + functions * FUNCTION_COLUMNS].reshape(functions, FUNCTION_COLUMNS),
-        i[i[H_I_EXTRA] : i[H_I_EXTRA] + i[H_N_EXTRA_I]],
-        i[i[H_I_SLOT] : i[H_I_SLOT] + i[H_SLOTS]],
-        i[i[H_I_STATE] : i[H_I_STATE] + i[H_STATES] * STATE_COLUMNS].reshape(i[H_STATES], STATE_COLUMNS),
-        i[i[H_I_TAPE] : i[H_I_TAPE] + i[H_TAPES] * TAPE_COLUMNS].reshape(i[H_TAPES], TAPE_COLUMNS),
-        r[i[H_R_GRAVITY] : i[H_R_GRAVITY] + 3],
-        r[i[H_R_BODY] : i[H_R_BODY] + bodies * BODY_COLUMNS].reshape(bodies, BODY_COLUMNS),
-        r[i[H_R_MARKER] : i[H_R_MARKER] + markers * MARKER_COLUMNS].reshape(markers, MARKER_COLUMNS),
-        r[i[H_R_COEF] : i[H_R_COEF] + terms],
-        r[i[H_R_FUNCTION] : i[H_R_FUNCTION] + i[H_N_FUNCTION_R]],
-        r[i[H_R_EXTRA] : i[H_R_EXTRA] + i[H_N_EXTRA_R]],
-        r[i[H_R_REFERENCE] : i[H_R_REFERENCE] + terms],
-        r[i[H_R_REFERENCE] + terms : i[H_R_REFERENCE] + 3 * terms + 1],
-        r[i[H_R_REFERENCE] + 3 * terms + 1 : i[H_R_REFERENCE] + 3 * (terms + bodies) + 1],
-        work[i[H_W_KIN] : i[H_W_KIN] + bodies * KIN_COLUMNS].reshape(bodies, KIN_COLUMNS),
-        work[i[H_W_MARKER] : i[H_W_MARKER] + markers * MK_COLUMNS].reshape(markers, MK_COLUMNS),
-        work[i[H_W_FUNCTION] : i[H_W_FUNCTION] + 3 * functions].reshape(functions, 3),
-        work[i[H_W_SCRATCH] :],
-        work[i[H_W_TAPE] : i[H_W_TAPE] + i[H_W_TAPE_SIZE]],
+        vector_at(i, H_ADDRESS, H_SIZE - H_ADDRESS),
+        vector_at(i, i[H_I_CODE], bodies),
+        vector_at(i, i[H_I_MARKER_BODY], markers),
+        matrix_at(i, i[H_I_ROW], rows + 1, ROW_COLUMNS),
+        matrix_at(i, i[H_I_TERM], terms, TERM_COLUMNS),
+        matrix_at(i, i[H_I_FORCE], forces, FORCE_COLUMNS),
+        matrix_at(i, i[H_I_FUNCTION], functions, FUNCTION_COLUMNS),
+        vector_at(i, i[H_I_EXTRA], i[H_N_EXTRA_I]),
+        vector_at(i, i[H_I_SLOT], i[H_SLOTS]),
+        matrix_at(i, i[H_I_STATE], i[H_STATES], STATE_COLUMNS),
+        matrix_at(i, i[H_I_TAPE], i[H_TAPES], TAPE_COLUMNS),
+        vector_at(r, i[H_R_GRAVITY], 3),
+        matrix_at(r, i[H_R_BODY], bodies, BODY_COLUMNS),
+        matrix_at(r, i[H_R_MARKER], markers, MARKER_COLUMNS),
+        vector_at(r, i[H_R_COEF], terms),
+        vector_at(r, i[H_R_FUNCTION], i[H_N_FUNCTION_R]),
+        vector_at(r, i[H_R_EXTRA], i[H_N_EXTRA_R]),
+        vector_at(r, reference, terms),
+        vector_at(r, reference + terms, 2 * terms + 1),
+        vector_at(r, reference + 3 * terms + 1, 3 * bodies),
+        matrix_at(work, i[H_W_KIN], bodies, KIN_COLUMNS),
+        matrix_at(work, i[H_W_MARKER], markers, MK_COLUMNS),
+        matrix_at(work, i[H_W_FUNCTION], functions, 3),
+        vector_at(work, i[H_W_SCRATCH], work.size - i[H_W_SCRATCH]),
+        vector_at(work, i[H_W_TAPE], i[H_W_TAPE_SIZE]),
     )
 
 

@@ -7,6 +7,7 @@ from numba import njit
 from gearmbs.dae import linkage
 from gearmbs.dae import tables as T
 from gearmbs.dae.linkage import angle_rates_at, angles_at, gradient_at, second_at, value_at
+from gearmbs.dae.views import vector_at
 
 LINE = 0
 """Force f along the line from J to I."""
@@ -28,9 +29,9 @@ def parts(k, tab):
     row = tab.tape[k]
     i, r, a = row[T.TAPE_I], row[T.TAPE_R], row[T.TAPE_REFERENCE]
     return (
-        tab.extra_i[i : i + row[T.TAPE_I_SIZE]],
-        tab.extra_r[r : r + row[T.TAPE_R_SIZE]],
-        tab.extra_r[a : a + row[T.TAPE_REFERENCE_SIZE]],
+        vector_at(tab.extra_i, i, row[T.TAPE_I_SIZE]),
+        vector_at(tab.extra_r, r, row[T.TAPE_R_SIZE]),
+        vector_at(tab.extra_r, a, row[T.TAPE_REFERENCE_SIZE]),
     )
 
 
@@ -66,7 +67,7 @@ def gradient_size(row):
 @njit(cache=True, error_model="numpy")
 def tail(tab, size):
     """Return ``size`` floats at the end of the tapes' scratch, which the evaluators leave alone."""
-    return tab.tape_work[tab.tape_work.size - size :]
+    return vector_at(tab.tape_work, tab.tape_work.size - size, size)
 
 
 @njit(cache=True, error_model="numpy")
@@ -80,7 +81,7 @@ def update_references(t, y, tab, moving):
             m = ref.size
             a = tab.tape[k, T.TAPE_REFERENCE] + m
             tab.extra_r[a : a + m] = ref
-            rates = tab.extra_r[a + m : a + 2 * m]
+            rates = vector_at(tab.extra_r, a + m, m)
             rates[:] = 0.0
             if moving:
                 grad = tail(tab, gradient_size(tab.tape[k]))
