@@ -101,6 +101,8 @@ def simulate(
             raise ModelError(f"rate = {rate} 1/s; it must be positive")
         count = 500 if rate is None else max(1, round((t_end - t_start) * rate))
         t_eval = t_start + (np.arange(count + 1) / rate if rate else np.linspace(0.0, t_end - t_start, count + 1))
+    # a column of a table is taken apart from it, for the kernels
+    t_eval = np.ascontiguousarray(t_eval, dtype=float)
     if not np.isfinite(tol) or tol <= 0.0:
         raise ModelError(f"tol = {tol}; it must be a positive number")
     name = integrator.upper()

@@ -221,3 +221,12 @@ def test_same_run_twice_is_bit_identical():
     for integrator in INTEGRATORS:
         first, second = (m.simulate(1.0, integrator=integrator).result.y for _ in range(2))
         assert np.array_equal(first, second)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_output_times_may_be_a_column_of_a_table(integrator):
+    m = Mechanism("fall", gravity=(0, 0, -9.81))
+    m.body("stone", 1.0, (0.1, 0.1, 0.1))
+    table = np.column_stack([np.linspace(0.0, 1.0, 5), np.ones(5)])
+    solution = m.simulate(1.0, t_eval=table[:, 0], integrator=integrator)
+    np.testing.assert_allclose(solution.position("stone")[:, 2], -9.81 / 2 * table[:, 0] ** 2, atol=1e-5)

@@ -228,11 +228,21 @@ OPENSIM = "figure of L. Tagliapietra et al., MBS benchmarks in OpenSim, which sh
 GONZALEZ = "F. Gonzalez's submission to the library, as kept with Exudyn"
 MASARATI = "P. Masarati's submission to the library, as kept with Exudyn"
 MASOUDI = "R. Masoudi's submission to the library, as kept with Exudyn"
+LIBRARY = "the library's own A01_solution_data.txt and A02_solution_data.txt, as kept with S. Acuna's simEngine3D"
 BARI = "Test Set for Initial Value Problem Solvers, release 2.4"
 
+
+def _both(table: dict[float, tuple[float, float]]) -> tuple[Published, ...]:
+    """Return x and y of the library's files, which have six digits."""
+    return tuple(Published(t, k, v, 1e-6, LIBRARY) for t, row in table.items() for k, v in enumerate(row))
+
+
 PUBLISHED: dict[str, tuple[Published, ...]] = {
-    "A01": (),
+    "A01": _both({1: (0.986292, -0.165011), 5: (-0.942305, -0.334754), 10: (-0.275087, -0.961419)}),
+    "A01 long": _both({100: (-0.181513, -0.983388), 1000: (0.683230, -0.730203), 2000: (0.814603, -0.580019)}),
     "A02": (Published(10.0, 0, 0.33, 0.02, OPENSIM),),
+    "A02 long": _both({1: (-0.115357, -0.993324), 5: (-0.540191, -0.841543), 10: (0.180513, 0.983573),
+                       20: (0.410902, 0.911679)}),
     "A03": (Published(0.03, 0, 15.81077119624904, 1e-9, BARI),),
     "A04": (Published(2.5, 0, -1.0, 0.01, OPENSIM), Published(10.0, 0, 1.0, 0.01, OPENSIM)),
     "A05": (Published(10.0, 0, 0.62, 0.01, OPENSIM),),
