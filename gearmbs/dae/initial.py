@@ -28,6 +28,10 @@ NEARLY = 1e-4
 CONFLICT = 1e-7
 """Violation of a redundant row, in m or of 1, above which it contradicts the others."""
 MAX_POSITION_ITERATIONS = 50
+VISIBLE = 1e-3
+"""Displacement, of the mechanism's length, from which a correction of the positions is told."""
+
+VISIBLE_TURN = np.radians(0.1)
 DENSE_ROWS = 400
 """Rows up to which redundancy is looked for by a dense factorisation."""
 SURE = 1e-12
@@ -54,6 +58,10 @@ class InitialReport:
         Newton iterations of the assembly.
     largest_correction : float
         Largest displacement (m) or rotation (rad) made to assemble the mechanism.
+    moved, turned : tuple of (str, float)
+        The body moved farthest by the assembly and how far, m; the one turned most and how far, rad.
+    length : float
+        Length of the mechanism, m.
     violation : float
         Largest remaining constraint violation (m or 1).
     """
@@ -63,6 +71,18 @@ class InitialReport:
     position_iterations: int = 0
     largest_correction: float = 0.0
     violation: float = 0.0
+    moved: tuple[str, float] = ("", 0.0)
+    turned: tuple[str, float] = ("", 0.0)
+    length: float = 1.0
+
+    def correction(self) -> str | None:
+        """Return a sentence about a correction of the positions one can see, None when there was none."""
+        parts = []
+        if self.moved[1] > VISIBLE * self.length:
+            parts.append(f"moved body '{self.moved[0]}' by {self.moved[1]:.3g} m")
+        if self.turned[1] > VISIBLE_TURN:
+            parts.append(f"turned body '{self.turned[0]}' by {np.degrees(self.turned[1]):.3g} degrees")
+        return f"To satisfy joints and motions the assembly {' and '.join(parts)} before the start." if parts else None
 
     def __str__(self) -> str:
         lines = [f"degrees of freedom: {self.degrees_of_freedom}"]
@@ -73,6 +93,7 @@ class InitialReport:
             f"assembled in {self.position_iterations} iterations, largest correction "
             f"{self.largest_correction:.3g}, violation {self.violation:.3g}"
         )
+        lines.extend(line for line in (self.correction(),) if line)
         return "\n".join(lines)
 
 
@@ -178,6 +199,8 @@ def assemble_position(system: System, pose: np.ndarray, t: float) -> tuple[np.nd
     """
     weights = system.coordinate_weights()
     jacobian, phi, _ = system.constraint_jacobian(pose, t)
+    if not np.all(np.isfinite(phi)):
+        raise _not_finite(system, phi, t)
     kept = independent_rows(jacobian, weights)
     report = InitialReport(degrees_of_freedom=jacobian.shape[1] - kept.size)
     start = pose
@@ -198,9 +221,23 @@ def assemble_position(system: System, pose: np.ndarray, t: float) -> tuple[np.nd
         raise _conflict(system, dropped, phi)
     report.redundant = [system.row_names[i] for i in dropped]
     report.violation = float(np.abs(phi).max(initial=0.0))
-    report.largest_correction = float(np.abs(pose - start)[:, :12].max(initial=0.0))
+    _note_correction(system, report, start, pose)
     system.keep_rows(kept)
     return pose, report
+
+
+def _note_correction(system: System, report: InitialReport, start: np.ndarray, pose: np.ndarray) -> None:
+    report.length = system.length
+    if not len(pose):
+        return
+    shift = np.linalg.norm(pose[:, 0:3] - start[:, 0:3], axis=1)
+    # |A - A0| = 2 sqrt(2) |sin(angle / 2)|
+    apart = np.linalg.norm(pose[:, 3:12] - start[:, 3:12], axis=1)
+    turn = 2.0 * np.arcsin(np.minimum(apart / np.sqrt(8.0), 1.0))
+    far, most = int(np.argmax(shift)), int(np.argmax(turn))
+    report.moved = (system.body_names[far], float(shift[far]))
+    report.turned = (system.body_names[most], float(turn[most]))
+    report.largest_correction = max(report.moved[1], report.turned[1])
 
 
 def _closed(
@@ -213,7 +250,7 @@ def _closed(
     for iteration in range(MAX_POSITION_ITERATIONS):
         size = float(np.abs(phi[kept]).max(initial=0.0))
         if not np.isfinite(size):
-            raise AssemblyError("the constraint values are not finite: check the markers' positions for NaN")
+            raise _not_finite(system, phi, t)
         if size <= POSITION_TOLERANCE * max(1.0, length):
             return pose, jacobian, phi, iteration
         step = least_correction(csc_array(jacobian[kept]), weights, phi[kept])
@@ -228,6 +265,14 @@ def _closed(
             "check the lengths and the markers of that joint"
         )
     return pose, jacobian, phi, MAX_POSITION_ITERATIONS
+
+
+def _not_finite(system: System, phi: np.ndarray, t: float) -> AssemblyError:
+    """Say which row has no value."""
+    name = system.row_names[int(np.argmin(np.isfinite(phi)))]
+    return AssemblyError(
+        f"{name}: its value at t = {t:.6g} s is not finite; check its function of time and the markers' positions"
+    )
 
 
 def _conflict(system: System, dropped: np.ndarray, phi: np.ndarray) -> AssemblyError:

@@ -74,13 +74,15 @@ class Solution:
 
     @property
     def message(self) -> str:
-        """What happened, when, which unknown, what to try; which constraints were set aside as redundant."""
+        """What happened, when, which unknown, what to try; what the assembly moved; which constraints are redundant."""
         if self._conflict is not None:
             return self._conflict
         parts = [self.result.message]
         if not self.result.success and self.t.size:
             parts.append(self.system.locking(self._pose[-1], float(self.t[-1])) or "")
-        aside = self.system.report.redundant if self.system.report is not None else []
+        report = self.system.report
+        parts.append((report.correction() if report is not None else None) or "")
+        aside = report.redundant if report is not None else []
         if aside:
             parts.append(f"Set aside as redundant: {', '.join(aside)}.")
         return " ".join(part for part in parts if part)

@@ -303,6 +303,7 @@ class System:
         inner: np.ndarray | None = None
         for attempt in range(MAX_LOAD_ITERATIONS if self._coupled() else 1):
             matrix, rhs, _, loads, y, idata, rdata, work = self._evaluate(pose, t, inner)
+            self._check_finite(matrix, rhs, loads, t)
             try:
                 solution = splu(matrix).solve(rhs)
             except RuntimeError:
@@ -316,6 +317,26 @@ class System:
             if last is not None and np.abs(inner - last).max() <= 1e-13 * (1e-3 + np.abs(inner).max()):
                 break
         return solution[:base].reshape(-1, 6), solution[base:], loads, y, idata, rdata, work
+
+    def _check_finite(self, matrix: csc_array, rhs: np.ndarray, loads: np.ndarray, t: float) -> None:
+        """Raise a ModelError that names the load, constraint or body whose terms of the equations are not finite."""
+        bad = ~np.all(np.isfinite(loads[:, :6]), axis=1)
+        if np.any(bad[: len(self.force_names)]):
+            name = self.force_names[int(np.argmax(bad))]
+            element = self.mechanism.elements.get(name) if self.mechanism is not None else None
+            raise ModelError(
+                f"{getattr(element, 'kind', 'load')} '{name}': its value at t = {t:.6g} s is not finite; look for a "
+                f"division by zero, a root or logarithm of a negative number or coinciding markers in {element!r}"
+            )
+        base = matrix.shape[0] - len(self.row_names)
+        wrong = np.flatnonzero(~np.isfinite(rhs))
+        if wrong.size and wrong[-1] >= base:
+            raise ModelError(
+                f"{self.row_names[wrong[-1] - base]}: the derivatives of its function of time at t = {t:.6g} s are not "
+                "finite; let the motion begin smoothly"
+            )
+        if wrong.size:
+            raise ModelError(f"body '{self.body_names[wrong[0] // 6]}': its forces at t = {t:.6g} s are not finite")
 
     def _coupled(self) -> bool:
         """Whether some load depends on unknowns other than positions, velocities and states."""

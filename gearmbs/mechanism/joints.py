@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gearmbs.dae import terms
+from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.functions import TimeFunction
 from gearmbs.mechanism.parts import Marker
 
@@ -118,6 +119,23 @@ JOINTS = {
     "perpendicular": lambda i, j: [axes_normal(i, j, Z, Z)],
 }
 """Rows of the joints that need nothing but their two markers."""
+
+CROSSED = ("universal", "perpendicular")
+"""Kinds whose z axes are at right angles."""
+
+LARGEST_COSINE = 0.7
+"""Of the angle between axes to be put at right angles; nearer to parallel, nothing says which way to turn them."""
+
+
+def check_crossed(label: str, i: Marker, j: Marker) -> None:
+    """Raise a ModelError unless z_I and z_J are at the start about at right angles."""
+    cosine = float(i.global_orientation()[:, 2] @ j.global_orientation()[:, 2])
+    if abs(cosine) > LARGEST_COSINE:
+        angle = np.degrees(np.arccos(min(1.0, abs(cosine))))
+        raise ModelError(
+            f"{label}: the axes z of '{i.name}' and '{j.name}' must be at right angles, not at {angle:.3g} degrees; "
+            "turn one of the markers"
+        )
 
 
 def screw_rows(i: Marker, j: Marker, pitch: float) -> list[Row]:

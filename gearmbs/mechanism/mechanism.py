@@ -116,6 +116,7 @@ class Mechanism(LoadMethods):
         *,
         at: Vector | None = None,
         axis: Vector | None = None,
+        axis_j: Vector | None = None,
     ) -> jt.Joint:
         """Add a joint of one of the kinds in :data:`gearmbs.mechanism.joints.JOINTS`.
 
@@ -123,16 +124,39 @@ class Mechanism(LoadMethods):
         ----------
         i, j : Body or Marker
             What the joint connects. With bodies, ``at`` (default: the origin of ``i``) and ``axis`` (default: z)
-            place a marker on each, in global components at the initial position.
+            place a marker on each, in global components at the initial position. Of a marker and a body, the body
+            gets one that lies on the marker.
+        axis_j : array_like, optional
+            Axis on ``j`` at the initial position, at a right angle to ``axis``: for universal joints and the
+            perpendicular primitive between bodies, which need two.
 
         Raises
         ------
         ModelError
-            For an unknown kind, a name in use, foreign bodies, or a joint of a body with itself.
+            For an unknown kind, a name in use, foreign bodies, a joint of a body with itself, or axes that should be at
+            right angles and are nearly parallel.
         """
         if kind not in jt.JOINTS:
             raise ModelError(f"joint '{name}': kind {kind!r} is unknown; choose one of {', '.join(jt.JOINTS)}")
-        mi, mj = self._markers(f"joint '{name}'", name, i, j, at, axis)
+        label = f"{kind.replace('_', ' ')} joint '{name}'"
+        crossed = kind in jt.CROSSED
+        if crossed and axis_j is None and not (isinstance(i, Marker) and isinstance(j, Marker)):
+            raise ModelError(
+                f"{label}: it needs two axes at right angles, one on each body; give axis=... (on I) and axis_j=... "
+                "(on J), or two markers with such z axes"
+            )
+        if axis_j is not None and not crossed:
+            raise ModelError(f"{label}: axis_j is for {' and '.join(jt.CROSSED)} joints; others have one axis")
+        mi, mj = self._markers(label, name, i, j, at, axis, axis_j)
+        if crossed:
+            try:
+                jt.check_crossed(label, mi, mj)
+            except ModelError:
+                # markers made for it would be in the way of the next attempt
+                for marker in (mi, mj):
+                    if marker is not i and marker is not j:
+                        marker.body.markers.remove(marker)
+                raise
         return self._add_joint(jt.Joint(name, kind, mi, mj, jt.JOINTS[kind](mi, mj)))
 
     def fixed(self, name, i, j, **where) -> jt.Joint:
@@ -156,7 +180,7 @@ class Mechanism(LoadMethods):
         return self.joint("translational", name, i, j, **where)
 
     def universal(self, name, i, j, **where) -> jt.Joint:
-        """Add a universal joint whose cross arms are z_I and z_J (give markers). See :meth:`joint`."""
+        """Add a universal joint whose cross arms are z_I and z_J: ``axis`` and ``axis_j``. See :meth:`joint`."""
         return self.joint("universal", name, i, j, **where)
 
     def planar(self, name, i, j, **where) -> jt.Joint:
@@ -371,21 +395,23 @@ class Mechanism(LoadMethods):
 
     # --- checks -----------------------------------------------------------------------------------
 
-    def _markers(self, label, name, i, j, at, axis) -> tuple[Marker, Marker]:
+    def _markers(self, label, name, i, j, at, axis, axis_j=None) -> tuple[Marker, Marker]:
         self._check_name(name)
         for part in (i, j):
             self._check_body(label, part.body if isinstance(part, Marker) else part)
-        if isinstance(i, Marker) and isinstance(j, Marker):
-            if at is not None or axis is not None:
-                raise ModelError(f"{label}: give either markers or bodies with `at` and `axis`, not both")
-            mi, mj = i, j
+        given = [part for part in (i, j) if isinstance(part, Marker)]
+        if given and not (at is None and axis is None and axis_j is None):
+            raise ModelError(f"{label}: give either markers or bodies with `at` and `axis`, not both")
+        if given:
+            # a body gets a marker that lies on the other's
+            where = given[0].global_position(), given[0].global_orientation()
+            mi = i if isinstance(i, Marker) else i.marker_at(*where, name=f"{name}.I")
+            mj = j if isinstance(j, Marker) else j.marker_at(*where, name=f"{name}.J")
         else:
-            body_i = i.body if isinstance(i, Marker) else i
-            if at is None:
-                at = i.global_position() if isinstance(i, Marker) else (j if body_i.is_ground else body_i).position
+            at = (j if i.is_ground else i).position if at is None else at
             frame = frame_along((0.0, 0.0, 1.0) if axis is None else axis, f"{label}: axis")
-            mi = i if isinstance(i, Marker) else i.marker_at(at, frame, name=f"{name}.I")
-            mj = j if isinstance(j, Marker) else j.marker_at(at, frame, name=f"{name}.J")
+            mi = i.marker_at(at, frame, name=f"{name}.I")
+            mj = j.marker_at(at, frame if axis_j is None else frame_along(axis_j, f"{label}: axis_j"), name=f"{name}.J")
         if mi.body is mj.body:
             raise ModelError(f"{label}: both markers are on body '{mi.body.name}'; a joint connects two bodies")
         return mi, mj

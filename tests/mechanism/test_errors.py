@@ -294,3 +294,68 @@ def test_wheels_in_each_other_or_out_of_reach():
         m.gear_contact("mesh", one, same, pair)
     with pytest.warns(UserWarning, match="the teeth cannot touch"):
         m.gear_contact("far mesh", one, far, pair)
+
+
+@pytest.mark.parametrize("kind", ["universal", "perpendicular"])
+def test_axes_that_should_cross(kind):
+    m = Mechanism("cross")
+    one, two = m.body("one", 1.0, UNIT), m.body("two", 1.0, UNIT)
+    with pytest.raises(ModelError, match=f"{kind} joint 'j': it needs two axes at right angles.*axis_j"):
+        m.joint(kind, "j", one, two, at=(0, 0, 0), axis=(0, 0, 1))
+    with pytest.raises(ModelError, match="must be at right angles, not at 10 degrees"):
+        m.joint(kind, "j", one, two, axis=(0, 0, 1), axis_j=(0, np.sin(np.pi / 18), np.cos(np.pi / 18)))
+    with pytest.raises(ModelError, match="'k' and 'l' must be at right angles, not at 0 degrees"):
+        m.joint(kind, "j", one.marker(name="k"), two.marker(name="l"))
+    joint = m.joint(kind, "j", one, two, at=(0, 0, 0), axis=(0, 0, 1), axis_j=(1, 0, 0))
+    assert joint.j.global_orientation()[:, 2] == pytest.approx([1, 0, 0])
+    assert m.compile().initialise().largest_correction == 0.0
+    with pytest.raises(ModelError, match="axis_j is for universal and perpendicular joints"):
+        m.revolute("r", one, m.ground, axis_j=(1, 0, 0))
+
+
+def test_a_body_takes_the_axis_of_the_marker_it_is_joined_to():
+    m = Mechanism("pendulum", gravity=(0, 0, -9.81))
+    rod = m.body("rod", 1.0, UNIT, position=(0.5, 0, 0))
+    end = rod.marker((-0.5, 0, 0), axis=(0, 1, 0), name="end")
+    joint = m.revolute("pin", end, m.ground)
+    assert joint.j.global_orientation()[:, 2] == pytest.approx([0, 1, 0])
+    solution = m.simulate(0.5)
+    # it swings about y, and nothing had to be moved to assemble it
+    assert solution.position("rod")[-1, 2] < -0.2
+    assert "assembly" not in solution.message
+    with pytest.raises(ModelError, match="either markers or bodies"):
+        m.revolute("again", end, m.ground, axis=(0, 1, 0))
+
+
+@pytest.mark.parametrize(
+    ("expression", "words"),
+    [("1/TIME", "its value at t = 0 s is not finite"), ("SQRT(-1-TIME)", "SQRT"), ("LOG(-TIME)", "sforce 's'")],
+)
+def test_forces_that_are_not_finite_are_named(expression, words):
+    m = Mechanism("free")
+    body = m.body("b", 1.0, UNIT)
+    m.line_force("fine", body.marker(name="tip"), m.ground.marker((2, 0, 0), name="a"), "3")
+    m.line_force("s", body.marker(name="top"), m.ground.marker((2, 0, 1), name="b"), expression)
+    with pytest.raises(ModelError, match=words):
+        m.simulate(0.1)
+    with pytest.raises(ModelError, match="'s'"):
+        m.compile().problem()
+
+
+@pytest.mark.parametrize("text", ["SQRT(-1-TIME)", "SQRT(TIME)"])
+def test_motions_that_are_not_finite_are_named(text):
+    """The first has no value at the start, the second no rate."""
+    m = pendulum()
+    m.rotation("swing", m.joints["pin"], text)
+    with pytest.raises(ModelError, match="swing: angle: "):
+        m.simulate(0.1)
+
+
+def test_corrections_of_the_assembly_are_told():
+    m = pendulum()
+    m.rotation("swing", m.joints["pin"], "PI/6 + TIME")
+    solution = m.simulate(0.1)
+    assert "turned body 'rod' by 30 degrees before the start" in solution.message
+    assert "turned body 'rod' by 30 degrees" in str(solution.system.report)
+    # on a circle of 0.5 m: 2 sin(15 degrees) 0.5 m
+    assert solution.system.report.moved == ("rod", pytest.approx(2 * 0.5 * np.sin(np.pi / 12)))
