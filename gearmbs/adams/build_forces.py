@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -64,30 +64,37 @@ def add_spring_damper(b: Builder, s: st.SpringDamper) -> None:
     i, j = b.markers[s.i or 0], b.markers[s.j or 0]
     if s.type == "TRANSLATIONAL":
         text = weighted_sum((s.force, ""), (-s.k, f"(DM({s.i},{s.j}) - {s.length!r})"), (-s.c, f"VR({s.i},{s.j})"))
-        b.mechanism.line_force(name, i, j, text, kind="springdamper")
+        load = b.mechanism.line_force(name, i, j, text, kind="springdamper")
+        load.parameters = {"stiffness": s.k, "damping": s.c, "length": s.length, "preload": s.force}
     else:
         turn = (-s.kt, f"(AZ({s.i},{s.j}) - ({s.angle!r}))")
         text = weighted_sum((s.torque, ""), turn, (-s.ct, f"WZ({s.i},{s.j},{s.j})"))
-        b.mechanism.load(name, i, j, tz=text, rm=j, kind="springdamper")
+        load = b.mechanism.load(name, i, j, tz=text, rm=j, kind="springdamper")
+        load.parameters = {"stiffness": s.kt, "damping": s.ct, "angle": s.angle, "preload": s.torque}
 
 
 def _matrix_load(
     b: Builder, name: str, kind: str, s: Any, stiffness: np.ndarray, damping: np.ndarray, free: Sequence[float],
-    preload: Sequence[float],
+    preload: Sequence[float], parameters: Mapping[str, Any],
 ) -> None:  # fmt: skip
     """Add F = preload - K (q - free) - C q' in J's frame; every product in the deck's units."""
     texts = matrix_texts(str(s.i), str(s.j), stiffness, damping, np.array(free), np.array(preload))
     given = {c: t for c, t in zip(COMPONENTS, texts) if t is not None}
     if given:
         i, j = b.markers[s.i], b.markers[s.j]
-        b.mechanism.load(name, i, j, rm=j, kind=kind, **given)  # type: ignore[arg-type]
+        load = b.mechanism.load(name, i, j, rm=j, kind=kind, **given)  # type: ignore[arg-type]
+        load.parameters = parameters
 
 
 def add_bushing(b: Builder, s: st.Bushing) -> None:
     """BUSHING: diagonal stiffness and damping."""
     k, c = np.diag([*s.k, *s.kt]), np.diag([*s.c, *s.ct])
     name = b.model.names["bushing", s.id]
-    _matrix_load(b, name, "bushing", s, k, c, [0.0] * 6, [*s.force, *s.torque])
+    preload = [*s.force, *s.torque]
+    made = {
+        "stiffness": s.k, "damping": s.c, "torsional_stiffness": s.kt, "torsional_damping": s.ct, "preload": preload,
+    }  # fmt: skip
+    _matrix_load(b, name, "bushing", s, k, c, [0.0] * 6, preload, made)
 
 
 def add_field(b: Builder, s: st.Field) -> None:
@@ -99,7 +106,9 @@ def add_field(b: Builder, s: st.Field) -> None:
     if s.cratio is not None:
         c = s.cratio * k
     name = b.model.names["field", s.id]
-    _matrix_load(b, name, "field", s, k, c, s.length or [0.0] * 6, s.force or [0.0] * 6)
+    free, preload = s.length or [0.0] * 6, s.force or [0.0] * 6
+    made = {"stiffness": k, "damping": c, "free": free, "preload": preload}
+    _matrix_load(b, name, "field", s, k, c, free, preload, made)
 
 
 def add_beam(b: Builder, s: st.Beam) -> None:
@@ -113,7 +122,12 @@ def add_beam(b: Builder, s: st.Beam) -> None:
         # the lower triangle by columns is the upper one by rows
         c[rows, columns] = c[columns, rows] = s.cmatrix
     free = [s.length or 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-    _matrix_load(b, b.model.names["beam", s.id], "beam", s, k, c, free, [0.0] * 6)
+    made = {
+        "length": length, "area": area, "second_moments": (ixx, iyy, izz), "modulus": s.emodulus or 0.0,
+        "shear_modulus": s.gmodulus or 0.0, "shear_ratios": (s.asy, s.asz), "damping_ratio": s.cratio or 0.0,
+        "damping": c if s.cmatrix is not None else None,
+    }  # fmt: skip
+    _matrix_load(b, b.model.names["beam", s.id], "beam", s, k, c, free, [0.0] * 6, made)
 
 
 def add_friction(b: Builder, s: st.Friction) -> None:

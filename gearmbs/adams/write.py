@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gearmbs.adams.build_constraints import JOINT_KINDS, JPRIM_KINDS
 from gearmbs.adams.units import TABLES
+from gearmbs.adams.write_elements import KEYWORDS, element_arguments, hidden, kept
 from gearmbs.adams.write_gears import gear_statements, is_gear_contact
+from gearmbs.adams.write_output import integrator_statement, request_statements
+from gearmbs.adams.write_text import listed, number, wrapped
 from gearmbs.dae import terms
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.rotation import euler_from_matrix
@@ -22,15 +26,25 @@ from gearmbs.mechanism.function_text import function_text
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Body, Marker
 
-WIDTH = 78
 STATEMENT_OF = {v: k for k, v in JOINT_KINDS.items()}
 PRIMITIVE_OF = {v: k for k, v in JPRIM_KINDS.items()}
 PLANTS = {"PINVAL": "pinput", "POUVAL": "poutput"}
 COMPONENTS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
 
 
-def write_deck(mechanism: Mechanism, title: str | None = None) -> str:
-    """Return a mechanism as the text of an .adm file, in the mechanism's units.
+def write_deck(
+    mechanism: Mechanism,
+    path: str | Path | None = None,
+    *,
+    title: str | None = None,
+    output: bool = True,
+    requests: Mapping[str, str | Sequence[str]] | None = None,
+    integrator: str | None = None,
+    formulation: str = "SI2",
+    tol: float | None = None,
+    max_step: float | None = None,
+) -> str:
+    """Write a mechanism as an .adm file, in the mechanism's units.
 
     Contacts of gears with parallel axes become GFORCEs of IMPACT expressions along both lines of action; their
     friction and the contact of tooth corners beyond the path of contact are left out, as comments say.
@@ -38,19 +52,43 @@ def write_deck(mechanism: Mechanism, title: str | None = None) -> str:
     Parameters
     ----------
     mechanism : Mechanism
+    path : path, optional
+        File to write; without it the text is only returned.
     title : str, optional
         First line; default: the mechanism's name.
+    output : bool
+        Ask for the request file and the results file (OUTPUT/REQSAVE, RESULTS/XRF), with requests for the position and
+        velocity of every body and the forces of all elements.
+    requests : mapping of str to str or sequence of str, optional
+        More requests by name: up to six expressions in the mechanism's function language.
+    integrator, formulation : str, optional
+        INTEGRATOR's method, GSTIFF or WSTIFF, and formulation; written when the method or one of the next is given.
+    tol : float, optional
+        Its ERROR.
+    max_step : float, optional
+        Its HMAX, s.
 
     Returns
     -------
     str
+        The deck.
 
     Raises
     ------
     ModelError
         Naming what cannot be written.
     """
-    return DeckWriter(mechanism).text(title)
+    writer = DeckWriter(mechanism)
+    writer.model(title)
+    request_statements(writer, requests or {}, output)
+    if output:
+        writer.statement("OUTPUT/REQSAVE", [])
+        writer.statement("RESULTS/XRF", [])
+    integrator_statement(writer, integrator, formulation, tol, max_step)
+    text = "\n".join([*writer.lines, "END"]) + "\n"
+    if path is not None:
+        Path(path).write_text(text, encoding="utf-8", newline="\n")
+    return text
 
 
 class DeckWriter:
@@ -64,15 +102,22 @@ class DeckWriter:
         self.markers: dict[int, int] = {}
         self.marker_names: dict[str, int] = {}
         self.elements: dict[tuple[str, str], int] = {}
-        self.variables = {_upper(k): n for n, k in enumerate(mechanism.variables, 1)}
-        self.states = {_upper(k): n for n, k in enumerate(mechanism.states, 1)}
+        self.centers: dict[int, int] = {}
+        self.kept = kept(mechanism)
+        self._hidden = hidden(mechanism)
+        self.variables = self._numbered(mechanism.variables)
+        self.states = self._numbered(mechanism.states)
         self.splines = {_upper(k): n for n, k in enumerate(mechanism.splines, 1)}
         self.arrays = {_upper(k): n for n, k in enumerate(mechanism.arrays, 1)}
         self.plants = {(kind, _upper(k)): n for n, (kind, k) in enumerate(mechanism.plants, 1)}
         self._next_marker = 1
 
-    def text(self, title: str | None) -> str:
-        """Return the deck."""
+    def _numbered(self, table: Iterable[Any]) -> dict[Any, int]:
+        """Number variables or states, without those that a statement stands for."""
+        return {_upper(k): n for n, k in enumerate((k for k in table if _upper(k) not in self._hidden), 1)}
+
+    def model(self, title: str | None) -> None:
+        """Write the title and all that moves."""
         self.lines = [" ".join((title or self.mechanism.name).split()) or "mechanism", "!"]
         self._units()
         self._number()
@@ -85,8 +130,6 @@ class DeckWriter:
         if np.any(g != 0.0):
             keys = ("IGRAV", "JGRAV", "KGRAV")
             self.statement("ACCGRAV/", [f"{k} = {number(v)}" for k, v in zip(keys, g) if v != 0.0])
-        self.lines.append("END")
-        return "\n".join(self.lines) + "\n"
 
     # --- pieces -------------------------------------------------------------------------------------
 
@@ -198,7 +241,7 @@ class DeckWriter:
         for name in self.mechanism.constraints:
             yield name, "gcon"
         for name, element in self.mechanism.elements.items():
-            yield name, "sforce" if isinstance(element, Load) and element.mode == LINE else "gforce"
+            yield name, self.kept.get(name) or load_statement(element).lower()
 
     def _parts(self) -> None:
         for body in (self.mechanism.ground, *self.mechanism.bodies.values()):
@@ -213,8 +256,8 @@ class DeckWriter:
 
     def _part(self, body: Body, n: int) -> None:
         units = self.units
-        cm = self._next_marker
-        self._next_marker += 1
+        own = self._center(body)
+        cm = self.centers[id(body)] = self.markers[id(own)] if own is not None else self._next_marker
         i = body.inertia / units.factor("inertia")
         inertia = [i[0, 0], i[1, 1], i[2, 2], -i[0, 1], -i[0, 2], -i[1, 2]]
         if not any(inertia[3:]):
@@ -227,7 +270,15 @@ class DeckWriter:
         arguments += [f"V{a} = {number(v)}" for a, v in zip("XYZ", velocity) if v != 0.0]
         arguments += [f"W{a} = {number(v)}" for a, v in zip("XYZ", spin) if v != 0.0]
         self.statement(f"PART/{n}", arguments, body.name)
-        self.statement(f"MARKER/{cm}", [f"PART = {n}", *self._frame("QP", body.com, np.eye(3))])
+        if own is None:
+            self._next_marker += 1
+            self.statement(f"MARKER/{cm}", [f"PART = {n}", *self._frame("QP", body.com, np.eye(3))])
+
+    @staticmethod
+    def _center(body: Body) -> Marker | None:
+        """Return a marker that stands in the centre of mass along the body's axes."""
+        there = (m for m in body.markers if np.array_equal(m.position, body.com))
+        return next((m for m in there if np.array_equal(m.orientation, np.eye(3))), None)
 
     def _constraints(self) -> None:
         for name, joint in self.mechanism.joints.items():
@@ -290,9 +341,13 @@ class DeckWriter:
     def _data(self) -> None:
         m = self.mechanism
         for key, text in m.variables.items():
+            if _upper(key) in self._hidden:
+                continue
             n = self.variables[_upper(key)]
             self.statement(f"VARIABLE/{n}", [f"FUNCTION = {self.expression(text)}"], str(key))
         for key, state in m.states.items():
+            if _upper(key) in self._hidden:
+                continue
             if state.algebraic:
                 raise ModelError(f"state '{key}': an algebraic state cannot be written; use a variable")
             text = _times(self.expression(state.expression), self.units.time)
@@ -325,11 +380,16 @@ class DeckWriter:
             raise ModelError(f"element '{name}': {element!r} has no form in an ADAMS deck")
 
     def _load(self, name: str, load: Load) -> None:
-        if load.mode == LINE:
+        if name in self.kept:
+            kind = self.kept[name]
+            self.statement(f"{KEYWORDS[kind]}/{self.elements[kind, name]}", element_arguments(self, load), name)
+            return
+        keyword = load_statement(load)
+        if keyword == "SFORCE":
             text = self.expression(load.expressions[0] or "0")
             ends = [f"I = {self.markers[id(load.i)]}", f"J = {self.markers[id(load.j)]}"]
-            head = f"SFORCE/{self.elements['sforce', name]}"
-            self.statement(head, ["TRANSLATIONAL", *ends, f"FUNCTION = {text}"], name)
+            kind = "TRANSLATIONAL" if load.mode == LINE else "ROTATIONAL"
+            self.statement(f"SFORCE/{self.elements['sforce', name]}", [kind, *ends, f"FUNCTION = {text}"], name)
             return
         slots = {AXIS_FORCE: ("FZ",), AXIS_TORQUE: ("TZ",)}.get(load.mode, COMPONENTS)
         given = {c: self.expression(e) for c, e in zip(slots, load.expressions) if e is not None}
@@ -345,6 +405,13 @@ class DeckWriter:
         arguments = [f"I = {i}", f"JFLOAT = {jfloat}", f"RM = {rm}"]
         arguments += [f"{c} = {given.get(c, '0')}" + ("\\" if c != "TZ" else "") for c in COMPONENTS]
         self.statement(f"GFORCE/{n}", arguments, name)
+
+
+def load_statement(element: Any) -> str:
+    """Return the statement for an element given by expressions."""
+    along = isinstance(element, Load) and element.mode == LINE
+    about = isinstance(element, Load) and element.mode == AXIS_TORQUE and element.rm is element.j
+    return "SFORCE" if along or about else "GFORCE"
 
 
 def joint_statement(joint: Joint) -> str:
@@ -363,48 +430,6 @@ def joint_statement(joint: Joint) -> str:
     if joint.kind not in table:
         raise ModelError(f"joint '{joint.name}': its kind {joint.kind} has no form in an ADAMS deck")
     return table[joint.kind]
-
-
-def number(value: float) -> str:
-    """Return a number with all its digits."""
-    return f"{float(value):.17g}"
-
-
-def listed(values: Iterable[float]) -> str:
-    """Return numbers separated by commas."""
-    return ", ".join(number(v) for v in values)
-
-
-def wrapped(argument: str) -> list[str]:
-    """Break an argument into continuation lines: lists at commas, expressions after operators."""
-    lines, rest, lead = [], argument, ", "
-    is_list = "(" not in argument
-    while len(rest) > WIDTH - len(lead):
-        cut = _break(rest, WIDTH - len(lead), is_list)
-        if cut <= 0:
-            break
-        piece = rest[:cut].rstrip()
-        # the comma that leads the next line separates the items of a list
-        lines.append(lead + (piece.rstrip(",") if is_list else piece))
-        rest, lead = rest[cut:].lstrip(), ",   "
-    lines.append(lead + rest)
-    return lines
-
-
-def _break(text: str, limit: int, is_list: bool) -> int:
-    """Return where to break, at most ``limit``: after a comma of a list, else after an operator between blanks.
-
-    An expression without an operator in reach is broken after a comma between arguments.
-    """
-    operator = comma = 0
-    for k in range(2, min(limit, len(text) - 1)):
-        if text[k] != " ":
-            continue
-        if text[k - 1] == ",":
-            comma = k
-        elif text[k - 1] in "+-*/" and text[k - 2] == " ":
-            operator = k
-    return comma if is_list else operator or comma
 
 
 def _times(text: str, factor: float) -> str:

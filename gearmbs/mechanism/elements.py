@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -99,6 +100,9 @@ class Load:
         LINE (along the line from J to I), AXIS_FORCE or AXIS_TORQUE (along z of RM), COMPONENTS (in RM's frame).
     expressions : tuple of str or None
         One expression, or for COMPONENTS six: fx, fy, fz, tx, ty, tz.
+    parameters : mapping, optional
+        What the expressions were made from, by the names of the method that adds the element and in the mechanism's
+        units; for writing the element as what it is.
     """
 
     name: str
@@ -108,6 +112,7 @@ class Load:
     rm: Marker
     mode: int
     expressions: tuple[str | None, ...]
+    parameters: Mapping[str, Any] | None = None
 
     @property
     def has_force(self) -> bool:

@@ -162,6 +162,8 @@ class _Writer:
         self.mechanism, self.name, self.joint, self.f = mechanism, name, joint, friction
         self.i, self.j = joint.i, joint.j
         self.vs = float(friction.stiction_transition_velocity)
+        self.keys: list[str] = []
+        """Names of the variables and states it adds."""
 
     def add(self) -> list[Load]:
         return getattr(self, f"_{self.joint.kind}")()
@@ -260,6 +262,7 @@ class _Writer:
 
     def _variable(self, what: str, text: str) -> str:
         key = f"{self.name}.{what}"
+        self.keys.append(key)
         self.mechanism.variable(key, text)
         return f'VARVAL("{key}")'
 
@@ -307,12 +310,14 @@ class _Writer:
             z = f'DIF("{key}")'
             rate = self._variable(f"rate{k + 1}", f"{slip} - {stiffness!r}*{speed}*{z}/{limit}")
             text = rate if m.units.time == 1.0 else f"({rate})/{m.units.time!r}"
+            self.keys.append(key)
             m.states[key] = State(key, text, 0.0)
             found.append(f"{stiffness!r}*({z} + {damping}*{rate})")
         return found
 
     def _load(self, mode: int, expressions: tuple[str | None, ...], frame: Marker) -> Load:
-        return self.mechanism._add_load(Load(self.name, "friction", self.i, self.j, frame, mode, expressions))
+        made = {"joint": self.joint, "friction": self.f, "keys": tuple(self.keys)}
+        return self.mechanism._add_load(Load(self.name, "friction", self.i, self.j, frame, mode, expressions, made))
 
 
 def _at_most(text: str, most: float | None) -> str:

@@ -84,7 +84,8 @@ class LoadMethods:
         a, b = _ref(i), _ref(j)
         k, c, free, start = float(stiffness), float(damping), float(length), float(preload)
         text = f"{start!r} - {k!r}*(DM({a},{b}) - {free!r}) - {c!r}*VR({a},{b})"
-        return self.line_force(name, i, j, text, kind="springdamper")
+        made = {"stiffness": k, "damping": c, "length": free, "preload": start}
+        return self._add_load(Load(name, "springdamper", i, j, j, el.LINE, (text,), made))
 
     def torsion_spring(
         self,
@@ -101,7 +102,8 @@ class LoadMethods:
         a, b = _ref(i), _ref(j)
         k, c, free, start = float(stiffness), float(damping), float(angle), float(preload)
         text = f"{start!r} - {k!r}*(AZ({a},{b}) - {free!r}) - {c!r}*WZ({a},{b},{b})"
-        return self._add_load(Load(name, "springdamper", i, j, j, el.AXIS_TORQUE, (text,)))
+        made = {"stiffness": k, "damping": c, "angle": free, "preload": start}
+        return self._add_load(Load(name, "springdamper", i, j, j, el.AXIS_TORQUE, (text,), made))
 
     def bushing(
         self,
@@ -127,7 +129,8 @@ class LoadMethods:
         parts += [e if kt[n] or ct[n] else None for n, e in enumerate(turn)]
         if not any(parts):
             raise ModelError(f"bushing '{name}': all stiffnesses and dampings are zero")
-        return self._add_load(Load(name, "bushing", i, j, j, el.COMPONENTS, tuple(parts)))
+        made = {"stiffness": k, "damping": c, "torsional_stiffness": kt, "torsional_damping": ct}
+        return self._add_load(Load(name, "bushing", i, j, j, el.COMPONENTS, tuple(parts), made))
 
     def field(
         self,
@@ -158,7 +161,8 @@ class LoadMethods:
         texts = matrix_texts(_ref(i), _ref(j), k, c, rest, start)
         if not any(texts):
             raise ModelError(f"{kind} '{name}': all stiffnesses, dampings and preloads are zero")
-        return self._add_load(Load(name, kind, i, j, j, el.COMPONENTS, texts))
+        made = {"stiffness": k, "damping": c, "free": rest, "preload": start}
+        return self._add_load(Load(name, kind, i, j, j, el.COMPONENTS, texts, made))
 
     def beam(
         self,
@@ -200,7 +204,17 @@ class LoadMethods:
                 raise ModelError(f"beam '{name}': {field} = {value}; it must be positive")
         k = beam_stiffness(length, area, ixx, iyy, izz, modulus, shear_modulus, shear_ratios)
         free = (length, 0.0, 0.0, 0.0, 0.0, 0.0)
-        return self.field(name, i, j, stiffness=k, damping=damping_ratio * k, free=free, kind="beam")
+        load = self.field(name, i, j, stiffness=k, damping=damping_ratio * k, free=free, kind="beam")
+        load.parameters = {
+            "length": length,
+            "area": area,
+            "second_moments": (ixx, iyy, izz),
+            "modulus": modulus,
+            "shear_modulus": shear_modulus,
+            "shear_ratios": shear_ratios,
+            "damping_ratio": damping_ratio,
+        }
+        return load
 
 
 def beam_stiffness(

@@ -15,7 +15,7 @@ from gearmbs.studies import load_case
 from tests.docs.support import DOCS, ROOT, blocks, links, notebooks, pages, run_blocks
 
 ALL = [ROOT / "README.md", *pages()]
-QUICK = ("own_dae.md", "own_mechanism.md", "measured.md")
+QUICK = ("own_dae.md", "own_mechanism.md", "measured.md", "adams.md")
 WITH_EXAMPLES = [p for p in pages() if any(b.language == "python" for b in blocks(p))]
 DOCTESTS = [p for p in ALL if ">>> " in p.read_text(encoding="utf-8")]
 
