@@ -105,7 +105,13 @@ def build(deck: Deck, allow_unsupported: bool = False, inactive: frozenset[tuple
 
     model = build_model(deck, allow_unsupported, inactive)
     if model.initial_motions:
-        model = build_model(deck, allow_unsupported, inactive, with_initial_motions(model))
+        try:
+            start = with_initial_motions(model)
+        except ModelError as error:
+            joint = model.sources[model.initial_motions[0][0].name]
+            message = f"{joint.label()}: its initial conditions cannot be met: {error}"
+            raise DeckError([Diagnostic(ERROR, message, deck.file, joint.line)]) from error
+        model = build_model(deck, allow_unsupported, inactive, start)
     return model.mechanism
 
 
@@ -345,7 +351,10 @@ class Builder:
         if statement.part is None:
             return
         owner = self.model.names["part", statement.part]
-        body = self.mechanism.ground if owner == "ground" else self.mechanism.bodies[owner]
+        body = self.mechanism.ground if owner == "ground" else self.mechanism.bodies.get(owner)
+        if body is None:
+            # its part could not be built, which is reported
+            return
         position = self.units.length * np.array(statement.qp)
         name = self.claim(statement, "marker")
         marker = body.marker(position, marker_orientation(statement), name=name)

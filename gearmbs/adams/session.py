@@ -77,6 +77,9 @@ def change(session: Session, command: Change, allow_unsupported: bool) -> None:
             command,
             f"{new.label()}: {what} after the first analysis; the mechanism goes on from where it is",
         )
+    refused = [n for n in UNSUPPORTED_ARGUMENTS.get(type(new), ()) if n in new.given]
+    if refused and not allow_unsupported:
+        raise unsupported(command, f"{new.label()}: {', '.join(refused).upper()} is not supported")
     group = session.deck.items.setdefault(type(new), {})
     old = group.get(new.id)
     if old is None:
@@ -89,10 +92,13 @@ def change(session: Session, command: Change, allow_unsupported: bool) -> None:
     session.deck.__dict__.pop("units", None)
     trial = replace(session.deck, diagnostics=[])
     wrong = check(trial)
-    refused = [n for n in UNSUPPORTED_ARGUMENTS.get(type(new), ()) if n in new.given]
-    if refused and not allow_unsupported:
-        raise unsupported(command, f"{new.label()}: {', '.join(refused).upper()} is not supported")
     if wrong:
+        # the deck stays as it was
+        if old is None:
+            del group[new.id]
+        else:
+            group[new.id] = old
+        session.deck.__dict__.pop("units", None)
         raise DeckError([Diagnostic(d.severity, d.message, command.file, command.line) for d in wrong])
 
 

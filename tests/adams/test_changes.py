@@ -73,7 +73,7 @@ def test_inactive_elements_exert_nothing():
 )
 def test_wrong_changes_are_named_with_their_line(commands, line, message):
     with pytest.raises(DeckError, match=message) as caught:
-        run("MOTION/1,JOINT=1,FUNCTION=TIME\n", *commands)
+        run("MOTION/1,JOINT=1,FUNCTION=TIME\n", *commands, "SIM/DYN, END=1, STEPS=2")
     assert caught.value.diagnostics[0].line == line
     assert caught.value.diagnostics[0].file == "<script>"
 

@@ -190,3 +190,16 @@ def test_redundant_four_bar_runs_and_names_them():
     assert "Degree-of-freedom analysis identified redundant constraints in the model:" in text
     assert text.count("deactivating constraint equation") == 3
     assert np.abs(result.request(1)[:, 3]).max() < 1e-9
+
+
+def test_parts_that_cannot_be_built_are_errors_with_their_line():
+    """A marker of such a part, and initial conditions that cannot be met, do not end in a traceback."""
+    body = "PART/2,MASS=1,CM=20,IP=-1,1,1\nMARKER/20,PART=2\n"
+    with pytest.raises(DeckError, match=r":5: error: PART/2: .*principal moments") as caught:
+        parse_deck(model(body), "deck.adm").to_mechanism()
+    assert len(caught.value.diagnostics) == 1
+    body = (
+        "PART/2,MASS=1,CM=20,IP=1,1,1\nMARKER/20,PART=2\nJOINT/1,REVOLUTE,I=20,J=10,IC=1,0\nJOINT/2,FIXED,I=20,J=10\n"
+    )
+    with pytest.raises(DeckError, match=r":7: error: JOINT/1: its initial conditions cannot be met"):
+        parse_deck(model(body), "deck.adm").to_mechanism()
