@@ -93,6 +93,9 @@ def _model_errors(session: Session, allow_unsupported: bool) -> list[Diagnostic]
         model = build_model(quiet, allow_unsupported, frozenset(session.inactive))
     except DeckError as error:
         return list(error.diagnostics) if session.state is None else []
+    if not model.mechanism.bodies:
+        message = "no PART moves; add one with its mass and centre of mass: PART/2, MASS=1, CM=20, IP=1,1,1"
+        return [Diagnostic(ERROR, message, session.deck.file, 0)]
     return expression_errors(model, session.inactive)
 
 

@@ -290,8 +290,12 @@ def _linear(session: Session, command: Linear, allow_unsupported: bool) -> Modes
 def _line(model: AdamsModel | None, message: str) -> int:
     """Return the line of the first statement a message names, 0 when it names none."""
     sources = model.sources if model is not None else {}
-    named = [s.line for name, s in sources.items() if f"'{name}'" in message or f"{name}:" in message]
-    return min(named, default=0)
+    places = []
+    for name, statement in sources.items():
+        found = [at for at in (message.find(f"'{name}'"), message.find(f"{name}:")) if at >= 0]
+        if found:
+            places.append((min(found), statement.line))
+    return min(places, default=(0, 0))[1]
 
 
 def _model(session: Session, allow_unsupported: bool, span: tuple[float, float]) -> AdamsModel:

@@ -91,6 +91,16 @@ def test_all_wrong_expressions_are_named_at_once_with_their_lines():
     assert ":0:" not in text
 
 
+def test_what_only_a_run_finds_has_its_line():
+    """The repr of the load in the message names its markers, too, which stand before it in the deck."""
+    body = FREE + "SFORCE/1,TRANS,ACTION,I=20,J=10,FUNCTION=1/TIME\n"
+    with pytest.raises(DeckError, match="SFORCE_1") as caught:
+        run_deck(parse_deck(model(body)), end=1.0)
+    assert caught.value.diagnostics[0].line == 9
+    with pytest.raises(DeckError, match="<deck>: error: no PART moves"):
+        run_deck(parse_deck(model("")), end=1.0)
+
+
 def test_statics_and_linear_of_a_motion_by_its_velocity():
     """A crank turned at 2 rad/s; an analysis at one time needs no span of it."""
     body = (
