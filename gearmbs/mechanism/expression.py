@@ -161,12 +161,16 @@ class Scope:
 
 _TOKEN = re.compile(
     r"""\s*(?:
-      (?P<number>(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?)(?P<degree>[Dd](?![A-Za-z0-9_]))?
+      (?P<number>(?:\d+\.?\d*|\.\d+)(?:[Ee][+-]?\d+|[Dd]\d+)?)(?P<degree>[Dd](?![A-Za-z0-9_]))?
     | (?P<name>[A-Za-z_.$][A-Za-z0-9_.$]*|"[^"]*"|'[^']*')
     | (?P<op>\*\*|[-+*/(),:])
     )""",
     re.VERBOSE,
 )
+
+
+_EXPONENT = re.compile(r"[+-]\d+(?![\d.A-Za-z_])")
+"""What may be an exponent behind a D: a signed integer that does not go on as a number or name."""
 
 
 class _Parser:
@@ -181,6 +185,14 @@ class _Parser:
                     break
                 at += len(text[at:]) - len(text[at:].lstrip())
                 raise self.error(f"unexpected character {text[at]!r}", at)
+            exponent = _EXPONENT.match(text, match.end()) if match["degree"] else None
+            if exponent is not None:
+                number, sign, digits = match["number"], exponent[0][0], exponent[0][1:]
+                raise self.error(
+                    f"{number}D{sign}{digits} may be {number} degrees {sign} {digits} or a number with an exponent; "
+                    f"write {number}D {sign} {digits} or {number}E{sign}{digits}",
+                    match.start("number"),
+                )
             kind = match.lastgroup if match.lastgroup != "degree" else "number"
             self.tokens.append((str(kind), match.group(str(kind)), match.start(str(kind)), bool(match.group("degree"))))
             at = match.end()

@@ -60,7 +60,7 @@ def simulate(
     t_end : float
         End of the simulation, s.
     rate : float, optional
-        Outputs a second; default: 500 outputs over the span.
+        Outputs a second from the start on, and one at the end; default: 500 outputs over the span.
     t_eval : ndarray, optional
         Output times instead of ``rate``; the first is the start.
     every_step : bool
@@ -99,8 +99,7 @@ def simulate(
             raise ModelError(f"t_end = {t_end} s; it must be later than the start {t_start} s")
         if rate is not None and not rate > 0.0:
             raise ModelError(f"rate = {rate} 1/s; it must be positive")
-        count = 500 if rate is None else max(1, round((t_end - t_start) * rate))
-        t_eval = t_start + (np.arange(count + 1) / rate if rate else np.linspace(0.0, t_end - t_start, count + 1))
+        t_eval = np.linspace(t_start, t_end, 501) if rate is None else _sampled(t_start, t_end, rate)
     # a column of a table is taken apart from it, for the kernels
     t_eval = np.ascontiguousarray(t_eval, dtype=float)
     if not np.isfinite(tol) or tol <= 0.0:
@@ -124,6 +123,14 @@ def simulate(
             options.setdefault("slopes", not every_step)
             result = solve_wstiff(problem, times, t_end=last, tol=tol, method=name, progress=report, **options)
     return Solution(system, problem, result)
+
+
+def _sampled(start: float, end: float, rate: float) -> np.ndarray:
+    """Return the times at a rate from the start on; the end is always one of them."""
+    span = (end - start) * rate
+    count = int(np.floor(span + 1e-6))
+    times = start + np.arange(count + 1) / rate
+    return np.append(times, end) if span > count + 1e-6 else times
 
 
 class _reporter:

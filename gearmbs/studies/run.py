@@ -97,6 +97,8 @@ def simulate_case(
     mechanism = case_mechanism(case)
     operation, solver = case.operation, case.solver
     t_end = operation.run_up + operation.settling + operation.duration + edge(case)
+    # up to a whole sample
+    t_end = np.ceil(t_end * solver.output_rate - 1e-6) / solver.output_rate
     return simulate(
         mechanism,
         t_end,

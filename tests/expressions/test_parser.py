@@ -35,6 +35,7 @@ from .support import MARKER_BODY, MARKERS, time_series
         ("ORIENT(13,1,1)", "system 13 is not supported"),
         ("FX(1,2)", "no force or joint acts between MARKER 1 and MARKER 2"),
         ("1 2", "unexpected '2' after the expression at column 3"),
+        ("2*(60D+3*TIME)", "60D\\+3 may be 60 degrees .* write 60D \\+ 3 or 60E\\+3 at column 4"),
         ("5 # 3", "unexpected character '#' at column 3"),
         ("(" * 500, "nested deeper than 100"),
         ("1E999", "too large"),

@@ -230,3 +230,14 @@ def test_output_times_may_be_a_column_of_a_table(integrator):
     table = np.column_stack([np.linspace(0.0, 1.0, 5), np.ones(5)])
     solution = m.simulate(1.0, t_eval=table[:, 0], integrator=integrator)
     np.testing.assert_allclose(solution.position("stone")[:, 2], -9.81 / 2 * table[:, 0] ** 2, atol=1e-5)
+
+
+@pytest.mark.parametrize(("t_end", "rate", "count"), [(1.0, 0.1, 2), (0.5, 3.0, 3), (1.0, 333.3, 335), (0.3, 10.0, 4)])
+def test_the_last_output_is_the_end(t_end, rate, count):
+    """Outputs at multiples of 1/rate below the end and one at the end: floor(t_end rate) + 1 or + 2."""
+    m = Mechanism("stone", gravity=(0, 0, -9.81))
+    m.body("stone", 2.0, (1, 1, 1))
+    t = m.simulate(t_end, rate=rate).t
+    assert t.size == count
+    assert t[-1] == pytest.approx(t_end, abs=1e-12)
+    np.testing.assert_allclose(np.diff(t)[:-1], 1.0 / rate)
