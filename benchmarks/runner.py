@@ -97,5 +97,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     unknown = [name for name in given.parts if name not in PARTS]
     if unknown:
         parser.error(f"unknown part {', '.join(unknown)}; choose from {', '.join(PARTS)}")
-    run(given.parts or list(PARTS), given.out, given.quick, given.fresh, partial(print, flush=True), given.only)
+    names = given.parts or list(PARTS)
+    if not any(given.only in key for name in names for key, _ in PARTS[name].cells(given.quick)):
+        parser.error(f"no piece of {', '.join(names)} has {given.only!r} in its name")
+    run(names, given.out, given.quick, given.fresh, partial(print, flush=True), given.only)
     print(f"\n{(given.out / 'results.md').read_text(encoding='utf-8')}\nwritten to {given.out}")

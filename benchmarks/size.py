@@ -22,7 +22,7 @@ SPAN = 5.0
 """Simulated seconds: the links pass the singular positions seven times."""
 TOLERANCE = 1e-5
 EXUDYN_STEPS = 1000
-GRID_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+GRID_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 GRID_SPAN = 2.0
 REPEATS = 5
 

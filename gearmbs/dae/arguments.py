@@ -50,17 +50,25 @@ def check_choices(tol, rtol, method, corrector, max_order, max_step, first_step,
         raise ValueError(f"max_iterations (MAXIT) must be 1 to 100, is {max_iterations!r}")
 
 
-def event_rules(n_events: int, direction: Sequence[int] | None, action: Sequence[int] | None) -> np.ndarray:
-    rules = np.zeros((2, max(1, n_events)), dtype=np.int64)
+def event_rules(
+    n_events: int,
+    direction: Sequence[int] | None,
+    action: Sequence[int] | None,
+    count: Sequence[int] | None = None,
+) -> np.ndarray:
+    rules = np.zeros((3, max(1, n_events)), dtype=np.int64)
+    rules[2] = 1
     for row, (name, given, allowed) in enumerate(
-        (("event_direction", direction, (-1, 0, 1)), ("event_action", action, (0, 1, 2)))
+        (("event_direction", direction, (-1, 0, 1)), ("event_action", action, (0, 1, 2)), ("event_count", count, None))
     ):
         if given is None:
             continue
         if len(given) != n_events:
             raise ValueError(f"{name} has {len(given)} entries for {n_events} event functions")
         for value in given:
-            if value not in allowed:
+            if allowed is not None and value not in allowed:
                 raise ValueError(f"{name} may hold {allowed}, has {value!r}")
+            if allowed is None and (value != int(value) or value < 1):
+                raise ValueError(f"{name} may hold whole numbers from 1 on, has {value!r}")
         rules[row, :n_events] = given
     return rules

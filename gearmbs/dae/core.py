@@ -18,9 +18,11 @@ from gearmbs.dae.functions import FUNCTIONS_TYPE
 from gearmbs.dae.newton import (
     CONVERGED,
     NOT_FINITE,
+    SLOW,
     correct,
     first_not_finite,
     set_weights,
+    settle_for_noise,
     weighted_argmax,
     weighted_max,
 )
@@ -41,6 +43,7 @@ RESTART_AFTER = 6
 DROP_AFTER = 3
 DROP_LEVELS = 3
 DROPPED_STEPS = 5
+RENEWALS = 3
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -72,7 +75,7 @@ def _respace(real, count, times, hist, small, first):
     if abs((t - times[first + 1]) - h) <= 1e-10 * h + 4.0 * EPS * abs(t):
         return
     nodes = times[first:]
-    weights = np.empty((k + 1, k + 1))
+    weights = small[s.WEIGHTS :]
     for j in range(1, k + 1):
         # value weights of the polynomial through the k + 1 old points at the new place
         for m in range(k + 1):
@@ -147,6 +150,9 @@ def _restart(real, count):
     count[s.SINCE_CHANGE] = 0
     count[s.CAUTION] = 0
     count[s.JAC_WANTED] = 1
+    count[s.NOISY] = 0
+    count[s.NOISY_RUN] = 0
+    real[s.NOISE] = 0.0
 
 
 @njit(float64(_VEC, _IVEC, float64, float64), cache=True, nogil=True, error_model="numpy")
@@ -230,6 +236,7 @@ def advance(functions, st, plan, factors, max_accepted):
             real[s.H] = max(real[s.H], real[s.H_MIN])
             real[s.H_TRY] = real[s.H]
             real[s.H_REFUSED] = np.inf
+            real[s.ERROR] = 0.0
         past = times[1:]
         t_old = past[0]
         if count[s.ERROR_FAILS] + count[s.NEWTON_FAILS] + count[s.NAN_FAILS] > MAX_FAILS:
@@ -308,6 +315,22 @@ def advance(functions, st, plan, factors, max_accepted):
 
         # corrector
         code = correct(residual, t, gamma, vec, real, count, plan, factors, idata, rdata, work)
+        renewals = 0
+        sound = True
+        while code == SLOW and count[s.FRESH] != 0 and sound and renewals < RENEWALS:
+            # contacts or multipliers are not as predicted: the matrix at the iterate knows them
+            renewals += 1
+            _evaluate_jacobian(jacobian, t, gamma, vec, real, count, st.jac, st.jac_slope, idata, rdata, work)
+            _carry_over(0.0, st.jac, st.jac_slope, st.matrix)
+            growth = factor(plan, factors, st.matrix)
+            count[s.FACTORIZATIONS] += 1
+            sound = growth <= real[s.GROWTH_MAX]
+            if sound:
+                real[s.GAMMA_J] = gamma
+                real[s.RATE] = RATE_OF_FRESH
+                code = correct(residual, t, gamma, vec, real, count, plan, factors, idata, rdata, work)
+        if code == SLOW and sound and settle_for_noise(real, count, vec, st.matrix, plan, factors):
+            code = CONVERGED
         if code != CONVERGED:
             if code == NOT_FINITE:
                 bad = first_not_finite(vec[s.RES])
@@ -347,11 +370,17 @@ def advance(functions, st, plan, factors, max_accepted):
                 delta[i] *= vec[s.IS_DIFFERENTIAL, i]
         times[0] = t
         error = constant * weighted_max(delta, vec[s.W_ERROR])
-        real[s.ERROR] = error
-        if error > 1.0:
+        passed = error <= 1.0 + constant * 2.0 ** (k + 1) * real[s.NOISE]
+        if not passed and settle_for_noise(real, count, vec, st.matrix, plan, factors):
+            passed = True
+            for i in range(n):
+                hist[0, i] = y[i]
+        if not passed:
             count[s.ERROR_REJECTIONS] += 1
             count[s.ERROR_FAILS] += 1
             count[s.WORST] = weighted_argmax(delta, vec[s.W_ERROR])
+            count[s.WORST_ERROR] = count[s.WORST]
+            real[s.ERROR] = error
             after_error_failure(real, count, times, hist, vec, small, error, count[s.ERROR_FAILS])
             if count[s.ERROR_FAILS] == RESTART_AFTER and count[s.NPAST] > 1:
                 # a jump, most likely: the past says nothing about what comes
@@ -371,6 +400,14 @@ def advance(functions, st, plan, factors, max_accepted):
         count[s.FRESH] = 0
         count[s.JAC_AGE] += 1
         count[s.DROP_AGE] += 1
+        noisy = count[s.NOISY] > 0
+        if noisy:
+            count[s.NOISY] -= 1
+            count[s.NOISY_RUN] += 1
+            count[s.JAC_WANTED] = 1
+            if count[s.NOISY] == 0:
+                count[s.NOISY_RUN] = 0
+                real[s.NOISE] = 0.0
         count[s.NPAST] = min(count[s.NPAST] + 1, HISTORY)
         real[s.T] = t
         real[s.H_USED] = h
@@ -399,6 +436,9 @@ def advance(functions, st, plan, factors, max_accepted):
                 work,
             )
             for e in range(count[s.HAS_EVENTS]):
+                if not np.isfinite(st.g_new[e]):
+                    count[s.WORST] = -1 - e
+                    return s.FAIL_NOT_FINITE
                 st.g_old[e] = st.g_new[e]
         write_outputs(cut, k, count, times, hist, vec, small, st.outputs, st.y_out, st.yp_out)
         p = count[s.N_RECORDS]
@@ -433,7 +473,7 @@ def advance(functions, st, plan, factors, max_accepted):
             real[s.H] = RESTART_SHRINK * h
             _restart(real, count)
             rewritten = True
-        else:
+        elif not noisy:
             after_success(real, count, times, hist, vec, small)
             if h < 0.999 * h_wish and real[s.H] >= h:
                 # shortened only to land: go on with the size the error test had asked for

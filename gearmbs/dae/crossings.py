@@ -151,7 +151,8 @@ def locate_events(
         if not ((rising and rules[0, e] >= 0) or (falling and rules[0, e] <= 0)):
             continue
         root = _root(events, e, k, times, hist, vec, small, g_old, g_new, idata, rdata, work)
-        if rules[1, e] != RECORD and (action == RECORD or root < cut):
+        acts = rules[1, e] == RESTART or (rules[1, e] == STOP and rules[2, e] <= 1)
+        if acts and (action == RECORD or root < cut):
             cut = root
             action = rules[1, e]
         # insertion keeps the crossings of one step in order of time
@@ -166,6 +167,7 @@ def locate_events(
     while count[N_CROSSINGS] > first and hit_t[count[N_CROSSINGS] - 1] > cut:
         count[N_CROSSINGS] -= 1
     for p in range(first, count[N_CROSSINGS]):
+        rules[2, hit_which[p]] -= 1
         interpolate(hit_t[p], k, times, hist, small, vec[Y_INT], vec[YP_INT])
         for i in range(n):
             hit_y[p, i] = vec[Y_INT, i]

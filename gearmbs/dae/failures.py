@@ -8,6 +8,8 @@ from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import Status
 
 NAMES_SHOWN = 6
+NOISE_WORTH_TELLING = 0.1
+"""Movement by rounding, in units of the tolerance, from which on rounding is named as a cause."""
 
 ADVICE = {
     Status.NOT_FINITE: (
@@ -88,27 +90,46 @@ def not_finite(problem: DAEProblem, t: float, row: int, what: str = "equation") 
     )
 
 
-def step_too_small(problem: DAEProblem, t: float, h: float, worst: int, error: float) -> str:
-    """Explain a run that would need steps below HMIN."""
+def event_not_finite(problem: DAEProblem, t: float, which: int) -> str:
+    """Explain NaN or infinity out of an event function."""
     return (
-        f"{Status.STEP_TOO_SMALL.sentence} At t = {t:.9g} with h = {h:.3g}; the error is dominated by "
-        f"{unknown_name(problem, worst)} ({error:.3g} times its tolerance). {advice(problem, Status.STEP_TOO_SMALL)}"
+        f"{Status.NOT_FINITE.sentence} At t = {t:.9g} event function {which} is NaN or infinite, so that its crossings "
+        f"cannot be seen. {advice(problem, Status.NOT_FINITE)}"
     )
 
 
-def newton(problem: DAEProblem, t: float, h: float, worst: int) -> str:
+def _rounding(noise: float) -> str:
+    """Say that double precision does not allow the tolerance, where it does not."""
+    if noise < NOISE_WORTH_TELLING:
+        return ""
+    return (
+        f" Rounding alone moves the solution there by about {noise:.2g} times its tolerance: the position is nearly "
+        "singular, or the tolerance too tight for double precision, and a looser one is all that helps."
+    )
+
+
+def step_too_small(problem: DAEProblem, t: float, h: float, worst: int, error: float, noise: float = 0.0) -> str:
+    """Explain a run that would need steps below HMIN."""
+    what = f"; the error is dominated by {unknown_name(problem, worst)} ({error:.3g} times its tolerance)"
+    return (
+        f"{Status.STEP_TOO_SMALL.sentence} At t = {t:.9g} with h = {h:.3g}{what if error > 0.0 else ''}."
+        f"{_rounding(noise)} {advice(problem, Status.STEP_TOO_SMALL)}"
+    )
+
+
+def newton(problem: DAEProblem, t: float, h: float, worst: int, noise: float = 0.0) -> str:
     """Explain a corrector that fails at the smallest step."""
     return (
         f"{Status.NEWTON_FAILURE.sentence} At t = {t:.9g} with h = {h:.3g}; the largest correction is in "
-        f"{unknown_name(problem, worst)}. {advice(problem, Status.NEWTON_FAILURE)}"
+        f"{unknown_name(problem, worst)}.{_rounding(noise)} {advice(problem, Status.NEWTON_FAILURE)}"
     )
 
 
-def too_many_rejections(problem: DAEProblem, t: float, h: float, worst: int) -> str:
+def too_many_rejections(problem: DAEProblem, t: float, h: float, worst: int, noise: float = 0.0) -> str:
     """Explain a step that was refused again and again."""
     return (
         f"{Status.TOO_MANY_REJECTIONS.sentence} At t = {t:.9g} with h = {h:.3g}, mostly because of "
-        f"{unknown_name(problem, worst)}. {advice(problem, Status.TOO_MANY_REJECTIONS)}"
+        f"{unknown_name(problem, worst)}.{_rounding(noise)} {advice(problem, Status.TOO_MANY_REJECTIONS)}"
     )
 
 

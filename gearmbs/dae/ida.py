@@ -7,6 +7,10 @@ at the smallest sensible value and the vector of absolute tolerances does the wo
 
 from __future__ import annotations
 
+import contextlib
+import io
+import re
+import sys
 import time
 import warnings
 from collections.abc import Callable
@@ -23,7 +27,7 @@ UNCONTROLLED = 1e10
 SMALLEST_RTOL = 1e-14
 DENSE_LIMIT = 150
 """Unknowns up to which the dense factorisation is used: SuperLU_MT waits busily and stalls on a loaded machine."""
-HISTORY_GROWTH = 1024
+IDA_MAX_ORDER = 5
 MAX_STEPS = 100_000
 """Steps allowed between two outputs: 15 s of a gear pair's run, which takes some tens of steps a mesh period."""
 
@@ -33,6 +37,31 @@ NOT_FINITE_LIMIT = 100
 
 class _NotFiniteError(ArithmeticError):
     """The residual is not finite beyond some time, whatever the step."""
+
+
+class _Messages(io.TextIOBase):
+    """Standard output, but what SUNDIALS has to say about a failure is kept instead of printed."""
+
+    PATTERN = re.compile(r"\s*\[(?:IDA|SUN)\w*, Error: -?\d+\]\s*(.*)", re.DOTALL)
+
+    def __init__(self) -> None:
+        self.through = sys.stdout
+        self.text = ""
+        self.ending = False
+
+    def write(self, text: str) -> int:
+        """Keep a message and the end of its line; pass anything else on."""
+        found = self.PATTERN.match(text)
+        if found is not None:
+            self.text = " ".join(found[1].split())
+        elif not (self.ending and text == "\n"):
+            self.through.write(text)
+        self.ending = found is not None
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush standard output."""
+        self.through.flush()
 
 
 class _Callbacks:
@@ -98,6 +127,35 @@ def _solver(problem: DAEProblem, calls: _Callbacks, atol: np.ndarray, rtol: floa
         )
 
 
+def check_ida(
+    tol: float,
+    rtol: float,
+    max_order: int,
+    max_step: float,
+    first_step: float,
+    min_step: float,
+    max_iterations: int,
+    max_steps: int,
+) -> None:
+    """Refuse what IDA would pass over or reject in words of its own."""
+    if not (np.isfinite(tol) and tol > 0):
+        raise ValueError(f"tol (ERROR) must be positive, is {tol!r}")
+    if not (np.isfinite(rtol) and rtol >= 0):
+        raise ValueError(f"rtol must not be negative, is {rtol!r}")
+    if not 1 <= max_order <= IDA_MAX_ORDER:
+        raise ValueError(f"max_order (KMAX) must be 1 to {IDA_MAX_ORDER} for IDA, is {max_order!r}")
+    for name, value in (
+        ("max_step (HMAX)", max_step),
+        ("first_step (HINIT)", first_step),
+        ("min_step (HMIN)", min_step),
+    ):
+        if not value >= 0:
+            raise ValueError(f"{name} must not be negative, is {value!r}")
+    for name, count in (("max_iterations (MAXIT)", max_iterations), ("max_steps", max_steps)):
+        if not count >= 1:
+            raise ValueError(f"{name} must be at least 1, is {count!r}")
+
+
 def solve_ida(
     problem: DAEProblem,
     t_eval: np.ndarray | None = None,
@@ -114,6 +172,8 @@ def solve_ida(
     progress: Callable[[float], None] | None = None,
 ) -> DAEResult:
     """Integrate a DAE with IDA and return it at the times ``t_eval``, or at every step IDA takes.
+
+    What SUNDIALS prints about a failure goes into the message instead.
 
     Parameters
     ----------
@@ -139,7 +199,13 @@ def solve_ida(
     DAEResult
         With ``status`` `SOLVER_FAILURE`, `NOT_FINITE` or `INTERRUPTED`, and what was computed so far, if the run did
         not finish.
+
+    Raises
+    ------
+    ValueError
+        For arguments that make no sense.
     """
+    check_ida(tol, rtol, max_order, max_step, first_step, min_step, max_iterations, max_steps)
     every_step = t_eval is None
     if every_step and t_end is None:
         raise ValueError("t_end: give it when t_eval is left out")
@@ -163,35 +229,37 @@ def solve_ida(
     status, message = Status.SUCCESS, Status.SUCCESS.sentence
     start = time.perf_counter()
     t, end = float(times[0]), float(times[-1])
-    try:
-        solver = _solver(problem, calls, atol, rtol, options)
-        solver.init_step(t, problem.y0, problem.yp0)
-        y = problem.y0
-        while t < end:
-            target = rows.next_time
-            if problem.hook_interval is not None and not every_step:
-                target = min(target, t + problem.hook_interval(y))
-            answer = solver.step(target, method="onestep" if every_step else "normal", tstop=end)
-            if not answer.success:
-                status, message = _failure(problem, calls, float(answer.t), answer.message, atol)
-                break
-            t, y, yp = float(answer.t) if every_step else target, answer.y, answer.yp
-            if rows.take(t, y, yp) and progress is not None:
-                progress(t)
-            if problem.hook is not None:
-                hist[0] = y
-                if problem.hook(t, hist, 1, idata, rdata, calls.work):
-                    epochs.append((rows.done, idata.copy()))
-                    y = hist[0].copy()
-                    yp = np.array(yp)
-                    if problem.restart_rates is not None:
-                        yp = problem.restart_rates(t, y, yp, idata, rdata)
-                    solver = _solver(problem, calls, atol, rtol, options)
-                    solver.init_step(t, y, yp)
-    except KeyboardInterrupt:
-        status, message = Status.INTERRUPTED, f"{Status.INTERRUPTED.sentence} Reached t = {t:.6g} s."
-    except (_NotFiniteError, RuntimeError) as error:
-        status, message = _failure(problem, calls, max(t, calls.last_t), str(error), atol)
+    messages = _Messages()
+    with contextlib.redirect_stdout(messages):
+        try:
+            solver = _solver(problem, calls, atol, rtol, options)
+            solver.init_step(t, problem.y0, problem.yp0)
+            y = problem.y0
+            while t < end:
+                target = rows.next_time
+                if problem.hook_interval is not None and not every_step:
+                    target = min(target, t + problem.hook_interval(y))
+                answer = solver.step(target, method="onestep" if every_step else "normal", tstop=end)
+                if not answer.success:
+                    status, message = _failure(problem, calls, float(answer.t), messages.text or answer.message, atol)
+                    break
+                t, y, yp = float(answer.t) if every_step else target, answer.y, answer.yp
+                if rows.take(t, y, yp) and progress is not None:
+                    progress(t)
+                if problem.hook is not None:
+                    hist[0] = y
+                    if problem.hook(t, hist, 1, idata, rdata, calls.work):
+                        epochs.append((rows.done, idata.copy()))
+                        y = hist[0].copy()
+                        yp = np.array(yp)
+                        if problem.restart_rates is not None:
+                            yp = problem.restart_rates(t, y, yp, idata, rdata)
+                        solver = _solver(problem, calls, atol, rtol, options)
+                        solver.init_step(t, y, yp)
+        except KeyboardInterrupt:
+            status, message = Status.INTERRUPTED, f"{Status.INTERRUPTED.sentence} Reached t = {t:.6g} s."
+        except (_NotFiniteError, RuntimeError) as error:
+            status, message = _failure(problem, calls, max(t, calls.last_t), messages.text or str(error), atol)
     stats = SolverStats(
         steps=calls.steps,
         residuals=calls.residuals,
@@ -255,6 +323,6 @@ def _failure(problem: DAEProblem, calls: _Callbacks, t: float, why: str, atol: n
     moving = np.where(problem.error_mask, np.abs(calls.yp) / np.maximum(atol, 1e-300), 0.0)
     worst = int(np.argmax(moving))
     return Status.SOLVER_FAILURE, (
-        f"IDA stopped at t = {t:.6g} s ({why}). The unknown that changes fastest for its tolerance is "
+        f"IDA stopped at t = {t:.6g} s ({why.rstrip('.')}). The unknown that changes fastest for its tolerance is "
         f"{unknown_name(problem, worst)}. {advice(problem, Status.SOLVER_FAILURE)}"
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import boolean, float64, int64, njit, types
 
+from gearmbs.dae.bdf import HISTORY
 from gearmbs.dae.problem import RESIDUAL_SIG
 from gearmbs.dae.sparse_lu import FACTORS_TYPE, PLAN_TYPE, solve
 from gearmbs.dae.state import (
@@ -17,6 +18,10 @@ from gearmbs.dae.state import (
     IS_TESTED,
     MAX_ITERATIONS,
     NEWTON_TOL,
+    NOISE,
+    NOISY,
+    NOISY_RUN,
+    NPAST,
     ORDER,
     RATE,
     RES,
@@ -25,7 +30,10 @@ from gearmbs.dae.state import (
     SOLVES,
     W_ERROR,
     W_NEWTON,
+    Y_INT,
+    Y_PRED,
     YP,
+    YP_PRED,
     Y,
 )
 
@@ -38,6 +46,11 @@ RATE_FLOOR = 0.02
 ROUNDING_LEVEL = 0.1
 ROUNDING_LEVEL_FRESH = 0.5
 LOOSEST = 0.1
+NOISE_SAMPLES = 2
+NOISE_MARGIN = 4.0
+NOISY_ALLOWED = 60
+PREDICTION_ERROR = 2.0
+EPS = 2.220446049250313e-16
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -207,3 +220,69 @@ def correct(residual, t, gamma, vec, real, count, plan, factors, idata, rdata, w
                 return _verdict(delta, vec[W_ERROR], trust, count[FRESH] != 0)
         previous = norm
     return _verdict(delta, vec[W_ERROR], real[RATE], count[FRESH] != 0) if iterations > 1 else SLOW
+
+
+@njit(float64(_MAT, _VEC, PLAN_TYPE, FACTORS_TYPE), cache=True, nogil=True, error_model="numpy")
+def rounding_level(vec, matrix, plan, factors):
+    """Return how far rounding alone moves the corrector, in units of the tolerance.
+
+    The terms of the equations are about |J| |y| in size, and their sums wrong by the last digit of that. Near a
+    singular position of a mechanism the equations turn such errors into many times as much of some unknowns, whatever
+    the step.
+
+    Parameters
+    ----------
+    vec : ndarray
+        Unknowns in row Y; rows RES and Y_INT are overwritten.
+    matrix : ndarray
+        Values of the factored matrix in CSC order.
+    plan, factors : LUPlan, LUFactors
+    """
+    y = vec[Y]
+    size = vec[RES]
+    moved = vec[Y_INT]
+    n = y.shape[0]
+    size[:] = 0.0
+    for k in range(n):
+        a = abs(y[plan.col_to[k]])
+        for p in range(plan.a_ptr[k], plan.a_ptr[k + 1]):
+            size[plan.row_from[plan.a_pos[p]]] += abs(matrix[plan.a_src[p]]) * a
+    level = 0.0
+    phase = 0.0
+    for _ in range(NOISE_SAMPLES):
+        for i in range(n):
+            # signs without a pattern: the fractional parts of multiples of the golden ratio
+            phase += 0.6180339887498949
+            phase -= np.floor(phase)
+            moved[i] = EPS * size[i] if phase < 0.5 else -EPS * size[i]
+        solve(plan, factors, moved, moved)
+        level = max(level, weighted_max(moved, vec[W_ERROR]))
+    return level
+
+
+@njit(boolean(_VEC, _IVEC, _MAT, _VEC, PLAN_TYPE, FACTORS_TYPE), cache=True, nogil=True, error_model="numpy")
+def settle_for_noise(real, count, vec, matrix, plan, factors):
+    """Return whether rounding explains row DELTA of ``vec``; if so, leave the better of corrector and prediction.
+
+    DELTA is a correction that will not get smaller, or a result too far from its prediction. No step would mend it near
+    a singular position, so the run has to go through as it is. The noise passed on to the past, ``real[NOISE]``
+    in units of the tolerance, comes back amplified by 2^k in predictions of order k. Where that is less
+    than the noise of the corrector, the prediction stands for the solution.
+    """
+    if count[FRESH] == 0 or count[NOISY_RUN] >= NOISY_ALLOWED or count[NPAST] < 3:
+        return False
+    noise = rounding_level(vec, matrix, plan, factors)
+    predicted = 2.0 ** count[ORDER] * max(real[NOISE], ROUNDING_LEVEL) + PREDICTION_ERROR
+    if not weighted_max(vec[DELTA], vec[W_ERROR]) <= NOISE_MARGIN * noise + 2.0 * predicted:
+        return False
+    if noise < ROUNDING_LEVEL:
+        return False
+    count[NOISY] = HISTORY
+    if noise <= predicted:
+        real[NOISE] = max(real[NOISE], noise)
+        return True
+    real[NOISE] = max(real[NOISE], predicted)
+    for i in range(vec.shape[1]):
+        vec[Y, i] = vec[Y_PRED, i]
+        vec[YP, i] = vec[YP_PRED, i]
+    return True

@@ -8,6 +8,8 @@ References
 .. [1] H. M. Markowitz, "The elimination form of the inverse and its application to linear programming",
        Management Science 3 (1957) 255-269.
 .. [2] I. S. Duff, A. M. Erisman, J. K. Reid, "Direct Methods for Sparse Matrices", Oxford (1986), ch. 7, 9, 10.
+.. [3] D. Ruiz, "A scaling algorithm to equilibrate both rows and columns norms in matrices", report RAL-TR-2001-034,
+       Rutherford Appleton Laboratory (2001).
 """
 
 from __future__ import annotations
@@ -15,12 +17,14 @@ from __future__ import annotations
 import numpy as np
 from numba import float64, int64, njit, types
 
-THRESHOLD = 0.1
+THRESHOLDS = (0.01, 0.1, 0.5)
+"""Fraction of its column's largest entry a pivot must reach; the next is taken where entries grow too much."""
+
+GROWTH_ALLOWED = 1e4
 ROW_SINGLETON_THRESHOLD = 1e-3
 CANCELLED = 1e-14
 SEARCH_LIMIT = 12
 EQUILIBRATION_SWEEPS = 8
-NEGLIGIBLE = 1e-12
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -28,12 +32,12 @@ _IVEC = int64[::1]
 
 @njit(types.void(_IVEC, _IVEC, _VEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def equilibrate(indptr, indices, vals, row_scale, col_scale):
-    """Scale rows and columns so that entries lie as near to one as they can, by powers of two.
+    """Scale rows and columns together until the largest entry of each is near one, by powers of two.
 
-    Rows and columns are divided in turn by the geometric mean of their largest and smallest entry: in the Newton
-    matrix of an index-2 or index-3 system this finds the powers of the step size that belong to
-    positions, velocities and multipliers, which scaling by the largest entry alone does not. Entries at the level of
-    rounding beside the largest of their line are taken for zeros.
+    Dividing row i and column j at once by the roots of their largest entries [3]_ treats equations and unknowns alike
+    and finds the powers of the step size that belong to positions, velocities and multipliers. It looks at largest
+    entries only: the smallest of a moving mechanism are rounding noise of what is zero by geometry, of any magnitude,
+    and a scaling that heeds them makes a harmless matrix singular to working precision.
 
     Parameters
     ----------
@@ -44,36 +48,23 @@ def equilibrate(indptr, indices, vals, row_scale, col_scale):
         ``row_scale[i] * a[i, j] * col_scale[j]``.
     """
     n = row_scale.shape[0]
-    top = np.zeros(n)
-    low = np.zeros(n)
+    row_top = np.zeros(n)
+    col_top = np.zeros(n)
     row_scale[:] = 1.0
-    for sweep in range(EQUILIBRATION_SWEEPS):
-        top[:] = 0.0
-        low[:] = np.inf
+    for _ in range(EQUILIBRATION_SWEEPS):
+        row_top[:] = 0.0
         for j in range(n):
+            col_top[j] = 0.0
             for p in range(indptr[j], indptr[j + 1]):
-                a = abs(vals[p]) * col_scale[j]
-                top[indices[p]] = max(top[indices[p]], a)
-        for j in range(n):
-            for p in range(indptr[j], indptr[j + 1]):
-                a = abs(vals[p]) * col_scale[j]
-                if a > NEGLIGIBLE * top[indices[p]]:
-                    low[indices[p]] = min(low[indices[p]], a)
-        last = sweep == EQUILIBRATION_SWEEPS - 1
+                i = indices[p]
+                a = abs(vals[p]) * row_scale[i] * col_scale[j]
+                col_top[j] = max(col_top[j], a)
+                row_top[i] = max(row_top[i], a)
         for i in range(n):
-            if top[i] > 0.0:
-                row_scale[i] = 1.0 / (top[i] if last else np.sqrt(top[i] * low[i]))
-        for j in range(n):
-            col_top = 0.0
-            col_low = np.inf
-            for p in range(indptr[j], indptr[j + 1]):
-                col_top = max(col_top, abs(vals[p]) * row_scale[indices[p]])
-            for p in range(indptr[j], indptr[j + 1]):
-                a = abs(vals[p]) * row_scale[indices[p]]
-                if a > NEGLIGIBLE * col_top:
-                    col_low = min(col_low, a)
-            if col_top > 0.0:
-                col_scale[j] = 1.0 / (col_top if last else np.sqrt(col_top * col_low))
+            if row_top[i] > 0.0:
+                row_scale[i] /= np.sqrt(row_top[i])
+            if col_top[i] > 0.0:
+                col_scale[i] /= np.sqrt(col_top[i])
     for i in range(n):
         row_scale[i] = 2.0 ** np.round(np.log2(row_scale[i]))
         col_scale[i] = 2.0 ** np.round(np.log2(col_scale[i]))
@@ -147,13 +138,30 @@ def _make_room(pool, pool_vals, start, length, room, line, want):
 
 @njit(
     types.UniTuple(int64, 2)(
-        int64, float64, _IVEC, _IVEC, _VEC, _VEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _VEC, _IVEC, _IVEC, _IVEC
+        int64,
+        float64,
+        float64,
+        _IVEC,
+        _IVEC,
+        _VEC,
+        _VEC,
+        _IVEC,
+        _IVEC,
+        _IVEC,
+        _IVEC,
+        _IVEC,
+        _VEC,
+        _IVEC,
+        _IVEC,
+        _IVEC,
     ),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def _best_pivot(n, drop, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, cvals, rpool, rhead, rafter):
+def _best_pivot(
+    n, drop, threshold, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, cvals, rpool, rhead, rafter
+):
     """Return the row and column of the acceptable entry with the lowest Markowitz cost, or (-1, -1)."""
     best_row = -1
     best_col = -1
@@ -168,7 +176,7 @@ def _best_pivot(n, drop, cstart, clen, top, peak, rstart, rlen, chead, cafter, c
             if top[j] > drop * peak[j]:
                 for p in range(cstart[j], cstart[j] + count):
                     ratio = abs(cvals[p]) / top[j]
-                    if ratio < THRESHOLD:
+                    if ratio < threshold:
                         continue
                     cost = (rlen[cpool[p]] - 1) * (count - 1)
                     if cost < best_cost or (cost == best_cost and ratio > best_ratio):
@@ -190,7 +198,7 @@ def _best_pivot(n, drop, cstart, clen, top, peak, rstart, rlen, chead, cafter, c
                 for q in range(cstart[j], cstart[j] + clen[j]):
                     if cpool[q] == i:
                         ratio = abs(cvals[q]) / top[j]
-                        limit = ROW_SINGLETON_THRESHOLD if count == 1 else THRESHOLD
+                        limit = min(ROW_SINGLETON_THRESHOLD, threshold) if count == 1 else threshold
                         if ratio >= limit and (cost < best_cost or ratio > best_ratio):
                             best_cost = cost
                             best_ratio = ratio
@@ -205,12 +213,12 @@ def _best_pivot(n, drop, cstart, clen, top, peak, rstart, rlen, chead, cafter, c
 
 
 @njit(
-    types.Tuple((int64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC))(_IVEC, _IVEC, _VEC, float64),
+    types.Tuple((int64, float64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC))(_IVEC, _IVEC, _VEC, float64, float64),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def choose_pivots(indptr, indices, scaled, drop):
+def choose_pivots(indptr, indices, scaled, drop, threshold):
     """Eliminate the matrix once with Markowitz's rule and record pivots and fill.
 
     Parameters
@@ -221,11 +229,15 @@ def choose_pivots(indptr, indices, scaled, drop):
         Values after `equilibrate`.
     drop : float
         Columns whose entries have all fallen below this fraction of their largest value are left without a pivot.
+    threshold : float
+        Fraction of the largest entry left in its column that a pivot must reach.
 
     Returns
     -------
     rank : int
         Number of pivots found, less than n when the matrix is singular.
+    growth : float
+        Largest entry met on the way, beside the largest of the matrix.
     pivot_rows, pivot_cols : ndarray, shape (n,)
         Original row and column of each pivot; in a singular case the places from ``rank`` on hold what was left over.
     l_ptr, l_rows : ndarray
@@ -258,6 +270,7 @@ def choose_pivots(indptr, indices, scaled, drop):
             rlen[indices[p]] += 1
             top[j] = max(top[j], abs(scaled[p]))
         peak[j] = top[j]
+    largest = max(np.max(peak), 1e-300)
     croom[n] = nnz
     end = 0
     for i in range(n):
@@ -294,7 +307,7 @@ def choose_pivots(indptr, indices, scaled, drop):
     rank = 0
     for k in range(n):
         pi, pj = _best_pivot(
-            n, drop, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, cvals, rpool, rhead, rafter
+            n, drop, threshold, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, cvals, rpool, rhead, rafter
         )
         if pi < 0:
             break
@@ -398,4 +411,14 @@ def choose_pivots(indptr, indices, scaled, drop):
         if not col_done[m]:
             pivot_cols[left_c] = m
             left_c += 1
-    return rank, pivot_rows, pivot_cols, l_ptr, l_rows[: l_ptr[rank]].copy(), u_ptr, u_cols[: u_ptr[rank]].copy()
+    growth = np.max(peak) / largest
+    return (
+        rank,
+        growth,
+        pivot_rows,
+        pivot_cols,
+        l_ptr,
+        l_rows[: l_ptr[rank]].copy(),
+        u_ptr,
+        u_cols[: u_ptr[rank]].copy(),
+    )

@@ -20,7 +20,7 @@ from gearmbs.dae.arguments import check_choices, event_rules, output_times
 from gearmbs.dae.bdf import HISTORY
 from gearmbs.dae.core import SLOPE_MAX_AGE, advance
 from gearmbs.dae.functions import bind
-from gearmbs.dae.newton import set_weights
+from gearmbs.dae.newton import rounding_level, set_weights
 from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, SolverStats, Status
 from gearmbs.dae.sparse_lu import (
@@ -85,6 +85,7 @@ class Run:
         breakpoints: Sequence[float],
         event_direction: Sequence[int] | None,
         event_action: Sequence[int] | None,
+        event_count: Sequence[int] | None,
         dense_output: bool,
         slopes: bool,
         max_steps: int | None,
@@ -135,7 +136,7 @@ class Run:
             rec_order=np.zeros(rows, dtype=np.int64),
             g_old=np.zeros(max(1, n_events)),
             g_new=np.zeros(max(1, n_events)),
-            event_rules=event_rules(n_events, event_direction, event_action),
+            event_rules=event_rules(n_events, event_direction, event_action, event_count),
             hit_t=np.zeros(EVENT_BUFFER + n_events),
             hit_which=np.zeros(EVENT_BUFFER + n_events, dtype=np.int64),
             hit_y=np.zeros((EVENT_BUFFER + n_events if n_events else 1, n)),
@@ -224,6 +225,9 @@ class Run:
             return Status.NOT_FINITE, failures.not_finite(problem, t0, int(bad[0]))
         if st.count[s.HAS_EVENTS] and problem.events is not None:
             problem.events(t0, st.vec[s.Y], st.vec[s.YP], st.g_old, st.idata, st.rdata, st.work)
+            bad = np.flatnonzero(~np.isfinite(st.g_old))
+            if len(bad) and self._user_exception() is None:
+                return Status.NOT_FINITE, failures.event_not_finite(problem, t0, int(bad[0]))
         # over a vanishing step wrong rates are harmless, but values off the constraints still have to jump
         h_check = min(st.real[s.H], CHECK_STEP * (st.real[s.T_END] - t0)) if self.check_start else st.real[s.H]
         failure = self._choose_first_pivots(h_check)
@@ -416,15 +420,27 @@ class Run:
         h = float(st.real[s.H])
         worst = int(st.count[s.WORST])
         status = Status(code)  # type: ignore[call-arg]
+        if status is Status.NOT_FINITE and worst < 0:
+            return status, failures.event_not_finite(problem, t, -1 - worst)
         if status is Status.NOT_FINITE:
             return status, failures.not_finite(problem, t, worst)
         if status is Status.STEP_TOO_SMALL:
-            return status, failures.step_too_small(problem, t, h, worst, float(st.real[s.ERROR]))
+            worst = int(st.count[s.WORST_ERROR])
+            told = failures.step_too_small(problem, t, h, worst, float(st.real[s.ERROR]), self._noise())
+            return status, told
         if status is Status.NEWTON_FAILURE:
-            return status, failures.newton(problem, t, h, worst)
+            return status, failures.newton(problem, t, h, worst, self._noise())
         if status is Status.TOO_MANY_STEPS:
             return status, failures.too_many_steps(problem, t, int(st.count[s.STEPS]))
-        return status, failures.too_many_rejections(problem, t, h, worst)
+        return status, failures.too_many_rejections(problem, t, h, worst, self._noise())
+
+    def _noise(self) -> float:
+        """Return how far rounding alone moves the solution where the run stopped, in units of the tolerance."""
+        st = self.state
+        if self.plan is None or self.factors is None or not np.isfinite(st.vec[s.Y]).all():
+            return 0.0
+        level = float(rounding_level(st.vec, st.matrix, self.plan, self.factors))
+        return level if np.isfinite(level) else 0.0
 
     def _stats(self, wall_time: float) -> SolverStats:
         count = self.state.count

@@ -11,7 +11,7 @@ from numba.core.registry import CPUDispatcher
 from scipy.sparse import csc_array, issparse
 
 from gearmbs.dae import difference_jacobian as dj
-from gearmbs.dae.ida import solve_ida
+from gearmbs.dae.ida import IDA_MAX_ORDER, solve_ida
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, Status
 from gearmbs.dae.sparse_lu import LUFactors, LUPlan, SingularMatrixError, analyse, factor, new_factors, solve
@@ -19,7 +19,6 @@ from gearmbs.dae.wstiff import solve_wstiff
 
 METHODS = ("WSTIFF", "GSTIFF", "IDA")
 IDA_DEFAULT_OUTPUTS = 201
-IDA_MAX_ORDER = 5
 SET_HERE = ("problem", "t_end", "error_probe")
 SETTLING_STEP = 1e-12
 SETTLING_SWEEPS = 3
@@ -259,16 +258,26 @@ def as_problem(
     return problem, functions.probe
 
 
-def _event_rules(events: Sequence[Callable]) -> tuple[list[int], list[int]]:
-    """Read scipy's attributes ``direction`` and ``terminal``, and ours ``restart``, from event functions."""
-    direction, action = [], []
+def _event_rules(events: Sequence[Callable]) -> dict[str, list[int]]:
+    """Read scipy's attributes ``direction`` and ``terminal``, and ours ``restart``, from event functions.
+
+    A whole number in ``terminal`` says at which occurrence of the event the run ends, as in scipy.
+    """
+    direction, action, count = [], [], []
     for g in events:
         attributes = g.py_func if isinstance(g, CPUDispatcher) else g
         direction.append(int(np.sign(getattr(attributes, "direction", 0))))
-        action.append(
-            1 if getattr(attributes, "terminal", False) else 2 if getattr(attributes, "restart", False) else 0
-        )
-    return direction, action
+        terminal = getattr(attributes, "terminal", False)
+        if isinstance(terminal, bool | np.bool_):
+            terminal = int(terminal)
+        if terminal is not None and (terminal != int(terminal) or terminal < 0):
+            raise ValueError(
+                f"terminal of {getattr(attributes, '__name__', 'an event function')} is {terminal!r}; set True, False, "
+                "or the number of the occurrence that ends the run"
+            )
+        action.append(1 if terminal else 2 if getattr(attributes, "restart", False) else 0)
+        count.append(max(1, int(terminal or 0)))
+    return {"event_direction": direction, "event_action": action, "event_count": count}
 
 
 def _check_options(method: str, options: Mapping[str, Any], max_order: int | None, rtol: float) -> None:
@@ -346,8 +355,9 @@ def solve_dae(
     jac_sparsity : array_like or sparse matrix, shape (n, n), optional
         Pattern of dG/dy and dG/dy' together.
     events : callable or list of callable, optional
-        ``g(t, y, yp[, p])`` whose zeros are located. Attributes: ``direction`` (-1, 0, 1), ``terminal`` (stop there),
-        ``restart`` (land there and start afresh, for discontinuities).
+        ``g(t, y, yp[, p])`` whose zeros are located. Attributes: ``direction`` (-1, 0, 1), ``terminal`` (True to
+        stop there, a number to stop at that occurrence), ``restart`` (land there and start afresh, for
+        discontinuities).
     t_eval : array_like, optional
         Output times; default every step.
     dense_output : bool
@@ -418,7 +428,7 @@ def solve_dae(
         )
         tol, relative = 1.0, float(rtol)
         if functions:
-            options["event_direction"], options["event_action"] = _event_rules(functions)
+            options.update(_event_rules(functions))
     if method == "IDA":
         if dense_output or problem.n_events:
             raise ValueError("method='IDA' has neither dense output nor events here; use WSTIFF or GSTIFF")

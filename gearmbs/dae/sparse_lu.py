@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, int64, njit, types, uint32
 
-from gearmbs.dae.ordering import CANCELLED, choose_pivots, equilibrate
+from gearmbs.dae.ordering import CANCELLED, GROWTH_ALLOWED, THRESHOLDS, choose_pivots, equilibrate
 
 GROWTH_LIMIT = 1e5
 
@@ -120,7 +120,12 @@ def _plan(indptr, indices, vals, scale, drop):
     for j in range(n):
         for p in range(indptr[j], indptr[j + 1]):
             scaled[p] = vals[p] * row_scale[indices[p]] * col_scale[j]
-    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(indptr, indices, scaled, drop)
+    rank, growth, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(indptr, indices, scaled, drop, THRESHOLDS[0])
+    for threshold in THRESHOLDS[1:]:
+        if growth > GROWTH_ALLOWED:
+            rank, growth, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(
+                indptr, indices, scaled, drop, threshold
+            )
 
     row_place = np.empty(n, dtype=np.int64)
     col_place = np.empty(n, dtype=np.int64)

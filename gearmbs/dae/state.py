@@ -39,6 +39,7 @@ NEWTON_TOL = 11
 GAMMA_BASE = 12
 H_TRY = 13
 H_REFUSED = 14
+NOISE = 15
 N_REAL = 16
 
 # RunState.count
@@ -51,7 +52,7 @@ ERROR_FAILS = 5
 NEWTON_FAILS = 6
 NAN_FAILS = 7
 FRESH = 8
-PIVOTS_NEW = 9
+WORST_ERROR = 9
 STEPS = 10
 ERROR_REJECTIONS = 11
 NEWTON_REJECTIONS = 12
@@ -80,6 +81,8 @@ SLOPE_AGE = 34
 DROP_LEVEL = 35
 DROP_AGE = 36
 DROP_ROUNDS = 37
+NOISY = 38
+NOISY_RUN = 39
 N_COUNT = 40
 
 # rows of RunState.vec
@@ -105,7 +108,7 @@ VALUE = 0
 SLOPE = 1
 NODES = 2
 WEIGHTS = 3
-N_SMALL = 4
+N_SMALL = WEIGHTS + 8
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -142,8 +145,8 @@ class RunState(NamedTuple):
         Accepted points since the last call.
     g_old, g_new : ndarray
         Event functions at the last accepted point and at the new one.
-    event_rules : ndarray of int64, shape (2, n_events)
-        Direction and action of each event.
+    event_rules : ndarray of int64, shape (3, n_events)
+        Direction and action of each event, and the crossings left until a stop.
     hit_t, hit_which, hit_y : ndarray
         Crossings since the last call.
     """

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
 from gearmbs.dae import initial, jacobian, outputs, residual
@@ -29,6 +29,9 @@ from gearmbs.dae.rotation import (
 from gearmbs.dae.tables import TableBuilder
 from gearmbs.dae.terms import ANGLE, dot3
 
+DENSE_COORDINATES = 600
+"""Coordinates up to which motions without inertia are looked for by dense decompositions."""
+INVERSE_ITERATIONS = 3
 MAX_LOAD_ITERATIONS = 200
 """Of loads that depend on each other, at the start; friction converges like a power of the friction coefficient."""
 
@@ -369,6 +372,8 @@ class System:
     def _free_massless_body(self, matrix: csc_array, base: int) -> str | None:
         from scipy.linalg import null_space
 
+        if base > DENSE_COORDINATES:
+            return self._free_massless_body_of_many(matrix, base)
         constraint = matrix[base:, :base].toarray()
         free = null_space(constraint) if constraint.shape[0] else np.eye(base)
         mass = matrix[:base, :base].toarray()
@@ -377,6 +382,27 @@ class System:
             motion = np.abs(free @ vectors[:, 0])
             return self.body_names[int(np.argmax(motion)) // 6]
         return None
+
+    def _free_massless_body_of_many(self, matrix: csc_array, base: int) -> str | None:
+        """Look for a motion without inertia by inverse iteration, on masses raised by a trace that keeps it regular."""
+        heaviest = abs(matrix[:base, :base]).max()
+        raised = np.zeros(matrix.shape[0])
+        raised[:base] = 1e-15 * heaviest
+        try:
+            factors = splu(csc_array(matrix + diags_array(raised)))
+        except RuntimeError:
+            return None
+        motion = np.zeros(matrix.shape[0])
+        motion[:base] = np.random.default_rng(0).standard_normal(base)
+        answer = 1.0
+        for _ in range(INVERSE_ITERATIONS):
+            motion[base:] = 0.0
+            motion /= np.linalg.norm(motion)
+            motion = factors.solve(motion)
+            answer = float(np.linalg.norm(motion[:base]))
+        if not answer * heaviest >= 1e14:
+            return None
+        return self.body_names[int(np.argmax(np.abs(motion[:base]))) // 6]
 
     def _singular_message(self, matrix: csc_array, base: int) -> str:
         name = self._free_massless_body(matrix, base)

@@ -35,6 +35,7 @@ def solve_wstiff(
     breakpoints: Sequence[float] = (),
     event_direction: Sequence[int] | None = None,
     event_action: Sequence[int] | None = None,
+    event_count: Sequence[int] | None = None,
     dense_output: bool = False,
     slopes: bool = True,
     max_steps: int | None = None,
@@ -69,6 +70,8 @@ def solve_wstiff(
     event_direction, event_action : sequence of int, optional
         For each event function: crossings that count (-1 falling, 1 rising, 0 both), and what they do (0 record,
         1 stop, 2 land on the crossing and start afresh).
+    event_count : sequence of int, optional
+        For each event function that stops the run: at which of its crossings; default the first.
     dense_output : bool
         Keep every step, for ``result.sol``.
     slopes : bool
@@ -109,6 +112,7 @@ def solve_wstiff(
         breakpoints=breakpoints,
         event_direction=event_direction,
         event_action=event_action,
+        event_count=event_count,
         dense_output=dense_output,
         slopes=slopes,
         max_steps=max_steps,

@@ -103,6 +103,10 @@ def test_unknown_parts_and_the_command_line(tmp_path, capsys):
     with pytest.raises(SystemExit):
         runner.main(["gears"])
     assert "gears" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        runner.main(["precision", "size", "--quick", "--out", str(tmp_path), "--only", "no such piece"])
+    assert "no piece of precision, size has 'no such piece' in its name" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
     runner.main(["precision", "--quick", "--out", str(tmp_path), "--only", SOME])
     assert "Reference: one-degree-of-freedom" in capsys.readouterr().out
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
+from gearmbs.dae.ida import solve_ida
 from gearmbs.dae.result import Status
 from gearmbs.dae.solve import solve_dae
 from gearmbs.dae.wstiff import solve_wstiff
@@ -155,6 +156,78 @@ def test_nan_at_the_start():
     result = solve_dae(residual, (0.0, 1.0), [1.0], [0.0])
     assert result.status is Status.NOT_FINITE
     assert result.stats.steps == 0
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_an_event_function_that_is_not_finite_is_named(compiled):
+    """The root of a negative number from t = 1 on: its crossings would never be seen."""
+    wrap = njit if compiled else (lambda f: f)
+
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - 1.0
+
+    def fine(t, y, yp):
+        return y[0] - 5.0
+
+    def root(t, y, yp):
+        return (1.0 - t) ** 0.5 - 2.0 if t <= 1.0 else np.nan
+
+    result = solve_dae(wrap(residual), (0.0, 3.0), [0.0], [1.0], events=[wrap(fine), wrap(root)])
+    assert result.status is Status.NOT_FINITE
+    assert "event function 1 is NaN" in result.message
+    assert 1.0 <= result.t_last < 3.0
+    assert result.t[-1] > 0.0
+
+
+def test_an_event_function_that_is_not_finite_at_the_start():
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - 1.0
+
+    result = solve_dae(residual, (0.0, 3.0), [0.0], [1.0], events=lambda t, y, yp: float("nan"))
+    assert result.status is Status.NOT_FINITE
+    assert "event function 0 is NaN" in result.message
+    assert result.t.tolist() == [0.0]
+
+
+def test_what_sundials_has_to_say_is_in_the_message(capsys):
+    """y' = y^2 has a pole at t = 1; the steps run out before it, and nothing is printed."""
+
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - y[0] ** 2
+
+    result = solve_dae(residual, (0.0, 2.0), [1.0], [1.0], method="IDA", max_steps=300)
+    assert result.status is Status.SOLVER_FAILURE
+    assert "mxstep steps taken" in result.message
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize(
+    ("change", "names"),
+    [
+        ({"max_order": 6}, "max_order .KMAX. must be 1 to 5 for IDA"),
+        ({"rtol": -1.0}, "rtol must not be negative"),
+        ({"rtol": float("nan")}, "rtol must not be negative"),
+        ({"tol": 0.0}, "tol .ERROR. must be positive"),
+        ({"max_step": -1.0}, "max_step .HMAX. must not be negative"),
+        ({"max_iterations": 0}, "max_iterations .MAXIT. must be at least 1"),
+    ],
+)
+def test_ida_called_directly_checks_its_arguments(change, names):
+    with pytest.raises(ValueError, match=names):
+        solve_ida(pendulum(), [0.0, 1.0], **change)
+
+
+def test_the_error_told_is_of_the_step_that_failed():
+    """The rates jump without end: the error test fails down to HMIN, and the sentence gives an error above one."""
+
+    @njit
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - (np.sin(1e9 * t) if t > 0.5 else 0.0)
+
+    result = solve_dae(residual, (0.0, 1.0), [0.0], [0.0], min_step=1e-3, rtol=0.0, atol=1e-9)
+    assert result.status is Status.STEP_TOO_SMALL
+    told = float(result.message.split("(")[1].split(" times")[0])
+    assert told > 1.0
 
 
 def test_ida_gives_up_where_the_equations_are_not_finite():

@@ -49,19 +49,22 @@ def test_start_is_consistent(name, formulation):
 
 @pytest.mark.parametrize("name", list(PROBLEMS))
 def test_error_falls_with_the_tolerance(name):
-    """Order k at fixed order gives an error of tol^(k/(k+1)); with free order the power lies between 1/2 and 1.3."""
+    """Order k at fixed order gives an error of tol^(k/(k+1)): 0.75 to 0.86 for the orders 3 to 6 that are used.
+
+    The order rises as the tolerance falls, which adds to the power; chaotic parts of the error scatter by +- 0.1.
+    """
     reference = PROBLEMS[name]
     problem = reference.make("SI2")
-    tolerances = np.array([1e-5, 1e-6, 1e-7, 1e-8])
+    tolerances = 10.0 ** -np.arange(5.0, 9.1, 0.5)
     errors = []
     for tol in tolerances:
         result = solve_wstiff(problem, reference.times, tol=tol)
         assert result.success, result.message
         errors.append(reference.error(result.t, result.y))
     power = np.polyfit(np.log(tolerances), np.log(errors), 1)[0]
-    assert 0.5 < power < 1.4
-    # 1e-8 a step, up to 2,000 steps, and the growth of errors along the motion
-    assert errors[-1] < 1e-3
+    assert 0.65 < power < 1.15
+    # 1e-9 a step, up to 3,000 steps, and a growth of up to ten along the motion (heavy top)
+    assert errors[-1] < 3e-5
 
 
 @pytest.mark.parametrize(("k", "slack"), [(1, 0.12), (2, 0.12), (3, 0.15), (4, 0.15)])
@@ -108,15 +111,26 @@ def test_chain_passes_its_singular_positions(loops, tol, corrector):
     assert reference.error(result.t, result.y) < 500 * tol**0.8
 
 
-@pytest.mark.parametrize(("formulation", "loops"), [("SI2", 13), ("SI2", 80), ("SI1", 10), ("SI1", 40), ("I3", 80)])
-@pytest.mark.parametrize("tol", [1e-8, 1e-9])
+@pytest.mark.parametrize("formulation", ["SI2", "SI1", "I3"])
+@pytest.mark.parametrize("loops", [10, 40, 80, 160])
+@pytest.mark.parametrize("tol", [1e-8, 1e-9, 1e-10, 1e-11])
 def test_chain_passes_at_the_level_of_rounding(formulation, loops, tol):
-    """Near the singular positions rounding alone moves the velocities by a part of such a tolerance."""
+    """An angle d from a singular position rounding moves the velocities by about 1e-14 / d^2: 1e-10 at 1e-2."""
     reference = chain_problem(loops, 2.0)
     result = solve_wstiff(reference.make(formulation), reference.times, tol=tol)
     assert result.success, result.message
-    # at 1e-8 a step the free runs end within 2e-6
-    assert reference.error(result.t, result.y) < 200 * tol
+    # at 1e-8 a step the free runs end within 2e-6; at 1e-11 noise of 1e-9 comes on top
+    assert reference.error(result.t, result.y) < 400 * tol + 5e-9
+    assert result.stats.newton_rejections <= 2
+
+
+def test_a_tolerance_below_rounding_is_told():
+    """At 1e-12 some tenth of a radian before the singular position is already lost in rounding."""
+    reference = chain_problem(160, 2.0)
+    result = solve_wstiff(reference.make("SI2"), reference.times, tol=1e-12)
+    assert not result.success
+    assert "Rounding alone moves the solution" in result.message
+    assert "looser one" in result.message
 
 
 def test_constraints_hold_along_the_pendulum():

@@ -117,6 +117,46 @@ def test_terminal_event(compiled):
     np.testing.assert_allclose(result.y_events[0][0], result.y[-1], atol=1e-12)
 
 
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
+def test_terminal_counts_occurrences(compiled, method):
+    """cos crosses zero upward at 3 pi/2 + 2 k pi; the third time ends the run, as in scipy."""
+    wrap = njit if compiled else (lambda f: f)
+
+    def circle(t, y, yp, out):
+        out[0] = yp[0] + y[1]
+        out[1] = yp[1] - y[0]
+
+    def upward(t, y, yp):
+        return y[0]
+
+    def half(t, y, yp):
+        return y[1] - 0.5
+
+    upward.direction = 1
+    upward.terminal = 3
+    result = solve_dae(
+        wrap(circle), (0.0, 50.0), [1.0, 0.0], [0.0, 1.0], rtol=1e-9, atol=1e-9, events=[wrap(upward), wrap(half)],
+        method=method,
+    )  # fmt: skip
+    assert result.status == 1
+    third = 1.5 * np.pi + 4.0 * np.pi
+    assert result.t_last == pytest.approx(third, abs=1e-6)
+    assert result.t_events[0] == pytest.approx(third - 2.0 * np.pi * np.array([2, 1, 0]), abs=1e-6)
+    # sin = 1/2 twice a turn
+    assert len(result.t_events[1]) == 6
+
+
+@pytest.mark.parametrize("terminal", [-1, 1.5])
+def test_terminal_must_be_a_count(terminal):
+    def event(t, y, yp):
+        return y[0]
+
+    event.terminal = terminal
+    with pytest.raises(ValueError, match="terminal of event is"):
+        solve_dae(falling, (0.0, 1.0), [10.0, 0.0], events=event)
+
+
 def test_directions_and_several_events():
     """cos crosses zero downward at pi/2 + 2 k pi and upward at 3 pi/2 + 2 k pi; sin - 1/2 both ways."""
 

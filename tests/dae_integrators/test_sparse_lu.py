@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearmbs.dae.ordering import equilibrate
+from gearmbs.dae.ordering import GROWTH_ALLOWED, THRESHOLDS, choose_pivots, equilibrate
 from gearmbs.dae.sparse_lu import GROWTH_LIMIT, SingularMatrixError, analyse, factor, new_factors, solve
 
 
@@ -167,3 +167,47 @@ def test_equilibration_brings_entries_near_one(n, seed):
     scaled = rows[:, None] * a * cols
     assert scaled.max() / scaled.min() < 5.0
     assert scaled.max() < 4.0
+
+
+def test_noise_in_place_of_zeros_does_not_spoil_the_scaling():
+    """Entries that geometry makes zero hold rounding noise of any size; the rest is as well conditioned as before."""
+    rng = np.random.default_rng(5)
+    n = 400
+    rows = np.concatenate([np.arange(n), rng.integers(0, n, 6 * n)])
+    cols = np.concatenate([rng.permutation(n), rng.integers(0, n, 6 * n)])
+    vals = np.concatenate([rng.uniform(1.0, 2.0, n), 10.0 ** rng.uniform(-16.0, -5.0, 6 * n)])
+    # dynamics with h^2, constraints without: the scales that have to be found
+    power = 10.0 ** rng.integers(-6, 7, n)
+    matrix = sp.csc_array((vals * power[rows], (rows, cols)), shape=(n, n))
+    matrix.sum_duplicates()
+    indptr, indices = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64)
+    plan = analyse(indptr, indices, matrix.data, np.ones(n))
+    factors = new_factors(plan)
+    factor(plan, factors, matrix.data)
+    x = rng.normal(size=n)
+    out = np.empty(n)
+    solve(plan, factors, matrix @ x, out)
+    # a permuted diagonal but for entries of 1e-5: condition below 4
+    assert np.abs(out - x).max() < 1e-13
+    row_scale, col_scale = np.ones(n), np.ones(n)
+    equilibrate(indptr, indices, matrix.data, row_scale, col_scale)
+    scaled = row_scale[:, None] * matrix.toarray() * col_scale
+    assert np.linalg.cond(scaled) < 10.0
+
+
+def test_growing_entries_ask_for_stricter_pivots():
+    """A band of entries 1 and 0.011: pivots of a hundredth of their column let entries grow 1e7 times, a tenth 60."""
+    rng = np.random.default_rng(1390)
+    n, band = int(rng.integers(30, 120)), int(rng.integers(2, 6))
+    dense = np.zeros((n, n))
+    for k in range(n):
+        for j in range(max(0, k - band), min(n, k + band + 1)):
+            if rng.random() < 0.8:
+                dense[k, j] = rng.choice([-1, 1]) * (0.011 if rng.random() < 0.6 else 1.0)
+    indptr, indices, vals = csc(dense)
+    growth = [choose_pivots(indptr, indices, vals, 1e-14, threshold)[1] for threshold in THRESHOLDS[:2]]
+    assert growth[0] > GROWTH_ALLOWED > 10.0 * growth[1]
+    x = rng.normal(size=n)
+    out = solve_once(dense, dense @ x)
+    # backward stable: rounding, a growth below 100, and a sum over 2 * 5 + 1 entries
+    assert np.abs(dense @ out - dense @ x).max() < 100.0 * 11 * 2.2e-16 * np.abs(dense).max() * np.abs(out).max()

@@ -252,6 +252,28 @@ def test_massless_free_body():
         m.compile().problem()
 
 
+@pytest.mark.parametrize("dense_up_to", [600, 6])
+def test_massless_free_body_at_the_end_of_a_chain(monkeypatch, dense_up_to):
+    """The last of 20 slender rods hangs on a ball: nothing resists its turning about itself. A pin holds it."""
+    monkeypatch.setattr("gearmbs.dae.system.DENSE_COORDINATES", dense_up_to)
+    for ball in (False, True):
+        m = Mechanism("rods", gravity=(0, -9.81, 0))
+        last = m.ground
+        for k in range(20):
+            rod = m.body(f"rod {k}", 1.0, (0, 1 / 12, 1 / 12), position=(k + 0.5, 0, 0))
+            if ball and k == 19:
+                m.spherical(f"ball {k}", rod, last, at=(k, 0, 0))
+            else:
+                m.revolute(f"pin {k}", rod, last, at=(k, 0, 0), axis=(0, 0, 1))
+            last = rod
+        system = m.compile()
+        if not ball:
+            assert system.problem().n > 20 * 12
+            continue
+        with pytest.raises(SingularModelError, match="body 'rod 19' can move without any inertia"):
+            system.problem()
+
+
 def test_massless_held_body_is_fine():
     m = Mechanism("carried", gravity=(0, 0, -9.81))
     weight = m.body("weight", 2.0, UNIT)

@@ -81,6 +81,19 @@ def test_ten_windows_pass_the_flat_position():
     np.testing.assert_allclose(height, references.four_bars(t, 10)[:, 1], atol=1e-5)
 
 
+@pytest.mark.parametrize("loops", [2, 40])
+@pytest.mark.parametrize("tol", [1e-5, 1e-6, 1e-7, 1e-8, 1e-9])
+def test_many_windows_at_any_tolerance(loops, tol):
+    """Entries that the plane motion makes zero hold rounding noise, which must not decide about scales and pivots."""
+    t = np.linspace(0.0, 3.0, 301)
+    solution = iftomm.four_bars(loops).simulate(3.0, t_eval=t, tol=tol)
+    assert solution.success, solution.message
+    height = 2 * solution.position(f"crank {loops}")[:, 1]
+    # free runs: 60 times the tolerance at 1e-8, with a power of 0.8
+    np.testing.assert_allclose(height, references.four_bars(t, loops)[:, 1], atol=20 * tol**0.8)
+    assert solution.stats.error_rejections + solution.stats.newton_rejections <= 3
+
+
 def test_outputs_at_the_flat_position():
     """At 1e-6 an output of this run falls on a position that is singular to rounding; it is solved all the same."""
     t = np.linspace(0.0, 3.0, 301)
