@@ -96,18 +96,19 @@ def _model_errors(session: Session, allow_unsupported: bool) -> list[Diagnostic]
     if not model.mechanism.bodies:
         message = "no PART moves; add one with its mass and centre of mass: PART/2, MASS=1, CM=20, IP=1,1,1"
         return [Diagnostic(ERROR, message, session.deck.file, 0)]
-    return expression_errors(model, session.inactive)
+    return expression_errors(model, session)
 
 
-def expression_errors(model: AdamsModel, inactive: set[tuple[str, int]]) -> list[Diagnostic]:
-    """Return every expression of the active statements that is not understood, with its line."""
+def expression_errors(model: AdamsModel, session: Session) -> list[Diagnostic]:
+    """Return every expression of the active statements that is not understood, with the line that gave it."""
     deck = model.deck
     markers = markers_of(model.mechanism)
     bodies = {id(body): k for k, body in enumerate((model.mechanism.ground, *model.mechanism.bodies.values()))}
     scope = model.scope({id(m): k for k, m in enumerate(markers)}, [bodies[id(m.body)] for m in markers])
     found = []
     for statement in deck:
-        if (st.KEYWORD_OF[type(statement)], statement.id) in inactive or getattr(statement, "implicit", False):
+        key = (st.KEYWORD_OF[type(statement)], statement.id)
+        if key in session.inactive or getattr(statement, "implicit", False):
             # what is not supported is left out, or refused before
             continue
         for name, spec in specs_of(type(statement)).items():
@@ -120,9 +121,10 @@ def expression_errors(model: AdamsModel, inactive: set[tuple[str, int]]) -> list
             except ExpressionError as error:
                 message = str(error)
             if message:
-                line = statement.given.get(name, statement.line)
+                own = (deck.file, statement.given.get(name, statement.line))
+                file, line = session.places.get((type(statement), statement.id, name), own)
                 message = f"{statement.label()}: {spec.keyword}: {message}"
-                found.append(Diagnostic(ERROR, message, deck.file, line))
+                found.append(Diagnostic(ERROR, message, file, line))
     return found
 
 

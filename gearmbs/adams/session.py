@@ -25,7 +25,20 @@ AT_START: dict[type, frozenset[str]] = {
 
 @dataclass
 class Session:
-    """What changes while a script is carried out."""
+    """What changes while a script is carried out.
+
+    Attributes
+    ----------
+    deck : Deck
+        As commands have left it.
+    inactive : set of (statement name, id)
+    state, states, turns
+        Where the last analysis ended: parts by id, DIFFs by id, counted angles; ``state`` is None before the first.
+    time : float
+        In the deck's unit.
+    places : dict
+        (statement class, id, argument) -> (file, line) of the command that gave it.
+    """
 
     deck: Deck
     inactive: set[tuple[str, int]] = field(default_factory=set)
@@ -33,6 +46,7 @@ class Session:
     states: dict[int, float] = field(default_factory=dict)
     turns: dict[tuple[str, str, str], float] = field(default_factory=dict)
     time: float = 0.0
+    places: dict[tuple[type, int, str], tuple[str, int]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, deck: Deck) -> Session:
@@ -100,6 +114,7 @@ def change(session: Session, command: Change, allow_unsupported: bool) -> None:
             group[new.id] = old
         session.deck.__dict__.pop("units", None)
         raise DeckError([Diagnostic(d.severity, d.message, command.file, command.line) for d in wrong])
+    session.places.update({(type(new), new.id, name): (command.file, line) for name, line in new.given.items()})
 
 
 def output_times(session: Session, command: Simulate) -> np.ndarray:

@@ -9,8 +9,8 @@ WIDTH = 78
 
 
 def number(value: float) -> str:
-    """Return a number with all its digits."""
-    return f"{float(value):.17g}"
+    """Return a number with all the digits it needs to be read back."""
+    return repr(float(value)).removesuffix(".0")
 
 
 def listed(values: Iterable[float]) -> str:

@@ -57,7 +57,10 @@ def test_interrupted_scripts_keep_what_ran(tmp_path, monkeypatch):
             "SIM/DYN, END=0.1, STEPS=1\nDEACT/JOINT, ID=9\nSIM/DYN, END=1, STEPS=1",
             "<script>:2: error: there is no JOINT/9",
         ),
-        ("SIM/DYN, END=0.1, STEPS=1\nREQUEST/1, F2=DX(77)\nSIM/DYN, END=1, STEPS=1", "there is no MARKER 77"),
+        (
+            "SIM/DYN, END=0.1, STEPS=1\nREQUEST/1, F2=DX(77)\nSIM/DYN, END=1, STEPS=1",
+            "<script>:2: error: REQUEST/1: F2: there is no MARKER 77",
+        ),
     ],
 )
 def test_mistakes_show_before_anything_is_run(tmp_path, commands, message):
