@@ -181,6 +181,8 @@ class Builder:
         self.inactive = inactive
         self.mechanism = Mechanism(deck.title or "adams")
         self.mechanism.units = deck.units
+        # in decks a text is an expression in the deck's units, and checked with its line
+        self.mechanism.reads_units = False
         self.model = AdamsModel(self.mechanism, deck)
         self.markers: dict[int, Marker] = {}
         self.joints: dict[int, Joint] = {}

@@ -221,7 +221,7 @@ class Solution:
                     f"joint {joint!r} was set aside as redundant, so its share of the load is not determined: "
                     f"{', '.join(known)} carry all of it"
                 )
-            raise KeyError(f"joint {joint!r}; the joints are {', '.join(known)}")
+            raise KeyError(f"joint {joint!r}; the joints are {', '.join(known) or 'none in this mechanism'}")
         return self._records.force[:, rows].sum(axis=1), self._records.moment[:, rows].sum(axis=1)
 
     def load(self, element: str) -> tuple[np.ndarray, np.ndarray]:
@@ -238,7 +238,8 @@ class Solution:
         try:
             return self.system.force_names.index(name)
         except ValueError:
-            raise KeyError(f"force element {name!r}; there are {', '.join(self.system.force_names)}") from None
+            known = ", ".join(self.system.force_names) or "none in this mechanism"
+            raise KeyError(f"force element {name!r}; the force elements are {known}") from None
 
     @property
     def multipliers(self) -> np.ndarray:

@@ -35,8 +35,10 @@ import numpy as np
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import elements as el
 from gearmbs.mechanism.elements import Load, State
+from gearmbs.mechanism.expression import Units
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Marker
+from gearmbs.mechanism.quantities import quantity
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.mechanism import Mechanism
@@ -126,19 +128,43 @@ class Friction:
             raise ModelError(f"{label}: mu_static = {self.mu_static} is less than mu_dynamic = {self.mu_dynamic}")
 
 
-def friction_of(name: str, mu_static: float, mu_dynamic: float, parameters: dict) -> Friction:
-    """Return the parameters of a friction given as keywords.
+DIMENSIONS = {
+    "stiction_transition_velocity": ("speed", "velocity"),
+    "preload_force": ("force", "force"),
+    "preload_torque": ("torque", "torque"),
+    "max_force": ("force", "force"),
+    "max_torque": ("torque", "torque"),
+    **dict.fromkeys(
+        ("max_stiction_deformation", "pin_radius", "friction_arm", "bending_arm", "reaction_arm", "overlap",
+         "ball_radius"),
+        ("length", "length"),
+    ),
+}  # fmt: skip
+"""Dimension of each parameter with a unit, for texts and in the function language."""
+
+
+def friction_of(name: str, mu_static: float, mu_dynamic: float, parameters: dict, units: Units) -> Friction:
+    """Return the parameters of a friction given as keywords; texts with a unit become numbers in ``units``.
 
     Raises
     ------
     ModelError
-        For a keyword that does not exist.
+        For a keyword that does not exist, or a value that is not what it should be.
     """
+    label = f"friction '{name}'"
+    mu_static, mu_dynamic = (
+        quantity(value, "dimensionless", f"{label}: {field}")
+        for field, value in (("mu_static", mu_static), ("mu_dynamic", mu_dynamic))
+    )
     known = [f.name for f in fields(Friction)]
     for key in parameters:
         if key not in known:
             raise ModelError(f"friction '{name}': {key!r} is no parameter; there are {', '.join(known)}")
-    return Friction(mu_static, mu_dynamic, **parameters)
+    given = dict(parameters)
+    for key, (unit, dimension) in DIMENSIONS.items():
+        if given.get(key) is not None:
+            given[key] = quantity(given[key], unit, f"{label}: {key}", units.factor(dimension))
+    return Friction(mu_static, mu_dynamic, **given)
 
 
 def add_friction(mechanism: Mechanism, name: str, joint: Joint, friction: Friction) -> list[Load]:

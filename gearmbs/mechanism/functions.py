@@ -8,6 +8,10 @@ import numpy as np
 
 from gearmbs.dae import timefunctions as tf
 from gearmbs.dae.errors import ModelError
+from gearmbs.mechanism.quantities import any_quantity, expression_text, quantity
+
+RATES = ("angular speed", "speed", "rad/s^2", "acceleration", "dimensionless")
+"""What the rate of a ramp may be."""
 
 
 @dataclass(frozen=True)
@@ -44,18 +48,19 @@ class TimeFunction:
 
 def constant(value: float) -> TimeFunction:
     """Return the constant function."""
-    return TimeFunction(tf.CONSTANT, (float(value),), f"{value:g}")
+    value = any_quantity(value, "constant")
+    return TimeFunction(tf.CONSTANT, (value,), f"{value:g}")
 
 
 def step(t0: float, f0: float, t1: float, f1: float, quintic: bool = False) -> TimeFunction:
     """Return ADAMS's STEP (cubic) or STEP5 (quintic) from f0 before t0 to f1 after t1."""
+    t0, t1 = quantity(t0, "time", "step: t0"), quantity(t1, "time", "step: t1")
+    f0, f1 = any_quantity(f0, "step: f0"), any_quantity(f1, "step: f1")
     if not t1 > t0:
         raise ModelError(f"step: its end {t1} s must be later than its start {t0} s")
     name = "STEP5" if quintic else "STEP"
     kind = tf.STEP5 if quintic else tf.STEP
-    return TimeFunction(
-        kind, (float(t0), float(f0), float(t1), float(f1)), f"{name}(TIME, {t0:g}, {f0:g}, {t1:g}, {f1:g})"
-    )
+    return TimeFunction(kind, (t0, f0, t1, f1), f"{name}(TIME, {t0:g}, {f0:g}, {t1:g}, {f1:g})")
 
 
 def ramp(rate: float, over: float = 0.0, start: float = 0.0, quintic: bool = False) -> TimeFunction:
@@ -63,18 +68,22 @@ def ramp(rate: float, over: float = 0.0, start: float = 0.0, quintic: bool = Fal
 
     The rate is STEP(TIME, 0, 0, over, rate), so the function is its integral, in closed form.
     """
+    rate, over = any_quantity(rate, "ramp: rate", RATES), quantity(over, "time", "ramp: over")
+    start = any_quantity(start, "ramp: start")
     if over < 0.0:
         raise ModelError(f"ramp: over = {over} s; the run-up time cannot be negative")
     if over == 0.0:
         return polynomial([start, rate])
     kind = tf.STEP5_INTEGRAL if quintic else tf.STEP_INTEGRAL
     text = f"integral of STEP{5 if quintic else ''}(TIME, 0, 0, {over:g}, {rate:g})"
-    return TimeFunction(kind, (0.0, 0.0, float(over), float(rate), float(start)), text)
+    return TimeFunction(kind, (0.0, 0.0, over, rate, start), text)
 
 
 def harmonic(amplitude: float, omega: float, phase: float = 0.0, offset: float = 0.0) -> TimeFunction:
     """Return offset + amplitude sin(omega t + phase)."""
-    parameters = (float(amplitude), float(omega), float(phase), float(offset))
+    amplitude, offset = any_quantity(amplitude, "harmonic: amplitude"), any_quantity(offset, "harmonic: offset")
+    omega, phase = quantity(omega, "angular speed", "harmonic: omega"), quantity(phase, "angle", "harmonic: phase")
+    parameters = (amplitude, omega, phase, offset)
     return TimeFunction(tf.HARMONIC, parameters, f"{offset:g} + {amplitude:g} SIN({omega:g} TIME + {phase:g})")
 
 
@@ -91,8 +100,25 @@ def expression(text: str) -> TimeFunction:
     return TimeFunction(tf.TAPE, (), text)
 
 
-def as_function(value: float | str | TimeFunction) -> TimeFunction:
-    """Return ``value`` as a function of time; a number becomes a constant, a text an expression of TIME."""
+def as_function(
+    value: float | str | TimeFunction, unit: str = "dimensionless", field: str = "function"
+) -> TimeFunction:
+    """Return ``value`` as a function of time.
+
+    A number or a text with a unit becomes a constant, another text an expression of TIME.
+
+    Raises
+    ------
+    ModelError
+        If it is none of these.
+    """
+    if isinstance(value, TimeFunction):
+        return value
     if isinstance(value, str):
-        return expression(value)
-    return value if isinstance(value, TimeFunction) else constant(value)
+        return expression(expression_text(value, unit, field))
+    if callable(value):
+        raise ModelError(
+            f"{field}: a function of Python cannot be compiled; give a number, an expression such as '0.1*SIN(5*TIME)' "
+            "or one of step, ramp, harmonic, polynomial"
+        )
+    return constant(quantity(value, unit, field))

@@ -10,22 +10,20 @@ import numpy.typing as npt
 
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.rotation import matrix_from_euler
+from gearmbs.mechanism.quantities import quantities
 
 Vector = npt.ArrayLike
 
 
-def vector(value: Vector, field: str) -> np.ndarray:
-    """Return three finite floats.
+def vector(value: Vector, field: str, unit: str = "dimensionless", factor: float = 1.0) -> np.ndarray:
+    """Return three finite floats, given as such or as texts with a unit (see :func:`.quantities.quantities`).
 
     Raises
     ------
     ModelError
         If ``value`` is not three finite numbers.
     """
-    try:
-        out = np.array(value, dtype=float).reshape(-1)
-    except (TypeError, ValueError) as error:
-        raise ModelError(f"{field}: {value!r} is not a vector; give three numbers") from error
+    out = quantities(value, unit, field, factor).reshape(-1)
     if out.size != 3 or not np.all(np.isfinite(out)):
         raise ModelError(f"{field}: {value!r} is not three finite numbers")
     return out
@@ -53,7 +51,7 @@ def orientation(value: npt.ArrayLike | None, field: str) -> np.ndarray:
     """Return a rotation matrix from None (identity), a 3x3 matrix, or three 3-1-3 Euler angles in rad."""
     if value is None:
         return np.eye(3)
-    out = np.array(value, dtype=float)
+    out = quantities(value, "angle", field)
     if out.shape == (3,):
         return matrix_from_euler(*out)
     if out.shape != (3, 3):
@@ -79,10 +77,7 @@ def inertia_matrix(value: float | Sequence[float] | np.ndarray, field: str) -> n
     UserWarning
         If a moment exceeds the sum of the other two, which no rigid body can do; the equations can.
     """
-    try:
-        raw = np.array(value, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ModelError(f"{field}: {value!r} is not made of numbers; give moments in kg m^2") from error
+    raw = quantities(value, "inertia", field)
     if raw.shape == (3,):
         out = np.diag(raw)
     elif raw.shape == (6,):

@@ -13,18 +13,40 @@ from gearmbs.mechanism import elements as el
 from gearmbs.mechanism.elements import Load
 from gearmbs.mechanism.geometry import Vector, vector
 from gearmbs.mechanism.parts import Marker
+from gearmbs.mechanism.quantities import expression_text, quantity
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.expression import Units
 
 Expression = str | float | None
 
+SI_UNITS = {
+    "force": "N", "torque": "N*m", "length": "m", "angle": "rad", "time": "s", "stiffness": "N/m", "damping": "N*s/m",
+    "rotational_stiffness": "N*m/rad", "rotational_damping": "N*m*s/rad",
+}  # fmt: skip
+"""SI unit of each dimension of the function language that loads have."""
+
+FIELDS = {"damping_ratio": "time"}
+"""Dimensions of fields that are not called like them."""
+
 
 class LoadMethods:
     """The part of :class:`gearmbs.mechanism.Mechanism` that adds loads."""
 
     units: Units
+    reads_units: bool
     _add_load: Callable[[Load], Load]
+
+    def _text(self, label: str, value: Expression, dimension: str) -> str:
+        """Return an expression, or the number a text with a unit stands for."""
+        if not self.reads_units:
+            return str(value)
+        return expression_text(value, SI_UNITS[dimension], label, self.units.factor(dimension))
+
+    def _number(self, label: str, field: str, value: float, dimension: str | None = None) -> float:
+        """Return a number in the mechanism's units; ``dimension`` is that of the field's name by default."""
+        dimension = dimension or FIELDS.get(field, field)
+        return quantity(value, SI_UNITS[dimension], f"{label}: {field}", self.units.factor(dimension))
 
     def load(
         self,
@@ -47,22 +69,29 @@ class LoadMethods:
         function language and SI units, for instance ``"-100*DX(tip, anchor, anchor) - STEP(TIME, 0, 0, 1, 5)"``;
         markers go by their names (in quotes when they hold other characters than letters, digits, dot and underscore).
         """
-        expressions = tuple(None if e is None else str(e) for e in (fx, fy, fz, tx, ty, tz))
+        given = zip(("fx", "fy", "fz", "tx", "ty", "tz"), (fx, fy, fz, tx, ty, tz))
+        expressions = tuple(
+            None if e is None else self._text(f"{kind} '{name}': {c}", e, "force" if c[0] == "f" else "torque")
+            for c, e in given
+        )
         if not any(expressions):
             raise ModelError(f"load '{name}': give at least one of fx, fy, fz, tx, ty, tz")
         return self._add_load(Load(name, kind, i, j, rm or j, el.COMPONENTS, expressions))
 
     def line_force(self, name: str, i: Marker, j: Marker, expression: Expression, kind: str = "sforce") -> Load:
         """Apply a force along the line between two markers; positive values push I and J apart."""
-        return self._add_load(Load(name, kind, i, j, j, el.LINE, (str(expression),)))
+        text = self._text(f"{kind} '{name}'", expression, "force")
+        return self._add_load(Load(name, kind, i, j, j, el.LINE, (text,)))
 
     def axis_force(self, name: str, i: Marker, j: Marker, expression: Expression, rm: Marker | None = None) -> Load:
         """Apply a force on I along z of ``rm`` (default: J), the reaction on J's body at the same point."""
-        return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_FORCE, (str(expression),)))
+        text = self._text(f"sforce '{name}'", expression, "force")
+        return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_FORCE, (text,)))
 
     def axis_torque(self, name: str, i: Marker, j: Marker, expression: Expression, rm: Marker | None = None) -> Load:
         """Apply a torque on I about z of ``rm`` (default: J), the reaction on J's body."""
-        return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_TORQUE, (str(expression),)))
+        text = self._text(f"sforce '{name}'", expression, "torque")
+        return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_TORQUE, (text,)))
 
     def spring_damper(
         self,
@@ -82,7 +111,9 @@ class LoadMethods:
         if length is None:
             length = float(np.linalg.norm(i.global_position() - j.global_position()))
         a, b = _ref(i), _ref(j)
-        k, c, free, start = float(stiffness), float(damping), float(length), float(preload)
+        label = f"spring-damper '{name}'"
+        k, c = self._number(label, "stiffness", stiffness), self._number(label, "damping", damping)
+        free, start = self._number(label, "length", length), self._number(label, "preload", preload, "force")
         text = f"{start!r} - {k!r}*(DM({a},{b}) - {free!r}) - {c!r}*VR({a},{b})"
         made = {"stiffness": k, "damping": c, "length": free, "preload": start}
         return self._add_load(Load(name, "springdamper", i, j, j, el.LINE, (text,), made))
@@ -100,7 +131,10 @@ class LoadMethods:
     ) -> Load:
         """Connect two markers by a rotational spring (N m/rad) and damper (N m s/rad) about z of J."""
         a, b = _ref(i), _ref(j)
-        k, c, free, start = float(stiffness), float(damping), float(angle), float(preload)
+        label = f"torsion spring '{name}'"
+        k = self._number(label, "stiffness", stiffness, "rotational_stiffness")
+        c = self._number(label, "damping", damping, "rotational_damping")
+        free, start = self._number(label, "angle", angle), self._number(label, "preload", preload, "torque")
         text = f"{start!r} - {k!r}*(AZ({a},{b}) - {free!r}) - {c!r}*WZ({a},{b},{b})"
         made = {"stiffness": k, "damping": c, "angle": free, "preload": start}
         return self._add_load(Load(name, "springdamper", i, j, j, el.AXIS_TORQUE, (text,), made))
@@ -119,10 +153,15 @@ class LoadMethods:
         """Connect two markers by springs and dampers along and about the three axes of J (small rotations)."""
         a, b = _ref(i), _ref(j)
         label = f"bushing '{name}'"
-        k = vector(stiffness, f"{label}: stiffness").tolist()
-        c = vector(damping, f"{label}: damping").tolist()
-        kt = vector(torsional_stiffness, f"{label}: torsional_stiffness").tolist()
-        ct = vector(torsional_damping, f"{label}: torsional_damping").tolist()
+        k, c, kt, ct = (
+            vector(value, f"{label}: {field}", SI_UNITS[dimension], self.units.factor(dimension)).tolist()
+            for field, value, dimension in (
+                ("stiffness", stiffness, "stiffness"),
+                ("damping", damping, "damping"),
+                ("torsional_stiffness", torsional_stiffness, "rotational_stiffness"),
+                ("torsional_damping", torsional_damping, "rotational_damping"),
+            )
+        )
         force = [f"-{k[n]!r}*D{x}({a},{b},{b}) - {c[n]!r}*V{x}({a},{b},{b},{b})" for n, x in enumerate("XYZ")]
         turn = [f"-{kt[n]!r}*A{x}({a},{b}) - {ct[n]!r}*W{x}({a},{b},{b})" for n, x in enumerate("XYZ")]
         parts = [e if k[n] or c[n] else None for n, e in enumerate(force)]
@@ -154,8 +193,12 @@ class LoadMethods:
             Displacements and rotations of I in J's frame (small rotations about its axes) without load, and the load
             there.
         """
-        k, c = (np.zeros((6, 6)) if m is None else np.array(m, dtype=float) for m in (stiffness, damping))
-        rest, start = np.array(free, dtype=float), np.array(preload, dtype=float)
+        label = f"{kind} '{name}'"
+        k, c = (
+            np.zeros((6, 6)) if m is None else _numbers(m, f"{label}: {field}")
+            for field, m in (("stiffness", stiffness), ("damping", damping))
+        )
+        rest, start = _numbers(free, f"{label}: free"), _numbers(preload, f"{label}: preload")
         if k.shape != (6, 6) or c.shape != (6, 6) or rest.shape != (6,) or start.shape != (6,):
             raise ModelError(f"{kind} '{name}': stiffness and damping are 6x6, free and preload have 6 entries")
         texts = matrix_texts(_ref(i), _ref(j), k, c, rest, start)
@@ -193,7 +236,18 @@ class LoadMethods:
         damping_ratio : float
             Damping over stiffness, s.
         """
-        ixx, iyy, izz = vector(second_moments, f"beam '{name}': second_moments")
+        label = f"beam '{name}'"
+        units = self.units
+        ixx, iyy, izz = vector(second_moments, f"{label}: second_moments", "m^4", units.length**4)
+        length, damping_ratio = (
+            self._number(label, "length", length),
+            self._number(label, "damping_ratio", damping_ratio),
+        )
+        area = quantity(area, "area", f"{label}: area", units.length**2)
+        modulus, shear_modulus = (
+            quantity(value, "pressure", f"{label}: {field}", units.force / units.length**2)
+            for field, value in (("modulus", modulus), ("shear_modulus", shear_modulus))
+        )
         for field, value in (
             ("length", length),
             ("area", area),
@@ -255,6 +309,16 @@ def weighted_sum(*parts: tuple[float, str]) -> str:
     """Return the terms with a factor other than zero, added up."""
     shown = [f"({factor!r})" + (f"*{measure}" if measure else "") for factor, measure in parts if factor != 0.0]
     return " + ".join(shown) if shown else "0"
+
+
+def _numbers(value: npt.ArrayLike, field: str) -> np.ndarray:
+    """Return an array without texts: its entries have different units."""
+    try:
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError(
+            f"{field}: {value!r} is not made of numbers; give them in SI, texts have no place here"
+        ) from None
 
 
 def _ref(marker: Marker) -> str:

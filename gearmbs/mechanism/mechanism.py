@@ -20,6 +20,7 @@ from gearmbs.mechanism.functions import TimeFunction, as_function, constant
 from gearmbs.mechanism.geometry import Vector, frame_along, vector
 from gearmbs.mechanism.load_methods import Expression, LoadMethods
 from gearmbs.mechanism.parts import Body, Marker, make_body
+from gearmbs.mechanism.quantities import quantity
 
 
 class Mechanism(LoadMethods):
@@ -49,7 +50,7 @@ class Mechanism(LoadMethods):
 
     def __init__(self, name: str = "mechanism", gravity: Vector = (0.0, 0.0, 0.0)) -> None:
         self.name = name
-        self.gravity = vector(gravity, "gravity")
+        self.gravity = vector(gravity, "gravity", "acceleration")
         self.ground = Body("ground", is_ground=True)
         self.bodies: dict[str, Body] = {}
         self.joints: dict[str, jt.Joint] = {}
@@ -61,6 +62,7 @@ class Mechanism(LoadMethods):
         self.arrays: dict[Any, tuple[float, ...]] = {}
         self.plants: dict[tuple[str, Any], tuple[Any, ...]] = {}
         self.units = Units()
+        self.reads_units = True
         self.turns: dict[tuple[str, str, str], float] = {}
 
     # --- bodies -----------------------------------------------------------------------------------
@@ -189,6 +191,7 @@ class Mechanism(LoadMethods):
 
     def screw(self, name, i, j, *, pitch: float, at: Vector | None = None, axis: Vector | None = None) -> jt.Joint:
         """Add a screw joint: I advances ``pitch`` metres along z_J a turn."""
+        pitch = quantity(pitch, "length", f"joint '{name}': pitch")
         mi, mj = self._markers(f"joint '{name}'", name, i, j, at, axis)
         return self._add_joint(jt.Joint(name, "screw", mi, mj, jt.screw_rows(mi, mj, pitch)))
 
@@ -197,6 +200,7 @@ class Mechanism(LoadMethods):
         self._check_name(name)
         if length is None:
             length = float(np.linalg.norm(i.global_position() - j.global_position()))
+        length = quantity(length, "length", f"joint '{name}': length")
         if not length > 0.0:
             raise ModelError(f"joint '{name}': length = {length} m; a distance joint needs a positive length")
         row = jt.Row(f"distance {length:g} m", (jt.Term(terms.DISTANCE, i, j),), constant(length))
@@ -229,7 +233,7 @@ class Mechanism(LoadMethods):
 
         Two outside gears on parallel axes of one direction have ratio = -z1/z2.
         """
-        return self.coupler(name, [(first, float(ratio)), (second, -1.0)])
+        return self.coupler(name, [(first, quantity(ratio, "dimensionless", f"gear '{name}': ratio")), (second, -1.0)])
 
     def rack_pinion(self, name: str, pinion: jt.Joint, rack: jt.Joint, radius: float) -> jt.Joint:
         """Let the rack's joint move ``radius`` metres along its z_J for each radian of the pinion's.
@@ -238,7 +242,8 @@ class Mechanism(LoadMethods):
         """
         if rack.kind != "translational":
             raise ModelError(f"rack and pinion '{name}': joint '{rack.name}' is {rack.kind}; it must be translational")
-        return self.coupler(name, [(pinion, float(radius)), (rack, -1.0)])
+        size = quantity(radius, "length", f"rack and pinion '{name}': radius")
+        return self.coupler(name, [(pinion, size), (rack, -1.0)])
 
     def rotation(
         self, name: str, joint: jt.Joint, function: float | str | TimeFunction, *, level: str = "displacement",
@@ -258,8 +263,9 @@ class Mechanism(LoadMethods):
             Angular velocity at time 0 for accelerations, rad/s.
         """
         self._check_joint(name, joint, ("revolute", "cylindrical"))
-        given = self._prescribed(name, function, level, start, rate, jt.coordinate_term(joint, 1.0))
-        row = jt.Row("angle", (jt.Term(terms.ROTATION, joint.i, joint.j),), None, _displacement(function, given))
+        given = self._prescribed(name, function, level, start, rate, jt.coordinate_term(joint, 1.0), "rad")
+        moved = _displacement(name, function, given, "rad")
+        row = jt.Row("angle", (jt.Term(terms.ROTATION, joint.i, joint.j),), None, moved)
         return self._add_joint(jt.Joint(name, "rotation", joint.i, joint.j, [row], given))
 
     def translation(
@@ -269,8 +275,8 @@ class Mechanism(LoadMethods):
         """Prescribe the displacement of I along z_J of a joint; as :meth:`rotation`, in m, m/s or m/s^2."""
         self._check_joint(name, joint, ("translational", "cylindrical"))
         along = jt.Term(terms.DOT2, joint.i, joint.j, jt.Z)
-        given = self._prescribed(name, function, level, start, rate, along)
-        row = jt.Row("displacement", (along,), _displacement(function, given))
+        given = self._prescribed(name, function, level, start, rate, along, "m")
+        row = jt.Row("displacement", (along,), _displacement(name, function, given, "m"))
         return self._add_joint(jt.Joint(name, "translation", joint.i, joint.j, [row], given))
 
     # --- forces -----------------------------------------------------------------------------------
@@ -298,7 +304,7 @@ class Mechanism(LoadMethods):
         self._check_body(f"torque '{name}'", against)
         frame = frame_along(axis, f"torque '{name}': axis")
         other = against.marker_at(marker.global_position(), frame, name=f"{name}.J")
-        element = Torque(name, marker, other, other, as_function(function))
+        element = Torque(name, marker, other, other, as_function(function, "torque", f"torque '{name}'"))
         self.elements[name] = element
         return element
 
@@ -348,7 +354,7 @@ class Mechanism(LoadMethods):
         self._check_name(name)
         if self.joints.get(getattr(joint, "name", "")) is not joint:
             raise ModelError(f"friction '{name}': {joint!r} is not a joint of mechanism '{self.name}'")
-        return add_friction(self, name, joint, friction_of(name, mu_static, mu_dynamic, parameters))
+        return add_friction(self, name, joint, friction_of(name, mu_static, mu_dynamic, parameters, self.units))
 
     def general_constraint(self, name: str, expression: str) -> None:
         """Demand that an expression of positions and time vanish (ADAMS's GCON)."""
@@ -361,7 +367,8 @@ class Mechanism(LoadMethods):
 
     def differential_state(self, name: str, expression: Expression, start: float = 0.0) -> State:
         """Add a state with z' = expression; others use it as DIF(name)."""
-        self.states[name] = State(name, str(expression), float(start))
+        value = quantity(start, "dimensionless", f"state '{name}': start")
+        self.states[name] = State(name, str(expression), value)
         return self.states[name]
 
     def spline(self, name: str, x: npt.ArrayLike, y: npt.ArrayLike) -> None:
@@ -408,7 +415,7 @@ class Mechanism(LoadMethods):
             mi = i if isinstance(i, Marker) else i.marker_at(*where, name=f"{name}.I")
             mj = j if isinstance(j, Marker) else j.marker_at(*where, name=f"{name}.J")
         else:
-            at = (j if i.is_ground else i).position if at is None else at
+            at = (j if i.is_ground else i).position if at is None else vector(at, f"{label}: at", "length")
             frame = frame_along((0.0, 0.0, 1.0) if axis is None else axis, f"{label}: axis")
             mi = i.marker_at(at, frame, name=f"{name}.I")
             mj = j.marker_at(at, frame if axis_j is None else frame_along(axis_j, f"{label}: axis_j"), name=f"{name}.J")
@@ -423,20 +430,26 @@ class Mechanism(LoadMethods):
             raise ModelError(f"{label}: body '{body.name}' does not belong to mechanism '{self.name}'")
 
     def _check_name(self, name: str) -> None:
-        if not name or any(name in table for table in (self.joints, self.elements, self.constraints)):
-            raise ModelError(f"name {name!r}: empty or in use; choose another")
+        if not isinstance(name, str) or not name:
+            raise ModelError(f"name {name!r}: give a text that is not empty")
+        for title, table in (("joint", self.joints), ("load", self.elements), ("constraint", self.constraints)):
+            if name in table:
+                kind = getattr(table[name], "kind", title)
+                raise ModelError(f"name {name!r}: it is in use by a {title} ({kind}); choose another")
 
     def _prescribed(
         self, name: str, function: float | str | TimeFunction, level: str, start: float | None, rate: float,
-        term: jt.Term,
+        term: jt.Term, unit: str,
     ) -> jt.Prescribed | None:  # fmt: skip
         """Return what a motion is given by, None for its displacement."""
         if level == "displacement":
             return None
         if level not in ("velocity", "acceleration"):
             raise ModelError(f"motion '{name}': level {level!r}; choose displacement, velocity or acceleration")
-        first = jt.initial_coordinate(term) if start is None else float(start)
-        return jt.Prescribed(level, as_function(function), first, float(rate))
+        label = f"motion '{name}'"
+        first = jt.initial_coordinate(term) if start is None else quantity(start, unit, f"{label}: start")
+        given = as_function(function, f"{unit}/s" if level == "velocity" else f"{unit}/s^2", label)
+        return jt.Prescribed(level, given, first, quantity(rate, f"{unit}/s", f"{label}: rate"))
 
     def _check_joint(self, name: str, joint: jt.Joint, kinds: tuple[str, ...]) -> None:
         self._check_name(name)
@@ -469,8 +482,10 @@ class Mechanism(LoadMethods):
         return "\n".join(lines)
 
 
-def _displacement(function: float | str | TimeFunction, given: jt.Prescribed | None) -> TimeFunction:
+def _displacement(
+    name: str, function: float | str | TimeFunction, given: jt.Prescribed | None, unit: str
+) -> TimeFunction:
     """Return the displacement of a motion, whatever its function gives."""
     if given is None:
-        return as_function(function)
+        return as_function(function, unit, f"motion '{name}'")
     return integrated(given.function, given.start, None if given.level == "velocity" else given.rate)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.geometry import Vector, frame_along, inertia_matrix, orientation, vector
+from gearmbs.mechanism.quantities import quantity
 
 
 @dataclass(eq=False)
@@ -103,13 +104,13 @@ class Body:
             if axis is not None
             else _orientation(orientation, f"marker '{label}': orientation")
         )
-        marker = Marker(label, self, vector(position, f"marker '{label}': position"), matrix)
+        marker = Marker(label, self, vector(position, f"marker '{label}': position", "length"), matrix)
         self.markers.append(marker)
         return marker
 
     def marker_at(self, point: Vector, matrix: np.ndarray, name: str | None = None) -> Marker:
         """Add a marker given in global components at the initial position of the body."""
-        local = self.orientation.T @ (vector(point, f"body '{self.name}': marker position") - self.position)
+        local = self.orientation.T @ (vector(point, f"body '{self.name}': marker position", "length") - self.position)
         return self.marker(local, self.orientation.T @ matrix, name=name)
 
     def __repr__(self) -> str:
@@ -141,17 +142,16 @@ def make_body(
         If mass or inertia is negative or not finite, or a vector is malformed.
     """
     label = f"body '{name}'"
-    if not isinstance(mass, (int, float, np.number)):
-        raise ModelError(f"{label}: mass = {mass!r} is not a number; give it in kg")
+    mass = quantity(mass, "mass", f"{label}: mass")
     if not np.isfinite(mass) or mass < 0.0:
         raise ModelError(f"{label}: mass = {mass} kg; it must be a positive number")
     return Body(
         name=name,
-        mass=float(mass),
+        mass=mass,
         inertia=inertia_matrix(inertia, f"{label}: inertia"),
-        com=vector(com, f"{label}: com"),
-        position=vector(position, f"{label}: position"),
+        com=vector(com, f"{label}: com", "length"),
+        position=vector(position, f"{label}: position", "length"),
         orientation=orientation(matrix, f"{label}: orientation"),
-        velocity=vector(velocity, f"{label}: velocity"),
-        angular_velocity=vector(angular_velocity, f"{label}: angular_velocity"),
+        velocity=vector(velocity, f"{label}: velocity", "speed"),
+        angular_velocity=vector(angular_velocity, f"{label}: angular_velocity", "angular speed"),
     )

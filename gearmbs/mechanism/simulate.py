@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -12,6 +14,7 @@ from gearmbs.dae.ida import solve_ida
 from gearmbs.dae.result import Status
 from gearmbs.dae.solution import Solution
 from gearmbs.mechanism.mechanism import Mechanism
+from gearmbs.mechanism.quantities import quantity
 
 INTEGRATORS = ("WSTIFF", "GSTIFF", "IDA")
 ADVICE = {
@@ -94,9 +97,11 @@ def simulate(
     """
     if every_step and (rate is not None or t_eval is not None):
         raise ModelError("every_step: outputs are at the integrator's own steps; leave rate and t_eval away")
+    t_end, t_start = quantity(t_end, "time", "t_end"), quantity(t_start, "time", "t_start")
     if t_eval is None:
         if not np.isfinite(t_end) or t_end <= t_start:
             raise ModelError(f"t_end = {t_end} s; it must be later than the start {t_start} s")
+        rate = None if rate is None else quantity(rate, "frequency", "rate")
         if rate is not None and not rate > 0.0:
             raise ModelError(f"rate = {rate} 1/s; it must be positive")
         t_eval = np.linspace(t_start, t_end, 501) if rate is None else _sampled(t_start, t_end, rate)
@@ -107,6 +112,7 @@ def simulate(
     name = integrator.upper()
     if name not in INTEGRATORS:
         raise ModelError(f"integrator: {integrator!r} is unknown; choose one of {', '.join(INTEGRATORS)}")
+    _check_options(name, options)
     system = mechanism.compile(t_start)
     problem = system.problem(formulation, rate_scale)
     problem.advice = {**ADVICE, **(advice or {})}
@@ -131,6 +137,28 @@ def _sampled(start: float, end: float, rate: float) -> np.ndarray:
     count = int(np.floor(span + 1e-6))
     times = start + np.arange(count + 1) / rate
     return np.append(times, end) if span > count + 1e-6 else times
+
+
+def _check_options(name: str, options: Mapping[str, Any]) -> None:
+    """Raise a ModelError for an option the integrator does not have."""
+    if name == "IDA":
+        solver: Callable = solve_ida
+    else:
+        from gearmbs.dae.wstiff import solve_wstiff as solver
+    known = [p for p in inspect.signature(solver).parameters if p not in ("problem", "t_eval", "t_end", "method")]
+    for option in options:
+        if option in known:
+            continue
+        remark = "outputs are set by rate, t_eval or every_step" if "step" in option or "out" in option else ""
+        near = difflib.get_close_matches(option, [*known, *SETTINGS], n=1)
+        hint = remark or (f"did you mean {near[0]}?" if near else "")
+        raise ModelError(
+            f"simulate has no option {option!r}{': ' + hint if hint else ''}; besides {', '.join(SETTINGS)} the "
+            f"integrator {name} takes {', '.join(k for k in known if k not in SETTINGS)}"
+        )
+
+
+SETTINGS = ("rate", "t_eval", "every_step", "t_start", "integrator", "formulation", "tol", "rate_scale", "progress")
 
 
 class _reporter:
