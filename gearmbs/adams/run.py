@@ -140,6 +140,9 @@ def _carry_out(
 
 
 def _script(acf: str | Path | Script | None, end: float | None, steps: int | None, dtout: float | None) -> Script:
+    if acf is not None and (end, steps, dtout) != (None, None, None):
+        message = "a script has its own end times and steps; give either the script or end, steps and dtout"
+        raise DeckError([Diagnostic(ERROR, message, "", 0)])
     if isinstance(acf, Script):
         return acf
     if acf is not None:

@@ -137,9 +137,11 @@ def _friction(writer: DeckWriter, joint: Joint, f: Friction) -> list[str]:
         f"MAX_STICTION_DEFORMATION = {number(f.max_stiction_deformation)}",
         f"EFFECT = {f.effect.upper()}",
         f"INPUTS = {':'.join(i.upper() for i in inputs) or 'NONE'}",
-        f"FRICTION_FORCE_PRELOAD = {number(f.preload_force)}",
-        f"FRICTION_TORQUE_PRELOAD = {number(f.preload_torque)}",
     ]
+    if joint.kind in ("translational", "cylindrical"):
+        out.append(f"FRICTION_FORCE_PRELOAD = {number(f.preload_force)}")
+    if joint.kind != "translational":
+        out.append(f"FRICTION_TORQUE_PRELOAD = {number(f.preload_torque)}")
     for field in LENGTHS_OF[joint.kind]:
         value = getattr(f, field)
         if value > 0.0 or field == "friction_arm":

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 COLUMNS = ("F2", "F3", "F4", "F6", "F7", "F8")
 """Columns of a request that stand in the .req."""
+LONGEST = 80
+"""Characters of a comment in the .req."""
 NOT_ASKED = ("coupler", "gear")
 """Elements whose forces are those of their joints."""
 METHODS = ("GSTIFF", "WSTIFF")
@@ -49,7 +51,7 @@ def _functions(writer: DeckWriter, n: int, expressions: list[str], comment: str)
 def _bodies_and_elements(writer: DeckWriter, n: int) -> None:
     for body in writer.mechanism.bodies.values():
         for kind in ("DISPLACEMENT", "VELOCITY"):
-            comment = f"COMMENT = {_plain(body.name)} {kind.lower()}"
+            comment = f"COMMENT = {_plain(f'{body.name} {kind.lower()}')}"
             writer.statement(f"REQUEST/{n}", [kind, f"I = {writer.centers[id(body)]}", comment])
             n += 1
     functions = {kind: function for function, kind in ELEMENT_FORCES.items() if kind not in NOT_ASKED}
@@ -86,4 +88,4 @@ def integrator_statement(
 
 def _plain(text: str) -> str:
     """Return a text without characters that mean something in a deck."""
-    return re.sub(r"[^\w .:()+-]+", " ", text).strip() or "request"
+    return re.sub(r"[^\w .:()+-]+", " ", text).strip()[:LONGEST] or "request"
