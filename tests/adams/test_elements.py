@@ -311,3 +311,14 @@ def test_joint_force_about_its_other_marker():
     result = run(model(body), 0.1, 1)
     # 2 kg at 0.5 m: 20 N up and -10 N m about y hold it
     np.testing.assert_allclose(result.request(1)[0, [1, 2, 3, 5]], [20, -20, -10, 10], atol=1e-9)
+
+
+def test_friction_of_a_joint_can_be_asked_for():
+    """A sliding block: mu m g = 0.2 * 2 * 10 against the motion, at the I marker, and its opposite at J."""
+    body = BLOCK.replace("PART/2,", "PART/2,VX=5,") + "MARKER/21,PART=2,REULER=90D,90D,0D\n"
+    body += "MARKER/11,PART=1,REULER=90D,90D,0D\nJOINT/1,TRANSLATIONAL,I=21,J=11\nACCGRAV/KGRAV=-10\n"
+    body += "FRICTION/1,JOINT=1,MU_STATIC=0.2,MU_DYNAMIC=0.2,MAX_STICTION_DEFORMATION=1E-6\n"
+    result = run(model(body + "REQUEST/1,F2=FRICTION(1,0,2,0)\\F3=FRICTION(1,1,2,0)\\F4=VX(20)"), 0.5, 5)
+    np.testing.assert_allclose(result.request(1)[1:, 1], -4.0, rtol=1e-5)
+    np.testing.assert_allclose(result.request(1)[1:, 2], 4.0, rtol=1e-5)
+    np.testing.assert_allclose(result.request(1)[:, 3], 5 - 2 * result.t, atol=1e-5)
