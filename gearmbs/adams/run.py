@@ -216,7 +216,7 @@ def _simulate(
             note = _frozen(session, model)
         solution, equilibrium = _solve(session, command, kind, model, times, options, progress)
     except (ModelError, ArithmeticError) as error:
-        raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, _line(model, str(error)))]) from error
+        raise _failed(session, command, model, error) from error
     evaluator = RequestEvaluator(model, solution)
     segment = Segment(command, kind, model, solution, options, note, equilibrium=equilibrium)
     if kind != "STATICS":
@@ -287,7 +287,14 @@ def _linear(session: Session, command: Linear, allow_unsupported: bool) -> Modes
         model = _model(session, allow_unsupported, (session.time, session.time))
         return linear_modes(model.mechanism, t=session.time * session.deck.units.time)
     except (ModelError, ArithmeticError) as error:
-        raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, _line(model, str(error)))]) from error
+        raise _failed(session, command, model, error) from error
+
+
+def _failed(session: Session, command: Command, model: AdamsModel | None, error: Exception) -> DeckError:
+    """Return an error with the line of the statement it names and the command it happened in."""
+    text = str(error)
+    where = f" (in {command.file}:{command.line})" if command.line else ""
+    return DeckError([Diagnostic(ERROR, text + where, session.deck.file, _line(model, text))])
 
 
 def _line(model: AdamsModel | None, message: str) -> int:

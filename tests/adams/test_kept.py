@@ -23,6 +23,7 @@ def test_an_error_in_a_later_command_keeps_what_ran(tmp_path):
     )
     with pytest.raises(DeckError) as caught:
         run_deck(parse_deck(model(FREE)), script, tmp_path / "run")
+    assert str(caught.value).endswith("(in <script>:4)")
     result = caught.value.result
     assert len(result.segments) == 1
     assert not result.success
