@@ -8,11 +8,13 @@ from collections.abc import Callable
 import numpy as np
 from numba import njit
 
+from benchmarks.gear_pair import call_costs
 from benchmarks.markdown import number, table
 from gearmbs.contact import gear_contact
 from gearmbs.gears import Friction, GearPair
 from gearmbs.gears.faults import GradedFlanks
 from gearmbs.gears.transmission import StaticMesh
+from gearmbs.studies import Case, simulate_case
 
 CASES = {
     "healthy": ({}, 1),
@@ -23,6 +25,13 @@ CASES = {
     "skew 1 deg, 0.4 mm backlash, 41 slices": ({"misalignment": "1 deg", "backlash": "0.4 mm"}, 41),
     "graded flanks, 41 slices": ({"faults": (GradedFlanks(),)}, 41),
 }
+WHOLE = {
+    "healthy": (None, None),
+    "skew 1 deg, default slices": ("1 deg", None),
+    "skew 1 deg, 41 slices": ("1 deg", 41),
+}
+"""Misalignment and slices of the study's model whose whole residual is measured."""
+SHORT_RUN = 0.002
 SPEED = 1000 * 2 * np.pi / 60
 REPEATS = 200
 TITLE = "Gear contact kernel"
@@ -74,10 +83,30 @@ def measure(pair: GearPair, slices: int | None) -> dict[str, float]:
     }
 
 
+def measure_whole(misalignment: str | None, slices: int | None) -> dict[str, float]:
+    """Time the whole residual of the study's model and its Jacobian at the end of a short run at 100 N m."""
+    case = Case(
+        operation={"duration": SHORT_RUN, "torque": "100 N m"},
+        fault={} if misalignment is None else {"misalignment": misalignment},
+        contact={"slices": slices},
+    )
+    solution = simulate_case(case)
+    costs = call_costs(solution)
+    return {
+        "value_us": 1e6 * costs["residual"],
+        "jacobian_us": 1e6 * costs["jacobian"],
+        "unknowns": solution.problem.n,
+    }
+
+
 def cells(quick: bool) -> list[tuple[str, Callable[[], dict]]]:
     """Return name and measurement of each part."""
     chosen = list(CASES.items())[: 2 if quick else None]
-    return [
+    whole = list(WHOLE.items())[: 1 if quick else None]
+    parts: list[tuple[str, Callable[[], dict]]] = [
+        (f"whole residual, {name}", lambda name=name, a=a: {"whole": name, **measure_whole(*a)}) for name, a in whole
+    ]
+    return parts + [
         (name, lambda name=name, a=(changes, slices): {"case": name, **measure(GearPair.paper(**a[0]), a[1])})
         for name, (changes, slices) in chosen
     ]
@@ -101,5 +130,15 @@ def render(extra: dict) -> str:
             number(r["ns_per_pair_slice"]),
         ]
         for r in results
+        if "case" in r
     ]
-    return "One evaluation of a gear pair at 100 N m, averaged over a mesh cycle.\n\n" + table(header, rows)
+    whole = [
+        [r["whole"], str(r["unknowns"]), number(r["value_us"]), number(r["jacobian_us"])]
+        for r in results
+        if "whole" in r
+    ]
+    text = "One evaluation of a gear pair at 100 N m, averaged over a mesh cycle.\n\n" + table(header, rows)
+    if whole:
+        text += "\nThe whole residual of the study's model, all bodies in space, SI2:\n\n"
+        text += table(["case", "unknowns", "residual us", "Jacobian us"], whole)
+    return text

@@ -99,6 +99,14 @@ def test_contact_part(tmp_path):
     assert outcome["parts"]["contact"]["results"][0]["jacobian_us"] > 0
 
 
+def test_whole_residual_at_many_slices(tmp_path):
+    outcome, _ = run(tmp_path, ["contact"], only="whole residual, healthy")
+    (row,) = outcome["parts"]["contact"]["results"]
+    assert row["unknowns"] > 100
+    assert 0 < row["value_us"] < row["jacobian_us"]
+    assert "whole residual of the study's model" in (tmp_path / "results.md").read_text()
+
+
 def test_unknown_parts_and_the_command_line(tmp_path, capsys):
     with pytest.raises(SystemExit):
         runner.main(["gears"])
