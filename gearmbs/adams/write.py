@@ -20,6 +20,7 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.dae.rotation import euler_from_matrix
 from gearmbs.mechanism import Mechanism, Torque
 from gearmbs.mechanism.elements import AXIS_FORCE, AXIS_TORQUE, LINE, Load
+from gearmbs.mechanism.elements import COMPONENTS as COMPONENT_MODE
 from gearmbs.mechanism.expression import Call, Name, Node, Number, parse, shown, unparse
 from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
 from gearmbs.mechanism.function_text import function_text
@@ -30,6 +31,7 @@ STATEMENT_OF = {v: k for k, v in JOINT_KINDS.items()}
 PRIMITIVE_OF = {v: k for k, v in JPRIM_KINDS.items()}
 PLANTS = {"PINVAL": "pinput", "POUVAL": "poutput"}
 COMPONENTS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
+COMPONENTS_OF = {"GFORCE": COMPONENTS, "VFORCE": COMPONENTS[:3], "VTORQUE": COMPONENTS[3:]}
 
 
 def write_deck(
@@ -386,32 +388,44 @@ class DeckWriter:
             return
         keyword = load_statement(load)
         if keyword == "SFORCE":
-            text = self.expression(load.expressions[0] or "0")
+            text = self.expression(next(e for e in load.expressions if e is not None) or "0")
             ends = [f"I = {self.markers[id(load.i)]}", f"J = {self.markers[id(load.j)]}"]
             kind = "TRANSLATIONAL" if load.mode == LINE else "ROTATIONAL"
             self.statement(f"SFORCE/{self.elements['sforce', name]}", [kind, *ends, f"FUNCTION = {text}"], name)
             return
         slots = {AXIS_FORCE: ("FZ",), AXIS_TORQUE: ("TZ",)}.get(load.mode, COMPONENTS)
         given = {c: self.expression(e) for c, e in zip(slots, load.expressions) if e is not None}
-        self._gforce(name, load.i, load.j, load.rm, given)
+        self._gforce(name, load.i, load.j, load.rm, given, keyword)
 
-    def _gforce(self, name: str, i: Marker, j: Marker, rm: Marker, given: dict[str, str]) -> None:
+    def _gforce(
+        self, name: str, i: Marker, j: Marker, rm: Marker, given: dict[str, str], keyword: str = "GFORCE"
+    ) -> None:
         floating = self.new_marker(j.body, np.zeros(3), np.eye(3), floating=True)
-        self.gforce(name, self.markers[id(i)], floating, self.markers[id(rm)], given)
+        self.gforce(name, self.markers[id(i)], floating, self.markers[id(rm)], given, keyword)
 
-    def gforce(self, name: str, i: int, jfloat: int, rm: int, given: dict[str, str]) -> None:
-        """Write a GFORCE with all six components."""
-        n = self.elements["gforce", name]
+    def gforce(self, name: str, i: int, jfloat: int, rm: int, given: dict[str, str], keyword: str = "GFORCE") -> None:
+        """Write a GFORCE, VFORCE or VTORQUE with all its components."""
+        n = self.elements[keyword.lower(), name]
+        components = COMPONENTS_OF[keyword]
         arguments = [f"I = {i}", f"JFLOAT = {jfloat}", f"RM = {rm}"]
-        arguments += [f"{c} = {given.get(c, '0')}" + ("\\" if c != "TZ" else "") for c in COMPONENTS]
-        self.statement(f"GFORCE/{n}", arguments, name)
+        arguments += [f"{c} = {given.get(c, '0')}" + ("\\" if c != components[-1] else "") for c in components]
+        self.statement(f"{keyword}/{n}", arguments, name)
 
 
 def load_statement(element: Any) -> str:
     """Return the statement for an element given by expressions."""
-    along = isinstance(element, Load) and element.mode == LINE
-    about = isinstance(element, Load) and element.mode == AXIS_TORQUE and element.rm is element.j
-    return "SFORCE" if along or about else "GFORCE"
+    if not isinstance(element, Load):
+        return "GFORCE"
+    if element.mode == LINE or (element.mode == AXIS_TORQUE and element.rm is element.j):
+        return "SFORCE"
+    given = {c for c, e in zip(COMPONENTS, element.expressions) if e is not None}
+    if element.mode == COMPONENT_MODE:
+        if element.kind == "sforce" and given == {"TZ"} and element.rm is element.j:
+            return "SFORCE"
+        for kind, keyword in (("vforce", "VFORCE"), ("vtorque", "VTORQUE")):
+            if element.kind == kind and given <= set(COMPONENTS_OF[keyword]):
+                return keyword
+    return "GFORCE"
 
 
 def joint_statement(joint: Joint) -> str:

@@ -10,6 +10,10 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.expression import Units
 
+from .test_run import model
+from .test_writers import ELEMENTS as STATEMENTS
+from .test_writers import PARTS
+
 
 def mechanism() -> tuple[Mechanism, object, object]:
     """A tilted block hung between two markers."""
@@ -80,6 +84,21 @@ def test_beam_with_its_own_damping_and_bushing_with_preload_survive():
     for head in ("BEAM/1", "BUSHING/1", "PART/2"):
         assert block(again, head) == block(text, head)
     assert write_deck(parse_deck(again).to_mechanism()) == again
+
+
+@pytest.mark.parametrize("kind", [k for k in STATEMENTS if k not in ("joint", "gear")])
+def test_decks_of_every_element_are_written_with_it(kind):
+    """A GEAR is a coupler of its joints."""
+    deck = parse_deck(model(PARTS + STATEMENTS[kind]))
+    text = write_deck(deck.to_mechanism())
+    head = STATEMENTS[kind].split("/")[0] + "/1"
+    assert f"\n{head}\n" in text
+    one, two = (run_deck(d, end=0.1, steps=4, tol=1e-8) for d in (deck, parse_deck(text)))
+    # axes go through Euler angles
+    for body in ("PART_2", "PART_3"):
+        a, b = (r.segments[0].solution.position(body) for r in (one, two))
+        np.testing.assert_allclose(b, a, atol=1e-8)
+    np.testing.assert_allclose(two.force(kind, 1), one.force(kind, 7), atol=1e-5)
 
 
 JOINTS = {
