@@ -18,7 +18,11 @@ def kernels_missing(package: Path = PACKAGE) -> bool:
 def announce(package: Path = PACKAGE) -> None:
     """Tell on standard error that kernels are about to be compiled, unless they are there or someone else tells."""
     if "GEARMBS_COMPILING" not in os.environ and kernels_missing(package):
-        print("gearmbs: compiling the numerical kernels, once; this takes a minute or two", file=sys.stderr, flush=True)
+        print(
+            "gearmbs: compiling the numerical kernels, once; this takes two to five minutes",
+            file=sys.stderr,
+            flush=True,
+        )
 
 
 announce()

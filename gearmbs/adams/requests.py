@@ -10,13 +10,14 @@ from numba import njit
 from gearmbs.adams import statements as st
 from gearmbs.adams.build import AdamsModel, markers_of
 from gearmbs.dae import tables
-from gearmbs.dae.expressions import angle_rates, eval_gradient, eval_request, update_angles
-from gearmbs.dae.expressions.kinematics import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.expressions import eval_gradient
+from gearmbs.dae.expressions.kinematics import KIN_A, KIN_R
 from gearmbs.dae.expressions.tape import ExpressionError, Tape
 from gearmbs.dae.solution import Solution
 from gearmbs.dae.standstill import Standstill
 from gearmbs.mechanism.compile import starting_angles
 from gearmbs.mechanism.expression import Scope, compile_expression
+from gearmbs.mechanism.measures import evaluate_series, motion_tables
 
 COLUMNS = {
     "DISPLACEMENT": ("DM", "DX", "DY", "DZ", "", "PSI", "THETA", "PHI"),
@@ -94,7 +95,7 @@ class RequestEvaluator:
         builder = system.builder
         self.marker_body = np.array(builder.marker_body, dtype=np.int64)
         self.marker_frame = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float)
-        self.kin, self.acc = _tables(solution)
+        self.kin, self.acc = motion_tables(solution)
         index: dict[int, int] = system.marker_index  # type: ignore[attr-defined]
         self.scope: Scope = model.scope(index, builder.marker_body)
         self._names = {index[id(m)]: m.name for m in markers_of(model.mechanism)}
@@ -140,7 +141,7 @@ class RequestEvaluator:
         angles = np.zeros((3, max(1, tape.n_angles)))
         angles[0, : tape.n_angles] = starting_angles(tape, self._turns, self._marker_named)
         out = np.zeros(m)
-        _series(
+        evaluate_series(
             tape.ints, tape.floats, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
             angles, np.zeros(max(1, tape.gradient_size)), np.zeros(tape.work_size), out,
         )  # fmt: skip
@@ -248,46 +249,6 @@ class RequestEvaluator:
             out[:, :3] += sign * force
             out[:, 3:] += sign * (torque + np.cross(center - origin, force))
         return out
-
-
-def _tables(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
-    """Return the kinematics (m, bodies + 1, 27) and acceleration (m, bodies + 1, 6) tables over time."""
-    names = solution.system.body_names
-    m = solution.t.size
-    kin = np.zeros((m, len(names) + 1, KIN_AXES + 9))
-    acc = np.zeros((m, len(names) + 1, 6))
-    kin[:, 0, KIN_A : KIN_A + 9] = np.eye(3).ravel()
-    for b, name in enumerate(names, 1):
-        kin[:, b, KIN_R : KIN_R + 3] = solution.position(name)
-        kin[:, b, KIN_V : KIN_V + 3] = solution.velocity(name)
-        kin[:, b, KIN_A : KIN_A + 9] = solution.orientation(name).reshape(m, 9)
-        kin[:, b, KIN_W : KIN_W + 3] = solution.angular_velocity(name)
-        acc[:, b, :3] = solution.acceleration(name)
-        acc[:, b, 3:] = solution.angular_acceleration(name)
-    return kin, acc
-
-
-@njit(
-    "void(int64[::1], float64[::1], float64[::1], float64[:, :, ::1], float64[:, :, ::1], int64[::1],"
-    " float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1])",
-    cache=True,
-    nogil=True,
-)
-def _series(ints, floats, t, kin, acc, marker_body, marker_frame, y, angles, grad, work, out):
-    """Evaluate a tape at every time.
-
-    Counted angles go on by the mean of their rates at both ends of an output step, to the nearest turn.
-    ``angles`` is scratch: references, present and last rates, a row each.
-    """
-    ref, rates, last = angles[0], angles[1], angles[2]
-    for k in range(t.size):
-        angle_rates(ints, floats, t[k], kin[k], marker_body, marker_frame, y[k], ref, rates, grad, work)
-        if k > 0:
-            for a in range(ref.size):
-                ref[a] += 0.5 * (rates[a] + last[a]) * (t[k] - t[k - 1])
-        update_angles(ints, floats, t[k], kin[k], marker_body, marker_frame, y[k], ref, work)
-        last[:] = rates
-        out[k] = eval_request(ints, floats, t[k], kin[k], acc[k], marker_body, marker_frame, y[k], ref, work)
 
 
 @njit(

@@ -187,7 +187,7 @@ class Solution:
             raise KeyError(f"body {name!r}; the bodies are {', '.join(self.system.body_names)}") from None
 
     def position(self, body: str) -> np.ndarray:
-        """Return the centre of mass over time, shape (m, 3), m."""
+        """Return the centre of mass over time, shape (m, 3), m; of the body's own frame: `marker_position(body)`."""
         return self._pose[:, self._body(body), 0:3]
 
     def orientation(self, body: str) -> np.ndarray:
@@ -240,6 +240,42 @@ class Solution:
         except ValueError:
             known = ", ".join(self.system.force_names) or "none in this mechanism"
             raise KeyError(f"force element {name!r}; the force elements are {known}") from None
+
+    # --- measurements -------------------------------------------------------------------------------
+
+    def _measures(self):
+        mechanism = self.system.mechanism
+        if mechanism is None:
+            raise ValueError("the solution does not know its mechanism, so nothing can be asked of it by name")
+        return mechanism.measures(self)
+
+    def joint_angle(self, joint) -> np.ndarray:
+        """Return the rotation of a joint's I about z_J with full turns counted, shape (m,), rad; by joint or name."""
+        return self._measures().angle(joint)
+
+    def joint_displacement(self, joint) -> np.ndarray:
+        """Return the way of a joint's I from J along z_J, shape (m,), m; by joint or name."""
+        return self._measures().displacement(joint)
+
+    def marker_position(self, marker) -> np.ndarray:
+        """Return the origin of a marker, shape (m, 3), m, global; by marker or name, or of a body's own frame."""
+        return self._measures().place(marker)
+
+    def marker_velocity(self, marker) -> np.ndarray:
+        """Return the velocity of a marker's origin, shape (m, 3), m/s, global; arguments as of `marker_position`."""
+        return self._measures().velocity(marker)
+
+    def state(self, state) -> np.ndarray:
+        """Return a user-defined state of the mechanism, shape (m,); by state or name."""
+        return self._measures().state(state)
+
+    def evaluate(self, expression: str) -> np.ndarray:
+        """Return an expression in the ADAMS function language over time, shape (m,), SI.
+
+        As ``"DM(tip, anchor)"`` or ``"AZ(i, j)*RTOD"``; accelerations (ACCX, WDTZ ..) can be asked for, too. Markers
+        may have been added to the bodies after the run.
+        """
+        return self._measures().expression(expression)
 
     @property
     def multipliers(self) -> np.ndarray:
@@ -319,6 +355,9 @@ class Solution:
             data["constraint_violation"] = var(
                 ("time",), self.constraint_violation, "1", "largest |Phi| before projection"
             )
+        if self.system.state_names and self.system.mechanism is not None:
+            values = np.stack([self.state(name) for name in self.system.state_names], 1)
+            data["states"] = var(("time", "state"), values, "-", "user-defined state")
         if self.system.force_names:
             element = ("time", "element", "xyz")
             data["load_force"] = var(element, self._loads[:, :, 0:3], "N", "applied force on I's body")
@@ -332,6 +371,7 @@ class Solution:
             "xyz": xyz,
             "axis": xyz,
             "joint": joints,
+            "state": self.system.state_names,
             "element": self.system.force_names,
         }
         used = {d for v in data.values() for d in v[0]}

@@ -50,6 +50,15 @@ def compile_mechanism(mechanism: Mechanism, t0: float) -> System:
         measured = [*measured, *compiler.missing]
 
 
+def scope_of(mechanism: Mechanism) -> tuple[Scope, TableBuilder, Callable[[int], str]]:
+    """Return what expressions about a mechanism may name, its present markers' tables, and the names of markers."""
+    compiler = _Compiler(mechanism, [])
+    for body in mechanism.bodies.values():
+        compiler.add_body(body)
+    compiler.index_all_markers()
+    return compiler.scope(), compiler.builder, compiler.marker_named
+
+
 class _Compiler:
     def __init__(self, mechanism: Mechanism, measured: list[str]) -> None:
         self.mechanism = mechanism

@@ -400,6 +400,12 @@ class Mechanism(LoadMethods):
 
         return simulate(self, t_end, **options)
 
+    def measures(self, solution):
+        """Return what can be measured on a solution of this mechanism; its methods offer it by name."""
+        from gearmbs.mechanism.measures import Measures
+
+        return Measures(self, solution)
+
     # --- checks -----------------------------------------------------------------------------------
 
     def _markers(self, label, name, i, j, at, axis, axis_j=None) -> tuple[Marker, Marker]:

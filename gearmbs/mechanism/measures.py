@@ -1,0 +1,208 @@
+"""What can be asked of a finished solution by joint, marker, state or expression."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+
+from gearmbs.dae import tables as T
+from gearmbs.dae.errors import ModelError
+from gearmbs.dae.expressions import ExpressionError, angle_rates, eval_request, update_angles
+from gearmbs.dae.expressions.kinematics import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
+from gearmbs.mechanism.elements import State
+from gearmbs.mechanism.expression import compile_expression
+from gearmbs.mechanism.joints import Joint
+from gearmbs.mechanism.parts import Body, Marker
+
+if TYPE_CHECKING:
+    from gearmbs.dae.solution import Solution
+    from gearmbs.mechanism.mechanism import Mechanism
+
+SLIDING = ("translational", "cylindrical", "inline")
+TURNING = ("revolute", "cylindrical", "screw", "parallel_axes", "planar")
+
+
+class Measures:
+    """Measurements on a solution of a mechanism; :class:`gearmbs.dae.solution.Solution` has them as methods.
+
+    Markers may have been added to the bodies after the run.
+    """
+
+    def __init__(self, mechanism: Mechanism, solution: Solution) -> None:
+        if list(mechanism.bodies) != solution.system.body_names:
+            raise ModelError(f"mechanism '{mechanism.name}': its bodies are no longer those of the solution")
+        self.mechanism, self.solution = mechanism, solution
+
+    # --- joints -------------------------------------------------------------------------------------
+
+    def angle(self, joint: Joint | str) -> np.ndarray:
+        """Return the rotation of I about z_J, full turns counted, shape (m,), rad."""
+        found = self._joint(joint, TURNING, "angle")
+        t = self.solution.t
+        ai, aj = self._axes(found.i), self._axes(found.j)
+        wanted = np.arctan2(_dot(ai[:, :, 0], aj[:, :, 1]), _dot(ai[:, :, 0], aj[:, :, 0]))
+        speed = _dot(self._spin(found.i) - self._spin(found.j), aj[:, :, 2])
+        steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(t)
+        # each step is the one nearest to what the speeds make of it
+        rest = np.diff(wanted) - steps
+        return wanted[0] + np.concatenate([[0.0], np.cumsum(steps + rest - 2 * np.pi * np.round(rest / (2 * np.pi)))])
+
+    def displacement(self, joint: Joint | str) -> np.ndarray:
+        """Return the way of I from J along z_J, shape (m,), m."""
+        found = self._joint(joint, SLIDING, "displacement")
+        return _dot(self.place(found.i) - self.place(found.j), self._axes(found.j)[:, :, 2])
+
+    def _joint(self, joint: Joint | str, kinds: tuple[str, ...], what: str) -> Joint:
+        name = joint.name if isinstance(joint, Joint) else joint
+        found = self.mechanism.joints.get(name)
+        if found is None:
+            raise KeyError(f"joint {name!r}; the joints are {', '.join(self.mechanism.joints) or 'none'}")
+        if found.kind not in kinds:
+            raise ModelError(f"joint '{name}' is {found.kind}; {what} is for {', '.join(kinds)} joints")
+        return found
+
+    # --- markers ------------------------------------------------------------------------------------
+
+    def place(self, marker: Marker | Body | str) -> np.ndarray:
+        """Return the origin of a marker, or of a body's frame, global components, shape (m, 3), m."""
+        body, point, _ = self._frame(marker)
+        if body.is_ground:
+            return np.tile(point, (self.solution.t.size, 1))
+        return self.solution.position(body.name) + self.solution.orientation(body.name) @ point
+
+    def velocity(self, marker: Marker | Body | str) -> np.ndarray:
+        """Return the velocity of a marker's, or of a body's frame's, origin, global components, shape (m, 3), m/s."""
+        body, point, _ = self._frame(marker)
+        if body.is_ground:
+            return np.zeros((self.solution.t.size, 3))
+        arm = self.solution.orientation(body.name) @ point
+        spin = self.solution.angular_velocity(body.name)
+        return self.solution.velocity(body.name) + np.cross(spin, arm)
+
+    def _frame(self, marker: Marker | Body | str) -> tuple[Body, np.ndarray, np.ndarray]:
+        """Return body, origin from the centre of mass and axes in the body."""
+        if isinstance(marker, str):
+            marker = self._find(marker)
+        if isinstance(marker, Body):
+            return marker, -marker.com, np.eye(3)
+        if not isinstance(marker, Marker):
+            raise ModelError(f"{marker!r} is not a marker, a body or the name of a marker")
+        return marker.body, marker.position - marker.body.com, marker.orientation
+
+    def _find(self, name: str) -> Marker:
+        bodies = (self.mechanism.ground, *self.mechanism.bodies.values())
+        found = [m for body in bodies for m in body.markers if m.name == name]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise ModelError(
+                f"marker {name!r} is on {' and '.join(m.body.name for m in found)}; give the marker itself"
+            )
+        known = [m.name for body in bodies for m in body.markers]
+        raise KeyError(f"marker {name!r}; the markers are {', '.join(known) or 'none'}")
+
+    def _axes(self, marker: Marker) -> np.ndarray:
+        axes = marker.orientation
+        if marker.body.is_ground:
+            return np.tile(axes, (self.solution.t.size, 1, 1))
+        return self.solution.orientation(marker.body.name) @ axes
+
+    def _spin(self, marker: Marker) -> np.ndarray:
+        if marker.body.is_ground:
+            return np.zeros((self.solution.t.size, 3))
+        return self.solution.angular_velocity(marker.body.name)
+
+    # --- states and expressions ---------------------------------------------------------------------
+
+    def state(self, state: State | str) -> np.ndarray:
+        """Return a user-defined state, shape (m,)."""
+        name = str(state.name if isinstance(state, State) else state)
+        names = [n.upper() for n in self.solution.system.state_names]
+        if name.upper() not in names:
+            raise KeyError(f"state {name!r}; the states are {', '.join(self.solution.system.state_names) or 'none'}")
+        at = int(self.solution.problem.idata[T.H_Z]) + names.index(name.upper())
+        return self.solution.result.y[:, at].copy()
+
+    def expression(self, text: str) -> np.ndarray:
+        """Return the values of an expression, in the mechanism's units, shape (m,)."""
+        from gearmbs.mechanism.compile import scope_of, starting_angles
+
+        scope, builder, marker_named = scope_of(self.mechanism)
+        try:
+            tape = compile_expression(text, scope, accelerations=True)
+        except ExpressionError as error:
+            raise ModelError(str(error)) from error
+        t = self.solution.t
+        y = np.zeros((t.size, max(1, len(tape.algebraic))))
+        for q, key in enumerate(tape.algebraic):
+            y[:, q] = self._unknown(key)
+        tape = tape.bind(tape.algebraic.index)
+        angles = np.zeros((3, max(1, tape.n_angles)))
+        angles[0, : tape.n_angles] = starting_angles(tape, self.mechanism.turns, marker_named)
+        bodies = np.array(builder.marker_body, dtype=np.int64)
+        frames = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float).reshape(-1, 12)
+        kin, acc = motion_tables(self.solution)
+        out = np.zeros(t.size)
+        evaluate_series(
+            tape.ints, tape.floats, t, kin, acc, bodies, frames, y, angles, np.zeros(max(1, tape.gradient_size)),
+            np.zeros(tape.work_size), out,
+        )  # fmt: skip
+        return out
+
+    def _unknown(self, key: tuple) -> np.ndarray:
+        if key[0] in ("diff", "variable"):
+            return self.state(str(key[1]))
+        kind, ref, component = key
+        for name in self.solution.system.force_names:
+            if name.upper() == str(ref).upper() and kind not in ("joint", "jprim", "motion", "coupler", "gear", "gcon"):
+                return np.hstack(self.solution.load(name))[:, component]
+        for name in self.mechanism.joints:
+            if name.upper() == str(ref).upper():
+                return np.hstack(self.solution.reaction(name))[:, component]
+        raise ModelError(f"the force of {kind} {ref} is not part of the solution")
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("ti,ti->t", a, b)
+
+
+def motion_tables(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """Return the kinematics (m, bodies + 1, 27) and acceleration (m, bodies + 1, 6) tables over time."""
+    names = solution.system.body_names
+    m = solution.t.size
+    kin = np.zeros((m, len(names) + 1, KIN_AXES + 9))
+    acc = np.zeros((m, len(names) + 1, 6))
+    kin[:, 0, KIN_A : KIN_A + 9] = np.eye(3).ravel()
+    for b, name in enumerate(names, 1):
+        kin[:, b, KIN_R : KIN_R + 3] = solution.position(name)
+        kin[:, b, KIN_V : KIN_V + 3] = solution.velocity(name)
+        kin[:, b, KIN_A : KIN_A + 9] = solution.orientation(name).reshape(m, 9)
+        kin[:, b, KIN_W : KIN_W + 3] = solution.angular_velocity(name)
+        acc[:, b, :3] = solution.acceleration(name)
+        acc[:, b, 3:] = solution.angular_acceleration(name)
+    return kin, acc
+
+
+@njit(
+    "void(int64[::1], float64[::1], float64[::1], float64[:, :, ::1], float64[:, :, ::1], int64[::1],"
+    " float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1])",
+    cache=True,
+    nogil=True,
+)
+def evaluate_series(ints, floats, t, kin, acc, marker_body, marker_frame, y, angles, grad, work, out):
+    """Evaluate a tape at every time.
+
+    Counted angles go on by the mean of their rates at both ends of an output step, to the nearest turn.
+    ``angles`` is scratch: references, present and last rates, a row each.
+    """
+    ref, rates, last = angles[0], angles[1], angles[2]
+    for k in range(t.size):
+        angle_rates(ints, floats, t[k], kin[k], marker_body, marker_frame, y[k], ref, rates, grad, work)
+        if k > 0:
+            for a in range(ref.size):
+                ref[a] += 0.5 * (rates[a] + last[a]) * (t[k] - t[k - 1])
+        update_angles(ints, floats, t[k], kin[k], marker_body, marker_frame, y[k], ref, work)
+        last[:] = rates
+        out[k] = eval_request(ints, floats, t[k], kin[k], acc[k], marker_body, marker_frame, y[k], ref, work)

@@ -1,0 +1,83 @@
+"""What can be asked of a finished solution: joints, markers, states and expressions, against closed solutions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearmbs.mechanism import Mechanism, ModelError
+
+
+@pytest.fixture(scope="module")
+def machine():
+    """A wheel driven at 40 rad/s with an eccentric centre of mass, a slider moved by t^2, a lagging state."""
+    m = Mechanism("machine")
+    wheel = m.body("wheel", 1.0, (0.1, 0.1, 0.1), com=(0.02, 0, 0), position=(1, 0, 0))
+    slide = m.body("slide", 1.0, (0.1, 0.1, 0.1))
+    hinge = m.revolute("hinge", wheel, m.ground, at=(1, 0, 0), axis=(0, 0, 1))
+    guide = m.translational("guide", slide, m.ground, axis=(1, 0, 0))
+    m.rotation("motor", hinge, "0.5 + 40*TIME")
+    m.translation("push", guide, "TIME**2")
+    rim, shoe = wheel.marker((0.3, 0, 0), name="rim"), slide.marker(name="shoe")
+    m.spring_damper("band", rim, shoe, stiffness=50.0)
+    lag = m.differential_state("lag", "-2*DIF(lag)", start=3.0)
+    return m, m.simulate(1.0, rate=20, tol=1e-9), lag
+
+
+def test_joint_coordinates(machine):
+    m, solution, _ = machine
+    t = solution.t
+    # 2 rad between outputs, six turns in all
+    np.testing.assert_allclose(solution.joint_angle("hinge"), 0.5 + 40 * t, atol=1e-9)
+    np.testing.assert_allclose(solution.joint_angle(m.joints["hinge"]), solution.joint_angle("hinge"))
+    np.testing.assert_allclose(solution.joint_displacement("guide"), t**2, atol=1e-9)
+    with pytest.raises(ModelError, match="joint 'guide' is translational; angle is for revolute"):
+        solution.joint_angle("guide")
+    with pytest.raises(KeyError, match="the joints are hinge, guide"):
+        solution.joint_angle("hing")
+
+
+def test_markers_and_frames(machine):
+    m, solution, _ = machine
+    t, turn = solution.t, 0.5 + 40 * solution.t
+    ring = np.stack([np.cos(turn), np.sin(turn), 0 * t], axis=1)
+    along = np.stack([-np.sin(turn), np.cos(turn), 0 * t], axis=1)
+    np.testing.assert_allclose(solution.marker_position("rim"), [1, 0, 0] + 0.3 * ring, atol=1e-9)
+    np.testing.assert_allclose(solution.marker_velocity("rim"), 12.0 * along, atol=1e-7)
+    # the body's own frame stays on the axis, its centre of mass does not
+    np.testing.assert_allclose(
+        solution.marker_position(m.bodies["wheel"]), np.tile([1.0, 0, 0], (t.size, 1)), atol=1e-9
+    )
+    np.testing.assert_allclose(solution.position("wheel"), [1, 0, 0] + 0.02 * ring, atol=1e-9)
+    late = m.ground.marker((0, 2, 0), name="late") if "late" not in [k.name for k in m.ground.markers] else "late"
+    assert solution.marker_position(late)[3] == pytest.approx([0, 2, 0])
+    with pytest.raises(KeyError, match=r"the markers are .*rim"):
+        solution.marker_position("rimm")
+
+
+def test_states(machine):
+    _, solution, lag = machine
+    np.testing.assert_allclose(solution.state(lag), 3 * np.exp(-2 * solution.t), rtol=1e-6)
+    np.testing.assert_allclose(solution.to_dataset()["states"].sel(state="lag"), solution.state("lag"))
+    with pytest.raises(KeyError, match="the states are lag"):
+        solution.state("lead")
+
+
+def test_expressions(machine):
+    m, solution, _ = machine
+    t, turn = solution.t, 0.5 + 40 * solution.t
+    rim = np.stack([1 + 0.3 * np.cos(turn), 0.3 * np.sin(turn)], axis=1)
+    apart = np.hypot(rim[:, 0] - t**2, rim[:, 1])
+    np.testing.assert_allclose(solution.evaluate("DM(rim, shoe)"), apart, atol=1e-9)
+    first = np.hypot(1 + 0.3 - 0.0, 0.0)  # where the bodies were drawn: rim at 1.3, shoe at 0
+    np.testing.assert_allclose(solution.evaluate("FM(rim, shoe)"), 50 * np.abs(apart - first), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(solution.evaluate("ACCX(shoe)"), 2.0, rtol=1e-7)
+    np.testing.assert_allclose(solution.evaluate("2*DIF(lag) + TIME"), 2 * solution.state("lag") + t)
+    np.testing.assert_allclose(solution.evaluate('AZ("hinge.I", "hinge.J")*RTOD'), np.degrees(turn), atol=1e-6)
+    moment = solution.reaction("motor")[1][:, 2]
+    np.testing.assert_allclose(solution.evaluate("MOTION(motor, 0, 8, 0)"), moment, atol=1e-9)
+    if "late too" not in [k.name for k in m.ground.markers]:
+        m.ground.marker((0, 0, 4), name="late too")
+    np.testing.assert_allclose(solution.evaluate('DZ(shoe, "late too")'), -4.0, atol=1e-12)
+    with pytest.raises(ModelError, match="TIM"):
+        solution.evaluate("2*TIM")
