@@ -15,7 +15,7 @@ STAGES = (
     ("gearmbs.gears.transmission", "gearmbs.dae.expressions", "gearmbs.dae.wstiff"),
     ("gearmbs.dae.jacobian", "gearmbs.dae.residual"),
     ("gearmbs.dae.outputs", "gearmbs.dae.rereference"),
-    ("gearmbs.studies.paper", "gearmbs.signals"),
+    ("gearmbs.studies.paper", "gearmbs.signals", "gearmbs.mechanism.measures"),
 )
 """Modules whose kernels do not depend on each other within a stage."""
 

@@ -83,24 +83,30 @@ class StaticResult:
 
     def table(self) -> str:
         """Return the equilibrium as text: how good and stable it is, where the bodies are, what joints carry."""
+
+        def shown(value: float) -> float:
+            return 0.0 if abs(value) < 1e-12 else value
+
         lines = [repr(self), f"{'body':<24} {'x/m':>12} {'y/m':>12} {'z/m':>12}"]
         for name, row in zip(self.body_names, self.pose):
-            lines.append(f"{name:<24} " + " ".join(f"{value + 0.0:>12.6g}" for value in row[0:3]))
+            lines.append(f"{name:<24} " + " ".join(f"{shown(value):>12.6g}" for value in row[0:3]))
         for title, table in (("joint", self.reactions), ("load", self.loads)):
             if table:
                 lines.append(f"{title:<24} {'force/N':>12} {'moment/N m':>12}")
             for name, (force, moment) in table.items():
-                lines.append(f"{name:<24} {np.linalg.norm(force):>12.6g} {np.linalg.norm(moment):>12.6g}")
+                sizes = (shown(float(np.linalg.norm(part))) for part in (force, moment))
+                lines.append(f"{name:<24} " + " ".join(f"{size:>12.6g}" for size in sizes))
         return "\n".join(lines)
 
     def __str__(self) -> str:
         return self.table()
 
     def __repr__(self) -> str:
+        count = f"{len(self.body_names)} {'body' if len(self.body_names) == 1 else 'bodies'}"
         known = {True: "stable", False: "unstable", None: "stability not examined"}[self.stable]
         neutral = f", free to move: {', '.join(self.neutral)}" if self.neutral else ""
         return (
-            f"StaticResult({len(self.body_names)} bodies at t = {self.t:g} s, {known}{neutral}; "
+            f"StaticResult({count} at t = {self.t:g} s, {known}{neutral}; "
             f"{self.iterations} iterations, residual {self.residual:.1e})"
         )
 

@@ -407,3 +407,26 @@ def test_runs_end_at_their_end_whatever_the_rate(t_end, rate, count):
     assert solution.t[-1] == t_end
     assert len(solution) == count
     assert np.diff(solution.t).min() > 0.0
+
+
+@pytest.mark.parametrize(
+    ("line", "ok"),
+    [
+        ("JOINT/1, UNIVERSAL, I=20, J=10", False),
+        ("JOINT/1, UNIVERSAL, I=20, J=11", True),
+        # the arms of a Hooke joint are x of I and y of J
+        ("JOINT/1, HOOKE, I=20, J=10", True),
+        ("JOINT/1, HOOKE, I=21, J=10", False),
+        ("JPRIM/1, PERPENDICULAR, I=20, J=10", False),
+    ],
+)
+def test_axes_that_should_cross_in_decks(line, ok):
+    from gearmbs.adams import DeckError, parse_deck
+
+    deck = "x\nPART/1,GROUND\nMARKER/10,PART=1\nMARKER/11,PART=1,REULER=0,90D,0\nPART/2,MASS=2,CM=20,IP=1,1,1\n"
+    deck += f"MARKER/20,PART=2\nMARKER/21,PART=2,REULER=90D,0,0\n{line}\nEND\n"
+    if ok:
+        assert len(parse_deck(deck).to_mechanism().joints) == 1
+        return
+    with pytest.raises(DeckError, match=r":8: error: J.*must be at right angles, not at 0 degrees"):
+        parse_deck(deck).to_mechanism()
