@@ -31,7 +31,7 @@ class Status(enum.IntEnum):
     INTERRUPTED = -1, "The integration was interrupted; what was computed until then is kept."
     SINGULAR_JACOBIAN = -2, "The Newton matrix is singular: some unknown is not determined by the equations."
     NOT_FINITE = -3, "The equations returned a value that is not finite."
-    STEP_TOO_SMALL = -4, "The step size fell to its lower limit HMIN before the requested accuracy was reached."
+    STEP_TOO_SMALL = -4, "The step size fell to its lower limit before the requested accuracy was reached."
     TOO_MANY_REJECTIONS = -5, "One step was rejected too many times."
     INCONSISTENT_START = -6, "The initial values do not satisfy the equations."
     TOO_MANY_STEPS = -7, "The limit on the number of steps was reached."
