@@ -11,9 +11,10 @@ import contextlib
 import io
 import re
 import sys
+import threading
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.sparse import csc_array
@@ -40,28 +41,56 @@ class _NotFiniteError(ArithmeticError):
 
 
 class _Messages(io.TextIOBase):
-    """Standard output, but what SUNDIALS has to say about a failure is kept instead of printed."""
+    """Standard output, but what SUNDIALS has to say about a failure is kept for the thread it failed in."""
 
     PATTERN = re.compile(r"\s*\[(?:IDA|SUN)\w*, Error: -?\d+\]\s*(.*)", re.DOTALL)
+    LOCK = threading.Lock()
 
     def __init__(self) -> None:
         self.through = sys.stdout
-        self.text = ""
-        self.ending = False
+        self.runs = 0
+        self._own = threading.local()
+
+    @property
+    def text(self) -> str:
+        """The last message of the calling thread."""
+        return getattr(self._own, "text", "")
+
+    @text.setter
+    def text(self, text: str) -> None:
+        self._own.text = text
 
     def write(self, text: str) -> int:
         """Keep a message and the end of its line; pass anything else on."""
         found = self.PATTERN.match(text)
         if found is not None:
             self.text = " ".join(found[1].split())
-        elif not (self.ending and text == "\n"):
+        elif not (getattr(self._own, "ending", False) and text == "\n"):
             self.through.write(text)
-        self.ending = found is not None
+        self._own.ending = found is not None
         return len(text)
 
     def flush(self) -> None:
         """Flush standard output."""
         self.through.flush()
+
+
+@contextlib.contextmanager
+def _listening() -> Iterator[_Messages]:
+    """Listen on standard output; runs side by side share one listener, which goes with the last of them."""
+    with _Messages.LOCK:
+        messages = sys.stdout if isinstance(sys.stdout, _Messages) else _Messages()
+        messages.runs += 1
+        sys.stdout = messages
+    before, messages.text = messages.text, ""
+    try:
+        yield messages
+    finally:
+        messages.text = before
+        with _Messages.LOCK:
+            messages.runs -= 1
+            if messages.runs == 0 and sys.stdout is messages:
+                sys.stdout = messages.through
 
 
 class _Callbacks:
@@ -229,8 +258,7 @@ def solve_ida(
     status, message = Status.SUCCESS, Status.SUCCESS.sentence
     start = time.perf_counter()
     t, end = float(times[0]), float(times[-1])
-    messages = _Messages()
-    with contextlib.redirect_stdout(messages):
+    with _listening() as messages:
         try:
             solver = _solver(problem, calls, atol, rtol, options)
             solver.init_step(t, problem.y0, problem.yp0)

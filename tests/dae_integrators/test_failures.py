@@ -1,10 +1,13 @@
 """Every way a run can fail: status, a sentence that names time, unknown and remedy, and what was computed so far."""
 
+import sys
+import threading
+
 import numpy as np
 import pytest
 from numba import njit
 
-from gearmbs.dae.ida import solve_ida
+from gearmbs.dae.ida import _listening, solve_ida
 from gearmbs.dae.result import Status
 from gearmbs.dae.solve import solve_dae
 from gearmbs.dae.wstiff import solve_wstiff
@@ -199,6 +202,33 @@ def test_what_sundials_has_to_say_is_in_the_message(capsys):
     assert result.status is Status.SOLVER_FAILURE
     assert "mxstep steps taken" in result.message
     assert capsys.readouterr().out == ""
+
+
+def test_runs_side_by_side_keep_their_messages_apart_and_give_standard_output_back(capsys):
+    """The first run to begin is the first to end, as nested redirections could not be."""
+    begun, told = threading.Event(), threading.Event()
+    texts = []
+
+    def other():
+        with _listening() as messages:
+            begun.set()
+            told.wait(10.0)
+            print("[IDA, Error: -4] of the other")
+            print("progress")
+            texts.append(messages.text)
+
+    before = sys.stdout
+    thread = threading.Thread(target=other)
+    with _listening() as messages:
+        thread.start()
+        assert begun.wait(10.0)
+        print("[IDA, Error: -1] of this one")
+        texts.append(messages.text)
+    told.set()
+    thread.join()
+    assert sys.stdout is before
+    assert texts == ["of this one", "of the other"]
+    assert capsys.readouterr().out == "progress\n"
 
 
 @pytest.mark.parametrize(
