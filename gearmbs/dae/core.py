@@ -329,7 +329,8 @@ def advance(functions, st, plan, factors, max_accepted):
                 real[s.GAMMA_J] = gamma
                 real[s.RATE] = RATE_OF_FRESH
                 code = correct(residual, t, gamma, vec, real, count, plan, factors, idata, rdata, work)
-        if code == SLOW and sound and settle_for_noise(real, count, vec, st.matrix, plan, factors):
+        known_noise, known_noisy = real[s.NOISE], count[s.NOISY]
+        if code == SLOW and sound and settle_for_noise(False, real, count, vec, st.matrix, plan, factors):
             code = CONVERGED
         if code != CONVERGED:
             if code == NOT_FINITE:
@@ -371,11 +372,13 @@ def advance(functions, st, plan, factors, max_accepted):
         times[0] = t
         error = constant * weighted_max(delta, vec[s.W_ERROR])
         passed = error <= 1.0 + constant * 2.0 ** (k + 1) * real[s.NOISE]
-        if not passed and settle_for_noise(real, count, vec, st.matrix, plan, factors):
+        if not passed and settle_for_noise(True, real, count, vec, st.matrix, plan, factors):
             passed = True
             for i in range(n):
                 hist[0, i] = y[i]
         if not passed:
+            # what was settled for in the corrector has not come into the past
+            real[s.NOISE], count[s.NOISY] = known_noise, known_noisy
             count[s.ERROR_REJECTIONS] += 1
             count[s.ERROR_FAILS] += 1
             count[s.WORST] = weighted_argmax(delta, vec[s.W_ERROR])
@@ -404,6 +407,7 @@ def advance(functions, st, plan, factors, max_accepted):
         if noisy:
             count[s.NOISY] -= 1
             count[s.NOISY_RUN] += 1
+            count[s.SETTLED] += 1
             count[s.JAC_WANTED] = 1
             if count[s.NOISY] == 0:
                 count[s.NOISY_RUN] = 0
@@ -478,6 +482,8 @@ def advance(functions, st, plan, factors, max_accepted):
             if h < 0.999 * h_wish and real[s.H] >= h:
                 # shortened only to land: go on with the size the error test had asked for
                 real[s.H] = min(h_wish, 2.0 * real[s.H]) if count[s.INTERPOLATE] else h_wish
+        elif h < 0.999 * h_wish:
+            real[s.H] = h_wish
         if real[s.T] >= real[s.T_END]:
             return s.DONE
         told = 0

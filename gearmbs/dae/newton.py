@@ -260,20 +260,21 @@ def rounding_level(vec, matrix, plan, factors):
     return level
 
 
-@njit(boolean(_VEC, _IVEC, _MAT, _VEC, PLAN_TYPE, FACTORS_TYPE), cache=True, nogil=True, error_model="numpy")
-def settle_for_noise(real, count, vec, matrix, plan, factors):
+@njit(boolean(boolean, _VEC, _IVEC, _MAT, _VEC, PLAN_TYPE, FACTORS_TYPE), cache=True, nogil=True, error_model="numpy")
+def settle_for_noise(from_prediction, real, count, vec, matrix, plan, factors):
     """Return whether rounding explains row DELTA of ``vec``; if so, leave the better of corrector and prediction.
 
-    DELTA is a correction that will not get smaller, or a result too far from its prediction. No step would mend it near
-    a singular position, so the run has to go through as it is. The noise passed on to the past, ``real[NOISE]``
-    in units of the tolerance, comes back amplified by 2^k in predictions of order k. Where that is less
-    than the noise of the corrector, the prediction stands for the solution.
+    DELTA is a result too far from its prediction, which is noisy itself, or else a correction that will not get
+    smaller. No step would mend it near a singular position, so the run has to go through as it is. The noise passed on
+    to the past, ``real[NOISE]`` in units of the tolerance, comes back amplified by 2^k in predictions of order k. Where
+    that is less than the noise of the corrector, the prediction stands for the solution.
     """
     if count[FRESH] == 0 or count[NOISY_RUN] >= NOISY_ALLOWED or count[NPAST] < 3:
         return False
     noise = rounding_level(vec, matrix, plan, factors)
     predicted = 2.0 ** count[ORDER] * max(real[NOISE], ROUNDING_LEVEL) + PREDICTION_ERROR
-    if not weighted_max(vec[DELTA], vec[W_ERROR]) <= NOISE_MARGIN * noise + 2.0 * predicted:
+    leeway = 2.0 * predicted if from_prediction else 0.0
+    if not weighted_max(vec[DELTA], vec[W_ERROR]) <= NOISE_MARGIN * noise + leeway:
         return False
     if noise < ROUNDING_LEVEL:
         return False

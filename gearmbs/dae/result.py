@@ -56,6 +56,8 @@ class SolverStats:
         spent on a differenced Jacobian are not in ``residuals``.
     repivots : int
         Times the sparse factorisation had to choose new pivots.
+    settled : int
+        Steps taken at the level of rounding, near singular positions, where no step could satisfy the tolerance.
     wall_time : float
         Seconds spent in the integrator.
     t_steps, h_steps, orders : ndarray, shape (steps,)
@@ -70,6 +72,7 @@ class SolverStats:
     factorizations: int = 0
     solves: int = 0
     repivots: int = 0
+    settled: int = 0
     wall_time: float = 0.0
     t_steps: np.ndarray = field(default_factory=lambda: np.empty(0))
     h_steps: np.ndarray = field(default_factory=lambda: np.empty(0))
@@ -88,6 +91,7 @@ class SolverStats:
                 "factorizations",
                 "solves",
                 "repivots",
+                "settled",
                 "wall_time",
             )
         }
@@ -96,7 +100,9 @@ class SolverStats:
         return (
             f"{self.steps} steps ({self.error_rejections} rejected for error, {self.newton_rejections} for the "
             f"corrector), {self.residuals} residuals, {self.jacobians} Jacobians, {self.factorizations} "
-            f"factorisations ({self.repivots} re-pivoted), {self.wall_time:.3g} s"
+            f"factorisations ({self.repivots} re-pivoted), "
+            + (f"{self.settled} steps at the level of rounding, " if self.settled else "")
+            + f"{self.wall_time:.3g} s"
         )
 
 

@@ -453,6 +453,7 @@ class Run:
             factorizations=int(count[s.FACTORIZATIONS]),
             solves=int(count[s.SOLVES]),
             repivots=max(0, self.repivots - self.first_pivots),
+            settled=int(count[s.SETTLED]),
             wall_time=wall_time,
         )
 

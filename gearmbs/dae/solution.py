@@ -79,13 +79,19 @@ class Solution:
             return self._conflict
         parts = [self.result.message]
         if not self.result.success and self.t.size:
-            parts.append(self.system.locking(self._pose[-1], float(self.t[-1])) or "")
+            parts.append(self.system.locking(self._last_pose(), float(self.t[-1])) or "")
         report = self.system.report
         parts.append((report.correction() if report is not None else None) or "")
         aside = report.redundant if report is not None else []
         if aside:
             parts.append(f"Set aside as redundant: {', '.join(aside)}.")
         return " ".join(part for part in parts if part)
+
+    def _last_pose(self) -> np.ndarray:
+        """Return the bodies' record at the last output time, without evaluating the others."""
+        if "_records" in self.__dict__:
+            return self._pose[-1]
+        return next(self.parts(np.array([self.t.size - 1])))._pose[-1]
 
     @property
     def stats(self):

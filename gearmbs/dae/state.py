@@ -83,7 +83,8 @@ DROP_AGE = 36
 DROP_ROUNDS = 37
 NOISY = 38
 NOISY_RUN = 39
-N_COUNT = 40
+SETTLED = 40
+N_COUNT = 41
 
 # rows of RunState.vec
 Y = 0

@@ -122,6 +122,8 @@ def test_chain_passes_at_the_level_of_rounding(formulation, loops, tol):
     # at 1e-8 a step the free runs end within 2e-6; at 1e-11 noise of 1e-9 comes on top
     assert reference.error(result.t, result.y) < 400 * tol + 5e-9
     assert result.stats.newton_rejections <= 2
+    if tol >= 1e-8:
+        assert result.stats.settled == 0
 
 
 def test_a_tolerance_below_rounding_is_told():
