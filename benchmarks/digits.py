@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from benchmarks.markdown import number, table
 from benchmarks.problems.reference import reference_problems
-from gearmbs.dae.ida import solve_ida
-from gearmbs.dae.wstiff import solve_wstiff
+from gearmbs.dae.integrators.ida import solve_ida
+from gearmbs.dae.integrators.wstiff import solve_wstiff
 
 TITLE = "Digits against the reference solutions"
 PUBLISHED = ("car axis", "Andrews")

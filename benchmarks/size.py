@@ -12,8 +12,8 @@ from benchmarks.methods.base import RunFailed
 from benchmarks.methods.exudyn_peer import model_of, simulate
 from benchmarks.problems.reference import chain_problem
 from benchmarks.timing import measure
-from gearmbs.dae.ida import solve_ida
-from gearmbs.dae.wstiff import solve_wstiff
+from gearmbs.dae.integrators.ida import solve_ida
+from gearmbs.dae.integrators.wstiff import solve_wstiff
 
 TITLE = "Cost against size: chains of N four-bar linkages"
 SIZES = (5, 10, 20, 40, 80, 160)

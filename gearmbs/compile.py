@@ -12,9 +12,9 @@ import sys
 import time
 
 STAGES = (
-    ("gearmbs.gears.transmission", "gearmbs.dae.expressions", "gearmbs.dae.wstiff"),
-    ("gearmbs.dae.jacobian", "gearmbs.dae.residual"),
-    ("gearmbs.dae.outputs", "gearmbs.dae.rereference"),
+    ("gearmbs.gears.transmission", "gearmbs.dae.equations.expressions", "gearmbs.dae.integrators.wstiff"),
+    ("gearmbs.dae.equations.jacobian", "gearmbs.dae.equations.residual"),
+    ("gearmbs.dae.model.evaluator", "gearmbs.dae.equations.euler_switch"),
     ("gearmbs.studies.paper", "gearmbs.signals", "gearmbs.mechanism.measures"),
 )
 """Modules whose kernels do not depend on each other within a stage."""

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 from benchmarks.methods.base import Method, RunFailed, RunResult, tolerances
 from benchmarks.problems.reference import ReferenceProblem
-from gearmbs.dae.ida import solve_ida
+from gearmbs.dae.integrators.ida import solve_ida
+from gearmbs.dae.integrators.wstiff import solve_wstiff
 from gearmbs.dae.result import DAEResult
-from gearmbs.dae.wstiff import solve_wstiff
 
 
 def _result(reference: ReferenceProblem, result: DAEResult) -> RunResult:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearmbs.adams.build import AdamsModel, markers_of
-from gearmbs.dae.solution import Solution
+from gearmbs.dae.results.solution import Solution
 
 FAR = 1e-3
 """Displacement worth a warning, in sizes of the model."""

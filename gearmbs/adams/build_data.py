@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gearmbs.adams import statements as st
-from gearmbs.dae.expressions import SplineData
+from gearmbs.dae.equations.expressions import SplineData
 
 
 def spline_data(spline: st.Spline) -> SplineData:

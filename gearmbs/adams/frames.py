@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gearmbs.adams import statements as st
-from gearmbs.dae.rotation import matrix_from_euler
+from gearmbs.dae.equations.rotation import matrix_from_euler
 
 PARALLEL = 1e-10
 

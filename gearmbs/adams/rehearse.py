@@ -9,7 +9,7 @@ from gearmbs.adams.deck import Deck
 from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
 from gearmbs.adams.grammar import EXPRESSION, specs_of
 from gearmbs.adams.session import Session, change, output_times, switch, unsupported
-from gearmbs.dae.expressions.tape import LEVEL_TIME, ExpressionError, Tape
+from gearmbs.dae.equations.expressions.tape import LEVEL_TIME, ExpressionError, Tape
 from gearmbs.mechanism.expression import compile_expression
 
 SINGLE = ("STATICS", "INITIAL_CONDITIONS", "DISPLACEMENT", "VELOCITY", "ACCELERATION")

@@ -9,12 +9,12 @@ from numba import njit
 
 from gearmbs.adams import statements as st
 from gearmbs.adams.build import AdamsModel, markers_of
-from gearmbs.dae import tables
-from gearmbs.dae.expressions import eval_gradient
-from gearmbs.dae.expressions.kinematics import KIN_A, KIN_R
-from gearmbs.dae.expressions.tape import ExpressionError, Tape
-from gearmbs.dae.solution import Solution
-from gearmbs.dae.standstill import Standstill
+from gearmbs.dae.analyses.equilibrium_solution import Standstill
+from gearmbs.dae.equations import layout as tables
+from gearmbs.dae.equations.expressions import eval_gradient
+from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_R
+from gearmbs.dae.equations.expressions.tape import ExpressionError, Tape
+from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.compile import starting_angles
 from gearmbs.mechanism.expression import Scope, compile_expression
 from gearmbs.mechanism.measures import evaluate_series, motion_tables

@@ -17,9 +17,9 @@ from gearmbs.adams.deck import Deck
 from gearmbs.adams.errors import Diagnostic
 from gearmbs.adams.requests import RequestSeries
 from gearmbs.adams.units import RESULT_NAMES, unit_names
-from gearmbs.dae.modes import Modes
-from gearmbs.dae.solution import Solution
-from gearmbs.dae.statics import StaticResult
+from gearmbs.dae.analyses.modes import Modes
+from gearmbs.dae.analyses.statics import StaticResult
+from gearmbs.dae.results.solution import Solution
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -295,7 +295,7 @@ def unique(names: tuple[str, ...]) -> tuple[str, ...]:
 
 def part_motion(segment: Segment, number: int) -> np.ndarray:
     """Return the 18 columns of a part's frame over an analysis, in the deck's units."""
-    from gearmbs.dae.rotation import euler_from_matrix
+    from gearmbs.dae.equations.rotation import euler_from_matrix
 
     s = segment.solution
     name = segment.model.names["part", number]

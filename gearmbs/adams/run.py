@@ -19,14 +19,14 @@ from gearmbs.adams.requests import RequestEvaluator
 from gearmbs.adams.result import NEWTON, AdamsResult, Segment
 from gearmbs.adams.session import Session, change, output_times, switch
 from gearmbs.adams.start import part_states, with_initial_motions
+from gearmbs.dae.analyses.kinematic_analysis import kinematic
+from gearmbs.dae.analyses.modes import Modes
+from gearmbs.dae.analyses.quasi_static import initial_conditions, quasi_static
+from gearmbs.dae.analyses.statics import StaticResult, static_equilibrium
+from gearmbs.dae.equations.expressions import ExpressionError
+from gearmbs.dae.equations.layout import STATE_ALGEBRAIC
 from gearmbs.dae.errors import ModelError
-from gearmbs.dae.expressions import ExpressionError
-from gearmbs.dae.kinematic import kinematic
-from gearmbs.dae.modes import Modes
-from gearmbs.dae.sequence import initial_conditions, quasi_static
-from gearmbs.dae.solution import Solution
-from gearmbs.dae.statics import StaticResult, static_equilibrium
-from gearmbs.dae.tables import STATE_ALGEBRAIC
+from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.analyses import frozen_friction, linear_modes
 
 DEFAULT_TOLERANCE = 1e-8

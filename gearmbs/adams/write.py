@@ -15,9 +15,9 @@ from gearmbs.adams.write_elements import KEYWORDS, element_arguments, hidden, ke
 from gearmbs.adams.write_gears import gear_statements, is_gear_contact
 from gearmbs.adams.write_output import integrator_statement, request_statements
 from gearmbs.adams.write_text import listed, number, wrapped
-from gearmbs.dae import terms
+from gearmbs.dae.equations import constraint_terms as terms
+from gearmbs.dae.equations.rotation import euler_from_matrix
 from gearmbs.dae.errors import ModelError
-from gearmbs.dae.rotation import euler_from_matrix
 from gearmbs.mechanism import Mechanism, Torque
 from gearmbs.mechanism.elements import AXIS_FORCE, AXIS_TORQUE, LINE, Load
 from gearmbs.mechanism.elements import COMPONENTS as COMPONENT_MODE

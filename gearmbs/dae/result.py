@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.dae.interpolant import DenseOutput
+from gearmbs.dae.dense_output import DenseOutput
 
 
 class Status(enum.IntEnum):

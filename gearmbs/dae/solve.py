@@ -10,12 +10,12 @@ import numpy as np
 from numba.core.registry import CPUDispatcher
 from scipy.sparse import csc_array, issparse
 
-from gearmbs.dae import difference_jacobian as dj
-from gearmbs.dae.ida import IDA_MAX_ORDER, solve_ida
+from gearmbs.dae.integrators import differences
+from gearmbs.dae.integrators.ida import IDA_MAX_ORDER, solve_ida
+from gearmbs.dae.integrators.wstiff import solve_wstiff
+from gearmbs.dae.linalg.sparse_lu import LUFactors, LUPlan, SingularMatrixError, analyse, factor, new_factors, solve
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, Status
-from gearmbs.dae.sparse_lu import LUFactors, LUPlan, SingularMatrixError, analyse, factor, new_factors, solve
-from gearmbs.dae.wstiff import solve_wstiff
 
 METHODS = ("WSTIFF", "GSTIFF", "IDA")
 IDA_DEFAULT_OUTPUTS = 201
@@ -46,11 +46,11 @@ class _UserFunctions:
         self.n = n
         self.parameters = parameters
         self.errors: list[BaseException] = []
-        self.callbacks: list[dj.PythonCallback] = []
+        self.callbacks: list[differences.PythonCallback] = []
         self.addresses: dict[int, int] = {}
 
     def _register(self, slot: int, function: Callable, n_out: int) -> None:
-        callback = dj.PythonCallback(function, self.n, n_out, self.errors)
+        callback = differences.PythonCallback(function, self.n, n_out, self.errors)
         self.callbacks.append(callback)
         assert callback.address is not None
         self.addresses[slot] = callback.address
@@ -58,7 +58,7 @@ class _UserFunctions:
     def residual(self, fun: Callable) -> Callable:
         takes_p = _takes(fun, 4, "the residual")
         if isinstance(fun, CPUDispatcher):
-            return dj.adapt_residual(fun, takes_p)
+            return differences.adapt_residual(fun, takes_p)
         extra = (self.parameters,) if takes_p else ()
 
         def call(t, y, yp, _unused, out):
@@ -69,36 +69,36 @@ class _UserFunctions:
                     "nothing"
                 )
 
-        self._register(dj.RESIDUAL_ADDRESS, call, self.n)
-        return dj.python_residual
+        self._register(differences.RESIDUAL_ADDRESS, call, self.n)
+        return differences.python_residual
 
     def jacobian(self, jac: Callable | None, residual: Callable, nnz: int, dense: bool) -> Callable:
         if jac is None:
-            return dj.differenced(residual)
+            return differences.differenced(residual)
         takes_p = _takes(jac, 5, "the Jacobian")
         if isinstance(jac, CPUDispatcher):
-            return dj.adapt_jacobian(jac, takes_p, dense)
+            return differences.adapt_jacobian(jac, takes_p, dense)
         extra = (self.parameters,) if takes_p else ()
         n = self.n
 
         def call(t, y, yp, cj, vals):
             jac(t, y, yp, cj, vals.reshape((n, n)).T if dense else vals, *extra)
 
-        self._register(dj.JACOBIAN_ADDRESS, call, nnz)
-        return dj.python_jacobian
+        self._register(differences.JACOBIAN_ADDRESS, call, nnz)
+        return differences.python_jacobian
 
     def events(self, functions: Sequence[Callable]) -> Callable:
         takes_p = [_takes(g, 3, "an event function") for g in functions]
         if all(isinstance(g, CPUDispatcher) for g in functions):
-            return dj.adapt_events(list(functions), takes_p)
+            return differences.adapt_events(list(functions), takes_p)
         extras = [(self.parameters,) if p else () for p in takes_p]
 
         def call(t, y, yp, _unused, out):
             for i, (g, extra) in enumerate(zip(functions, extras, strict=True)):
                 out[i] = g(t, y, yp, *extra)
 
-        self._register(dj.EVENTS_ADDRESS, call, len(functions))
-        return dj.python_events
+        self._register(differences.EVENTS_ADDRESS, call, len(functions))
+        return differences.python_events
 
     def probe(self) -> BaseException | None:
         """Return the first exception a callback has raised."""
@@ -222,13 +222,13 @@ def as_problem(
     residual = functions.residual(fun)
     jacobian = functions.jacobian(jac, residual, len(indices), jac_sparsity is None)
     compiled_events = functions.events(events) if len(events) else None
-    idata, rdata, work_size = dj.pack_tables(indptr, indices, scales, parameters)
+    idata, rdata, work_size = differences.pack_tables(indptr, indices, scales, parameters)
     for slot, address in functions.addresses.items():
         idata[slot] = address
     rates = np.zeros(n) if yp0 is None else _vector(yp0, n, "yp0")
     if differential is None:
         differential = np.empty(n, dtype=np.bool_)
-        dj.find_differential(residual, float(t0), y0, rates, differential, idata, rdata, np.zeros(work_size))
+        differences.find_differential(residual, float(t0), y0, rates, differential, idata, rdata, np.zeros(work_size))
     else:
         differential = _mask(differential, n, "differential")
     problem = DAEProblem(
@@ -371,7 +371,8 @@ def solve_dae(
     names : sequence of str
         Names of the unknowns, for messages.
     **options
-        Further options of `gearmbs.dae.wstiff.solve_wstiff`: ``corrector``, ``breakpoints``, ``interpolate``, ...
+        Further options of `gearmbs.dae.integrators.wstiff.solve_wstiff`: ``corrector``, ``breakpoints``,
+        ``interpolate``, ...
 
     Returns
     -------

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.dae import kinematic as _kinematic
-from gearmbs.dae import modes as _modes
-from gearmbs.dae import sequence as _sequence
-from gearmbs.dae import statics as _statics
+from gearmbs.dae.analyses import kinematic_analysis as _kinematic
+from gearmbs.dae.analyses import modes as _modes
+from gearmbs.dae.analyses import quasi_static as _sequence
+from gearmbs.dae.analyses import statics as _statics
+from gearmbs.dae.analyses.modes import Modes
+from gearmbs.dae.analyses.statics import StaticResult
 from gearmbs.dae.errors import ModelError
-from gearmbs.dae.modes import Modes
-from gearmbs.dae.statics import StaticResult
 
 if TYPE_CHECKING:
-    from gearmbs.dae.solution import Solution
+    from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism.mechanism import Mechanism
 
 

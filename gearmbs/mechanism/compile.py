@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.dae import forces as force_kinds
-from gearmbs.dae import tables as T
-from gearmbs.dae import terms, timefunctions
+from gearmbs.dae.equations import constraint_terms as terms
+from gearmbs.dae.equations import forces as force_kinds
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations import time_functions
+from gearmbs.dae.equations.expressions import ExpressionError, Tape
+from gearmbs.dae.equations.expressions.tape import LEVEL_ACCELERATION, LEVEL_TIME
+from gearmbs.dae.equations.layout import TableBuilder
+from gearmbs.dae.equations.reactions import REACTION
 from gearmbs.dae.errors import ModelError
-from gearmbs.dae.expressions import ExpressionError, Tape
-from gearmbs.dae.expressions.tape import LEVEL_ACCELERATION, LEVEL_TIME
-from gearmbs.dae.reactions import REACTION
-from gearmbs.dae.system import System
-from gearmbs.dae.tables import TableBuilder
+from gearmbs.dae.model.system import System
 from gearmbs.mechanism import elements as el
 from gearmbs.mechanism import joints as jt
 from gearmbs.mechanism.elements import GearContact, Load, Torque
@@ -151,7 +152,7 @@ class _Compiler:
         if tape.level > LEVEL_TIME:
             raise ModelError(f"{label}: {function.text!r} must be a function of TIME alone")
         number = self.add_tape(tape)
-        self.builder.functions.append((timefunctions.TAPE, number))
+        self.builder.functions.append((time_functions.TAPE, number))
         return len(self.builder.functions) - 1
 
     # --- expressions --------------------------------------------------------------------------------

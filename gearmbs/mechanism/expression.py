@@ -2,7 +2,7 @@
 
 ``parse`` reads the text into a syntax tree (and finds every syntax error without a model);
 ``compile_expression`` resolves names in a ``Scope`` and writes the tape of
-``gearmbs.dae.expressions``.  Case does not matter; angles are radians, ``90D`` is ninety degrees.
+``gearmbs.dae.equations.expressions``.  Case does not matter; angles are radians, ``90D`` is ninety degrees.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from gearmbs.dae.expressions import opcodes as op
-from gearmbs.dae.expressions.splines import SplineData
-from gearmbs.dae.expressions.tape import ExpressionError, Tape, TapeBuilder
+from gearmbs.dae.equations.expressions import opcodes as op
+from gearmbs.dae.equations.expressions.splines import SplineData
+from gearmbs.dae.equations.expressions.tape import ExpressionError, Tape, TapeBuilder
 
 MAX_DEPTH = 100
 """Deepest nesting of brackets, functions and signs."""
@@ -392,7 +392,7 @@ def compile_expression(text: str, scope: Scope, dimension: str = "number", accel
     ExpressionError
         When the text is malformed or names something the scope does not hold.
     """
-    from gearmbs.dae.expressions.tape import LEVEL_ACCELERATION
+    from gearmbs.dae.equations.expressions.tape import LEVEL_ACCELERATION
     from gearmbs.mechanism.expression_functions import Lowering
 
     builder = TapeBuilder(scope.marker_body)

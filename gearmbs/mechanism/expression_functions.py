@@ -7,8 +7,8 @@ import math
 from collections.abc import Callable
 from typing import NoReturn
 
-from gearmbs.dae.expressions import opcodes as op
-from gearmbs.dae.expressions.tape import ExpressionError, TapeBuilder
+from gearmbs.dae.equations.expressions import opcodes as op
+from gearmbs.dae.equations.expressions.tape import ExpressionError, TapeBuilder
 from gearmbs.mechanism.expression import (
     Call,
     Chain,

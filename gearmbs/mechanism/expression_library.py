@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 
-from gearmbs.dae.expressions import opcodes as op
+from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.mechanism.expression import Call, Ref
 from gearmbs.mechanism.expression_functions import EULER_SEQUENCES, Lowering
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from gearmbs.dae import timefunctions as tf
+from gearmbs.dae.equations import time_functions as tf
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.functions import TimeFunction, expression
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearmbs.dae import timefunctions as tf
+from gearmbs.dae.equations import time_functions as tf
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.quantities import any_quantity, expression_text, quantity
 
@@ -16,7 +16,7 @@ RATES = ("angular speed", "speed", "rad/s^2", "acceleration", "dimensionless")
 
 @dataclass(frozen=True)
 class TimeFunction:
-    """A function of time in one of the closed forms of :mod:`gearmbs.dae.timefunctions`.
+    """A function of time in one of the closed forms of :mod:`gearmbs.dae.equations.time_functions`.
 
     Make one with :func:`constant`, :func:`step`, :func:`ramp`, :func:`harmonic` or :func:`polynomial`.
     """

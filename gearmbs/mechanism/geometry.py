@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from gearmbs.dae.equations.rotation import matrix_from_euler
 from gearmbs.dae.errors import ModelError
-from gearmbs.dae.rotation import matrix_from_euler
 from gearmbs.mechanism.quantities import quantities
 
 Vector = npt.ArrayLike

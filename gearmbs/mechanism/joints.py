@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gearmbs.dae import terms
+from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.functions import TimeFunction
 from gearmbs.mechanism.parts import Marker

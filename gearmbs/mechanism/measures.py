@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numba import njit
 
-from gearmbs.dae import tables as T
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.expressions import ExpressionError, angle_rates, eval_request, update_angles
+from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.errors import ModelError
-from gearmbs.dae.expressions import ExpressionError, angle_rates, eval_request, update_angles
-from gearmbs.dae.expressions.kinematics import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
 from gearmbs.mechanism.elements import State
 from gearmbs.mechanism.expression import compile_expression
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Body, Marker
 
 if TYPE_CHECKING:
-    from gearmbs.dae.solution import Solution
+    from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism.mechanism import Mechanism
 
 SLIDING = ("translational", "cylindrical", "inline")
@@ -25,7 +25,7 @@ TURNING = ("revolute", "cylindrical", "screw", "parallel_axes", "planar")
 
 
 class Measures:
-    """Measurements on a solution of a mechanism; :class:`gearmbs.dae.solution.Solution` has them as methods.
+    """Measurements on a solution of a mechanism; :class:`gearmbs.dae.results.solution.Solution` has them as methods.
 
     Markers may have been added to the bodies after the run.
     """

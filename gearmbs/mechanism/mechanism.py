@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gearmbs.dae import terms
+from gearmbs.dae.equations import constraint_terms as terms
+from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.dae.errors import ModelError
-from gearmbs.dae.expressions import SplineData
-from gearmbs.dae.system import System
+from gearmbs.dae.model.system import System
 from gearmbs.mechanism import joints as jt
 from gearmbs.mechanism.elements import ContactTables, GearContact, Load, State, Torque, check_wheels
 from gearmbs.mechanism.expression import Units

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.errors import ModelError
-from gearmbs.dae.expressions import ExpressionError
 from gearmbs.units import to_si
 
 VALUES = (

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from gearmbs.dae.errors import ModelError
-from gearmbs.dae.ida import solve_ida
+from gearmbs.dae.integrators.ida import solve_ida
 from gearmbs.dae.result import Status
-from gearmbs.dae.solution import Solution
+from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
 
@@ -122,7 +122,7 @@ def simulate(
         if name == "IDA":
             result = solve_ida(problem, times, t_end=last, tol=tol, progress=report, **options)
         else:
-            from gearmbs.dae.wstiff import solve_wstiff
+            from gearmbs.dae.integrators.wstiff import solve_wstiff
 
             # errors are controlled on positions and velocities, and so is the corrector
             options.setdefault("corrector", "modified")
@@ -144,7 +144,7 @@ def _check_options(name: str, options: Mapping[str, Any]) -> None:
     if name == "IDA":
         solver: Callable = solve_ida
     else:
-        from gearmbs.dae.wstiff import solve_wstiff as solver
+        from gearmbs.dae.integrators.wstiff import solve_wstiff as solver
     known = [p for p in inspect.signature(solver).parameters if p not in ("problem", "t_eval", "t_end", "method")]
     for option in options:
         if option in known:

@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 
 import gearmbs
 from gearmbs.dae.result import Status
-from gearmbs.dae.solution import Solution
+from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.simulate import simulate
 from gearmbs.signals import (
     decimate,

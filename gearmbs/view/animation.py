@@ -26,7 +26,7 @@ from gearmbs.view.solid import pair_deviations, section_outline
 from gearmbs.view.transverse import ARROW, FILLS, LINES, MM, TOLERANCE, force_text, mesh_view, projected
 
 if TYPE_CHECKING:
-    from gearmbs.dae.solution import Solution
+    from gearmbs.dae.results.solution import Solution
 
 
 class MeshAnimation(Page):

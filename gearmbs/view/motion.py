@@ -12,7 +12,7 @@ from gearmbs.gears import GearPair
 from gearmbs.gears.pair import Placement
 
 if TYPE_CHECKING:
-    from gearmbs.dae.solution import Solution
+    from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism.parts import Marker
 
 

@@ -17,7 +17,7 @@ from gearmbs.view.scene import UP, Part, Scene
 from gearmbs.view.solid import pair_solids
 
 if TYPE_CHECKING:
-    from gearmbs.dae.solution import Solution
+    from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism import Mechanism
     from gearmbs.mechanism.parts import Body
 

@@ -84,7 +84,7 @@ def test_functions_of_time_are_written_as_expressions(function):
     from gearmbs.mechanism.expression import Scope, compile_expression
     from gearmbs.mechanism.function_text import function_text
     from gearmbs.mechanism.functions import as_function
-    from tests.expressions.support import time_series
+    from tests.dae.equations.expressions.support import time_series
 
     f = as_function(function)
     # in milliseconds and tenths

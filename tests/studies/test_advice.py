@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearmbs.dae import failures
+from gearmbs.dae.integrators import messages
 from gearmbs.dae.result import Status
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.simulate import ADVICE as MODELLER
@@ -49,14 +49,14 @@ def test_every_failure_has_its_advice(advice):
     problem = swing().compile(0.0).problem()
     problem.advice = advice
     texts = {
-        Status.NOT_FINITE: failures.not_finite(problem, 0.1, 3),
-        Status.STEP_TOO_SMALL: failures.step_too_small(problem, 0.1, 1e-9, 2, 7.0),
-        Status.NEWTON_FAILURE: failures.newton(problem, 0.1, 1e-9, 2),
-        Status.TOO_MANY_REJECTIONS: failures.too_many_rejections(problem, 0.1, 1e-9, 2),
+        Status.NOT_FINITE: messages.not_finite(problem, 0.1, 3),
+        Status.STEP_TOO_SMALL: messages.step_too_small(problem, 0.1, 1e-9, 2, 7.0),
+        Status.NEWTON_FAILURE: messages.newton(problem, 0.1, 1e-9, 2),
+        Status.TOO_MANY_REJECTIONS: messages.too_many_rejections(problem, 0.1, 1e-9, 2),
     }
     for status, text in texts.items():
         assert text.endswith(advice[status])
-        assert failures.ADVICE[status] not in text
+        assert messages.ADVICE[status] not in text
     problem.advice = {}
-    assert failures.newton(problem, 0.1, 1e-9, 2).endswith(failures.ADVICE[Status.NEWTON_FAILURE])
+    assert messages.newton(problem, 0.1, 1e-9, 2).endswith(messages.ADVICE[Status.NEWTON_FAILURE])
     assert np.isfinite(problem.y0).all()

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.dae.solution import Solution
+from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism import Mechanism, ModelError
 from gearmbs.studies.iftomm import models, references
 from gearmbs.studies.iftomm.references import Published

@@ -1,0 +1,1 @@
+"""Static, quasi-static, kinematic, linearised and modal analyses of a mechanism."""

@@ -1,0 +1,388 @@
+"""Accelerations and multipliers from the index-1 linear system at given (t, q, v).
+
+    [ M  Phi_q^T ] [ a      ]   [ Q                     ]
+    [ Phi_q  0   ] [ lambda ] = [ -(Phi_q v)_q v - ...  ]
+
+in the spatial velocities (v, omega) of the bodies, in which no orientation is singular.  Solved once
+per output time, it gives reaction forces that are free of the integrator's noise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from gearmbs.dae.compiled.views import matrix_at, vector_at
+from gearmbs.dae.equations import constraint_terms as terms
+from gearmbs.dae.equations import expression_loads
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.forces import TORQUE, element_wrench, torque
+from gearmbs.dae.equations.jacobian import NUMBERS, put
+from gearmbs.dae.equations.reactions import REACTION
+from gearmbs.dae.equations.residual import S_DIAG, S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR, S_WRENCH, arm_to
+from gearmbs.dae.equations.rotation import (
+    KIN_A,
+    KIN_ADOT,
+    KIN_H,
+    KIN_R,
+    KIN_V,
+    KIN_W,
+    axes_and_velocity,
+    euler_rates,
+    momentum_from_conjugate,
+)
+from gearmbs.dae.equations.simple_terms import dot_motion, point_motion
+from gearmbs.dae.equations.update import inertia_times, update_bodies
+
+"""Per force element: F, N, then eight diagnostics of a contact."""
+FORCE_RECORD = 14
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def apply_load(b, sign, row, wrench, marker_body, kin, frame, scratch, rhs):
+    if b == 0:
+        return
+    s = scratch[S_VECTOR : S_VECTOR + 12]
+    arm_to(b, row[T.FORCE_I], marker_body, kin, frame, s, 0)
+    terms.cross3(s, 0, wrench, 0, s, 3)
+    k = 6 * (b - 1)
+    for c in range(3):
+        rhs[k + c] += sign * wrench[c]
+        rhs[k + 3 + c] += sign * (s[3 + c] + wrench[3 + c])
+
+
+@njit(cache=True, error_model="numpy")
+def tape_row_rates(k, t, y, idata, tab, room):
+    """Return value, rate, partial time derivative and quadratic part of a row given by tape k.
+
+    ``room`` receives the spatial gradient, six entries a body.
+    """
+    row = tab.tape[k]
+    bodies = row[T.TAPE_N_BODIES]
+    n = 6 * bodies + 1
+    grad, hess = room[0:n], room[n:]
+    value = expression_loads.second(k, t, y, tab, grad, hess)
+    partial = grad[n - 1]
+    rate, gamma = partial, hess[n * n - 1]
+    for i in range(n - 1):
+        b = tab.extra_i[row[T.TAPE_BODIES] + i // 6]
+        speed = y[(idata[T.H_EPS] if i % 6 >= 3 else idata[T.H_U]) + 3 * (b - 1) + i % 3]
+        rate += grad[i] * speed
+        gamma += 2.0 * hess[i * n + n - 1] * speed
+        for j in range(n - 1):
+            b2 = tab.extra_i[row[T.TAPE_BODIES] + j // 6]
+            gamma += (
+                speed * hess[i * n + j] * y[(idata[T.H_EPS] if j % 6 >= 3 else idata[T.H_U]) + 3 * (b2 - 1) + j % 3]
+            )
+    for p in range(bodies):
+        b = tab.extra_i[row[T.TAPE_BODIES] + p]
+        kin = tab.kin[b]
+        # Phi_pi from Phi_theta_k = a_k . Phi_pi; omega' = sum a_k eps_k' + adot_k eps_k
+        momentum_from_conjugate(tab.kin, b, grad, 6 * p + 3, grad, 6 * p + 3)
+        for m in range(3):
+            eps = y[idata[T.H_EPS] + 3 * (b - 1) + m]
+            gamma -= eps * terms.dot3(kin, KIN_ADOT + 3 * m, grad, 6 * p + 3)
+    return value, rate, partial, gamma
+
+
+@njit(cache=True, error_model="numpy")
+def put_pair(mode, slot, vals, k, row, col, value):
+    """Hand over an entry of Phi_q and its mirror image in Phi_q^T; return the number of the next entry."""
+    k = put(mode, slot, vals, k, row, col, value)
+    return put(mode, slot, vals, k, col, row, value)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def put_point(mode, slot, vals, k, row, coef, term, marker_body, frame):
+    """Hand over the gradient of a POINT term; return the number of the next entry."""
+    c = term[T.TERM_AXES]
+    c1 = c + 1 if c < 2 else 0
+    c2 = c - 1 if c > 0 else 2
+    for side in range(2):
+        marker = term[T.TERM_I + side]
+        if marker_body[marker] == 0:
+            continue
+        sign = coef if side == 0 else -coef
+        if mode == NUMBERS:
+            arm_2, arm_1 = sign * frame[marker, T.MK_ARM + c2], -sign * frame[marker, T.MK_ARM + c1]
+            vals[slot[k]] += sign
+            vals[slot[k + 1]] += sign
+            vals[slot[k + 2]] += arm_2
+            vals[slot[k + 3]] += arm_2
+            vals[slot[k + 4]] += arm_1
+            vals[slot[k + 5]] += arm_1
+            k += 6
+            continue
+        q = 6 * (marker_body[marker] - 1)
+        k = put_pair(mode, slot, vals, k, row, q + c, sign)
+        k = put_pair(mode, slot, vals, k, row, q + 3 + c1, sign * frame[marker, T.MK_ARM + c2])
+        k = put_pair(mode, slot, vals, k, row, q + 3 + c2, -sign * frame[marker, T.MK_ARM + c1])
+    return k
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def put_dot(mode, slot, vals, k, row, coef, term, marker_body, cross):
+    """Hand over the gradient of a DOT1 term, given that of its first side; return the number of the next entry."""
+    for side in range(2):
+        body = marker_body[term[T.TERM_I + side]]
+        if body == 0:
+            continue
+        sign = coef if side == 0 else -coef
+        if mode == NUMBERS:
+            for c in range(3):
+                vals[slot[k]] += sign * cross[c]
+                vals[slot[k + 1]] += sign * cross[c]
+                k += 2
+            continue
+        for c in range(3):
+            k = put_pair(mode, slot, vals, k, row, 6 * (body - 1) + 3 + c, sign * cross[c])
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
+    """Assemble the saddle-point matrix (by slots) and right-hand side; return the number of entries.
+
+    The kinematics, marker and function tables must be up to date. Without loads (0) the right-hand side lacks the
+    applied forces: enough for a projection.
+
+    ``phi`` receives 3 values a row one after the other: Phi, Phi_q v + Phi_t, Phi_t.
+    ``loads[f]`` receives F, N and the diagnostics of force element f.
+    """
+    mode = idata[T.H_MODE]
+    bodies, rows = idata[T.H_BODIES], idata[T.H_ROWS]
+    base = 6 * (bodies - 1)
+    s = vector_at(tab.scratch, S_TERM, 100)
+    for c in range(rhs.size):
+        rhs[c] = 0.0
+    k = np.int64(0)
+    for b in range(1, bodies):
+        kin = tab.kin[b]
+        i = 6 * (b - 1)
+        mass = tab.body[b, T.BODY_MASS]
+        for c in range(3):
+            k = put(mode, slot, vals, k, i + c, i + c, mass)
+            rhs[i + c] = mass * tab.gravity[c]
+            s[0] = s[1] = s[2] = 0.0
+            s[c] = 1.0
+            inertia_times(kin, tab.body[b], s, 0, s, 3, s[6:9])
+            for d in range(3):
+                k = put(mode, slot, vals, k, i + 3 + d, i + 3 + c, s[3 + d])
+        terms.cross3(kin, KIN_H, kin, KIN_W, rhs, i + 3)
+    g = vector_at(tab.scratch, S_GRADIENT, 12)
+    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
+    for r in range(rows):
+        value, rate, partial, gamma = 0.0, 0.0, 0.0, 0.0
+        if tab.row[r, T.ROW_FUNCTION] >= 0:
+            fun = tab.row[r, T.ROW_FUNCTION]
+            f, f1, f2 = tab.fval[fun, 0], tab.fval[fun, 1], tab.fval[fun, 2]
+            value, rate, partial, gamma = -f, -f1, -f1, -f2
+        for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
+            coef = tab.coef[j]
+            kind = tab.term[j, T.TERM_TYPE]
+            if kind == terms.POINT or kind == terms.DOT1:
+                if kind == terms.POINT:
+                    p, d, q2 = point_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame)
+                    k = put_point(mode, slot, vals, k, base + r, coef, tab.term[j], tab.marker_body, tab.frame)
+                else:
+                    p, d, q2 = dot_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame, s)
+                    k = put_dot(mode, slot, vals, k, base + r, coef, tab.term[j], tab.marker_body, s)
+                value += coef * p
+                rate += coef * d
+                gamma += coef * q2
+                continue
+            p, p_t = terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
+            value += coef * p
+            rate += coef * p_t
+            partial += coef * p_t
+            gamma += coef * terms.quadratic_part(j, tab.term, tab.fval, tab.marker_body, tab.kin, tab.frame, s)
+            for side in range(2):
+                b = tab.marker_body[tab.term[j, T.TERM_I + side]]
+                if b == 0:
+                    continue
+                h, q = 6 * side, 6 * (b - 1)
+                kin = tab.kin[b]
+                rate += coef * (terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W))
+                for c in range(6):
+                    k = put_pair(mode, slot, vals, k, base + r, q + c, coef * g[h + c])
+        if tab.row[r, T.ROW_TAPE] >= 0:
+            tape = tab.tape[tab.row[r, T.ROW_TAPE]]
+            n = 6 * tape[T.TAPE_N_BODIES] + 1
+            room = expression_loads.tail(tab, n * (n + 1))
+            v, d, p, q2 = tape_row_rates(tab.row[r, T.ROW_TAPE], t, y, idata, tab, room)
+            value += v
+            rate += d
+            partial += p
+            gamma += q2
+            for b in range(tape[T.TAPE_N_BODIES]):
+                q = 6 * (tab.extra_i[tape[T.TAPE_BODIES] + b] - 1)
+                for c in range(6):
+                    k = put_pair(mode, slot, vals, k, base + r, q + c, room[6 * b + c])
+        rhs[base + r] = -gamma
+        phi[3 * r], phi[3 * r + 1], phi[3 * r + 2] = value, rate, partial
+    if mode == NUMBERS and with_loads != 0:
+        wrench = vector_at(tab.scratch, S_WRENCH, 6)
+        diag = vector_at(tab.scratch, S_DIAG, 8)
+        for f in range(idata[T.H_FORCES]):
+            row = tab.force[f]
+            width = row[T.FORCE_WIDTH]
+            jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, width)
+            for c in range(8):
+                diag[c] = 0.0
+            if row[T.FORCE_KIND] == REACTION:
+                # it follows from the multipliers that this system is solved for; the integrator's is at hand
+                for c in range(3):
+                    loads[f, c], loads[f, 3 + c] = y[row[T.FORCE_F] + c], y[row[T.FORCE_N] + c]
+                continue
+            if row[T.FORCE_KIND] == TORQUE:
+                for c in range(3):
+                    wrench[c] = 0.0
+                torque(row, tab.fval, tab.frame, wrench)
+            else:
+                element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(0))
+            for c in range(6):
+                loads[f, c] = wrench[c]
+            for c in range(8):
+                loads[f, 6 + c] = diag[c]
+            for side in range(2):
+                b = tab.marker_body[row[T.FORCE_I + side]]
+                apply_load(b, 1.0 - 2.0 * side, row, wrench, tab.marker_body, tab.kin, tab.frame, tab.scratch, rhs)
+    return k
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def loads_of_rows(multipliers, idata, tab, force, moment):
+    """Write the reaction of each constraint row on I's body: force, and moment about the origin of marker I, global.
+
+    The kinematics tables must be up to date. Of a row that couples several joints, the part that acts through the
+    first one's marker I.
+    """
+    g = vector_at(tab.scratch, S_GRADIENT, 12)
+    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
+    s = vector_at(tab.scratch, S_TERM, 100)
+    for r in range(idata[T.H_ROWS]):
+        for c in range(3):
+            force[r, c] = 0.0
+            moment[r, c] = 0.0
+        lam = multipliers[r]
+        first, last = tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]
+        for j in range(first, last):
+            if tab.term[j, T.TERM_I] != tab.term[first, T.TERM_I]:
+                continue
+            factor = -lam * tab.coef[j]
+            kind = tab.term[j, T.TERM_TYPE]
+            if kind == terms.POINT:
+                force[r, tab.term[j, T.TERM_AXES]] += factor
+                continue
+            if kind == terms.DOT1:
+                a, b = tab.term[j, T.TERM_AXES] // 3, tab.term[j, T.TERM_AXES] % 3
+                i_row, j_row = tab.frame[tab.term[j, T.TERM_I]], tab.frame[tab.term[j, T.TERM_J]]
+                terms.cross3(i_row, T.MK_AXES + 3 * a, j_row, T.MK_AXES + 3 * b, s, 0)
+                for c in range(3):
+                    moment[r, c] += factor * s[c]
+                continue
+            terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
+            for c in range(3):
+                s[c] = factor * g[c]
+                force[r, c] += s[c]
+            terms.cross3(tab.frame[tab.term[j, T.TERM_I]], T.MK_ARM, s, 0, s, 3)
+            for c in range(3):
+                moment[r, c] += factor * g[3 + c] - s[3 + c]
+
+
+@njit(
+    "void(float64[::1], int64[::1], float64[::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])",
+    cache=True,
+    error_model="numpy",
+)
+def joint_loads(y, idata, rdata, work, multipliers, force, moment):
+    """Write the loads of `loads_of_rows`; ``multipliers[0]`` holds lambda."""
+    loads_of_rows(multipliers[0], idata, T.unpack(idata, rdata, work), force, moment)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def poses(kin, out):
+    """Write R, A (row-major), v, omega of each body (18 values, the ground left out) from an up-to-date table."""
+    for b in range(1, kin.shape[0]):
+        k = 18 * (b - 1)
+        for c in range(3):
+            out[k + c] = kin[b, KIN_R + c]
+            out[k + 12 + c] = kin[b, KIN_V + c]
+            out[k + 15 + c] = kin[b, KIN_W + c]
+        for c in range(9):
+            out[k + 3 + c] = kin[b, KIN_A + c]
+
+
+@njit("void(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy")
+def pose_record(y, idata, rdata, work, out):
+    """Write the record of `poses` for y."""
+    tab = T.unpack(idata, rdata, work)
+    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
+    poses(tab.kin, out)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def violations(t, y, phi, idata, tab):
+    """Write Phi and Phi_q v + Phi_t of each row to ``phi`` (three places a row); return the fastest body's |omega|.
+
+    The kinematics, marker and function tables must be up to date.
+    """
+    g = vector_at(tab.scratch, S_GRADIENT, 12)
+    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
+    s = vector_at(tab.scratch, S_TERM, 100)
+    for r in range(idata[T.H_ROWS]):
+        value, rate = 0.0, 0.0
+        if tab.row[r, T.ROW_FUNCTION] >= 0:
+            fun = tab.row[r, T.ROW_FUNCTION]
+            value, rate = -tab.fval[fun, 0], -tab.fval[fun, 1]
+        for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
+            coef = tab.coef[j]
+            kind = tab.term[j, T.TERM_TYPE]
+            if kind == terms.POINT or kind == terms.DOT1:
+                if kind == terms.POINT:
+                    p, d, _ = point_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame)
+                else:
+                    p, d, _ = dot_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame, s)
+                value += coef * p
+                rate += coef * d
+                continue
+            p, p_t = terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
+            value += coef * p
+            rate += coef * p_t
+            for side in range(2):
+                kin = tab.kin[tab.marker_body[tab.term[j, T.TERM_I + side]]]
+                rate += coef * (terms.dot3(g, 6 * side, kin, KIN_V) + terms.dot3(g, 6 * side + 3, kin, KIN_W))
+        if tab.row[r, T.ROW_TAPE] >= 0:
+            k = tab.row[r, T.ROW_TAPE]
+            n = 6 * tab.tape[k, T.TAPE_N_BODIES] + 1
+            v, d, _, _ = tape_row_rates(k, t, y, idata, tab, expression_loads.tail(tab, n * (n + 1)))
+            value += v
+            rate += d
+        phi[3 * r], phi[3 * r + 1] = value, rate
+    spin = 0.0
+    for b in range(1, idata[T.H_BODIES]):
+        spin = max(spin, terms.dot3(tab.kin[b], KIN_W, tab.kin[b], KIN_W))
+    return np.sqrt(spin)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def displace(y, d, w, idata, tab):
+    """Move the bodies of y by the spatial displacements ``d`` and change their spatial velocities by ``w``.
+
+    The kinematics table must be up to date; conjugate momenta are left alone.
+    """
+    s = tab.scratch
+    for b in range(1, idata[T.H_BODIES]):
+        k, i = 3 * (b - 1), 6 * (b - 1)
+        e, th = idata[T.H_EPS] + k, idata[T.H_THETA] + k
+        for c in range(3):
+            y[idata[T.H_R] + k + c] += d[i + c]
+            y[idata[T.H_U] + k + c] += w[i + c]
+            s[c] = d[i + 3 + c]
+            s[3 + c] = tab.kin[b, KIN_W + c] + w[i + 3 + c]
+        euler_rates(tab.kin, b, s, 0, s, 6)
+        for c in range(3):
+            y[th + c] += s[6 + c]
+        # the new rates give the corrected velocity about the displaced axes
+        axes_and_velocity(y[th], y[th + 1], 0.0, 0.0, 0.0, tab.kin, b)
+        euler_rates(tab.kin, b, s, 3, y, e)

@@ -1,0 +1,434 @@
+"""The exact sparse Jacobian dG/dy + cj dG/dy' of the residual, and its pattern.
+
+One routine walks through the entries in a fixed order.  Asked for the pattern it records their places;
+asked for numbers it adds each entry to its slot of the CSC values, so both can never disagree.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from gearmbs.dae.compiled.views import matrix_at, vector_at
+from gearmbs.dae.equations import constraint_terms as terms
+from gearmbs.dae.equations import expression_loads
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.forces import element_wrench
+from gearmbs.dae.equations.reactions import REACTION, reaction_wrench
+from gearmbs.dae.equations.residual import (
+    S_DIAG,
+    S_GRADIENT,
+    S_GRADIENT_T,
+    S_HESSIAN,
+    S_PRODUCT,
+    S_TERM,
+    S_VECTOR,
+    S_WRENCH,
+    arm_to,
+)
+from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, KIN_DW, KIN_H
+from gearmbs.dae.equations.update import euler_component, inertia_times, update_tables
+from gearmbs.dae.problem import JACOBIAN_SIG
+
+NUMBERS, PLACES, COUNT = 0, 1, 2
+
+HESSIAN_BLOCKS = terms.HESSIAN_BLOCKS
+
+
+@njit("int64(int64, int64[::1], float64[::1], int64, int64, int64, float64)", cache=True, error_model="numpy")
+def put(mode, slot, vals, k, row, col, value):
+    """Hand over entry k; return the number of the next."""
+    if mode == NUMBERS:
+        vals[slot[k]] += value
+    elif mode == PLACES:
+        vals[2 * k] = row
+        vals[2 * k + 1] = col
+    return k + 1
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def body_entries(mode, b, cj, idata, tab, slot, vals, k):
+    """Entries of one body's inertia terms in eq. (5) and (6)."""
+    i = 3 * (b - 1)
+    u, p, e, r, th = (
+        idata[T.H_U] + i,
+        idata[T.H_P] + i,
+        idata[T.H_EPS] + i,
+        idata[T.H_R] + i,
+        idata[T.H_THETA] + i,
+    )
+    kin = tab.kin[b]
+    s = vector_at(tab.scratch, S_TERM, 100)
+    mass = tab.body[b, T.BODY_MASS]
+    # J a_k in s[0:9], J adot_k in s[9:18], dh/dtheta_m = a_m x h + J adot_m in s[18:27]
+    for m in range(3):
+        inertia_times(kin, tab.body[b], kin, KIN_AXES + 3 * m, s, 3 * m, s[30:33])
+        inertia_times(kin, tab.body[b], kin, KIN_ADOT + 3 * m, s, 9 + 3 * m, s[30:33])
+        terms.cross3(kin, KIN_AXES + 3 * m, kin, KIN_H, s, 18 + 3 * m)
+        for c in range(3):
+            s[18 + 3 * m + c] += s[9 + 3 * m + c]
+    for m in range(3):
+        k = put(mode, slot, vals, k, u + m, u + m, mass * cj)
+        k = put(mode, slot, vals, k, p + m, p + m, cj)
+        k = put(mode, slot, vals, k, e + m, p + m, 1.0)
+        k = put(mode, slot, vals, k, r + m, u + m, 1.0)
+        k = put(mode, slot, vals, k, r + m, r + m, -cj)
+        k = put(mode, slot, vals, k, th + m, e + m, 1.0)
+        k = put(mode, slot, vals, k, th + m, th + m, -cj)
+        for n in range(3):
+            # L_eps_m = a_m . h
+            k = put(mode, slot, vals, k, e + m, e + n, -terms.dot3(kin, KIN_AXES + 3 * m, s, 3 * n))
+            mixed_mn = terms.dot3(kin, KIN_ADOT + 3 * n, s, 3 * m)
+            if m < n:
+                terms.cross3(kin, KIN_AXES + 3 * m, kin, KIN_AXES + 3 * n, s, 30)
+                mixed_mn += terms.dot3(s, 30, kin, KIN_H)
+            # d2T/d(eps_m)d(theta_n) serves p - L_eps and p' - L_theta
+            k = put(mode, slot, vals, k, e + m, th + n, -mixed_mn)
+            k = put(mode, slot, vals, k, p + n, e + m, -mixed_mn)
+    for m in range(3):
+        for n in range(3):
+            value = terms.dot3(kin, KIN_ADOT + 3 * m, s, 18 + 3 * n)
+            if n < m:
+                # d(adot_m)/d(theta_n) . h, with adot_m = sum_{l<m} eps_l a_l x a_m
+                for l in range(m):
+                    lo, hi = min(n, l), max(n, l)
+                    terms.cross3(kin, KIN_AXES + 3 * hi, kin, KIN_AXES + 3 * m, s, 30)
+                    terms.cross3(kin, KIN_AXES + 3 * lo, s, 30, s, 33)
+                    value += tab.scratch[S_PRODUCT + l] * terms.dot3(s, 33, kin, KIN_H)
+            k = put(mode, slot, vals, k, p + m, th + n, -value)
+    return k
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
+    """Entries of one constraint row, its derivative, and the forces of its multipliers."""
+    form = idata[T.H_FORMULATION]
+    e0, t0 = idata[T.H_EPS], idata[T.H_THETA]
+    u0, p0, r0 = idata[T.H_U], idata[T.H_P], idata[T.H_R]
+    lam, mu = idata[T.H_LAMBDA] + r, idata[T.H_MU] + r
+    lam_value = yp[lam] if form == T.SI1 else y[lam]
+    factor = cj if form == T.SI1 else 1.0
+    mu_value = 0.0
+    if form == T.SI2:
+        mu_value = y[mu]
+    elif form == T.SI1:
+        mu_value = yp[mu]
+    g = vector_at(tab.scratch, S_GRADIENT, 12)
+    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
+    s = vector_at(tab.scratch, S_TERM, 100)
+    hess = matrix_at(tab.scratch, S_HESSIAN, 12, 12)
+    w = vector_at(tab.scratch, S_VECTOR, 12)
+    for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
+        coef = tab.coef[j]
+        terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
+        terms.hessian(j, tab.term, tab.fval, tab.marker_body, tab.kin, tab.frame, hess, s)
+        kind = tab.term[j, T.TERM_TYPE]
+        for side in range(2):
+            b = tab.marker_body[tab.term[j, T.TERM_I + side]]
+            h, q = 6 * side, 3 * (b - 1)
+            for c in range(3):
+                w[h + c] = y[u0 + q + c] if b > 0 else 0.0
+                w[h + 3 + c] = y[e0 + q + c] if b > 0 else 0.0
+        for side in range(2):
+            b = tab.marker_body[tab.term[j, T.TERM_I + side]]
+            if b == 0:
+                continue
+            h, q = 6 * side, 3 * (b - 1)
+            for c in range(3):
+                along = coef * g[h + c]
+                about = coef * euler_component(tab.kin[b], c, g, h + 3)
+                if kind == terms.POINT and c != tab.term[j, T.TERM_AXES]:
+                    pass
+                elif kind != terms.DOT1 and kind != terms.ANGLE and kind != terms.ROTATION:
+                    k = put(mode, slot, vals, k, u0 + q + c, lam, factor * along)
+                    k = put(mode, slot, vals, k, lam, r0 + q + c, along)
+                    if form != T.I3:
+                        k = put(mode, slot, vals, k, r0 + q + c, mu, -factor * along)
+                        k = put(mode, slot, vals, k, mu, u0 + q + c, along)
+                k = put(mode, slot, vals, k, p0 + q + c, lam, factor * about)
+                k = put(mode, slot, vals, k, lam, t0 + q + c, about)
+                if form != T.I3:
+                    k = put(mode, slot, vals, k, t0 + q + c, mu, -factor * about)
+                    k = put(mode, slot, vals, k, mu, e0 + q + c, about)
+        for bm in range(4):
+            b = tab.marker_body[tab.term[j, T.TERM_I + bm // 2]]
+            if b == 0:
+                continue
+            q = 3 * (b - 1)
+            force_row = (p0 if bm % 2 == 1 else u0) + q
+            position = (t0 if bm % 2 == 1 else r0) + q
+            any_block = False
+            for bn in range(4):
+                b2 = tab.marker_body[tab.term[j, T.TERM_I + bn // 2]]
+                if b2 == 0 or not HESSIAN_BLOCKS[kind, bm, bn]:
+                    continue
+                any_block = True
+                other = (t0 if bn % 2 == 1 else r0) + 3 * (b2 - 1)
+                for m in range(3):
+                    for n in range(3):
+                        value = coef * hess[3 * bm + m, 3 * bn + n]
+                        k = put(mode, slot, vals, k, force_row + m, other + n, lam_value * value)
+                        if form != T.I3:
+                            k = put(mode, slot, vals, k, position + m, other + n, -mu_value * value)
+            if form != T.I3 and any_block:
+                # the derivative of Phi_q q' + Phi_t with respect to q
+                for m in range(3):
+                    value = 0.0
+                    for n in range(12):
+                        value += hess[3 * bm + m, n] * w[n]
+                    if bm % 2 == 1:
+                        value += euler_component(tab.kin[b], m, gt, 6 * (bm // 2) + 3)
+                    k = put(mode, slot, vals, k, mu, position + m, coef * value)
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k):
+    """Entries of a constraint row given by an expression."""
+    form = idata[T.H_FORMULATION]
+    lam, mu = idata[T.H_LAMBDA] + r, idata[T.H_MU] + r
+    lam_value = yp[lam] if form == T.SI1 else y[lam]
+    factor = cj if form == T.SI1 else 1.0
+    mu_value = 0.0
+    if form != T.I3:
+        mu_value = yp[mu] if form == T.SI1 else y[mu]
+    tape = tab.row[r, T.ROW_TAPE]
+    bodies = tab.tape[tape, T.TAPE_N_BODIES]
+    first = tab.tape[tape, T.TAPE_BODIES]
+    n = 6 * bodies + 1
+    room = expression_loads.tail(tab, n * (n + 1))
+    grad, hess = room[0:n], room[n:]
+    expression_loads.second(tape, t, y, tab, grad, hess)
+    for i in range(n - 1):
+        q = 3 * (tab.extra_i[first + i // 6] - 1) + i % 3
+        turn = i % 6 >= 3
+        position = (idata[T.H_THETA] if turn else idata[T.H_R]) + q
+        speed = (idata[T.H_EPS] if turn else idata[T.H_U]) + q
+        force = (idata[T.H_P] if turn else idata[T.H_U]) + q
+        k = put(mode, slot, vals, k, lam, position, grad[i])
+        k = put(mode, slot, vals, k, force, lam, factor * grad[i])
+        rate = hess[i * n + n - 1]
+        for j in range(n - 1):
+            q2 = 3 * (tab.extra_i[first + j // 6] - 1) + j % 3
+            turn2 = j % 6 >= 3
+            other = (idata[T.H_THETA] if turn2 else idata[T.H_R]) + q2
+            rate += hess[i * n + j] * y[(idata[T.H_EPS] if turn2 else idata[T.H_U]) + q2]
+            k = put(mode, slot, vals, k, force, other, lam_value * hess[i * n + j])
+            if form != T.I3:
+                k = put(mode, slot, vals, k, position, other, -mu_value * hess[i * n + j])
+        if form != T.I3:
+            k = put(mode, slot, vals, k, position, mu, -factor * grad[i])
+            k = put(mode, slot, vals, k, mu, speed, grad[i])
+            k = put(mode, slot, vals, k, mu, position, rate)
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, idata, tab, slot, vals, k):
+    """Entries of one row from the spatial gradient ``d`` over a list of bodies, then of unknowns."""
+    for q in range(bodies):
+        b = tab.extra_i[first + q]
+        if b == 0:
+            continue
+        kin = tab.kin[b]
+        i, col = 3 * (b - 1), 12 * q
+        for m in range(3):
+            turn = euler_component(kin, m, d, col + 3) + terms.dot3(kin, KIN_DW + 3 * m, d, col + 9)
+            spin = euler_component(kin, m, d, col + 9)
+            k = put(mode, slot, vals, k, base, idata[T.H_R] + i + m, sign * d[col + m])
+            k = put(mode, slot, vals, k, base, idata[T.H_THETA] + i + m, sign * turn)
+            k = put(mode, slot, vals, k, base, idata[T.H_U] + i + m, sign * d[col + 6 + m])
+            k = put(mode, slot, vals, k, base, idata[T.H_EPS] + i + m, sign * spin)
+    for q in range(unknowns):
+        k = put(mode, slot, vals, k, base, tab.extra_i[after + q], sign * d[12 * bodies + q])
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k):
+    """Entries of the equation of one user-defined state."""
+    z = idata[T.H_Z] + s
+    k = put(mode, slot, vals, k, z, z, cj if tab.state[s, T.STATE_KIND] == T.STATE_DIFFERENTIAL else 1.0)
+    tape = tab.state[s, T.STATE_TAPE]
+    row = tab.tape[tape]
+    grad = expression_loads.tail(tab, expression_loads.gradient_size(row))
+    expression_loads.gradient(tape, t, y, tab, grad)
+    bodies, first = row[T.TAPE_N_BODIES], row[T.TAPE_BODIES]
+    return chain_entries(
+        mode,
+        z,
+        grad,
+        -1.0,
+        bodies,
+        first,
+        row[T.TAPE_N_UNKNOWNS],
+        first + bodies,
+        idata,
+        tab,
+        slot,
+        vals,
+        k,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def load_entries(mode, b, sign, row, y, idata, tab, slot, vals, k):
+    """Entries of one force element's loads on body b in the rows of eq. (5)."""
+    if b == 0:
+        return k
+    i = 3 * (b - 1)
+    u, p, th = idata[T.H_U] + i, idata[T.H_P] + i, idata[T.H_THETA] + i
+    f, n = row[T.FORCE_F], row[T.FORCE_N]
+    kin = tab.kin[b]
+    point = row[T.FORCE_I]
+    owner = tab.marker_body[point]
+    s = vector_at(tab.scratch, S_VECTOR, 30)
+    for c in range(3):
+        s[3 + c] = 0.0
+        s[6 + c] = 0.0
+    if f >= 0:
+        arm_to(b, point, tab.marker_body, tab.kin, tab.frame, s, 0)
+        for c in range(3):
+            s[3 + c] = sign * y[f + c]
+        terms.cross3(s, 0, s, 3, s, 6)
+    if n >= 0:
+        for c in range(3):
+            s[6 + c] += sign * y[n + c]
+    for m in range(3):
+        a = KIN_AXES + 3 * m
+        for c in range(3):
+            if f >= 0:
+                if m == 0:
+                    k = put(mode, slot, vals, k, u + c, f + c, -sign)
+                # a . (s x e_c) = (a x s)_c
+                terms.cross3(kin, a, s, 0, s, 9)
+                k = put(mode, slot, vals, k, p + m, f + c, -sign * s[9 + c])
+            if n >= 0:
+                k = put(mode, slot, vals, k, p + m, n + c, -sign * kin[a + c])
+        for l in range(3):
+            value = 0.0
+            if l < m:
+                terms.cross3(kin, KIN_AXES + 3 * l, kin, a, s, 9)
+                value = terms.dot3(s, 9, s, 6)
+            if f >= 0 and owner == b:
+                # the arm turns with the body
+                terms.cross3(kin, KIN_AXES + 3 * l, s, 0, s, 9)
+                terms.cross3(s, 9, s, 3, s, 12)
+                value += terms.dot3(kin, a, s, 12)
+            k = put(mode, slot, vals, k, p + m, th + l, -value)
+        if f >= 0 and owner != b:
+            # a . (ds x F) = ds . (F x a)
+            terms.cross3(s, 3, kin, a, s, 9)
+            for l in range(3):
+                k = put(mode, slot, vals, k, p + m, idata[T.H_R] + i + l, s[9 + l])
+            if owner > 0:
+                o = 3 * (owner - 1)
+                for l in range(3):
+                    terms.cross3(tab.kin[owner], KIN_AXES + 3 * l, tab.frame[point], 0, s, 12)
+                    k = put(mode, slot, vals, k, p + m, idata[T.H_R] + o + l, -s[9 + l])
+                    k = put(mode, slot, vals, k, p + m, idata[T.H_THETA] + o + l, -terms.dot3(s, 9, s, 12))
+    return k
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k):
+    """Entries of the rows F - F(q, q', t) and N - N(q, q', t) of one force element."""
+    wrench = vector_at(tab.scratch, S_WRENCH, 6)
+    diag = vector_at(tab.scratch, S_DIAG, 8)
+    width = row[T.FORCE_WIDTH]
+    jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, width)
+    depends = row[T.FORCE_DEPENDS]
+    bodies = tab.extra_i[depends]
+    if row[T.FORCE_KIND] == REACTION:
+        si1 = idata[T.H_FORMULATION] == T.SI1
+        source = yp if si1 else y
+        lam = idata[T.H_LAMBDA]
+        room = vector_at(tab.scratch, 0, 64)
+        reaction_wrench(row, source[lam : lam + idata[T.H_ROWS]], lam, tab, room, wrench, jac, np.int64(1))
+        if si1:
+            for c in range(12 * bodies, width):
+                for r in range(6):
+                    jac[r, c] *= cj
+    else:
+        element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(1))
+    unknowns = tab.extra_i[depends + 1 + bodies]
+    for block in range(2):
+        base = row[T.FORCE_F + block]
+        if base < 0:
+            continue
+        for c in range(3):
+            k = put(mode, slot, vals, k, base + c, base + c, 1.0)
+            k = chain_entries(
+                mode,
+                base + c,
+                jac[3 * block + c],
+                -1.0,
+                bodies,
+                depends + 1,
+                unknowns,
+                depends + 2 + bodies,
+                idata,
+                tab,
+                slot,
+                vals,
+                k,
+            )
+    return k
+
+
+@njit(JACOBIAN_SIG, cache=True, error_model="numpy")
+def jacobian(t, y, yp, cj, vals, idata, rdata, work):
+    """Evaluate dG/dy + cj dG/dy' into ``vals``, CSC order.
+
+    Asked for it in the header, count the entries or write their rows and columns instead.
+    """
+    tab = T.unpack(idata, rdata, work)
+    mode = idata[T.H_MODE]
+    update_tables(t, y, idata, tab)
+    slot = tab.slot
+    if mode == NUMBERS:
+        for k in range(vals.size):
+            vals[k] = 0.0
+        for k in range(3 * (idata[T.H_BODIES] - 1)):
+            tab.seen[k] = y[idata[T.H_THETA] + k]
+    # a literal 0 would make numba compile every callee once more
+    k = np.int64(0)
+    for b in range(1, idata[T.H_BODIES]):
+        for l in range(3):
+            tab.scratch[S_PRODUCT + l] = y[idata[T.H_EPS] + 3 * (b - 1) + l]
+        k = body_entries(mode, b, cj, idata, tab, slot, vals, k)
+    for r in range(idata[T.H_ROWS]):
+        k = row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k)
+        if tab.row[r, T.ROW_TAPE] >= 0:
+            k = tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k)
+    for f in range(idata[T.H_FORCES]):
+        row = tab.force[f]
+        if row[T.FORCE_KIND] != REACTION:
+            k = load_entries(mode, tab.marker_body[row[T.FORCE_I]], 1.0, row, y, idata, tab, slot, vals, k)
+            k = load_entries(mode, tab.marker_body[row[T.FORCE_J]], -1.0, row, y, idata, tab, slot, vals, k)
+        k = element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k)
+    for s in range(idata[T.H_STATES]):
+        k = state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k)
+    if mode == COUNT:
+        vals[0] = k
+
+
+def pattern(idata: np.ndarray, rdata: np.ndarray, work_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (indptr, indices, slots): the CSC pattern and, for each entry in walking order, its place in it."""
+    n = int(idata[T.H_UNKNOWNS])
+    y, work, count = np.zeros(n), np.zeros(work_size), np.zeros(1)
+    ask = idata.copy()
+    ask[T.H_MODE] = COUNT
+    jacobian(0.0, y, y, 1.0, count, ask, rdata.copy(), work)
+    places = np.zeros(2 * int(count[0]))
+    ask[T.H_MODE] = PLACES
+    jacobian(0.0, y, y, 1.0, places, ask, rdata.copy(), work)
+    return compressed(places.reshape(-1, 2).astype(np.int64), n)
+
+
+def compressed(places: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the CSC pattern of a list of (row, column) places and the slot of each place in it."""
+    unique, slots = np.unique(places[:, 1] * n + places[:, 0], return_inverse=True)
+    columns, rows = np.divmod(unique, n)
+    indptr = np.searchsorted(columns, np.arange(n + 1)).astype(np.int64)
+    return indptr, rows.astype(np.int64), slots.astype(np.int64)

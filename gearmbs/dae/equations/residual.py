@@ -1,0 +1,274 @@
+"""The residual G(t, y, y') of eq. (5)-(9), for the formulations I3, SI2 and SI1.
+
+With y = [u, p, eps, R, theta, lambda, F, N, z, mu] the rows are, in the same order as the unknowns,
+
+    M u' - m g + Phi_R^T lambda - H_F^T F                     (5), first
+    p' - L_theta^T + Phi_theta^T lambda - H_N^T N             (5), second
+    p - L_eps^T                                               (5), third
+    u - R' - Phi_R^T mu                                       (6), first, stabilised
+    eps - theta' - Phi_theta^T mu                             (6), second, stabilised
+    Phi(q, t)                                                 (7)
+    F - F(q, q', t),  N - N(q, q', t)                         definitions of the applied loads (and, where a load
+                                                              depends on them, of joints' reactions by lambda)
+    z' - f  or  z - f                                         user-defined states, if any
+    Phi_q q' + Phi_t   (with q' = [u, eps])                   the derivative of (7)
+
+I3 drops the last block and mu; SI1 puts the derivatives of the unknowns Lambda and Gamma in place of
+lambda and mu.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from gearmbs.dae.compiled.views import matrix_at, vector_at
+from gearmbs.dae.equations import constraint_terms as terms
+from gearmbs.dae.equations import expression_loads
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.forces import TORQUE, element_wrench, torque
+from gearmbs.dae.equations.reactions import REACTION, reaction_wrench
+from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, KIN_H, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.update import euler_component, update_tables
+from gearmbs.dae.problem import RESIDUAL_SIG
+
+S_GRADIENT = 0
+S_GRADIENT_T = 12
+S_TERM = 24
+S_HESSIAN = 128
+S_WRENCH = 280
+S_DIAG = 288
+S_PRODUCT = 300
+S_VECTOR = 320
+
+
+@njit(
+    "void(float64, float64[::1], float64[::1], int64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy"
+)
+def update(t, y, yp, idata, rdata, work):
+    """Bring the kinematics and marker tables up to date with y."""
+    tab = T.unpack(idata, rdata, work)
+    update_tables(t, y, idata, tab)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def arm_to(b, point_marker, marker_body, kin, frame, out, k):
+    """Write the vector from body b's centre of mass to the origin of a marker, global components."""
+    owner = marker_body[point_marker]
+    for c in range(3):
+        out[k + c] = kin[owner, KIN_R + c] + frame[point_marker, c] - kin[b, KIN_R + c]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_load(b, sign, row, y, idata, marker_body, kin, frame, scratch, out):
+    """Subtract the generalised loads of one force element on body b (eq. (5), H_F^T F and H_N^T N)."""
+    if b == 0:
+        return
+    s = scratch[S_VECTOR : S_VECTOR + 12]
+    for c in range(6):
+        s[3 + c] = 0.0
+    k = 3 * (b - 1)
+    if row[T.FORCE_F] >= 0:
+        arm_to(b, row[T.FORCE_I], marker_body, kin, frame, s, 0)
+        for c in range(3):
+            s[3 + c] = sign * y[row[T.FORCE_F] + c]
+            out[idata[T.H_U] + k + c] -= s[3 + c]
+        terms.cross3(s, 0, s, 3, s, 6)
+    if row[T.FORCE_N] >= 0:
+        for c in range(3):
+            s[6 + c] += sign * y[row[T.FORCE_N] + c]
+    for m in range(3):
+        out[idata[T.H_P] + k + m] -= euler_component(kin[b], m, s, 6)
+
+
+@njit(cache=True, error_model="numpy")
+def add_tape_row(k, t, lam, mu, y, idata, tab, out):
+    """Add the constraint forces of a row given by tape k; return its value and rate."""
+    row = tab.tape[k]
+    n = 6 * row[T.TAPE_N_BODIES] + 1
+    room = expression_loads.tail(tab, n * (n + 1))
+    grad, hess = room[0:n], room[n:]
+    value = expression_loads.second(k, t, y, tab, grad, hess)
+    rate = grad[n - 1]
+    for p in range(row[T.TAPE_N_BODIES]):
+        q = 3 * (tab.extra_i[row[T.TAPE_BODIES] + p] - 1)
+        for c in range(3):
+            along, about = grad[6 * p + c], grad[6 * p + 3 + c]
+            rate += along * y[idata[T.H_U] + q + c] + about * y[idata[T.H_EPS] + q + c]
+            out[idata[T.H_U] + q + c] += lam * along
+            out[idata[T.H_P] + q + c] += lam * about
+            out[idata[T.H_R] + q + c] -= mu * along
+            out[idata[T.H_THETA] + q + c] -= mu * about
+    return value, rate
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_point_term(k, coef, lam, mu, idata, term, marker_body, kin, frame, out):
+    """As the general path of `add_constraints` for a POINT term, whose gradient is a unit vector."""
+    c = term[k, T.TERM_AXES]
+    c1 = c + 1 if c < 2 else 0
+    c2 = c - 1 if c > 0 else 2
+    value, rate = 0.0, 0.0
+    for side in range(2):
+        marker = term[k, T.TERM_I + side]
+        b = marker_body[marker]
+        sign = coef if side == 0 else -coef
+        row = kin[b]
+        x1, x2 = frame[marker, T.MK_ARM + c1], frame[marker, T.MK_ARM + c2]
+        value += sign * (row[KIN_R + c] + frame[marker, T.MK_ARM + c])
+        if b == 0:
+            continue
+        rate += sign * (row[KIN_V + c] + row[KIN_W + c1] * x2 - row[KIN_W + c2] * x1)
+        q = 3 * (b - 1)
+        out[idata[T.H_U] + q + c] += sign * lam
+        out[idata[T.H_R] + q + c] -= sign * mu
+        for m in range(3):
+            a = KIN_AXES + 3 * m
+            angle = sign * (row[a + c1] * x2 - row[a + c2] * x1)
+            out[idata[T.H_P] + q + m] += lam * angle
+            out[idata[T.H_THETA] + q + m] -= mu * angle
+    return value, rate
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_dot_term(k, coef, lam, mu, idata, term, marker_body, kin, frame, s, out):
+    """As the general path of `add_constraints` for a DOT1 term, which has no translations."""
+    i, j = term[k, T.TERM_I], term[k, T.TERM_J]
+    a = T.MK_AXES + 3 * (term[k, T.TERM_AXES] // 3)
+    b = T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3)
+    terms.cross3(frame[i], a, frame[j], b, s, 0)
+    rate = 0.0
+    for side in range(2):
+        body = marker_body[i if side == 0 else j]
+        if body == 0:
+            continue
+        sign = coef if side == 0 else -coef
+        row = kin[body]
+        rate += sign * terms.dot3(s, 0, row, KIN_W)
+        q = 3 * (body - 1)
+        for m in range(3):
+            angle = sign * terms.dot3(row, KIN_AXES + 3 * m, s, 0)
+            out[idata[T.H_P] + q + m] += lam * angle
+            out[idata[T.H_THETA] + q + m] -= mu * angle
+    return coef * terms.dot3(frame[i], a, frame[j], b), rate
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_constraints(t, y, yp, idata, tab, out):
+    """Constraint rows, their derivatives, and the constraint forces of lambda and mu."""
+    form = idata[T.H_FORMULATION]
+    u0, p0, r0, t0 = idata[T.H_U], idata[T.H_P], idata[T.H_R], idata[T.H_THETA]
+    lam0, mu0 = idata[T.H_LAMBDA], idata[T.H_MU]
+    g = vector_at(tab.scratch, S_GRADIENT, 12)
+    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
+    s = vector_at(tab.scratch, S_TERM, 100)
+    for r in range(idata[T.H_ROWS]):
+        value, rate = 0.0, 0.0
+        if tab.row[r, T.ROW_FUNCTION] >= 0:
+            fun = tab.row[r, T.ROW_FUNCTION]
+            f, f1 = tab.fval[fun, 0], tab.fval[fun, 1]
+            value, rate = -f, -f1
+        lam = yp[lam0 + r] if form == T.SI1 else y[lam0 + r]
+        mu = 0.0
+        if form == T.SI2:
+            mu = y[mu0 + r]
+        elif form == T.SI1:
+            mu = yp[mu0 + r]
+        for k in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
+            coef = tab.coef[k]
+            kind = tab.term[k, T.TERM_TYPE]
+            if kind == terms.POINT:
+                v, d = add_point_term(k, coef, lam, mu, idata, tab.term, tab.marker_body, tab.kin, tab.frame, out)
+                value += v
+                rate += d
+                continue
+            if kind == terms.DOT1:
+                v, d = add_dot_term(k, coef, lam, mu, idata, tab.term, tab.marker_body, tab.kin, tab.frame, s, out)
+                value += v
+                rate += d
+                continue
+            phi, phi_t = terms.gradient(
+                k,
+                tab.term,
+                tab.fval,
+                tab.reference,
+                tab.marker_body,
+                tab.kin,
+                tab.frame,
+                s,
+                g,
+                gt,
+            )
+            value += coef * phi
+            rate += coef * phi_t
+            for side in range(2):
+                b = tab.marker_body[tab.term[k, T.TERM_I + side]]
+                if b == 0:
+                    continue
+                kin = tab.kin[b]
+                h, q = 6 * side, 3 * (b - 1)
+                rate += coef * (terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W))
+                for c in range(3):
+                    angle = coef * euler_component(kin, c, g, h + 3)
+                    out[u0 + q + c] += coef * lam * g[h + c]
+                    out[p0 + q + c] += lam * angle
+                    out[r0 + q + c] -= coef * mu * g[h + c]
+                    out[t0 + q + c] -= mu * angle
+        if tab.row[r, T.ROW_TAPE] >= 0:
+            v, d = add_tape_row(tab.row[r, T.ROW_TAPE], t, lam, mu, y, idata, tab, out)
+            value += v
+            rate += d
+        out[lam0 + r] = value
+        if form != T.I3:
+            out[mu0 + r] = rate
+
+
+@njit(RESIDUAL_SIG, cache=True, error_model="numpy")
+def residual(t, y, yp, out, idata, rdata, work):
+    """Evaluate G(t, y, y') of eq. (8) into ``out``."""
+    tab = T.unpack(idata, rdata, work)
+    update_tables(t, y, idata, tab)
+    u0, p0, e0, r0, t0 = idata[T.H_U], idata[T.H_P], idata[T.H_EPS], idata[T.H_R], idata[T.H_THETA]
+    for b in range(1, idata[T.H_BODIES]):
+        k = 3 * (b - 1)
+        kin = tab.kin[b]
+        mass = tab.body[b, T.BODY_MASS]
+        for c in range(3):
+            out[u0 + k + c] = mass * (yp[u0 + k + c] - tab.gravity[c])
+            out[p0 + k + c] = yp[p0 + k + c] - terms.dot3(kin, KIN_ADOT + 3 * c, kin, KIN_H)
+            out[e0 + k + c] = y[p0 + k + c] - terms.dot3(kin, KIN_AXES + 3 * c, kin, KIN_H)
+            out[r0 + k + c] = y[u0 + k + c] - yp[r0 + k + c]
+            out[t0 + k + c] = y[e0 + k + c] - yp[t0 + k + c]
+    add_constraints(t, y, yp, idata, tab, out)
+    wrench = vector_at(tab.scratch, S_WRENCH, 6)
+    diag = vector_at(tab.scratch, S_DIAG, 8)
+    room = vector_at(tab.scratch, 0, 64)
+    lam0 = idata[T.H_LAMBDA]
+    source = yp if idata[T.H_FORMULATION] == T.SI1 else y
+    multipliers = vector_at(source, lam0, idata[T.H_ROWS])
+    for f in range(idata[T.H_FORCES]):
+        row = tab.force[f]
+        width = row[T.FORCE_WIDTH]
+        jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, width)
+        if row[T.FORCE_KIND] == TORQUE:
+            # handing over the tables would cost more than the torque
+            for c in range(3):
+                wrench[c] = 0.0
+            torque(row, tab.fval, tab.frame, wrench)
+        elif row[T.FORCE_KIND] == REACTION:
+            reaction_wrench(row, multipliers, lam0, tab, room, wrench, jac, np.int64(0))
+        else:
+            element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(0))
+        for c in range(3):
+            if row[T.FORCE_F] >= 0:
+                out[row[T.FORCE_F] + c] = y[row[T.FORCE_F] + c] - wrench[c]
+            if row[T.FORCE_N] >= 0:
+                out[row[T.FORCE_N] + c] = y[row[T.FORCE_N] + c] - wrench[3 + c]
+        if row[T.FORCE_KIND] != REACTION:
+            for side in range(2):
+                b = tab.marker_body[row[T.FORCE_I + side]]
+                add_load(b, 1.0 - 2.0 * side, row, y, idata, tab.marker_body, tab.kin, tab.frame, tab.scratch, out)
+    for k in range(idata[T.H_STATES]):
+        z = idata[T.H_Z] + k
+        left = yp[z] if tab.state[k, T.STATE_KIND] == T.STATE_DIFFERENTIAL else y[z]
+        out[z] = left - expression_loads.value(tab.state[k, T.STATE_TAPE], t, y, tab)

@@ -1,0 +1,129 @@
+"""From y to the kinematics table and the marker frames."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from gearmbs.dae.compiled import pointers
+from gearmbs.dae.compiled.pointers import time_at
+from gearmbs.dae.compiled.views import vector_at
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations import time_functions
+from gearmbs.dae.equations.constraint_terms import dot3
+from gearmbs.dae.equations.rotation import (
+    KIN_A,
+    KIN_AXES,
+    KIN_H,
+    KIN_R,
+    KIN_V,
+    KIN_W,
+    axes_and_velocity,
+    rotation_matrix,
+)
+
+
+@njit(
+    "void(float64[::1], float64[::1], float64[::1], int64, float64[::1], int64, float64[::1])",
+    cache=True,
+    error_model="numpy",
+)
+def inertia_times(kin_row, body_row, v, i, out, k, s):
+    """Write J_global v to ``out[k:k+3]``; ``s`` has three scratch places."""
+    for c in range(3):
+        s[c] = kin_row[KIN_A + c] * v[i] + kin_row[KIN_A + 3 + c] * v[i + 1] + kin_row[KIN_A + 6 + c] * v[i + 2]
+    q = T.BODY_INERTIA
+    x = dot3(body_row, q, s, 0)
+    y = dot3(body_row, q + 3, s, 0)
+    z = dot3(body_row, q + 6, s, 0)
+    for c in range(3):
+        a = KIN_A + 3 * c
+        out[k + c] = kin_row[a] * x + kin_row[a + 1] * y + kin_row[a + 2] * z
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def update_ground(kin):
+    """Set the ground's row: the global frame at rest, with no Euler axes."""
+    row = kin[0]
+    for c in range(row.size):
+        row[c] = 0.0
+    row[KIN_A] = row[KIN_A + 4] = row[KIN_A + 8] = 1.0
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def update_bodies(idata, y, code, body, kin, scratch):
+    """Fill the kinematics table from u, eps, R, theta in y."""
+    update_ground(kin)
+    u, e, r, th = idata[T.H_U], idata[T.H_EPS], idata[T.H_R], idata[T.H_THETA]
+    for b in range(1, idata[T.H_BODIES]):
+        k = 3 * (b - 1)
+        row = kin[b]
+        for c in range(3):
+            row[KIN_R + c] = y[r + k + c]
+            row[KIN_V + c] = y[u + k + c]
+        psi, theta, phi = y[th + k], y[th + k + 1], y[th + k + 2]
+        rotation_matrix(psi, theta, phi, code[b], row, KIN_A)
+        axes_and_velocity(psi, theta, y[e + k], y[e + k + 1], y[e + k + 2], kin, b)
+        inertia_times(row, body[b], row, KIN_W, row, KIN_H, scratch)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def update_markers(marker_body, marker, kin, frame):
+    """Fill the marker table: arms and axes in global components."""
+    for m in range(marker_body.size):
+        row = kin[marker_body[m]]
+        for c in range(3):
+            a = KIN_A + 3 * c
+            frame[m, T.MK_ARM + c] = dot3(row, a, marker[m], 0)
+            for axis in range(3):
+                frame[m, T.MK_AXES + 3 * axis + c] = (
+                    row[a] * marker[m, 3 + axis] + row[a + 1] * marker[m, 6 + axis] + row[a + 2] * marker[m, 9 + axis]
+                )
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def update_functions(t, tab):
+    """Evaluate every function of time with two derivatives into the function table."""
+    for k in range(tab.function.shape[0]):
+        kind, at = tab.function[k, T.FUNCTION_KIND], tab.function[k, T.FUNCTION_OFFSET]
+        if kind == time_functions.TAPE:
+            row = tab.tape[at]
+            i, r = row[T.TAPE_I], row[T.TAPE_R]
+            time_at(tab.address[pointers.TIME])(
+                vector_at(tab.extra_i, i, row[T.TAPE_I_SIZE]),
+                vector_at(tab.extra_r, r, row[T.TAPE_R_SIZE]),
+                t,
+                tab.fval[k],
+                tab.tape_work,
+            )
+        else:
+            f, f1, f2 = time_functions.evaluate(kind, tab.function_r, at, t)
+            tab.fval[k, 0], tab.fval[k, 1], tab.fval[k, 2] = f, f1, f2
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def predict_angles(t, tab):
+    """Set the references of all counted angles to what their last values and rates let expect at time t."""
+    n = tab.reference.size
+    past = t - tab.winding[0]
+    for k in range(n):
+        tab.reference[k] = tab.winding[1 + k] + past * tab.winding[1 + n + k]
+    for k in range(tab.tape.shape[0]):
+        m = tab.tape[k, T.TAPE_REFERENCE_SIZE]
+        first = tab.tape[k, T.TAPE_REFERENCE]
+        for a in range(first, first + m):
+            tab.extra_r[a] = tab.extra_r[a + m] + past * tab.extra_r[a + 2 * m]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def update_tables(t, y, idata, tab):
+    """Bring bodies, markers, functions of time and expected angles up to date with t and y."""
+    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
+    update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+    update_functions(t, tab)
+    predict_angles(t, tab)
+
+
+@njit("float64(float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
+def euler_component(kin_row, m, v, k):
+    """Return a_m . v, the component of a spatial rotation gradient along Euler angle m."""
+    return dot3(kin_row, KIN_AXES + 3 * m, v, k)

@@ -1,0 +1,4 @@
+"""Integrators of DAEs G(t, y, y') = 0: WSTIFF, GSTIFF and IDA.
+
+Any `gearmbs.dae.problem.DAEProblem` will do; nothing here knows the equations of a mechanism.
+"""

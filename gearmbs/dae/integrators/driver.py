@@ -1,0 +1,523 @@
+"""One integration: the Python side of the compiled loop.
+
+The loop in `gearmbs.dae.integrators.step` does the work; here a run is set up, driven in chunks so that Ctrl-C and
+progress work, helped out when new pivots are needed, and turned into a `DAEResult`.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numba import njit
+
+from gearmbs.dae.compiled.bound_functions import bind
+from gearmbs.dae.integrators import messages
+from gearmbs.dae.integrators import run_state as s
+from gearmbs.dae.integrators.arguments import check_choices, event_rules, output_times
+from gearmbs.dae.integrators.bdf import HISTORY
+from gearmbs.dae.integrators.corrector import rounding_level, set_weights
+from gearmbs.dae.integrators.step import SLOPE_MAX_AGE, advance
+from gearmbs.dae.linalg.sparse_lu import (
+    GROWTH_LIMIT,
+    LUFactors,
+    LUPlan,
+    SingularMatrixError,
+    analyse,
+    factor,
+    new_factors,
+    solve,
+)
+from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, DAEProblem
+from gearmbs.dae.result import DAEResult, DenseOutput, SolverStats, Status
+
+NEWTON_TOLERANCE = 1.0
+FIRST_CHUNK = 256
+CHUNK_SECONDS = 0.05
+RECORD_BYTES = 8_000_000
+EVENT_BUFFER = 64
+START_JUMP_LIMIT = 100.0
+CHECK_STEP = 1e-10
+ROUNDED_RESIDUAL = 1e-10
+SINGULAR_RETRIES = 8
+DROP_ROUNDS_ALLOWED = 3
+REPAIR_SWEEPS = 4
+DROP_TOLERANCES = (0.0, 1e-9, 1e-7, 1e-5)
+EPS = float(np.finfo(float).eps)
+
+
+@njit(HOOK_SIG, cache=True, nogil=True, error_model="numpy")
+def no_hook(t, hist, npast, idata, rdata, work):
+    """Stand in for a problem without a hook."""
+    return 0
+
+
+@njit(EVENTS_SIG, cache=True, nogil=True, error_model="numpy")
+def no_events(t, y, yp, out, idata, rdata, work):
+    """Stand in for a problem without events."""
+
+
+class Run:
+    """One integration that can be driven, interrupted and resumed.
+
+    Parameters are those of `solve_wstiff`.
+    """
+
+    def __init__(
+        self,
+        problem: DAEProblem,
+        t_eval: np.ndarray | None,
+        *,
+        t_end: float | None,
+        tol: float,
+        rtol: float,
+        method: str,
+        corrector: str,
+        max_order: int,
+        max_step: float,
+        first_step: float | None,
+        min_step: float | None,
+        max_iterations: int,
+        interpolate: bool,
+        breakpoints: Sequence[float],
+        event_direction: Sequence[int] | None,
+        event_action: Sequence[int] | None,
+        event_count: Sequence[int] | None,
+        dense_output: bool,
+        slopes: bool,
+        max_steps: int | None,
+        progress: Callable[[float], None] | None,
+        check_start: bool,
+        error_probe: Callable[[], BaseException | None] | None,
+    ):
+        self.problem = problem
+        self.progress = progress
+        self.error_probe = error_probe
+        self.check_start = check_start
+        self.dense_output = dense_output
+        self.slopes = slopes
+        self.wall_time = 0.0
+        self.repivots = 0
+        self.first_pivots = 0
+        self.started = False
+        self.start_note = ""
+        t0 = float(problem.t0)
+        outputs, t_end = output_times(t_eval, t0, t_end)
+        self.every_step = t_eval is None
+        check_choices(tol, rtol, method, corrector, max_order, max_step, first_step, min_step, max_iterations)
+        n = problem.n
+        keep = self.every_step or dense_output
+        rows = int(np.clip(RECORD_BYTES // (8 * n), 8 * HISTORY, 8192)) if keep else 8192
+        n_events = int(problem.n_events) if problem.events is not None else 0
+
+        st = s.RunState(
+            real=np.zeros(s.N_REAL),
+            count=np.zeros(s.N_COUNT, dtype=np.int64),
+            times=np.zeros(HISTORY),
+            hist=np.zeros((HISTORY, n)),
+            vec=np.zeros((s.N_VEC, n)),
+            small=np.zeros((s.N_SMALL, 16)),
+            jac=np.zeros(len(problem.indices)),
+            jac_slope=np.zeros(len(problem.indices)),
+            matrix=np.zeros(len(problem.indices)),
+            idata=np.array(problem.idata, dtype=np.int64),
+            rdata=np.array(problem.rdata, dtype=float),
+            work=np.zeros(max(1, problem.work_size)),
+            stops=np.array(sorted(b for b in breakpoints if t0 < b < t_end), dtype=float),
+            outputs=outputs,
+            y_out=np.empty((len(outputs), n)),
+            yp_out=np.empty((len(outputs), n)),
+            rec_t=np.zeros(rows),
+            rec_h=np.zeros(rows),
+            rec_y=np.zeros((rows if keep else 1, n)),
+            rec_order=np.zeros(rows, dtype=np.int64),
+            g_old=np.zeros(max(1, n_events)),
+            g_new=np.zeros(max(1, n_events)),
+            event_rules=event_rules(n_events, event_direction, event_action, event_count),
+            hit_t=np.zeros(EVENT_BUFFER + n_events),
+            hit_which=np.zeros(EVENT_BUFFER + n_events, dtype=np.int64),
+            hit_y=np.zeros((EVENT_BUFFER + n_events if n_events else 1, n)),
+        )
+        self.state = st
+        y0 = np.array(problem.y0, dtype=float)
+        yp0 = np.array(problem.yp0, dtype=float)
+        atol = tol * np.asarray(problem.atol_scale, dtype=float)
+        if not (atol > 0).all():
+            raise ValueError(f"atol_scale must be positive, is {problem.atol_scale[int(np.argmin(atol))]:g} somewhere")
+        st.vec[s.ATOL] = atol
+        st.vec[s.IS_CONTROLLED] = problem.error_mask
+        st.vec[s.IS_TESTED] = problem.error_mask if corrector == "modified" else 1.0
+        st.vec[s.IS_DIFFERENTIAL] = problem.differential
+        st.vec[s.Y] = y0
+        st.vec[s.YP] = yp0
+        st.vec[s.YP_START] = yp0
+        st.hist[0] = y0
+        st.times[0] = t0
+        st.real[s.T] = t0
+        st.real[s.T_END] = t_end
+        st.real[s.H_MAX] = max_step
+        st.real[s.H_MIN] = min_step if min_step is not None else _default_min_step(t0, t_end)
+        st.real[s.RTOL] = rtol
+        st.real[s.NEWTON_TOL] = NEWTON_TOLERANCE
+        st.real[s.GAMMA_J] = 1.0
+        st.count[s.ORDER] = 1
+        st.count[s.NPAST] = 1
+        st.count[s.JAC_WANTED] = 1
+        st.count[s.SLOPE_AGE] = SLOPE_MAX_AGE
+        st.count[s.MAX_ORDER_ALLOWED] = max_order
+        st.count[s.MAX_ITERATIONS] = max_iterations
+        st.count[s.FIXED_LEADING] = method == "GSTIFF"
+        st.count[s.INTERPOLATE] = interpolate
+        st.count[s.HAS_HOOK] = problem.hook is not None
+        st.count[s.HAS_EVENTS] = n_events
+        st.count[s.KEEP_ROWS] = keep
+        st.count[s.MAX_STEPS] = max_steps or 0
+        set_weights(st.real, st.hist[0], 1.0, st.vec)
+        st.real[s.H] = first_step if first_step is not None else self._first_step()
+        self.indptr = np.asarray(problem.indptr, dtype=np.int64)
+        self.indices = np.asarray(problem.indices, dtype=np.int64)
+        self.scale = np.asarray(problem.scale, dtype=float)
+        self.functions = bind(
+            problem.residual,
+            problem.jacobian,
+            problem.hook if problem.hook is not None else no_hook,
+            problem.events if n_events else no_events,
+        )
+        self.plan: LUPlan | None = None
+        self.factors: LUFactors | None = None
+
+        self.records: list[tuple[np.ndarray, ...]] = []
+        self.row_blocks: list[np.ndarray] = []
+        self.hits: list[tuple[float, int, np.ndarray]] = []
+        self.epochs: list[tuple[int, np.ndarray]] = [(0, st.idata.copy())]
+        self.accepted_rows = 1
+        st.count[s.N_RECORDS] = 1
+        st.rec_t[0] = t0
+        st.rec_y[0] = y0
+        if len(outputs) and outputs[0] == t0:
+            st.y_out[0] = y0
+            st.yp_out[0] = yp0
+            st.count[s.NEXT_OUTPUT] = 1
+
+    def _first_step(self) -> float:
+        """Return a step that moves no controlled unknown by more than half its tolerance, within sane bounds."""
+        st = self.state
+        span = st.real[s.T_END] - st.real[s.T]
+        speed = float(np.max(np.abs(st.vec[s.YP_START]) * st.vec[s.W_ERROR]))
+        h = 0.5 / speed if speed > 0 else np.inf
+        return max(min(max(h, 1e-7 * span), 1e-3 * span, st.real[s.H_MAX]), st.real[s.H_MIN])
+
+    def _start(self) -> tuple[Status, str] | None:
+        """Evaluate the start, choose the first pivots and check consistency; return a failure or None."""
+        st, problem = self.state, self.problem
+        t0 = float(st.real[s.T])
+        res = st.vec[s.RES]
+        delta = st.vec[s.DELTA]
+        problem.residual(t0, st.vec[s.Y], st.vec[s.YP], res, st.idata, st.rdata, st.work)
+        st.count[s.RESIDUALS] += 1
+        if self._user_exception() is not None:
+            return self._user_failure()
+        bad = np.flatnonzero(~np.isfinite(res))
+        if len(bad):
+            return Status.NOT_FINITE, messages.not_finite(problem, t0, int(bad[0]))
+        if st.count[s.HAS_EVENTS] and problem.events is not None:
+            problem.events(t0, st.vec[s.Y], st.vec[s.YP], st.g_old, st.idata, st.rdata, st.work)
+            bad = np.flatnonzero(~np.isfinite(st.g_old))
+            if len(bad) and self._user_exception() is None:
+                return Status.NOT_FINITE, messages.event_not_finite(problem, t0, int(bad[0]))
+        # over a vanishing step wrong rates are harmless, but values off the constraints still have to jump
+        h_check = min(st.real[s.H], CHECK_STEP * (st.real[s.T_END] - t0)) if self.check_start else st.real[s.H]
+        failure = self._choose_first_pivots(h_check)
+        if failure is not None and h_check < st.real[s.H]:
+            # an index-3 matrix is singular to working precision at such a step: check over the first step itself
+            h_check = st.real[s.H]
+            failure = self._choose_first_pivots(h_check)
+        if failure is not None:
+            return failure
+        if not self.check_start:
+            return self._repair_start()
+        solve(self.plan, self.factors, res, delta)
+        jump = np.abs(delta) * st.vec[s.W_ERROR]
+        worst = int(np.argmax(jump))
+        if not jump[worst] <= START_JUMP_LIMIT:
+            assert self.plan is not None
+            row = int(np.argmax(np.abs(res[self.plan.row_from]) * self.plan.row_scale))
+            message = messages.inconsistent(problem, t0, worst, int(self.plan.row_from[row]), float(abs(delta[worst])))
+            return Status.INCONSISTENT_START, message
+        if self.error_probe is not None and h_check < st.real[s.H]:
+            self.start_note = self._algebraic_note(res, delta)
+        return self._choose_first_pivots(st.real[s.H]) if h_check < st.real[s.H] else None
+
+    def _algebraic_note(self, res: np.ndarray, delta: np.ndarray) -> str:
+        """Name the algebraic unknowns whose starting values the first step has to replace."""
+        st = self.state
+        y = st.vec[s.Y]
+        allowed = START_JUMP_LIMIT * (st.vec[s.ATOL] + st.real[s.RTOL] * np.abs(y))
+        replaced = (np.abs(delta) > allowed) & ~self.problem.differential
+        # over a vanishing step an equation that is satisfied up to rounding can move an unknown of a high index too
+        if not np.max(np.abs(res)) > ROUNDED_RESIDUAL * (1.0 + np.max(np.abs(y))):
+            replaced[:] = False
+        return messages.replaced_start(self.problem, np.flatnonzero(replaced))
+
+    def _repair_start(self) -> tuple[Status, str] | None:
+        """Move the initial values onto the constraints by Newton's method over the first step."""
+        st, problem = self.state, self.problem
+        t0, gamma = float(st.real[s.T]), 1.0 / st.real[s.H]
+        y, rates = st.vec[s.Y], st.vec[s.YP].copy()
+        for _ in range(REPAIR_SWEEPS):
+            st.vec[s.YP] = rates + gamma * (y - st.hist[0])
+            problem.residual(t0, y, st.vec[s.YP], st.vec[s.RES], st.idata, st.rdata, st.work)
+            st.count[s.RESIDUALS] += 1
+            solve(self.plan, self.factors, st.vec[s.RES], st.vec[s.DELTA])
+            if not np.isfinite(st.vec[s.DELTA]).all():
+                break
+            y -= st.vec[s.DELTA]
+        st.hist[0] = y
+        st.vec[s.YP] = rates
+        st.rec_y[0] = y
+        if st.count[s.NEXT_OUTPUT]:
+            st.y_out[0] = y
+        return self._choose_first_pivots(st.real[s.H])
+
+    def _choose_first_pivots(self, h: float) -> tuple[Status, str] | None:
+        """Factor the Newton matrix of a first step of size ``h``; return a failure or None."""
+        st = self.state
+        self.problem.jacobian(st.real[s.T], st.vec[s.Y], st.vec[s.YP], 1.0 / h, st.matrix, st.idata, st.rdata, st.work)
+        st.count[s.JACOBIANS] += 1
+        self.first_pivots += 1
+        return self._repivot()
+
+    def _repivot(self) -> tuple[Status, str] | None:
+        """Choose new pivots for the current Newton matrix; return a failure or None."""
+        st, problem = self.state, self.problem
+        t = float(st.real[s.T])
+        self.repivots += 1
+        bad = np.flatnonzero(~np.isfinite(st.matrix))
+        retry = st.count[s.STEPS] > 0 and st.count[s.SINGULAR_FAILS] < SINGULAR_RETRIES
+        if len(bad):
+            if retry:
+                self._retry_smaller()
+                return None
+            return Status.NOT_FINITE, messages.not_finite(
+                problem, t, int(self.indices[bad[0]]), "the Jacobian of equation"
+            )
+        try:
+            drop = DROP_TOLERANCES[st.count[s.DROP_LEVEL]]
+            self.plan = analyse(self.indptr, self.indices, st.matrix, self.scale, drop)
+        except SingularMatrixError as error:
+            if st.count[s.STEPS] > 0 and st.count[s.DROP_ROUNDS] < DROP_ROUNDS_ALLOWED:
+                st.count[s.DROP_ROUNDS] += 1
+                st.count[s.DROP_LEVEL] = 1
+                st.count[s.DROP_AGE] = 0
+                return self._repivot()
+            return Status.SINGULAR_JACOBIAN, messages.singular(problem, t, error.rows, error.cols)
+        if st.count[s.DROP_LEVEL] == 0:
+            st.count[s.DROP_ROUNDS] = 0
+        self.factors = new_factors(self.plan)
+        growth = factor(self.plan, self.factors, st.matrix)
+        st.count[s.FACTORIZATIONS] += 1
+        st.real[s.GROWTH_MAX] = max(GROWTH_LIMIT, 100.0 * growth)
+        return None
+
+    def _retry_smaller(self) -> None:
+        """Move the end of the step off a singular position."""
+        self.state.count[s.SINGULAR_FAILS] += 1
+        self.state.real[s.H] *= 0.6
+
+    def _user_exception(self) -> BaseException | None:
+        return self.error_probe() if self.error_probe is not None else None
+
+    def _user_failure(self) -> tuple[Status, str]:
+        error = self._user_exception() or RuntimeError("unknown")
+        if isinstance(error, KeyboardInterrupt):
+            return Status.INTERRUPTED, self._interrupted_message()
+        return Status.USER_ERROR, messages.user_error(float(self.state.real[s.T]), error)
+
+    def _interrupted_message(self) -> str:
+        return f"{Status.INTERRUPTED.sentence} Reached t = {self.state.real[s.T]:.9g}."
+
+    def _drain(self) -> None:
+        """Take the records and crossings out of the buffers of the compiled loop."""
+        st = self.state
+        m = int(st.count[s.N_RECORDS])
+        if m:
+            self.records.append((st.rec_t[:m].copy(), st.rec_h[:m].copy(), st.rec_order[:m].copy()))
+            if st.count[s.KEEP_ROWS]:
+                self.row_blocks.append(st.rec_y[:m].copy())
+            st.count[s.N_RECORDS] = 0
+        for e in range(int(st.count[s.N_CROSSINGS])):
+            self.hits.append((float(st.hit_t[e]), int(st.hit_which[e]), st.hit_y[e].copy()))
+        st.count[s.N_CROSSINGS] = 0
+
+    def drive(self) -> DAEResult:
+        """Run to the end, a failure or an interruption, and return everything computed so far."""
+        begin = time.perf_counter()
+        with InterruptFlag() as interrupt:
+            status, message = self._loop(interrupt)
+        self.wall_time += time.perf_counter() - begin
+        self._drain()
+        return self._result(status, message)
+
+    def _loop(self, interrupt: InterruptFlag) -> tuple[Status, str]:
+        st = self.state
+        if not self.started:
+            failure = self._start()
+            if self._user_exception() is not None:
+                return self._user_failure()
+            if failure is not None:
+                return failure
+            self.started = True
+        chunk = FIRST_CHUNK
+        while True:
+            tic = time.perf_counter()
+            code = advance(self.functions, st, self.plan, self.factors, chunk)
+            if self._user_exception() is not None:
+                return self._user_failure()
+            if code == s.DONE:
+                self._report()
+                return Status.SUCCESS, f"{Status.SUCCESS.sentence}{self.start_note}"
+            if code == s.TERMINAL:
+                return (
+                    Status.TERMINAL_EVENT,
+                    f"{Status.TERMINAL_EVENT.sentence} t = {st.real[s.T]:.9g}.{self.start_note}",
+                )
+            if code == s.PAUSED:
+                first = self._accepted_so_far() if self.every_step else int(st.count[s.NEXT_OUTPUT])
+                self.epochs.append((first, st.idata.copy()))
+            elif code == s.REPIVOT:
+                failure = self._repivot()
+                if self._user_exception() is not None:
+                    return self._user_failure()
+                if failure is not None:
+                    return failure
+            elif code == s.BUFFER_FULL:
+                self._drain()
+            elif code < 0:
+                return self._failure(code)
+            if interrupt.raised:
+                return Status.INTERRUPTED, self._interrupted_message()
+            if code == s.RUNNING:
+                self._report()
+                elapsed = time.perf_counter() - tic
+                if elapsed < 0.5 * CHUNK_SECONDS:
+                    chunk *= 2
+                elif elapsed > 2.0 * CHUNK_SECONDS and chunk > 1:
+                    chunk //= 2
+
+    def _accepted_so_far(self) -> int:
+        return 1 + int(self.state.count[s.STEPS])
+
+    def _report(self) -> None:
+        if self.progress is not None:
+            self.progress(float(self.state.real[s.T]))
+
+    def _failure(self, code: int) -> tuple[Status, str]:
+        st, problem = self.state, self.problem
+        t = float(st.real[s.T])
+        h = float(st.real[s.H])
+        worst = int(st.count[s.WORST])
+        status = Status(code)  # type: ignore[call-arg]
+        if status is Status.NOT_FINITE and worst < 0:
+            return status, messages.event_not_finite(problem, t, -1 - worst)
+        if status is Status.NOT_FINITE:
+            return status, messages.not_finite(problem, t, worst)
+        if status is Status.STEP_TOO_SMALL:
+            worst = int(st.count[s.WORST_ERROR])
+            told = messages.step_too_small(problem, t, h, worst, float(st.real[s.ERROR]), self._noise())
+            return status, told
+        if status is Status.NEWTON_FAILURE:
+            return status, messages.newton(problem, t, h, worst, self._noise())
+        if status is Status.TOO_MANY_STEPS:
+            return status, messages.too_many_steps(problem, t, int(st.count[s.STEPS]))
+        return status, messages.too_many_rejections(problem, t, h, worst, self._noise())
+
+    def _noise(self) -> float:
+        """Return how far rounding alone moves the solution where the run stopped, in units of the tolerance."""
+        st = self.state
+        if self.plan is None or self.factors is None or not np.isfinite(st.vec[s.Y]).all():
+            return 0.0
+        level = float(rounding_level(st.vec, st.matrix, self.plan, self.factors))
+        return level if np.isfinite(level) else 0.0
+
+    def _stats(self, wall_time: float) -> SolverStats:
+        count = self.state.count
+        return SolverStats(
+            steps=int(count[s.STEPS]),
+            error_rejections=int(count[s.ERROR_REJECTIONS]),
+            newton_rejections=int(count[s.NEWTON_REJECTIONS]),
+            residuals=int(count[s.RESIDUALS]),
+            jacobians=int(count[s.JACOBIANS]),
+            factorizations=int(count[s.FACTORIZATIONS]),
+            solves=int(count[s.SOLVES]),
+            repivots=max(0, self.repivots - self.first_pivots),
+            settled=int(count[s.SETTLED]),
+            wall_time=wall_time,
+        )
+
+    def _result(self, status: Status, message: str) -> DAEResult:
+        st, problem = self.state, self.problem
+        t, h, order = (np.concatenate(parts) for parts in zip(*self.records, strict=True))
+        is_step = order > 0
+        stats = self._stats(self.wall_time)
+        stats.t_steps, stats.h_steps, stats.orders = t[is_step], h[is_step], order[is_step]
+        rows = np.concatenate(self.row_blocks) if self.row_blocks else None
+        sol = DenseOutput(t, rows, order) if rows is not None else None
+        if self.every_step:
+            t_out = np.concatenate((t[:1], t[is_step]))
+            if sol is None or rows is None:
+                raise AssertionError("every step was to be kept")
+            ends = np.concatenate(([0], np.flatnonzero(is_step)))
+            # the rows themselves where nothing but steps was stored
+            y_out, yp_out = rows if ends.size == len(rows) else rows[ends], np.empty((0, problem.n))
+            if self.slopes:
+                yp_out = sol.derivative(t_out)
+                yp_out[0] = problem.yp0
+        else:
+            m = int(st.count[s.NEXT_OUTPUT])
+            t_out, y_out, yp_out = st.outputs[:m], st.y_out[:m], st.yp_out[:m]
+            if status is not Status.SUCCESS:
+                # the run may go on, or the arrays are mostly empty; those of a finished run are handed over as they are
+                t_out, y_out, yp_out = t_out.copy(), y_out.copy(), yp_out.copy()
+        n_events = int(st.count[s.HAS_EVENTS])
+        return DAEResult(
+            t=t_out,
+            y=y_out,
+            yp=yp_out,
+            status=status,
+            message=message,
+            stats=stats,
+            sol=sol if self.dense_output else None,
+            t_events=[np.array([hit[0] for hit in self.hits if hit[1] == e]) for e in range(n_events)],
+            y_events=[
+                np.array([hit[2] for hit in self.hits if hit[1] == e]).reshape(-1, problem.n) for e in range(n_events)
+            ],
+            epochs=[(first, table.copy()) for first, table in self.epochs],
+            t_last=float(st.real[s.T]),
+            checkpoint=self if status in (Status.INTERRUPTED, Status.TOO_MANY_STEPS) else None,
+        )
+
+
+class InterruptFlag:
+    """Turn Ctrl-C into a flag while a run is under way, in the main thread only."""
+
+    raised = False
+
+    def __enter__(self) -> InterruptFlag:
+        self._previous = None
+        if threading.current_thread() is threading.main_thread():
+            self._previous = signal.signal(signal.SIGINT, self._raise)
+        return self
+
+    def _raise(self, *_args) -> None:
+        self.raised = True
+
+    def __exit__(self, *_args) -> None:
+        if self._previous is not None:
+            signal.signal(signal.SIGINT, self._previous)
+
+
+def _default_min_step(t0: float, t_end: float) -> float:
+    return 1e-14 * (t_end - t0) + 16.0 * EPS * max(abs(t0), abs(t_end))

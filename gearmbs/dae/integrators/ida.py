@@ -1,0 +1,356 @@
+"""IDA from SUNDIALS through scikit-sundae, set up for constrained mechanical systems.
+
+The binding cannot take unknowns out of the error test, so those without error control get an absolute
+tolerance of `UNCONTROLLED`.  ``rtol`` acts on |y| of all unknowns, and angles wind up, so it is kept
+at the smallest sensible value and the vector of absolute tolerances does the work.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from scipy.sparse import csc_array
+from sksundae.ida import IDA
+
+from gearmbs.dae.integrators.messages import advice, unknown_name
+from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.result import DAEResult, SolverStats, Status
+
+UNCONTROLLED = 1e10
+SMALLEST_RTOL = 1e-14
+DENSE_LIMIT = 150
+"""Unknowns up to which the dense factorisation is used: SuperLU_MT waits busily and stalls on a loaded machine."""
+IDA_MAX_ORDER = 5
+MAX_STEPS = 100_000
+"""Steps allowed between two outputs: 15 s of a gear pair's run, which takes some tens of steps a mesh period."""
+
+NOT_FINITE_LIMIT = 100
+"""Evaluations without a finite result, at times it never gets past, after which a run is given up."""
+
+
+class _NotFiniteError(ArithmeticError):
+    """The residual is not finite beyond some time, whatever the step."""
+
+
+class _Messages(io.TextIOBase):
+    """Standard output, but what SUNDIALS has to say about a failure is kept for the thread it failed in."""
+
+    PATTERN = re.compile(r"\s*\[(?:IDA|SUN)\w*, Error: -?\d+\]\s*(.*)", re.DOTALL)
+    LOCK = threading.Lock()
+
+    def __init__(self) -> None:
+        self.through = sys.stdout
+        self.runs = 0
+        self._own = threading.local()
+
+    @property
+    def text(self) -> str:
+        """The last message of the calling thread."""
+        return getattr(self._own, "text", "")
+
+    @text.setter
+    def text(self, text: str) -> None:
+        self._own.text = text
+
+    def write(self, text: str) -> int:
+        """Keep a message and the end of its line; pass anything else on."""
+        found = self.PATTERN.match(text)
+        if found is not None:
+            self.text = " ".join(found[1].split())
+        elif not (getattr(self._own, "ending", False) and text == "\n"):
+            self.through.write(text)
+        self._own.ending = found is not None
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush standard output."""
+        self.through.flush()
+
+
+@contextlib.contextmanager
+def _listening() -> Iterator[_Messages]:
+    """Listen on standard output; runs side by side share one listener, which goes with the last of them."""
+    with _Messages.LOCK:
+        messages = sys.stdout if isinstance(sys.stdout, _Messages) else _Messages()
+        messages.runs += 1
+        sys.stdout = messages
+    before, messages.text = messages.text, ""
+    try:
+        yield messages
+    finally:
+        messages.text = before
+        with _Messages.LOCK:
+            messages.runs -= 1
+            if messages.runs == 0 and sys.stdout is messages:
+                sys.stdout = messages.through
+
+
+class _Callbacks:
+    """The residual and Jacobian as scikit-sundae calls them: read-only arrays in, values written in place."""
+
+    def __init__(self, problem: DAEProblem, idata: np.ndarray, rdata: np.ndarray) -> None:
+        self.problem = problem
+        self.idata, self.rdata = idata, rdata
+        self.work = np.zeros(problem.work_size)
+        self.y, self.yp = np.zeros(problem.n), np.zeros(problem.n)
+        self.dense = problem.n <= DENSE_LIMIT
+        self.columns = np.repeat(np.arange(problem.n), np.diff(problem.indptr))
+        self.vals = np.zeros(problem.indices.size)
+        self.last_t = np.nan
+        self.steps = self.residuals = self.jacobians = 0
+        self.bad_count, self.bad_t, self.bad_row = 0, -np.inf, 0
+
+    def residual(self, t, y, yp, out):
+        self.y[:] = y
+        self.yp[:] = yp
+        self.problem.residual(t, self.y, self.yp, out, self.idata, self.rdata, self.work)
+        if t != self.last_t:
+            self.steps += 1
+            self.last_t = t
+        self.residuals += 1
+        finite = np.isfinite(out)
+        if not finite.all():
+            # IDA tries a smaller step; where that never helps it creeps on in ever smaller ones
+            self.bad_count += 1
+            self.bad_t, self.bad_row = max(self.bad_t, t), int(np.argmin(finite))
+            if self.bad_count >= NOT_FINITE_LIMIT:
+                raise _NotFiniteError
+        elif t > self.bad_t:
+            self.bad_count, self.bad_t = 0, -np.inf
+
+    def jacobian(self, t, y, yp, res, cj, out):
+        self.y[:] = y
+        self.yp[:] = yp
+        self.problem.jacobian(t, self.y, self.yp, cj, self.vals, self.idata, self.rdata, self.work)
+        if self.dense:
+            out[self.problem.indices, self.columns] = self.vals
+        else:
+            out[:] = self.vals
+        self.jacobians += 1
+
+
+def _solver(problem: DAEProblem, calls: _Callbacks, atol: np.ndarray, rtol: float, options: dict) -> IDA:
+    # the binding insists on 32-bit indices
+    places = problem.indices.astype(np.int32), problem.indptr.astype(np.int32)
+    pattern = csc_array((np.ones(problem.indices.size), *places), shape=(problem.n,) * 2)
+    linear = {"linsolver": "dense"} if calls.dense else {"linsolver": "sparse", "sparsity": pattern}
+    with warnings.catch_warnings():
+        # it says that our Jacobian is used instead of differences on the pattern, which is what we want
+        warnings.filterwarnings("ignore", message="Custom sparse Jacobian", category=UserWarning)
+        return IDA(
+            calls.residual,
+            jacfn=calls.jacobian,
+            rtol=max(rtol, SMALLEST_RTOL),
+            atol=atol,
+            algebraic_idx=np.flatnonzero(~problem.differential),
+            **linear,
+            **options,
+        )
+
+
+def check_ida(
+    tol: float,
+    rtol: float,
+    max_order: int,
+    max_step: float,
+    first_step: float,
+    min_step: float,
+    max_iterations: int,
+    max_steps: int,
+) -> None:
+    """Refuse what IDA would pass over or reject in words of its own."""
+    if not (np.isfinite(tol) and tol > 0):
+        raise ValueError(f"tol (ERROR) must be positive, is {tol!r}")
+    if not (np.isfinite(rtol) and rtol >= 0):
+        raise ValueError(f"rtol must not be negative, is {rtol!r}")
+    if not 1 <= max_order <= IDA_MAX_ORDER:
+        raise ValueError(f"max_order (KMAX) must be 1 to {IDA_MAX_ORDER} for IDA, is {max_order!r}")
+    for name, value in (
+        ("max_step (HMAX)", max_step),
+        ("first_step (HINIT)", first_step),
+        ("min_step (HMIN)", min_step),
+    ):
+        if not value >= 0:
+            raise ValueError(f"{name} must not be negative, is {value!r}")
+    for name, count in (("max_iterations (MAXIT)", max_iterations), ("max_steps", max_steps)):
+        if not count >= 1:
+            raise ValueError(f"{name} must be at least 1, is {count!r}")
+
+
+def solve_ida(
+    problem: DAEProblem,
+    t_eval: np.ndarray | None = None,
+    *,
+    t_end: float | None = None,
+    tol: float = 1e-6,
+    rtol: float = 0.0,
+    max_order: int = 5,
+    max_step: float = 0.0,
+    first_step: float = 0.0,
+    min_step: float = 0.0,
+    max_iterations: int = 4,
+    max_steps: int = MAX_STEPS,
+    progress: Callable[[float], None] | None = None,
+) -> DAEResult:
+    """Integrate a DAE with IDA and return it at the times ``t_eval``, or at every step IDA takes.
+
+    What SUNDIALS prints about a failure goes into the message instead.
+
+    Parameters
+    ----------
+    problem : DAEProblem
+        With consistent initial values at ``t_eval[0]``.
+    t_eval : array_like, shape (m,), optional
+        Increasing output times, s; the first is the start. Default: the end of every step.
+    t_end : float, optional
+        End of the run when ``t_eval`` is not given, s.
+    tol : float
+        Absolute tolerance of unknown i is ``tol * problem.atol_scale[i]`` where the error mask is set.
+    rtol : float
+        Relative tolerance of all unknowns; 0 gives the smallest IDA accepts (see the module's text).
+    max_order, max_step, first_step, min_step, max_iterations
+        Handed to IDA; 0 leaves a size to IDA.
+    max_steps : int
+        Steps allowed between two outputs, so that a run that gets stuck ends.
+    progress : callable, optional
+        Called with the time reached, at most a few hundred times a run.
+
+    Returns
+    -------
+    DAEResult
+        With ``status`` `SOLVER_FAILURE`, `NOT_FINITE` or `INTERRUPTED`, and what was computed so far, if the run did
+        not finish.
+
+    Raises
+    ------
+    ValueError
+        For arguments that make no sense.
+    """
+    check_ida(tol, rtol, max_order, max_step, first_step, min_step, max_iterations, max_steps)
+    every_step = t_eval is None
+    if every_step and t_end is None:
+        raise ValueError("t_end: give it when t_eval is left out")
+    times = np.asarray([problem.t0, t_end] if t_eval is None else t_eval, dtype=float)
+    if times.ndim != 1 or times.size < 2 or np.any(np.diff(times) <= 0.0):
+        raise ValueError("t_eval: give at least two strictly increasing times")
+    idata, rdata = problem.idata.copy(), problem.rdata.copy()
+    calls = _Callbacks(problem, idata, rdata)
+    atol = np.where(problem.error_mask, tol * problem.atol_scale, UNCONTROLLED)
+    options = {
+        "max_order": max_order,
+        "max_step": max_step,
+        "first_step": first_step,
+        "min_step": min_step,
+        "max_nonlin_iters": max_iterations,
+        "max_num_steps": max_steps,
+    }
+    rows = _Rows(times, problem, every_step)
+    epochs = [(0, idata.copy())]
+    hist = np.zeros((1, problem.n))
+    status, message = Status.SUCCESS, Status.SUCCESS.sentence
+    start = time.perf_counter()
+    t, end = float(times[0]), float(times[-1])
+    with _listening() as messages:
+        try:
+            solver = _solver(problem, calls, atol, rtol, options)
+            solver.init_step(t, problem.y0, problem.yp0)
+            y = problem.y0
+            while t < end:
+                target = rows.next_time
+                if problem.hook_interval is not None and not every_step:
+                    target = min(target, t + problem.hook_interval(y))
+                answer = solver.step(target, method="onestep" if every_step else "normal", tstop=end)
+                if not answer.success:
+                    status, message = _failure(problem, calls, float(answer.t), messages.text or answer.message, atol)
+                    break
+                t, y, yp = float(answer.t) if every_step else target, answer.y, answer.yp
+                if rows.take(t, y, yp) and progress is not None:
+                    progress(t)
+                if problem.hook is not None:
+                    hist[0] = y
+                    if problem.hook(t, hist, 1, idata, rdata, calls.work):
+                        epochs.append((rows.done, idata.copy()))
+                        y = hist[0].copy()
+                        yp = np.array(yp)
+                        if problem.restart_rates is not None:
+                            yp = problem.restart_rates(t, y, yp, idata, rdata)
+                        solver = _solver(problem, calls, atol, rtol, options)
+                        solver.init_step(t, y, yp)
+        except KeyboardInterrupt:
+            status, message = Status.INTERRUPTED, f"{Status.INTERRUPTED.sentence} Reached t = {t:.6g} s."
+        except (_NotFiniteError, RuntimeError) as error:
+            status, message = _failure(problem, calls, max(t, calls.last_t), messages.text or str(error), atol)
+    stats = SolverStats(
+        steps=calls.steps,
+        residuals=calls.residuals,
+        jacobians=calls.jacobians,
+        factorizations=calls.jacobians,
+        wall_time=time.perf_counter() - start,
+    )
+    return DAEResult(
+        t=rows.t[: rows.done],
+        y=rows.y[: rows.done],
+        yp=rows.yp[: rows.done],
+        status=status,
+        message=message,
+        stats=stats,
+        epochs=epochs,
+        t_last=t,
+    )
+
+
+class _Rows:
+    """Output rows, at given times or at every step."""
+
+    def __init__(self, times: np.ndarray, problem: DAEProblem, every_step: bool) -> None:
+        self.every_step = every_step
+        self.end = float(times[-1])
+        self.t = np.zeros(4096) if every_step else times
+        self.y, self.yp = np.zeros((self.t.size, problem.n)), np.zeros((self.t.size, problem.n))
+        self.t[0], self.y[0], self.yp[0] = times[0], problem.y0, problem.yp0
+        self.done = 1
+        self.told = float(times[0])
+        self.span = (self.end - self.told) / 200.0
+
+    @property
+    def next_time(self) -> float:
+        """Time to integrate to next."""
+        return self.end if self.every_step else float(self.t[self.done])
+
+    def take(self, t: float, y: np.ndarray, yp: np.ndarray) -> bool:
+        """Store a row if ``t`` is an output; return whether it is time for a word on progress."""
+        if not self.every_step and t != self.t[self.done]:
+            return False
+        if self.done == self.t.size:
+            more = self.t.size // 2
+            self.t = np.concatenate([self.t, np.zeros(more)])
+            self.y, self.yp = (np.concatenate([a, np.zeros((more, a.shape[1]))]) for a in (self.y, self.yp))
+        self.t[self.done], self.y[self.done], self.yp[self.done] = t, y, yp
+        self.done += 1
+        if t < self.told + self.span:
+            return False
+        self.told = t
+        return True
+
+
+def _failure(problem: DAEProblem, calls: _Callbacks, t: float, why: str, atol: np.ndarray) -> tuple[Status, str]:
+    """Say when the run failed, which unknown is the least satisfied, and what to try."""
+    if calls.bad_count:
+        return Status.NOT_FINITE, (
+            f"{Status.NOT_FINITE.sentence} IDA stopped at t = {t:.6g} s: the equation of "
+            f"{unknown_name(problem, calls.bad_row)} is not a finite number. {advice(problem, Status.NOT_FINITE)}"
+        )
+    moving = np.where(problem.error_mask, np.abs(calls.yp) / np.maximum(atol, 1e-300), 0.0)
+    worst = int(np.argmax(moving))
+    return Status.SOLVER_FAILURE, (
+        f"IDA stopped at t = {t:.6g} s ({why.rstrip('.')}). The unknown that changes fastest for its tolerance is "
+        f"{unknown_name(problem, worst)}. {advice(problem, Status.SOLVER_FAILURE)}"
+    )

@@ -1,0 +1,1 @@
+"""Sparse LU factorisation with pivots chosen once and replayed in compiled code."""

@@ -1,0 +1,333 @@
+"""Sparse LU for a fixed pattern: pivots and fill found once, numeric factorisations replayed without search.
+
+`analyse` chooses pivots on values and lays down a plan. `factor` replays the plan column by column (left-looking),
+`solve` applies it. Pivots stay frozen until a multiplier grows beyond `GROWTH_LIMIT` or a pivot vanishes; then the
+caller analyses again with the current values.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import float64, int64, njit, types, uint32
+
+from gearmbs.dae.linalg.pivoting import CANCELLED, GROWTH_ALLOWED, THRESHOLDS, choose_pivots, equilibrate
+
+GROWTH_LIMIT = 1e5
+
+_VEC = float64[::1]
+_IVEC = int64[::1]
+_UVEC = uint32[::1]
+
+
+class LUPlan(NamedTuple):
+    """Frozen pivots and index lists of one pattern, in pivot order.
+
+    Attributes
+    ----------
+    a_ptr, a_pos, a_src : ndarray
+        For each pivot column the entries of the matrix: their place among the rows in pivot order and their
+        index in the CSC values.
+    a_scale : ndarray
+        Scale of each of these entries (row times column scale).
+    u_ptr, u_pos : ndarray
+        For each column the earlier pivots that act on it, ascending.
+    l_ptr, l_pos : ndarray
+        For each column the rows below the pivot.
+    row_from, col_to : ndarray
+        Original row and column of each pivot.
+    row_scale, col_scale : ndarray
+        Scales, in pivot order.
+    kept : ndarray
+        One for a proper pivot; zero for an equation and an unknown set aside because the matrix is nearly singular.
+    """
+
+    a_ptr: np.ndarray
+    a_pos: np.ndarray
+    a_src: np.ndarray
+    a_scale: np.ndarray
+    u_ptr: np.ndarray
+    u_pos: np.ndarray
+    l_ptr: np.ndarray
+    l_pos: np.ndarray
+    row_from: np.ndarray
+    col_to: np.ndarray
+    row_scale: np.ndarray
+    col_scale: np.ndarray
+    kept: np.ndarray
+
+
+class LUFactors(NamedTuple):
+    """Numbers of one factorisation: L below its unit diagonal, U above its diagonal, inverse pivots, scratch."""
+
+    l_vals: np.ndarray
+    u_vals: np.ndarray
+    pivot_inv: np.ndarray
+    x: np.ndarray
+
+
+PLAN_TYPE = types.NamedTuple(
+    (_IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _VEC, _VEC, _VEC), LUPlan
+)
+FACTORS_TYPE = types.NamedUniTuple(_VEC, 4, LUFactors)
+
+
+class SingularMatrixError(ValueError):
+    """No pivot is left.
+
+    Attributes
+    ----------
+    rows, cols : ndarray of int
+        Equations and unknowns that could not be paired.
+    """
+
+    def __init__(self, rows: np.ndarray, cols: np.ndarray):
+        super().__init__(f"the matrix is singular: no pivot left for columns {cols.tolist()}, rows {rows.tolist()}")
+        self.rows = rows
+        self.cols = cols
+
+
+@njit(types.void(_UVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
+def _sort_lines(places, ptr):
+    """Sort each of the short lists ``places[ptr[k] : ptr[k + 1]]``."""
+    for k in range(ptr.shape[0] - 1):
+        for p in range(ptr[k] + 1, ptr[k + 1]):
+            value = places[p]
+            q = p - 1
+            while q >= ptr[k] and places[q] > value:
+                places[q + 1] = places[q]
+                q -= 1
+            places[q + 1] = value
+
+
+@njit(
+    types.Tuple((int64, _IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _VEC, _VEC, _VEC))(
+        _IVEC, _IVEC, _VEC, _VEC, float64
+    ),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def _plan(indptr, indices, vals, scale, drop):
+    """Return the rank and the fields of an `LUPlan`."""
+    n = indptr.shape[0] - 1
+    nnz = indices.shape[0]
+    row_scale = np.ones(n)
+    col_scale = scale.copy()
+    equilibrate(indptr, indices, vals, row_scale, col_scale)
+    scaled = np.empty(nnz)
+    for j in range(n):
+        for p in range(indptr[j], indptr[j + 1]):
+            scaled[p] = vals[p] * row_scale[indices[p]] * col_scale[j]
+    rank, growth, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(indptr, indices, scaled, drop, THRESHOLDS[0])
+    for threshold in THRESHOLDS[1:]:
+        if growth > GROWTH_ALLOWED:
+            rank, growth, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(
+                indptr, indices, scaled, drop, threshold
+            )
+
+    row_place = np.empty(n, dtype=np.int64)
+    col_place = np.empty(n, dtype=np.int64)
+    row_from = np.empty(n, dtype=np.uint32)
+    col_to = np.empty(n, dtype=np.uint32)
+    row_scale_out = np.empty(n)
+    col_scale_out = np.empty(n)
+    kept = np.zeros(n)
+    for k in range(n):
+        row_place[rows[k]] = k
+        col_place[cols[k]] = k
+        row_from[k] = rows[k]
+        col_to[k] = cols[k]
+        row_scale_out[k] = row_scale[rows[k]]
+        col_scale_out[k] = col_scale[cols[k]]
+        if k < rank:
+            kept[k] = 1.0
+
+    # entries of the matrix, column by column in pivot order, rows ascending
+    a_ptr = np.zeros(n + 1, dtype=np.int64)
+    a_pos = np.empty(nnz, dtype=np.uint32)
+    a_src = np.empty(nnz, dtype=np.uint32)
+    a_scale = np.empty(nnz)
+    at = np.empty(n, dtype=np.int64)
+    for k in range(n):
+        j = cols[k]
+        end = a_ptr[k]
+        for p in range(indptr[j], indptr[j + 1]):
+            a_pos[end] = row_place[indices[p]]
+            end += 1
+        a_ptr[k + 1] = end
+    _sort_lines(a_pos, a_ptr)
+    for k in range(n):
+        j = cols[k]
+        for p in range(indptr[j], indptr[j + 1]):
+            at[row_place[indices[p]]] = p
+        for e in range(a_ptr[k], a_ptr[k + 1]):
+            p = at[a_pos[e]]
+            a_src[e] = p
+            a_scale[e] = row_scale[indices[p]] * col_scale[j]
+
+    # rows of U come out pivot by pivot, so that each column's pivots ascend
+    u_by_col = np.zeros(n + 1, dtype=np.int64)
+    for e in range(u_cols.shape[0]):
+        u_by_col[col_place[u_cols[e]] + 1] += 1
+    for k in range(n):
+        u_by_col[k + 1] += u_by_col[k]
+        at[k] = u_by_col[k]
+    u_pos = np.empty(u_cols.shape[0], dtype=np.uint32)
+    for k in range(n):
+        for e in range(u_ptr[k], u_ptr[k + 1]):
+            m = col_place[u_cols[e]]
+            u_pos[at[m]] = k
+            at[m] += 1
+    l_pos = np.empty(l_rows.shape[0], dtype=np.uint32)
+    for e in range(l_rows.shape[0]):
+        l_pos[e] = row_place[l_rows[e]]
+    _sort_lines(l_pos, l_ptr)
+    return (
+        rank,
+        a_ptr,
+        a_pos,
+        a_src,
+        a_scale,
+        u_by_col,
+        u_pos,
+        l_ptr,
+        l_pos,
+        row_from,
+        col_to,
+        row_scale_out,
+        col_scale_out,
+        kept,
+    )
+
+
+def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np.ndarray, drop: float = 0.0) -> LUPlan:
+    """Choose pivots for a matrix and lay down the plan to factor every matrix of its pattern.
+
+    Parameters
+    ----------
+    indptr, indices : ndarray of int64
+        CSC pattern, n columns.
+    vals : ndarray
+        Values on which pivots are chosen.
+    scale : ndarray, shape (n,)
+        Typical magnitude of each unknown.
+    drop : float
+        When positive, unknowns without a pivot larger than this fraction of their entries are set aside, each with an
+        equation: they come out of `solve` as zero.
+
+    Returns
+    -------
+    LUPlan
+
+    Raises
+    ------
+    SingularMatrixError
+        If nothing may be dropped and the matrix is singular to working precision, with the rows and columns left over.
+    ValueError
+        If a value is not finite.
+    """
+    if not np.isfinite(vals).all():
+        raise ValueError("the matrix has entries that are not finite")
+    rank, *plan = _plan(indptr, indices, vals, np.asarray(scale, dtype=float), max(drop, CANCELLED))
+    if rank < len(indptr) - 1 and drop == 0.0:
+        rows, cols = (np.asarray(plan[i], dtype=np.int64)[rank:] for i in (8, 9))
+        raise SingularMatrixError(rows, cols)
+    return LUPlan(*plan)
+
+
+def new_factors(plan: LUPlan) -> LUFactors:
+    """Return empty factors for a plan."""
+    n = len(plan.row_from)
+    return LUFactors(np.zeros(len(plan.l_pos)), np.zeros(len(plan.u_pos)), np.zeros(n), np.zeros(n))
+
+
+@njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
+def factor(plan, factors, vals):
+    """Factor the matrix with values ``vals`` along the plan.
+
+    Parameters
+    ----------
+    plan : LUPlan
+    factors : LUFactors
+        Overwritten.
+    vals : ndarray
+        Values in CSC order.
+
+    Returns
+    -------
+    growth : float
+        Largest multiplier in L. Above `GROWTH_LIMIT`, infinite or NaN the pivots no longer fit: analyse again.
+    """
+    x = factors.x
+    l_vals = factors.l_vals
+    u_vals = factors.u_vals
+    l_pos = plan.l_pos
+    l_ptr = plan.l_ptr
+    u_pos = plan.u_pos
+    growth = 0.0
+    n = x.shape[0]
+    for k in range(n):
+        for p in range(np.uint64(plan.a_ptr[k]), np.uint64(plan.a_ptr[k + 1])):
+            x[plan.a_pos[p]] = vals[plan.a_src[p]] * plan.a_scale[p]
+        for p in range(np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])):
+            j = np.uint64(u_pos[p])
+            u = x[j]
+            x[j] = 0.0
+            u_vals[p] = u
+            if u != 0.0:
+                for q in range(np.uint64(l_ptr[j]), np.uint64(l_ptr[j + np.uint64(1)])):
+                    x[l_pos[q]] -= l_vals[q] * u
+        pivot = x[k]
+        x[k] = 0.0
+        if plan.kept[k] == 0.0:
+            factors.pivot_inv[k] = 0.0
+            x[:] = 0.0
+            continue
+        if pivot == 0.0:
+            return np.inf
+        inv = 1.0 / pivot
+        factors.pivot_inv[k] = inv
+        for q in range(np.uint64(l_ptr[k]), np.uint64(l_ptr[k + 1])):
+            i = l_pos[q]
+            l = x[i] * inv
+            x[i] = 0.0
+            l_vals[q] = l
+            if not abs(l) <= growth:
+                growth = abs(l)
+    return growth
+
+
+@njit(types.void(PLAN_TYPE, FACTORS_TYPE, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
+def solve(plan, factors, b, out):
+    """Write the solution of A out = b; ``out`` may be ``b`` itself.
+
+    Parameters
+    ----------
+    plan : LUPlan
+    factors : LUFactors
+        From `factor`.
+    b, out : ndarray, shape (n,)
+    """
+    x = factors.x
+    l_vals = factors.l_vals
+    u_vals = factors.u_vals
+    l_pos = plan.l_pos
+    u_pos = plan.u_pos
+    n = x.shape[0]
+    for k in range(n):
+        x[k] = b[plan.row_from[k]] * plan.row_scale[k]
+    for k in range(n):
+        v = x[k]
+        if v != 0.0:
+            for q in range(np.uint64(plan.l_ptr[k]), np.uint64(plan.l_ptr[k + 1])):
+                x[l_pos[q]] -= l_vals[q] * v
+    for m in range(n):
+        k = n - 1 - m
+        v = x[k] * factors.pivot_inv[k]
+        out[plan.col_to[k]] = v * plan.col_scale[k]
+        x[k] = 0.0
+        if v != 0.0:
+            for p in range(np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])):
+                x[u_pos[p]] -= u_vals[p] * v

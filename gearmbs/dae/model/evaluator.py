@@ -1,0 +1,298 @@
+"""Accelerations, multipliers, loads and reactions at all output times, in one compiled pass."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import float64, int64, njit, types
+from scipy.sparse import csc_array
+
+from gearmbs.dae.equations import accelerations as index1
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.euler_switch import track
+from gearmbs.dae.equations.jacobian import COUNT, NUMBERS, PLACES, compressed
+from gearmbs.dae.equations.reactions import renew_reactions
+from gearmbs.dae.equations.residual import update
+from gearmbs.dae.equations.update import update_tables
+from gearmbs.dae.linalg.sparse_lu import (
+    FACTORS_TYPE,
+    GROWTH_LIMIT,
+    PLAN_TYPE,
+    LUFactors,
+    LUPlan,
+    analyse,
+    factor,
+    new_factors,
+    solve,
+)
+
+_VEC = float64[::1]
+_MAT = float64[:, ::1]
+_CUBE = float64[:, :, ::1]
+_IVEC = int64[::1]
+
+
+FARTHEST = 1e-3
+"""A constraint farther off than this belongs to an angle whose full turns were not counted; it is left alone."""
+
+
+GENERIC_TURNS = (0.1, 0.02, 0.3, 0.0)
+"""Rotations, rad, off the position at which pivots are chosen, tried in turn: at special positions entries vanish by
+accident and the pivots would not serve their neighbours."""
+
+SAME_POSITION = 0.05
+"""Rotation, rad, after which the factors of one output no longer serve to project the next."""
+
+
+SINGULAR = 1e-8
+"""Relative singular value of the index-1 matrix below which a direction counts as undetermined."""
+
+REACTION_PASSES = 30
+"""Most corrections of loads that depend on reactions, such as joint friction, to the multipliers of one output."""
+
+
+class Records(NamedTuple):
+    """What is evaluated, one row per output time.
+
+    Attributes
+    ----------
+    pose : ndarray, shape (m, 18 bodies)
+        R, A (row-major), v, omega of each moving body.
+    solution : ndarray, shape (m, 6 bodies + rows)
+        Accelerations a, alpha of each body, then the multipliers.
+    loads : ndarray, shape (m, elements, 14)
+        F, N and contact diagnostics.
+    phi : ndarray, shape (m, 3 rows)
+        Phi, its rate and its partial time derivative, row by row.
+    force, moment : ndarray, shape (m, rows, 3)
+        Reaction on I's body at marker I.
+    strayed : ndarray, shape (m,)
+        Largest |Phi| of the integrator's solution, before it is projected onto the constraints.
+    """
+
+    pose: np.ndarray
+    solution: np.ndarray
+    loads: np.ndarray
+    phi: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+    strayed: np.ndarray
+
+    @property
+    def by_body(self) -> np.ndarray:
+        """`pose` as (m, bodies, 18)."""
+        return self.pose.reshape(len(self.pose), self.pose.shape[1] // 18, 18)
+
+    @property
+    def accelerations(self) -> np.ndarray:
+        """a and alpha, shape (m, bodies, 6)."""
+        m, bodies = len(self.pose), self.pose.shape[1] // 18
+        return self.solution[:, : 6 * bodies].reshape(m, bodies, 6)
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """Lambda, shape (m, rows)."""
+        return self.solution[:, self.solution.shape[1] - self.force.shape[1] :]
+
+    @property
+    def by_row(self) -> np.ndarray:
+        """`phi` as (m, rows, 3)."""
+        return self.phi.reshape(len(self.phi), self.phi.shape[1] // 3, 3)
+
+    def first(self, m: int) -> Records:
+        """Return views of the first m rows."""
+        return Records(*(part[:m] for part in self))
+
+
+RECORDS_TYPE = types.NamedTuple((_MAT, _MAT, _CUBE, _MAT, _CUBE, _CUBE, _VEC), Records)
+
+
+def new_records(m: int, bodies: int, rows: int, elements: int) -> Records:
+    """Return empty records for m output times."""
+    return Records(
+        np.zeros((m, 18 * bodies)),
+        np.zeros((m, 6 * bodies + rows)),
+        np.zeros((m, max(elements, 1), index1.FORCE_RECORD)),
+        np.zeros((m, 3 * rows)),
+        np.zeros((m, rows, 3)),
+        np.zeros((m, rows, 3)),
+        np.zeros(m),
+    )
+
+
+@njit(
+    int64(int64, int64, _VEC, _MAT, _IVEC, _IVEC, _VEC, _VEC, _VEC, PLAN_TYPE, FACTORS_TYPE, RECORDS_TYPE, float64),
+    cache=True,
+    error_model="numpy",
+    nogil=True,
+)
+def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, factors, records, growth):
+    """Evaluate output rows from ``first``; return the row where new pivots are needed, or ``last``.
+
+    Each row of y is first projected onto the constraints, from which the integrator and its interpolant stray by the
+    tolerance; y itself is not changed.
+
+    Asked for it in the header of ``idata``, only count the entries of the matrix or write their places to ``vals``;
+    with ``last`` less than ``first``, assemble row ``first`` without solving. ``growth`` is what the factors may grow.
+    """
+    rows = records.force.shape[1]
+    size = records.solution.shape[1]
+    base = size - rows
+    tab = T.unpack(idata, rdata, work)
+    rhs, moved, pushed = np.zeros(size), np.zeros(size), np.zeros(size)
+    at = np.zeros(y.shape[1])
+    only_assemble = last < first or idata[T.H_MODE] != NUMBERS
+    for k in range(first, first + 1 if only_assemble else last):
+        for c in range(at.size):
+            at[c] = y[k, c]
+        phi, loads = records.phi[k], records.loads[k]
+        if idata[T.H_MODE] == NUMBERS:
+            vals[:] = 0.0
+        update_tables(t[k], at, idata, tab)
+        if only_assemble:
+            count = index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
+            records.solution[k, :] = rhs
+            if idata[T.H_MODE] == COUNT:
+                vals[0] = count
+            return last
+        track(t[k], at, tab, False)
+        if rows > 0:
+            # the nearest position and velocity, in the metric of the masses, that satisfy the constraints; the
+            # factors of the row before serve while the bodies have hardly turned since
+            spin = index1.violations(t[k], at, phi, idata, tab)
+            if k == first or spin * (t[k] - t[k - 1]) > SAME_POSITION:
+                index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(0))
+                if not factor(plan, factors, vals) <= growth:
+                    return k
+                vals[:] = 0.0
+            rhs[:base] = 0.0
+            records.strayed[k] = 0.0
+            for r in range(rows):
+                records.strayed[k] = max(records.strayed[k], abs(phi[3 * r]))
+                rhs[base + r] = 0.0 if abs(phi[3 * r]) > FARTHEST else -phi[3 * r]
+            solve(plan, factors, rhs, moved)
+            for r in range(rows):
+                rhs[base + r] = -phi[3 * r + 1]
+            solve(plan, factors, rhs, pushed)
+            index1.displace(at, moved, pushed, idata, tab)
+            update_tables(t[k], at, idata, tab)
+        index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
+        if not factor(plan, factors, vals) <= growth:
+            return k
+        solve(plan, factors, rhs, records.solution[k])
+        for _ in range(REACTION_PASSES):
+            # loads that depend on reactions change the right-hand side only
+            if renew_reactions(at, records.solution[k, base:], idata, tab) <= 1e-12:
+                break
+            index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
+            solve(plan, factors, rhs, records.solution[k])
+        index1.loads_of_rows(records.solution[k, base:], idata, tab, records.force[k], records.moment[k])
+        index1.poses(tab.kin, records.pose[k])
+    return last
+
+
+NO_PLAN = analyse(np.array([0, 1]), np.array([0]), np.ones(1), np.ones(1))
+NO_FACTORS = new_factors(NO_PLAN)
+
+
+def pattern(idata, rdata, work_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (indptr, indices, slots) of the saddle-point matrix in CSC form."""
+    n = int(6 * (idata[T.H_BODIES] - 1) + idata[T.H_ROWS])
+    y, slots = np.zeros((1, int(idata[T.H_UNKNOWNS]))), np.zeros(1, dtype=np.int64)
+    ask = idata.copy()
+    count = np.zeros(1)
+    for mode in (COUNT, PLACES):
+        ask[T.H_MODE] = mode
+        places = count if mode == COUNT else np.zeros(2 * int(count[0]))
+        assemble(np.zeros(1), y, slots, ask, rdata.copy(), work_size, places)
+    return compressed(places.reshape(-1, 2).astype(np.int64), n)
+
+
+def assemble(t, y, slots, idata, rdata, work_size, vals) -> Records:
+    """Assemble the index-1 system at ``t[0], y[0]`` into ``vals`` and the right-hand side in ``solution``."""
+    bodies, rows, elements = int(idata[T.H_BODIES]) - 1, int(idata[T.H_ROWS]), int(idata[T.H_FORCES])
+    records = new_records(1, bodies, rows, elements)
+    work = np.zeros(work_size)
+    evaluate_rows(0, -1, t, y, slots, idata, rdata, work, vals, NO_PLAN, NO_FACTORS, records, GROWTH_LIMIT)
+    return records
+
+
+class Evaluator:
+    """Fills records piece by piece: what is found for one piece (pattern, pivots, counted turns) serves the next.
+
+    Pieces are to be handed over in the order of time.
+    """
+
+    def __init__(self, idata: np.ndarray, rdata: np.ndarray, work_size: int) -> None:
+        self.pattern = pattern(idata, rdata, work_size)
+        self.rdata = rdata.copy()
+        self.work = np.zeros(work_size)
+        self.vals = np.zeros(self.pattern[1].size)
+        self.plan: LUPlan | None = None
+        self.factors: LUFactors | None = None
+        self.growth = GROWTH_LIMIT
+
+    def fill(self, t: np.ndarray, y: np.ndarray, epochs, records: Records) -> None:
+        """Fill ``records`` for all rows of ``y``; ``epochs`` names the integer tables valid from each row on.
+
+        At a singular position, where constraints are dependent, the smallest accelerations and multipliers are taken.
+        """
+        y = np.ascontiguousarray(y)
+        bounds = [row for row, _ in epochs] + [t.size]
+        slots, rdata, work, vals = self.pattern[2], self.rdata, self.work, self.vals
+        for (first, table), last in zip(epochs, bounds[1:]):
+            table = np.ascontiguousarray(table)
+            attempt = 0
+            while first < last:
+                if self.plan is None or attempt > 0:
+                    place = t[first : first + 1], y[first : first + 1]
+                    if attempt > len(GENERIC_TURNS):
+                        _least_squares_row(first, *place, self.pattern, table, rdata, work.size, records)
+                        first, attempt, self.plan = first + 1, 0, None
+                        continue
+                    self._choose_pivots(*place, table, GENERIC_TURNS[max(attempt, 1) - 1])
+                done = evaluate_rows(
+                    first, last, t, y, slots, table, rdata, work, vals, self.plan, self.factors, records, self.growth
+                )
+                attempt = attempt + 1 if done == first else 1 if done < last else 0
+                first = done
+
+    def _choose_pivots(self, t: np.ndarray, y: np.ndarray, table: np.ndarray, turn: float) -> None:
+        """Choose pivots near one row, every angle turned off it so that no entry is zero by accident."""
+        indptr, indices, slots = self.pattern
+        self.vals[:] = 0.0
+        assemble(t, _turned(y, table, turn), slots, table, self.rdata, self.work.size, self.vals)
+        self.plan = analyse(indptr, indices, self.vals, np.ones(indptr.size - 1))
+        self.factors = new_factors(self.plan)
+        # an ill-scaled mechanism may grow with the best of pivots
+        self.growth = max(GROWTH_LIMIT, 100.0 * factor(self.plan, self.factors, self.vals))
+
+
+def _least_squares_row(k: int, t, y, matrix_pattern, idata, rdata, work_size, records: Records) -> None:
+    """Fill row k of the records at a singular position by least squares."""
+    indptr, indices, slots = matrix_pattern
+    vals, n = np.zeros(indices.size), indptr.size - 1
+    one = assemble(t, y, slots, idata, rdata, work_size, vals)
+    matrix = csc_array((vals, indices, indptr), shape=(n, n)).toarray()
+    # rows and columns to one size first, or masses and constraints would be told apart by their units
+    scale = 1.0 / np.sqrt(np.maximum(np.abs(matrix).max(axis=1), 1e-300))
+    scaled = scale[:, None] * matrix * scale
+    records.solution[k] = scale * np.linalg.lstsq(scaled, scale * one.solution[0], rcond=SINGULAR)[0]
+    records.loads[k], records.phi[k] = one.loads[0], one.phi[0]
+    work = np.zeros(work_size)
+    update(t[0], y[0], y[0], idata, rdata, work)
+    index1.pose_record(y[0], idata, rdata, work, records.pose[k])
+    rows = records.force.shape[1]
+    multipliers = np.zeros((2, max(rows, 1)))
+    multipliers[0, :rows] = records.solution[k, n - rows :]
+    multipliers[1, 0] = t[0]
+    index1.joint_loads(y[0], idata, rdata, work, multipliers, records.force[k], records.moment[k])
+
+
+def _turned(y: np.ndarray, idata: np.ndarray, angle: float) -> np.ndarray:
+    """Return a copy of y with every Euler angle turned differently, so that no entry is zero by accident."""
+    y = y.copy()
+    angles = slice(int(idata[T.H_THETA]), int(idata[T.H_LAMBDA]))
+    y[0, angles] += angle * np.sin(1.0 + np.arange(angles.stop - angles.start))
+    return y

@@ -1,0 +1,303 @@
+"""Initial conditions: position, velocity, then acceleration and multipliers; redundant rows set aside.
+
+Positions and velocities are corrected as little as possible in the norm sum |dR|^2 + L^2 |dpi|^2 with a
+length L of the mechanism, by Newton's method on the constraints with the exact Jacobian.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import qr
+from scipy.sparse import block_array, csc_array, diags_array
+from scipy.sparse.linalg import splu
+
+from gearmbs.dae.errors import AssemblyError, SingularModelError
+
+if TYPE_CHECKING:
+    from gearmbs.dae.model.system import System
+
+POSITION_TOLERANCE = 1e-12
+RANK_TOLERANCE = 1e-9
+LEAST = 1e-6
+"""Distance of a constraint row of length 1 from the others above which it is independent."""
+NEARLY = 1e-4
+"""The same where an assembly has stopped short of its end."""
+CONFLICT = 1e-7
+"""Violation of a redundant row, in m or of 1, above which it contradicts the others."""
+MAX_POSITION_ITERATIONS = 50
+VISIBLE = 1e-3
+"""Displacement, of the mechanism's length, from which a correction of the positions is told."""
+
+VISIBLE_TURN = np.radians(0.1)
+DENSE_ROWS = 400
+"""Rows up to which redundancy is looked for by a dense factorisation."""
+SURE = 1e-12
+"""Squared distance of a row from the others, all of length 1, above which it is independent beyond rounding."""
+DOUBTFUL = 1e-6
+"""Squared distance of a row from those before it below which it is looked at again."""
+CHUNK = 200
+"""Doubtful rows that are looked at together."""
+SELECTIONS = 3
+"""How often other rows are set aside when those set aside at first turn out to be violated."""
+
+
+@dataclass
+class InitialReport:
+    """What the initial-condition analysis found.
+
+    Attributes
+    ----------
+    degrees_of_freedom : int
+        Coordinates less independent constraint rows.
+    redundant : list of str
+        Names of the constraint rows set aside because the others imply them.
+    position_iterations : int
+        Newton iterations of the assembly.
+    largest_correction : float
+        Largest displacement (m) or rotation (rad) made to assemble the mechanism.
+    moved, turned : tuple of (str, float)
+        The body moved farthest by the assembly and how far, m; the one turned most and how far, rad.
+    length : float
+        Length of the mechanism, m.
+    violation : float
+        Largest remaining constraint violation (m or 1).
+    """
+
+    degrees_of_freedom: int
+    redundant: list[str] = field(default_factory=list)
+    position_iterations: int = 0
+    largest_correction: float = 0.0
+    violation: float = 0.0
+    moved: tuple[str, float] = ("", 0.0)
+    turned: tuple[str, float] = ("", 0.0)
+    length: float = 1.0
+
+    def correction(self) -> str | None:
+        """Return a sentence about a correction of the positions one can see, None when there was none."""
+        parts = []
+        if self.moved[1] > VISIBLE * self.length:
+            parts.append(f"moved body '{self.moved[0]}' by {self.moved[1]:.3g} m")
+        if self.turned[1] > VISIBLE_TURN:
+            parts.append(f"turned body '{self.turned[0]}' by {np.degrees(self.turned[1]):.3g} degrees")
+        return f"To satisfy joints and motions the assembly {' and '.join(parts)} before the start." if parts else None
+
+    def __str__(self) -> str:
+        lines = [f"degrees of freedom: {self.degrees_of_freedom}"]
+        if self.redundant:
+            lines.append("redundant constraints set aside:")
+            lines.extend(f"  {name}" for name in self.redundant)
+        lines.append(
+            f"assembled in {self.position_iterations} iterations, largest correction "
+            f"{self.largest_correction:.3g}, violation {self.violation:.3g}"
+        )
+        lines.extend(line for line in (self.correction(),) if line)
+        return "\n".join(lines)
+
+
+def independent_rows(jacobian: csc_array, weights: np.ndarray, least: float = LEAST) -> np.ndarray:
+    """Return the indices of a largest set of independent rows of the constraint Jacobian, in order.
+
+    Earlier rows are preferred, so that a redundancy is blamed on the joint added last. ``least`` is the distance of a
+    row of length 1 from those before below which it counts as redundant.
+    """
+    m = jacobian.shape[0]
+    if m == 0:
+        return np.zeros(0, dtype=np.int64)
+    scaled = csc_array(jacobian @ diags_array(1.0 / np.sqrt(weights)))
+    norms = np.sqrt(np.asarray((scaled.multiply(scaled)).sum(axis=1)).ravel())
+    norms[norms == 0.0] = 1.0
+    scaled = csc_array(diags_array(1.0 / norms) @ scaled)
+    if m > DENSE_ROWS:
+        return _sparse_rows(scaled, least)
+    dense = scaled.toarray()
+    r_diagonal = np.abs(np.diag(qr(dense.T, mode="r", pivoting=True)[0]))
+    rank = int(np.sum(r_diagonal > RANK_TOLERANCE * max(1.0, r_diagonal[0])))
+    if rank == m and least <= LEAST:
+        return np.arange(m)
+    return _greedy_rows(dense, rank, least)
+
+
+def _pivots(gram: csc_array, order: str) -> np.ndarray | None:
+    """Return the pivots of a symmetric factorisation: in the order NATURAL, squared distances to the rows before."""
+    try:
+        factors = splu(gram, permc_spec=order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except RuntimeError:
+        return None
+    return np.abs(factors.U.diagonal())
+
+
+def _sparse_rows(scaled: csc_array, least: float = LEAST) -> np.ndarray:
+    """Independent rows of a large sparse matrix whose rows have length 1, earlier ones preferred."""
+    m = scaled.shape[0]
+    gram = csc_array(scaled @ scaled.T)
+    pivots = _pivots(gram, "MMD_AT_PLUS_A")
+    if pivots is not None and least <= LEAST and pivots.min() > SURE:
+        return np.arange(m)
+    # a little on the diagonal keeps the elimination going past dependent rows
+    pivots = _pivots(csc_array(gram + diags_array(np.full(m, SURE))), "NATURAL")
+    if pivots is None:
+        return _greedy_rows(scaled.toarray(), min(scaled.shape), least)
+    doubtful = np.flatnonzero(pivots < DOUBTFUL)
+    sure = np.setdiff1d(np.arange(m), doubtful)
+    rows = csc_array(scaled[sure])
+    factors = splu(csc_array(rows @ rows.T), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    added: list[int] = []
+    directions = np.zeros((0, scaled.shape[1]))
+    for first in range(0, doubtful.size, CHUNK):
+        part = doubtful[first : first + CHUNK]
+        rest = scaled[part].toarray()
+        for _ in range(2):
+            rest -= (rows.T @ factors.solve(rows @ rest.T)).T
+            rest -= (rest @ directions.T) @ directions
+        for k, row in zip(part, rest):
+            row = row - directions.T @ (directions @ row)
+            size = np.linalg.norm(row)
+            if size > least:
+                added.append(int(k))
+                directions = np.vstack([directions, row / size])
+    return np.sort(np.concatenate([sure, np.array(added, dtype=np.int64)]))
+
+
+def _greedy_rows(dense: np.ndarray, rank: int, least: float = LEAST) -> np.ndarray:
+    """Gram-Schmidt through the rows in order, keeping those that add a direction."""
+    basis = np.zeros((rank, dense.shape[1]))
+    kept: list[int] = []
+    for i, row in enumerate(dense):
+        rest = row - basis[: len(kept)].T @ (basis[: len(kept)] @ row)
+        rest -= basis[: len(kept)].T @ (basis[: len(kept)] @ rest)
+        size = np.linalg.norm(rest)
+        if size > least and len(kept) < rank:
+            basis[len(kept)] = rest / size
+            kept.append(i)
+    return np.array(kept, dtype=np.int64)
+
+
+def least_correction(jacobian: csc_array, weights: np.ndarray, violation: np.ndarray) -> np.ndarray:
+    """Solve min |x|_W subject to jacobian x = -violation."""
+    n = jacobian.shape[1]
+    kkt = csc_array(block_array([[diags_array(weights), jacobian.T], [jacobian, None]]))
+    rhs = np.concatenate([np.zeros(n), -violation])
+    try:
+        return splu(kkt).solve(rhs)[:n]
+    except RuntimeError as error:
+        raise AssemblyError(
+            "the constraints became dependent while the mechanism was being assembled: "
+            "it is near a position where it locks; move the bodies closer to a position that satisfies the joints"
+        ) from error
+
+
+def assemble_position(system: System, pose: np.ndarray, t: float) -> tuple[np.ndarray, InitialReport]:
+    """Move the bodies as little as possible onto the constraints; set redundant rows of ``system`` aside.
+
+    Parameters
+    ----------
+    pose : ndarray, shape (bodies, 18)
+        R, A (row-major), v, omega of each moving body.
+    """
+    weights = system.coordinate_weights()
+    jacobian, phi, _ = system.constraint_jacobian(pose, t)
+    if not np.all(np.isfinite(phi)):
+        raise _not_finite(system, phi, t)
+    kept = independent_rows(jacobian, weights)
+    report = InitialReport(degrees_of_freedom=jacobian.shape[1] - kept.size)
+    start = pose
+    length = np.sqrt(weights[3]) if weights.size else 1.0
+    for _ in range(SELECTIONS):
+        pose, jacobian, phi, iterations = _closed(system, pose, t, kept, length)
+        report.position_iterations += iterations
+        dropped = np.setdiff1d(np.arange(jacobian.shape[0]), kept)
+        if not dropped.size or np.abs(phi[dropped]).max() <= CONFLICT * max(1.0, length):
+            break
+        # rows that are redundant where the assembly began need not be so where it ends
+        others = independent_rows(jacobian, weights, NEARLY)
+        if np.array_equal(others, kept):
+            raise _conflict(system, dropped, phi)
+        kept = others
+        report.degrees_of_freedom = jacobian.shape[1] - kept.size
+    else:
+        raise _conflict(system, dropped, phi)
+    report.redundant = [system.row_names[i] for i in dropped]
+    report.violation = float(np.abs(phi).max(initial=0.0))
+    _note_correction(system, report, start, pose)
+    system.keep_rows(kept)
+    return pose, report
+
+
+def _note_correction(system: System, report: InitialReport, start: np.ndarray, pose: np.ndarray) -> None:
+    report.length = system.length
+    if not len(pose):
+        return
+    shift = np.linalg.norm(pose[:, 0:3] - start[:, 0:3], axis=1)
+    # |A - A0| = 2 sqrt(2) |sin(angle / 2)|
+    apart = np.linalg.norm(pose[:, 3:12] - start[:, 3:12], axis=1)
+    turn = 2.0 * np.arcsin(np.minimum(apart / np.sqrt(8.0), 1.0))
+    far, most = int(np.argmax(shift)), int(np.argmax(turn))
+    report.moved = (system.body_names[far], float(shift[far]))
+    report.turned = (system.body_names[most], float(turn[most]))
+    report.largest_correction = max(report.moved[1], report.turned[1])
+
+
+def _closed(
+    system: System, pose: np.ndarray, t: float, kept: np.ndarray, length: float
+) -> tuple[np.ndarray, csc_array, np.ndarray, int]:
+    """Solve the kept rows for the pose nearest; return it with the Jacobian, Phi and the iterations taken."""
+    weights = system.coordinate_weights()
+    jacobian, phi, _ = system.constraint_jacobian(pose, t)
+    size = 0.0
+    for iteration in range(MAX_POSITION_ITERATIONS):
+        size = float(np.abs(phi[kept]).max(initial=0.0))
+        if not np.isfinite(size):
+            raise _not_finite(system, phi, t)
+        if size <= POSITION_TOLERANCE * max(1.0, length):
+            return pose, jacobian, phi, iteration
+        step = least_correction(csc_array(jacobian[kept]), weights, phi[kept])
+        turn = np.abs(step.reshape(-1, 6)[:, 3:]).max(initial=0.0)
+        pose = system.displaced(pose, step * min(1.0, 0.5 / max(turn, 1e-300)))
+        jacobian, phi, _ = system.constraint_jacobian(pose, t)
+    if size > 1e-9 * max(1.0, length):
+        worst = kept[np.argmax(np.abs(phi[kept]))]
+        raise AssemblyError(
+            f"the mechanism cannot be assembled: after {MAX_POSITION_ITERATIONS} iterations "
+            f"{system.row_names[worst]} is still violated by {abs(phi[worst]):.3g}; "
+            "check the lengths and the markers of that joint"
+        )
+    return pose, jacobian, phi, MAX_POSITION_ITERATIONS
+
+
+def _not_finite(system: System, phi: np.ndarray, t: float) -> AssemblyError:
+    """Say which row has no value."""
+    name = system.row_names[int(np.argmin(np.isfinite(phi)))]
+    return AssemblyError(
+        f"{name}: its value at t = {t:.6g} s is not finite; check its function of time and the markers' positions"
+    )
+
+
+def _conflict(system: System, dropped: np.ndarray, phi: np.ndarray) -> AssemblyError:
+    """Say which redundant row contradicts the others most."""
+    worst = dropped[np.argmax(np.abs(phi[dropped]))]
+    return AssemblyError(
+        f"conflicting constraints: {system.row_names[worst]} is implied by the other joints but they leave it "
+        f"violated by {abs(phi[worst]):.3g}; correct the markers or remove one of the joints"
+    )
+
+
+def consistent_velocity(system: System, pose: np.ndarray, t: float) -> np.ndarray:
+    """Correct v and omega as little as possible so that Phi_q v + Phi_t = 0."""
+    weights = system.coordinate_weights()
+    jacobian, _, rate = system.constraint_jacobian(pose, t)
+    if jacobian.shape[0] == 0:
+        return pose
+    step = least_correction(jacobian, weights, rate)
+    pose = pose.copy()
+    pose[:, 12:18] += step.reshape(-1, 6)
+    return pose
+
+
+def check_inertia(system: System) -> None:
+    """Raise if a body that can move freely in some direction has no inertia there."""
+    for name, row in zip(system.body_names, np.asarray(system.builder.bodies)[1:]):
+        if not np.all(np.isfinite(row)):
+            raise SingularModelError(f"body '{name}': mass or inertia is not finite")

@@ -1,0 +1,1 @@
+"""Solutions of mechanisms: motions, reactions, loads, diagnostics and the energy balance."""

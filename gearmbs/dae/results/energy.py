@@ -1,0 +1,112 @@
+"""The energy balance of a solution: work in and out, dissipation, and what is stored.
+
+Powers are evaluated at the output times and integrated by a cubic spline; stored energies come from the
+state alone. So the balance tests the integrated motion, not the algebra of one instant.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+from scipy.interpolate import CubicSpline
+
+from gearmbs.dae.equations import forces
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.reactions import REACTION
+
+if TYPE_CHECKING:
+    from gearmbs.dae.results.solution import Solution
+
+
+def energy_balance(solution: Solution) -> xr.Dataset:
+    """Return the energies and works of a solution over time, from its first output.
+
+    Parameters
+    ----------
+    solution : Solution
+        Sampled finely enough for its powers to be integrated: several outputs a step of the fastest force.
+
+    Returns
+    -------
+    Dataset
+        In J over ``time``: ``kinetic``, ``gravity`` (potential), ``elastic`` (contacts); ``work_motion`` (done by
+        prescribed motions), ``work_applied`` (done by torques and expression loads, springs included),
+        ``dissipated_damping``, ``dissipated_friction``; ``imbalance``: work in less dissipation less change of
+        stored energy; ``work``: sum of |power| over time. Attribute ``relative_imbalance``: the largest imbalance over
+        all the work or, where more is exchanged than worked, over the largest change of a stored energy; NaN when
+        there is neither.
+    """
+    t = solution.t
+    powers = _powers(solution)
+    works = {name: _integral(t, p) for name, p in powers.items()}
+    stored = {
+        "kinetic": solution.kinetic_energy,
+        "gravity": _gravity(solution),
+        "elastic": _contact_sum(solution, "elastic_energy"),
+    }
+    change = sum(e - e[0] for e in stored.values())
+    net = works["work_motion"] + works["work_applied"] - works["dissipated_damping"] - works["dissipated_friction"]
+    size = _integral(t, np.abs(powers["work_motion"])) + _integral(t, np.abs(powers["work_applied"]))
+    data = {**stored, **works, "imbalance": net - change, "work": size}
+    out = xr.Dataset({name: ("time", values, {"units": "J"}) for name, values in data.items()}, {"time": t})
+    turned_over = max(float(size[-1]), *(float(np.ptp(e)) for e in stored.values()))
+    largest = float(np.abs(out.imbalance).max())
+    out.attrs["relative_imbalance"] = largest / turned_over if turned_over > 0.0 else float("nan")
+    return out
+
+
+def _integral(t: np.ndarray, power: np.ndarray) -> np.ndarray:
+    if t.size < 2:
+        return np.zeros_like(t)
+    work = CubicSpline(t, power).antiderivative()(t)
+    return work - work[0]
+
+
+def _powers(solution: Solution) -> dict[str, np.ndarray]:
+    motion = np.einsum("tr,tr->t", solution.multipliers, solution._phi[:, :, 2])
+    applied = np.zeros(solution.t.size)
+    for k, row in enumerate(solution.system.builder.forces):
+        if row[T.FORCE_KIND] not in (forces.GEAR_CONTACT, REACTION):
+            applied += _load_power(solution, k, row)
+    return {
+        "work_motion": motion,
+        "work_applied": applied,
+        "dissipated_damping": _contact_sum(solution, "damping_power"),
+        "dissipated_friction": _contact_sum(solution, "friction_power"),
+    }
+
+
+def _load_power(solution: Solution, k: int, row: list[int]) -> np.ndarray:
+    """Power of a force element: F and N on I's body at marker I, the opposite on J's body at the same point."""
+    builder = solution.system.builder
+    force, torque = solution._loads[:, k, 0:3], solution._loads[:, k, 3:6]
+    bi, bj = (builder.marker_body[row[column]] for column in (T.FORCE_I, T.FORCE_J))
+    local = builder.marker_frame[row[T.FORCE_I]][:3]
+    zero = np.zeros((solution.t.size, 3))
+    point = local + zero
+    if bi:
+        pose_i = solution._pose[:, bi - 1]
+        point = pose_i[:, 0:3] + pose_i[:, 3:12].reshape(-1, 3, 3) @ local
+    power = np.zeros(solution.t.size)
+    for body, sign in ((bi, 1.0), (bj, -1.0)):
+        if body:
+            pose = solution._pose[:, body - 1]
+            velocity = pose[:, 12:15] + np.cross(pose[:, 15:18], point - pose[:, 0:3])
+            power += sign * (np.sum(force * velocity, axis=1) + np.sum(torque * pose[:, 15:18], axis=1))
+    return power
+
+
+def _gravity(solution: Solution) -> np.ndarray:
+    builder = solution.system.builder
+    masses = np.array([row[0] for row in builder.bodies[1:]])
+    return -np.einsum("b,tbc,c->t", masses, solution._pose[:, :, 0:3], builder.gravity)
+
+
+def _contact_sum(solution: Solution, name: str) -> np.ndarray:
+    total = np.zeros(solution.t.size)
+    for element, row in zip(solution.system.force_names, solution.system.builder.forces):
+        if row[T.FORCE_KIND] == forces.GEAR_CONTACT:
+            total = total + solution.contact(element)[name]
+    return total

@@ -1,0 +1,388 @@
+"""The solution of a mechanism: poses, velocities, accelerations, reactions, loads, energies, by name.
+
+Accelerations and reactions come from the index-1 system solved at each output time, so they carry none
+of the integrator's noise.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearmbs.dae.model import evaluator as outputs
+from gearmbs.dae.result import DAEResult, Status
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from gearmbs.dae.model.system import System
+    from gearmbs.dae.problem import DAEProblem
+
+CONTACT_DIAGNOSTICS = (
+    "elastic_energy",
+    "damping_power",
+    "friction_power",
+    "penetration_drive",
+    "penetration_back",
+    "pairs_drive",
+    "pairs_back",
+    "normal_force",
+)
+
+
+PART_SIZE = 512
+"""Output times whose records fit the processor's cache."""
+
+CONFLICT_SAMPLES = 50
+"""Outputs at which constraints set aside as redundant are looked at."""
+
+
+class Solution:
+    """Motion and forces of a mechanism over the output times.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+        Output times, s.
+    result : DAEResult
+        The integrator's own account: y, y', status, message, statistics.
+    system : System
+        Names and tables.
+    """
+
+    def __init__(self, system: System, problem: DAEProblem, result: DAEResult) -> None:
+        self.system = system
+        self.problem = problem
+        self.result = result
+        self.t = result.t
+        self._conflict = self._find_conflict()
+
+    @property
+    def success(self) -> bool:
+        """True when the run reached its end and no constraint was found violated on the way."""
+        return self.result.success and self._conflict is None
+
+    @property
+    def status(self) -> Status:
+        """How the run ended."""
+        return self.result.status if self._conflict is None else Status.CONFLICTING_CONSTRAINTS
+
+    @property
+    def message(self) -> str:
+        """What happened, when, which unknown, what to try; what the assembly moved; which constraints are redundant."""
+        if self._conflict is not None:
+            return self._conflict
+        parts = [self.result.message]
+        if not self.result.success and self.t.size:
+            parts.append(self.system.locking(self._last_pose(), float(self.t[-1])) or "")
+        report = self.system.report
+        parts.append((report.correction() if report is not None else None) or "")
+        aside = report.redundant if report is not None else []
+        if aside:
+            parts.append(f"Set aside as redundant: {', '.join(aside)}.")
+        return " ".join(part for part in parts if part)
+
+    def _last_pose(self) -> np.ndarray:
+        """Return the bodies' record at the last output time, without evaluating the others."""
+        if "_records" in self.__dict__:
+            return self._pose[-1]
+        return next(self.parts(np.array([self.t.size - 1])))._pose[-1]
+
+    @property
+    def stats(self):
+        """Counts of steps, evaluations and times."""
+        return self.result.stats
+
+    @cached_property
+    def _records(self) -> outputs.Records:
+        """Everything at every output time, once somebody asks."""
+        return self._evaluate()
+
+    def _evaluate(self) -> outputs.Records:
+        """Solve the index-1 system at every output time."""
+        records = self._new_records(self.t.size)
+        self._evaluator().fill(self.t, self.result.y, self.result.epochs, records)
+        return records
+
+    def _evaluator(self) -> outputs.Evaluator:
+        problem = self.problem
+        return outputs.Evaluator(problem.idata, problem.rdata, problem.work_size)
+
+    def _new_records(self, m: int) -> outputs.Records:
+        system = self.system
+        return outputs.new_records(m, len(system.body_names), len(system.row_names), len(system.force_names))
+
+    @property
+    def _pose(self) -> np.ndarray:
+        return self._records.by_body
+
+    @property
+    def _acc(self) -> np.ndarray:
+        return self._records.accelerations
+
+    @property
+    def _lam(self) -> np.ndarray:
+        return self._records.multipliers
+
+    @property
+    def _loads(self) -> np.ndarray:
+        return self._records.loads
+
+    @property
+    def _phi(self) -> np.ndarray:
+        return self._records.by_row
+
+    def parts(self, rows: np.ndarray | None = None, *, size: int = PART_SIZE) -> Iterator[Solution]:
+        """Yield the solution piece by piece, for what is wanted of a long one to be collected in little memory.
+
+        Forces and accelerations are evaluated for each part in turn, which is also faster than for all at once.
+
+        Parameters
+        ----------
+        rows : ndarray of int, optional
+            Increasing numbers of the output times wanted, the first ones included if angles are counted; default all.
+        size : int
+            Most output times in a part.
+
+        Yields
+        ------
+        Solution
+            Valid until the next one is asked for: they share their memory.
+        """
+        rows = np.arange(self.t.size) if rows is None else np.asarray(rows)
+        known = self.__dict__.get("_records")
+        room = self._new_records(min(size, rows.size)) if known is None else None
+        evaluator = self._evaluator() if known is None else None
+        for k in range(0, rows.size, size):
+            wanted = rows[k : k + size]
+            part = copy.copy(self)
+            part.__dict__.pop("kinetic_energy", None)
+            part.t = self.t[wanted]
+            places = [int(np.searchsorted(wanted, row)) for row, _ in self.result.epochs]
+            epochs = [(place, table) for place, (_, table) in zip(places, self.result.epochs)]
+            yp = self.result.yp[wanted] if len(self.result.yp) else self.result.yp
+            part.result = replace(self.result, t=part.t, y=self.result.y[wanted], yp=yp, epochs=epochs)
+            if evaluator is not None and room is not None:
+                part._records = room.first(wanted.size)
+                evaluator.fill(part.t, part.result.y, epochs, part._records)
+            elif known is not None:
+                part._records = outputs.Records(*(column[wanted] for column in known))
+            yield part
+
+    def _find_conflict(self) -> str | None:
+        """Return what is wrong if a row set aside as redundant is violated by the motion, tried at some outputs."""
+        if not self.system.has_dropped_rows or self.t.size == 0:
+            return None
+        for k in np.unique(np.linspace(0, self.t.size - 1, min(self.t.size, CONFLICT_SAMPLES)).astype(int)):
+            found = self.system.conflict(self._pose[k], float(self.t[k]))
+            if found is not None:
+                return f"at t = {self.t[k]:.6g} s: {found}"
+        return None
+
+    # --- access by name -----------------------------------------------------------------------------
+
+    def _body(self, name: str) -> int:
+        try:
+            return self.system.body_names.index(name)
+        except ValueError:
+            raise KeyError(f"body {name!r}; the bodies are {', '.join(self.system.body_names)}") from None
+
+    def position(self, body: str) -> np.ndarray:
+        """Return the centre of mass over time, shape (m, 3), m; of the body's own frame: `marker_position(body)`."""
+        return self._pose[:, self._body(body), 0:3]
+
+    def orientation(self, body: str) -> np.ndarray:
+        """Return the rotation matrices over time, shape (m, 3, 3)."""
+        return self._pose[:, self._body(body), 3:12].reshape(-1, 3, 3)
+
+    def velocity(self, body: str) -> np.ndarray:
+        """Return the velocity of the centre of mass, shape (m, 3), m/s."""
+        return self._pose[:, self._body(body), 12:15]
+
+    def angular_velocity(self, body: str) -> np.ndarray:
+        """Return the angular velocity, global components, shape (m, 3), rad/s."""
+        return self._pose[:, self._body(body), 15:18]
+
+    def acceleration(self, body: str) -> np.ndarray:
+        """Return the acceleration of the centre of mass, shape (m, 3), m/s^2."""
+        return self._acc[:, self._body(body), 0:3]
+
+    def angular_acceleration(self, body: str) -> np.ndarray:
+        """Return the angular acceleration, global components, shape (m, 3), rad/s^2."""
+        return self._acc[:, self._body(body), 3:6]
+
+    def reaction(self, joint: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return force (N) and moment about marker I's origin (N m) of a joint on I's body, each (m, 3), global."""
+        rows = [k for k, name in enumerate(self.system.row_names) if name.rsplit(": ", 1)[0] == joint]
+        if not rows:
+            known = sorted({name.rsplit(": ", 1)[0] for name in self.system.row_names})
+            aside = self.system.report.redundant if self.system.report is not None else []
+            if any(name.rsplit(": ", 1)[0] == joint for name in aside):
+                raise KeyError(
+                    f"joint {joint!r} was set aside as redundant, so its share of the load is not determined: "
+                    f"{', '.join(known)} carry all of it"
+                )
+            raise KeyError(f"joint {joint!r}; the joints are {', '.join(known) or 'none in this mechanism'}")
+        return self._records.force[:, rows].sum(axis=1), self._records.moment[:, rows].sum(axis=1)
+
+    def load(self, element: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return force F (N) and torque N (N m) of a force element on I's body at marker I, each (m, 3), global."""
+        k = self._element(element)
+        return self._loads[:, k, 0:3], self._loads[:, k, 3:6]
+
+    def contact(self, element: str) -> dict[str, np.ndarray]:
+        """Return the diagnostics of a gear contact over time: energy, powers, penetrations, pairs, normal force."""
+        k = self._element(element)
+        return {name: self._loads[:, k, 6 + c] for c, name in enumerate(CONTACT_DIAGNOSTICS)}
+
+    def _element(self, name: str) -> int:
+        try:
+            return self.system.force_names.index(name)
+        except ValueError:
+            known = ", ".join(self.system.force_names) or "none in this mechanism"
+            raise KeyError(f"force element {name!r}; the force elements are {known}") from None
+
+    # --- measurements -------------------------------------------------------------------------------
+
+    def _measures(self):
+        mechanism = self.system.mechanism
+        if mechanism is None:
+            raise ValueError("the solution does not know its mechanism, so nothing can be asked of it by name")
+        return mechanism.measures(self)
+
+    def joint_angle(self, joint) -> np.ndarray:
+        """Return the rotation of a joint's I about z_J with full turns counted, shape (m,), rad; by joint or name."""
+        return self._measures().angle(joint)
+
+    def joint_displacement(self, joint) -> np.ndarray:
+        """Return the way of a joint's I from J along z_J, shape (m,), m; by joint or name."""
+        return self._measures().displacement(joint)
+
+    def marker_position(self, marker) -> np.ndarray:
+        """Return the origin of a marker, shape (m, 3), m, global; by marker or name, or of a body's own frame."""
+        return self._measures().place(marker)
+
+    def marker_velocity(self, marker) -> np.ndarray:
+        """Return the velocity of a marker's origin, shape (m, 3), m/s, global; arguments as of `marker_position`."""
+        return self._measures().velocity(marker)
+
+    def state(self, state) -> np.ndarray:
+        """Return a user-defined state of the mechanism, shape (m,); by state or name."""
+        return self._measures().state(state)
+
+    def evaluate(self, expression: str) -> np.ndarray:
+        """Return an expression in the ADAMS function language over time, shape (m,), SI.
+
+        As ``"DM(tip, anchor)"`` or ``"AZ(i, j)*RTOD"``; accelerations (ACCX, WDTZ ..) can be asked for, too. Markers
+        may have been added to the bodies after the run.
+        """
+        return self._measures().expression(expression)
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """Lagrange multipliers of the constraint rows, shape (m, rows)."""
+        return self._lam
+
+    @property
+    def constraint_violation(self) -> np.ndarray:
+        """Largest |Phi| of the integrator's solution over the rows at each output time, shape (m,), m or 1.
+
+        Positions and all that follows from them are projected onto the constraints afterwards, to rounding.
+        """
+        return self._records.strayed
+
+    # --- energy -------------------------------------------------------------------------------------
+
+    @cached_property
+    def kinetic_energy(self) -> np.ndarray:
+        """Kinetic energy, shape (m,), J."""
+        total = np.zeros(self.t.size)
+        for b, row in enumerate(self.system.builder.bodies[1:]):
+            v, w = self._pose[:, b, 12:15], self._pose[:, b, 15:18]
+            a = self._pose[:, b, 3:12].reshape(-1, 3, 3)
+            local = np.einsum("tji,tj->ti", a, w)
+            total += 0.5 * row[0] * np.sum(v * v, axis=1)
+            total += 0.5 * np.einsum("ti,ij,tj->t", local, row[1:].reshape(3, 3), local)
+        return total
+
+    def energy_balance(self) -> xr.Dataset:
+        """Return energies, works, dissipation and their imbalance; see `gearmbs.dae.results.energy.energy_balance`."""
+        from gearmbs.dae.results.energy import energy_balance
+
+        return energy_balance(self)
+
+    def __len__(self) -> int:
+        return self.t.size
+
+    def __repr__(self) -> str:
+        mechanism = getattr(self.system, "mechanism", None)
+        name = mechanism.name if mechanism is not None else "mechanism"
+        return (
+            f"Solution({name!r}: {self.t.size} times from {self.t[0]:g} to {self.t[-1]:g} s, "
+            f"{self.status.name}; {self.stats})"
+        )
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return everything as an :class:`xarray.Dataset` with units in the attributes."""
+        import xarray as xr
+
+        xyz = ["x", "y", "z"]
+        joints = list(dict.fromkeys(name.rsplit(": ", 1)[0] for name in self.system.row_names))
+        reactions = [self.reaction(j) for j in joints]
+
+        def var(dims, data, unit, title):
+            return (dims, data, {"units": unit, "long_name": title})
+
+        body = ("time", "body", "xyz")
+        data = {
+            "position": var(body, self._pose[:, :, 0:3], "m", "position of the centre of mass"),
+            "orientation": var(
+                ("time", "body", "xyz", "axis"),
+                self._pose[:, :, 3:12].reshape(self.t.size, -1, 3, 3),
+                "1",
+                "rotation matrix, columns are the body's axes",
+            ),
+            "velocity": var(body, self._pose[:, :, 12:15], "m/s", "velocity of the centre of mass"),
+            "angular_velocity": var(body, self._pose[:, :, 15:18], "rad/s", "angular velocity"),
+            "acceleration": var(body, self._acc[:, :, 0:3], "m/s^2", "acceleration of the centre of mass"),
+            "angular_acceleration": var(body, self._acc[:, :, 3:6], "rad/s^2", "angular acceleration"),
+        }
+        if joints:
+            joint = ("time", "joint", "xyz")
+            data["reaction_force"] = var(joint, np.stack([r[0] for r in reactions], 1), "N", "joint force on I's body")
+            data["reaction_moment"] = var(
+                joint, np.stack([r[1] for r in reactions], 1), "N m", "joint moment on I's body about marker I"
+            )
+            data["constraint_violation"] = var(
+                ("time",), self.constraint_violation, "1", "largest |Phi| before projection"
+            )
+        if self.system.state_names and self.system.mechanism is not None:
+            values = np.stack([self.state(name) for name in self.system.state_names], 1)
+            data["states"] = var(("time", "state"), values, "-", "user-defined state")
+        if self.system.force_names:
+            element = ("time", "element", "xyz")
+            data["load_force"] = var(element, self._loads[:, :, 0:3], "N", "applied force on I's body")
+            data["load_torque"] = var(element, self._loads[:, :, 3:6], "N m", "applied torque on I's body at marker I")
+            units = ("J", "W", "W", "m", "m", "1", "1", "N")
+            for c, (name, unit) in enumerate(zip(CONTACT_DIAGNOSTICS, units)):
+                data[name] = var(("time", "element"), self._loads[:, :, 6 + c], unit, name.replace("_", " "))
+        coords = {
+            "time": ("time", self.t, {"units": "s"}),
+            "body": self.system.body_names,
+            "xyz": xyz,
+            "axis": xyz,
+            "joint": joints,
+            "state": self.system.state_names,
+            "element": self.system.force_names,
+        }
+        used = {d for v in data.values() for d in v[0]}
+        out = xr.Dataset(data, coords={k: v for k, v in coords.items() if k in used})
+        out.attrs["status"] = self.status.name
+        out.attrs["message"] = self.message
+        out.attrs.update({f"solver_{k}": v for k, v in self.stats.as_dict().items()})
+        return out

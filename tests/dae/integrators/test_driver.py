@@ -1,0 +1,220 @@
+"""Runs as a whole: outputs, restart, interruption, coordinate changes, repeatability."""
+
+import os
+import signal
+import threading
+
+import numpy as np
+import pytest
+
+from gearmbs.dae.integrators import driver as run
+from gearmbs.dae.integrators.wstiff import resume, solve_wstiff
+from gearmbs.dae.result import Status
+from tests.dae.integrators.problems import pendulum, rotor
+
+TIMES = np.linspace(0.0, 3.0, 61)
+
+
+def assert_same(a, b):
+    np.testing.assert_array_equal(a.t, b.t)
+    np.testing.assert_array_equal(a.y, b.y)
+    np.testing.assert_array_equal(a.yp, b.yp)
+    np.testing.assert_array_equal(a.stats.t_steps, b.stats.t_steps)
+
+
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
+def test_same_run_twice_is_bit_identical(method):
+    assert_same(*(solve_wstiff(pendulum(), TIMES, tol=1e-7, method=method) for _ in range(2)))
+
+
+def test_chunking_does_not_show(monkeypatch):
+    whole = solve_wstiff(pendulum(), TIMES, tol=1e-7)
+    monkeypatch.setattr(run, "FIRST_CHUNK", 1)
+    monkeypatch.setattr(run, "CHUNK_SECONDS", 0.0)
+    monkeypatch.setattr(run, "RECORD_BYTES", 0)
+    assert_same(whole, solve_wstiff(pendulum(), TIMES, tol=1e-7))
+
+
+def test_threads_give_the_same_result():
+    expected = solve_wstiff(pendulum(), TIMES, tol=1e-8)
+    results = [None] * 3
+
+    def work(i):
+        results[i] = solve_wstiff(pendulum(), TIMES, tol=1e-8)
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for result in results:
+        assert_same(expected, result)
+
+
+def test_the_loop_releases_the_gil():
+    """While a run is inside the compiled loop another thread goes on counting."""
+    long_chunk = 200_000
+    ticks = []
+    stop = threading.Event()
+
+    def count():
+        while not stop.wait(0.002):
+            ticks.append(1)
+
+    thread = threading.Thread(target=count)
+    saved = run.FIRST_CHUNK
+    run.FIRST_CHUNK = long_chunk
+    try:
+        thread.start()
+        result = solve_wstiff(pendulum(), np.array([0.0, 400.0]), tol=1e-9)
+    finally:
+        stop.set()
+        thread.join()
+        run.FIRST_CHUNK = saved
+    assert result.success
+    assert result.stats.wall_time > 0.05
+    assert len(ticks) > 5
+
+
+def test_ctrl_c_keeps_what_was_computed_and_resumes_bit_identically(monkeypatch):
+    before = signal.getsignal(signal.SIGINT)
+    whole = solve_wstiff(pendulum(), TIMES, tol=1e-9, dense_output=True)
+    monkeypatch.setattr(run, "FIRST_CHUNK", 8)
+    monkeypatch.setattr(run, "CHUNK_SECONDS", 0.0)
+
+    def interrupt_at_one(t):
+        if 1.0 < t < 1.2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    stopped = solve_wstiff(pendulum(), TIMES, tol=1e-9, dense_output=True, progress=interrupt_at_one)
+    assert stopped.status is Status.INTERRUPTED
+    assert not stopped.success
+    assert 1.0 < stopped.t_last < 1.5
+    assert "t = 1." in stopped.message
+    np.testing.assert_array_equal(stopped.y, whole.y[: len(stopped.t)])
+    stopped.checkpoint.progress = None
+    rest = resume(stopped)
+    assert rest.success
+    assert_same(whole, rest)
+    np.testing.assert_array_equal(whole.sol(TIMES), rest.sol(TIMES))
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_resume_after_the_step_limit_and_refusal_after_success():
+    whole = solve_wstiff(pendulum(), TIMES, tol=1e-6)
+    part = solve_wstiff(pendulum(), TIMES, tol=1e-6, max_steps=40)
+    assert part.status is Status.TOO_MANY_STEPS
+    assert part.stats.steps == 40
+    assert_same(whole, resume(part))
+    with pytest.raises(ValueError, match="SUCCESS"):
+        resume(whole)
+
+
+def test_progress_rises_to_the_end():
+    seen = []
+    solve_wstiff(pendulum(), TIMES, tol=1e-8, progress=seen.append)
+    assert seen == sorted(seen)
+    assert seen[-1] == TIMES[-1]
+
+
+def test_outputs_at_every_step_and_dense_output_agree():
+    every = solve_wstiff(pendulum(), t_end=2.0, tol=1e-7, dense_output=True)
+    assert len(every.t) == every.stats.steps + 1
+    assert every.t[-1] == 2.0
+    at = np.linspace(0.0, 2.0, 33)
+    sampled = solve_wstiff(pendulum(), at, tol=1e-7)
+    np.testing.assert_allclose(every.sol(at[:-1]), sampled.y[:-1], atol=1e-12)
+    np.testing.assert_allclose(every.sol.derivative(every.t)[1:], every.yp[1:], atol=1e-8)
+
+
+def test_dense_output_derivative_is_the_slope():
+    result = solve_wstiff(pendulum(), t_end=1.0, tol=1e-9, dense_output=True)
+    t = np.linspace(0.1, 0.9, 17)
+    d = 1e-6
+    slope = (result.sol(t + d) - result.sol(t - d)) / (2 * d)
+    np.testing.assert_allclose(result.sol.derivative(t)[:, :4], slope[:, :4], rtol=1e-4, atol=1e-5)
+    with pytest.raises(ValueError, match="leaves the integrated span"):
+        result.sol(1.5)
+
+
+def test_without_interpolation_steps_land_on_the_outputs():
+    result = solve_wstiff(pendulum(), TIMES, tol=1e-6, interpolate=False)
+    assert set(TIMES[1:]) <= set(result.stats.t_steps)
+    exact = solve_wstiff(pendulum(), TIMES, tol=1e-10)
+    assert np.abs(result.y - exact.y)[:, :4].max() < 1e-3
+
+
+def test_breakpoints_are_landed_on_and_restart_at_order_one():
+    result = solve_wstiff(pendulum(), TIMES, tol=1e-6, breakpoints=[0.7, 1.9, 99.0])
+    t, orders = result.stats.t_steps, result.stats.orders
+    for mark in (0.7, 1.9):
+        at = int(np.flatnonzero(t == mark)[0])
+        assert orders[at + 1] == 1
+
+
+def test_limits_on_order_and_step():
+    result = solve_wstiff(pendulum(), TIMES, tol=1e-5, max_order=2, max_step=0.01)
+    assert result.stats.orders.max() <= 2
+    assert result.stats.h_steps.max() <= 0.01 * (1 + 1e-12)
+    first = solve_wstiff(pendulum(), TIMES, tol=1e-5, first_step=1e-5)
+    assert first.stats.h_steps[0] == pytest.approx(1e-5)
+
+
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
+def test_a_change_of_coordinates_leaves_the_motion_alone(method):
+    """The angle is taken back by whole turns in the stored history: same steps, same motion, one epoch per turn."""
+    times = np.linspace(0.0, 20.0, 101)
+    free = solve_wstiff(rotor(False), times, tol=1e-8, method=method)
+    turned = solve_wstiff(rotor(True), times, tol=1e-8, method=method)
+    assert turned.success
+    assert len(turned.epochs) > 10
+    assert np.all(turned.y[:, 0] < 2 * np.pi + 2.0)
+    unwound = turned.y[:, 0] + 2 * np.pi * np.array([turned.epoch_of(i)[0] for i in range(len(times))])
+    np.testing.assert_allclose(unwound, free.y[:, 0], atol=2e-5)
+    if method == "WSTIFF":
+        assert abs(turned.stats.steps - free.stats.steps) <= 0.1 * free.stats.steps
+
+
+def test_dense_output_across_coordinate_changes():
+    turned = solve_wstiff(rotor(True), np.linspace(0.0, 20.0, 101), tol=1e-8, dense_output=True)
+    np.testing.assert_allclose(turned.sol(turned.t)[:-1], turned.y[:-1], atol=1e-10)
+
+
+def test_epochs_when_every_step_is_an_output():
+    turned = solve_wstiff(rotor(True), t_end=20.0, tol=1e-8)
+    rows = [first for first, _ in turned.epochs]
+    assert rows == sorted(rows)
+    angle = turned.y[:, 0] + 2 * np.pi * np.array([turned.epoch_of(i)[0] for i in range(len(turned.t))])
+    assert np.abs(np.diff(angle)).max() < 1.5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [
+        ({"tol": 0.0}, "tol"),
+        ({"rtol": -1.0}, "rtol"),
+        ({"method": "LSODE"}, "method"),
+        ({"corrector": "none"}, "corrector"),
+        ({"max_order": 7}, "max_order"),
+        ({"max_step": 0.0}, "max_step"),
+        ({"first_step": 0.0}, "first_step"),
+        ({"min_step": -1.0}, "min_step"),
+        ({"max_iterations": 0}, "max_iterations"),
+        ({"event_action": [1]}, "event_action"),
+        ({"t_end": 1.0}, "t_eval ends"),
+    ],
+)
+def test_wrong_arguments_are_named(arguments, names):
+    with pytest.raises(ValueError, match=names):
+        solve_wstiff(pendulum(), TIMES, **arguments)
+
+
+@pytest.mark.parametrize("t_eval", [[], [1.0, 0.5], [0.0, np.nan], [-1.0, 1.0]])
+def test_wrong_output_times(t_eval):
+    with pytest.raises(ValueError, match="t_eval"):
+        solve_wstiff(pendulum(), t_eval)
+
+
+def test_no_end_is_an_error():
+    with pytest.raises(ValueError, match="t_end"):
+        solve_wstiff(pendulum())

@@ -1,0 +1,109 @@
+"""The parser: messages that show the place, and no text that crashes it."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gearmbs.mechanism.expression import ExpressionError, Scope, compile_expression, parse, unparse
+from tests.dae.equations.expressions.support import MARKER_BODY, MARKERS, time_series
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "empty"),
+        ("1+", "found the end at column 3"),
+        ("2*(3+4", "expected '\\)' to close the bracket"),
+        ("STP(1,2,3,4,5)", "unknown function STP; did you mean STEP\\?"),
+        ("STEP(1,2,3)", "STEP takes 5 arguments, got 3 at column 1"),
+        ("1 + DX(77)", "no MARKER 77 at column 8"),
+        ("DX(1.5)", "expected the id or name"),
+        ("3*TIM", "TIM is not TIME"),
+        ("1/0", "division by zero"),
+        ("SQRT(-1)", "not a finite number"),
+        ("STEP(TIME,1,0,1,1)", "x1 different from x0"),
+        ("VARVAL(3)", "no VARIABLE 3"),
+        ("JOINT(1,0,2,0)", "no JOINT 1"),
+        ("CUBSPL(TIME,0,4)", "no SPLINE 4"),
+        ("ACCX(1)", "only be asked for in a REQUEST"),
+        ("CONTACT(1,0,2,0)", "CONTACT is not supported"),
+        ("ORIENT(13,1,1)", "system 13 is not supported"),
+        ("FX(1,2)", "no force or joint acts between MARKER 1 and MARKER 2"),
+        ("1 2", "unexpected '2' after the expression at column 3"),
+        ("2*(60D+3*TIME)", "60D\\+3 may be 60 degrees .* write 60D \\+ 3 or 60E\\+3 at column 4"),
+        ("5 # 3", "unexpected character '#' at column 3"),
+        ("(" * 500, "nested deeper than 100"),
+        ("1E999", "too large"),
+    ],
+)
+def test_messages(text, message):
+    with pytest.raises(ExpressionError, match=message):
+        compile_expression(text, Scope(markers=MARKERS, marker_body=MARKER_BODY))
+
+
+@pytest.mark.parametrize("text", ["-2**2", "1-(2-3)-4*5/6", "2**(3-1)**.5", "IF(TIME-1: SIN(90D), 2, 3E-7)*-TIME"])
+def test_unparsed_text_means_the_same(text):
+    again = unparse(parse(text))
+    for t in (0.3, 1.7):
+        tapes = [compile_expression(f"{x}+0*SIN(TIME)+TIME", Scope()) for x in (text, again)]
+        assert time_series(tapes[0], t)[0] == time_series(tapes[1], t)[0]
+
+
+def test_long_sums_do_not_nest():
+    text = "+".join(["TIME"] * 5000)
+    assert time_series(compile_expression(text, Scope()), 2.0)[1] == pytest.approx(5000.0)
+
+
+def test_equal_parts_are_evaluated_once():
+    scope = Scope(markers=MARKERS, marker_body=MARKER_BODY)
+    once = compile_expression("DX(1,2,3)", scope)
+    many = compile_expression("(DX(1,2,3)*DX(1,2,3)+dx(1,2,3))/DX(1,2,3)", scope)
+    assert many.length == once.length + 3
+
+
+LEAVES = st.sampled_from(["TIME", "1.5", "2", "0.25", "PI", "3E-1"])
+
+
+def combined(inner):
+    return st.one_of(
+        st.tuples(inner, st.sampled_from(["+", "-", "*", "/"]), inner).map(lambda p: f"({p[0]}{p[1]}{p[2]})"),
+        st.tuples(st.sampled_from(["SIN", "COS", "ABS", "ATAN", "TANH"]), inner).map(lambda p: f"{p[0]}({p[1]})"),
+        inner.map(lambda p: f"(-{p})"),
+        st.tuples(inner, st.sampled_from(["2", "3"])).map(lambda p: f"{p[0]}**{p[1]}"),
+        st.tuples(inner, inner).map(lambda p: f"MAX({p[0]},{p[1]})"),
+    )
+
+
+PYTHON = {"SIN": math.sin, "COS": math.cos, "ABS": abs, "ATAN": math.atan, "TANH": math.tanh, "MAX": max, "PI": math.pi}
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(st.recursive(LEAVES, combined, max_leaves=12), st.floats(0.1, 3.0))
+def test_arithmetic_agrees_with_python(text, t):
+    """Python's precedence of these operators is FORTRAN's."""
+    try:
+        expected = eval(text, {"__builtins__": {}}, {**PYTHON, "TIME": t})
+        tape = compile_expression(text, Scope())
+    except (ZeroDivisionError, OverflowError, ExpressionError):
+        return
+    value = tape.constant if tape.constant is not None else time_series(tape, t)[0]
+    assert value == pytest.approx(expected, rel=1e-9, abs=1e-9) or abs(expected) > 1e6
+
+
+WORDS = """DX STEP ( ) , : TIME 1 2.5E3 90D ** * - / + ' .m.p
+           IF IMPACT CUBSPL VARVAL ORIENT JOINT 1E5 \\ é 0 FX D E""".split()
+
+
+@settings(max_examples=400, deadline=None, derandomize=True)
+@given(st.one_of(st.lists(st.sampled_from(WORDS), max_size=25).map("".join), st.text(max_size=40)))
+def test_any_text_gives_a_tape_or_an_expression_error(text):
+    try:
+        parse(text)
+        tape = compile_expression(text, Scope(markers=MARKERS, marker_body=MARKER_BODY))
+    except ExpressionError:
+        return
+    assert tape.length >= 1
