@@ -10,17 +10,11 @@ import numpy as np
 from gearmbs.adams import statements as st
 from gearmbs.adams.build import Builder
 from gearmbs.mechanism.functions import expression
-from gearmbs.mechanism.joints import Joint, Prescribed
+from gearmbs.mechanism.joints import JOINTS, Joint, Prescribed
 from gearmbs.mechanism.parts import Marker
 
-JOINT_KINDS = {
-    "FIXED": "fixed", "REVOLUTE": "revolute", "TRANSLATIONAL": "translational", "CYLINDRICAL": "cylindrical",
-    "SPHERICAL": "spherical", "UNIVERSAL": "universal", "PLANAR": "planar", "CONVEL": "constant_velocity",
-}  # fmt: skip
-JPRIM_KINDS = {
-    "ATPOINT": "at_point", "INLINE": "inline", "INPLANE": "inplane", "ORIENTATION": "orientation",
-    "PARALLEL_AXES": "parallel_axes", "PERPENDICULAR": "perpendicular",
-}  # fmt: skip
+JOINT_KINDS = {k.adams[1]: kind for kind, k in JOINTS.items() if k.adams and k.adams[0] == "JOINT"}
+JPRIM_KINDS = {k.adams[1]: kind for kind, k in JOINTS.items() if k.adams and k.adams[0] == "JPRIM"}
 X_TO_Z = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]).T
 """Columns y, z, x: the old x axis becomes the new z axis."""
 Y_TO_Z = X_TO_Z.T

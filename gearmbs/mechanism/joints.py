@@ -6,6 +6,7 @@ where *swapped* exchanges the roles of I and J.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -102,29 +103,60 @@ def homokinetic(i: Marker, j: Marker) -> Row:
     return Row("equal rotation about both shafts", turn)
 
 
-JOINTS = {
-    "fixed": lambda i, j: [*at_point(i, j), *same_orientation(i, j)],
-    "revolute": lambda i, j: [*at_point(i, j), *parallel_z(i, j)],
-    "spherical": at_point,
-    "cylindrical": lambda i, j: [*in_line(i, j), *parallel_z(i, j)],
-    "translational": lambda i, j: [*in_line(i, j), *same_orientation(i, j)],
-    "universal": lambda i, j: [*at_point(i, j), axes_normal(i, j, Z, Z)],
-    "planar": lambda i, j: [in_plane(i, j), *parallel_z(i, j)],
-    "constant_velocity": lambda i, j: [*at_point(i, j), homokinetic(i, j)],
-    "at_point": at_point,
-    "inline": in_line,
-    "inplane": lambda i, j: [in_plane(i, j)],
-    "orientation": same_orientation,
-    "parallel_axes": parallel_z,
-    "perpendicular": lambda i, j: [axes_normal(i, j, Z, Z)],
-}
-"""Rows of the joints that need nothing but their two markers."""
+@dataclass(frozen=True)
+class JointKind:
+    """What there is to know of a kind of joint that needs nothing but its two markers.
 
-CROSSED = ("universal", "perpendicular")
-"""Kinds whose z axes are at right angles."""
+    Attributes
+    ----------
+    rows : callable
+        ``rows(i, j)`` returns the constraint rows.
+    angle, displacement : bool
+        Whether I turns about z_J, or moves along it, in a way that can be counted and measured.
+    crossed : bool
+        Whether z_I and z_J are at right angles.
+    adams : tuple of str, optional
+        Statement and type in an ADAMS deck, as ``("JOINT", "REVOLUTE")``.
+    """
+
+    rows: Callable[[Marker, Marker], list[Row]]
+    angle: bool = False
+    displacement: bool = False
+    crossed: bool = False
+    adams: tuple[str, str] | None = None
+
+
+JOINTS: dict[str, JointKind] = {
+    "fixed": JointKind(lambda i, j: [*at_point(i, j), *same_orientation(i, j)], adams=("JOINT", "FIXED")),
+    "revolute": JointKind(lambda i, j: [*at_point(i, j), *parallel_z(i, j)], angle=True, adams=("JOINT", "REVOLUTE")),
+    "spherical": JointKind(at_point, adams=("JOINT", "SPHERICAL")),
+    "cylindrical": JointKind(
+        lambda i, j: [*in_line(i, j), *parallel_z(i, j)],
+        angle=True,
+        displacement=True,
+        adams=("JOINT", "CYLINDRICAL"),
+    ),
+    "translational": JointKind(
+        lambda i, j: [*in_line(i, j), *same_orientation(i, j)], displacement=True, adams=("JOINT", "TRANSLATIONAL")
+    ),
+    "universal": JointKind(
+        lambda i, j: [*at_point(i, j), axes_normal(i, j, Z, Z)], crossed=True, adams=("JOINT", "UNIVERSAL")
+    ),
+    "planar": JointKind(lambda i, j: [in_plane(i, j), *parallel_z(i, j)], angle=True, adams=("JOINT", "PLANAR")),
+    "constant_velocity": JointKind(lambda i, j: [*at_point(i, j), homokinetic(i, j)], adams=("JOINT", "CONVEL")),
+    "at_point": JointKind(at_point, adams=("JPRIM", "ATPOINT")),
+    "inline": JointKind(in_line, displacement=True, adams=("JPRIM", "INLINE")),
+    "inplane": JointKind(lambda i, j: [in_plane(i, j)], adams=("JPRIM", "INPLANE")),
+    "orientation": JointKind(same_orientation, adams=("JPRIM", "ORIENTATION")),
+    "parallel_axes": JointKind(parallel_z, angle=True, adams=("JPRIM", "PARALLEL_AXES")),
+    "perpendicular": JointKind(lambda i, j: [axes_normal(i, j, Z, Z)], crossed=True, adams=("JPRIM", "PERPENDICULAR")),
+}
+"""The joints and primitives that need nothing but their two markers, by the name of their kind."""
 
 LARGEST_COSINE = 0.7
-"""Of the angle between axes to be put at right angles; nearer to parallel, nothing says which way to turn them."""
+"""Largest cosine of the angle between two axes that are to be turned to right angles.
+
+Axes nearer to parallel do not define the plane to turn in."""
 
 
 def check_crossed(label: str, i: Marker, j: Marker) -> None:
@@ -141,7 +173,17 @@ def check_crossed(label: str, i: Marker, j: Marker) -> None:
 def screw_rows(i: Marker, j: Marker, pitch: float) -> list[Row]:
     """Return a cylindrical joint that advances ``pitch`` metres a turn of I about z_J."""
     advance = (Term(terms.DOT2, i, j, Z), Term(terms.ANGLE, i, j, 0, -pitch / (2.0 * np.pi)))
-    return [*JOINTS["cylindrical"](i, j), Row(f"advance {pitch:g} m a turn", advance)]
+    return [*in_line(i, j), *parallel_z(i, j), Row(f"advance {pitch:g} m a turn", advance)]
+
+
+def kinds_with_angle() -> list[str]:
+    """Return the kinds of joints that have a rotation of I about z_J that can be counted."""
+    return [*(kind for kind, known in JOINTS.items() if known.angle), "screw"]
+
+
+def kinds_with_displacement() -> list[str]:
+    """Return the kinds of joints whose coordinate is, or contains, the displacement of I along z_J."""
+    return [kind for kind, known in JOINTS.items() if known.displacement]
 
 
 def coordinate_term(joint: Joint, coefficient: float) -> Term:

@@ -13,15 +13,12 @@ from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_AXES, KIN
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.elements import State
 from gearmbs.mechanism.expression import compile_expression
-from gearmbs.mechanism.joints import Joint
+from gearmbs.mechanism.joints import Joint, kinds_with_angle, kinds_with_displacement
 from gearmbs.mechanism.parts import Body, Marker
 
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism.mechanism import Mechanism
-
-SLIDING = ("translational", "cylindrical", "inline")
-TURNING = ("revolute", "cylindrical", "screw", "parallel_axes", "planar")
 
 
 class Measures:
@@ -39,7 +36,7 @@ class Measures:
 
     def angle(self, joint: Joint | str) -> np.ndarray:
         """Return the rotation of I about z_J, full turns counted, shape (m,), rad."""
-        found = self._joint(joint, TURNING, "angle")
+        found = self._joint(joint, kinds_with_angle(), "angle")
         t = self.solution.t
         ai, aj = self._axes(found.i), self._axes(found.j)
         wanted = np.arctan2(_dot(ai[:, :, 0], aj[:, :, 1]), _dot(ai[:, :, 0], aj[:, :, 0]))
@@ -51,10 +48,10 @@ class Measures:
 
     def displacement(self, joint: Joint | str) -> np.ndarray:
         """Return the way of I from J along z_J, shape (m,), m."""
-        found = self._joint(joint, SLIDING, "displacement")
+        found = self._joint(joint, kinds_with_displacement(), "displacement")
         return _dot(self.place(found.i) - self.place(found.j), self._axes(found.j)[:, :, 2])
 
-    def _joint(self, joint: Joint | str, kinds: tuple[str, ...], what: str) -> Joint:
+    def _joint(self, joint: Joint | str, kinds: list[str], what: str) -> Joint:
         name = joint.name if isinstance(joint, Joint) else joint
         found = self.mechanism.joints.get(name)
         if found is None:

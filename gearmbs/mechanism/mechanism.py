@@ -126,8 +126,8 @@ class Mechanism(LoadMethods):
         ----------
         i, j : Body or Marker
             What the joint connects. With bodies, ``at`` (default: the origin of ``i``) and ``axis`` (default: z)
-            place a marker on each, in global components at the initial position. Of a marker and a body, the body
-            gets one that lies on the marker.
+            place a marker on each, in global components at the initial position. If one is a marker and the other a
+            body, a marker that coincides with the given one is placed on the body.
         axis_j : array_like, optional
             Axis on ``j`` at the initial position, at a right angle to ``axis``: for universal joints and the
             perpendicular primitive between bodies, which need two.
@@ -141,14 +141,15 @@ class Mechanism(LoadMethods):
         if kind not in jt.JOINTS:
             raise ModelError(f"joint '{name}': kind {kind!r} is unknown; choose one of {', '.join(jt.JOINTS)}")
         label = f"{kind.replace('_', ' ')} joint '{name}'"
-        crossed = kind in jt.CROSSED
+        crossed = jt.JOINTS[kind].crossed
         if crossed and axis_j is None and not (isinstance(i, Marker) and isinstance(j, Marker)):
             raise ModelError(
                 f"{label}: it needs two axes at right angles, one on each body; give axis=... (on I) and axis_j=... "
                 "(on J), or two markers with such z axes"
             )
         if axis_j is not None and not crossed:
-            raise ModelError(f"{label}: axis_j is for {' and '.join(jt.CROSSED)} joints; others have one axis")
+            kinds = " and ".join(k for k, v in jt.JOINTS.items() if v.crossed)
+            raise ModelError(f"{label}: axis_j is for {kinds} joints; others have one axis")
         mi, mj = self._markers(label, name, i, j, at, axis, axis_j)
         if crossed:
             try:
@@ -159,7 +160,7 @@ class Mechanism(LoadMethods):
                     if marker is not i and marker is not j:
                         marker.body.markers.remove(marker)
                 raise
-        return self._add_joint(jt.Joint(name, kind, mi, mj, jt.JOINTS[kind](mi, mj)))
+        return self._add_joint(jt.Joint(name, kind, mi, mj, jt.JOINTS[kind].rows(mi, mj)))
 
     def fixed(self, name, i, j, **where) -> jt.Joint:
         """Add a fixed joint: no relative motion. See :meth:`joint`."""
