@@ -144,6 +144,7 @@ JOINTS: dict[str, JointKind] = {
     ),
     "planar": JointKind(lambda i, j: [in_plane(i, j), *parallel_z(i, j)], angle=True, adams=("JOINT", "PLANAR")),
     "constant_velocity": JointKind(lambda i, j: [*at_point(i, j), homokinetic(i, j)], adams=("JOINT", "CONVEL")),
+    "pin_slot": JointKind(lambda i, j: [in_plane(i, j, Y), in_plane(i, j, Z), *parallel_z(i, j)], angle=True),
     "at_point": JointKind(at_point, adams=("JPRIM", "ATPOINT")),
     "inline": JointKind(in_line, displacement=True, adams=("JPRIM", "INLINE")),
     "inplane": JointKind(lambda i, j: [in_plane(i, j)], adams=("JPRIM", "INPLANE")),

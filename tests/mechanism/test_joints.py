@@ -64,6 +64,7 @@ DEFINITIONS: dict[str, Callable[[Frame, Frame, float], list[float]]] = {
     "universal": lambda i, j, t: [*point(i, j), *crossed(i, j)],
     "planar": lambda i, j, t: [offset(i, j)[2], *parallel(i, j)],
     # equal turns of both shafts about their own axes: x_I . y_J = x_J . y_I
+    "pin_slot": lambda i, j, t: [*offset(i, j)[1:], *parallel(i, j)],
     "constant_velocity": lambda i, j, t: [*point(i, j), i[1][:, 0] @ j[1][:, 1] - j[1][:, 0] @ i[1][:, 1]],
     "at_point": lambda i, j, t: point(i, j),
     "inline": lambda i, j, t: list(offset(i, j)[:2]),
