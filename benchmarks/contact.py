@@ -11,14 +11,14 @@ from numba import njit
 from benchmarks.gear_pair import call_costs
 from benchmarks.markdown import number, table
 from gearmbs.contact import gear_contact
-from gearmbs.gears import Friction, GearPair
+from gearmbs.gears import FlankFriction, GearPair
 from gearmbs.gears.faults import GradedFlanks
 from gearmbs.gears.transmission import StaticMesh
 from gearmbs.studies import Case, simulate_case
 
 CASES = {
     "healthy": ({}, 1),
-    "healthy, no friction": ({"friction": Friction.none()}, 1),
+    "healthy, no friction": ({"friction": FlankFriction.none()}, 1),
     "+3 mm": ({"centre_distance_error": "3 mm"}, 1),
     "skew 1 deg, jammed, default slices": ({"misalignment": "1 deg"}, None),
     "skew 1 deg, jammed, 41 slices": ({"misalignment": "1 deg"}, 41),

@@ -15,7 +15,7 @@ from benchmarks.timing import seconds_per_call
 from gearmbs.dae.linalg.sparse_lu import analyse, factor, new_factors
 from gearmbs.dae.linalg.sparse_lu import solve as substitute
 from gearmbs.studies import Case, simulate_case
-from gearmbs.studies.run import record
+from gearmbs.studies.simulation import record
 
 TITLE = "Gear cases: WSTIFF and IDA"
 STATES = {

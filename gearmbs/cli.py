@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 if TYPE_CHECKING:
-    from gearmbs.studies.run import SimulationFailed
+    from gearmbs.studies.simulation import SimulationFailed
 
 app = typer.Typer(
     name="gearmbs",
@@ -81,7 +81,7 @@ def stage_bar(name: str) -> Iterator[Callable[[float, str], None]]:
 
 def keep_partial(failure: SimulationFailed, path: Path) -> NoReturn:
     """Write what a run has computed before it stopped, and end: with status 130 if the user interrupted it."""
-    from gearmbs.studies.run import SimulationInterrupted
+    from gearmbs.studies.simulation import SimulationInterrupted
     from gearmbs.studies.store import write_dataset
 
     partial = failure.partial()
@@ -174,7 +174,7 @@ def paper(
         check_record(base.changed(operation={"torque": 2.0 * low}, fault={"misalignment": tilt}), "options")
 
         from gearmbs.studies.paper import paper_cases, run_paper
-        from gearmbs.studies.run import SimulationFailed
+        from gearmbs.studies.simulation import SimulationFailed
         from gearmbs.studies.store import write_dataset
 
         settings: dict[str, Any] = {"torques": (low, 2.0 * low), "misalignment": tilt}
@@ -213,7 +213,7 @@ def run(
         case = load_case(case_file)
         check_record(case, str(case_file))
 
-        from gearmbs.studies.run import SimulationFailed, run_case
+        from gearmbs.studies.simulation import SimulationFailed, run_case
         from gearmbs.studies.store import write_dataset
 
         target = out or case_file.with_suffix(".nc")

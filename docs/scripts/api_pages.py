@@ -30,12 +30,12 @@ EXPORTED = ["__all__"]
 
 CONSTANTS = {
     "gearmbs.signals": {
-        "COMPONENTS": "gearmbs.signals.newton",
+        "COMPONENTS": "gearmbs.signals.shaft_force",
         "EXPECTED": "gearmbs.signals.comparison_report",
         "FORMATS": "gearmbs.signals.io",
         "INDICATORS": "gearmbs.signals.indicators",
     },
-    "gearmbs.view": {"COLOURS": "gearmbs.view.canvas"},
+    "gearmbs.view": {"COLOURS": "gearmbs.view.figure_style"},
 }
 """Exported values that are no functions or classes, with the module that defines and describes them."""
 
@@ -94,12 +94,12 @@ MORE = {
             "Gears",
             "Shafts",
             "Operation",
-            "Fault",
+            "FaultSettings",
             "Contact",
             "FrictionSettings",
             "Solver",
         ],
-        "gearmbs.studies.run": ["record"],
+        "gearmbs.studies.simulation": ["record"],
         "gearmbs.studies.store": ["write_dataset", "write_text", "whole_file"],
         "gearmbs.studies.iftomm": EXPORTED,
     },

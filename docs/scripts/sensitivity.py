@@ -21,7 +21,7 @@ from gearmbs.signals import COMPONENTS
 from gearmbs.studies import Case, SimulationFailed, make_case, run_cases
 from gearmbs.studies.paper import MUCH
 from gearmbs.studies.store import write_text
-from gearmbs.view.canvas import new_figure
+from gearmbs.view.figure_style import new_figure
 
 DATA = Path(__file__).parent.parent / "data" / "sensitivity.csv"
 DEPTHS = (0.01, 0.03, 0.1, 0.3, 1.0)

@@ -14,9 +14,9 @@ from gearmbs.adams.build import AdamsModel, build_model
 from gearmbs.adams.commands import Change, Command, Linear, Script, Simulate, Stop, Switch, read_script
 from gearmbs.adams.deck import Deck, read_deck
 from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
-from gearmbs.adams.rehearse import check_linear, is_sequence, rehearse
 from gearmbs.adams.requests import RequestEvaluator
 from gearmbs.adams.result import NEWTON, AdamsResult, Segment
+from gearmbs.adams.script_check import check_linear, check_script, is_sequence
 from gearmbs.adams.session import Session, change, output_times, switch
 from gearmbs.adams.start import part_states, with_initial_motions
 from gearmbs.dae.analyses.kinematic_analysis import kinematic
@@ -94,7 +94,7 @@ def run_deck(
     session = Session.of(deck)
     command = Command(script.file)
     try:
-        rehearse(deck, script, allow_unsupported)
+        check_script(deck, script, allow_unsupported)
         for command in script:
             if isinstance(command, Stop):
                 break

@@ -13,7 +13,7 @@ import numpy as np
 from gearmbs.adams.write_text import listed, number
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.elements import LINE, Load
-from gearmbs.mechanism.friction import INPUTS, Friction
+from gearmbs.mechanism.friction import INPUTS, JointFriction
 from gearmbs.mechanism.joints import Joint
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def _beam(p: Mapping[str, Any]) -> list[str]:
     return [*out, f"CMATRIX = {listed(damping[np.triu_indices(6)])}"]
 
 
-def _friction(writer: DeckWriter, joint: Joint, f: Friction) -> list[str]:
+def _friction(writer: DeckWriter, joint: Joint, f: JointFriction) -> list[str]:
     inputs = [i for i in INPUTS if i in f.inputs and _matters(joint, f, i)]
     out = [
         f"JOINT = {writer.elements['joint', joint.name]}",
@@ -156,7 +156,7 @@ def _friction(writer: DeckWriter, joint: Joint, f: Friction) -> list[str]:
     return out
 
 
-def _matters(joint: Joint, f: Friction, item: str) -> bool:
+def _matters(joint: Joint, f: JointFriction, item: str) -> bool:
     """Whether an input has an effect on the joint: a length of zero switches a moment off."""
     if item == "preload":
         return True

@@ -102,7 +102,7 @@ def _flank(
     k = law.stiffness * length**law.exponent / units.force
     c = law.damping / units.factor("damping")
     force = f"IMPACT(-{depth}, -({' + '.join(rates)}), 0, {k!r}, {law.exponent!r}, {c!r}, {law.depth / length!r})"
-    low, high = line - two.tip_string, one.tip_string
+    low, high = line - two.tip_roll_length, one.tip_roll_length
     edge = EDGE * pitch
     first = math.floor(low / pitch) - 1
     last = math.ceil(high / pitch) + 1

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from gearmbs._lazy import late
 from gearmbs.gears import faults
-from gearmbs.gears.laws import ContactLaw, Friction
+from gearmbs.gears.laws import ContactLaw, FlankFriction
 from gearmbs.gears.pair import GearPair, Placement
 from gearmbs.gears.spec import GearSpec, Material, involute
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ContactLaw",
-    "Friction",
+    "FlankFriction",
     "GearPair",
     "GearSpec",
     "Material",

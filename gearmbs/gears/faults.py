@@ -12,24 +12,26 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from gearmbs.gears.canvas import Canvas
 from gearmbs.gears.iso1328 import random_pitch, tolerances
 from gearmbs.gears.settings import choice, real, switch, tooth_numbers, whole
 from gearmbs.gears.spec import convert_fields, require
 from gearmbs.gears.stiffness import Crack, pair_stiffness
+from gearmbs.gears.tooth_deviations import ToothDeviations
 from gearmbs.units import Quantity
 
 if TYPE_CHECKING:
     from gearmbs.gears.pair import GearPair
 
 Wheel = Literal["driver", "driven"]
-Flank = Literal["drive", "back", "both"]
+Flank = Literal["drive", "coast", "both"]
 
 CHOICES: dict[str, tuple[Any, ...]] = {
     "wheel": ("driver", "driven"),
-    "flank": ("drive", "back", "both"),
+    "flank": ("drive", "coast", "both"),
     "end": (1, -1),
 }
+COAST_ALIASES = {"back": "coast"}
+"""The former name of the coast flank, still understood."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +47,7 @@ class Fault:
     ------
     ValueError
         For a setting of the wrong kind; the message names the field, its value and what would do. What a wheel must
-        fit, such as a length along its face, is found when the fault is drawn.
+        fit, such as a length along its face, is found when the fault is applied to its wheel.
     """
 
     label: ClassVar[str] = "fault"
@@ -62,6 +64,7 @@ class Fault:
             if item.name in self.units:
                 require(value is not None or item.default is None, f"{place} is None; give a number")
             elif item.name in CHOICES:
+                value = COAST_ALIASES.get(value, value) if item.name == "flank" and isinstance(value, str) else value
                 value = choice(value, place, CHOICES[item.name])
             elif item.name == "teeth":
                 value = tooth_numbers(value, place)
@@ -90,8 +93,8 @@ class Fault:
         """Label, severity and all parameters, for storing beside results."""
         return {"label": self.label, "severity": self.severity, **asdict(self)}
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
-        """Add the deviation to the wheel's canvas."""
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+        """Add what the fault does to the deviations of its wheel."""
         raise TypeError(f"{type(self).__name__} does not say what it does to a tooth")
 
 
@@ -119,17 +122,17 @@ class ChippedCorner(Fault):
     tooth: int = 0
     end: int = 1
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
-        gear = canvas.gear
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+        gear = deviations.gear
         require(
             0 < self.length <= gear.face_width,
             f"ChippedCorner.length is {self.length} m; give more than 0 up to the face width, {gear.face_width:.6g} m",
         )
         most = gear.tip_radius - gear.root_radius
         require(0 < self.height <= most, f"ChippedCorner.height is {self.height} m; the tooth is {most:.6f} m high")
-        from_end = 0.5 * gear.face_width - self.end * canvas.station
+        from_end = 0.5 * gear.face_width - self.end * deviations.section
         cut = self.height * np.maximum(0.0, 1 - from_end / self.length)
-        canvas.shorten(self.tooth % gear.teeth, gear.tip_radius - cut)
+        deviations.shorten(self.tooth % gear.teeth, gear.tip_radius - cut)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,11 +152,11 @@ class BrokenTooth(Fault):
     lost: Quantity = 0.7
     tooth: int = 0
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
         require(0 < self.lost <= 1, f"BrokenTooth.lost is {self.lost}; give a share of the height above 0 up to 1")
-        gear = canvas.gear
+        gear = deviations.gear
         radius = gear.tip_radius - self.lost * (gear.tip_radius - gear.root_radius)
-        canvas.shorten(self.tooth % gear.teeth, np.full(canvas.station.size, radius))
+        deviations.shorten(self.tooth % gear.teeth, np.full(deviations.section.size, radius))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,13 +179,14 @@ class RootCrack(Fault):
     angle: Quantity = "70 deg"
     tooth: int = 0
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
         require(self.depth > 0, f"RootCrack.depth is {self.depth} m; it must be positive")
         crack = Crack(self.depth, self.angle)
         driver = self.wheel == "driver"
-        string = canvas.compliance_string if driver else pair.line_of_action - canvas.compliance_string
-        cracked = pair_stiffness(pair, string, (crack, None) if driver else (None, crack))
-        canvas.compliance[:, self.tooth % canvas.gear.teeth] += pair_stiffness(pair, string) / cracked - 1
+        own = deviations.compliance_roll_length
+        roll_length = own if driver else pair.line_of_action - own
+        cracked = pair_stiffness(pair, roll_length, (crack, None) if driver else (None, crack))
+        deviations.compliance[:, self.tooth % deviations.gear.teeth] += pair_stiffness(pair, roll_length) / cracked - 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,7 +204,7 @@ class Pit(Fault):
     position : float or str
         Of its centre along the face, from mid-face.
     tooth : int
-    flank : {"drive", "back", "both"}
+    flank : {"drive", "coast", "both"}
     """
 
     label: ClassVar[str] = "pitting"
@@ -221,21 +225,21 @@ class Pit(Fault):
     tooth: int = 0
     flank: Flank = "drive"
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
         for name in ("depth", "height", "width"):
             value = getattr(self, name)
             require(value > 0, f"Pit.{name} is {value} m; it must be positive")
-        centre = canvas.gear.pitch_radius if self.radius is None else self.radius
-        u = (canvas.radius - centre) / (0.5 * self.height)
-        v = (canvas.station - self.position) / (0.5 * self.width)
+        centre = deviations.gear.pitch_radius if self.radius is None else self.radius
+        u = (deviations.radius - centre) / (0.5 * self.height)
+        v = (deviations.section - self.position) / (0.5 * self.width)
         hollow = self.depth * np.maximum(0.0, 1 - u[None, :] ** 2 - v[:, None] ** 2)
         require(
             hollow.max() > 0,
             f"Pit.radius {centre} m or Pit.position {self.position} m puts the pit off the flank or between its "
-            "stations; move or enlarge it",
+            "sections; move or enlarge it",
         )
-        for flank in canvas.flanks(self.flank):
-            canvas.shape[flank, self.tooth % canvas.gear.teeth] += hollow
+        for flank in deviations.flanks(self.flank):
+            deviations.shape[flank, self.tooth % deviations.gear.teeth] += hollow
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -247,7 +251,7 @@ class Wear(Fault):
     depth : float or str
         At the end of the active profile that slides most.
     teeth : "all", int or several
-    flank : {"drive", "back", "both"}
+    flank : {"drive", "coast", "both"}
     """
 
     label: ClassVar[str] = "wear"
@@ -257,17 +261,17 @@ class Wear(Fault):
     teeth: Any = "all"
     flank: Flank = "drive"
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
         require(self.depth >= 0, f"Wear.depth is {self.depth} m; it must not be negative")
-        gear = canvas.gear
+        gear = deviations.gear
         pitch_point = gear.base_radius * math.tan(pair.working_pressure_angle)
-        start = pair.line_of_action - pair.wheels[self.wheel == "driver"].tip_string
+        start = pair.line_of_action - pair.wheels[self.wheel == "driver"].tip_roll_length
         # specific sliding: way slid per way rolled over, finite from the start of the active profile on
-        string = np.maximum(canvas.string, start)
-        sliding = np.abs(string - pitch_point) / string
+        roll_length = np.maximum(deviations.roll_length, start)
+        sliding = np.abs(roll_length - pitch_point) / roll_length
         worn = self.depth * sliding / max(abs(start - pitch_point) / start, sliding[-1])
-        for flank in canvas.flanks(self.flank):
-            canvas.shape[flank, canvas.tooth_list(self.teeth)] += worn
+        for flank in deviations.flanks(self.flank):
+            deviations.shape[flank, deviations.tooth_list(self.teeth)] += worn
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -288,9 +292,9 @@ class Eccentricity(Fault):
     amount: Quantity = 20e-6
     phase: Quantity = 0.0
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
         require(self.amount >= 0, f"Eccentricity.amount is {self.amount} m; it must not be negative")
-        canvas.shift(self.amount * math.cos(self.phase), self.amount * math.sin(self.phase))
+        deviations.shift(self.amount * math.cos(self.phase), self.amount * math.sin(self.phase))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -311,9 +315,9 @@ class Wobble(Fault):
     angle: Quantity = "0.05 deg"
     phase: Quantity = 0.0
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
-        lean = math.tan(self.angle) * canvas.station
-        canvas.shift(lean * math.cos(self.phase), lean * math.sin(self.phase))
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+        lean = math.tan(self.angle) * deviations.section
+        deviations.shift(lean * math.cos(self.phase), lean * math.sin(self.phase))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -333,10 +337,10 @@ class PitchError(Fault):
     amount: Quantity = 20e-6
     tooth: int = 0
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
-        tooth = self.tooth % canvas.gear.teeth
-        canvas.offset[canvas.drive, tooth] -= self.amount
-        canvas.offset[1 - canvas.drive, tooth] += self.amount
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+        tooth = self.tooth % deviations.gear.teeth
+        deviations.offset[deviations.drive, tooth] -= self.amount
+        deviations.offset[1 - deviations.drive, tooth] += self.amount
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -360,8 +364,8 @@ class CumulativePitchError(Fault):
     order: int = 1
     phase: Quantity = 0.0
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
-        teeth = canvas.gear.teeth
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+        teeth = deviations.gear.teeth
         require(self.amount >= 0, f"CumulativePitchError.amount is {self.amount} m; it must not be negative")
         require(
             1 <= self.order <= teeth // 2,
@@ -369,8 +373,8 @@ class CumulativePitchError(Fault):
         )
         wave = np.sin(2 * math.pi * self.order * np.arange(teeth) / teeth + self.phase)
         index = self.amount / np.ptp(wave) * wave
-        canvas.offset[canvas.drive] -= index
-        canvas.offset[1 - canvas.drive] += index
+        deviations.offset[deviations.drive] -= index
+        deviations.offset[1 - deviations.drive] += index
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -403,18 +407,18 @@ class GradedFlanks(Fault):
         good = self.grade in range(1, 12)
         require(good, f"GradedFlanks.grade is {self.grade}; ISO 1328-1 has the whole grades 1 to 11")
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
-        gear = canvas.gear
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+        gear = deviations.gear
         grade = int(self.grade)
         limit = tolerances(gear, grade)
         generator = np.random.default_rng([self.seed, 0 if self.wheel == "driver" else 1])
-        along = (canvas.string - canvas.string[0]) / np.ptp(canvas.string) - 0.5
-        across = canvas.station / gear.face_width
+        along = (deviations.roll_length - deviations.roll_length[0]) / np.ptp(deviations.roll_length) - 0.5
+        across = deviations.section / gear.face_width
         for flank in (0, 1):
             side = 1 - 2 * flank
             if self.pitch:
                 index = random_pitch(gear, grade, generator)
-                canvas.offset[flank] -= side * index
+                deviations.offset[flank] -= side * index
             scale = generator.uniform(-1, 1, size=(4, gear.teeth))
             wave = generator.uniform(0, 2 * math.pi, size=2)
             for tooth in range(gear.teeth):
@@ -422,7 +426,7 @@ class GradedFlanks(Fault):
                 profile = profile + 0.5 * limit.profile_form * scale[1, tooth] * np.sin(4 * math.pi * along + wave[0])
                 lead = limit.lead_slope * scale[2, tooth] * across
                 lead = lead + 0.5 * limit.lead_form * scale[3, tooth] * np.sin(3 * math.pi * across + wave[1])
-                canvas.shape[flank, tooth] += self.profile * profile[None, :] + self.lead * lead[:, None]
+                deviations.shape[flank, tooth] += self.profile * profile[None, :] + self.lead * lead[:, None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -434,7 +438,7 @@ class TipRelief(Fault):
     amount : float or str
         At the tip.
     length : float or str
-        Over which roll-off (string) length below the tip.
+        Length of roll below the tip over which it extends.
     power : float
         1 linear, 2 parabolic.
     teeth, flank
@@ -450,16 +454,16 @@ class TipRelief(Fault):
     teeth: Any = "all"
     flank: Flank = "both"
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
         name = type(self).__name__
         require(self.length > 0, f"{name}.length is {self.length} m; it must be positive")
         require(self.power >= 1, f"{name}.power is {self.power}; give 1 (linear) or more")
-        relief = self.amount * np.clip(1 - self._distance(canvas, pair) / self.length, 0, None) ** self.power
-        for flank in canvas.flanks(self.flank):
-            canvas.shape[flank, canvas.tooth_list(self.teeth)] += relief
+        relief = self.amount * np.clip(1 - self._distance(deviations, pair) / self.length, 0, None) ** self.power
+        for flank in deviations.flanks(self.flank):
+            deviations.shape[flank, deviations.tooth_list(self.teeth)] += relief
 
-    def _distance(self, canvas: Canvas, pair: GearPair) -> np.ndarray:
-        return canvas.gear.tip_string - canvas.string
+    def _distance(self, deviations: ToothDeviations, pair: GearPair) -> np.ndarray:
+        return deviations.gear.tip_roll_length - deviations.roll_length
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -468,9 +472,9 @@ class RootRelief(TipRelief):
 
     label: ClassVar[str] = "root relief"
 
-    def _distance(self, canvas: Canvas, pair: GearPair) -> np.ndarray:
-        start = pair.line_of_action - pair.wheels[self.wheel == "driver"].tip_string
-        return np.maximum(canvas.string - start, 0.0)
+    def _distance(self, deviations: ToothDeviations, pair: GearPair) -> np.ndarray:
+        start = pair.line_of_action - pair.wheels[self.wheel == "driver"].tip_roll_length
+        return np.maximum(deviations.roll_length - start, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -493,10 +497,10 @@ class Crowning(Fault):
     teeth: Any = "all"
     flank: Flank = "both"
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
-        relief = self.amount * (2 * canvas.station / canvas.gear.face_width) ** 2
-        for flank in canvas.flanks(self.flank):
-            canvas.shape[flank, canvas.tooth_list(self.teeth)] += relief[:, None]
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+        relief = self.amount * (2 * deviations.section / deviations.gear.face_width) ** 2
+        for flank in deviations.flanks(self.flank):
+            deviations.shape[flank, deviations.tooth_list(self.teeth)] += relief[:, None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -519,7 +523,7 @@ class LeadCorrection(Fault):
     teeth: Any = "all"
     flank: Flank = "both"
 
-    def draw(self, canvas: Canvas, pair: GearPair) -> None:
-        slope = self.amount * canvas.station / canvas.gear.face_width
-        for flank in canvas.flanks(self.flank):
-            canvas.shape[flank, canvas.tooth_list(self.teeth)] += slope[:, None]
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+        slope = self.amount * deviations.section / deviations.gear.face_width
+        for flank in deviations.flanks(self.flank):
+            deviations.shape[flank, deviations.tooth_list(self.teeth)] += slope[:, None]

@@ -1,4 +1,4 @@
-"""What the mesh did during a motion: forces, pairs in contact, separations and hits of the back flanks."""
+"""What the mesh did during a motion: forces, pairs in contact, separations and hits of the coast flanks."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ class ContactHistory:
         Force and torque (about its origin) on the driver, global components.
     elastic_energy, damping_power, friction_power : ndarray
         J, W, W.
-    drive_penetration, back_penetration : ndarray
+    drive_penetration, coast_penetration : ndarray
         Largest, m.
-    drive_pairs, back_pairs : ndarray of int
+    drive_pairs, coast_pairs : ndarray of int
         Tooth pairs touching.
     normal_force : ndarray
         Sum of all normal forces, N.
@@ -55,21 +55,21 @@ class ContactHistory:
     damping_power: np.ndarray
     friction_power: np.ndarray
     drive_penetration: np.ndarray
-    back_penetration: np.ndarray
+    coast_penetration: np.ndarray
     drive_pairs: np.ndarray
-    back_pairs: np.ndarray
+    coast_pairs: np.ndarray
     normal_force: np.ndarray
 
     @property
     def separations(self) -> int:
         """How many times the teeth lost all contact."""
-        free = (self.drive_pairs + self.back_pairs) == 0
+        free = (self.drive_pairs + self.coast_pairs) == 0
         return int(np.count_nonzero(free[1:] & ~free[:-1]))
 
     @property
-    def back_hits(self) -> int:
-        """How many times the back flanks came into contact."""
-        touching = self.back_pairs > 0
+    def coast_hits(self) -> int:
+        """How many times the coast flanks came into contact."""
+        touching = self.coast_pairs > 0
         return int(np.count_nonzero(touching[1:] & ~touching[:-1]))
 
 
@@ -103,6 +103,6 @@ def contact_history(
     diag = np.zeros((n, 8))
     run: Any = _run
     run(gi, gr, *args, wrench, diag, np.zeros(size))
-    energy, damping, friction, drive, back = diag[:, :5].T
-    drive_pairs, back_pairs = diag[:, 5:7].T.astype(int)
-    return ContactHistory(wrench, energy, damping, friction, drive, back, drive_pairs, back_pairs, diag[:, 7])
+    energy, damping, friction, drive, coast = diag[:, :5].T
+    drive_pairs, coast_pairs = diag[:, 5:7].T.astype(int)
+    return ContactHistory(wrench, energy, damping, friction, drive, coast, drive_pairs, coast_pairs, diag[:, 7])

@@ -112,7 +112,7 @@ class ContactLaw:
 
 
 @dataclass(frozen=True)
-class Friction:
+class FlankFriction:
     """Coulomb friction between flanks, regularised in the sliding speed.
 
     Parameters
@@ -132,20 +132,20 @@ class Friction:
 
     def __post_init__(self) -> None:
         for name in ("static_speed", "dynamic_speed"):
-            object.__setattr__(self, name, to_si(getattr(self, name), "speed", f"Friction.{name}"))
+            object.__setattr__(self, name, to_si(getattr(self, name), "speed", f"FlankFriction.{name}"))
         for name in ("static", "dynamic"):
             value = getattr(self, name)
             if not (math.isfinite(value) and 0 <= value <= 2):
-                raise ValueError(f"Friction.{name} is {value}; give 0 to 2")
+                raise ValueError(f"FlankFriction.{name} is {value}; give 0 to 2")
         if not 0 < self.static_speed < self.dynamic_speed:
             raise ValueError(
-                f"Friction.static_speed is {self.static_speed} m/s and dynamic_speed {self.dynamic_speed} m/s; "
+                f"FlankFriction.static_speed is {self.static_speed} m/s and dynamic_speed {self.dynamic_speed} m/s; "
                 "the first must be positive and below the second"
             )
         if self.kind not in ("adams", "smooth", "none"):
-            raise ValueError(f"Friction.kind is {self.kind!r}; choose 'adams', 'smooth' or 'none'")
+            raise ValueError(f"FlankFriction.kind is {self.kind!r}; choose 'adams', 'smooth' or 'none'")
 
     @classmethod
-    def none(cls) -> Friction:
+    def none(cls) -> FlankFriction:
         """No friction."""
         return cls(kind="none")

@@ -10,10 +10,10 @@ from typing import Any, Literal
 import numpy as np
 
 from gearmbs.gears.faults import Fault
-from gearmbs.gears.laws import ContactLaw, Friction
+from gearmbs.gears.laws import ContactLaw, FlankFriction
 from gearmbs.gears.spec import GearSpec, convert_fields, involute, require
 from gearmbs.gears.stiffness import iso_mesh_stiffness, iso_single_stiffness, pair_stiffness
-from gearmbs.gears.tables import compliance_stations, pack
+from gearmbs.gears.tables import compliance_roll_lengths, pack
 from gearmbs.units import Quantity
 
 TILTED_SLICES = 11
@@ -67,7 +67,7 @@ class GearPair:
     backlash : float or str
         Normal backlash made by thinning both wheels' teeth equally, m; at the nominal centre distance.
     contact : ContactLaw
-    friction : Friction
+    friction : FlankFriction
     rotation : {1, -1}
         Sense in which the driver turns about +z.
     torque : float or str
@@ -106,7 +106,7 @@ class GearPair:
     axial_shift: Quantity = 0.0
     backlash: Quantity = 0.0
     contact: ContactLaw = field(default_factory=ContactLaw.impact)
-    friction: Friction = field(default_factory=Friction)
+    friction: FlankFriction = field(default_factory=FlankFriction)
     rotation: Literal[1, -1] = 1
     torque: Quantity = 100.0
     slices: int | None = None
@@ -157,7 +157,7 @@ class GearPair:
         damping, depth : float or str
             See `ContactLaw.linear`.
         """
-        largest = float(pair_stiffness(self, compliance_stations(self)).max())
+        largest = float(pair_stiffness(self, compliance_roll_lengths(self)).max())
         law = ContactLaw.linear(largest, damping, depth)
         return replace(self, contact=law, stiffness_curve="potential-energy")
 
@@ -251,11 +251,11 @@ class GearPair:
         )
         length = self.line_of_action
         for far, near in ((one, two), (two, one)):
-            start = length - far.tip_string
+            start = length - far.tip_roll_length
             require(
-                start > near.form_string - 1e-12 and start > 0,
-                f"GearPair: the tip of {far.name} meets {near.name} inside the start of its involute (string "
-                f"{start * mm:.4f} mm, involute from {near.form_string * mm:.4f} mm): interference; reduce the "
+                start > near.form_roll_length - 1e-12 and start > 0,
+                f"GearPair: the tip of {far.name} meets {near.name} inside the start of its involute (length of roll "
+                f"{start * mm:.4f} mm, involute from {near.form_roll_length * mm:.4f} mm): interference; reduce the "
                 f"addendum of {far.name} or increase centre_distance_error",
             )
 
@@ -306,7 +306,7 @@ class GearPair:
     @property
     def path_of_contact(self) -> float:
         """Length of the path of contact, m."""
-        return self.driver.tip_string + self.driven.tip_string - self.line_of_action
+        return self.driver.tip_roll_length + self.driven.tip_roll_length - self.line_of_action
 
     @property
     def contact_ratio(self) -> float:
@@ -318,8 +318,8 @@ class GearPair:
         """Radii on driver and driven where the mate's tip begins to bear, m."""
         one, two = self.driver, self.driven
         return (
-            math.hypot(one.base_radius, self.line_of_action - two.tip_string),
-            math.hypot(two.base_radius, self.line_of_action - one.tip_string),
+            math.hypot(one.base_radius, self.line_of_action - two.tip_roll_length),
+            math.hypot(two.base_radius, self.line_of_action - one.tip_roll_length),
         )
 
     @property
@@ -449,7 +449,7 @@ class GearPair:
     def placement(self, driver_angle: float = 0.0) -> Placement:
         """Frames at which the drive flanks just touch, for a given driver angle (rad).
 
-        With misalignment beyond the backlash the back flanks overlap there; see `jams`.
+        With misalignment beyond the backlash the coast flanks overlap there; see `jams`.
         """
         return self.frames(driver_angle, self.driven_angle(driver_angle))
 

@@ -1,4 +1,4 @@
-"""What a gear person looks at, without dynamics: contact pattern over the face, load sharing between pairs."""
+"""Static analyses of the loaded mesh: contact pattern over the face and load sharing between tooth pairs."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gearmbs.gears.faults import COAST_ALIASES
 from gearmbs.gears.transmission import StaticMesh, warn_of_unseen
 
 if TYPE_CHECKING:
     from gearmbs.gears.pair import GearPair
 
-SIDE, STATION, GAP, STRING_1, SOFT = 0, 3, 4, 6, 11
+SIDE, SECTION, GAP, ROLL_LENGTH_1, SOFT = 0, 3, 4, 6, 11
 TEETH = slice(1, 3)
 FINE = 8
-MAX_STATIONS = 300
+MAX_SECTIONS = 300
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,12 @@ class ContactPattern:
     ----------
     roll_angle : ndarray, shape (n,)
         Driver angle from where the tooth touches at the pitch point, rad, positive towards recess.
-    station : ndarray, shape (m,)
+    section : ndarray, shape (m,)
         Along the mean axis, from mid-way between the wheels, m.
     pressure : ndarray, shape (n, m)
         Load per unit face width, N/m.
-    string : ndarray, shape (n, m)
-        Where on the driver's profile, string length, m; NaN without load.
+    roll_length : ndarray, shape (n, m)
+        Where on the driver's profile, length of roll, m; NaN without load.
     force : ndarray, shape (n,)
         Load of the tooth, N.
     total : ndarray, shape (n,)
@@ -40,9 +41,9 @@ class ContactPattern:
     """
 
     roll_angle: np.ndarray
-    station: np.ndarray
+    section: np.ndarray
     pressure: np.ndarray
-    string: np.ndarray
+    roll_length: np.ndarray
     force: np.ndarray
     total: np.ndarray
 
@@ -61,7 +62,7 @@ def contact_pattern(
     pair: GearPair,
     torque: float | None = None,
     points: int = 81,
-    stations: int = 41,
+    sections: int = 41,
     side: str = "drive",
     tooth: int = 0,
 ) -> ContactPattern:
@@ -74,10 +75,10 @@ def contact_pattern(
         On the driven wheel, N m; default the pair's.
     points : int
         Positions over the engagement.
-    stations : int
+    sections : int
         Along the face, up to 300.
-    side : {"drive", "back"}
-        Flank to look at; the back flanks are loaded when misalignment jams the teeth.
+    side : {"drive", "coast"}
+        Flank to look at; the coast flanks are loaded when misalignment jams the teeth.
     tooth : int
         Of the driver; numbers wrap around the wheel.
 
@@ -93,37 +94,38 @@ def contact_pattern(
     Notes
     -----
     The load of a pair of teeth is integrated between the ends of its own common face by the midpoint rule, eight points
-    to a station, over gaps that are straight between the stations. With ``load="adams"`` it is the one force of the
-    overlap, spread as its cross-section, depth^1.5. The totals of drive less back times r_b are the torque within 0.2 %
-    while involutes touch; a corner that bears has another arm than r_b: 1.3 % were seen, of jammed teeth, which carry
-    much more on both sides, 3 % of the drive side's load.
+    to a section, over gaps that are straight between the sections. With ``load="adams"`` it is the one force of the
+    overlap, spread as its cross-section, depth^1.5. The total of the drive flanks less that of the coast flanks, times
+    r_b, is the torque within 0.2 % while involutes touch. A corner in contact has another arm than r_b: deviations of
+    1.3 % were seen and, for jammed teeth, which carry much more on both sides, 3 % of the drive flanks' load.
     """
-    if side not in ("drive", "back"):
-        raise ValueError(f"side is {side!r}; choose 'drive' or 'back'")
-    if not 1 <= stations <= MAX_STATIONS:
-        raise ValueError(f"stations is {stations!r}; give 1 up to {MAX_STATIONS}")
+    side = COAST_ALIASES.get(side, side)
+    if side not in ("drive", "coast"):
+        raise ValueError(f"side is {side!r}; choose 'drive' or 'coast'")
+    if not 1 <= sections <= MAX_SECTIONS:
+        raise ValueError(f"sections is {sections!r}; give 1 up to {MAX_SECTIONS}")
     load = pair.torque if torque is None else torque
     tooth %= pair.driver.teeth
     mesh = StaticMesh(pair)
     low, high = pair.common_face
-    width = (high - low) / stations
-    station = low + (np.arange(stations) + 0.5) * width
+    width = (high - low) / sections
+    section = low + (np.arange(sections) + 0.5) * width
     flank = pair.rotation * (1 if side == "drive" else -1)
     gear = pair.wheels[0]
     alpha = pair.working_pressure_angle
     middle = gear.base_radius * math.tan(alpha)
-    # tooth 0 touches at string s when the driver stands at s / r_b - psi - alpha, on the side that turns with the drive
+    # tooth 0 touches at length of roll s when the driver is at s / r_b - psi - alpha, on the drive flank
     offset = pair.rotation * (math.tan(alpha) - gear.base_half_angle - alpha)
     offset -= 2 * math.pi * tooth / gear.teeth
     reach = 0.5 * gear.base_pitch
-    begin = pair.line_of_action - pair.wheels[1].tip_string - middle - reach
-    end = gear.tip_string - middle + reach
+    begin = pair.line_of_action - pair.wheels[1].tip_roll_length - middle - reach
+    end = gear.tip_roll_length - middle + reach
     roll = np.linspace(begin, end, points) / gear.base_radius
     pitch_angle = 2 * math.pi / gear.teeth
     passed = [(pair.rotation * offset + turn) / pitch_angle for turn in (roll[0], roll[-1])]
     warn_of_unseen(pair, passed[0], passed[1], "give the number of another driver tooth to follow, tooth=...")
-    pressure = np.zeros((points, stations))
-    string = np.full((points, stations), np.nan)
+    pressure = np.zeros((points, sections))
+    roll_length = np.full((points, sections), np.nan)
     total = np.zeros(points)
     lag = pair.penetration(load) * pair.rotation / pair.driven.base_radius
     for k, turn in enumerate(roll):
@@ -131,7 +133,7 @@ def contact_pattern(
         ideal = mesh.ideal_angle(angle)
         driven = mesh.loaded_angle(angle, load, ideal + lag)
         lag = driven - ideal
-        rows = mesh.gaps(angle, driven, station).copy()
+        rows = mesh.gaps(angle, driven, section).copy()
         ends = mesh.gaps(angle, driven)
         rows, ends = (found[found[:, SIDE] == flank] for found in (rows, ends))
         both = np.concatenate([rows, ends])
@@ -141,19 +143,19 @@ def contact_pattern(
             total[k] += loads.sum() * width
             if one[0] == tooth:
                 pressure[k] += loads
-                string[k] = np.where(loads > 0, mine[:, STRING_1], string[k])
-    return ContactPattern(roll, station, pressure, string, pressure.sum(axis=1) * width, total)
+                roll_length[k] = np.where(loads > 0, mine[:, ROLL_LENGTH_1], roll_length[k])
+    return ContactPattern(roll, section, pressure, roll_length, pressure.sum(axis=1) * width, total)
 
 
 def _pair_load(pair: GearPair, rows: np.ndarray, ends: np.ndarray, low: float, width: float) -> np.ndarray:
-    """Load of a pair of teeth per unit face width at the stations of its gap rows, N/m.
+    """Load of a pair of teeth per unit face width at the sections of its gap rows, N/m.
 
-    What a face tilted sideways carries beyond the outermost stations counts to these.
+    What a face tilted sideways carries beyond the outermost sections counts to these.
     """
-    place, gap = rows[:, STATION], rows[:, GAP]
+    place, gap = rows[:, SECTION], rows[:, GAP]
     bounds = (low, low + rows.shape[0] * width)
     if len(ends) == 2:
-        bounds = (ends[0, STATION], ends[1, STATION])
+        bounds = (ends[0, SECTION], ends[1, SECTION])
         inside = (place > bounds[0]) & (place < bounds[1])
         place = np.concatenate([bounds[:1], place[inside], bounds[1:]])
         gap = np.concatenate([ends[:1, GAP], gap[inside], ends[1:, GAP]])

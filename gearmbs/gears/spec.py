@@ -266,8 +266,8 @@ class GearSpec:
         return 2 * self.tip_radius * self.half_angle(self.tip_radius)
 
     @property
-    def tip_string(self) -> float:
-        """String length (base tangent) where the involute ends at the tip, m."""
+    def tip_roll_length(self) -> float:
+        """Length of roll (along the base tangent) where the involute ends at the tip, m."""
         centre = self.tip_radius - self.tip_rounding
         return math.sqrt(centre**2 - self.base_radius**2) + self.tip_rounding
 
@@ -292,8 +292,8 @@ class GearSpec:
         return math.sqrt(self.fillet_centre_radius**2 - self.fillet_radius**2)
 
     @property
-    def form_string(self) -> float:
-        """String length where the involute begins, m."""
+    def form_roll_length(self) -> float:
+        """Length of roll where the involute begins, m."""
         return math.sqrt(max(0.0, self.form_radius**2 - self.base_radius**2))
 
     @property

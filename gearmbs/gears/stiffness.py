@@ -87,12 +87,12 @@ class ToothCompliance:
 
     Attributes
     ----------
-    string : ndarray
-        String length of the loaded point, m.
+    roll_length : ndarray
+        Length of roll of the loaded point, m.
     bending, shear, axial, foundation : ndarray
     """
 
-    string: np.ndarray
+    roll_length: np.ndarray
     bending: np.ndarray
     shear: np.ndarray
     axial: np.ndarray
@@ -124,8 +124,8 @@ def tooth_compliance(gear: GearSpec, crack: Crack | None = None, root_angle: flo
     G = E / (2 * (1 + gear.material.poisson_ratio))
     half, height = rack_root(gear)
     start = math.sqrt(max(half[-1] ** 2 + height[-1] ** 2 - rb**2, 0.0))
-    string = np.linspace(start, gear.tip_string, 2 * POINTS)
-    beta = string / rb - psi
+    roll_length = np.linspace(start, gear.tip_roll_length, 2 * POINTS)
+    beta = roll_length / rb - psi
     x_load = rb * ((beta + psi) * np.cos(beta) - np.sin(beta))
     y_load = rb * ((beta + psi) * np.sin(beta) + np.cos(beta))
     x = np.concatenate([half, x_load[1:]])
@@ -158,7 +158,7 @@ def tooth_compliance(gear: GearSpec, crack: Crack | None = None, root_angle: flo
     }
     u = (y_load - gear.root_radius) / (2 * gear.root_radius * theta)
     foundation = cos**2 / (E * b) * (fit["L"] * u**2 + fit["M"] * u + fit["P"] * (1 + fit["Q"] * np.tan(beta) ** 2))
-    return ToothCompliance(string, bending, shear, axial, foundation)
+    return ToothCompliance(roll_length, bending, shear, axial, foundation)
 
 
 def hertz_stiffness(pair: GearPair) -> float:
@@ -169,7 +169,7 @@ def hertz_stiffness(pair: GearPair) -> float:
 
 def pair_stiffness(
     pair: GearPair,
-    string: np.ndarray,
+    roll_length: np.ndarray,
     cracks: tuple[Crack | None, Crack | None] = (None, None),
     root_angles: tuple[float | None, float | None] = (None, None),
 ) -> np.ndarray:
@@ -178,16 +178,16 @@ def pair_stiffness(
     Parameters
     ----------
     pair : GearPair
-    string : ndarray
-        Contact on wheel 1, as string length, m; beyond the profiles' ends the end values are used.
+    roll_length : ndarray
+        Contact on wheel 1, as length of roll, m; beyond the profiles' ends the end values are used.
     cracks, root_angles : tuple
         Per wheel, see `tooth_compliance`.
     """
-    mate = pair.line_of_action - string
-    total = np.full(np.shape(string), 1 / hertz_stiffness(pair))
-    for wheel, at, crack, angle in zip(pair.wheels, (string, mate), cracks, root_angles):
+    mate = pair.line_of_action - roll_length
+    total = np.full(np.shape(roll_length), 1 / hertz_stiffness(pair))
+    for wheel, at, crack, angle in zip(pair.wheels, (roll_length, mate), cracks, root_angles):
         tooth = tooth_compliance(wheel, crack, angle)
-        total = total + np.interp(at, tooth.string, tooth.total)
+        total = total + np.interp(at, tooth.roll_length, tooth.total)
     return 1 / total
 
 
@@ -242,7 +242,7 @@ def mesh_stiffness(
             "Crack, or loaded_transmission_error(pair, cycles=...).stiffness",
             stacklevel=2,
         )
-    begin = pair.line_of_action - pair.driven.tip_string
+    begin = pair.line_of_action - pair.driven.tip_roll_length
     pitch, ratio = pair.driver.base_pitch, pair.contact_ratio
     phase = np.arange(points) / points
     stiffness = np.zeros(points)

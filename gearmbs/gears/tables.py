@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.gears.canvas import COMPLIANCE_STATIONS, PROFILE_STATIONS, Canvas
 from gearmbs.gears.stiffness import pair_stiffness
+from gearmbs.gears.tooth_deviations import COMPLIANCE_POINTS, PROFILE_POINTS, ToothDeviations
 
 if TYPE_CHECKING:
     from gearmbs.gears.pair import GearPair
@@ -27,14 +27,14 @@ EDGE_BLEND = 1e-6
 def _pack_wheel(gear: GearSpec, gr: np.ndarray, base: int) -> None:
     gr[base + L.RB] = gear.base_radius
     gr[base + L.PSI] = gear.base_half_angle
-    gr[base + L.S_TIP] = gear.tip_string
+    gr[base + L.S_TIP] = gear.tip_roll_length
     gr[base + L.R_CORNER] = gear.corner_radius
     gr[base + L.PSI_CORNER] = gear.corner_half_angle
     gr[base + L.R_ROUND] = gear.tip_rounding
     gr[base + L.R_TIP] = gear.tip_radius
     gr[base + L.R_ROOT] = gear.root_radius
     gr[base + L.FACE] = gear.face_width
-    gr[base + L.S_FORM] = gear.form_string
+    gr[base + L.S_FORM] = gear.form_roll_length
     gr[base + L.R_FILLET] = gear.fillet_radius
     gr[base + L.R_FILLET_CENTRE] = gear.fillet_centre_radius
     gr[base + L.PSI_FILLET] = gear.fillet_half_angle
@@ -77,23 +77,23 @@ def pack(pair: GearPair, slices: int) -> tuple[np.ndarray, np.ndarray, int]:
     return gi, gr, L.work_size(slices)
 
 
-def compliance_stations(pair: GearPair) -> np.ndarray:
-    """String lengths on wheel 1 at which the compliance of a tooth pair is tabulated, m."""
+def compliance_roll_lengths(pair: GearPair) -> np.ndarray:
+    """Lengths of roll on wheel 1 at which the compliance of a tooth pair is tabulated, m."""
     first, second = pair.wheels
-    return np.linspace(pair.line_of_action - second.tip_string, first.tip_string, COMPLIANCE_STATIONS)
+    return np.linspace(pair.line_of_action - second.tip_roll_length, first.tip_roll_length, COMPLIANCE_POINTS)
 
 
-def canvases(pair: GearPair) -> tuple[Canvas, Canvas]:
-    """Deviations of all teeth of both wheels, with every fault drawn."""
+def tooth_deviations(pair: GearPair) -> tuple[ToothDeviations, ToothDeviations]:
+    """Deviations of all teeth of both wheels, with every fault applied."""
     along_face = any(fault.along_face for fault in pair.faults)
-    string = compliance_stations(pair)
-    drawn = (
-        Canvas(pair.wheels[0], pair.rotation, along_face, string),
-        Canvas(pair.wheels[1], pair.rotation, along_face, pair.line_of_action - string),
+    roll_length = compliance_roll_lengths(pair)
+    both = (
+        ToothDeviations(pair.wheels[0], pair.rotation, along_face, roll_length),
+        ToothDeviations(pair.wheels[1], pair.rotation, along_face, pair.line_of_action - roll_length),
     )
     for fault in pair.faults:
-        fault.draw(drawn[fault.wheel == "driven"], pair)
-    return drawn
+        fault.apply(both[fault.wheel == "driven"], pair)
+    return both
 
 
 def _numbered(rows: np.ndarray, plain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -104,41 +104,41 @@ def _numbered(rows: np.ndarray, plain: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def _pack_teeth(pair: GearPair, gi: np.ndarray, gr: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    drawn = canvases(pair)
-    nz = drawn[0].station.size
-    records = [c.offset.size for c in drawn]
+    both = tooth_deviations(pair)
+    nz = both[0].section.size
+    records = [c.offset.size for c in both]
     tooth = np.full((sum(records), L.TOOTH), -1, dtype=np.int64)
-    base_curve = np.ones(COMPLIANCE_STATIONS)
+    base_curve = np.ones(COMPLIANCE_POINTS)
     if pair.stiffness_curve == "potential-energy":
-        stiffness = pair_stiffness(pair, compliance_stations(pair))
+        stiffness = pair_stiffness(pair, compliance_roll_lengths(pair))
         base_curve = stiffness.max() / stiffness
     parts: dict[str, list[np.ndarray]] = {"offset": [], "shape": [], "tip": [], "compliance": []}
     counts = {"shape": 0, "tip": 0, "compliance": 0}
     added = 0.0
     start = 0
-    for k, canvas in enumerate(drawn):
+    for k, deviations in enumerate(both):
         rows = slice(start, start + records[k])
-        parts["offset"].append(canvas.offset.ravel())
+        parts["offset"].append(deviations.offset.ravel())
         kinds = (
-            ("shape", canvas.shape.reshape(records[k], -1), 0.0),
-            ("tip", canvas.tip.reshape(records[k], -1), canvas.gear.tip_string),
-            ("compliance", canvas.compliance.reshape(records[k], -1) * base_curve, 0.0),
+            ("shape", deviations.shape.reshape(records[k], -1), 0.0),
+            ("tip", deviations.tip.reshape(records[k], -1), deviations.gear.tip_roll_length),
+            ("compliance", deviations.compliance.reshape(records[k], -1) * base_curve, 0.0),
         )
         for column, (name, data, plain) in enumerate(kinds):
             number, distinct = _numbered(data, np.full(data.shape[1], plain))
             tooth[rows, column] = np.where(number < 0, -1, number + counts[name])
             counts[name] += len(distinct)
             parts[name].append(distinct.ravel())
-        removed = canvas.offset[:, :, None, None] + canvas.shape
+        removed = deviations.offset[:, :, None, None] + deviations.shape
         added += max(0.0, -float(removed.min()))
-        gr[k * L.WHEEL + L.SHAPE_DS] = canvas.string[1] - canvas.string[0]
+        gr[k * L.WHEEL + L.SHAPE_DS] = deviations.roll_length[1] - deviations.roll_length[0]
         start += records[k]
     gr[L.GAP_MARGIN] = added
     softened = pair.stiffness_curve != "constant" or (tooth[:, 2] >= 0).any()
     if softened:
-        stations = compliance_stations(pair)
-        gr[L.COMPLIANCE_S0] = stations[0]
-        gr[L.COMPLIANCE_DS] = stations[1] - stations[0]
+        at = compliance_roll_lengths(pair)
+        gr[L.COMPLIANCE_S0] = at[0]
+        gr[L.COMPLIANCE_DS] = at[1] - at[0]
         parts["compliance"].insert(0, base_curve)
     blocks = [gr]
     end = gr.size
@@ -154,8 +154,8 @@ def _pack_teeth(pair: GearPair, gi: np.ndarray, gr: np.ndarray) -> tuple[np.ndar
         block = np.concatenate(parts[name])
         blocks.append(block)
         end += block.size
-    gi[L.SHAPE_S] = PROFILE_STATIONS
+    gi[L.SHAPE_S] = PROFILE_POINTS
     gi[L.SHAPE_Z] = nz
-    gi[L.N_COMPLIANCE] = COMPLIANCE_STATIONS
+    gi[L.N_COMPLIANCE] = COMPLIANCE_POINTS
     gi[L.O_TOOTH] = gi.size
     return np.concatenate([gi, tooth.ravel()]), np.concatenate(blocks)

@@ -101,13 +101,13 @@ class StaticMesh:
         slope = -column[3:] + np.cross(arm, column[:3])
         return float(on_driven @ axis), float(slope @ axis)
 
-    def gaps(self, driver_angle: float, driven_angle: float, stations: np.ndarray | None = None) -> np.ndarray:
+    def gaps(self, driver_angle: float, driven_angle: float, sections: np.ndarray | None = None) -> np.ndarray:
         """Rows of ``gearmbs.contact.pair_gaps`` (by default at the ends of the common face, mid-face for one slice)."""
         place = self.pair.frames(driver_angle, driven_angle)
-        if stations is None:
-            stations = np.zeros(1 if self.gi[layout.N_SLICES] == 1 else 0)
+        if sections is None:
+            sections = np.zeros(1 if self.gi[layout.N_SLICES] == 1 else 0)
         count = pair_gaps(
-            self.gi, self.gr, place.origin_1, place.axes_1, place.origin_2, place.axes_2, stations, self.rows, self.work
+            self.gi, self.gr, place.origin_1, place.axes_1, place.origin_2, place.axes_2, sections, self.rows, self.work
         )
         return self.rows[:count]
 
@@ -266,8 +266,8 @@ def _passing(pair: GearPair, begin: float, end: float) -> tuple[set[int], set[in
     alpha = pair.working_pressure_angle
     middle = gear.base_radius * math.tan(alpha)
     centre = (math.tan(alpha) - gear.base_half_angle - alpha) * gear.teeth / (2 * math.pi)
-    first = (pair.line_of_action - mate.tip_string - middle) / gear.base_pitch
-    last = (gear.tip_string - middle) / gear.base_pitch
+    first = (pair.line_of_action - mate.tip_roll_length - middle) / gear.base_pitch
+    last = (gear.tip_roll_length - middle) / gear.base_pitch
     # the tooth of the driven wheel that tooth 0 of the driver meets
     mesh = StaticMesh(pair)
     angle = pair.rotation * centre * 2 * math.pi / gear.teeth

@@ -5,7 +5,7 @@ import gearmbs.mechanism.expression  # noqa: F401  (first, so that the function 
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
 from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
 from gearmbs.mechanism.elements import GearContact, Load, State, Torque
-from gearmbs.mechanism.friction import Friction
+from gearmbs.mechanism.friction import JointFriction
 from gearmbs.mechanism.functions import TimeFunction, constant, expression, harmonic, polynomial, ramp, step
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.mechanism import Mechanism
@@ -15,9 +15,9 @@ from gearmbs.mechanism.simulate import simulate
 __all__ = [
     "AssemblyError",
     "Body",
-    "Friction",
     "GearContact",
     "Joint",
+    "JointFriction",
     "Load",
     "Marker",
     "Mechanism",

@@ -52,7 +52,7 @@ TINY = 1e-6
 
 
 @dataclass(frozen=True)
-class Friction:
+class JointFriction:
     """Parameters of a joint's friction, in the mechanism's units (SI unless read from a deck).
 
     Attributes
@@ -143,7 +143,7 @@ DIMENSIONS = {
 """Dimension of each parameter with a unit, for texts and in the function language."""
 
 
-def friction_of(name: str, mu_static: float, mu_dynamic: float, parameters: dict, units: Units) -> Friction:
+def friction_of(name: str, mu_static: float, mu_dynamic: float, parameters: dict, units: Units) -> JointFriction:
     """Return the parameters of a friction given as keywords; texts with a unit become numbers in ``units``.
 
     Raises
@@ -156,7 +156,7 @@ def friction_of(name: str, mu_static: float, mu_dynamic: float, parameters: dict
         quantity(value, "dimensionless", f"{label}: {field}")
         for field, value in (("mu_static", mu_static), ("mu_dynamic", mu_dynamic))
     )
-    known = [f.name for f in fields(Friction)]
+    known = [f.name for f in fields(JointFriction)]
     for key in parameters:
         if key not in known:
             raise ModelError(f"friction '{name}': {key!r} is no parameter; there are {', '.join(known)}")
@@ -164,10 +164,10 @@ def friction_of(name: str, mu_static: float, mu_dynamic: float, parameters: dict
     for key, (unit, dimension) in DIMENSIONS.items():
         if given.get(key) is not None:
             given[key] = quantity(given[key], unit, f"{label}: {key}", units.factor(dimension))
-    return Friction(mu_static, mu_dynamic, **given)
+    return JointFriction(mu_static, mu_dynamic, **given)
 
 
-def add_friction(mechanism: Mechanism, name: str, joint: Joint, friction: Friction) -> list[Load]:
+def add_friction(mechanism: Mechanism, name: str, joint: Joint, friction: JointFriction) -> list[Load]:
     """Add a joint's friction to a mechanism: its states, variables and loads; return the loads.
 
     Raises
@@ -184,7 +184,7 @@ def add_friction(mechanism: Mechanism, name: str, joint: Joint, friction: Fricti
 class _Writer:
     """Writes one joint's friction in the function language."""
 
-    def __init__(self, mechanism: Mechanism, name: str, joint: Joint, friction: Friction) -> None:
+    def __init__(self, mechanism: Mechanism, name: str, joint: Joint, friction: JointFriction) -> None:
         self.mechanism, self.name, self.joint, self.f = mechanism, name, joint, friction
         self.i, self.j = joint.i, joint.j
         self.vs = float(friction.stiction_transition_velocity)

@@ -345,7 +345,7 @@ class Mechanism(LoadMethods):
         mu_static, mu_dynamic : float
             Coefficients of friction.
         **parameters
-            Radii, arms, preloads, transition velocity: see :class:`gearmbs.mechanism.Friction`.
+            Radii, arms, preloads, transition velocity: see :class:`gearmbs.mechanism.JointFriction`.
 
         Raises
         ------

@@ -32,7 +32,6 @@ from .indicators import (
     sideband_level,
 )
 from .io import FORMATS, read_signal, write_signal
-from .newton import COMPONENTS, force_components, force_to_acceleration
 from .orders import harmonic_amplitudes
 from .ordinal import level_distance, ordinal_agreement
 from .phase import instantaneous_speed, phase_from_line, phase_from_speed, phase_from_tacho
@@ -50,6 +49,7 @@ from .sensors import (
     quantise,
     sample,
 )
+from .shaft_force import COMPONENTS, force_components, force_to_acceleration
 from .signal import (
     as_signal,
     common_unit,

@@ -9,11 +9,11 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
+from .dimensions import DIMENSIONS, unit_dimension
 from .errors import SignalError
-from .kinds import KINDS, unit_kind
 from .signal import like, rate_of, units_of
 
-Kind = Literal["displacement", "velocity", "acceleration"]
+Dimension = Literal["displacement", "velocity", "acceleration"]
 DERIVATIVE = {"displacement": 0, "velocity": 1, "acceleration": 2}
 TAPER = 0.25
 EDGE_PERIODS = 6.0
@@ -21,7 +21,7 @@ EDGE_PERIODS = 6.0
 
 def convert(
     signal: xr.DataArray,
-    to: Kind,
+    to: Dimension,
     *,
     band: tuple[float, float],
     edges: Literal["trim", "keep"] = "trim",
@@ -75,11 +75,11 @@ def convert(
     pad = min(n - 1, margin)
     columns = []
     for column, unit in zip(signal.values.T, units_of(signal)):
-        kind, factor = unit_kind(unit)
-        if kind not in DERIVATIVE:
-            raise SignalError(f"units: {unit!r} measures {kind}, which cannot be converted to {to}")
+        dimension, factor = unit_dimension(unit)
+        if dimension not in DERIVATIVE:
+            raise SignalError(f"units: {unit!r} is a unit of {dimension}, which cannot be converted to {to}")
         column = factor * (column - column.mean())
-        power = DERIVATIVE[to] - DERIVATIVE[kind]
+        power = DERIVATIVE[to] - DERIVATIVE[dimension]
         if edges == "trim":
             fade = _fade(margin // 2)
             column[: fade.size] *= fade
@@ -91,7 +91,11 @@ def convert(
             columns.append(_multiply(extended, rate, power, low, high, 0)[pad : pad + n])
     first = margin if edges == "trim" else 0
     return like(
-        signal, np.stack(columns, axis=1), t0=float(signal["time"].values[first]), units=KINDS[to], band=(low, high)
+        signal,
+        np.stack(columns, axis=1),
+        t0=float(signal["time"].values[first]),
+        units=DIMENSIONS[to],
+        band=(low, high),
     )
 
 

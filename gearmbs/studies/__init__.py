@@ -6,11 +6,11 @@ from gearmbs._lazy import late
 from gearmbs.studies.case import Case, CaseError, load_case, make_case
 
 if TYPE_CHECKING:
-    from gearmbs.studies.exchange import record_signal
+    from gearmbs.signals.simulated import record_signal
     from gearmbs.studies.paper import Claim, PaperStudy, paper_cases, run_paper
     from gearmbs.studies.parallel import run_cases
     from gearmbs.studies.rig import gear_rig
-    from gearmbs.studies.run import SimulationFailed, SimulationInterrupted, run_case, simulate_case
+    from gearmbs.studies.simulation import SimulationFailed, SimulationInterrupted, run_case, simulate_case
 
 __all__ = [
     "Case",
@@ -34,16 +34,16 @@ __all__ = [
 __getattr__ = late(
     __name__,
     {
-        "record_signal": "gearmbs.studies.exchange",
+        "record_signal": "gearmbs.signals.simulated",
         "Claim": "gearmbs.studies.paper",
         "PaperStudy": "gearmbs.studies.paper",
         "paper_cases": "gearmbs.studies.paper",
         "run_paper": "gearmbs.studies.paper",
         "run_cases": "gearmbs.studies.parallel",
         "gear_rig": "gearmbs.studies.rig",
-        "SimulationFailed": "gearmbs.studies.run",
-        "SimulationInterrupted": "gearmbs.studies.run",
-        "run_case": "gearmbs.studies.run",
-        "simulate_case": "gearmbs.studies.run",
+        "SimulationFailed": "gearmbs.studies.simulation",
+        "SimulationInterrupted": "gearmbs.studies.simulation",
+        "run_case": "gearmbs.studies.simulation",
+        "simulate_case": "gearmbs.studies.simulation",
     },
 )

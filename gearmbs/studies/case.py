@@ -127,7 +127,7 @@ def _fault_tables(value: Any) -> tuple[dict[str, Any], ...]:
 ToothFaults = Annotated[tuple[dict[str, Any], ...], BeforeValidator(_fault_tables)]
 
 
-class Fault(_Section):
+class FaultSettings(_Section):
     """Deviations of the pair: axes, distance, backlash; and ``teeth``, faults of teeth by name or as tables.
 
     In a case file a fault of a tooth is a table ``[[fault.teeth]]`` with ``kind = "broken tooth"`` and the parameters
@@ -243,7 +243,7 @@ class Case(_Section):
     gears: Gears = Field(default_factory=Gears)
     shafts: Shafts = Field(default_factory=Shafts)
     operation: Operation = Field(default_factory=Operation)
-    fault: Fault = Field(default_factory=Fault)
+    fault: FaultSettings = Field(default_factory=FaultSettings)
     contact: Contact = Field(default_factory=Contact)
     friction: FrictionSettings = Field(default_factory=FrictionSettings)
     solver: Solver = Field(default_factory=Solver)
@@ -256,7 +256,7 @@ class Case(_Section):
         ValueError
             If the wheels are impossible or do not mesh.
         """
-        from gearmbs.gears import ContactLaw, Friction, GearPair, GearSpec, Material
+        from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, Material
         from gearmbs.studies.tooth_faults import tooth_fault
 
         g, f, c, r = self.gears, self.fault, self.contact, self.friction
@@ -282,7 +282,9 @@ class Case(_Section):
             )
             wheels.append(wheel)
         law = ContactLaw.impact(stiffness=c.stiffness, exponent=c.exponent, damping=c.damping, depth=c.depth)
-        friction = Friction(r.static, r.dynamic, r.static_speed, r.dynamic_speed) if r.enabled else Friction.none()
+        friction = (
+            FlankFriction(r.static, r.dynamic, r.static_speed, r.dynamic_speed) if r.enabled else FlankFriction.none()
+        )
         return GearPair(
             wheels[0],
             wheels[1],
@@ -347,10 +349,10 @@ def make_case(data: dict[str, Any], source: str = "case") -> Case:
     except ValueError as error:
         raise CaseError(f"{source}: {error}") from error
     if pair.faults:
-        from gearmbs.studies.tooth_faults import draw_alone
+        from gearmbs.studies.tooth_faults import check_each_fault
 
         try:
-            draw_alone(pair)
+            check_each_fault(pair)
         except ValueError as error:
             raise CaseError(f"{source}: fault.teeth{error}") from error
     if pair.misalignment == 0.0 and pair.jams:

@@ -13,7 +13,7 @@ import xarray as xr
 from gearmbs.studies.case import Case
 from gearmbs.studies.limits import check_record
 from gearmbs.studies.processes import run_jobs
-from gearmbs.studies.run import run_case
+from gearmbs.studies.simulation import run_case
 
 REPORT_SECONDS = 0.2
 """Shortest time between two reports of a process."""

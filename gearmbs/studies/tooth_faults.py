@@ -11,7 +11,7 @@ from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
 from gearmbs.gears import faults
-from gearmbs.gears.tables import canvases
+from gearmbs.gears.tables import tooth_deviations
 
 if TYPE_CHECKING:
     from gearmbs.gears.pair import GearPair
@@ -70,8 +70,8 @@ def fault_tables(value: Any) -> tuple[dict[str, Any], ...]:
     return tuple(fault_table(_placed(one, place)) for place, one in enumerate(several))
 
 
-def draw_alone(pair: GearPair) -> None:
-    """Draw every fault of a pair by itself, to find those that do not fit their wheel before anything is run.
+def check_each_fault(pair: GearPair) -> None:
+    """Apply every fault of a pair by itself, to find those that do not fit their wheel before anything is run.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def draw_alone(pair: GearPair) -> None:
     """
     for place, fault in enumerate(pair.faults):
         try:
-            canvases(pair.with_changes(faults=(fault,)))
+            tooth_deviations(pair.with_changes(faults=(fault,)))
         except ValueError as error:
             raise ValueError(_at(place, fault, error)) from error
 

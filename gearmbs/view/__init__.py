@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gearmbs.view.animation import MeshAnimation, mesh_animation
     from gearmbs.view.bars import comparison_bars, gmf_bars
-    from gearmbs.view.canvas import COLOURS, save_figure
     from gearmbs.view.contacts import ContactPoints, ContactProbe
     from gearmbs.view.curves import contact_pattern_plot, load_sharing_plot, stiffness_plot, transmission_error_plot
     from gearmbs.view.export_dxf import write_dxf
     from gearmbs.view.export_step import write_step
     from gearmbs.view.export_stl import read_stl, write_stl
+    from gearmbs.view.figure_style import COLOURS, save_figure
     from gearmbs.view.maps import sensitivity_map
     from gearmbs.view.mesh import Mesh
     from gearmbs.view.motion import PairMotion, solution_motion, static_motion
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from gearmbs.view.transverse import mesh_view
 
 _HOMES = {
-    "COLOURS": "canvas",
+    "COLOURS": "figure_style",
     "ContactPoints": "contacts",
     "ContactProbe": "contacts",
     "Mesh": "mesh",
@@ -57,7 +57,7 @@ _HOMES = {
     "pair_solids": "solid",
     "profile_area": "outline",
     "read_stl": "export_stl",
-    "save_figure": "canvas",
+    "save_figure": "figure_style",
     "sensitivity_map": "maps",
     "solution_motion": "motion",
     "solution_scene": "scenes",

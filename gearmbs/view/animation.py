@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.gears import GearPair
-from gearmbs.view.canvas import png_bytes
 from gearmbs.view.contacts import ContactPoints, ContactProbe, mean_frame
+from gearmbs.view.figure_style import png_bytes
 from gearmbs.view.files import whole_file
 from gearmbs.view.motion import (
     PairMotion,
@@ -40,15 +40,15 @@ class MeshAnimation(Page):
     """
 
     def __init__(
-        self, motion: PairMotion, title: str = "Gear mesh", width: float | None = None, station: float = 0.0
+        self, motion: PairMotion, title: str = "Gear mesh", width: float | None = None, section: float = 0.0
     ) -> None:
         self.motion = motion
         self.points = ContactProbe(motion.pair).over(motion)
         self.span = 7.0 * motion.pair.driver.module if width is None else float(width)
-        self.station = station
+        self.section = section
         if not self.span > 0.0:
             raise ValueError(f"width is {width} m; give a positive width of the detail")
-        data = _page_data(motion, self.points, self.span, station)
+        data = _page_data(motion, self.points, self.span, section)
         super().__init__(title, f"{len(motion)} instants", ("player.js", "transverse.js"), data)
 
     def save(self, path: str | Path) -> Path:
@@ -64,7 +64,7 @@ class MeshAnimation(Page):
                 place=self.motion.placement(k),
                 points=self.points[k],
                 width=self.span,
-                station=self.station,
+                section=self.section,
                 title=f"{self.title}: {self.motion.label} {self.motion.value[k]:.5f} {self.motion.unit}",
             )
             images.append(
@@ -84,7 +84,7 @@ def mesh_animation(
     frames: int = 120,
     torque: float | None = None,
     width: float | None = None,
-    station: float = 0.0,
+    section: float = 0.0,
     title: str | None = None,
 ) -> MeshAnimation:
     """Animate the teeth in mesh with their contact forces.
@@ -103,7 +103,7 @@ def mesh_animation(
         Load of a pair at rest, N m; default the pair's.
     width : float, optional
         Width of the detail, m; default seven modules.
-    station : float
+    section : float
         Section along the face, m from mid-face.
     title : str, optional
 
@@ -120,11 +120,11 @@ def mesh_animation(
     """
     if isinstance(source, GearPair):
         motion = static_motion(source, torque=torque, pitches=2.0, frames=frames)
-        return MeshAnimation(motion, title or "Gear mesh at rest under load", width, station)
+        return MeshAnimation(motion, title or "Gear mesh at rest under load", width, section)
     if start is None:
         start = _last_cycles(source, element, stop)
     motion = solution_motion(source, element=element, start=start, stop=stop, frames=frames)
-    return MeshAnimation(motion, title or "Gear mesh, simulated", width, station)
+    return MeshAnimation(motion, title or "Gear mesh, simulated", width, section)
 
 
 def _last_cycles(solution: Solution, element: str | None, stop: float | None, cycles: float = 3.0) -> float:
@@ -139,13 +139,13 @@ def _last_cycles(solution: Solution, element: str | None, stop: float | None, cy
     return max(begin, end - cycles * 2.0 * math.pi / (speed * contact.pair.driver.teeth))
 
 
-def _page_data(motion: PairMotion, points: list[ContactPoints], span: float, station: float) -> dict:
+def _page_data(motion: PairMotion, points: list[ContactPoints], span: float, section: float) -> dict:
     """Return what the page draws: lengths in mm, in the mean frame of each instant."""
     pair = motion.pair
     means = [mean_frame(motion.placement(k)) for k in range(len(motion))]
     wheels = []
     for w, (wheel, deviation) in enumerate(zip(pair.wheels, pair_deviations(pair))):
-        outline = section_outline(wheel, station, TOLERANCE, deviation)
+        outline = section_outline(wheel, section, TOLERANCE, deviation)
         wheels.append(
             {
                 "name": ("driver", "driven")[w],
@@ -154,7 +154,7 @@ def _page_data(motion: PairMotion, points: list[ContactPoints], span: float, sta
                 "outline": packed(outline * MM),
                 "bore": wheel.bore_radius * MM,
                 "base": wheel.base_radius * MM,
-                "maps": [_affine(motion, w, k, means[k], station) for k in range(len(motion))],
+                "maps": [_affine(motion, w, k, means[k], section) for k in range(len(motion))],
             }
         )
     largest = max((float(np.linalg.norm(f)) for p in points for *_, f in p.pairs()), default=1.0)
@@ -189,10 +189,10 @@ def _page_data(motion: PairMotion, points: list[ContactPoints], span: float, sta
     }
 
 
-def _affine(motion: PairMotion, wheel: int, k: int, mean: np.ndarray, station: float) -> list[float]:
+def _affine(motion: PairMotion, wheel: int, k: int, mean: np.ndarray, section: float) -> list[float]:
     """Return the six numbers of the map from a wheel's section to the plane of the picture, mm."""
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     zero, x, y = projected(
-        corners, motion.origins[wheel, k], motion.axes[wheel, k], motion.origins[0, k], mean, station
+        corners, motion.origins[wheel, k], motion.axes[wheel, k], motion.origins[0, k], mean, section
     )
     return rounded([*(x - zero), *(y - zero), *(zero * MM)], 9)

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gearmbs.view.canvas import BLUE, COLOURS, GREEN, ORANGE, drawn_on, label, legend_below, look, new_figure
+from gearmbs.view.figure_style import BLUE, COLOURS, GREEN, ORANGE, drawn_on, label, legend_below, look, new_figure
 
 STATE_COLOURS = {"healthy": BLUE, "misaligned": ORANGE, "distance": GREEN}
 HATCHES = ("", "///", "...", "xxx", "\\\\\\", "++")

@@ -16,19 +16,19 @@ COLUMN = {name: k for k, name in enumerate(GAP_COLUMNS)}
 MAX_PAIRS = 60
 """More tooth pairs, of both sides, than are ever within reach."""
 
-STATIONS = 21
+SECTIONS = 21
 
 
 @dataclass(frozen=True)
 class ContactPoints:
-    """Touching places, k of them: one a tooth pair and station of the face.
+    """Touching places, k of them: one a tooth pair and section of the face.
 
     Attributes
     ----------
     side : ndarray of int
         +1 where the driver's anticlockwise flank presses, -1 the other.
     tooth_1, tooth_2 : ndarray of int
-    station : ndarray
+    section : ndarray
         Along the face, m.
     depth : ndarray
         Penetration, m.
@@ -39,13 +39,13 @@ class ContactPoints:
     normal : ndarray, shape (k, 3)
         Direction in which the driver pushes the driven wheel, global.
     force : ndarray
-        Normal force of the station's part of the face, N.
+        Normal force of the section's part of the face, N.
     """
 
     side: np.ndarray
     tooth_1: np.ndarray
     tooth_2: np.ndarray
-    station: np.ndarray
+    section: np.ndarray
     depth: np.ndarray
     kind: np.ndarray
     point: np.ndarray
@@ -68,17 +68,17 @@ class ContactPoints:
 class ContactProbe:
     """Finds the touching places of a pair in any pose."""
 
-    def __init__(self, pair: GearPair, stations: int | None = None) -> None:
+    def __init__(self, pair: GearPair, sections: int | None = None) -> None:
         self.pair = pair
         self.gi, self.gr, size = pair.contact_tables()
         self.work = np.zeros(size)
-        if stations is not None and stations < 1:
-            raise ValueError(f"stations is {stations}; give 1 or more")
+        if sections is not None and sections < 1:
+            raise ValueError(f"sections is {sections}; give 1 or more")
         low, high = pair.common_face
         single = pair.face_slices == 1
-        count = 1 if single else (STATIONS if stations is None else stations)
+        count = 1 if single else (SECTIONS if sections is None else sections)
         self.width = pair.common_face_width / count if single else (high - low) / count
-        self.stations = np.zeros(1) if single else low + (np.arange(count) + 0.5) * self.width
+        self.sections = np.zeros(1) if single else low + (np.arange(count) + 0.5) * self.width
         self.rows = np.zeros((MAX_PAIRS * max(2, count), len(GAP_COLUMNS)))
 
     def at(
@@ -95,7 +95,7 @@ class ContactProbe:
         velocities, spins : pair of ndarray, optional
             Velocities of the wheels' origins and angular velocities, global; default at rest. They enter the damping.
         """
-        rows = self._rows(place, self.stations)
+        rows = self._rows(place, self.sections)
         touching = rows[:, COLUMN["gap"]] < 0.0
         width = self._widths(place, rows)[touching]
         rows = rows[touching]
@@ -121,7 +121,7 @@ class ContactProbe:
             side=side.astype(int),
             tooth_1=rows[:, COLUMN["tooth_1"]].astype(int),
             tooth_2=rows[:, COLUMN["tooth_2"]].astype(int),
-            station=rows[:, COLUMN["station"]],
+            section=rows[:, COLUMN["station"]],
             depth=depth,
             kind=rows[:, COLUMN["kind"]].astype(int),
             point=point,
@@ -140,18 +140,18 @@ class ContactProbe:
             for k in range(len(motion))
         ]
 
-    def _rows(self, place: Placement, stations: np.ndarray) -> np.ndarray:
+    def _rows(self, place: Placement, sections: np.ndarray) -> np.ndarray:
         frames = [np.ascontiguousarray(a) for a in (place.origin_1, place.axes_1, place.origin_2, place.axes_2)]
-        count = pair_gaps(self.gi, self.gr, *frames, stations, self.rows, self.work)
+        count = pair_gaps(self.gi, self.gr, *frames, sections, self.rows, self.work)
         return self.rows[:count].copy()
 
     def _widths(self, place: Placement, rows: np.ndarray) -> np.ndarray:
         """Return the part of the face each row stands for: tilt moves the ends of the faces along the teeth."""
-        count = self.stations.size
+        count = self.sections.size
         if count == 1 or len(rows) == 0:
             return np.full(len(rows), self.width)
         ends = self._rows(place, np.zeros(0))[:, COLUMN["station"]].reshape(-1, 1, 2)
-        low, high = self.stations - 0.5 * self.width, self.stations + 0.5 * self.width
+        low, high = self.sections - 0.5 * self.width, self.sections + 0.5 * self.width
         low = np.where(np.arange(count) == 0, -np.inf, low)
         high = np.where(np.arange(count) == count - 1, np.inf, high)
         return np.maximum(0.0, np.minimum(high, ends[:, :, 1]) - np.maximum(low, ends[:, :, 0])).ravel()

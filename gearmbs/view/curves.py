@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from gearmbs.gears import GearPair, TransmissionError
 from gearmbs.gears.pattern import ContactPattern
-from gearmbs.view.canvas import BLUE, COLOURS, VERMILLION, drawn_on, label, legend_below, look
+from gearmbs.view.figure_style import BLUE, COLOURS, VERMILLION, drawn_on, label, legend_below, look
 
 DASHES = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (7, 2, 1, 2)), (0, (1, 1)))
 
@@ -91,12 +91,12 @@ def contact_pattern_plot(
     title : str, optional
     ax : matplotlib axes, optional
     """
-    station, roll = np.asarray(pattern.station) * 1e3, np.rad2deg(pattern.roll_angle)
+    section, roll = np.asarray(pattern.section) * 1e3, np.rad2deg(pattern.roll_angle)
     pressure = np.ma.masked_less_equal(np.asarray(pattern.pressure, dtype=float) * 1e-3, 0.0)
     with look():
         figure, ax = drawn_on(ax, 6.6, 4.4)
         top = max(float(pressure.max()) if pressure.count() else 1.0, 1e-12)
-        mesh = ax.pcolormesh(station, roll, pressure, cmap="cividis", vmin=0.0, vmax=top, shading="nearest")
+        mesh = ax.pcolormesh(section, roll, pressure, cmap="cividis", vmin=0.0, vmax=top, shading="nearest")
         ax.set_facecolor("#ECEDEF")
         ax.grid(visible=False)
         if pair is not None:
@@ -116,8 +116,11 @@ def _path_ends(ax: Axes, pair: GearPair) -> None:
     """Mark where the tooth enters and leaves the path of contact of parallel wheels."""
     first, second = pair.wheels
     middle = first.base_radius * np.tan(pair.working_pressure_angle)
-    begin = pair.line_of_action - second.tip_string - middle
-    for way, text, where in ((begin, "start of path", "top"), (first.tip_string - middle, "end of path", "bottom")):
+    begin = pair.line_of_action - second.tip_roll_length - middle
+    for way, text, where in (
+        (begin, "start of path", "top"),
+        (first.tip_roll_length - middle, "end of path", "bottom"),
+    ):
         angle = np.rad2deg(way / first.base_radius)
         ax.axhline(angle, color=VERMILLION, linewidth=0.9, linestyle=(0, (5, 3)))
         shift = -3 if where == "top" else 3

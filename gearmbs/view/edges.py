@@ -124,12 +124,12 @@ def _flank_edges(gear: GearSpec) -> list[Edge]:
     edges: list[Edge] = [Arc(foot, form, centre, -1)]
     if gear.form_radius < gear.base_radius * (1.0 - 1e-12):
         edges.append(Line(form, polar(gear.base_radius, -gear.base_half_angle)))
-    string = np.linspace(gear.form_string, gear.tip_string, SPLINE_POINTS)
-    radius = np.hypot(gear.base_radius, string)
-    angle = np.array([involute(math.atan2(s, gear.base_radius)) - gear.base_half_angle for s in string])
+    roll_length = np.linspace(gear.form_roll_length, gear.tip_roll_length, SPLINE_POINTS)
+    radius = np.hypot(gear.base_radius, roll_length)
+    angle = np.array([involute(math.atan2(s, gear.base_radius)) - gear.base_half_angle for s in roll_length])
     points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
     points[0] = edges[-1].stop
-    spline = make_interp_spline(string / string[-1], points, k=DEGREE)
+    spline = make_interp_spline(roll_length / roll_length[-1], points, k=DEGREE)
     control = spline.c.copy()
     control[0], control[-1] = points[0], points[-1]
     edges.append(Spline(control, spline.t))

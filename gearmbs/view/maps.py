@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 
-from gearmbs.view.canvas import drawn_on, label, look, new_figure
+from gearmbs.view.figure_style import drawn_on, label, look, new_figure
 
 SEQUENTIAL, DIVERGING = "cividis", "PuOr_r"
 SHOWN_UNITS = {"m": ("mm", 1e3), "rad": ("°", 180.0 / np.pi), "rad/s": ("rpm", 30.0 / np.pi), "N/m": ("N/µm", 1e-6)}

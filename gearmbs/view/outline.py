@@ -121,7 +121,7 @@ def profile_area(gear: GearSpec) -> float:
     mass of the simulated wheel is that of a disc of the pitch radius (`GearSpec.mass`); this is the true profile's.
     """
     start = max(gear.form_radius, gear.base_radius)
-    tip_form = math.hypot(gear.base_radius, gear.tip_string)
+    tip_form = math.hypot(gear.base_radius, gear.tip_roll_length)
     root = gear.root_radius**2 * (math.pi / gear.teeth - gear.fillet_half_angle)
     low, high = _root_arc_span(gear)
     arm = gear.fillet_centre_radius * (math.sin(low) - math.sin(high))
@@ -150,14 +150,14 @@ def _root_arc(gear: GearSpec, tolerance: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def _flank(gear: GearSpec, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Involute from where it begins to the tip (or its rounding), by equal steps of the square root of the string."""
-    low, high = gear.form_string, gear.tip_string
-    # a chord of roll angle du on an involute of string s departs by s du^2 r_b / (8 r_b) = s du^2 / 8
+    """Involute from where it begins to the tip (or its rounding), by equal steps of the root of the length of roll."""
+    low, high = gear.form_roll_length, gear.tip_roll_length
+    # a chord of roll angle du on an involute at length of roll s departs by s du^2 r_b / (8 r_b) = s du^2 / 8
     roll = (high - low) / gear.base_radius
     count = max(FEWEST, math.ceil(roll * math.sqrt(high / (8.0 * tolerance))))
-    string = np.linspace(low, high, count + 1)
-    radius = np.hypot(gear.base_radius, string)
-    angle = np.array([gear.base_half_angle - involute(math.atan2(s, gear.base_radius)) for s in string])
+    roll_length = np.linspace(low, high, count + 1)
+    radius = np.hypot(gear.base_radius, roll_length)
+    angle = np.array([gear.base_half_angle - involute(math.atan2(s, gear.base_radius)) for s in roll_length])
     if gear.tip_rounding == 0.0:
         radius[-1] = gear.tip_radius
     if gear.form_radius < gear.base_radius * (1.0 - 1e-12):
@@ -168,7 +168,7 @@ def _flank(gear: GearSpec, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _tip_arc_span(gear: GearSpec) -> tuple[float, float]:
     """Directions from the rounding's centre, against the radial direction, of its ends on flank and tip circle, rad."""
-    form = math.hypot(gear.base_radius, gear.tip_string)
+    form = math.hypot(gear.base_radius, gear.tip_roll_length)
     polar = gear.base_half_angle - involute(math.acos(gear.base_radius / form)) - gear.corner_half_angle
     along, across = form * math.cos(polar) - gear.corner_radius, form * math.sin(polar)
     return (math.atan2(across, along) if gear.tip_rounding > 0.0 else 0.0), 0.0

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.view.canvas import VERMILLION
+from gearmbs.view.figure_style import VERMILLION
 from gearmbs.view.scene import Scene
 from gearmbs.view.shading import feature_edges
 

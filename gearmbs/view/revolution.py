@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from gearmbs.view.bars import state_colour
-from gearmbs.view.canvas import GREY, drawn_on, label, look, new_figure
+from gearmbs.view.figure_style import GREY, drawn_on, label, look, new_figure
 from gearmbs.view.signals import KINDS
 
 MOST_TICKS = 60

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from gearmbs.view.canvas import VERMILLION, look, new_figure
+from gearmbs.view.figure_style import VERMILLION, look, new_figure
 from gearmbs.view.mesh import Mesh
 from gearmbs.view.render import Camera, render
 from gearmbs.view.shading import corner_normals

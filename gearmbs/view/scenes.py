@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.gears import GearPair
-from gearmbs.view.canvas import BLUE, COLOURS, GREY, ORANGE
 from gearmbs.view.contacts import ContactProbe
+from gearmbs.view.figure_style import BLUE, COLOURS, GREY, ORANGE
 from gearmbs.view.mesh import Mesh, ball, box, cylinder, joined, rod
 from gearmbs.view.motion import PairMotion, chosen_times, marker_motion, mechanism_of, static_motion
 from gearmbs.view.scene import UP, Part, Scene

@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gearmbs.view.canvas import BLUE, VERMILLION, drawn_on, label, look, new_figure
+from gearmbs.view.figure_style import BLUE, VERMILLION, drawn_on, label, look, new_figure
 
 MAX_POINTS = 20_000
 """More points than this in a line are drawn as the envelope of minima and maxima."""

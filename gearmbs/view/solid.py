@@ -17,8 +17,8 @@ from gearmbs.view.outline import TOLERANCE, arc_chords, half_tooth, land_angles
 class Deviations(Protocol):
     """What single teeth do differently, tabulated over profile and face, as `gearmbs.gears` collects it."""
 
-    string: np.ndarray
-    station: np.ndarray
+    roll_length: np.ndarray
+    section: np.ndarray
     offset: np.ndarray
     shape: np.ndarray
     tip: np.ndarray
@@ -26,9 +26,9 @@ class Deviations(Protocol):
 
 @dataclass(frozen=True)
 class _Teeth:
-    """Radii and angles of all teeth: arrays of shape (stations, teeth, n); side 0 is the anticlockwise flank."""
+    """Radii and angles of all teeth: arrays of shape (sections, teeth, n); side 0 is the anticlockwise flank."""
 
-    station: np.ndarray
+    section: np.ndarray
     radius: np.ndarray
     angle: tuple[np.ndarray, np.ndarray]
 
@@ -55,9 +55,9 @@ def pair_deviations(pair: GearPair) -> tuple[Deviations | None, Deviations | Non
     """Return the deviations of driver and driven, None for perfect wheels."""
     if not pair.faults:
         return None, None
-    from gearmbs.gears.tables import canvases
+    from gearmbs.gears.tables import tooth_deviations
 
-    return canvases(pair)
+    return tooth_deviations(pair)
 
 
 def gear_solid(
@@ -88,8 +88,8 @@ def gear_solid(
     between = land_angles(gear, tolerance).size - 1
     builder = _Builder()
     rims, grids = [], []
-    last = teeth.station.size - 1
-    for j, z in enumerate(teeth.station):
+    last = teeth.section.size - 1
+    for j, z in enumerate(teeth.section):
         cap = j in (0, last)
         rim, grid = _section(builder, teeth, j, float(z), across, between, gear, cap)
         rims.append(rim)
@@ -101,7 +101,7 @@ def gear_solid(
         rows, ring = grids[j]
         for tooth in rows:
             builder.patch(tooth, up)
-        inner.append(_hub(builder, ring, gear, float(teeth.station[j]), up))
+        inner.append(_hub(builder, ring, gear, float(teeth.section[j]), up))
     if gear.bore_radius > 0.0:
         builder.wall(inner[1], inner[0])
     return builder.mesh()
@@ -111,30 +111,30 @@ def _teeth(gear: GearSpec, tolerance: float, deviations: Deviations | None, exag
     half = half_tooth(gear, tolerance)
     n, rb = half.radius.size, gear.base_radius
     if deviations is None:
-        station = np.array([-0.5, 0.5]) * gear.face_width
-        shape = (station.size, gear.teeth, n)
+        section = np.array([-0.5, 0.5]) * gear.face_width
+        shape = (section.size, gear.teeth, n)
         angle = np.broadcast_to(half.half_angle, shape)
-        return _Teeth(station, np.broadcast_to(half.radius, shape), (angle, angle))
-    station = np.asarray(deviations.station)
-    radius = np.empty((station.size, gear.teeth, n))
+        return _Teeth(section, np.broadcast_to(half.radius, shape), (angle, angle))
+    section = np.asarray(deviations.section)
+    radius = np.empty((section.size, gear.teeth, n))
     angles = (np.empty_like(radius), np.empty_like(radius))
     tips = np.hypot(rb, np.minimum(deviations.tip[0], deviations.tip[1]))
-    whole = math.hypot(rb, gear.tip_string) * (1.0 - 1e-9)
+    whole = math.hypot(rb, gear.tip_roll_length) * (1.0 - 1e-9)
     rise = (half.radius - gear.root_radius) / (gear.tip_radius - gear.root_radius)
-    for j in range(station.size):
+    for j in range(section.size):
         for tooth in range(gear.teeth):
             top = tips[tooth, j]
             here = half.radius if top >= whole else gear.root_radius + rise * (top - gear.root_radius)
             plain = half.half_angle if top >= whole else np.interp(here, half.radius, half.half_angle)
-            string = np.sqrt(np.maximum(here**2 - rb**2, 0.0))
+            roll_length = np.sqrt(np.maximum(here**2 - rb**2, 0.0))
             radius[j, tooth] = here
             for side in (0, 1):
-                removed = np.interp(string, deviations.string, deviations.shape[side, tooth, j])
+                removed = np.interp(roll_length, deviations.roll_length, deviations.shape[side, tooth, j])
                 removed = exaggeration * (removed + deviations.offset[side, tooth])
                 angles[side][j, tooth] = plain - removed / rb
     if ((angles[0] + angles[1]) <= 0.0).any():
         raise ValueError(f"exaggeration is {exaggeration}: a tooth's flanks cross; reduce it")
-    return _Teeth(station, radius, angles)
+    return _Teeth(section, radius, angles)
 
 
 class _Builder:
@@ -227,14 +227,14 @@ def _hub(builder: _Builder, ring: np.ndarray, gear: GearSpec, z: float, up: bool
 
 def section_outline(
     gear: GearSpec,
-    station: float = 0.0,
+    section: float = 0.0,
     tolerance: float = TOLERANCE,
     deviations: Deviations | None = None,
     exaggeration: float = 1.0,
 ) -> np.ndarray:
-    """Return the closed outline of a wheel in the section at ``station`` (m from mid-face), shape (n, 2), m."""
+    """Return the closed outline of a wheel in the section at ``section`` (m from mid-face), shape (n, 2), m."""
     teeth = _teeth(gear, tolerance, deviations, exaggeration)
-    j = int(np.argmin(np.abs(teeth.station - station)))
+    j = int(np.argmin(np.abs(teeth.section - section)))
     builder = _Builder()
     across = arc_chords(gear.tip_radius, 2.0 * gear.corner_half_angle, tolerance)
     between = land_angles(gear, tolerance).size - 1

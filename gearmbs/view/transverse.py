@@ -12,8 +12,8 @@ from matplotlib.patches import Polygon
 
 from gearmbs.gears import GearPair
 from gearmbs.gears.pair import Placement
-from gearmbs.view.canvas import BLUE, GREY, PURPLE, VERMILLION, drawn_on, look
 from gearmbs.view.contacts import ContactPoints, ContactProbe, mean_frame
+from gearmbs.view.figure_style import BLUE, GREY, PURPLE, VERMILLION, drawn_on, look
 from gearmbs.view.motion import static_motion
 from gearmbs.view.outline import circle
 from gearmbs.view.solid import pair_deviations, section_outline
@@ -35,7 +35,7 @@ def mesh_view(
     place: Placement | None = None,
     points: ContactPoints | None = None,
     width: float | None = None,
-    station: float = 0.0,
+    section: float = 0.0,
     exaggeration: float = 1.0,
     title: str | None = None,
     ax: Axes | None = None,
@@ -55,7 +55,7 @@ def mesh_view(
         Contacts at that pose; default found at rest.
     width : float, optional
         Width of the detail, m; default seven modules.
-    station : float
+    section : float
         Section along the face that is drawn, m from mid-face.
     exaggeration : float
         Deviations of the flanks are drawn this many times larger.
@@ -79,7 +79,7 @@ def mesh_view(
     with look():
         figure, ax = drawn_on(ax, 7.0, 6.6)
         mean = mean_frame(place)
-        draw_wheels(ax, pair, place, mean, station, exaggeration)
+        draw_wheels(ax, pair, place, mean, section, exaggeration)
         draw_lines(ax, pair)
         draw_contacts(ax, pair, points, place, mean)
         centre = _pitch_point(pair)
@@ -95,32 +95,32 @@ def mesh_view(
 
 
 def draw_wheels(
-    ax: Axes, pair: GearPair, place: Placement, mean: np.ndarray, station: float = 0.0, exaggeration: float = 1.0
+    ax: Axes, pair: GearPair, place: Placement, mean: np.ndarray, section: float = 0.0, exaggeration: float = 1.0
 ) -> None:
     """Draw both wheels' sections, their bores and base circles."""
     poses = ((place.origin_1, place.axes_1), (place.origin_2, place.axes_2))
     for k, (wheel, deviation, pose) in enumerate(zip(pair.wheels, pair_deviations(pair), poses)):
-        outline = section_outline(wheel, station, TOLERANCE, deviation, exaggeration)
-        shape = projected(outline, *pose, place.origin_1, mean, station)
+        outline = section_outline(wheel, section, TOLERANCE, deviation, exaggeration)
+        shape = projected(outline, *pose, place.origin_1, mean, section)
         ax.add_patch(Polygon(shape * MM, closed=True, facecolor=FILLS[k], edgecolor=LINES[k], linewidth=1.1, zorder=2))
         for radius, style in ((wheel.base_radius, (0, (5, 3))), (wheel.pitch_radius, (0, (1, 2)))):
-            ring = projected(_closed(circle(radius, 1e-5)), *pose, place.origin_1, mean, station)
+            ring = projected(_closed(circle(radius, 1e-5)), *pose, place.origin_1, mean, section)
             ax.plot(*(ring.T * MM), color=GREY, linewidth=0.8, linestyle=style, zorder=2.5)
         if wheel.bore_radius > 0.0:
-            hole = projected(circle(wheel.bore_radius, 1e-5), *pose, place.origin_1, mean, station)
+            hole = projected(circle(wheel.bore_radius, 1e-5), *pose, place.origin_1, mean, section)
             ax.add_patch(Polygon(hole * MM, closed=True, facecolor="white", edgecolor=LINES[k], zorder=2.2))
 
 
 def projected(
-    points: np.ndarray, origin: np.ndarray, axes: np.ndarray, base: np.ndarray, mean: np.ndarray, station: float
+    points: np.ndarray, origin: np.ndarray, axes: np.ndarray, base: np.ndarray, mean: np.ndarray, section: float
 ) -> np.ndarray:
-    """Return where a wheel's generatrices through plane points (n, 2) cut the plane at ``station`` of the mean axis.
+    """Return where a wheel's generatrices through plane points (n, 2) cut the plane at ``section`` of the mean axis.
 
     The result, shape (n, 2), is in the mean frame at ``base``.
     """
     local = mean.T @ axes
     start = points @ local[:, :2].T + mean.T @ (np.asarray(origin) - base)
-    reach = (station - start[:, 2]) / local[2, 2]
+    reach = (section - start[:, 2]) / local[2, 2]
     return start[:, :2] + reach[:, None] * local[:2, 2]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.colors import to_rgb
 
-from gearmbs.view.canvas import unit_text
+from gearmbs.view.figure_style import unit_text
 from gearmbs.view.page import Page, packed, rounded
 from gearmbs.view.scene import AZIMUTH, ELEVATION, Part, Scene
 from gearmbs.view.shading import corner_normals, feature_edges

@@ -179,9 +179,9 @@ def test_initial_conditions_of_joints_are_in_the_mechanism():
 
 def test_gear_contact_becomes_impact_expressions():
     """The deck's gear rig follows the contact kernel: same mesh force while no corner is in contact."""
-    from gearmbs.gears import ContactLaw, Friction, GearPair
+    from gearmbs.gears import ContactLaw, FlankFriction, GearPair
 
-    pair = GearPair.paper(contact=ContactLaw.impact(depth="0.1 mm"), friction=Friction.none(), backlash="0.1 mm")
+    pair = GearPair.paper(contact=ContactLaw.impact(depth="0.1 mm"), friction=FlankFriction.none(), backlash="0.1 mm")
     place = pair.placement(0.0)
     m = Mechanism("gears")
     joints = []

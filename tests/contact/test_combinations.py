@@ -5,7 +5,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from gearmbs.gears import ContactLaw, Friction, GearPair, GearSpec
+from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
 from gearmbs.gears.faults import BrokenTooth, ChippedCorner, Crowning, Eccentricity, Pit, RootCrack, TipRelief, Wear
 
 from .probe_tools import Contact, differences, rotation, shaken, varied
@@ -16,7 +16,7 @@ LAWS = {
     "linear": ContactLaw.linear("1.3e8 N/m", "200 N*s/m"),
     "Hertz": ContactLaw.hertz_line(damping="200 N*s/m"),
 }
-FRICTIONS = {"adams": Friction(), "smooth": Friction(kind="smooth"), "none": Friction.none()}
+FRICTIONS = {"adams": FlankFriction(), "smooth": FlankFriction(kind="smooth"), "none": FlankFriction.none()}
 FAULTS = {
     "perfect": (),
     "damaged": (
@@ -92,7 +92,7 @@ POTENTIALS = {
 
 
 def elastic(changes):
-    return GearPair.paper(**({"contact": ELASTIC["impact"], "friction": Friction.none()} | changes))
+    return GearPair.paper(**({"contact": ELASTIC["impact"], "friction": FlankFriction.none()} | changes))
 
 
 @pytest.mark.parametrize("name", POTENTIALS)

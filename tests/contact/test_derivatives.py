@@ -5,7 +5,7 @@ import pytest
 
 from gearmbs.contact import layout
 from gearmbs.contact import support as sup
-from gearmbs.gears import ContactLaw, Friction, GearPair, GearSpec
+from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
 from gearmbs.gears.faults import (
     BrokenTooth,
     ChippedCorner,
@@ -28,14 +28,14 @@ SHAPED = (
 )
 CASES = {
     "parallel": ({}, 1),
-    "parallel, no friction": ({"friction": Friction.none()}, 1),
+    "parallel, no friction": ({"friction": FlankFriction.none()}, 1),
     "one plane, tilted": ({"misalignment": "0.5 deg"}, 1),
     "skew": ({"misalignment": "1 deg"}, 12),
     "inclination": ({"misalignment": "1 deg", "plane": "inclination"}, 12),
     "slightly skew": ({"misalignment": "0.02 deg"}, 7),
     "parallel, sliced": ({}, 5),
     "far apart": ({"centre_distance_error": "3 mm"}, 1),
-    "smooth friction": ({"friction": Friction(kind="smooth")}, 4),
+    "smooth friction": ({"friction": FlankFriction(kind="smooth")}, 4),
     "Hunt-Crossley": ({"contact": ContactLaw.hunt_crossley(), "misalignment": "0.3 deg"}, 5),
     "linear": ({"contact": ContactLaw.linear("1.3e8 N/m"), "misalignment": "0.3 deg"}, 5),
     "centroid load": ({"misalignment": "1 deg", "load": "adams"}, 9),

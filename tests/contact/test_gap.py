@@ -79,7 +79,7 @@ def test_section_gap_against_search(name):
                 q = section_point(two, side, j, s[1] * 1e-3, place.origin_2, place.axes_2, centre, normal, zeta)
                 return 1e3 * np.linalg.norm(p - q)
 
-            tips = np.array([one.tip_string, two.tip_string]) * 1e3
+            tips = np.array([one.tip_roll_length, two.tip_roll_length]) * 1e3
             start = np.clip(row[6:8] * 1e3, 1e-3, tips)
             bounds = [(1e-3, tips[0]), (1e-3, tips[1])]
             found = nearest(distance, bounds, [start, np.clip(start + [0.3, -0.3], 1e-3, tips)]) * 1e-3

@@ -10,7 +10,7 @@ import pytest
 from numba import njit
 
 from gearmbs.contact import gear_contact
-from gearmbs.gears import ContactLaw, Friction, GearPair, GearSpec
+from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
 from gearmbs.gears.faults import BrokenTooth, ChippedCorner, Eccentricity, GradedFlanks, Pit, RootCrack
 
 from .probe_tools import Contact
@@ -19,7 +19,7 @@ from .test_fuzz import rotations
 PARTS = 16
 ROUNDS = 6
 DEEPEST = 1e-4  # paths whose contact gets no deeper than four times what 100 N m need
-ELASTIC = {"contact": ContactLaw.impact(damping=0.0), "friction": Friction.none()}
+ELASTIC = {"contact": ContactLaw.impact(damping=0.0), "friction": FlankFriction.none()}
 
 
 @njit
@@ -135,14 +135,14 @@ PERFECT = {
         GearPair.paper(driver=GearSpec(29, 95e-3 / 31, face_width="30 mm"), axial_shift="4 mm", **ELASTIC),
         11,
     ),
-    "linear": (GearPair.paper(contact=ContactLaw.linear("1.3e8 N/m"), friction=Friction.none()), 5),
+    "linear": (GearPair.paper(contact=ContactLaw.linear("1.3e8 N/m"), friction=FlankFriction.none()), 5),
     "varying stiffness": (
-        GearPair.paper(friction=Friction.none(), faults=[RootCrack()]).with_potential_energy_stiffness(),
+        GearPair.paper(friction=FlankFriction.none(), faults=[RootCrack()]).with_potential_energy_stiffness(),
         5,
     ),
     "damped, with friction": (GearPair.paper(), 5),
     "Hunt-Crossley, smooth friction": (
-        GearPair.paper(contact=ContactLaw.hunt_crossley(), friction=Friction(kind="smooth")),
+        GearPair.paper(contact=ContactLaw.hunt_crossley(), friction=FlankFriction(kind="smooth")),
         5,
     ),
     "broken teeth": (GearPair.paper(faults=[BrokenTooth(tooth=k, lost=0.4) for k in range(0, 29, 3)], **ELASTIC), 1),

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from gearmbs.gears import ContactLaw, Friction, GearPair, GearSpec
+from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
 from gearmbs.gears.transmission import StaticMesh
 
 from .probe_tools import Contact, moved, rotation, shaken, varied
 
 ELASTIC = ContactLaw.impact(damping=0.0)
-FREE = {"friction": Friction.none(), "contact": ELASTIC}
+FREE = {"friction": FlankFriction.none(), "contact": ELASTIC}
 
 
 def static(pair, driver_angle, torque=100.0, slices=None):
@@ -254,7 +254,7 @@ def test_separating_flanks_never_pull():
 
 @pytest.mark.parametrize("slices", [1, 11])
 def test_fuzz_stays_finite_pushes_and_does_not_jump(slices):
-    pair = GearPair.paper(contact=ELASTIC, friction=Friction.none())
+    pair = GearPair.paper(contact=ELASTIC, friction=FlankFriction.none())
     contact = Contact(pair, slices)
     rng = np.random.default_rng(0)
     stiffest = 4 * pair.contact.exponent * pair.contact.stiffness * (0.4e-3) ** 0.3

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from gearmbs.gears import ContactLaw, Friction, GearPair, GearSpec
+from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
 
 from .probe_tools import Contact, differences, shaken, varied
 
-ELASTIC = {"contact": ContactLaw.impact(damping=0.0), "friction": Friction.none()}
+ELASTIC = {"contact": ContactLaw.impact(damping=0.0), "friction": FlankFriction.none()}
 
 
 def pair(**changes):

@@ -56,7 +56,7 @@ class Search:
 
     def gap(self, side, teeth, station):
         """Kind of contact (0 flank on flank, 1 or 2 whose corner), gap and the two string lengths."""
-        tip_1, tip_2 = (w.tip_string for w in self.wheels)
+        tip_1, tip_2 = (w.tip_roll_length for w in self.wheels)
         found = minimize_scalar(
             lambda s: self.from_flank(0, side, teeth, station, s)[0],
             bounds=(1e-6, 1.6 * tip_1),
@@ -138,7 +138,9 @@ def test_no_pair_is_overlooked(name):
             for one in range(pair.driver.teeth):
                 for two in range(pair.driven.teeth):
                     _, gap, string_1, string_2 = search.gap(side, (one, two), 0.0)
-                    facing = max(string_1 / pair.wheels[0].tip_string, string_2 / pair.wheels[1].tip_string) <= 1
+                    facing = (
+                        max(string_1 / pair.wheels[0].tip_roll_length, string_2 / pair.wheels[1].tip_roll_length) <= 1
+                    )
                     if abs(gap) < REACH and facing and min(string_1, string_2) > 0:
                         close += 1
                         assert (side, one, two) in seen

@@ -24,7 +24,7 @@ from gearmbs.gears.faults import (
     Wobble,
 )
 from gearmbs.gears.iso1328 import tolerances
-from gearmbs.gears.tables import canvases
+from gearmbs.gears.tables import tooth_deviations
 from gearmbs.gears.transmission import StaticMesh
 
 ALL = [
@@ -218,14 +218,14 @@ def test_cumulative_pitch_error_is_a_wave_of_displaced_teeth(rotation):
 
 
 def removed(fault, places, stations):
-    """Material a fault takes from the driver's drive flank of tooth 0, where the flanks touch at these strings, m."""
+    """Material a fault takes from the driver's drive flank of tooth 0, where it touches at these lengths of roll, m."""
     pair = GearPair.paper(backlash="0.2 mm")
     gear = pair.wheels[0]
     meshes = [StaticMesh(pair, 41), StaticMesh(pair.with_faults(fault), 41)]
     found = np.empty((len(places), len(stations)))
-    for k, string in enumerate(places):
-        # tooth 0 touches at a string s when the driver stands at s / r_b - psi - alpha
-        angle = string / gear.base_radius - gear.base_half_angle - pair.working_pressure_angle
+    for k, roll_length in enumerate(places):
+        # tooth 0 touches at length of roll s when the driver is at s / r_b - psi - alpha
+        angle = roll_length / gear.base_radius - gear.base_half_angle - pair.working_pressure_angle
         driven = meshes[0].touching_angle(angle)
         rows = [mesh.gaps(angle, driven, np.array(stations)).copy() for mesh in meshes]
         mine = [r[(r[:, 0] == 1) & (r[:, 1] == 0)] for r in rows]
@@ -235,8 +235,8 @@ def removed(fault, places, stations):
 
 def test_shapes_stand_where_they_were_put():
     pair = GearPair.paper(backlash="0.2 mm")
-    tip, pitch = pair.driver.tip_string, pair.driver.base_radius * math.tan(pair.working_pressure_angle)
-    start = pair.line_of_action - pair.driven.tip_string
+    tip, pitch = pair.driver.tip_roll_length, pair.driver.base_radius * math.tan(pair.working_pressure_angle)
+    start = pair.line_of_action - pair.driven.tip_roll_length
     micron = 1e-6
     # 20 um at the tip, parabola over 3 mm: a quarter of it half-way, nothing below
     relief = removed(TipRelief(amount="20 um", power=2.0), [tip - 1e-9, tip - 1.5e-3, tip - 4e-3], [0.0])[:, 0]
@@ -258,12 +258,12 @@ def test_shapes_stand_where_they_were_put():
 def test_chipped_corner_shortens_one_end():
     # 2 mm of height missing at +z, nothing from 5 mm on: the corner bears lower there
     fault = ChippedCorner(height="2 mm", length="5 mm", tooth=0)
-    canvas = canvases(GearPair.paper().with_faults(fault))[0]
+    deviations = tooth_deviations(GearPair.paper().with_faults(fault))[0]
     gear = GearPair.paper().driver
-    radius = np.hypot(gear.base_radius, canvas.tip[:, 0])
-    expected = gear.tip_radius - 2e-3 * np.maximum(0.0, 1 - (10e-3 - canvas.station) / 5e-3)
+    radius = np.hypot(gear.base_radius, deviations.tip[:, 0])
+    expected = gear.tip_radius - 2e-3 * np.maximum(0.0, 1 - (10e-3 - deviations.section) / 5e-3)
     assert radius == pytest.approx(np.tile(expected, (2, 1)), abs=1e-12)
-    assert np.all(canvas.tip[:, 1:] == gear.tip_string)
+    assert np.all(deviations.tip[:, 1:] == gear.tip_roll_length)
 
 
 def test_broken_tooth_touches_lower_down():
@@ -271,12 +271,12 @@ def test_broken_tooth_touches_lower_down():
     faulty = pair.with_faults(BrokenTooth(lost=0.25, tooth=0))
     gear = pair.driver
     radius = gear.tip_radius - 0.25 * (gear.tip_radius - gear.root_radius)
-    string = math.sqrt(radius**2 - gear.base_radius**2)
+    roll_length = math.sqrt(radius**2 - gear.base_radius**2)
     rows = np.concatenate([gaps(faulty, a) for a in np.linspace(-0.1, 0.3, 40)])
     mine = rows[(rows[:, 1] == 0) & (rows[:, 0] == 1)]
     corners = mine[mine[:, 5] == 1]
-    assert corners[:, 6] == pytest.approx(string)
-    assert mine[:, 6].max() <= string * (1 + 1e-12)
+    assert corners[:, 6] == pytest.approx(roll_length)
+    assert mine[:, 6].max() <= roll_length * (1 + 1e-12)
 
 
 def test_severity_shows_in_the_mesh():
@@ -345,15 +345,17 @@ def test_lead_correction_undoes_a_skew():
 def test_graded_flanks_meet_their_tolerances(grade):
     pair = GearPair.paper().with_faults(GradedFlanks(grade=grade, seed=5, profile=False, lead=False))
     limit = tolerances(pair.driver, grade)
-    canvas = canvases(pair)[0]
+    deviations = tooth_deviations(pair)[0]
     for flank in (0, 1):
-        index = canvas.offset[flank]
+        index = deviations.offset[flank]
         single = abs(np.diff(np.append(index, index[0]))).max()
         assert single <= limit.single_pitch * (1 + 1e-12)
         assert np.ptp(index) <= limit.total_pitch * (1 + 1e-12)
         assert single == pytest.approx(limit.single_pitch) or np.ptp(index) == pytest.approx(limit.total_pitch)
-    again = canvases(GearPair.paper().with_faults(GradedFlanks(grade=grade, seed=5, profile=False, lead=False)))[0]
-    assert np.array_equal(again.offset, canvas.offset)
+    again = tooth_deviations(
+        GearPair.paper().with_faults(GradedFlanks(grade=grade, seed=5, profile=False, lead=False))
+    )[0]
+    assert np.array_equal(again.offset, deviations.offset)
 
 
 def test_iso_1328_formulas():
@@ -366,8 +368,8 @@ def test_iso_1328_formulas():
 
 def test_wear_is_least_at_the_pitch_point():
     pair = GearPair.paper().with_faults(Wear(depth="20 um"))
-    canvas = canvases(pair)[0]
-    worn = canvas.shape[canvas.drive, 3, 0]
-    assert abs(canvas.radius[worn.argmin()] - pair.driver.pitch_radius) < 0.3e-3
+    deviations = tooth_deviations(pair)[0]
+    worn = deviations.shape[deviations.drive, 3, 0]
+    assert abs(deviations.radius[worn.argmin()] - pair.driver.pitch_radius) < 0.3e-3
     assert worn.max() == pytest.approx(20e-6, rel=0.05)
-    assert np.all(canvas.shape[1 - canvas.drive] == 0)
+    assert np.all(deviations.shape[1 - deviations.drive] == 0)

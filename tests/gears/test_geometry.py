@@ -36,7 +36,7 @@ def test_root_arc_closes_the_profile():
     # an arc tangent to the root circle reaches its radial tangent within 3 um of the base circle
     gear = GearPair.paper().driver
     assert abs(gear.form_radius - gear.base_radius) < 3e-6
-    assert gear.form_string == 0
+    assert gear.form_roll_length == 0
 
 
 def test_mass_and_inertia_of_the_disc():

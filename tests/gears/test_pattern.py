@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearmbs.gears import ContactLaw, Friction, GearPair
+from gearmbs.gears import ContactLaw, FlankFriction, GearPair
 from gearmbs.gears.faults import Crowning, RootCrack
 from gearmbs.gears.history import contact_history
 from gearmbs.gears.pattern import contact_pattern
@@ -19,7 +19,7 @@ def test_healthy_pattern_is_even_and_carries_the_load():
     assert pattern.roll_angle[20] == pytest.approx(0, abs=1e-12)
     assert middle.mean() == pytest.approx(pair.normal_force / 20e-3, rel=1e-6)
     assert pattern.share.max() == pytest.approx(1.0)
-    assert pattern.string[20, 0] == pytest.approx(pair.driver.base_radius * np.tan(np.radians(20)), rel=1e-3)
+    assert pattern.roll_length[20, 0] == pytest.approx(pair.driver.base_radius * np.tan(np.radians(20)), rel=1e-3)
 
 
 @pytest.mark.parametrize("rotation", [1, -1])
@@ -33,8 +33,8 @@ def test_shares_of_a_tooth_and_the_next_add_up(rotation):
 
 def test_skew_loads_the_ends_of_the_face():
     pair = GearPair.paper(misalignment="1 deg", contact=ContactLaw.impact())
-    drive, back = contact_pattern(pair, 100.0), contact_pattern(pair, 100.0, side="back")
-    heavy = [p.station[p.pressure.sum(axis=0).argmax()] for p in (drive, back)]
+    drive, back = contact_pattern(pair, 100.0), contact_pattern(pair, 100.0, side="coast")
+    heavy = [p.section[p.pressure.sum(axis=0).argmax()] for p in (drive, back)]
     assert abs(heavy[0]) > 8e-3
     assert abs(heavy[1]) > 8e-3
     assert heavy[0] * heavy[1] < 0
@@ -56,7 +56,7 @@ def test_skew_loads_the_ends_of_the_face():
 def test_totals_carry_the_torque(load, placed, most):
     # T = (F_drive - F_back) r_b, but for corners, whose arm differs: 1 % here, more of the forces of jammed teeth
     pair = GearPair.paper(load=load, **placed)
-    drive, back = (contact_pattern(pair, 100.0, points=15, side=side) for side in ("drive", "back"))
+    drive, back = (contact_pattern(pair, 100.0, points=15, side=side) for side in ("drive", "coast"))
     miss = (drive.total - back.total) * pair.driven.base_radius - 100.0
     assert abs(miss).max() < 1.5 + most * drive.total.max() * pair.driven.base_radius
     if most == 0:
@@ -78,7 +78,7 @@ def test_any_tooth_can_be_followed():
 
 def test_crowning_loads_the_middle():
     pattern = contact_pattern(GearPair.paper(faults=[Crowning(amount="40 um")]), 100.0)
-    assert abs(pattern.station[pattern.pressure.sum(axis=0).argmax()]) < 1e-3
+    assert abs(pattern.section[pattern.pressure.sum(axis=0).argmax()]) < 1e-3
 
 
 def test_cracked_tooth_carries_less():
@@ -87,8 +87,8 @@ def test_cracked_tooth_carries_less():
     assert cracked.force.sum() < healthy.force.sum()
 
 
-def test_history_counts_separations_and_back_hits():
-    pair = GearPair.paper(backlash="20 um", friction=Friction.none())
+def test_history_counts_separations_and_coast_hits():
+    pair = GearPair.paper(backlash="20 um", friction=FlankFriction.none())
     n = 400
     turn = np.linspace(0, 2 * np.pi, n)
     # the driven wheel swings from drive flank to back flank and back, four times
@@ -101,10 +101,10 @@ def test_history_counts_separations_and_back_hits():
         (np.array([f.origin_1 for f in frames]), np.array([f.axes_1 for f in frames]), zero, zero),
         (np.array([f.origin_2 for f in frames]), np.array([f.axes_2 for f in frames]), zero, zero),
     )
-    assert history.back_hits == 4
+    assert history.coast_hits == 4
     assert history.separations == 8
     assert history.drive_penetration.max() == pytest.approx(10e-6, rel=1e-6)
-    assert history.back_penetration.max() == pytest.approx(10e-6, rel=1e-2)
+    assert history.coast_penetration.max() == pytest.approx(10e-6, rel=1e-2)
     assert np.all(history.damping_power >= 0)
     with pytest.raises(ValueError, match="instants"):
         contact_history(pair, (zero, np.zeros((n, 3, 3)), zero, zero), (zero[1:], np.zeros((n, 3, 3)), zero, zero))

@@ -41,7 +41,7 @@ def test_closed_forms_of_ross():
 def test_curve_of_ross():
     """Its curve starts at 396622921 N/m when its own contact mapping and root angle are used.
 
-    It lets the pressure angle, not the string length, of the driven contact fall as fast as the driver's rises, and
+    It lets the pressure angle, not the length of roll, of the driven contact fall as fast as the driver's rises, and
     takes the root half angle with the addendum where the cutter's depth below the pitch line belongs. With the
     geometry as it is, the same tooth energies give a largest value 1.5 % above the 4.0966e8 N/m.
     """
@@ -57,8 +57,8 @@ def test_curve_of_ross():
     assert low == pytest.approx(0.2577380345253824, rel=1e-9)
 
     def single(turn):
-        strings = gear.base_radius * np.tan([low + turn, high - turn])
-        return 1 / (np.interp(strings, tooth.string, tooth.total).sum() + 1 / hertz_stiffness(pair))
+        roll_lengths = gear.base_radius * np.tan([low + turn, high - turn])
+        return 1 / (np.interp(roll_lengths, tooth.roll_length, tooth.total).sum() + 1 / hertz_stiffness(pair))
 
     meshing = (high - low) / pair.contact_ratio
     assert single(0.0) + single(meshing) == pytest.approx(396622921.3581085, rel=3e-6)
@@ -80,13 +80,16 @@ def test_components_of_ross(angle):
     ratio = gear.fillet_radius / gear.module
     root = (math.pi / 2 + 2 * math.tan(ALPHA) * (1 - ratio) + 2 * ratio / math.cos(ALPHA)) / 62
     tooth, plain = tooth_compliance(gear, root_angle=root), tooth_compliance(gear)
-    string = gear.base_radius * math.tan(angle)
-    parts = [np.interp(string, tooth.string, p) for p in (tooth.bending, tooth.shear, tooth.axial, tooth.foundation)]
+    roll_length = gear.base_radius * math.tan(angle)
+    parts = [
+        np.interp(roll_length, tooth.roll_length, p)
+        for p in (tooth.bending, tooth.shear, tooth.axial, tooth.foundation)
+    ]
     # 400 trapezoids against its adaptive quadrature
     for ours, theirs, accuracy in zip(parts, ROSS_TOOTH[angle], (1e-4, 3e-6, 1e-5, 1e-6)):
         assert ours == pytest.approx(theirs, rel=accuracy)
     # the root angle of the cutter's depth makes the foundation 2 to 5 % stiffer in this pair
-    foundation = np.interp(string, plain.string, plain.foundation)
+    foundation = np.interp(roll_length, plain.roll_length, plain.foundation)
     assert 0.94 < foundation / ROSS_TOOTH[angle][3] < 0.985
 
 
@@ -95,10 +98,10 @@ def test_tooth_energies_against_quadrature():
     gear = ross_pair().driver
     tooth = tooth_compliance(gear)
     half, height = rack_root(gear, 4000)
-    string = np.linspace(tooth.string[0], gear.tip_string, 8000)
-    beta = string / gear.base_radius - gear.base_half_angle
-    x = gear.base_radius * (string / gear.base_radius * np.cos(beta) - np.sin(beta))
-    y = gear.base_radius * (string / gear.base_radius * np.sin(beta) + np.cos(beta))
+    roll_length = np.linspace(tooth.roll_length[0], gear.tip_roll_length, 8000)
+    beta = roll_length / gear.base_radius - gear.base_half_angle
+    x = gear.base_radius * (roll_length / gear.base_radius * np.cos(beta) - np.sin(beta))
+    y = gear.base_radius * (roll_length / gear.base_radius * np.sin(beta) + np.cos(beta))
     outline_x, outline_y = np.concatenate([half, x[1:]]), np.concatenate([height, y[1:]])
     lever = math.cos(beta[-1]) * (y[-1] - outline_y) - x[-1] * math.sin(beta[-1])
     density = lever**2 / (gear.material.youngs_modulus * 2 / 3 * outline_x**3 * gear.face_width)
@@ -145,11 +148,11 @@ def test_iso_6336_as_the_stiffness_of_a_pair():
 
 def test_cracks_soften_with_depth():
     pair = GearPair.paper()
-    string = np.linspace(9e-3, 20e-3, 30)
-    healthy = pair_stiffness(pair, string)
+    roll_length = np.linspace(9e-3, 20e-3, 30)
+    healthy = pair_stiffness(pair, roll_length)
     last = healthy
     for depth in (0.5e-3, 1e-3, 2e-3, 3e-3):
-        now = pair_stiffness(pair, string, (Crack(depth), None))
+        now = pair_stiffness(pair, roll_length, (Crack(depth), None))
         assert np.all(now <= last)
         last = now
     assert (last / healthy).min() < 0.95

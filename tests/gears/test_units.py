@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from gearmbs.gears import ContactLaw, Friction, GearSpec
+from gearmbs.gears import ContactLaw, FlankFriction, GearSpec
 from gearmbs.units import to_si
 
 
@@ -72,8 +72,8 @@ def test_laws_refuse_nonsense():
         with pytest.raises(ValueError, match="ContactLaw"):
             ContactLaw.impact(**arguments)
     for arguments in ({"static": -0.1}, {"static_speed": "2 m/s"}, {"kind": "glue"}):
-        with pytest.raises(ValueError, match="Friction"):
-            Friction(**arguments)
+        with pytest.raises(ValueError, match="FlankFriction"):
+            FlankFriction(**arguments)
 
 
 def test_hertz_line_contact():

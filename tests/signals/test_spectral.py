@@ -19,7 +19,7 @@ from gearmbs.signals import (
     units_of,
 )
 from gearmbs.signals.conversion import band_window
-from gearmbs.signals.kinds import unit_kind
+from gearmbs.signals.dimensions import unit_dimension
 
 RATE = 12800.0
 POWER = {"displacement": 0, "velocity": 1, "acceleration": 2}
@@ -78,7 +78,7 @@ def test_units_convert_to_si_and_keep_edges():
 
 
 @pytest.mark.parametrize(
-    ("unit", "kind", "factor"),
+    ("unit", "dimension", "factor"),
     [
         ("m/s2", "acceleration", 1.0),
         ("m/s²", "acceleration", 1.0),
@@ -89,8 +89,8 @@ def test_units_convert_to_si_and_keep_edges():
         ("inch/s", "velocity", 0.0254),
     ],
 )
-def test_unit_kinds(unit, kind, factor):
-    assert unit_kind(unit) == (kind, pytest.approx(factor))
+def test_unit_dimensions(unit, dimension, factor):
+    assert unit_dimension(unit) == (dimension, pytest.approx(factor))
 
 
 @pytest.mark.parametrize("unit", ["unknown", "", "V", "bananas", "m/s/"])

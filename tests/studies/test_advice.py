@@ -8,7 +8,7 @@ from gearmbs.dae.result import Status
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.simulate import ADVICE as MODELLER
 from gearmbs.studies import Case, simulate_case
-from gearmbs.studies.run import ADVICE as CASE
+from gearmbs.studies.simulation import ADVICE as CASE
 
 SHORT = {"run_up": 0.02, "settling": 0.0, "duration": 0.02}
 

@@ -5,7 +5,7 @@ import pytest
 
 from gearmbs.studies import Case, paper_cases, run_paper
 from gearmbs.studies.report import paper_report
-from gearmbs.studies.run import attributes_of
+from gearmbs.studies.simulation import attributes_of
 
 
 def test_every_quantity_has_its_unit():

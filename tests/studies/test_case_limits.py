@@ -131,7 +131,7 @@ def test_a_slipping_run_fails_and_keeps_what_it_computed(monkeypatch):
         contact={"stiffness": "1e-3 N/mm^1.3", "damping": "1e-6 N s/mm"},
         operation={"run_up": "10 ms", "settling": "0 ms", "duration": "60 ms"},
     )
-    monkeypatch.setattr("gearmbs.studies.run.check_record", lambda case: None)
+    monkeypatch.setattr("gearmbs.studies.simulation.check_record", lambda case: None)
     with pytest.raises(SimulationFailed, match="slipped past each other") as caught:
         run_case(case)
     partial = caught.value.partial()

@@ -10,7 +10,7 @@ import pytest
 
 from gearmbs.studies import Case, SimulationFailed, run_case, run_cases
 from gearmbs.studies.processes import WorkerDied, run_jobs
-from gearmbs.studies.run import simulate_case
+from gearmbs.studies.simulation import simulate_case
 from tests.studies.jobs import fail_or_wait, raise_what_cannot_travel, square
 
 SHORT = {"run_up": 0.02, "settling": 0.0, "duration": 0.07}

@@ -9,11 +9,11 @@ from scipy.signal.windows import blackmanharris
 from typer.testing import CliRunner
 
 from gearmbs.cli import app
+from gearmbs.signals.simulated import model_signals, parse_states
 from gearmbs.studies import Case, SimulationFailed, run_case, run_paper, simulate_case
 from gearmbs.studies import rig as parts
 from gearmbs.studies.case import CaseError, make_case
 from gearmbs.studies.choices import choices
-from gearmbs.studies.exchange import model_signals, parse_states
 from gearmbs.studies.paper import judge, paper_cases
 from gearmbs.studies.store import whole_file, write_dataset
 
@@ -201,7 +201,7 @@ def test_failure_keeps_what_was_computed(monkeypatch):
     assert not solution.success
     assert 0.005 < solution.t[-1] <= 0.0101
     assert "not finite" in solution.message or "NaN" in solution.message
-    monkeypatch.setattr("gearmbs.studies.run.simulate_case", lambda *a, **k: solution)
+    monkeypatch.setattr("gearmbs.studies.simulation.simulate_case", lambda *a, **k: solution)
     with pytest.raises(SimulationFailed) as caught:
         run_case(case)
     assert caught.value.solution is solution

@@ -22,7 +22,7 @@ def test_forces_in_space_are_those_of_the_simulation(case):
     pair = GearPair.paper(**CASES[case])
     motion = static_motion(pair, frames=4)
     single = pair.face_slices == 1
-    probe = ContactProbe(pair, stations=161)
+    probe = ContactProbe(pair, sections=161)
     gi, gr, size = pair.contact_tables(1 if single else 161)
     gi[layout.FRICTION] = layout.FRICTION_NONE
     still = np.zeros(3)
@@ -36,7 +36,7 @@ def test_forces_in_space_are_those_of_the_simulation(case):
         found = probe.at(place, (still, still), spins)
         force = -found.force @ found.normal
         torque = -np.cross(found.point - place.origin_1, found.force[:, None] * found.normal).sum(axis=0)
-        # parallel: the same numbers; tilted: midpoint rule over 161 stations, and without the small axial force
+        # parallel: the same numbers; tilted: midpoint rule over 161 sections, and without the small axial force
         # that the ends of a loaded face exert, its elastic energy per length
         tolerance = 1e-9 if single else 5e-3
         scale = max(diag[7], 100.0)

@@ -65,8 +65,12 @@ def test_outline_keeps_to_the_drawing(wheel):
     assert half.radius[-1] == wheel.tip_radius
     assert (np.diff(half.radius) > 0).all()
     # on the involute the half angle is that of the closed form used by the contact
-    string = np.sqrt(np.maximum(half.radius**2 - wheel.base_radius**2, 0.0))
-    on = (string >= wheel.form_string) & (string <= wheel.tip_string) & (half.radius > wheel.base_radius * 1.000001)
+    roll_length = np.sqrt(np.maximum(half.radius**2 - wheel.base_radius**2, 0.0))
+    on = (
+        (roll_length >= wheel.form_roll_length)
+        & (roll_length <= wheel.tip_roll_length)
+        & (half.radius > wheel.base_radius * 1.000001)
+    )
     expected = [wheel.half_angle(r) for r in half.radius[on]]
     np.testing.assert_allclose(half.half_angle[on], expected, atol=1e-12)
     # the whole profile repeats every pitch and is symmetric about tooth 0

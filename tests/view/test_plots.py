@@ -185,7 +185,7 @@ def test_long_names_of_curves_stay_in_the_figure(pair):
 
 def test_load_sharing_and_contact_pattern(pair):
     tilted = pair.with_changes(misalignment=np.deg2rad(1.0))
-    patterns = {n: contact_pattern(p, points=21, stations=11) for n, p in (("healthy", pair), ("misaligned", tilted))}
+    patterns = {n: contact_pattern(p, points=21, sections=11) for n, p in (("healthy", pair), ("misaligned", tilted))}
     assert_readable(load_sharing_plot(patterns, title="Load sharing"))
     figure = contact_pattern_plot(patterns["misaligned"], pair=tilted, title="Contact pattern")
     drawn = figure.axes[0].collections[0].get_array()
@@ -193,5 +193,5 @@ def test_load_sharing_and_contact_pattern(pair):
     assert drawn.max() == pytest.approx(patterns["misaligned"].pressure.max() * 1e-3)
     assert np.ma.getmaskarray(drawn).sum() == (patterns["misaligned"].pressure == 0).sum()
     assert_readable(figure)
-    empty = contact_pattern(pair, points=5, stations=3, side="back")
+    empty = contact_pattern(pair, points=5, sections=3, side="coast")
     assert "no load" in contact_pattern_plot(empty).axes[0].texts[0].get_text()

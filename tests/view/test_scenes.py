@@ -161,7 +161,7 @@ def test_animation_shows_the_forces_of_the_simulation(solution, tmp_path):
     animation = mesh_animation(solution, frames=30)
     force = np.array([p.force.sum() for p in animation.points])
     at = [int(np.argmin(np.abs(solution.t - v))) for v in animation.motion.value]
-    # 21 stations by the midpoint rule against the simulation's slices
+    # 21 sections by the midpoint rule against the simulation's slices
     np.testing.assert_allclose(force, solution.contact("mesh")["normal_force"][at], rtol=1e-2)
     # three mesh cycles at 1000 rpm take 3/483.33 s
     assert np.ptp(animation.motion.value) == pytest.approx(3 / 483.333, rel=0.02)

@@ -4,9 +4,9 @@
 numbers, and the energy drift.
 """
 
+from gearmbs.studies.iftomm.benchmark import PROBLEMS, Outcome, Problem, run, table
 from gearmbs.studies.iftomm.models import andrews, bricard, four_bars, governor, pendulum, slider_crank
 from gearmbs.studies.iftomm.references import PUBLISHED, Published
-from gearmbs.studies.iftomm.run import PROBLEMS, Outcome, Problem, run, table
 
 __all__ = [
     "PROBLEMS",

@@ -1,4 +1,4 @@
-"""Where deviations of all teeth of one wheel are collected before they go into the contact tables."""
+"""Deviations of the tooth flanks of one wheel, to which every fault adds its own; packed into the contact tables."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from gearmbs.gears.spec import GearSpec
 
-PROFILE_STATIONS = 65
-FACE_STATIONS = 33
-COMPLIANCE_STATIONS = 65
+PROFILE_POINTS = 65
+FACE_SECTIONS = 33
+COMPLIANCE_POINTS = 65
 
 
-class Canvas:
+class ToothDeviations:
     """Deviations of every tooth flank of one wheel.
 
     Material missing from a flank, along its normal, is positive. Flank 0 is the one at the counter-clockwise side of
@@ -24,66 +24,66 @@ class Canvas:
     gear : GearSpec
     drive : int
         The flank that carries the load.
-    string : ndarray, shape (ns,)
-        Profile stations from the base circle to the tip, string length, m.
-    station : ndarray, shape (nz,)
-        Stations along the face from mid-face, m.
+    roll_length : ndarray, shape (ns,)
+        Points of the profile from the base circle to the tip, by their length of roll, m.
+    section : ndarray, shape (nz,)
+        Transverse sections along the face, from mid-face, m.
     offset : ndarray, shape (2, z)
         Constant material missing per flank, m.
     shape : ndarray, shape (2, z, nz, ns)
         Material missing over face and profile, m.
     tip : ndarray, shape (2, z, nz)
-        String length where the flank ends at the tip, m.
+        Length of roll where the flank ends at the tip, m.
     compliance : ndarray, shape (2, z, nc)
-        Compliance added to a tooth pair, relative to a healthy pair's, at `compliance_string`.
-    compliance_string : ndarray, shape (nc,)
-        String lengths on this wheel.
+        Compliance added to a tooth pair, relative to a healthy pair's, at `compliance_roll_length`.
+    compliance_roll_length : ndarray, shape (nc,)
+        Lengths of roll on this wheel, m.
     """
 
-    def __init__(self, gear: GearSpec, rotation: int, along_face: bool, compliance_string: np.ndarray) -> None:
+    def __init__(self, gear: GearSpec, rotation: int, along_face: bool, compliance_roll_length: np.ndarray) -> None:
         z = gear.teeth
-        nz = FACE_STATIONS if along_face else 2
+        nz = FACE_SECTIONS if along_face else 2
         self.gear = gear
         self.drive = 0 if rotation > 0 else 1
-        self.string = np.linspace(0.0, gear.tip_string, PROFILE_STATIONS)
-        self.station = np.linspace(-0.5, 0.5, nz) * gear.face_width
+        self.roll_length = np.linspace(0.0, gear.tip_roll_length, PROFILE_POINTS)
+        self.section = np.linspace(-0.5, 0.5, nz) * gear.face_width
         self.offset = np.zeros((2, z))
-        self.shape = np.zeros((2, z, nz, PROFILE_STATIONS))
-        self.tip = np.full((2, z, nz), gear.tip_string)
-        self.compliance_string = compliance_string
-        self.compliance = np.zeros((2, z, compliance_string.size))
+        self.shape = np.zeros((2, z, nz, PROFILE_POINTS))
+        self.tip = np.full((2, z, nz), gear.tip_roll_length)
+        self.compliance_roll_length = compliance_roll_length
+        self.compliance = np.zeros((2, z, compliance_roll_length.size))
 
     @property
     def radius(self) -> np.ndarray:
-        """Radii of the profile stations, m."""
-        return np.hypot(self.gear.base_radius, self.string)
+        """Radii of the points of the profile, m."""
+        return np.hypot(self.gear.base_radius, self.roll_length)
 
     def flanks(self, which: str) -> list[int]:
-        """Flank numbers of ``"drive"``, ``"back"`` or ``"both"``."""
-        choices = {"drive": [self.drive], "back": [1 - self.drive], "both": [0, 1]}
+        """Flank numbers of ``"drive"``, ``"coast"`` or ``"both"``."""
+        choices = {"drive": [self.drive], "coast": [1 - self.drive], "both": [0, 1]}
         if which not in choices:
-            raise ValueError(f"flank is {which!r}; choose 'drive', 'back' or 'both'")
+            raise ValueError(f"flank is {which!r}; choose 'drive', 'coast' or 'both'")
         return choices[which]
 
     def normal_angle(self, flank: int) -> np.ndarray:
         """Direction of the outward normal in the wheel's frame, rad, shape (z, ns)."""
         side = 1 - 2 * flank
         middle = 2 * math.pi * np.arange(self.gear.teeth)[:, None] / self.gear.teeth
-        tangent = middle + side * (self.gear.base_half_angle - self.string / self.gear.base_radius)
+        tangent = middle + side * (self.gear.base_half_angle - self.roll_length / self.gear.base_radius)
         return tangent + side * 0.5 * math.pi
 
     def shift(self, x: np.ndarray | float, y: np.ndarray | float) -> None:
         """Displace the whole toothing by (x, y) in the wheel's frame, m; arrays run along the face."""
-        x = np.broadcast_to(np.asarray(x, dtype=float), self.station.shape)
-        y = np.broadcast_to(np.asarray(y, dtype=float), self.station.shape)
+        x = np.broadcast_to(np.asarray(x, dtype=float), self.section.shape)
+        y = np.broadcast_to(np.asarray(y, dtype=float), self.section.shape)
         for flank in (0, 1):
             angle = self.normal_angle(flank)[:, None, :]
             self.shape[flank] -= x[:, None] * np.cos(angle) + y[:, None] * np.sin(angle)
 
     def shorten(self, tooth: int, radius: np.ndarray) -> None:
         """Cut both flanks of a tooth at these radii along the face, m."""
-        string = np.sqrt(np.maximum(radius**2 - self.gear.base_radius**2, 0.0))
-        self.tip[:, tooth] = np.minimum(self.tip[:, tooth], string)
+        roll_length = np.sqrt(np.maximum(radius**2 - self.gear.base_radius**2, 0.0))
+        self.tip[:, tooth] = np.minimum(self.tip[:, tooth], roll_length)
 
     def tooth_list(self, teeth: object) -> list[int]:
         """Tooth numbers from ``"all"``, one number or several; numbers wrap around the wheel."""

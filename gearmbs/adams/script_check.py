@@ -1,4 +1,4 @@
-"""Go through a script without computing anything, so that its mistakes show before a long run: ``rehearse``."""
+"""Go through a script without computing anything, so that its mistakes show before a long run: ``check_script``."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ SINGLE = ("STATICS", "INITIAL_CONDITIONS", "DISPLACEMENT", "VELOCITY", "ACCELERA
 """Analyses that may stand at the present time."""
 
 
-def rehearse(deck: Deck, script: Script, allow_unsupported: bool = False) -> None:
-    """Check everything about a script that can be told before it is run.
+def check_script(deck: Deck, script: Script, allow_unsupported: bool = False) -> None:
+    """Check everything about a script that is known before it is run.
 
     The elements it switches and changes must be there, its times must go on, the mechanism of the first analysis must
     be built, and the expressions of all statements, as they are at every analysis, must be understood.

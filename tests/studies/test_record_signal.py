@@ -3,8 +3,8 @@
 import pytest
 
 from gearmbs.signals import SignalError, analyse, write_signal
+from gearmbs.signals.simulated import parse_models, read_any
 from gearmbs.studies import Case, record_signal, run_case
-from gearmbs.studies.exchange import parse_models, read_any
 from gearmbs.studies.store import write_dataset
 
 
