@@ -89,13 +89,13 @@ def _pendulum() -> tuple[str, float, float, str]:
     model.revolute("pin", rod, model.ground, at=(0, 0, 0), axis=(0, 1, 0))
     quarter = ellipk(0.5) * sqrt(1 / 9.81)
     motion = model.simulate(4 * quarter, t_eval=np.array([0.0, quarter, 2 * quarter, 4 * quarter]), tol=1e-9)
-    return ("pendulum from the horizontal, x after half a period", -1.0, motion.position("rod")[2, 0], "m")
+    return ("pendulum from the horizontal, x after half a period", -1.0, motion.com_position("rod")[2, 0], "m")
 
 
 def _free_fall() -> Rows:
     model = Mechanism("free fall", gravity=(0, 0, -9.81))
     model.body("stone", mass=2.0, inertia=(1, 1, 1), velocity=(3.0, 0, 0))
-    end = model.simulate(2.0, t_eval=np.array([0.0, 2.0]), tol=1e-8).position("stone")[-1]
+    end = model.simulate(2.0, t_eval=np.array([0.0, 2.0]), tol=1e-8).com_position("stone")[-1]
     return [("free fall after 2 s, z", -0.5 * 9.81 * 4, end[2], "m"), ("free fall after 2 s, x", 6.0, end[0], "m")]
 
 
@@ -127,7 +127,7 @@ def _slider_crank() -> tuple[str, float, float, str]:
     expected = speed**2 * (
         -r * cos(angle) - r**2 * cos(2 * angle) / root - (r**2 * sin(angle) * cos(angle)) ** 2 / root**3
     )
-    return ("slider-crank, acceleration of the piston", expected, motion.acceleration("piston")[1, 0], "m/s^2")
+    return ("slider-crank, acceleration of the piston", expected, motion.com_acceleration("piston")[1, 0], "m/s^2")
 
 
 def running() -> Rows:

@@ -54,7 +54,7 @@ def assembly_of(model: AdamsModel, solution: Solution) -> Assembly:
     for name, body in bodies.items():
         label = model.sources[name].label()
         distances[label] = float(
-            np.linalg.norm(solution.position(name)[0] - body.position - body.orientation @ body.com)
+            np.linalg.norm(solution.com_position(name)[0] - body.position - body.orientation @ body.com)
         )
         # |A - B| = 2 sqrt(2) sin(angle/2)
         apart = float(np.linalg.norm(solution.orientation(name)[0] - body.orientation))

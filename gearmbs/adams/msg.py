@@ -141,6 +141,6 @@ def _initial_conditions(result: AdamsResult, segment: Segment, time: float) -> l
     out += ["", "  End Displacement Initial Conditions", ""]
     for what in ("Velocity", "Acceleration"):
         out += ["", f"  Begin {what} Initial Conditions", "", "", f"  End {what} Initial Conditions", ""]
-    if np.any(~np.isfinite(segment.solution.acceleration(segment.solution.system.body_names[0])[0])):
+    if np.any(~np.isfinite(segment.solution.com_acceleration(segment.solution.system.body_names[0])[0])):
         out.append("  The initial accelerations are not finite.")
     return out

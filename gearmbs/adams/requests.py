@@ -9,7 +9,7 @@ from numba import njit
 
 from gearmbs.adams import statements as st
 from gearmbs.adams.build import AdamsModel, markers_of
-from gearmbs.dae.analyses.equilibrium_solution import Standstill
+from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution
 from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.equations.expressions import eval_gradient
 from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_R
@@ -100,7 +100,7 @@ class RequestEvaluator:
         self.scope: Scope = model.scope(index, builder.marker_body)
         self._names = {index[id(m)]: m.name for m in markers_of(model.mechanism)}
         self._turns = dict(model.mechanism.turns)
-        if isinstance(solution, Standstill):
+        if isinstance(solution, EquilibriumSolution):
             # the way to an equilibrium may have wound or unwound a spring
             for (function, i, j), angle in solution.counted().items():
                 self._turns[function, self._marker_named(i), self._marker_named(j)] = angle

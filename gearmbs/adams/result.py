@@ -306,11 +306,11 @@ def part_motion(segment: Segment, number: int) -> np.ndarray:
     tip = np.cross(spin, arm)
     motion = np.hstack(
         [
-            s.position(name) - arm,
+            s.com_position(name) - arm,
             np.array([euler_from_matrix(a) for a in axes]),
-            s.velocity(name) - tip,
+            s.com_velocity(name) - tip,
             spin,
-            s.acceleration(name) - np.cross(alpha, arm) - np.cross(spin, tip),
+            s.com_acceleration(name) - np.cross(alpha, arm) - np.cross(spin, tip),
             alpha,
         ]
     )

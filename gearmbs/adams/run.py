@@ -330,7 +330,9 @@ def _remember(session: Session, model: AdamsModel, segment: Segment, evaluator: 
     s = segment.solution
     names = s.system.body_names
     last = [
-        np.concatenate([s.position(n)[-1], s.orientation(n)[-1].ravel(), s.velocity(n)[-1], s.angular_velocity(n)[-1]])
+        np.concatenate(
+            [s.com_position(n)[-1], s.orientation(n)[-1].ravel(), s.com_velocity(n)[-1], s.angular_velocity(n)[-1]]
+        )
         for n in names
     ]
     session.state = part_states(model, np.array(last))

@@ -67,7 +67,7 @@ class Measures:
         body, point, _ = self._frame(marker)
         if body.is_ground:
             return np.tile(point, (self.solution.t.size, 1))
-        return self.solution.position(body.name) + self.solution.orientation(body.name) @ point
+        return self.solution.com_position(body.name) + self.solution.orientation(body.name) @ point
 
     def velocity(self, marker: Marker | Body | str) -> np.ndarray:
         """Return the velocity of a marker's, or of a body's frame's, origin, global components, shape (m, 3), m/s."""
@@ -76,7 +76,7 @@ class Measures:
             return np.zeros((self.solution.t.size, 3))
         arm = self.solution.orientation(body.name) @ point
         spin = self.solution.angular_velocity(body.name)
-        return self.solution.velocity(body.name) + np.cross(spin, arm)
+        return self.solution.com_velocity(body.name) + np.cross(spin, arm)
 
     def _frame(self, marker: Marker | Body | str) -> tuple[Body, np.ndarray, np.ndarray]:
         """Return body, origin from the centre of mass and axes in the body."""
@@ -173,11 +173,11 @@ def motion_tables(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     acc = np.zeros((m, len(names) + 1, 6))
     kin[:, 0, KIN_A : KIN_A + 9] = np.eye(3).ravel()
     for b, name in enumerate(names, 1):
-        kin[:, b, KIN_R : KIN_R + 3] = solution.position(name)
-        kin[:, b, KIN_V : KIN_V + 3] = solution.velocity(name)
+        kin[:, b, KIN_R : KIN_R + 3] = solution.com_position(name)
+        kin[:, b, KIN_V : KIN_V + 3] = solution.com_velocity(name)
         kin[:, b, KIN_A : KIN_A + 9] = solution.orientation(name).reshape(m, 9)
         kin[:, b, KIN_W : KIN_W + 3] = solution.angular_velocity(name)
-        acc[:, b, :3] = solution.acceleration(name)
+        acc[:, b, :3] = solution.com_acceleration(name)
         acc[:, b, 3:] = solution.angular_acceleration(name)
     return kin, acc
 

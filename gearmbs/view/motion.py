@@ -175,6 +175,6 @@ def marker_motion(
     turned = solution.orientation(body.name)[chosen]
     spin = solution.angular_velocity(body.name)[chosen]
     arm = turned @ (marker.position - body.com)
-    origin = solution.position(body.name)[chosen] + arm
-    velocity = solution.velocity(body.name)[chosen] + np.cross(spin, arm)
+    origin = solution.com_position(body.name)[chosen] + arm
+    velocity = solution.com_velocity(body.name)[chosen] + np.cross(spin, arm)
     return origin, turned @ marker.orientation, velocity, spin

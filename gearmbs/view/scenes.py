@@ -182,7 +182,7 @@ def solution_scene(
     poses = {}
     for name, body in mechanism.bodies.items():
         turned = solution.orientation(name)[chosen]
-        poses[name] = (solution.position(name)[chosen] - turned @ body.com, turned)
+        poses[name] = (solution.com_position(name)[chosen] - turned @ body.com, turned)
     balls = _joint_parts(mechanism, solution, chosen) if joints else []
     parts = [*_body_parts(mechanism, poses, shapes or {}), *balls]
     arrows = _contact_forces(solution, chosen) if forces else []

@@ -56,7 +56,7 @@ def test_written_mechanism_moves_alike(units):
     again = deck.to_mechanism()
     solution = again.simulate(0.5, rate=20, tol=1e-9, corrector="modified")
     for name in m.bodies:
-        np.testing.assert_allclose(solution.position(name), original.position(name), atol=1e-7)
+        np.testing.assert_allclose(solution.com_position(name), original.com_position(name), atol=1e-7)
         np.testing.assert_allclose(solution.angular_velocity(name), original.angular_velocity(name), atol=1e-5)
 
 
@@ -123,7 +123,7 @@ def test_friction_fields_and_loads_of_reactions_survive():
     m.axis_torque("brake", pin.i, pin.j, "-0.01*JOINT(pin, 0, 1)")
     again = parse_deck(write_deck(m)).to_mechanism()
     # what is written is equal up to rounding, which may change the choice of steps: as close as the integration
-    one, two = (x.simulate(1.0, rate=100, tol=1e-11).position("bob") for x in (m, again))
+    one, two = (x.simulate(1.0, rate=100, tol=1e-11).com_position("bob") for x in (m, again))
     np.testing.assert_allclose(two, one, atol=1e-9)
 
 
@@ -138,7 +138,7 @@ def test_arrays_and_plants_survive():
     again = parse_deck(write_deck(m)).to_mechanism()
     solution = again.simulate(1.0, rate=4, tol=1e-9)
     # a = (1 + 3 t)/2
-    np.testing.assert_allclose(solution.position("block")[:, 0], solution.t**2 / 4 + solution.t**3 / 4, atol=1e-8)
+    np.testing.assert_allclose(solution.com_position("block")[:, 0], solution.t**2 / 4 + solution.t**3 / 4, atol=1e-8)
 
 
 @pytest.mark.parametrize("units", [Units(), Units(length=1e-3, time=1e-3)])
@@ -158,7 +158,7 @@ def test_motions_by_their_rates_are_written_as_such(units):
     t = result.t * units.time
     spin = result.segments[0].solution.orientation("wheel")
     np.testing.assert_allclose(np.arctan2(spin[:, 1, 0], spin[:, 0, 0]), 0.3 + 2 * (t**3 - t**4 / 2), atol=1e-8)
-    place = result.segments[0].solution.position("slide")[:, 2]
+    place = result.segments[0].solution.com_position("slide")[:, 2]
     np.testing.assert_allclose(place, 0.2 - 0.1 * t + 0.25 * t**2, atol=1e-8)
     again = write_deck(deck.to_mechanism())
     assert "INTEGRAL" not in again

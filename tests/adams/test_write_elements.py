@@ -64,7 +64,7 @@ def test_elements_keep_their_statements(statement):
     again = parse_deck(text).to_mechanism()
     assert block(write_deck(again), statement.split("\n")[0]) == block(text, statement.split("\n")[0])
     one, two = (x.simulate(0.3, rate=20, tol=1e-9) for x in (m, again))
-    np.testing.assert_allclose(two.position("block"), one.position("block"), atol=1e-8)
+    np.testing.assert_allclose(two.com_position("block"), one.com_position("block"), atol=1e-8)
     np.testing.assert_allclose(two.load("e")[0], one.load("e")[0], atol=1e-5)
 
 
@@ -96,7 +96,7 @@ def test_decks_of_every_element_are_written_with_it(kind):
     one, two = (run_deck(d, end=0.1, steps=4, tol=1e-8) for d in (deck, parse_deck(text)))
     # axes go through Euler angles
     for body in ("PART_2", "PART_3"):
-        a, b = (r.segments[0].solution.position(body) for r in (one, two))
+        a, b = (r.segments[0].solution.com_position(body) for r in (one, two))
         np.testing.assert_allclose(b, a, atol=1e-8)
     np.testing.assert_allclose(two.force(kind, 1), one.force(kind, 7), atol=1e-5)
 
@@ -124,7 +124,7 @@ def test_friction_keeps_its_statement(kind):
     assert "DIFF/" not in text
     again = parse_deck(text).to_mechanism()
     one, two = (x.simulate(0.2, rate=50, tol=1e-8) for x in (m, again))
-    np.testing.assert_allclose(two.position("body"), one.position("body"), atol=1e-7)
+    np.testing.assert_allclose(two.com_position("body"), one.com_position("body"), atol=1e-7)
 
 
 def test_friction_that_others_look_into_is_written_as_expressions():
@@ -138,7 +138,7 @@ def test_friction_that_others_look_into_is_written_as_expressions():
     assert "SFORCE/1\n, ROTATIONAL" in text
     again = parse_deck(text).to_mechanism()
     one, two = (x.simulate(0.2, rate=50, tol=1e-8) for x in (m, again))
-    np.testing.assert_allclose(two.position("body"), one.position("body"), atol=1e-8)
+    np.testing.assert_allclose(two.com_position("body"), one.com_position("body"), atol=1e-8)
 
 
 @pytest.mark.parametrize("units", [Units(), Units(length=1e-3, time=1e-3)])
@@ -164,9 +164,9 @@ def test_written_decks_ask_for_results(tmp_path, units):
     )
     # then displacement and velocity of the rod and the force in the pin
     np.testing.assert_allclose(
-        result.request(3)[:, 1] * units.length, result.segments[0].solution.position("rod=1")[:, 0]
+        result.request(3)[:, 1] * units.length, result.segments[0].solution.com_position("rod=1")[:, 0]
     )
-    speed = result.segments[0].solution.velocity("rod=1")[:, 2]
+    speed = result.segments[0].solution.com_velocity("rod=1")[:, 2]
     np.testing.assert_allclose(result.request(4)[:, 3] * units.factor("velocity"), speed, atol=1e-12)
     np.testing.assert_allclose(result.request(5)[:, [1, 2, 3]], result.force("joint", 1)[:, :3], atol=1e-9)
     assert len((tmp_path / "out.req").read_text().splitlines()) == 3 + 2 * 5 + 11 * 6

@@ -282,7 +282,7 @@ def test_massless_held_body_is_fine():
     m.fixed("weld", ghost, weight)
     solution = m.simulate(1.0, integrator="IDA", tol=1e-8)
     # free fall: z = -g t^2 / 2
-    assert solution.position("ghost")[-1, 2] == pytest.approx(-4.905, abs=1e-6)
+    assert solution.com_position("ghost")[-1, 2] == pytest.approx(-4.905, abs=1e-6)
 
 
 def test_repr_lists_the_parts():
@@ -295,7 +295,7 @@ def test_repr_lists_the_parts():
 def test_unknown_names_in_results():
     solution = pendulum().simulate(0.1, integrator="IDA")
     with pytest.raises(KeyError, match="the bodies are rod"):
-        solution.position("arm")
+        solution.com_position("arm")
     with pytest.raises(KeyError, match="the joints are pin"):
         solution.reaction("hinge")
 
@@ -344,7 +344,7 @@ def test_a_body_takes_the_axis_of_the_marker_it_is_joined_to():
     assert joint.j.global_orientation()[:, 2] == pytest.approx([0, 1, 0])
     solution = m.simulate(0.5)
     # it swings about y, and nothing had to be moved to assemble it
-    assert solution.position("rod")[-1, 2] < -0.2
+    assert solution.com_position("rod")[-1, 2] < -0.2
     assert "assembly" not in solution.message
     with pytest.raises(ModelError, match="either markers or bodies"):
         m.revolute("again", end, m.ground, axis=(0, 1, 0))

@@ -21,7 +21,7 @@ def block(angle: float, **friction):
 
 
 def along(solution, angle: float) -> np.ndarray:
-    return solution.position("block") @ np.array([np.cos(angle), 0, -np.sin(angle)])
+    return solution.com_position("block") @ np.array([np.cos(angle), 0, -np.sin(angle)])
 
 
 @pytest.mark.parametrize("integrator", ["WSTIFF", "IDA"])
@@ -43,7 +43,7 @@ def test_block_slides_above_the_angle_of_friction(formulation, integrator):
     """tan 0.6 = 0.68 > 0.5: a = g (sin - mu_d cos), but for the first 1.5 mm/s."""
     solution = block(0.6).simulate(1.0, formulation=formulation, integrator=integrator, tol=1e-7)
     rate = G * (np.sin(0.6) - 0.3 * np.cos(0.6))
-    velocity = np.linalg.norm(solution.velocity("block"), axis=1)
+    velocity = np.linalg.norm(solution.com_velocity("block"), axis=1)
     np.testing.assert_allclose(np.diff(velocity[100:]) / np.diff(solution.t[100:]), rate, rtol=2e-5)
     assert along(solution, 0.6)[-1] == pytest.approx(0.5 * rate, rel=3e-3)
 
@@ -52,7 +52,7 @@ def test_without_deformation_the_block_creeps():
     """mu(V) = mu_s V (3 - V^2/v_s^2)/(2 v_s) equals tan 0.4 at one speed, at which the block creeps."""
     solution = block(0.4, max_stiction_deformation=0.0).simulate(1.0, tol=1e-8)
     creep = 1e-3 * min(np.roots([-1, 0, 3, -2 * np.tan(0.4) / 0.5]).real, key=lambda x: abs(x - 0.6))
-    assert np.linalg.norm(solution.velocity("block")[-1]) == pytest.approx(creep, rel=1e-6)
+    assert np.linalg.norm(solution.com_velocity("block")[-1]) == pytest.approx(creep, rel=1e-6)
 
 
 @pytest.mark.parametrize("deformation", [0.0, 1e-6])
@@ -66,7 +66,7 @@ def test_pendulum_with_a_dry_pin(deformation):
     m.friction("friction", pin, mu, mu, pin_radius=r, **options)
     solution = m.simulate(4.5, rate=400, tol=1e-9)
     assert solution.success, solution.message
-    angle = np.arctan2(solution.position("bob")[:, 0], -solution.position("bob")[:, 2])
+    angle = np.arctan2(solution.com_position("bob")[:, 0], -solution.com_position("bob")[:, 2])
 
     def swing(sign):
         def rate(_, y):
@@ -127,7 +127,7 @@ def test_cylindrical_joint_shares_its_friction_between_slide_and_turn():
     # V = hypot(0.6, 0.8) = 1
     time = 1.0 / (mu * G)
     t = np.minimum(solution.t, time)
-    np.testing.assert_allclose(solution.position("rod")[:, 0], 0.6 * (t - mu * G * t**2 / 2), atol=2e-6)
+    np.testing.assert_allclose(solution.com_position("rod")[:, 0], 0.6 * (t - mu * G * t**2 / 2), atol=2e-6)
     np.testing.assert_allclose(solution.angular_velocity("rod")[:, 0], 8.0 * (1 - mu * G * t), atol=2e-4)
 
 
@@ -153,7 +153,7 @@ def test_friction_force_has_a_limit(kind):
     radius = {"pin_radius": 0.1} if kind == "cylindrical" else {}
     m.friction("friction", rail, 0.3, 0.3, max_force=2.0, **radius, **SLIDING)
     solution = m.simulate(0.4, rate=100, tol=1e-8)
-    np.testing.assert_allclose(solution.velocity("body")[:, 0], 0.5 - solution.t, atol=1e-6)
+    np.testing.assert_allclose(solution.com_velocity("body")[:, 0], 0.5 - solution.t, atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["revolute", "spherical"])
@@ -208,10 +208,10 @@ def test_moments_press_a_slide(change):
     m.friction("friction", rail, 0.3, 0.1, reaction_arm=0.25, overlap=0.5, overlap_change=change, **SLIDING)
     m.load("push", body.marker((0, -0.1, 0.2), name="push"), m.ground.marker(name="base"), fx="30")
     solution = m.simulate(0.4, rate=500, tol=1e-8)
-    x = solution.position("slide")[:, 0]
+    x = solution.com_position("slide")[:, 0]
     overlap = 0.5 + {"constant": 0.0, "increasing": 1.0, "decreasing": -1.0}[change] * x
     # bending: about y 30 * 0.2 and, since the push and friction act 0.1 m from the centre, about z m a 0.1
-    a = solution.acceleration("slide")[:, 0]
+    a = solution.com_acceleration("slide")[:, 0]
     bending = np.hypot(30 * 0.2, 2.0 * a * 0.1)
     normal = 2 * G + bending / overlap + 2 * G * 0.1 / 0.25
     np.testing.assert_allclose(2.0 * a[5:], (30 - 0.1 * normal)[5:], rtol=1e-5)

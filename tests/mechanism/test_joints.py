@@ -202,8 +202,8 @@ def test_joint_against_its_definition(kind, formulation, integrator):
     # index 3 controls positions only
     bound = 1e-4 if formulation == "I3" else 2e-6
     for b, name in enumerate(("one", "two")):
-        np.testing.assert_allclose(solution.position(name)[-1], places[b], atol=bound)
+        np.testing.assert_allclose(solution.com_position(name)[-1], places[b], atol=bound)
         np.testing.assert_allclose(solution.orientation(name)[-1], axes[b], atol=bound)
-    pose = [(solution.position(n)[-1], solution.orientation(n)[-1]) for n in ("one", "two")]
+    pose = [(solution.com_position(n)[-1], solution.orientation(n)[-1]) for n in ("one", "two")]
     # the definition itself, with its own signs and axes, holds on our solution
     assert np.abs(DEFINITIONS[kind](*frames(pose, local), END)).max() < 1e-8

@@ -165,7 +165,7 @@ def test_load_against_its_law(kind, formulation, integrator):
     place, axes = reference(kind)
     # index 3 controls positions only; a stop that is hit costs it 2e-5
     bound = 5e-5 if formulation == "I3" else 2e-6
-    np.testing.assert_allclose(solution.position("b")[-1], place, atol=bound)
+    np.testing.assert_allclose(solution.com_position("b")[-1], place, atol=bound)
     np.testing.assert_allclose(solution.orientation("b")[-1], axes, atol=bound)
 
 
@@ -179,7 +179,7 @@ def test_beam_is_the_field_of_its_stiffness():
     m.beam("beam", i, j, length=1.0, area=1e-4, second_moments=(2e-8, 1e-8, 3e-8), modulus=2e11, shear_modulus=8e10)
     m.load("weight", i, m.ground.marker(name="base"), fy="0.6")
     rest = static_equilibrium(m)
-    np.testing.assert_allclose(rest.position("tip")[1], 0.6 / 18000, rtol=1e-4)
+    np.testing.assert_allclose(rest.com_position("tip")[1], 0.6 / 18000, rtol=1e-4)
     np.testing.assert_allclose(rest.orientation("tip")[1, 0], 0.6 / 12000, rtol=1e-4)
     with pytest.raises(ModelError, match=r"length = 0\.0; it must be positive"):
         m.beam("b", i, j, length=0.0, area=1, second_moments=(1, 1, 1), modulus=1, shear_modulus=1)
@@ -202,7 +202,7 @@ def test_gear_and_rack_by_name():
     rate = 0.5 / (0.1 + 0.05 + 3 * 0.05**2) * solution.t
     np.testing.assert_allclose(solution.angular_velocity("one")[:, 2], rate, atol=1e-6)
     np.testing.assert_allclose(solution.angular_velocity("two")[:, 2], -0.5 * rate, atol=1e-6)
-    np.testing.assert_allclose(solution.velocity("rack")[:, 0], -0.05 * rate, atol=1e-6)
+    np.testing.assert_allclose(solution.com_velocity("rack")[:, 0], -0.05 * rate, atol=1e-6)
     with pytest.raises(ModelError, match="it must be translational"):
         m.rack_pinion("bad", pins[0], pins[1], 0.1)
 
@@ -227,4 +227,4 @@ def test_arrays_in_expressions():
     body = m.body("b", 2.0, (1, 1, 1))
     m.array("forces", [1.0, 4.0])
     m.axis_force("push", body.marker(name="i"), m.ground.marker(name="j"), "ARYVAL(forces, 2)")
-    assert m.simulate(1.0, tol=1e-9).velocity("b")[-1, 2] == pytest.approx(2.0, abs=1e-8)
+    assert m.simulate(1.0, tol=1e-9).com_velocity("b")[-1, 2] == pytest.approx(2.0, abs=1e-8)

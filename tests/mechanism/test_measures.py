@@ -48,7 +48,7 @@ def test_markers_and_frames(machine):
     np.testing.assert_allclose(
         solution.marker_position(m.bodies["wheel"]), np.tile([1.0, 0, 0], (t.size, 1)), atol=1e-9
     )
-    np.testing.assert_allclose(solution.position("wheel"), [1, 0, 0] + 0.02 * ring, atol=1e-9)
+    np.testing.assert_allclose(solution.com_position("wheel"), [1, 0, 0] + 0.02 * ring, atol=1e-9)
     late = m.ground.marker((0, 2, 0), name="late") if "late" not in [k.name for k in m.ground.markers] else "late"
     assert solution.marker_position(late)[3] == pytest.approx([0, 2, 0])
     with pytest.raises(KeyError, match=r"the markers are .*rim"):

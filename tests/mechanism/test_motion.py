@@ -19,7 +19,7 @@ def test_pendulum_period(integrator, formulation):
     period = 4.0 * np.sqrt(1.0 / 9.81) * ellipk(0.5)
     solution = m.simulate(period, integrator=integrator, formulation=formulation, tol=1e-9)
     assert solution.success, solution.message
-    np.testing.assert_allclose(solution.position("bob")[-1], [1, 0, 0], atol=2e-7)
+    np.testing.assert_allclose(solution.com_position("bob")[-1], [1, 0, 0], atol=2e-7)
     # at the lowest point (T/4) the pin carries m g + m v^2/l = 3 m g
     force, _ = m.simulate(period / 4, integrator=integrator, tol=1e-9).reaction("pin")
     np.testing.assert_allclose(force[-1], [0, 0, 3 * 9.81], atol=1e-5)
@@ -30,7 +30,7 @@ def test_free_fall_and_spin():
     m.body("stone", 2.0, (1, 1, 1), velocity=(1, 2, 3), angular_velocity=(0, 0, 5), com=(0.1, 0, 0))
     solution = m.simulate(1.0, integrator="IDA", tol=1e-9)
     # the centre of mass starts at (0.1, 0, 0) with v + w x r = (1, 2.5, 3)
-    np.testing.assert_allclose(solution.position("stone")[-1], [1.1, 2.5, 3 - 4.905], atol=1e-7)
+    np.testing.assert_allclose(solution.com_position("stone")[-1], [1.1, 2.5, 3 - 4.905], atol=1e-7)
     np.testing.assert_allclose(solution.angular_velocity("stone")[-1], [0, 0, 5], atol=1e-8)
 
 
@@ -103,7 +103,7 @@ def test_prescribed_translation_and_expression_agree():
         return m.simulate(1.0, integrator="IDA", tol=1e-9)
 
     closed, text = moved(harmonic(0.2, 3.0)), moved("0.2*SIN(3*TIME)")
-    np.testing.assert_allclose(closed.position("b"), text.position("b"), atol=1e-8)
+    np.testing.assert_allclose(closed.com_position("b"), text.com_position("b"), atol=1e-8)
     # m x'' = -m A w^2 sin(w t)
     force, _ = text.reaction("push")
     np.testing.assert_allclose(force[:, 0], -3.0 * 0.2 * 9.0 * np.sin(3.0 * text.t), atol=1e-7)
@@ -120,7 +120,7 @@ def test_spring_damper_oscillator(integrator):
     solution = m.simulate(2.0, integrator=integrator, tol=1e-9)
     d, w = 1.0, np.sqrt(99.0)
     x = 1.0 + 0.1 * np.exp(-d * solution.t) * (np.cos(w * solution.t) + d / w * np.sin(w * solution.t))
-    np.testing.assert_allclose(solution.position("m")[:, 0], x, atol=5e-8)
+    np.testing.assert_allclose(solution.com_position("m")[:, 0], x, atol=5e-8)
 
 
 def test_screw_advances_by_its_pitch():
@@ -129,7 +129,7 @@ def test_screw_advances_by_its_pitch():
     m.screw("thread", nut, m.ground, pitch=0.01)
     solution = m.simulate(5.0, integrator="IDA", tol=1e-9)
     # five free turns: 50 mm
-    assert solution.position("nut")[-1, 2] == pytest.approx(0.05, abs=1e-8)
+    assert solution.com_position("nut")[-1, 2] == pytest.approx(0.05, abs=1e-8)
 
 
 @pytest.mark.parametrize("speed", [10.0, 100.0])
@@ -141,7 +141,7 @@ def test_turns_are_counted_in_steps_of_many_turns(integrator, speed):
     m.screw("thread", nut, m.ground, pitch=0.01)
     solution = m.simulate(20.0, t_eval=(0.0, 10.0, 20.0), integrator=integrator, tol=1e-8)
     expected = 0.005 * speed / np.pi * solution.t
-    np.testing.assert_allclose(solution.position("nut")[:, 2], expected, atol=1e-6)
+    np.testing.assert_allclose(solution.com_position("nut")[:, 2], expected, atol=1e-6)
     if integrator != "IDA":
         assert solution.stats.steps < 100
 
@@ -193,7 +193,7 @@ def test_energy_balance_of_a_conservative_mechanism():
     m.revolute("pin", rod, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
     solution = m.simulate(2.0, rate=500, tol=1e-8)
     balance = solution.energy_balance()
-    exchanged = 9.81 * np.ptp(solution.position("rod")[:, 2])
+    exchanged = 9.81 * np.ptp(solution.com_position("rod")[:, 2])
     expected = float(np.abs(balance.imbalance).max()) / exchanged
     assert balance.attrs["relative_imbalance"] == pytest.approx(expected, rel=1e-3)
     assert balance.attrs["relative_imbalance"] < 1e-6
@@ -229,7 +229,7 @@ def test_output_times_may_be_a_column_of_a_table(integrator):
     m.body("stone", 1.0, (0.1, 0.1, 0.1))
     table = np.column_stack([np.linspace(0.0, 1.0, 5), np.ones(5)])
     solution = m.simulate(1.0, t_eval=table[:, 0], integrator=integrator)
-    np.testing.assert_allclose(solution.position("stone")[:, 2], -9.81 / 2 * table[:, 0] ** 2, atol=1e-5)
+    np.testing.assert_allclose(solution.com_position("stone")[:, 2], -9.81 / 2 * table[:, 0] ** 2, atol=1e-5)
 
 
 @pytest.mark.parametrize(("t_end", "rate", "count"), [(1.0, 0.1, 2), (0.5, 3.0, 3), (1.0, 333.3, 335), (0.3, 10.0, 4)])

@@ -26,9 +26,9 @@ def series(solution) -> np.ndarray:
     return np.column_stack(
         [
             solution.t,
-            solution.position("crank"),
+            solution.com_position("crank"),
             solution.orientation("t").reshape(-1, 9),
-            solution.acceleration("crank"),
+            solution.com_acceleration("crank"),
             solution.angular_acceleration("t"),
             force,
             moment,
@@ -69,6 +69,6 @@ def test_parts_of_equilibria():
     guide = m.translational("guide", block, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
     m.translation("lift", guide, polynomial([0.0, 1.0]))
     solution = quasi_static(m, np.linspace(0.0, 1.0, 5))
-    parts = [part.velocity("block").copy() for part in solution.parts(size=2)]
-    np.testing.assert_array_equal(np.concatenate(parts), solution.velocity("block"))
-    assert np.all(solution.velocity("block") == 0.0)
+    parts = [part.com_velocity("block").copy() for part in solution.parts(size=2)]
+    np.testing.assert_array_equal(np.concatenate(parts), solution.com_velocity("block"))
+    assert np.all(solution.com_velocity("block") == 0.0)

@@ -64,7 +64,7 @@ def test_motions_in_usual_units():
     # half a turn in half a second; 5 mm + 10 mm/s t + 1 mm/s^2 t^2 further along
     assert solution.t[-1] == 0.5
     assert solution.angular_velocity("wheel")[-1, 2] == pytest.approx(2 * np.pi, rel=1e-9)
-    assert solution.position("slide")[-1, 0] == pytest.approx(1.01025, rel=1e-6)
+    assert solution.com_position("slide")[-1, 0] == pytest.approx(1.01025, rel=1e-6)
 
 
 def test_functions_of_time_in_usual_units():

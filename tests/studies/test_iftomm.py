@@ -77,7 +77,7 @@ def test_ten_windows_pass_the_flat_position():
     t = np.linspace(0.0, 3.0, 301)
     solution = iftomm.four_bars(10).simulate(3.0, t_eval=t, tol=1e-8)
     assert solution.success, solution.message
-    height = 2 * solution.position("crank 10")[:, 1]
+    height = 2 * solution.com_position("crank 10")[:, 1]
     np.testing.assert_allclose(height, references.four_bars(t, 10)[:, 1], atol=1e-5)
 
 
@@ -88,7 +88,7 @@ def test_many_windows_at_any_tolerance(loops, tol):
     t = np.linspace(0.0, 3.0, 301)
     solution = iftomm.four_bars(loops).simulate(3.0, t_eval=t, tol=tol)
     assert solution.success, solution.message
-    height = 2 * solution.position(f"crank {loops}")[:, 1]
+    height = 2 * solution.com_position(f"crank {loops}")[:, 1]
     # free runs: 60 times the tolerance at 1e-8, with a power of 0.8
     np.testing.assert_allclose(height, references.four_bars(t, loops)[:, 1], atol=20 * tol**0.8)
     assert solution.stats.error_rejections + solution.stats.newton_rejections <= 3
@@ -101,7 +101,7 @@ def test_outputs_at_the_flat_position():
     assert solution.success, solution.message
     assert np.all(np.isfinite(solution.multipliers))
     assert np.all(np.isfinite(solution.reaction("A0")[0]))
-    height = 2 * solution.position("crank 10")[:, 1]
+    height = 2 * solution.com_position("crank 10")[:, 1]
     np.testing.assert_allclose(height, references.four_bars(t, 10)[:, 1], atol=1e-3)
 
 

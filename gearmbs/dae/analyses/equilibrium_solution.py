@@ -50,7 +50,7 @@ class Snapshot:
         )
 
 
-class Standstill(Solution):
+class EquilibriumSolution(Solution):
     """Equilibria over time: nothing moves, whatever the rates of motions and constraints.
 
     Make one with :meth:`of`.
@@ -63,7 +63,7 @@ class Standstill(Solution):
         self._records = self._evaluate()
 
     @classmethod
-    def of(cls, rows: Sequence[Snapshot], message: str, iterations: int) -> Standstill:
+    def of(cls, rows: Sequence[Snapshot], message: str, iterations: int) -> EquilibriumSolution:
         """Return the solution of snapshots of equilibria."""
         return cls(rows, Snapshot.result(message, iterations, rows))
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.dae.analyses.equilibrium_solution import Snapshot, Standstill
+from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution, Snapshot
 from gearmbs.dae.analyses.linearised import Instant
 from gearmbs.dae.analyses.statics import Relaxation, static_equilibrium
 from gearmbs.dae.errors import ModelError
@@ -75,4 +75,4 @@ def quasi_static(system: System, times: np.ndarray, *, tol: float = 1e-10, max_i
             if last:
                 break
         rows.append(Snapshot.of(instant))
-    return Standstill.of(rows, f"{times.size} static equilibria found in {total} iterations", total)
+    return EquilibriumSolution.of(rows, f"{times.size} static equilibria found in {total} iterations", total)

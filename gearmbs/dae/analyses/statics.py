@@ -19,8 +19,9 @@ import numpy as np
 from scipy.sparse import block_diag, csc_array, diags_array
 from scipy.sparse.linalg import splu
 
+from gearmbs._deprecation import former_name
 from gearmbs.dae.analyses.eigenvalues import free_motions
-from gearmbs.dae.analyses.equilibrium_solution import Snapshot, Standstill
+from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution, Snapshot
 from gearmbs.dae.analyses.linearised import Instant, reduce
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
 
@@ -71,11 +72,13 @@ class StaticResult:
     residual: float
     neutral: list[str] = field(default_factory=list)
     stable: bool | None = None
-    solution: Standstill = field(repr=False, default=None)  # type: ignore[assignment]
+    solution: EquilibriumSolution = field(repr=False, default=None)  # type: ignore[assignment]
 
-    def position(self, body: str) -> np.ndarray:
-        """Return the centre of mass of a body, shape (3,), m."""
+    def com_position(self, body: str) -> np.ndarray:
+        """Return the position of the centre of mass of a body, shape (3,), m, global."""
         return self.pose[self._index(body), 0:3]
+
+    position = former_name("position", com_position, "it is the centre of mass; write com_position")
 
     def orientation(self, body: str) -> np.ndarray:
         """Return the rotation matrix of a body, shape (3, 3)."""
@@ -324,7 +327,9 @@ def describe(shape: np.ndarray, names: list[str], length: float) -> tuple[str, s
 
 def _result(instant: Instant, iterations: int, size: float) -> StaticResult:
     system = instant.system
-    solution = Standstill.of([Snapshot.of(instant)], f"static equilibrium found in {iterations} iterations", iterations)
+    solution = EquilibriumSolution.of(
+        [Snapshot.of(instant)], f"static equilibrium found in {iterations} iterations", iterations
+    )
     joints = dict.fromkeys(name.rsplit(": ", 1)[0] for name in system.row_names)
     reactions = {joint: (solution.reaction(joint)[0][0], solution.reaction(joint)[1][0]) for joint in joints}
     loads = {name: (solution.load(name)[0][0], solution.load(name)[1][0]) for name in system.force_names}

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gearmbs._deprecation import former_name
 from gearmbs.dae.model import evaluator as outputs
 from gearmbs.dae.result import DAEResult, Status
 
@@ -192,29 +193,41 @@ class Solution:
         except ValueError:
             raise KeyError(f"body {name!r}; the bodies are {', '.join(self.system.body_names)}") from None
 
-    def position(self, body: str) -> np.ndarray:
-        """Return the centre of mass over time, shape (m, 3), m; of the body's own frame: `marker_position(body)`."""
+    def com_position(self, body: str) -> np.ndarray:
+        """Return the position of the centre of mass over time, shape (m, 3), m, global.
+
+        The origin of the body's own frame, which is what ``position=`` of ``Mechanism.body`` gives, is
+        ``marker_position(body)``.
+        """
         return self._pose[:, self._body(body), 0:3]
 
     def orientation(self, body: str) -> np.ndarray:
         """Return the rotation matrices over time, shape (m, 3, 3)."""
         return self._pose[:, self._body(body), 3:12].reshape(-1, 3, 3)
 
-    def velocity(self, body: str) -> np.ndarray:
-        """Return the velocity of the centre of mass, shape (m, 3), m/s."""
+    def com_velocity(self, body: str) -> np.ndarray:
+        """Return the velocity of the centre of mass, shape (m, 3), m/s, global."""
         return self._pose[:, self._body(body), 12:15]
 
     def angular_velocity(self, body: str) -> np.ndarray:
         """Return the angular velocity, global components, shape (m, 3), rad/s."""
         return self._pose[:, self._body(body), 15:18]
 
-    def acceleration(self, body: str) -> np.ndarray:
-        """Return the acceleration of the centre of mass, shape (m, 3), m/s^2."""
+    def com_acceleration(self, body: str) -> np.ndarray:
+        """Return the acceleration of the centre of mass, shape (m, 3), m/s^2, global."""
         return self._acc[:, self._body(body), 0:3]
 
     def angular_acceleration(self, body: str) -> np.ndarray:
         """Return the angular acceleration, global components, shape (m, 3), rad/s^2."""
         return self._acc[:, self._body(body), 3:6]
+
+    position = former_name(
+        "position",
+        com_position,
+        "it is the centre of mass; write com_position, or marker_position for the body's frame",
+    )
+    velocity = former_name("velocity", com_velocity, "write com_velocity, or marker_velocity for the body's frame")
+    acceleration = former_name("acceleration", com_acceleration, "write com_acceleration")
 
     def reaction(self, joint: str) -> tuple[np.ndarray, np.ndarray]:
         """Return force (N) and moment about marker I's origin (N m) of a joint on I's body, each (m, 3), global."""

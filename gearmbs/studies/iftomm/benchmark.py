@@ -75,7 +75,7 @@ class Outcome:
 
 
 def _tip(body: str, local: tuple[float, float, float]) -> Callable[[Solution], np.ndarray]:
-    return lambda s: s.position(body) + s.orientation(body) @ np.array(local)
+    return lambda s: s.com_position(body) + s.orientation(body) @ np.array(local)
 
 
 def _crank_angle(s: Solution) -> np.ndarray:
@@ -88,15 +88,15 @@ def _first_tip(s: Solution) -> np.ndarray:
 
 
 def _mass(s: Solution) -> np.ndarray:
-    return s.position("mass")[:, :2]
+    return s.com_position("mass")[:, :2]
 
 
 def _height(s: Solution) -> np.ndarray:
-    return s.position("slider")[:, 2:]
+    return s.com_position("slider")[:, 2:]
 
 
 def _slide(s: Solution) -> np.ndarray:
-    return s.position("slider")[:, :1]
+    return s.com_position("slider")[:, :1]
 
 
 PROBLEMS = {

@@ -38,14 +38,14 @@ def pendulum(angle: float, *, mass: float = 1.5, length: float = 0.8, inertia: f
 
 def swing(result, body: str = "rod") -> float:
     """Angle of a rod from the vertical about y."""
-    x, _, z = result.position(body)
+    x, _, z = result.com_position(body)
     return float(np.arctan2(-x, -z))
 
 
 def test_hanging_mass_sinks_by_weight_over_stiffness():
     found = static_equilibrium(hanging())
     # k z = -m g
-    assert found.position("block") == pytest.approx([0, 0, -2.0 * G / 200.0], abs=1e-12)
+    assert found.com_position("block") == pytest.approx([0, 0, -2.0 * G / 200.0], abs=1e-12)
     assert found.loads["spring"][0][2] == pytest.approx(2.0 * G, rel=1e-12)
     assert found.reactions["guide"][0] == pytest.approx([0, 0, 0], abs=1e-9)
     assert found.stable
@@ -56,7 +56,7 @@ def test_hanging_mass_sinks_by_weight_over_stiffness():
 @pytest.mark.parametrize("start", [np.pi / 2, -0.3, 2.8, 3.1])
 def test_pendulum_comes_to_rest_below_its_pin(start):
     found = static_equilibrium(pendulum(start))
-    assert found.position("rod") == pytest.approx([0, 0, -0.8], abs=1e-8)
+    assert found.com_position("rod") == pytest.approx([0, 0, -0.8], abs=1e-8)
     # the pin carries the weight
     assert found.reactions["pin"][0] == pytest.approx([0, 0, 1.5 * G], abs=1e-8)
     assert found.stable
@@ -92,7 +92,7 @@ def test_simulation_from_equilibrium_stays():
     m = pendulum(0.9, kt=6.0)
     found = static_equilibrium(m, move=True)
     solution = m.simulate(0.5, tol=1e-8)
-    assert np.abs(solution.position("rod") - found.position("rod")).max() < 1e-9
+    assert np.abs(solution.com_position("rod") - found.com_position("rod")).max() < 1e-9
 
 
 def test_motions_are_frozen_at_the_given_time():
@@ -108,7 +108,7 @@ def test_states_that_follow_time_alone_keep_their_value():
     m = hanging()
     m.differential_state("drive", "2", start=0.25)
     found = static_equilibrium(m)
-    assert found.position("block")[2] == pytest.approx(-2.0 * G / 200.0, abs=1e-12)
+    assert found.com_position("block")[2] == pytest.approx(-2.0 * G / 200.0, abs=1e-12)
     assert found.solution.result.y[0, -1] == 0.25
 
 
@@ -301,21 +301,21 @@ def test_four_bar_kinematics_close_the_loop():
     unit = to_d / gap[:, None]
     normal = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
     c = b + along[:, None] * unit + up[:, None] * normal
-    assert found.position("coupler")[:, :2] == pytest.approx((b + c) / 2, abs=1e-11)
+    assert found.com_position("coupler")[:, :2] == pytest.approx((b + c) / 2, abs=1e-11)
     assert found.angular_velocity("crank")[:, 2] == pytest.approx(3.0 + t, rel=1e-11)
     assert found.angular_acceleration("crank")[:, 2] == pytest.approx(np.ones(61), rel=1e-8)
     # velocities and accelerations are the derivatives of the positions (central differences)
     fine = kinematic(m, np.array([0.0, 0.999, 1.0, 1.001]))
-    x, v = fine.position("rocker"), fine.velocity("rocker")
+    x, v = fine.com_position("rocker"), fine.com_velocity("rocker")
     assert v[2] == pytest.approx((x[3] - x[1]) / 0.002, abs=1e-4)
-    assert fine.acceleration("rocker")[2] == pytest.approx((v[3] - v[1]) / 0.002, abs=1e-3)
+    assert fine.com_acceleration("rocker")[2] == pytest.approx((v[3] - v[1]) / 0.002, abs=1e-3)
 
 
 def test_kinematics_agree_with_dynamics():
     t = np.linspace(0.0, 1.0, 11)
     a, b = kinematic(four_bar(), t), four_bar().simulate(1.0, t_eval=t, tol=1e-9)
     assert a.reaction("C")[0] == pytest.approx(b.reaction("C")[0], abs=1e-4)
-    assert a.position("rocker") == pytest.approx(b.position("rocker"), abs=1e-7)
+    assert a.com_position("rocker") == pytest.approx(b.com_position("rocker"), abs=1e-7)
 
 
 def test_kinematics_refuse_degrees_of_freedom():
@@ -335,7 +335,7 @@ def test_kinematics_name_the_time_of_locking():
     guide = m.translational("guide", slide, m.ground, at=(1.5, 0, 0), axis=(1, 0, 0))
     m.translation("pull", guide, polynomial([0.0, 1.0]))
     # two unit rods are stretched when the slide has moved from 1.5 m to 2 m
-    assert kinematic(m, np.array([0.0, 0.45])).position("slide")[-1, 0] == pytest.approx(1.95, abs=1e-12)
+    assert kinematic(m, np.array([0.0, 0.45])).com_position("slide")[-1, 0] == pytest.approx(1.95, abs=1e-12)
     with pytest.raises(ModelError, match=r"t = 0\.(49999|5)"):
         kinematic(m, np.linspace(0.0, 1.0, 5))
 
@@ -377,7 +377,7 @@ def test_quasi_static_sequence_follows_a_driven_crank():
     m.revolute("hook", weight, crank, at=(1, 0, 0), axis=(0, 1, 0))
     times = np.linspace(0.0, 20.0, 41)
     solution = quasi_static(m, times)
-    np.testing.assert_allclose(solution.position("weight")[:, 2], -np.sin(times) - 1, atol=1e-9)
+    np.testing.assert_allclose(solution.com_position("weight")[:, 2], -np.sin(times) - 1, atol=1e-9)
     np.testing.assert_allclose(solution.reaction("drive")[1][:, 1], -20.0 * np.cos(times), atol=1e-8)
     with pytest.raises(ModelError, match="increasing times"):
         quasi_static(m, np.array([1.0, 0.0]))
@@ -392,7 +392,7 @@ def test_quasi_static_snap_through():
     m.spring_damper("spring", eye, wall, stiffness=1000.0, length=float(np.hypot(1, 0.3)))
     m.load("push", block.marker(name="top"), m.ground.marker(name="base"), fz="-TIME")
     solution = quasi_static(m, np.linspace(0.0, 20.0, 41))
-    z = solution.position("block")[:, 2]
+    z = solution.com_position("block")[:, 2]
     # k (1 - l0/l) z + t = 0 on both branches
     length = np.hypot(1, z)
     np.testing.assert_allclose(1000 * (1 - np.hypot(1, 0.3) / length) * z + solution.t, 0.0, atol=1e-6)

@@ -22,7 +22,7 @@ def pendulum(kind: str) -> Mechanism:
 def test_pin_force_of_a_pendulum(integrator):
     """Released level, at the angle s below: tension 3 m g sin s, so the pin pulls with m g (3 sin s) along the rod."""
     solution = pendulum("revolute").simulate(0.8, rate=500, tol=1e-9, integrator=integrator)
-    r = solution.position("bob")
+    r = solution.com_position("bob")
     along = r / LENGTH
     tension = -3.0 * MASS * G * along[:, 1]
     force, _ = solution.reaction("pin")
@@ -35,13 +35,13 @@ def test_outputs_satisfy_the_constraints_better_than_the_integrator():
     raw = solution.result.y[:, [u.name.startswith("R_") for u in solution.system.unknowns()]]
     strayed = np.abs(np.linalg.norm(raw, axis=1) - LENGTH).max()
     assert 1e-11 < strayed < 1e-8
-    np.testing.assert_allclose(np.linalg.norm(solution.position("bob"), axis=1), LENGTH, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(solution.com_position("bob"), axis=1), LENGTH, atol=1e-12)
     assert solution.constraint_violation.max() == pytest.approx(strayed, rel=1e-3)
 
 
 def test_acceleration_is_the_second_derivative_of_the_position():
     """Differences of order 4 at 1 kHz: error about (omega h)^4 = (6 / 1000)^4 = 1e-9 of the acceleration."""
     solution = pendulum("revolute").simulate(0.5, rate=1000, tol=1e-10)
-    r, h = solution.position("bob"), 1e-3
+    r, h = solution.com_position("bob"), 1e-3
     second = (-r[4:] + 16 * r[3:-1] - 30 * r[2:-2] + 16 * r[1:-3] - r[:-4]) / (12 * h * h)
-    np.testing.assert_allclose(solution.acceleration("bob")[2:-2], second, atol=2e-4)
+    np.testing.assert_allclose(solution.com_acceleration("bob")[2:-2], second, atol=2e-4)
