@@ -11,10 +11,11 @@ from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import forces as force_kinds
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations import time_functions
+from gearmbs.dae.equations.builder import TableBuilder
 from gearmbs.dae.equations.expressions import ExpressionError, Tape
 from gearmbs.dae.equations.expressions.tape import LEVEL_ACCELERATION, LEVEL_TIME
-from gearmbs.dae.equations.layout import TableBuilder
 from gearmbs.dae.equations.reactions import REACTION
+from gearmbs.dae.equations.unknowns import I3, Counts, offsets
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.model.system import System
 from gearmbs.mechanism import elements as el
@@ -246,15 +247,17 @@ class _Compiler:
         )
 
     def offsets(self) -> dict[str, int]:
-        """Block offsets of y; the elements' and states' numbers are known before they are added."""
+        """Offsets of the blocks of y; the numbers of rows, elements and states are known before they are added."""
         m = self.mechanism
-        n3, rows = 3 * len(m.bodies), sum(len(j.rows) for j in m.joints.values()) + len(m.constraints)
-        n_f = 3 * (sum(_blocks(e)[0] for e in m.elements.values()) + len(self.measured))
-        n_n = 3 * (sum(_blocks(e)[1] for e in m.elements.values()) + len(self.measured))
-        at = {"F": 5 * n3 + rows}
-        at["N"] = at["F"] + n_f
-        at["z"] = at["N"] + n_n
-        return at
+        blocks = [_blocks(element) for element in m.elements.values()]
+        counts = Counts(
+            modes=tuple(self.builder.modes[1:]),
+            rows=sum(len(j.rows) for j in m.joints.values()) + len(m.constraints),
+            forces=sum(force for force, _ in blocks) + len(self.measured),
+            torques=sum(torque for _, torque in blocks) + len(self.measured),
+            states=len(m.states),
+        )
+        return offsets(counts, I3)
 
     # --- force elements -----------------------------------------------------------------------------
 
@@ -295,7 +298,7 @@ class _Compiler:
         """Make the force and moment of a joint on its I marker's body unknowns."""
         names = list(self.mechanism.joints)
         before = sum(len(self.mechanism.joints[n].rows) for n in names[: names.index(joint.name)])
-        first = 5 * 3 * len(self.mechanism.bodies) + before
+        first = self.offsets()["lambda"] + before
         bodies = {self.body_index[id(m.body)] for row in joint.rows for t in row.terms for m in (t.i, t.j)} - {0}
         self.builder.add_force(
             REACTION,

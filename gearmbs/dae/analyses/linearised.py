@@ -11,7 +11,7 @@ from scipy.sparse import csc_array
 
 from gearmbs.dae.equations import accelerations
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.rotation import KIN_AXES
+from gearmbs.dae.equations.rotation import KIN_AXES, POSE_COLUMNS
 from gearmbs.dae.errors import ModelError
 
 if TYPE_CHECKING:
@@ -88,9 +88,9 @@ class Instant:
 
     def pose(self) -> np.ndarray:
         """Return R, A (row-major), v, omega of each moving body, shape (bodies, 18)."""
-        out = np.zeros(18 * len(self.system.body_names))
+        out = np.zeros(POSE_COLUMNS * len(self.system.body_names))
         accelerations.pose_record(self.y, self.idata, self.rdata, self.work, out)
-        return out.reshape(-1, 18)
+        return out.reshape(-1, POSE_COLUMNS)
 
     def axes(self) -> np.ndarray:
         """Return the axes of the Euler angles, shape (bodies, 3, 3): row k turns with angle k."""

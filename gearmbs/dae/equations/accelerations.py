@@ -27,6 +27,11 @@ from gearmbs.dae.equations.rotation import (
     KIN_R,
     KIN_V,
     KIN_W,
+    POSE_A,
+    POSE_COLUMNS,
+    POSE_R,
+    POSE_V,
+    POSE_W,
     axes_and_velocity,
     euler_rates,
     momentum_from_conjugate,
@@ -39,20 +44,20 @@ FORCE_RECORD = 14
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def apply_load(b, sign, row, wrench, marker_body, kin, frame, scratch, rhs):
+def apply_load(b, sign, row, wrench, at, marker_body, kin, frame, scratch, rhs):
     if b == 0:
         return
     s = scratch[S_VECTOR : S_VECTOR + 12]
     arm_to(b, row[T.FORCE_I], marker_body, kin, frame, s, 0)
     terms.cross3(s, 0, wrench, 0, s, 3)
-    k = 6 * (b - 1)
+    k = at[b, T.AT_V]
     for c in range(3):
         rhs[k + c] += sign * wrench[c]
         rhs[k + 3 + c] += sign * (s[3 + c] + wrench[3 + c])
 
 
 @njit(cache=True, error_model="numpy")
-def tape_row_rates(k, t, y, idata, tab, room):
+def tape_row_rates(k, t, y, tab, room):
     """Return value, rate, partial time derivative and quadratic part of a row given by tape k.
 
     ``room`` receives the spatial gradient, six entries a body.
@@ -66,21 +71,19 @@ def tape_row_rates(k, t, y, idata, tab, room):
     rate, gamma = partial, hess[n * n - 1]
     for i in range(n - 1):
         b = tab.extra_i[row[T.TAPE_BODIES] + i // 6]
-        speed = y[(idata[T.H_EPS] if i % 6 >= 3 else idata[T.H_U]) + 3 * (b - 1) + i % 3]
+        speed = y[(tab.at[b, T.AT_EPS] if i % 6 >= 3 else tab.at[b, T.AT_U]) + i % 3]
         rate += grad[i] * speed
         gamma += 2.0 * hess[i * n + n - 1] * speed
         for j in range(n - 1):
             b2 = tab.extra_i[row[T.TAPE_BODIES] + j // 6]
-            gamma += (
-                speed * hess[i * n + j] * y[(idata[T.H_EPS] if j % 6 >= 3 else idata[T.H_U]) + 3 * (b2 - 1) + j % 3]
-            )
+            gamma += speed * hess[i * n + j] * y[(tab.at[b2, T.AT_EPS] if j % 6 >= 3 else tab.at[b2, T.AT_U]) + j % 3]
     for p in range(bodies):
         b = tab.extra_i[row[T.TAPE_BODIES] + p]
         kin = tab.kin[b]
         # Phi_pi from Phi_theta_k = a_k . Phi_pi; omega' = sum a_k eps_k' + adot_k eps_k
         momentum_from_conjugate(tab.kin, b, grad, 6 * p + 3, grad, 6 * p + 3)
         for m in range(3):
-            eps = y[idata[T.H_EPS] + 3 * (b - 1) + m]
+            eps = y[tab.at[b, T.AT_EPS] + m]
             gamma -= eps * terms.dot3(kin, KIN_ADOT + 3 * m, grad, 6 * p + 3)
     return value, rate, partial, gamma
 
@@ -93,7 +96,7 @@ def put_pair(mode, slot, vals, k, row, col, value):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def put_point(mode, slot, vals, k, row, coef, term, marker_body, frame):
+def put_point(mode, slot, vals, k, row, coef, term, at, marker_body, frame):
     """Hand over the gradient of a POINT term; return the number of the next entry."""
     c = term[T.TERM_AXES]
     c1 = c + 1 if c < 2 else 0
@@ -113,7 +116,7 @@ def put_point(mode, slot, vals, k, row, coef, term, marker_body, frame):
             vals[slot[k + 5]] += arm_1
             k += 6
             continue
-        q = 6 * (marker_body[marker] - 1)
+        q = at[marker_body[marker], T.AT_V]
         k = put_pair(mode, slot, vals, k, row, q + c, sign)
         k = put_pair(mode, slot, vals, k, row, q + 3 + c1, sign * frame[marker, T.MK_ARM + c2])
         k = put_pair(mode, slot, vals, k, row, q + 3 + c2, -sign * frame[marker, T.MK_ARM + c1])
@@ -121,7 +124,7 @@ def put_point(mode, slot, vals, k, row, coef, term, marker_body, frame):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def put_dot(mode, slot, vals, k, row, coef, term, marker_body, cross):
+def put_dot(mode, slot, vals, k, row, coef, term, at, marker_body, cross):
     """Hand over the gradient of a DOT1 term, given that of its first side; return the number of the next entry."""
     for side in range(2):
         body = marker_body[term[T.TERM_I + side]]
@@ -135,7 +138,7 @@ def put_dot(mode, slot, vals, k, row, coef, term, marker_body, cross):
                 k += 2
             continue
         for c in range(3):
-            k = put_pair(mode, slot, vals, k, row, 6 * (body - 1) + 3 + c, sign * cross[c])
+            k = put_pair(mode, slot, vals, k, row, at[body, T.AT_V] + 3 + c, sign * cross[c])
     return k
 
 
@@ -151,14 +154,14 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
     """
     mode = idata[T.H_MODE]
     bodies, rows = idata[T.H_BODIES], idata[T.H_ROWS]
-    base = 6 * (bodies - 1)
+    base = idata[T.H_COORDINATES]
     s = vector_at(tab.scratch, S_TERM, 100)
     for c in range(rhs.size):
         rhs[c] = 0.0
     k = np.int64(0)
     for b in range(1, bodies):
         kin = tab.kin[b]
-        i = 6 * (b - 1)
+        i = tab.at[b, T.AT_V]
         mass = tab.body[b, T.BODY_MASS]
         for c in range(3):
             k = put(mode, slot, vals, k, i + c, i + c, mass)
@@ -183,10 +186,10 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
             if kind == terms.POINT or kind == terms.DOT1:
                 if kind == terms.POINT:
                     p, d, q2 = point_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame)
-                    k = put_point(mode, slot, vals, k, base + r, coef, tab.term[j], tab.marker_body, tab.frame)
+                    k = put_point(mode, slot, vals, k, base + r, coef, tab.term[j], tab.at, tab.marker_body, tab.frame)
                 else:
                     p, d, q2 = dot_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame, s)
-                    k = put_dot(mode, slot, vals, k, base + r, coef, tab.term[j], tab.marker_body, s)
+                    k = put_dot(mode, slot, vals, k, base + r, coef, tab.term[j], tab.at, tab.marker_body, s)
                 value += coef * p
                 rate += coef * d
                 gamma += coef * q2
@@ -200,7 +203,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
                 b = tab.marker_body[tab.term[j, T.TERM_I + side]]
                 if b == 0:
                     continue
-                h, q = 6 * side, 6 * (b - 1)
+                h, q = 6 * side, tab.at[b, T.AT_V]
                 kin = tab.kin[b]
                 rate += coef * (terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W))
                 for c in range(6):
@@ -209,13 +212,13 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
             tape = tab.tape[tab.row[r, T.ROW_TAPE]]
             n = 6 * tape[T.TAPE_N_BODIES] + 1
             room = expression_loads.tail(tab, n * (n + 1))
-            v, d, p, q2 = tape_row_rates(tab.row[r, T.ROW_TAPE], t, y, idata, tab, room)
+            v, d, p, q2 = tape_row_rates(tab.row[r, T.ROW_TAPE], t, y, tab, room)
             value += v
             rate += d
             partial += p
             gamma += q2
             for b in range(tape[T.TAPE_N_BODIES]):
-                q = 6 * (tab.extra_i[tape[T.TAPE_BODIES] + b] - 1)
+                q = tab.at[tab.extra_i[tape[T.TAPE_BODIES] + b], T.AT_V]
                 for c in range(6):
                     k = put_pair(mode, slot, vals, k, base + r, q + c, room[6 * b + c])
         rhs[base + r] = -gamma
@@ -246,7 +249,9 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
                 loads[f, 6 + c] = diag[c]
             for side in range(2):
                 b = tab.marker_body[row[T.FORCE_I + side]]
-                apply_load(b, 1.0 - 2.0 * side, row, wrench, tab.marker_body, tab.kin, tab.frame, tab.scratch, rhs)
+                apply_load(
+                    b, 1.0 - 2.0 * side, row, wrench, tab.at, tab.marker_body, tab.kin, tab.frame, tab.scratch, rhs
+                )
     return k
 
 
@@ -304,20 +309,20 @@ def joint_loads(y, idata, rdata, work, multipliers, force, moment):
 def poses(kin, out):
     """Write R, A (row-major), v, omega of each body (18 values, the ground left out) from an up-to-date table."""
     for b in range(1, kin.shape[0]):
-        k = 18 * (b - 1)
+        k = POSE_COLUMNS * (b - 1)
         for c in range(3):
-            out[k + c] = kin[b, KIN_R + c]
-            out[k + 12 + c] = kin[b, KIN_V + c]
-            out[k + 15 + c] = kin[b, KIN_W + c]
+            out[k + POSE_R + c] = kin[b, KIN_R + c]
+            out[k + POSE_V + c] = kin[b, KIN_V + c]
+            out[k + POSE_W + c] = kin[b, KIN_W + c]
         for c in range(9):
-            out[k + 3 + c] = kin[b, KIN_A + c]
+            out[k + POSE_A + c] = kin[b, KIN_A + c]
 
 
 @njit("void(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy")
 def pose_record(y, idata, rdata, work, out):
     """Write the record of `poses` for y."""
     tab = T.unpack(idata, rdata, work)
-    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
+    update_bodies(y, tab.at, tab.code, tab.body, tab.kin, tab.scratch)
     poses(tab.kin, out)
 
 
@@ -355,7 +360,7 @@ def violations(t, y, phi, idata, tab):
         if tab.row[r, T.ROW_TAPE] >= 0:
             k = tab.row[r, T.ROW_TAPE]
             n = 6 * tab.tape[k, T.TAPE_N_BODIES] + 1
-            v, d, _, _ = tape_row_rates(k, t, y, idata, tab, expression_loads.tail(tab, n * (n + 1)))
+            v, d, _, _ = tape_row_rates(k, t, y, tab, expression_loads.tail(tab, n * (n + 1)))
             value += v
             rate += d
         phi[3 * r], phi[3 * r + 1] = value, rate
@@ -373,11 +378,11 @@ def displace(y, d, w, idata, tab):
     """
     s = tab.scratch
     for b in range(1, idata[T.H_BODIES]):
-        k, i = 3 * (b - 1), 6 * (b - 1)
-        e, th = idata[T.H_EPS] + k, idata[T.H_THETA] + k
+        at = tab.at[b]
+        i, e, th = at[T.AT_V], at[T.AT_EPS], at[T.AT_THETA]
         for c in range(3):
-            y[idata[T.H_R] + k + c] += d[i + c]
-            y[idata[T.H_U] + k + c] += w[i + c]
+            y[at[T.AT_R] + c] += d[i + c]
+            y[at[T.AT_U] + c] += w[i + c]
             s[c] = d[i + 3 + c]
             s[3 + c] = tab.kin[b, KIN_W + c] + w[i + 3 + c]
         euler_rates(tab.kin, b, s, 0, s, 6)

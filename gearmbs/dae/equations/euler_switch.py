@@ -16,6 +16,7 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import ANGLE, dot3, gradient
 from gearmbs.dae.equations.rotation import (
     KIN_A,
+    KIN_AXES,
     KIN_W,
     SWITCH_SINE,
     axes_and_velocity,
@@ -30,10 +31,9 @@ from gearmbs.dae.problem import HISTORY_CHANGED, HOOK_SIG, KEPT, MATRIX_OUTDATED
 
 
 @njit(cache=True, error_model="numpy")
-def rewrite_point(y, b, old, new, idata, kin, s):
+def rewrite_point(y, b, old, new, at, kin, s):
     """Turn angles, rates and conjugate momenta of body b from one reference to the other."""
-    k = 3 * (b - 1)
-    e, th, p = idata[T.H_EPS] + k, idata[T.H_THETA] + k, idata[T.H_P] + k
+    e, th, p = at[b, T.AT_EPS], at[b, T.AT_THETA], at[b, T.AT_P]
     row = kin[b]
     rotation_matrix(y[th], y[th + 1], y[th + 2], old, row, KIN_A)
     axes_and_velocity(y[th], y[th + 1], y[e], y[e + 1], y[e + 2], kin, b)
@@ -44,7 +44,7 @@ def rewrite_point(y, b, old, new, idata, kin, s):
     axes_and_velocity(y[th], y[th + 1], 0.0, 0.0, 0.0, kin, b)
     euler_rates(kin, b, s, 0, y, e)
     for m in range(3):
-        y[p + m] = dot3(row, 18 + 3 * m, s, 3)
+        y[p + m] = dot3(row, KIN_AXES + 3 * m, s, 3)
 
 
 TURN_OF_MATRIX = 0.3
@@ -106,33 +106,33 @@ def hook(t, hist, npast, idata, rdata, work):
     have turned too far for the Newton matrix.
     """
     tab = T.unpack(idata, rdata, work)
-    th = idata[T.H_THETA]
     s = vector_at(tab.scratch, 0, 24)
     told = KEPT
     for b in range(1, idata[T.H_BODIES]):
-        k = 3 * (b - 1)
-        if abs(np.sin(hist[0, th + k + 1])) >= SWITCH_SINE:
+        th = tab.at[b, T.AT_THETA]
+        if abs(np.sin(hist[0, th + 1])) >= SWITCH_SINE:
             continue
         old = tab.code[b]
-        rotation_matrix(hist[0, th + k], hist[0, th + k + 1], hist[0, th + k + 2], old, tab.kin[b], KIN_A)
+        rotation_matrix(hist[0, th], hist[0, th + 1], hist[0, th + 2], old, tab.kin[b], KIN_A)
         new = best_reference(tab.kin[b], KIN_A)
         if new == old:
             continue
         told = HISTORY_CHANGED
         for row in range(npast):
-            rewrite_point(hist[row], b, old, new, idata, tab.kin, s)
+            rewrite_point(hist[row], b, old, new, tab.at, tab.kin, s)
             if row > 0:
                 for c in range(3):
-                    turns = np.round((hist[row, th + k + c] - hist[row - 1, th + k + c]) / (2.0 * np.pi))
-                    hist[row, th + k + c] -= 2.0 * np.pi * turns
+                    turns = np.round((hist[row, th + c] - hist[row - 1, th + c]) / (2.0 * np.pi))
+                    hist[row, th + c] -= 2.0 * np.pi * turns
         tab.code[b] = new
     if counts_angles(tab):
-        update_bodies(idata, hist[0], tab.code, tab.body, tab.kin, tab.scratch)
+        update_bodies(hist[0], tab.at, tab.code, tab.body, tab.kin, tab.scratch)
         update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
         track(t, hist[0], tab, True)
     if told == KEPT and npast > 1:
-        for k in range(3 * (idata[T.H_BODIES] - 1)):
-            now = hist[0, th + k]
-            if abs(now - tab.seen[k]) + abs(now - hist[1, th + k]) > TURN_OF_MATRIX:
+        first = idata[T.H_THETA]
+        for k in range(idata[T.H_QF] - first):
+            now = hist[0, first + k]
+            if abs(now - tab.seen[k]) + abs(now - hist[1, first + k]) > TURN_OF_MATRIX:
                 return MATRIX_OUTDATED
     return told

@@ -27,6 +27,7 @@ from gearmbs.dae.equations.residual import (
     arm_to,
 )
 from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, KIN_DW, KIN_H
+from gearmbs.dae.equations.unknowns import SI1, has_rate_rows, multiplier_factor, multipliers_of_row
 from gearmbs.dae.equations.update import euler_component, inertia_times, update_tables
 from gearmbs.dae.problem import JACOBIAN_SIG
 
@@ -47,16 +48,10 @@ def put(mode, slot, vals, k, row, col, value):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def body_entries(mode, b, cj, idata, tab, slot, vals, k):
+def body_entries(mode, b, cj, tab, slot, vals, k):
     """Entries of one body's inertia terms in eq. (5) and (6)."""
-    i = 3 * (b - 1)
-    u, p, e, r, th = (
-        idata[T.H_U] + i,
-        idata[T.H_P] + i,
-        idata[T.H_EPS] + i,
-        idata[T.H_R] + i,
-        idata[T.H_THETA] + i,
-    )
+    at = tab.at[b]
+    u, p, e, r, th = at[T.AT_U], at[T.AT_P], at[T.AT_EPS], at[T.AT_R], at[T.AT_THETA]
     kin = tab.kin[b]
     s = vector_at(tab.scratch, S_TERM, 100)
     mass = tab.body[b, T.BODY_MASS]
@@ -102,17 +97,10 @@ def body_entries(mode, b, cj, idata, tab, slot, vals, k):
 @njit(cache=True, error_model="numpy", forceinline=True)
 def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
     """Entries of one constraint row, its derivative, and the forces of its multipliers."""
-    form = idata[T.H_FORMULATION]
-    e0, t0 = idata[T.H_EPS], idata[T.H_THETA]
-    u0, p0, r0 = idata[T.H_U], idata[T.H_P], idata[T.H_R]
+    rate_rows = has_rate_rows(idata[T.H_FORMULATION])
     lam, mu = idata[T.H_LAMBDA] + r, idata[T.H_MU] + r
-    lam_value = yp[lam] if form == T.SI1 else y[lam]
-    factor = cj if form == T.SI1 else 1.0
-    mu_value = 0.0
-    if form == T.SI2:
-        mu_value = y[mu]
-    elif form == T.SI1:
-        mu_value = yp[mu]
+    lam_value, mu_value = multipliers_of_row(r, y, yp, idata)
+    factor = multiplier_factor(cj, idata)
     g = vector_at(tab.scratch, S_GRADIENT, 12)
     gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
     s = vector_at(tab.scratch, S_TERM, 100)
@@ -125,52 +113,51 @@ def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
         kind = tab.term[j, T.TERM_TYPE]
         for side in range(2):
             b = tab.marker_body[tab.term[j, T.TERM_I + side]]
-            h, q = 6 * side, 3 * (b - 1)
+            h, at = 6 * side, tab.at[b]
             for c in range(3):
-                w[h + c] = y[u0 + q + c] if b > 0 else 0.0
-                w[h + 3 + c] = y[e0 + q + c] if b > 0 else 0.0
+                w[h + c] = y[at[T.AT_U] + c] if b > 0 else 0.0
+                w[h + 3 + c] = y[at[T.AT_EPS] + c] if b > 0 else 0.0
         for side in range(2):
             b = tab.marker_body[tab.term[j, T.TERM_I + side]]
             if b == 0:
                 continue
-            h, q = 6 * side, 3 * (b - 1)
+            h, at = 6 * side, tab.at[b]
             for c in range(3):
                 along = coef * g[h + c]
                 about = coef * euler_component(tab.kin[b], c, g, h + 3)
                 if kind == terms.POINT and c != tab.term[j, T.TERM_AXES]:
                     pass
                 elif kind != terms.DOT1 and kind != terms.ANGLE and kind != terms.ROTATION:
-                    k = put(mode, slot, vals, k, u0 + q + c, lam, factor * along)
-                    k = put(mode, slot, vals, k, lam, r0 + q + c, along)
-                    if form != T.I3:
-                        k = put(mode, slot, vals, k, r0 + q + c, mu, -factor * along)
-                        k = put(mode, slot, vals, k, mu, u0 + q + c, along)
-                k = put(mode, slot, vals, k, p0 + q + c, lam, factor * about)
-                k = put(mode, slot, vals, k, lam, t0 + q + c, about)
-                if form != T.I3:
-                    k = put(mode, slot, vals, k, t0 + q + c, mu, -factor * about)
-                    k = put(mode, slot, vals, k, mu, e0 + q + c, about)
+                    k = put(mode, slot, vals, k, at[T.AT_U] + c, lam, factor * along)
+                    k = put(mode, slot, vals, k, lam, at[T.AT_R] + c, along)
+                    if rate_rows:
+                        k = put(mode, slot, vals, k, at[T.AT_R] + c, mu, -factor * along)
+                        k = put(mode, slot, vals, k, mu, at[T.AT_U] + c, along)
+                k = put(mode, slot, vals, k, at[T.AT_P] + c, lam, factor * about)
+                k = put(mode, slot, vals, k, lam, at[T.AT_THETA] + c, about)
+                if rate_rows:
+                    k = put(mode, slot, vals, k, at[T.AT_THETA] + c, mu, -factor * about)
+                    k = put(mode, slot, vals, k, mu, at[T.AT_EPS] + c, about)
         for bm in range(4):
             b = tab.marker_body[tab.term[j, T.TERM_I + bm // 2]]
             if b == 0:
                 continue
-            q = 3 * (b - 1)
-            force_row = (p0 if bm % 2 == 1 else u0) + q
-            position = (t0 if bm % 2 == 1 else r0) + q
+            force_row = tab.at[b, T.AT_P] if bm % 2 == 1 else tab.at[b, T.AT_U]
+            position = tab.at[b, T.AT_THETA] if bm % 2 == 1 else tab.at[b, T.AT_R]
             any_block = False
             for bn in range(4):
                 b2 = tab.marker_body[tab.term[j, T.TERM_I + bn // 2]]
                 if b2 == 0 or not HESSIAN_BLOCKS[kind, bm, bn]:
                     continue
                 any_block = True
-                other = (t0 if bn % 2 == 1 else r0) + 3 * (b2 - 1)
+                other = tab.at[b2, T.AT_THETA] if bn % 2 == 1 else tab.at[b2, T.AT_R]
                 for m in range(3):
                     for n in range(3):
                         value = coef * hess[3 * bm + m, 3 * bn + n]
                         k = put(mode, slot, vals, k, force_row + m, other + n, lam_value * value)
-                        if form != T.I3:
+                        if rate_rows:
                             k = put(mode, slot, vals, k, position + m, other + n, -mu_value * value)
-            if form != T.I3 and any_block:
+            if rate_rows and any_block:
                 # the derivative of Phi_q q' + Phi_t with respect to q
                 for m in range(3):
                     value = 0.0
@@ -185,13 +172,10 @@ def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
 @njit(cache=True, error_model="numpy")
 def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k):
     """Entries of a constraint row given by an expression."""
-    form = idata[T.H_FORMULATION]
+    rate_rows = has_rate_rows(idata[T.H_FORMULATION])
     lam, mu = idata[T.H_LAMBDA] + r, idata[T.H_MU] + r
-    lam_value = yp[lam] if form == T.SI1 else y[lam]
-    factor = cj if form == T.SI1 else 1.0
-    mu_value = 0.0
-    if form != T.I3:
-        mu_value = yp[mu] if form == T.SI1 else y[mu]
+    lam_value, mu_value = multipliers_of_row(r, y, yp, idata)
+    factor = multiplier_factor(cj, idata)
     tape = tab.row[r, T.ROW_TAPE]
     bodies = tab.tape[tape, T.TAPE_N_BODIES]
     first = tab.tape[tape, T.TAPE_BODIES]
@@ -200,23 +184,23 @@ def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k):
     grad, hess = room[0:n], room[n:]
     expression_loads.second(tape, t, y, tab, grad, hess)
     for i in range(n - 1):
-        q = 3 * (tab.extra_i[first + i // 6] - 1) + i % 3
+        at = tab.at[tab.extra_i[first + i // 6]]
         turn = i % 6 >= 3
-        position = (idata[T.H_THETA] if turn else idata[T.H_R]) + q
-        speed = (idata[T.H_EPS] if turn else idata[T.H_U]) + q
-        force = (idata[T.H_P] if turn else idata[T.H_U]) + q
+        position = (at[T.AT_THETA] if turn else at[T.AT_R]) + i % 3
+        speed = (at[T.AT_EPS] if turn else at[T.AT_U]) + i % 3
+        force = (at[T.AT_P] if turn else at[T.AT_U]) + i % 3
         k = put(mode, slot, vals, k, lam, position, grad[i])
         k = put(mode, slot, vals, k, force, lam, factor * grad[i])
         rate = hess[i * n + n - 1]
         for j in range(n - 1):
-            q2 = 3 * (tab.extra_i[first + j // 6] - 1) + j % 3
+            at2 = tab.at[tab.extra_i[first + j // 6]]
             turn2 = j % 6 >= 3
-            other = (idata[T.H_THETA] if turn2 else idata[T.H_R]) + q2
-            rate += hess[i * n + j] * y[(idata[T.H_EPS] if turn2 else idata[T.H_U]) + q2]
+            other = (at2[T.AT_THETA] if turn2 else at2[T.AT_R]) + j % 3
+            rate += hess[i * n + j] * y[(at2[T.AT_EPS] if turn2 else at2[T.AT_U]) + j % 3]
             k = put(mode, slot, vals, k, force, other, lam_value * hess[i * n + j])
-            if form != T.I3:
+            if rate_rows:
                 k = put(mode, slot, vals, k, position, other, -mu_value * hess[i * n + j])
-        if form != T.I3:
+        if rate_rows:
             k = put(mode, slot, vals, k, position, mu, -factor * grad[i])
             k = put(mode, slot, vals, k, mu, speed, grad[i])
             k = put(mode, slot, vals, k, mu, position, rate)
@@ -224,21 +208,21 @@ def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k):
 
 
 @njit(cache=True, error_model="numpy")
-def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, idata, tab, slot, vals, k):
+def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, tab, slot, vals, k):
     """Entries of one row from the spatial gradient ``d`` over a list of bodies, then of unknowns."""
     for q in range(bodies):
         b = tab.extra_i[first + q]
         if b == 0:
             continue
-        kin = tab.kin[b]
-        i, col = 3 * (b - 1), 12 * q
+        kin, at = tab.kin[b], tab.at[b]
+        col = 12 * q
         for m in range(3):
             turn = euler_component(kin, m, d, col + 3) + terms.dot3(kin, KIN_DW + 3 * m, d, col + 9)
             spin = euler_component(kin, m, d, col + 9)
-            k = put(mode, slot, vals, k, base, idata[T.H_R] + i + m, sign * d[col + m])
-            k = put(mode, slot, vals, k, base, idata[T.H_THETA] + i + m, sign * turn)
-            k = put(mode, slot, vals, k, base, idata[T.H_U] + i + m, sign * d[col + 6 + m])
-            k = put(mode, slot, vals, k, base, idata[T.H_EPS] + i + m, sign * spin)
+            k = put(mode, slot, vals, k, base, at[T.AT_R] + m, sign * d[col + m])
+            k = put(mode, slot, vals, k, base, at[T.AT_THETA] + m, sign * turn)
+            k = put(mode, slot, vals, k, base, at[T.AT_U] + m, sign * d[col + 6 + m])
+            k = put(mode, slot, vals, k, base, at[T.AT_EPS] + m, sign * spin)
     for q in range(unknowns):
         k = put(mode, slot, vals, k, base, tab.extra_i[after + q], sign * d[12 * bodies + q])
     return k
@@ -263,7 +247,6 @@ def state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k):
         first,
         row[T.TAPE_N_UNKNOWNS],
         first + bodies,
-        idata,
         tab,
         slot,
         vals,
@@ -272,12 +255,12 @@ def state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k):
 
 
 @njit(cache=True, error_model="numpy")
-def load_entries(mode, b, sign, row, y, idata, tab, slot, vals, k):
+def load_entries(mode, b, sign, row, y, tab, slot, vals, k):
     """Entries of one force element's loads on body b in the rows of eq. (5)."""
     if b == 0:
         return k
-    i = 3 * (b - 1)
-    u, p, th = idata[T.H_U] + i, idata[T.H_P] + i, idata[T.H_THETA] + i
+    at = tab.at[b]
+    u, p, th = at[T.AT_U], at[T.AT_P], at[T.AT_THETA]
     f, n = row[T.FORCE_F], row[T.FORCE_N]
     kin = tab.kin[b]
     point = row[T.FORCE_I]
@@ -320,13 +303,13 @@ def load_entries(mode, b, sign, row, y, idata, tab, slot, vals, k):
             # a . (ds x F) = ds . (F x a)
             terms.cross3(s, 3, kin, a, s, 9)
             for l in range(3):
-                k = put(mode, slot, vals, k, p + m, idata[T.H_R] + i + l, s[9 + l])
+                k = put(mode, slot, vals, k, p + m, at[T.AT_R] + l, s[9 + l])
             if owner > 0:
-                o = 3 * (owner - 1)
+                owners = tab.at[owner]
                 for l in range(3):
                     terms.cross3(tab.kin[owner], KIN_AXES + 3 * l, tab.frame[point], 0, s, 12)
-                    k = put(mode, slot, vals, k, p + m, idata[T.H_R] + o + l, -s[9 + l])
-                    k = put(mode, slot, vals, k, p + m, idata[T.H_THETA] + o + l, -terms.dot3(s, 9, s, 12))
+                    k = put(mode, slot, vals, k, p + m, owners[T.AT_R] + l, -s[9 + l])
+                    k = put(mode, slot, vals, k, p + m, owners[T.AT_THETA] + l, -terms.dot3(s, 9, s, 12))
     return k
 
 
@@ -340,7 +323,7 @@ def element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k):
     depends = row[T.FORCE_DEPENDS]
     bodies = tab.extra_i[depends]
     if row[T.FORCE_KIND] == REACTION:
-        si1 = idata[T.H_FORMULATION] == T.SI1
+        si1 = idata[T.H_FORMULATION] == SI1
         source = yp if si1 else y
         lam = idata[T.H_LAMBDA]
         room = vector_at(tab.scratch, 0, 64)
@@ -367,7 +350,6 @@ def element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k):
                 depends + 1,
                 unknowns,
                 depends + 2 + bodies,
-                idata,
                 tab,
                 slot,
                 vals,
@@ -384,19 +366,19 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
     """
     tab = T.unpack(idata, rdata, work)
     mode = idata[T.H_MODE]
-    update_tables(t, y, idata, tab)
+    update_tables(t, y, tab)
     slot = tab.slot
     if mode == NUMBERS:
         for k in range(vals.size):
             vals[k] = 0.0
-        for k in range(3 * (idata[T.H_BODIES] - 1)):
+        for k in range(idata[T.H_QF] - idata[T.H_THETA]):
             tab.seen[k] = y[idata[T.H_THETA] + k]
     # a literal 0 would make numba compile every callee once more
     k = np.int64(0)
     for b in range(1, idata[T.H_BODIES]):
         for l in range(3):
-            tab.scratch[S_PRODUCT + l] = y[idata[T.H_EPS] + 3 * (b - 1) + l]
-        k = body_entries(mode, b, cj, idata, tab, slot, vals, k)
+            tab.scratch[S_PRODUCT + l] = y[tab.at[b, T.AT_EPS] + l]
+        k = body_entries(mode, b, cj, tab, slot, vals, k)
     for r in range(idata[T.H_ROWS]):
         k = row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k)
         if tab.row[r, T.ROW_TAPE] >= 0:
@@ -404,8 +386,8 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]
         if row[T.FORCE_KIND] != REACTION:
-            k = load_entries(mode, tab.marker_body[row[T.FORCE_I]], 1.0, row, y, idata, tab, slot, vals, k)
-            k = load_entries(mode, tab.marker_body[row[T.FORCE_J]], -1.0, row, y, idata, tab, slot, vals, k)
+            k = load_entries(mode, tab.marker_body[row[T.FORCE_I]], 1.0, row, y, tab, slot, vals, k)
+            k = load_entries(mode, tab.marker_body[row[T.FORCE_J]], -1.0, row, y, tab, slot, vals, k)
         k = element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k)
     for s in range(idata[T.H_STATES]):
         k = state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k)

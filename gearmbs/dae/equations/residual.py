@@ -29,6 +29,7 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.forces import TORQUE, element_wrench, torque
 from gearmbs.dae.equations.reactions import REACTION, reaction_wrench
 from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, KIN_H, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.unknowns import SI1, has_rate_rows, multipliers_of_row
 from gearmbs.dae.equations.update import euler_component, update_tables
 from gearmbs.dae.problem import RESIDUAL_SIG
 
@@ -48,7 +49,7 @@ S_VECTOR = 320
 def update(t, y, yp, idata, rdata, work):
     """Bring the kinematics and marker tables up to date with y."""
     tab = T.unpack(idata, rdata, work)
-    update_tables(t, y, idata, tab)
+    update_tables(t, y, tab)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -60,29 +61,29 @@ def arm_to(b, point_marker, marker_body, kin, frame, out, k):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def add_load(b, sign, row, y, idata, marker_body, kin, frame, scratch, out):
+def add_load(b, sign, row, y, at, marker_body, kin, frame, scratch, out):
     """Subtract the generalised loads of one force element on body b (eq. (5), H_F^T F and H_N^T N)."""
     if b == 0:
         return
     s = scratch[S_VECTOR : S_VECTOR + 12]
     for c in range(6):
         s[3 + c] = 0.0
-    k = 3 * (b - 1)
+    u, p = at[b, T.AT_U], at[b, T.AT_P]
     if row[T.FORCE_F] >= 0:
         arm_to(b, row[T.FORCE_I], marker_body, kin, frame, s, 0)
         for c in range(3):
             s[3 + c] = sign * y[row[T.FORCE_F] + c]
-            out[idata[T.H_U] + k + c] -= s[3 + c]
+            out[u + c] -= s[3 + c]
         terms.cross3(s, 0, s, 3, s, 6)
     if row[T.FORCE_N] >= 0:
         for c in range(3):
             s[6 + c] += sign * y[row[T.FORCE_N] + c]
     for m in range(3):
-        out[idata[T.H_P] + k + m] -= euler_component(kin[b], m, s, 6)
+        out[p + m] -= euler_component(kin[b], m, s, 6)
 
 
 @njit(cache=True, error_model="numpy")
-def add_tape_row(k, t, lam, mu, y, idata, tab, out):
+def add_tape_row(k, t, lam, mu, y, tab, out):
     """Add the constraint forces of a row given by tape k; return its value and rate."""
     row = tab.tape[k]
     n = 6 * row[T.TAPE_N_BODIES] + 1
@@ -91,19 +92,19 @@ def add_tape_row(k, t, lam, mu, y, idata, tab, out):
     value = expression_loads.second(k, t, y, tab, grad, hess)
     rate = grad[n - 1]
     for p in range(row[T.TAPE_N_BODIES]):
-        q = 3 * (tab.extra_i[row[T.TAPE_BODIES] + p] - 1)
+        at = tab.at[tab.extra_i[row[T.TAPE_BODIES] + p]]
         for c in range(3):
             along, about = grad[6 * p + c], grad[6 * p + 3 + c]
-            rate += along * y[idata[T.H_U] + q + c] + about * y[idata[T.H_EPS] + q + c]
-            out[idata[T.H_U] + q + c] += lam * along
-            out[idata[T.H_P] + q + c] += lam * about
-            out[idata[T.H_R] + q + c] -= mu * along
-            out[idata[T.H_THETA] + q + c] -= mu * about
+            rate += along * y[at[T.AT_U] + c] + about * y[at[T.AT_EPS] + c]
+            out[at[T.AT_U] + c] += lam * along
+            out[at[T.AT_P] + c] += lam * about
+            out[at[T.AT_R] + c] -= mu * along
+            out[at[T.AT_THETA] + c] -= mu * about
     return value, rate
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def add_point_term(k, coef, lam, mu, idata, term, marker_body, kin, frame, out):
+def add_point_term(k, coef, lam, mu, at, term, marker_body, kin, frame, out):
     """As the general path of `add_constraints` for a POINT term, whose gradient is a unit vector."""
     c = term[k, T.TERM_AXES]
     c1 = c + 1 if c < 2 else 0
@@ -119,19 +120,19 @@ def add_point_term(k, coef, lam, mu, idata, term, marker_body, kin, frame, out):
         if b == 0:
             continue
         rate += sign * (row[KIN_V + c] + row[KIN_W + c1] * x2 - row[KIN_W + c2] * x1)
-        q = 3 * (b - 1)
-        out[idata[T.H_U] + q + c] += sign * lam
-        out[idata[T.H_R] + q + c] -= sign * mu
+        p, th = at[b, T.AT_P], at[b, T.AT_THETA]
+        out[at[b, T.AT_U] + c] += sign * lam
+        out[at[b, T.AT_R] + c] -= sign * mu
         for m in range(3):
             a = KIN_AXES + 3 * m
             angle = sign * (row[a + c1] * x2 - row[a + c2] * x1)
-            out[idata[T.H_P] + q + m] += lam * angle
-            out[idata[T.H_THETA] + q + m] -= mu * angle
+            out[p + m] += lam * angle
+            out[th + m] -= mu * angle
     return value, rate
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def add_dot_term(k, coef, lam, mu, idata, term, marker_body, kin, frame, s, out):
+def add_dot_term(k, coef, lam, mu, at, term, marker_body, kin, frame, s, out):
     """As the general path of `add_constraints` for a DOT1 term, which has no translations."""
     i, j = term[k, T.TERM_I], term[k, T.TERM_J]
     a = T.MK_AXES + 3 * (term[k, T.TERM_AXES] // 3)
@@ -145,19 +146,18 @@ def add_dot_term(k, coef, lam, mu, idata, term, marker_body, kin, frame, s, out)
         sign = coef if side == 0 else -coef
         row = kin[body]
         rate += sign * terms.dot3(s, 0, row, KIN_W)
-        q = 3 * (body - 1)
+        p, th = at[body, T.AT_P], at[body, T.AT_THETA]
         for m in range(3):
             angle = sign * terms.dot3(row, KIN_AXES + 3 * m, s, 0)
-            out[idata[T.H_P] + q + m] += lam * angle
-            out[idata[T.H_THETA] + q + m] -= mu * angle
+            out[p + m] += lam * angle
+            out[th + m] -= mu * angle
     return coef * terms.dot3(frame[i], a, frame[j], b), rate
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def add_constraints(t, y, yp, idata, tab, out):
     """Constraint rows, their derivatives, and the constraint forces of lambda and mu."""
-    form = idata[T.H_FORMULATION]
-    u0, p0, r0, t0 = idata[T.H_U], idata[T.H_P], idata[T.H_R], idata[T.H_THETA]
+    rate_rows = has_rate_rows(idata[T.H_FORMULATION])
     lam0, mu0 = idata[T.H_LAMBDA], idata[T.H_MU]
     g = vector_at(tab.scratch, S_GRADIENT, 12)
     gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
@@ -168,22 +168,17 @@ def add_constraints(t, y, yp, idata, tab, out):
             fun = tab.row[r, T.ROW_FUNCTION]
             f, f1 = tab.fval[fun, 0], tab.fval[fun, 1]
             value, rate = -f, -f1
-        lam = yp[lam0 + r] if form == T.SI1 else y[lam0 + r]
-        mu = 0.0
-        if form == T.SI2:
-            mu = y[mu0 + r]
-        elif form == T.SI1:
-            mu = yp[mu0 + r]
+        lam, mu = multipliers_of_row(r, y, yp, idata)
         for k in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
             coef = tab.coef[k]
             kind = tab.term[k, T.TERM_TYPE]
             if kind == terms.POINT:
-                v, d = add_point_term(k, coef, lam, mu, idata, tab.term, tab.marker_body, tab.kin, tab.frame, out)
+                v, d = add_point_term(k, coef, lam, mu, tab.at, tab.term, tab.marker_body, tab.kin, tab.frame, out)
                 value += v
                 rate += d
                 continue
             if kind == terms.DOT1:
-                v, d = add_dot_term(k, coef, lam, mu, idata, tab.term, tab.marker_body, tab.kin, tab.frame, s, out)
+                v, d = add_dot_term(k, coef, lam, mu, tab.at, tab.term, tab.marker_body, tab.kin, tab.frame, s, out)
                 value += v
                 rate += d
                 continue
@@ -205,21 +200,21 @@ def add_constraints(t, y, yp, idata, tab, out):
                 b = tab.marker_body[tab.term[k, T.TERM_I + side]]
                 if b == 0:
                     continue
-                kin = tab.kin[b]
-                h, q = 6 * side, 3 * (b - 1)
+                kin, at = tab.kin[b], tab.at[b]
+                h = 6 * side
                 rate += coef * (terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W))
                 for c in range(3):
                     angle = coef * euler_component(kin, c, g, h + 3)
-                    out[u0 + q + c] += coef * lam * g[h + c]
-                    out[p0 + q + c] += lam * angle
-                    out[r0 + q + c] -= coef * mu * g[h + c]
-                    out[t0 + q + c] -= mu * angle
+                    out[at[T.AT_U] + c] += coef * lam * g[h + c]
+                    out[at[T.AT_P] + c] += lam * angle
+                    out[at[T.AT_R] + c] -= coef * mu * g[h + c]
+                    out[at[T.AT_THETA] + c] -= mu * angle
         if tab.row[r, T.ROW_TAPE] >= 0:
-            v, d = add_tape_row(tab.row[r, T.ROW_TAPE], t, lam, mu, y, idata, tab, out)
+            v, d = add_tape_row(tab.row[r, T.ROW_TAPE], t, lam, mu, y, tab, out)
             value += v
             rate += d
         out[lam0 + r] = value
-        if form != T.I3:
+        if rate_rows:
             out[mu0 + r] = rate
 
 
@@ -227,24 +222,23 @@ def add_constraints(t, y, yp, idata, tab, out):
 def residual(t, y, yp, out, idata, rdata, work):
     """Evaluate G(t, y, y') of eq. (8) into ``out``."""
     tab = T.unpack(idata, rdata, work)
-    update_tables(t, y, idata, tab)
-    u0, p0, e0, r0, t0 = idata[T.H_U], idata[T.H_P], idata[T.H_EPS], idata[T.H_R], idata[T.H_THETA]
+    update_tables(t, y, tab)
     for b in range(1, idata[T.H_BODIES]):
-        k = 3 * (b - 1)
-        kin = tab.kin[b]
+        kin, at = tab.kin[b], tab.at[b]
+        u, p, e, r, th = at[T.AT_U], at[T.AT_P], at[T.AT_EPS], at[T.AT_R], at[T.AT_THETA]
         mass = tab.body[b, T.BODY_MASS]
         for c in range(3):
-            out[u0 + k + c] = mass * (yp[u0 + k + c] - tab.gravity[c])
-            out[p0 + k + c] = yp[p0 + k + c] - terms.dot3(kin, KIN_ADOT + 3 * c, kin, KIN_H)
-            out[e0 + k + c] = y[p0 + k + c] - terms.dot3(kin, KIN_AXES + 3 * c, kin, KIN_H)
-            out[r0 + k + c] = y[u0 + k + c] - yp[r0 + k + c]
-            out[t0 + k + c] = y[e0 + k + c] - yp[t0 + k + c]
+            out[u + c] = mass * (yp[u + c] - tab.gravity[c])
+            out[p + c] = yp[p + c] - terms.dot3(kin, KIN_ADOT + 3 * c, kin, KIN_H)
+            out[e + c] = y[p + c] - terms.dot3(kin, KIN_AXES + 3 * c, kin, KIN_H)
+            out[r + c] = y[u + c] - yp[r + c]
+            out[th + c] = y[e + c] - yp[th + c]
     add_constraints(t, y, yp, idata, tab, out)
     wrench = vector_at(tab.scratch, S_WRENCH, 6)
     diag = vector_at(tab.scratch, S_DIAG, 8)
     room = vector_at(tab.scratch, 0, 64)
     lam0 = idata[T.H_LAMBDA]
-    source = yp if idata[T.H_FORMULATION] == T.SI1 else y
+    source = yp if idata[T.H_FORMULATION] == SI1 else y
     multipliers = vector_at(source, lam0, idata[T.H_ROWS])
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]
@@ -267,7 +261,7 @@ def residual(t, y, yp, out, idata, rdata, work):
         if row[T.FORCE_KIND] != REACTION:
             for side in range(2):
                 b = tab.marker_body[row[T.FORCE_I + side]]
-                add_load(b, 1.0 - 2.0 * side, row, y, idata, tab.marker_body, tab.kin, tab.frame, tab.scratch, out)
+                add_load(b, 1.0 - 2.0 * side, row, y, tab.at, tab.marker_body, tab.kin, tab.frame, tab.scratch, out)
     for k in range(idata[T.H_STATES]):
         z = idata[T.H_Z] + k
         left = yp[z] if tab.state[k, T.STATE_KIND] == T.STATE_DIFFERENTIAL else y[z]

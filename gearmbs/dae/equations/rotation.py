@@ -31,6 +31,13 @@ KIN_H = 45
 """Columns with the angular momentum about the centre of mass."""
 KIN_COLUMNS = 48
 
+POSE_R = 0
+"""Columns of a record of a body's pose: position of the centre of mass, orientation (row-major), velocities."""
+POSE_A = 3
+POSE_V = 12
+POSE_W = 15
+POSE_COLUMNS = 18
+
 REFERENCE_IDENTITY = 0
 REFERENCE_QUARTER_TURN = 1
 SWITCH_SINE = 0.5
@@ -170,6 +177,11 @@ __all__ = [
     "KIN_R",
     "KIN_V",
     "KIN_W",
+    "POSE_A",
+    "POSE_COLUMNS",
+    "POSE_R",
+    "POSE_V",
+    "POSE_W",
     "REFERENCE_IDENTITY",
     "REFERENCE_QUARTER_TURN",
     "SWITCH_SINE",

@@ -50,19 +50,18 @@ def update_ground(kin):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def update_bodies(idata, y, code, body, kin, scratch):
+def update_bodies(y, at, code, body, kin, scratch):
     """Fill the kinematics table from u, eps, R, theta in y."""
     update_ground(kin)
-    u, e, r, th = idata[T.H_U], idata[T.H_EPS], idata[T.H_R], idata[T.H_THETA]
-    for b in range(1, idata[T.H_BODIES]):
-        k = 3 * (b - 1)
+    for b in range(1, at.shape[0]):
+        u, e, r, th = at[b, T.AT_U], at[b, T.AT_EPS], at[b, T.AT_R], at[b, T.AT_THETA]
         row = kin[b]
         for c in range(3):
-            row[KIN_R + c] = y[r + k + c]
-            row[KIN_V + c] = y[u + k + c]
-        psi, theta, phi = y[th + k], y[th + k + 1], y[th + k + 2]
+            row[KIN_R + c] = y[r + c]
+            row[KIN_V + c] = y[u + c]
+        psi, theta, phi = y[th], y[th + 1], y[th + 2]
         rotation_matrix(psi, theta, phi, code[b], row, KIN_A)
-        axes_and_velocity(psi, theta, y[e + k], y[e + k + 1], y[e + k + 2], kin, b)
+        axes_and_velocity(psi, theta, y[e], y[e + 1], y[e + 2], kin, b)
         inertia_times(row, body[b], row, KIN_W, row, KIN_H, scratch)
 
 
@@ -115,9 +114,9 @@ def predict_angles(t, tab):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def update_tables(t, y, idata, tab):
+def update_tables(t, y, tab):
     """Bring bodies, markers, functions of time and expected angles up to date with t and y."""
-    update_bodies(idata, y, tab.code, tab.body, tab.kin, tab.scratch)
+    update_bodies(y, tab.at, tab.code, tab.body, tab.kin, tab.scratch)
     update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
     update_functions(t, tab)
     predict_angles(t, tab)

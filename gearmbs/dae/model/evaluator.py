@@ -14,6 +14,7 @@ from gearmbs.dae.equations.euler_switch import track
 from gearmbs.dae.equations.jacobian import COUNT, NUMBERS, PLACES, compressed
 from gearmbs.dae.equations.reactions import renew_reactions
 from gearmbs.dae.equations.residual import update
+from gearmbs.dae.equations.rotation import POSE_COLUMNS
 from gearmbs.dae.equations.update import update_tables
 from gearmbs.dae.linalg.sparse_lu import (
     FACTORS_TYPE,
@@ -82,12 +83,12 @@ class Records(NamedTuple):
     @property
     def by_body(self) -> np.ndarray:
         """`pose` as (m, bodies, 18)."""
-        return self.pose.reshape(len(self.pose), self.pose.shape[1] // 18, 18)
+        return self.pose.reshape(len(self.pose), self.pose.shape[1] // POSE_COLUMNS, POSE_COLUMNS)
 
     @property
     def accelerations(self) -> np.ndarray:
         """a and alpha, shape (m, bodies, 6)."""
-        m, bodies = len(self.pose), self.pose.shape[1] // 18
+        m, bodies = len(self.pose), self.pose.shape[1] // POSE_COLUMNS
         return self.solution[:, : 6 * bodies].reshape(m, bodies, 6)
 
     @property
@@ -111,7 +112,7 @@ RECORDS_TYPE = types.NamedTuple((_MAT, _MAT, _CUBE, _MAT, _CUBE, _CUBE, _VEC), R
 def new_records(m: int, bodies: int, rows: int, elements: int) -> Records:
     """Return empty records for m output times."""
     return Records(
-        np.zeros((m, 18 * bodies)),
+        np.zeros((m, POSE_COLUMNS * bodies)),
         np.zeros((m, 6 * bodies + rows)),
         np.zeros((m, max(elements, 1), index1.FORCE_RECORD)),
         np.zeros((m, 3 * rows)),
@@ -149,7 +150,7 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
         phi, loads = records.phi[k], records.loads[k]
         if idata[T.H_MODE] == NUMBERS:
             vals[:] = 0.0
-        update_tables(t[k], at, idata, tab)
+        update_tables(t[k], at, tab)
         if only_assemble:
             count = index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
             records.solution[k, :] = rhs
@@ -176,7 +177,7 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
                 rhs[base + r] = -phi[3 * r + 1]
             solve(plan, factors, rhs, pushed)
             index1.displace(at, moved, pushed, idata, tab)
-            update_tables(t[k], at, idata, tab)
+            update_tables(t[k], at, tab)
         index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
         if not factor(plan, factors, vals) <= growth:
             return k
@@ -198,7 +199,7 @@ NO_FACTORS = new_factors(NO_PLAN)
 
 def pattern(idata, rdata, work_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return (indptr, indices, slots) of the saddle-point matrix in CSC form."""
-    n = int(6 * (idata[T.H_BODIES] - 1) + idata[T.H_ROWS])
+    n = int(idata[T.H_COORDINATES] + idata[T.H_ROWS])
     y, slots = np.zeros((1, int(idata[T.H_UNKNOWNS]))), np.zeros(1, dtype=np.int64)
     ask = idata.copy()
     count = np.zeros(1)
@@ -293,6 +294,6 @@ def _least_squares_row(k: int, t, y, matrix_pattern, idata, rdata, work_size, re
 def _turned(y: np.ndarray, idata: np.ndarray, angle: float) -> np.ndarray:
     """Return a copy of y with every Euler angle turned differently, so that no entry is zero by accident."""
     y = y.copy()
-    angles = slice(int(idata[T.H_THETA]), int(idata[T.H_LAMBDA]))
+    angles = slice(int(idata[T.H_THETA]), int(idata[T.H_QF]))
     y[0, angles] += angle * np.sin(1.0 + np.arange(angles.stop - angles.start))
     return y

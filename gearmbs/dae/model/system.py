@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,21 +9,28 @@ from numba import njit
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
-from gearmbs.dae.equations import jacobian, residual
+from gearmbs.dae.equations import jacobian, residual, unknowns
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.builder import TableBuilder
 from gearmbs.dae.equations.constraint_terms import ANGLE, dot3
 from gearmbs.dae.equations.euler_switch import hook
-from gearmbs.dae.equations.layout import TableBuilder
 from gearmbs.dae.equations.reactions import reactions_from
 from gearmbs.dae.equations.rotation import (
     KIN_A,
     KIN_ADOT,
+    KIN_AXES,
     KIN_H,
+    POSE_A,
+    POSE_COLUMNS,
+    POSE_R,
+    POSE_V,
+    POSE_W,
     axes_and_velocity,
     best_reference,
     euler_angles,
     euler_rates,
 )
+from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, SI1, Unknown
 from gearmbs.dae.equations.update import inertia_times
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
 from gearmbs.dae.model import evaluator, initial
@@ -39,33 +45,6 @@ MAX_LOAD_ITERATIONS = 200
 LARGEST_LOCK = 600
 """Constraint rows up to which the cause of a failure is sought in a locking position."""
 
-FORMULATIONS = {"I3": T.I3, "SI2": T.SI2, "SI1": T.SI1}
-
-BLOCKS = {
-    "u": ("velocity of the centre of mass", "(6)", "m/s"),
-    "p": ("generalised momentum", "(5)", "kg m^2/s"),
-    "eps": ("rate of the Euler angle", "(6)", "rad/s"),
-    "R": ("position of the centre of mass", "(1)", "m"),
-    "theta": ("Euler angle", "(1)", "rad"),
-    "lambda": ("multiplier of the constraint", "(5), (7)", "N or N m"),
-    "F": ("applied force", "(5)", "N"),
-    "N": ("applied torque", "(5)", "N m"),
-    "z": ("user-defined state", "-", "-"),
-    "mu": ("multiplier of the stabilisation", "(6), stabilised", "-"),
-}
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """One entry of y: its index, block of eq. (9), name, meaning, equation number and unit."""
-
-    index: int
-    block: str
-    name: str
-    meaning: str
-    equation: str
-    unit: str
-
 
 @njit("void(float64[:, ::1], int64[::1], float64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy")
 def state_from_pose(pose, idata, rdata, work, y):
@@ -74,31 +53,29 @@ def state_from_pose(pose, idata, rdata, work, y):
     kin = tab.kin
     s = tab.scratch
     for b in range(1, idata[T.H_BODIES]):
-        k = 3 * (b - 1)
-        row = pose[b - 1]
-        th, e, p = idata[T.H_THETA] + k, idata[T.H_EPS] + k, idata[T.H_P] + k
+        row, at = pose[b - 1], tab.at[b]
+        th, e, p = at[T.AT_THETA], at[T.AT_EPS], at[T.AT_P]
         for c in range(3):
-            y[idata[T.H_R] + k + c] = row[c]
-            y[idata[T.H_U] + k + c] = row[12 + c]
+            y[at[T.AT_R] + c] = row[POSE_R + c]
+            y[at[T.AT_U] + c] = row[POSE_V + c]
         for c in range(9):
-            kin[b, KIN_A + c] = row[3 + c]
-        euler_angles(row, 3, tab.code[b], y, th)
+            kin[b, KIN_A + c] = row[POSE_A + c]
+        euler_angles(row, POSE_A, tab.code[b], y, th)
         axes_and_velocity(y[th], y[th + 1], 0.0, 0.0, 0.0, kin, b)
-        euler_rates(kin, b, row, 15, y, e)
-        inertia_times(kin[b], tab.body[b], row, 15, kin[b], KIN_H, s)
+        euler_rates(kin, b, row, POSE_W, y, e)
+        inertia_times(kin[b], tab.body[b], row, POSE_W, kin[b], KIN_H, s)
         for m in range(3):
-            y[p + m] = dot3(kin[b], 18 + 3 * m, kin[b], KIN_H)
+            y[p + m] = dot3(kin[b], KIN_AXES + 3 * m, kin[b], KIN_H)
 
 
 def _restart_rates(t, y, yp, idata, rdata) -> np.ndarray:
     """Return y' after a change of reference: angles' rates are eps, p' makes its residual vanish."""
     yp = yp.copy()
     out, work = np.zeros(y.size), np.zeros(int(idata[T.H_WORK]))
-    e, r, th, p = (int(idata[k]) for k in (T.H_EPS, T.H_R, T.H_THETA, T.H_P))
-    n3 = r - e
-    yp[th : th + n3] = y[e : e + n3]
+    e, r, th, p, lam = (int(idata[k]) for k in (T.H_EPS, T.H_R, T.H_THETA, T.H_P, T.H_LAMBDA))
+    yp[th:lam] = y[e:r]
     residual.residual(t, y, yp, out, idata, rdata, work)
-    yp[p : p + n3] -= out[p : p + n3]
+    yp[p:e] -= out[p:e]
     return yp
 
 
@@ -128,7 +105,7 @@ class System:
         t0: float = 0.0,
     ) -> None:
         self.builder = builder
-        self.pose = np.array(pose, dtype=float).reshape(-1, 18)
+        self.pose = np.array(pose, dtype=float).reshape(-1, POSE_COLUMNS)
         self.body_names = body_names
         self.row_names = row_names
         self.force_names = force_names
@@ -178,7 +155,7 @@ class System:
         ``inner`` holds loads and states, F to z of y; default: no loads, states at their start.
         """
         self.choose_references(pose)
-        idata, rdata, size = self.builder.pack(T.I3)
+        idata, rdata, size = self.builder.pack(I3)
         work = np.zeros(size)
         y = np.zeros(int(idata[T.H_UNKNOWNS]))
         y[int(idata[T.H_Z]) : int(idata[T.H_Z]) + self.state_start.size] = self.state_start
@@ -218,11 +195,11 @@ class System:
             terms.extend(old.terms[span])
             coef.extend(old.coef[span])
             reference.extend(old.reference[span])
-        lam, after = old.layout(T.I3)["lambda"], old.layout(T.I3)["F"]
-        end = old.layout(T.I3)["n"]
+        lam, after = old.layout(I3)["lambda"], old.layout(I3)["F"]
+        end = old.layout(I3)["n"]
         old.rows, old.terms, old.coef, old.reference = rows, terms, coef, reference
         moved = {lam + int(i): lam + k for k, i in enumerate(kept)}
-        moved |= {k: k - after + old.layout(T.I3)["F"] for k in range(after, end)}
+        moved |= {k: k - after + old.layout(I3)["F"] for k in range(after, end)}
         old.renumber_unknowns(moved)
         dropped = np.setdiff1d(np.arange(len(whole[0])), kept)
         self._dropped = (whole, dropped, [self.row_names[i] for i in dropped])
@@ -344,7 +321,7 @@ class System:
 
     def _coupled(self) -> bool:
         """Whether some load depends on unknowns other than positions, velocities and states."""
-        first, end = self.builder.layout(T.I3)["lambda"], self.builder.layout(T.I3)["z"]
+        first, end = self.builder.layout(I3)["lambda"], self.builder.layout(I3)["z"]
         for row in self.builder.forces:
             at = row[T.FORCE_DEPENDS]
             at += 1 + self.builder.extra_i[at]
@@ -436,29 +413,15 @@ class System:
         z = slice(int(idata[T.H_Z]), int(idata[T.H_Z]) + self.state_start.size)
         y[int(idata[T.H_F]) : int(idata[T.H_MU])] = y_small[int(idata[T.H_F]) :]
         rows = slice(int(idata[T.H_LAMBDA]), int(idata[T.H_LAMBDA]) + len(lam))
-        (yp if form == T.SI1 else y)[rows] = lam
+        (yp if form == SI1 else y)[rows] = lam
         work = np.zeros(size)
         self._settle_states(y, yp, z, idata, rdata, work)
         self._rates(y, yp, acc, idata, rdata, work)
         at = self.builder.layout(form)
-        differential = np.zeros(n, dtype=bool)
-        differential[: at["eps"]] = True
-        differential[at["R"] : at["lambda"]] = True
-        error_mask = np.zeros(n, dtype=bool)
-        error_mask[at["R"] : at["lambda"]] = True
-        if self.state_start.size:
-            kinds = np.array([kind for kind, _ in self.builder.states])
-            differential[z] = error_mask[z] = kinds == T.STATE_DIFFERENTIAL
-        if form != T.I3:
-            error_mask[at["u"] : at["p"]] = True
-            error_mask[at["eps"] : at["R"]] = True
-        if form == T.SI1:
-            differential[at["lambda"] : at["F"]] = True
-            differential[at["mu"] :] = True
+        kinds = np.array([kind == T.STATE_DIFFERENTIAL for kind, _ in self.builder.states], dtype=bool)
         scale = self._scales(form, loads)
         allowed = scale.copy()
-        allowed[at["u"] : at["p"]] *= rate_scale
-        allowed[at["eps"] : at["R"]] *= rate_scale
+        allowed[unknowns.velocities(at)] *= rate_scale
         return DAEProblem(
             n=n,
             residual=residual.residual,
@@ -470,10 +433,10 @@ class System:
             work_size=size,
             y0=y,
             yp0=yp,
-            error_mask=error_mask,
+            error_mask=unknowns.error_mask(at, form, kinds),
             atol_scale=allowed,
             scale=scale,
-            differential=differential,
+            differential=unknowns.differential_mask(at, form, kinds),
             t0=self.t0,
             names=[unknown.name for unknown in self.unknowns(formulation)],
             hook=hook,
@@ -483,7 +446,7 @@ class System:
 
     def _hook_interval(self, at: dict[str, int]):
         """Time in which no Euler angle comes near its singularity, and no counted angle turns by half a turn."""
-        rates = slice(at["eps"], at["R"])
+        rates = slice(at["eps"], at["v_f"])
         counted = any(term[T.TERM_TYPE] == ANGLE for term in self.builder.terms)
         counted = counted or any(tape.n_angles for tape in self.builder.tapes)
 
@@ -511,62 +474,31 @@ class System:
     def _rates(self, y, yp, acc, idata, rdata, work) -> None:
         """Fill y' from the accelerations; p' is what makes its own residual vanish."""
         out = np.zeros(y.size)
-        n3 = 3 * self.pose.shape[0]
-        u, p, e, r, th = (int(idata[k]) for k in (T.H_U, T.H_P, T.H_EPS, T.H_R, T.H_THETA))
-        yp[u : u + n3] = acc[:, :3].ravel()
-        yp[r : r + n3] = y[u : u + n3]
-        yp[th : th + n3] = y[e : e + n3]
+        u, p, e, r, th, lam = (int(idata[k]) for k in (T.H_U, T.H_P, T.H_EPS, T.H_R, T.H_THETA, T.H_LAMBDA))
+        yp[u:p] = acc[:, :3].ravel()
+        yp[r:th] = y[u:p]
+        yp[th:lam] = y[e:r]
         residual.residual(self.t0, y, yp, out, idata, rdata, work)
-        yp[p : p + n3] -= out[p : p + n3]
-        kin = T.unpack(idata, rdata, work).kin
+        yp[p:e] -= out[p:e]
+        tab = T.unpack(idata, rdata, work)
+        kin = tab.kin
         for b in range(1, kin.shape[0]):
-            k = e + 3 * (b - 1)
+            k = int(tab.at[b, T.AT_EPS])
             rest = acc[b - 1, 3:] - y[k : k + 3] @ kin[b, KIN_ADOT : KIN_ADOT + 9].reshape(3, 3)
             euler_rates(kin, b, np.ascontiguousarray(rest), 0, yp, k)
 
     def _scales(self, form: int, loads: np.ndarray) -> np.ndarray:
         """Typical magnitudes by kind of unknown: metres, radians, their rates, momenta, forces."""
-        at = self.builder.layout(form)
-        length = min(self.length, 1.0)
-        scale = np.ones(at["n"])
-        scale[at["u"] : at["p"]] = length
-        scale[at["R"] : at["theta"]] = length
-        for b, row in enumerate(self.builder.bodies[1:]):
-            inertia = max(np.abs(row[1:]).max(), row[0] * 1e-8, 1e-12)
-            scale[at["p"] + 3 * b : at["p"] + 3 * b + 3] = inertia
-        weight = max((row[0] for row in self.builder.bodies[1:]), default=1.0) * 9.81
-        force = max(weight, float(np.abs(loads[:, :3]).max(initial=0.0)), 1e-3)
-        scale[at["lambda"] : at["N"]] = force
-        scale[at["N"] : at["mu"]] = force * length
-        scale[at["mu"] :] = length
-        return scale
+        bodies = np.array(self.builder.bodies[1:]).reshape(-1, T.BODY_COLUMNS)
+        largest = float(np.abs(loads[:, :3]).max(initial=0.0))
+        return unknowns.scales(self.builder.counts(), form, bodies, np.zeros((0, 2)), min(self.length, 1.0), largest)
 
     def unknowns(self, formulation: str = "SI2") -> list[Unknown]:
         """Return the table of the unknowns of eq. (9) in their order."""
-        out: list[Unknown] = []
-
-        def add(block: str, name: str) -> None:
-            meaning, equation, unit = BLOCKS[block]
-            out.append(Unknown(len(out), block, name, meaning, equation, unit))
-
-        for block, parts in (("u", "xyz"), ("p", "123"), ("eps", "123"), ("R", "xyz"), ("theta", "123")):
-            angle = {"1": "psi", "2": "theta", "3": "phi"}
-            for body in self.body_names:
-                for part in parts:
-                    add(block, f"{block}_{angle.get(part, part)}({body})")
-        for row in self.row_names:
-            add("lambda", f"lambda({row})")
-        for block, column in (("F", T.FORCE_F), ("N", T.FORCE_N)):
-            for name, force in zip(self.force_names, self.builder.forces):
-                if force[column]:
-                    for part in "xyz":
-                        add(block, f"{block}_{part}({name})")
-        for name in self.state_names:
-            add("z", f"z({name})")
-        if formulation != "I3":
-            for row in self.row_names:
-                add("mu", f"mu({row})")
-        return out
+        forces = [name for name, row in zip(self.force_names, self.builder.forces) if row[T.FORCE_F]]
+        torques = [name for name, row in zip(self.force_names, self.builder.forces) if row[T.FORCE_N]]
+        names = (self.body_names, self.row_names, forces, torques, self.state_names)
+        return unknowns.named(self.builder.counts(), FORMULATIONS[formulation], *names)
 
     def unknowns_table(self, formulation: str = "SI2") -> str:
         """Return the table of the unknowns as text: index, name, meaning, equation, unit."""

@@ -1,0 +1,285 @@
+"""The unknowns y of eq. (9): blocks, offsets, units, masks, scales, and what the formulations choose.
+
+    y = [u, p, p_f, eps, v_f, R, theta, q_f, lambda, F, N, z, mu]
+
+Rigid bodies have u, p, eps, R and theta, three entries each. A body with modal coordinates q_f also has their
+velocities v_f and momenta p_f = dT/dv_f; without such bodies these blocks are empty and y is that of eq. (9), extended
+by the user-defined states z and the multipliers mu of the stabilisation.
+
+Nothing else in the package computes an offset: Python asks `offsets` and `places`, kernels read the header of the
+tables and their table ``at``, which are filled from these two.
+
+=========== ================================ =========================== ===============================
+formulation constraints of eq. (7)           mu                          lambda and mu enter eq. (5), (6)
+=========== ================================ =========================== ===============================
+I3          positions                        absent                      themselves
+SI2         positions and velocities         present                     themselves
+SI1         positions and velocities         present                     as derivatives of the unknowns
+=========== ================================ =========================== ===============================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from gearmbs.dae.equations import layout as T
+
+I3 = 0
+SI2 = 1
+SI1 = 2
+FORMULATIONS = {"I3": I3, "SI2": SI2, "SI1": SI1}
+
+BLOCKS = {
+    "u": ("velocity of the centre of mass", "(6)", "m/s"),
+    "p": ("generalised momentum", "(5)", "kg m^2/s"),
+    "p_f": ("momentum of the modal coordinate", "(5)", "kg m^2/s"),
+    "eps": ("rate of the Euler angle", "(6)", "rad/s"),
+    "v_f": ("velocity of the modal coordinate", "(6)", "1/s"),
+    "R": ("position of the centre of mass", "(1)", "m"),
+    "theta": ("Euler angle", "(1)", "rad"),
+    "q_f": ("modal coordinate", "(1)", "1"),
+    "lambda": ("multiplier of the constraint", "(5), (7)", "N or N m"),
+    "F": ("applied force", "(5)", "N"),
+    "N": ("applied torque", "(5)", "N m"),
+    "z": ("user-defined state", "-", "-"),
+    "mu": ("multiplier of the stabilisation", "(6), stabilised", "-"),
+}
+"""Meaning, equation and unit of each block of y, in the order of y."""
+
+COMPONENTS = {"u": "xyz", "p": ("psi", "theta", "phi"), "eps": ("psi", "theta", "phi"), "R": "xyz"}
+COMPONENTS["theta"] = COMPONENTS["eps"]
+MODAL = ("p_f", "v_f", "q_f")
+LIGHTEST = 1e-12
+"""Smallest inertia, kg m^2, by which a momentum is scaled."""
+GRAVITY = 9.81
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One entry of y: its index, block of eq. (9), name, meaning, equation number and unit."""
+
+    index: int
+    block: str
+    name: str
+    meaning: str
+    equation: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What the length of y depends on.
+
+    Attributes
+    ----------
+    modes : tuple of int
+        Number of modal coordinates of each moving body, 0 of a rigid one.
+    rows : int
+        Constraint rows.
+    forces, torques : int
+        Force elements whose F, whose N is unknown.
+    states : int
+        User-defined states.
+    """
+
+    modes: tuple[int, ...]
+    rows: int
+    forces: int
+    torques: int
+    states: int
+
+    @property
+    def bodies(self) -> int:
+        """Number of moving bodies."""
+        return len(self.modes)
+
+    @property
+    def coordinates(self) -> int:
+        """Number of coordinates: six of a rigid body, and the modal ones."""
+        return 6 * self.bodies + sum(self.modes)
+
+
+def offsets(counts: Counts, formulation: int) -> dict[str, int]:
+    """Return the index in y of the first entry of each block, and the length of y as ``n``."""
+    three, modal = 3 * counts.bodies, sum(counts.modes)
+    sizes = {
+        "u": three,
+        "p": three,
+        "p_f": modal,
+        "eps": three,
+        "v_f": modal,
+        "R": three,
+        "theta": three,
+        "q_f": modal,
+        "lambda": counts.rows,
+        "F": 3 * counts.forces,
+        "N": 3 * counts.torques,
+        "z": counts.states,
+        "mu": counts.rows if has_rate_rows(formulation) else 0,
+    }
+    at, next_free = {}, 0
+    for block in BLOCKS:
+        at[block] = next_free
+        next_free += sizes[block]
+    at["n"] = next_free
+    return at
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def has_rate_rows(formulation):
+    """Whether the derivatives of the constraints are among the equations, and so mu among the unknowns."""
+    return formulation != I3
+
+
+def places(counts: Counts, formulation: int) -> np.ndarray:
+    """Return the table ``at`` of the kernels: where the unknowns of each body are, one row a body, the ground first.
+
+    Returns
+    -------
+    ndarray of int, shape (1 + bodies, AT_COLUMNS)
+        Columns ``AT_*`` of `gearmbs.dae.equations.layout`; -1 in the ground's row, which has none.
+    """
+    at = offsets(counts, formulation)
+    table = np.full((1 + counts.bodies, T.AT_COLUMNS), -1, dtype=np.int64)
+    table[:, T.AT_MODES] = (0, *counts.modes)
+    mode = 0
+    for b, modes in enumerate(counts.modes):
+        row = table[1 + b]
+        for column, block in (
+            (T.AT_U, "u"),
+            (T.AT_P, "p"),
+            (T.AT_EPS, "eps"),
+            (T.AT_R, "R"),
+            (T.AT_THETA, "theta"),
+        ):
+            row[column] = at[block] + 3 * b
+        for column, block in ((T.AT_PF, "p_f"), (T.AT_VF, "v_f"), (T.AT_QF, "q_f")):
+            row[column] = at[block] + mode
+        row[T.AT_V] = 6 * b
+        row[T.AT_V_MODES] = 6 * counts.bodies + mode
+        mode += modes
+    return table
+
+
+# --- what the formulations choose, for kernels ---------------------------------------------------------
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def multipliers_of_row(r, y, yp, idata):
+    """Return lambda and mu of constraint row r: unknowns, or in SI1 derivatives of unknowns."""
+    form = idata[T.H_FORMULATION]
+    lam, mu = idata[T.H_LAMBDA] + r, idata[T.H_MU] + r
+    if form == I3:
+        return y[lam], 0.0
+    if form == SI2:
+        return y[lam], y[mu]
+    return yp[lam], yp[mu]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def multiplier_factor(cj, idata):
+    """Return the derivative of lambda and mu with respect to the unknown they are made from."""
+    return cj if idata[T.H_FORMULATION] == SI1 else 1.0
+
+
+# --- masks, scales, names ------------------------------------------------------------------------------
+
+
+def differential_mask(at: dict[str, int], formulation: int, states: np.ndarray) -> np.ndarray:
+    """Return which unknowns appear differentiated; ``states`` says it of the user-defined ones."""
+    mask = np.zeros(at["n"], dtype=bool)
+    mask[: at["eps"]] = True
+    mask[at["R"] : at["lambda"]] = True
+    mask[at["z"] : at["mu"]] = states
+    if formulation == SI1:
+        mask[at["lambda"] : at["F"]] = True
+        mask[at["mu"] :] = True
+    return mask
+
+
+def error_mask(at: dict[str, int], formulation: int, states: np.ndarray) -> np.ndarray:
+    """Return whose error an integrator is to control: positions, with rate rows velocities, differential states."""
+    mask = np.zeros(at["n"], dtype=bool)
+    mask[at["R"] : at["lambda"]] = True
+    mask[at["z"] : at["mu"]] = states
+    if has_rate_rows(formulation):
+        mask[velocities(at)] = True
+    return mask
+
+
+def velocities(at: dict[str, int]) -> np.ndarray:
+    """Return the indices of u, eps and v_f, in the order of the coordinates R, theta and q_f."""
+    return np.concatenate([np.arange(at["u"], at["p"]), np.arange(at["eps"], at["R"])])
+
+
+def scales(
+    counts: Counts, formulation: int, bodies: np.ndarray, modes: np.ndarray, length: float, largest_force: float
+) -> np.ndarray:
+    """Return typical magnitudes of the unknowns.
+
+    Parameters
+    ----------
+    bodies : ndarray, shape (bodies, BODY_COLUMNS)
+        Mass and inertia of the moving bodies.
+    modes : ndarray, shape (modal coordinates, 2)
+        For each a typical size and a modal mass.
+    length : float
+        Of the mechanism, m, at most 1.
+    largest_force : float
+        Among the loads at the start, N.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    at = offsets(counts, formulation)
+    scale = np.ones(at["n"])
+    scale[at["u"] : at["p"]] = length
+    scale[at["R"] : at["theta"]] = length
+    for b, row in enumerate(bodies):
+        first = at["p"] + 3 * b
+        largest = np.abs(row[T.BODY_INERTIA :]).max()
+        scale[first : first + 3] = max(largest, row[T.BODY_MASS] * 1e-8, LIGHTEST)
+    for k, (size, mass) in enumerate(modes):
+        scale[at["q_f"] + k] = scale[at["v_f"] + k] = size
+        scale[at["p_f"] + k] = max(mass * size, LIGHTEST)
+    weight = max((row[T.BODY_MASS] for row in bodies), default=1.0) * GRAVITY
+    force = max(weight, largest_force, 1e-3)
+    scale[at["lambda"] : at["N"]] = force
+    scale[at["N"] : at["mu"]] = force * length
+    scale[at["mu"] :] = length
+    return scale
+
+
+def named(
+    counts: Counts,
+    formulation: int,
+    bodies: Sequence[str],
+    rows: Sequence[str],
+    forces: Sequence[str],
+    torques: Sequence[str],
+    states: Sequence[str],
+) -> list[Unknown]:
+    """Return the table of the unknowns in their order, from the names of what they belong to.
+
+    ``forces`` and ``torques`` name the elements with an unknown F, with an unknown N.
+    """
+    owners = {"lambda": rows, "F": forces, "N": torques, "z": states, "mu": rows}
+    out: list[Unknown] = []
+    for block, (meaning, equation, unit) in BLOCKS.items():
+        if block == "mu" and not has_rate_rows(formulation):
+            continue
+        if block in MODAL:
+            names = [f"{block}_{k + 1}({body})" for body, n in zip(bodies, counts.modes) for k in range(n)]
+        elif block in COMPONENTS:
+            names = [f"{block}_{part}({body})" for body in bodies for part in COMPONENTS[block]]
+        elif block in ("F", "N"):
+            names = [f"{block}_{part}({owner})" for owner in owners[block] for part in "xyz"]
+        else:
+            names = [f"{block}({owner})" for owner in owners[block]]
+        out.extend(Unknown(len(out) + k, block, name, meaning, equation, unit) for k, name in enumerate(names))
+    return out
