@@ -13,6 +13,7 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.dae.integrators.ida import solve_ida
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
+from gearmbs.dae.results.stream import Stream
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
 
@@ -52,6 +53,7 @@ def simulate(
     rate_scale: float = 1.0,
     progress: bool | Callable[[float], None] = False,
     advice: Mapping[Status, str] | None = None,
+    consumer: Callable[[Solution], None] | None = None,
     **options,
 ) -> Solution:
     """Integrate a mechanism and return its motion and forces.
@@ -82,6 +84,10 @@ def simulate(
         True shows a bar; a callable is given the time reached.
     advice : mapping, optional
         What messages of failures recommend, by status, where it should be something else than for a mechanism.
+    consumer : callable, optional
+        With ``every_step``: called as ``consumer(part)`` with solutions of some steps at a time, in the order of time
+        and each valid during the call only, instead of keeping all steps in memory; see
+        `gearmbs.dae.results.stream.Stream`. The solution returned then holds nothing but the last step.
     **options
         Handed to the integrator.
 
@@ -97,6 +103,8 @@ def simulate(
     """
     if every_step and (rate is not None or t_eval is not None):
         raise ModelError("every_step: outputs are at the integrator's own steps; leave rate and t_eval away")
+    if consumer is not None and not every_step:
+        raise ModelError("consumer: it takes the integrator's own steps; give every_step=True, too")
     t_end, t_start = quantity(t_end, "time", "t_end"), quantity(t_start, "time", "t_start")
     if t_eval is None:
         if not np.isfinite(t_end) or t_end <= t_start:
@@ -118,6 +126,7 @@ def simulate(
     problem.advice = {**ADVICE, **(advice or {})}
     first, last = float(t_eval[0]), float(t_eval[-1])
     times = None if every_step else t_eval
+    stream = None if consumer is None else Stream(system, problem, last, consumer)
     with _reporter(progress, first, last) as report:
         if name == "IDA":
             result = solve_ida(problem, times, t_end=last, tol=tol, progress=report, **options)
@@ -127,8 +136,16 @@ def simulate(
             # errors are controlled on positions and velocities, and so is the corrector
             options.setdefault("corrector", "modified")
             options.setdefault("slopes", not every_step)
-            result = solve_wstiff(problem, times, t_end=last, tol=tol, method=name, progress=report, **options)
-    return Solution(system, problem, result)
+            result = solve_wstiff(
+                problem, times, t_end=last, tol=tol, method=name, progress=report, consumer=stream, **options
+            )
+    solution = Solution(system, problem, result)
+    if stream is None or consumer is None:
+        return solution
+    if name == "IDA":
+        for part in solution.parts():
+            consumer(part)
+    return stream.close(solution)
 
 
 def _sampled(start: float, end: float, rate: float) -> np.ndarray:
@@ -158,7 +175,18 @@ def _check_options(name: str, options: Mapping[str, Any]) -> None:
         )
 
 
-SETTINGS = ("rate", "t_eval", "every_step", "t_start", "integrator", "formulation", "tol", "rate_scale", "progress")
+SETTINGS = (
+    "rate",
+    "t_eval",
+    "every_step",
+    "t_start",
+    "integrator",
+    "formulation",
+    "tol",
+    "rate_scale",
+    "progress",
+    "consumer",
+)
 
 
 class _reporter:

@@ -6,7 +6,7 @@ import json
 import platform
 from collections.abc import Callable
 from importlib.metadata import version
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -25,17 +25,10 @@ from gearmbs.signals import (
     make_signal,
     trim,
 )
-from gearmbs.signals.uneven import MARGIN
 from gearmbs.studies import rig
 from gearmbs.studies.case import Case, units_of_fields
 from gearmbs.studies.limits import check_record, edge, remarks, slip
-
-SMOOTH = {"normal_force": "N", "penetration_drive": "m", "penetration_back": "m"}
-COUNTS = {"pairs_drive": "1", "pairs_back": "1"}
-"""What a record tells of the contact, with units; numbers of pairs cannot be interpolated."""
-
-TURN_BEFORE = 0.02
-"""Turns of the faster wheel between the steps that are looked at before the span of a record's filters."""
+from gearmbs.studies.measured import COUNTS, SMOOTH, Measured, Recorder, measure, rows_of_record
 
 ADVICE = {
     Status.STEP_TOO_SMALL: "Loosen solver.tolerance, raise contact.depth, or try another solver.integrator.",
@@ -147,11 +140,19 @@ def run_case(case: Case, progress: bool | Callable[[float], None] = False) -> xr
         If the integrator stops early or teeth slip past each other; the exception carries the solution so far.
     """
     check_record(case)
-    solution = simulate_case(case, progress, every_step=True)
+    recorder = Recorder(case)
+    solution = simulate_case(case, progress, every_step=True, consumer=recorder.take)
     if not solution.success:
         kind = SimulationInterrupted if solution.status is Status.INTERRUPTED else SimulationFailed
-        raise kind(f"case '{case.name}': {solution.message}", solution, case)
-    return record(case, solution)
+        raise kind(f"case '{case.name}': {solution.message}", solution, case, _partial(case, solution, recorder))
+    try:
+        return _evaluated(case, solution, recorder.measured(), even=False)
+    except SimulationFailed as failure:
+        raise SimulationFailed(str(failure), solution, case, _partial(case, solution, recorder)) from None
+
+
+def _partial(case: Case, solution: Solution, recorder: Recorder) -> xr.Dataset | None:
+    return None if recorder.is_empty else _partial_dataset(case, solution, recorder.everything())
 
 
 def partial_record(case: Case, solution: Solution) -> xr.Dataset:
@@ -162,7 +163,10 @@ def partial_record(case: Case, solution: Solution) -> xr.Dataset:
     Dataset
         As of :func:`run_case` without ``acceleration`` and ``gmf_rms``; status and message in the attributes.
     """
-    known = measure(case, solution)
+    return _partial_dataset(case, solution, measure(case, solution))
+
+
+def _partial_dataset(case: Case, solution: Solution, known: Measured) -> xr.Dataset:
     dataset = _time_series(known.t, known.forces, known.error, known.contact)
     attributes = attributes_of(case, solution)
     dataset.attrs = {**attributes, "status": solution.status.name, "message": solution.message}
@@ -196,6 +200,11 @@ def record(case: Case, solution: Solution) -> xr.Dataset:
         If teeth slipped past each other.
     """
     known = measure(case, solution, rows_of_record(case, solution.t))
+    return _evaluated(case, solution, known, even=_is_even(solution.t, case.solver.output_rate))
+
+
+def _evaluated(case: Case, solution: Solution, known: Measured, *, even: bool) -> xr.Dataset:
+    """Return the record of what was measured, at even times or not; see `record`."""
     slipped = slip(case, known.t, known.error)
     if slipped is not None:
         raise SimulationFailed(f"case '{case.name}': {slipped}", solution, case)
@@ -206,7 +215,7 @@ def record(case: Case, solution: Solution) -> xr.Dataset:
     rate, ahead = solver.output_rate, edge(case)
     labels: dict[str, Any] = {"units": "N", "speed": operation.speed, "teeth": case.gears.teeth}
     names = [f"{k}{axis}" for k in (1, 2) for axis in "xyz"]
-    if _is_even(solution.t, rate):
+    if even:
         keep = known.t >= start - ahead - 0.5 / rate
         forces = make_signal(known.forces[keep], rate, channels=names, t0=float(known.t[keep][0]), **labels)
     else:
@@ -245,63 +254,6 @@ def record(case: Case, solution: Solution) -> xr.Dataset:
 
 def _is_even(t: np.ndarray, rate: float) -> bool:
     return bool(np.allclose(np.diff(t) * rate, 1.0, atol=1e-6))
-
-
-def rows_of_record(case: Case, t: np.ndarray) -> np.ndarray:
-    """Return the numbers of the output times a record is made from.
-
-    Before the span of its filters only a few are needed, to follow the turning wheels.
-    """
-    operation, teeth = case.operation, case.gears.teeth
-    begin = operation.run_up + operation.settling - edge(case) - (MARGIN + 1) / case.solver.output_rate
-    first = int(np.searchsorted(t, begin))
-    turn = 2.0 * np.pi / (operation.speed * max(1.0, teeth[0] / teeth[1]))
-    interval = np.floor(t[: first + 1] / (TURN_BEFORE * turn))
-    return np.concatenate([np.flatnonzero(np.diff(interval) > 0.0), np.arange(first, t.size)])
-
-
-class Measured(NamedTuple):
-    """What a record is made from, at the output times of a solution or some of them.
-
-    Attributes
-    ----------
-    t : ndarray, shape (m,)
-    forces : ndarray, shape (m, 6)
-        Force of shaft 1 on gear 1, then of shaft 2 on gear 2, N.
-    error : ndarray, shape (m,)
-        Lag of the driven wheel behind the driver at the driven base circle, m.
-    contact : dict of ndarray
-        The quantities of `SMOOTH` and `COUNTS`.
-    """
-
-    t: np.ndarray
-    forces: np.ndarray
-    error: np.ndarray
-    contact: dict[str, np.ndarray]
-
-
-def measure(case: Case, solution: Solution, rows: np.ndarray | None = None) -> Measured:
-    """Return what a record is made from at the output times ``rows`` of a solution, default all."""
-    pair = case.pair()
-    place = pair.placement(0.0)
-    t = solution.t if rows is None else solution.t[rows]
-    forces, angles = np.empty((t.size, 6)), np.empty((t.size, 2))
-    contact = {name: np.empty(t.size) for name in (*SMOOTH, *COUNTS)}
-    k = 0
-    for part in solution.parts(rows):
-        here = slice(k, k + len(part))
-        k += len(part)
-        forces[here, :3], forces[here, 3:] = (part.reaction(seat)[0] for seat in rig.SEATS)
-        for wheel, (gear, axes) in enumerate(zip(rig.GEARS, (place.axes_1, place.axes_2))):
-            x_axis = part.orientation(gear)[:, :, 0] @ axes
-            angles[here, wheel] = np.arctan2(x_axis[:, 1], x_axis[:, 0])
-        diagnostics = part.contact(rig.MESH)
-        for name, column in contact.items():
-            column[here] = diagnostics[name]
-    turned = np.unwrap(angles, axis=0)
-    ratio = case.gears.teeth[0] / case.gears.teeth[1]
-    error = pair.rotation * pair.wheels[1].base_radius * (turned[:, 0] * ratio + turned[:, 1])
-    return Measured(t, forces, error, contact)
 
 
 def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any]:

@@ -38,6 +38,11 @@ NEWTON_TOLERANCE = 1.0
 FIRST_CHUNK = 256
 CHUNK_SECONDS = 0.05
 RECORD_BYTES = 8_000_000
+CONSUMED_BYTES = 500_000
+"""Of steps handed to a consumer at a time: what stays in the processor's cache."""
+
+Consumer = Callable[[np.ndarray, np.ndarray, np.ndarray], None]
+"""Takes t, y of some accepted steps and the integer table valid there; the arrays are valid during the call only."""
 EVENT_BUFFER = 64
 START_JUMP_LIMIT = 100.0
 CHECK_STEP = 1e-10
@@ -92,9 +97,12 @@ class Run:
         progress: Callable[[float], None] | None,
         check_start: bool,
         error_probe: Callable[[], BaseException | None] | None,
+        consumer: Consumer | None,
     ):
         self.problem = problem
         self.progress = progress
+        self.consumer = consumer
+        self.consumed_time = 0.0
         self.error_probe = error_probe
         self.check_start = check_start
         self.dense_output = dense_output
@@ -110,7 +118,8 @@ class Run:
         check_choices(tol, rtol, method, corrector, max_order, max_step, first_step, min_step, max_iterations)
         n = problem.n
         keep = self.every_step or dense_output
-        rows = int(np.clip(RECORD_BYTES // (8 * n), 8 * HISTORY, 8192)) if keep else 8192
+        size = RECORD_BYTES if consumer is None else CONSUMED_BYTES
+        rows = int(np.clip(size // (8 * n), 8 * HISTORY, 8192)) if keep else 8192
         n_events = int(problem.n_events) if problem.events is not None else 0
 
         st = s.RunState(
@@ -345,20 +354,39 @@ class Run:
         m = int(st.count[s.N_RECORDS])
         if m:
             self.records.append((st.rec_t[:m].copy(), st.rec_h[:m].copy(), st.rec_order[:m].copy()))
-            if st.count[s.KEEP_ROWS]:
+            if self.consumer is not None:
+                self._hand_over(m)
+            elif st.count[s.KEEP_ROWS]:
                 self.row_blocks.append(st.rec_y[:m].copy())
             st.count[s.N_RECORDS] = 0
         for e in range(int(st.count[s.N_CROSSINGS])):
             self.hits.append((float(st.hit_t[e]), int(st.hit_which[e]), st.hit_y[e].copy()))
         st.count[s.N_CROSSINGS] = 0
 
+    def _hand_over(self, m: int) -> None:
+        """Give the steps among the first m records to the consumer; keep the last of them for the result."""
+        assert self.consumer is not None
+        st = self.state
+        is_step = st.rec_order[:m] > 0
+        # the start is an output, too
+        is_step[0] |= len(self.records) == 1
+        if not is_step.any():
+            return
+        whole = bool(is_step.all())
+        t, y = (st.rec_t[:m], st.rec_y[:m]) if whole else (st.rec_t[:m][is_step], st.rec_y[:m][is_step])
+        begin = time.perf_counter()
+        self.consumer(t, y, self.epochs[-1][1])
+        self.consumed_time += time.perf_counter() - begin
+        self.row_blocks = [y[-1:].copy()]
+
     def drive(self) -> DAEResult:
         """Run to the end, a failure or an interruption, and return everything computed so far."""
         begin = time.perf_counter()
         with InterruptFlag() as interrupt:
             status, message = self._loop(interrupt)
-        self.wall_time += time.perf_counter() - begin
+        self.wall_time += time.perf_counter() - begin - self.consumed_time
         self._drain()
+        self.consumed_time = 0.0
         return self._result(status, message)
 
     def _loop(self, interrupt: InterruptFlag) -> tuple[Status, str]:
@@ -385,6 +413,9 @@ class Run:
                     f"{Status.TERMINAL_EVENT.sentence} t = {st.real[s.T]:.9g}.{self.start_note}",
                 )
             if code == s.PAUSED:
+                if self.consumer is not None:
+                    # what was stored so far belongs to the old table
+                    self._drain()
                 first = self._accepted_so_far() if self.every_step else int(st.count[s.NEXT_OUTPUT])
                 self.epochs.append((first, st.idata.copy()))
             elif code == s.REPIVOT:
@@ -395,6 +426,9 @@ class Run:
                     return failure
             elif code == s.BUFFER_FULL:
                 self._drain()
+                if self.consumer is not None:
+                    # its buffer is smaller than a chunk of steps
+                    self._report()
             elif code < 0:
                 return self._failure(code)
             if interrupt.raised:
@@ -463,9 +497,12 @@ class Run:
         is_step = order > 0
         stats = self._stats(self.wall_time)
         stats.t_steps, stats.h_steps, stats.orders = t[is_step], h[is_step], order[is_step]
+        consumed = self.consumer is not None
         rows = np.concatenate(self.row_blocks) if self.row_blocks else None
-        sol = DenseOutput(t, rows, order) if rows is not None else None
-        if self.every_step:
+        sol = DenseOutput(t, rows, order) if rows is not None and not consumed else None
+        if consumed and rows is not None:
+            t_out, y_out, yp_out = t[np.append(0, np.flatnonzero(is_step))[-1:]], rows, np.empty((0, problem.n))
+        elif self.every_step:
             t_out = np.concatenate((t[:1], t[is_step]))
             if sol is None or rows is None:
                 raise AssertionError("every step was to be kept")
@@ -494,7 +531,7 @@ class Run:
             y_events=[
                 np.array([hit[2] for hit in self.hits if hit[1] == e]).reshape(-1, problem.n) for e in range(n_events)
             ],
-            epochs=[(first, table.copy()) for first, table in self.epochs],
+            epochs=[(0 if consumed else first, table.copy()) for first, table in self.epochs[-1 if consumed else 0 :]],
             t_last=float(st.real[s.T]),
             checkpoint=self if status in (Status.INTERRUPTED, Status.TOO_MANY_STEPS) else None,
         )

@@ -42,6 +42,7 @@ def solve_wstiff(
     progress: Callable[[float], None] | None = None,
     check_start: bool = True,
     error_probe: Callable[[], BaseException | None] | None = None,
+    consumer: Callable[[np.ndarray, np.ndarray, np.ndarray], None] | None = None,
 ) -> DAEResult:
     """Integrate a DAE G(t, y, y') = 0 with variable-coefficient BDF.
 
@@ -84,6 +85,10 @@ def solve_wstiff(
         Refuse initial values that do not satisfy the equations.
     error_probe : callable, optional
         Returns the exception that a Python callback has stored, or None.
+    consumer : callable, optional
+        Without ``t_eval``: called as ``consumer(t, y, idata)`` with some accepted steps at a time and the integer table
+        valid there, instead of keeping them; the arrays are valid during the call only. The result then holds nothing
+        but the last step.
 
     Returns
     -------
@@ -119,6 +124,7 @@ def solve_wstiff(
         progress=progress,
         check_start=check_start,
         error_probe=error_probe,
+        consumer=consumer,
     ).drive()
 
 

@@ -61,7 +61,9 @@ class Solution:
         self.problem = problem
         self.result = result
         self.t = result.t
-        self._conflict = self._find_conflict()
+        self._shared: tuple[outputs.Evaluator, outputs.Records] | None = None
+        samples = np.linspace(0, self.t.size - 1, min(self.t.size, CONFLICT_SAMPLES))
+        self._conflict = self.find_conflict(np.unique(samples.astype(int)))
 
     @property
     def success(self) -> bool:
@@ -106,9 +108,22 @@ class Solution:
 
     def _evaluate(self) -> outputs.Records:
         """Solve the index-1 system at every output time."""
-        records = self._new_records(self.t.size)
-        self._evaluator().fill(self.t, self.result.y, self.result.epochs, records)
+        if self._shared is not None:
+            evaluator, room = self._shared
+            records = room.first(self.t.size) if self.t.size <= len(room.pose) else self._new_records(self.t.size)
+        else:
+            evaluator, records = self._evaluator(), self._new_records(self.t.size)
+        evaluator.fill(self.t, self.result.y, self.result.epochs, records)
         return records
+
+    def over(self, t: np.ndarray, y: np.ndarray, epochs: list[tuple[int, np.ndarray]]) -> Solution:
+        """Return a solution of the same equations over other times, with unknowns ``y`` and their ``epochs``."""
+        part = copy.copy(self)
+        for name in ("_records", "kinetic_energy"):
+            part.__dict__.pop(name, None)
+        part.t = t
+        part.result = replace(self.result, t=t, y=y, yp=np.empty((0, y.shape[1])), epochs=epochs)
+        return part
 
     def _evaluator(self) -> outputs.Evaluator:
         problem = self.problem
@@ -161,13 +176,11 @@ class Solution:
         evaluator = self._evaluator() if known is None else None
         for k in range(0, rows.size, size):
             wanted = rows[k : k + size]
-            part = copy.copy(self)
-            part.__dict__.pop("kinetic_energy", None)
-            part.t = self.t[wanted]
             places = [int(np.searchsorted(wanted, row)) for row, _ in self.result.epochs]
             epochs = [(place, table) for place, (_, table) in zip(places, self.result.epochs)]
-            yp = self.result.yp[wanted] if len(self.result.yp) else self.result.yp
-            part.result = replace(self.result, t=part.t, y=self.result.y[wanted], yp=yp, epochs=epochs)
+            part = self.over(self.t[wanted], self.result.y[wanted], epochs)
+            if len(self.result.yp):
+                part.result.yp = self.result.yp[wanted]
             if evaluator is not None and room is not None:
                 part._records = room.first(wanted.size)
                 evaluator.fill(part.t, part.result.y, epochs, part._records)
@@ -175,15 +188,26 @@ class Solution:
                 part._records = outputs.Records(*(column[wanted] for column in known))
             yield part
 
-    def _find_conflict(self) -> str | None:
-        """Return what is wrong if a row set aside as redundant is violated by the motion, tried at some outputs."""
-        if not self.system.has_dropped_rows or self.t.size == 0:
+    def find_conflict(self, rows: np.ndarray) -> str | None:
+        """Return what is wrong if a row set aside as redundant is violated at one of the output times ``rows``."""
+        if not self.system.has_dropped_rows or rows.size == 0:
             return None
-        for k in np.unique(np.linspace(0, self.t.size - 1, min(self.t.size, CONFLICT_SAMPLES)).astype(int)):
-            found = self.system.conflict(self._pose[k], float(self.t[k]))
+        for part in self.parts(rows, size=1):
+            found = self.system.conflict(part._pose[0], float(part.t[0]))
             if found is not None:
-                return f"at t = {self.t[k]:.6g} s: {found}"
+                return f"at t = {part.t[0]:.6g} s: {found}"
         return None
+
+    def note_conflict(self, found: str | None) -> None:
+        """Let the run count as failed for a conflict found elsewhere than at its own output times."""
+        self._conflict = self._conflict or found
+
+    def share(self, size: int) -> None:
+        """Let solutions made by `over` use one evaluator and, up to ``size`` output times, the memory of each other.
+
+        They are to be asked in the order of time then.
+        """
+        self._shared = (self._evaluator(), self._new_records(size))
 
     # --- access by name -----------------------------------------------------------------------------
 

@@ -1,0 +1,55 @@
+"""A solution handed on piece by piece while the integration goes, so that a long run needs no memory for its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gearmbs.dae.model.system import System
+from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.result import DAEResult, Status
+from gearmbs.dae.results.solution import CONFLICT_SAMPLES, PART_SIZE, Solution
+
+
+class Stream:
+    """Consumer of an integrator's steps that hands them on as solutions.
+
+    Parameters
+    ----------
+    system : System
+    problem : DAEProblem
+    t_end : float
+        End of the run, s.
+    consumer : callable
+        Called as ``consumer(part)`` with a `Solution` of some accepted steps, in the order of time. It is valid until
+        the next call: parts share their memory. Forces and accelerations are evaluated when first asked for.
+
+    Attributes
+    ----------
+    conflict : str or None
+        The first violation found of a constraint row set aside as redundant.
+    """
+
+    def __init__(self, system: System, problem: DAEProblem, t_end: float, consumer: Callable[[Solution], None]) -> None:
+        nothing = np.empty((0, problem.n))
+        self.whole = Solution(system, problem, DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, ""))
+        self.whole.share(PART_SIZE)
+        self.consumer = consumer
+        self.conflict: str | None = None
+        self.interval = (t_end - problem.t0) / CONFLICT_SAMPLES
+        self.next_look = problem.t0
+
+    def __call__(self, t: np.ndarray, y: np.ndarray, idata: np.ndarray) -> None:
+        """Hand on accepted steps and the integer table that is valid for them."""
+        for k in range(0, t.size, PART_SIZE):
+            part = self.whole.over(t[k : k + PART_SIZE], y[k : k + PART_SIZE], [(0, idata)])
+            if self.conflict is None and part.t[-1] >= self.next_look:
+                self.next_look = float(part.t[-1]) + self.interval
+                self.conflict = part.find_conflict(np.array([part.t.size - 1]))
+            self.consumer(part)
+
+    def close(self, solution: Solution) -> Solution:
+        """Give what was found on the way to the solution that the run ended with, and return it."""
+        solution.note_conflict(self.conflict)
+        return solution
