@@ -35,7 +35,7 @@ def test_parts_are_the_whole(integrator):
     assert last.success
     assert last.t[-1] == whole.t[-1]
     assert last.stats.steps == whole.stats.steps
-    np.testing.assert_allclose(last.position("rotor")[-1], whole.position("rotor")[-1], atol=1e-12)
+    np.testing.assert_allclose(last.com_position("rotor")[-1], whole.com_position("rotor")[-1], atol=1e-12)
 
 
 def test_a_conflict_on_the_way_is_found():
