@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 Wheel = Literal["driver", "driven"]
 Flank = Literal["drive", "coast", "both"]
 
+POINTS_A_WAVE = 10
+"""Points of the profile that a wave along the flank must be resolved by."""
+
 CHOICES: dict[str, tuple[Any, ...]] = {
     "wheel": ("driver", "driven"),
     "flank": ("drive", "coast", "both"),
@@ -375,6 +378,47 @@ class CumulativePitchError(Fault):
         index = self.amount / np.ptp(wave) * wave
         deviations.offset[deviations.drive] -= index
         deviations.offset[1 - deviations.drive] += index
+
+
+@dataclass(frozen=True, kw_only=True)
+class Waviness(Fault):
+    """Undulated flanks, as a machine tool leaves them: a line at an order that no number of teeth explains.
+
+    The wave is a function of the direction of the flank's normal, hence of the wheel's rotation where it touches. All
+    pairs in contact are then displaced alike, and the transmission error has the wave's own amplitude.
+
+    Parameters
+    ----------
+    amount : float or str
+        Amplitude of the wave.
+    waves : int
+        Waves per revolution of the wheel.
+    phase : float or str
+        Of the wave in the wheel's frame.
+    flank : {"drive", "coast", "both"}
+    """
+
+    label: ClassVar[str] = "waviness"
+    units: ClassVar[dict[str, str]] = {"amount": "length", "phase": "angle"}
+    least: ClassVar[dict[str, int]] = {"waves": 1}
+
+    amount: Quantity = 1e-6
+    waves: int = 71
+    phase: Quantity = 0.0
+    flank: Flank = "both"
+
+    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+        gear = deviations.gear
+        step = (deviations.roll_length[1] - deviations.roll_length[0]) / gear.base_radius
+        most = int(2 * math.pi / (POINTS_A_WAVE * step))
+        require(self.amount >= 0, f"Waviness.amount is {self.amount} m; it must not be negative")
+        require(
+            self.waves <= most,
+            f"Waviness.waves is {self.waves}; the profile's points resolve up to {most} waves per revolution",
+        )
+        for flank in deviations.flanks(self.flank):
+            wave = np.sin(self.waves * deviations.normal_angle(flank) + self.phase)
+            deviations.shape[flank] += self.amount * wave[:, None, :]
 
 
 @dataclass(frozen=True, kw_only=True)

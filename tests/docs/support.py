@@ -60,7 +60,7 @@ def run_cell(code: str, name: str, namespace: dict[str, object]) -> object:
     """Execute one cell and return the value of its last expression."""
     tree = ast.parse(code, name)
     last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
-    exec(compile(tree, name, "exec"), namespace)
+    exec(compile(tree, name, "exec", dont_inherit=True), namespace)
     if last is None:
         return None
     value = eval(compile(ast.Expression(last.value), name, "eval"), namespace)

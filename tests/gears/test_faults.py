@@ -20,12 +20,13 @@ from gearmbs.gears.faults import (
     RootCrack,
     RootRelief,
     TipRelief,
+    Waviness,
     Wear,
     Wobble,
 )
 from gearmbs.gears.iso1328 import tolerances
 from gearmbs.gears.tables import tooth_deviations
-from gearmbs.gears.transmission import StaticMesh
+from gearmbs.gears.transmission import StaticMesh, kinematic_transmission_error
 
 ALL = [
     BrokenTooth,
@@ -40,6 +41,7 @@ ALL = [
     RootCrack,
     RootRelief,
     TipRelief,
+    Waviness,
     Wear,
     Wobble,
 ]
@@ -215,6 +217,26 @@ def test_cumulative_pitch_error_is_a_wave_of_displaced_teeth(rotation):
         assert moved[:, 4] - plain[:, 4] == pytest.approx(-side * index[plain[:, 1].astype(int)], abs=1e-15)
     with pytest.raises(ValueError, match="order"):
         pair.with_faults(CumulativePitchError(order=20)).contact_tables()
+
+
+@pytest.mark.parametrize("wheel", ["driver", "driven"])
+def test_waviness_is_a_line_of_its_own_order(wheel):
+    """All pairs that touch are displaced by the same wave, so that the transmission error is that wave.
+
+    Steeper waves also let tip corners touch before the line of action.
+    """
+    waves, amount = 47, 2e-7
+    pair = GearPair.paper(backlash="0.2 mm").with_faults(Waviness(wheel=wheel, amount=amount, waves=waves))
+    teeth = 29 if wheel == "driver" else pair.driven.teeth
+    cycles = teeth
+    error = kinematic_transmission_error(pair, 24, cycles=cycles)
+    turn = 2 * np.pi * error.phase / teeth
+    wave = np.stack([np.cos(waves * turn), np.sin(waves * turn)], axis=1)
+    size = np.linalg.lstsq(wave, error.error, rcond=None)[0]
+    assert np.hypot(*size) == pytest.approx(amount, rel=0.01)
+    assert np.abs(error.error - wave @ size).max() < 0.03 * amount
+    with pytest.raises(ValueError, match=r"Waviness\.waves is 900; the profile's points resolve up to \d+ waves"):
+        pair.with_faults(Waviness(waves=900)).contact_tables()
 
 
 def removed(fault, places, stations):
