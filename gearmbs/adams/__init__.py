@@ -1,11 +1,12 @@
 """ADAMS decks in and out: .adm and .acf read and run, .res, .req and .msg written, mechanisms written as .adm."""
 
-from gearmbs.adams.commands import Script, parse_script, read_script
-from gearmbs.adams.deck import Deck, parse_deck, read_deck
 from gearmbs.adams.errors import DeckError, Diagnostic
-from gearmbs.adams.result import AdamsResult
-from gearmbs.adams.run import run_deck
-from gearmbs.adams.write import write_deck
+from gearmbs.adams.parse.commands import Script, parse_script, read_script
+from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.reader import parse_deck, read_deck
+from gearmbs.adams.results.result import AdamsResult
+from gearmbs.adams.run.runner import run_deck
+from gearmbs.adams.write.deck_writer import write_deck
 
 __all__ = [
     "AdamsResult",

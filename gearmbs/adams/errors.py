@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from gearmbs.adams.result import AdamsResult
+from typing import Any
 
 ERROR = "error"
 UNSUPPORTED = "unsupported"
@@ -55,7 +52,7 @@ class DeckError(ValueError):
         The analyses of a script that were carried out before, when it was being run.
     """
 
-    result: AdamsResult | None = None
+    result: Any = None
 
     def __init__(self, diagnostics: Sequence[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)

@@ -16,7 +16,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gearmbs.adams import parse_deck
-from gearmbs.adams.run import run_deck
+from gearmbs.adams.run.runner import run_deck
 
 FOLDER = os.environ.get("GEARMBS_ADAMS_CASES")
 pytestmark = pytest.mark.skipif(not FOLDER, reason="set GEARMBS_ADAMS_CASES to the folder of the ADAMS cases")

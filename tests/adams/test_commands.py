@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_script
-from gearmbs.adams import statements as st
-from gearmbs.adams.commands import Change, Simulate, Stop, Switch, apply_change
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.commands import Change, Simulate, Stop, Switch, apply_change
 
 from .decks import PENDULUM, SCRIPT
 

@@ -8,10 +8,10 @@ import re
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck
-from gearmbs.adams import statements as st
-from gearmbs.adams.grammar import joined_expression
-from gearmbs.adams.source import CONTINUED
-from gearmbs.adams.units import FORCE, LENGTH, MASS, deck_units
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.grammar import joined_expression
+from gearmbs.adams.parse.source import CONTINUED
+from gearmbs.adams.parse.units import FORCE, LENGTH, MASS, deck_units
 
 from .decks import EVERYTHING, PENDULUM
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from gearmbs.adams import commands
-from gearmbs.adams import statements as st
+from gearmbs.adams.parse import commands
+from gearmbs.adams.parse import statements as st
 from gearmbs.mechanism.expression_functions import BINARY, ELEMENT_FORCES, UNARY, UNSUPPORTED
 from gearmbs.mechanism.expression_library import FUNCTIONS
 

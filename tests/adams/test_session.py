@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_script
-from gearmbs.adams.msg import message_text
-from gearmbs.adams.run import run_deck
+from gearmbs.adams.results.msg import message_text
+from gearmbs.adams.run.runner import run_deck
 
 from .decks import PENDULUM
 from .test_run import model

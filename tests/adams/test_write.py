@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import parse_deck
-from gearmbs.adams.req import read_requests
-from gearmbs.adams.res import NAMESPACE
-from gearmbs.adams.run import run_deck
-from gearmbs.adams.write import write_deck
-from gearmbs.adams.write_text import wrapped
+from gearmbs.adams.results.req import read_requests
+from gearmbs.adams.results.res import NAMESPACE
+from gearmbs.adams.run.runner import run_deck
+from gearmbs.adams.write.deck_writer import write_deck
+from gearmbs.adams.write.text import wrapped
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism, harmonic, polynomial, ramp, step
 from gearmbs.mechanism.expression import Units

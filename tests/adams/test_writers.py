@@ -9,9 +9,9 @@ import pytest
 import xarray as xr
 
 from gearmbs.adams import parse_deck, run_deck
-from gearmbs.adams.build import KINDS
-from gearmbs.adams.req import read_requests
-from gearmbs.adams.res import ENTITY_TYPES, NAMESPACE
+from gearmbs.adams.builders.model import KINDS
+from gearmbs.adams.results.req import read_requests
+from gearmbs.adams.results.res import ENTITY_TYPES, NAMESPACE
 
 from .test_run import model
 

@@ -1,0 +1,1 @@
+"""Statements of a deck to a mechanism."""

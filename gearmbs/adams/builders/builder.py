@@ -1,0 +1,243 @@
+"""Parts, markers, names and data of a deck into a mechanism; what constraints and forces are added with.
+
+The mechanism keeps the deck's units in its expressions (``Mechanism.units``); its numbers are SI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace as replaced
+from typing import Any
+
+import numpy as np
+
+from gearmbs.adams.builders.frames import inertia_about_cm, marker_orientation, part_orientation
+from gearmbs.adams.builders.model import KINDS, AdamsModel, BodyState
+from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.check import measured_markers
+from gearmbs.adams.parse.data import spline_data
+from gearmbs.adams.parse.deck import Deck
+from gearmbs.dae.errors import ModelError
+from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.elements import State
+from gearmbs.mechanism.expression import Call, Name, Node, Number, parse, unparse
+from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
+from gearmbs.mechanism.joints import Joint
+from gearmbs.mechanism.parts import Marker
+
+
+class Builder:
+    """Adds a deck's statements to a mechanism one by one; use :func:`build_model`."""
+
+    def __init__(
+        self,
+        deck: Deck,
+        inactive: frozenset[tuple[str, int]],
+        state: Mapping[int, BodyState],
+        span: tuple[float, float],
+    ) -> None:
+        self.deck = deck
+        self.span = span
+        self.state = state
+        self.units = deck.units
+        self.inactive = inactive
+        self.mechanism = Mechanism(deck.title or "adams")
+        self.mechanism.units = deck.units
+        # in decks a text is an expression in the deck's units, and checked with its line
+        self.mechanism.reads_units = False
+        self.model = AdamsModel(self.mechanism, deck)
+        self.markers: dict[int, Marker] = {}
+        self.joints: dict[int, Joint] = {}
+        self.problems: list[Diagnostic] = []
+        self._taken: set[str] = {"ground"}
+
+    def add_bodies(self) -> bool:
+        """Add gravity, parts and markers; return whether elements may follow."""
+        gravity = self.deck.only(st.Accgrav)
+        if gravity is not None and ("ACCGRAV", 0) not in self.inactive:
+            scale = self.units.factor("acceleration")
+            self.mechanism.gravity = scale * np.array([gravity.igrav, gravity.jgrav, gravity.kgrav])
+        for part in self.deck.of(st.Part).values():
+            self.attempt(part, self.add_part)
+        for marker in self.deck.of(st.Marker).values():
+            self.attempt(marker, self.add_marker)
+        return not any(d.severity == ERROR for d in self.problems)
+
+    # --- helpers ------------------------------------------------------------------------------------
+
+    def active(self, kind: type[Any]) -> list[Any]:
+        keyword = st.KEYWORD_OF[kind]
+        group = self.deck.of(kind).values()
+        return [s for s in group if (keyword, s.id) not in self.inactive and self.resting_joint(s) is None]
+
+    def resting_joint(self, s: st.Statement) -> int | None:
+        """Return an inactive joint without which an element cannot act, None when there is none."""
+        refs: tuple[int, ...] = ()
+        if isinstance(s, (st.Motion, st.Friction)) and s.joint is not None:
+            refs = (s.joint,)
+        elif isinstance(s, (st.Coupler, st.Gear)):
+            refs = s.joints
+        return next((ref for ref in refs if ("JOINT", ref) in self.inactive), None)
+
+    def attempt(self, statement: st.Statement, add: Callable[[Any], None]) -> None:
+        """Add one statement; what is wrong with it gets its line."""
+        try:
+            add(statement)
+        except (ModelError, ValueError) as error:
+            message = f"{statement.label()}: {error}"
+            self.problems.append(Diagnostic(ERROR, message, self.deck.file, statement.line))
+
+    def unsupported(self, statement: st.Statement, what: str) -> None:
+        message = f"{statement.label()}: {what} is not supported"
+        self.problems.append(Diagnostic(UNSUPPORTED, message, self.deck.file, statement.line))
+
+    def claim(self, statement: st.Statement, kind: str) -> str:
+        """Return a unique name for a statement and remember it."""
+        keyword = st.KEYWORD_OF[type(statement)]
+        name = (statement.name or f"{keyword}_{statement.id}").replace('"', "'")
+        while name in self._taken:
+            name = f"{name}_{keyword}_{statement.id}"
+        self._taken.add(name)
+        self.model.names[kind, statement.id] = name
+        self.model.sources[name] = statement
+        return name
+
+    def name_elements(self) -> None:
+        """Name everything that transmits a force before any expression refers to it."""
+        for cls, kind in KINDS.items():
+            for statement in self.active(cls):
+                self.claim(statement, kind)
+            for statement in self.deck.of(cls).values():
+                self.model.pairs[kind, statement.id] = self.marker_pair(statement)
+                joint = self.resting_joint(statement)
+                if joint is not None and (st.KEYWORD_OF[cls], statement.id) not in self.inactive:
+                    message = f"{statement.label()} rests while JOINT/{joint} is inactive"
+                    self.problems.append(Diagnostic(WARNING, message, self.deck.file, statement.line))
+
+    def marker_pair(self, s: Any) -> tuple[int, int | None]:
+        if isinstance(s, st.Motion) and s.joint is not None:
+            joint = self.deck.of(st.Joint)[s.joint]
+            return joint.i or 0, joint.j
+        if isinstance(s, st.Friction):
+            joint = self.deck.of(st.Joint)[s.joint or 0]
+            return joint.i or 0, joint.j
+        if isinstance(s, (st.Coupler, st.Gear)):
+            joint = self.deck.of(st.Joint)[s.joints[0]]
+            return joint.i or 0, joint.j
+        if isinstance(s, st.Gcon):
+            return self.gcon_pair(s)
+        if isinstance(s, (st.Vforce, st.Vtorque, st.Gforce)):
+            return s.i or 0, s.jfloat
+        if isinstance(s, st.Sforce) and s.action_only:
+            return s.i or 0, None
+        return s.i or 0, s.j
+
+    def gcon_pair(self, s: st.Gcon) -> tuple[int, int | None]:
+        """Return a general constraint's I marker and, when its expression names just one other, that one."""
+        used = measured_markers(s.function or "")
+        first = s.i if s.i is not None else (used[0] if used else 0)
+        others = [m for m in used if m != first]
+        return first, others[0] if len(others) == 1 else None
+
+    def text(self, source: str) -> str:
+        """Return an expression with element ids replaced by the mechanism's names."""
+
+        def rename(call: Call) -> Node:
+            kind = ELEMENT_FORCES.get(call.name)
+            first = call.args[0] if call.args else None
+            if kind is None or not isinstance(first, Number) or first.integer is None:
+                return call
+            name = self.model.names.get((kind, first.integer))
+            if name is None:
+                # an inactive element exerts nothing
+                return Number(0.0, call.at) if (kind, first.integer) in self.model.pairs else call
+            return replaced(call, args=(Name(name, first.at), *call.args[1:]))
+
+        return unparse(parse(source), rename)
+
+    # --- parts and markers --------------------------------------------------------------------------
+
+    def add_part(self, part: st.Part) -> None:
+        if part.ground:
+            self.model.names["part", part.id] = "ground"
+            return
+        name = self.claim(part, "part")
+        units = self.units
+        markers = self.deck.of(st.Marker)
+        axes = part_orientation(part)
+        com, inertia = np.zeros(3), np.zeros((3, 3))
+        cm = markers[part.cm] if part.cm is not None else None
+        if cm is not None:
+            com = units.length * np.array(cm.qp)
+            im = markers[part.im] if part.im is not None else cm
+            inertia = units.factor("inertia") * inertia_about_cm(part, cm, im)
+        spin = self.direction(part.wm, part, axes, cm) @ np.array([part.wx, part.wy, part.wz])
+        spin = units.factor("angular_velocity") * spin
+        velocity = np.array([part.vx, part.vy, part.vz])
+        if part.vm is not None:
+            velocity = self.direction(part.vm, part, axes, cm) @ velocity
+        velocity = units.factor("velocity") * velocity
+        start = self.state.get(part.id)
+        if start is None:
+            position = units.length * np.array(part.qg)
+            start = BodyState(position, axes, velocity - np.cross(spin, axes @ com), spin)
+        body = self.mechanism.body(
+            name,
+            units.mass * part.mass,
+            inertia,
+            com=com,
+            position=start.position,
+            orientation=start.orientation,
+            velocity=start.velocity,
+            angular_velocity=start.angular_velocity,
+        )
+        self.model.sources[body.name] = part
+
+    def direction(self, ref: int | None, part: st.Part, axes: np.ndarray, cm: st.Marker | None) -> np.ndarray:
+        """Return the axes along which an initial velocity is given: a marker's, by default the CM marker's."""
+        marker = self.deck.of(st.Marker)[ref] if ref is not None else cm
+        if marker is None:
+            return np.eye(3)
+        owner = self.deck.of(st.Part)[marker.part or 0]
+        own = np.eye(3) if owner.ground else (axes if owner.id == part.id else part_orientation(owner))
+        return own @ marker_orientation(marker)
+
+    def add_marker(self, statement: st.Marker) -> None:
+        if statement.part is None:
+            return
+        owner = self.model.names["part", statement.part]
+        body = self.mechanism.ground if owner == "ground" else self.mechanism.bodies.get(owner)
+        if body is None:
+            # its part could not be built, which is reported
+            return
+        position = self.units.length * np.array(statement.qp)
+        name = self.claim(statement, "marker")
+        marker = body.marker(position, marker_orientation(statement), name=name)
+        marker.number = statement.id
+        self.markers[statement.id] = marker
+
+    def ground_marker(self, name: str) -> Marker:
+        """Return a marker on the ground that takes the reaction of an action-only force."""
+        return self.mechanism.ground.marker(name=name)
+
+    # --- data ---------------------------------------------------------------------------------------
+
+    def add_data(self) -> None:
+        m = self.mechanism
+        for variable in self.deck.of(st.Variable).values():
+            m.variables[variable.id] = self.text(variable.function or "0")
+        for array in self.deck.of(st.Array).values():
+            m.arrays[array.id] = array.numbers
+        for kind, group in (("pinput", st.PlantInput), ("poutput", st.PlantOutput)):
+            for plant in self.deck.of(group).values():
+                m.plants[kind, plant.id] = plant.variables
+        for spline in self.deck.of(st.Spline).values():
+            if spline.data_file is None:
+                m.splines[spline.id] = spline_data(spline)
+        for diff in self.active(st.Diff):
+            if diff.implicit:
+                self.unsupported(diff, "IMPLICIT")
+                continue
+            text = f"({self.text(diff.function)})/{self.units.time!r}"
+            m.states[diff.id] = State(f"DIFF_{diff.id}", text, diff.ic[0])

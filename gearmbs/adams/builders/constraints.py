@@ -1,0 +1,236 @@
+"""Joints, primitives, couplers, gears, general constraints and motions of a deck."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gearmbs.adams.builders.builder import Builder
+from gearmbs.adams.parse import statements as st
+from gearmbs.mechanism.functions import expression
+from gearmbs.mechanism.joints import JOINTS, Joint, Prescribed
+from gearmbs.mechanism.parts import Marker
+
+JOINT_KINDS = {k.adams[1]: kind for kind, k in JOINTS.items() if k.adams and k.adams[0] == "JOINT"}
+JPRIM_KINDS = {k.adams[1]: kind for kind, k in JOINTS.items() if k.adams and k.adams[0] == "JPRIM"}
+X_TO_Z = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]).T
+"""Columns y, z, x: the old x axis becomes the new z axis."""
+Y_TO_Z = X_TO_Z.T
+SHORTEST = 1e-3
+"""Span over which motions by velocity or acceleration are integrated at least, in units of time."""
+
+
+def add_joint(b: Builder, s: st.Joint) -> None:
+    """JOINT of any type."""
+    name = b.model.names["joint", s.id]
+    i, j = b.markers[s.i or 0], b.markers[s.j or 0]
+    if s.type in JOINT_KINDS:
+        b.joints[s.id] = b.mechanism.joint(JOINT_KINDS[s.type], name, i, j)
+    elif s.type == "SCREW":
+        b.joints[s.id] = b.mechanism.screw(name, i, j, pitch=b.units.length * (s.pitch or 0.0))
+    elif s.type == "HOOKE":
+        b.joints[s.id] = _hooke(b, name, i, j)
+    else:
+        _rack_and_pinion(b, s, name, i, j)
+    _initial_conditions(b, s)
+
+
+def _initial_conditions(b: Builder, s: st.Joint) -> None:
+    """Remember displacements and velocities a joint starts with."""
+    joint = b.joints.get(s.id)
+    for keyword, value in (("IC", s.ic), ("ICTRAN", s.ictran), ("ICROT", s.icrot)):
+        if value is None:
+            continue
+        rotational = s.type == "REVOLUTE" or (s.type == "CYLINDRICAL" and keyword == "ICROT")
+        if joint is None or s.type not in ("REVOLUTE", "TRANSLATIONAL", "CYLINDRICAL"):
+            b.unsupported(s, f"{keyword} of a {s.type} joint")
+            continue
+        b.model.initial_motions.append((joint, "rotation" if rotational else "translation", value))
+
+
+def _hooke(b: Builder, name: str, i: Marker, j: Marker) -> Joint:
+    """HOOKE: the arms of the cross lie along x of I and y of J; markers turned so that they are z axes."""
+    arm_i = i.body.marker(i.position, i.orientation @ X_TO_Z, name=f"{name}.arm I")
+    arm_j = j.body.marker(j.position, j.orientation @ Y_TO_Z, name=f"{name}.arm J")
+    return b.mechanism.joint("universal", name, arm_i, arm_j)
+
+
+def _rack_and_pinion(b: Builder, s: st.Joint, name: str, i: Marker, j: Marker) -> None:
+    """RACKPIN: the pinion (I, about z_I) rolls on the rack's line (J, along z_J).
+
+    The side on which the rack passes the pinion's axis tells the direction; the travel is PD/2 times the angle
+    counted from the start. A line through the axis itself moves along z_J for a positive turn: ADAMS asks for x_I along
+    z_J, and the pitch point then lies towards -y_I.
+    """
+    zi, zj = i.global_orientation()[:, 2], j.global_orientation()[:, 2]
+    apart = j.global_position() - i.global_position()
+    foot = apart - zj * (zj @ apart)
+    lever = np.cross(zi, foot) @ zj
+    if abs(zi @ zj) > 1e-6:
+        raise ValueError("z_J must be at a right angle to the pinion's axis z_I")
+    side = 1.0 if abs(lever) < 1e-9 * max(float(np.linalg.norm(apart)), b.units.length) else float(np.sign(lever))
+    axes = np.column_stack([zj, np.cross(zi, zj), zi])
+    fixed = j.body.marker_at(j.global_position(), axes, name=f"{name}.angle J")
+    turned = i.body.marker_at(i.global_position(), axes, name=f"{name}.angle I")
+    travel = float(zj @ apart) / b.units.length
+    rate = side * 0.5 * (s.pd or 0.0)
+    text = f'-DZ({s.i},{s.j},{s.j}) - ({travel!r}) - ({rate!r})*AZ("{turned.name}","{fixed.name}")'
+    b.mechanism.general_constraint(name, text)
+
+
+def add_jprim(b: Builder, s: st.Jprim) -> None:
+    """JPRIM."""
+    name = b.model.names["jprim", s.id]
+    b.mechanism.joint(JPRIM_KINDS[s.type or ""], name, b.markers[s.i or 0], b.markers[s.j or 0])
+
+
+def _coupled(b: Builder, s: st.Statement, refs: tuple[int, ...]) -> list[Joint]:
+    joints = []
+    for ref in refs:
+        joint = b.joints.get(ref)
+        if joint is None or joint.kind not in ("revolute", "translational", "cylindrical"):
+            raise ValueError(f"JOINT/{ref} must be an active revolute, translational or cylindrical joint")
+        joints.append(joint)
+    return joints
+
+
+def add_coupler(b: Builder, s: st.Coupler) -> None:
+    """COUPLER: the weighted sum of the joints' displacements keeps its initial value."""
+    if s.function is not None:
+        return
+    joints = _coupled(b, s, s.joints)
+    scales = s.scales if len(s.scales) == len(joints) else (1.0, *s.scales)
+    types = s.type or tuple("TRANSLATIONAL" if j.kind == "translational" else "ROTATIONAL" for j in joints)
+    terms = []
+    for joint, scale, kind in zip(joints, scales, types):
+        if (kind == "TRANSLATIONAL") != (joint.kind == "translational"):
+            if joint.kind == "cylindrical":
+                b.unsupported(s, f"the translation of the cylindrical joint {joint.name}")
+                return
+            raise ValueError(f"TYPE is {kind}, but {joint.name} is {joint.kind}")
+        terms.append((joint, scale / b.units.length if kind == "TRANSLATIONAL" else scale))
+    b.mechanism.coupler(b.model.names["coupler", s.id], terms)
+
+
+def add_gear(b: Builder, s: st.Gear) -> None:
+    """GEAR: both parts have the same velocity along z of the CV marker, seen from the carrier."""
+    cv = b.markers[s.cv or 0]
+    joints = _coupled(b, s, s.joints)
+    for joint in joints:
+        if joint.j.body is not cv.body:
+            raise ValueError(f"J of {joint.name} and the CV marker must be on one part, the carrier")
+    along = cv.global_orientation()[:, 2]
+    levers = []
+    for joint in joints:
+        z = joint.j.global_orientation()[:, 2]
+        arm = cv.global_position() - joint.j.global_position()
+        levers.append(float(z @ along if joint.kind == "translational" else np.cross(z, arm) @ along))
+    if min(abs(v) for v in levers) < 1e-12:
+        raise ValueError("the CV marker's z axis must point along the common velocity, off both joints' axes")
+    b.mechanism.coupler(b.model.names["gear", s.id], [(joints[0], levers[0]), (joints[1], -levers[1])])
+
+
+def add_gcon(b: Builder, s: st.Gcon) -> None:
+    """GCON."""
+    b.mechanism.general_constraint(b.model.names["gcon", s.id], b.text(s.function or ""))
+
+
+def add_motion(b: Builder, s: st.Motion) -> None:
+    """MOTION of a joint or between two markers, at displacement level."""
+    name = b.model.names["motion", s.id]
+    text = b.text(s.function or "")
+    if s.joint is None:
+        measures = {"X": "DX", "Y": "DY", "Z": "DZ"}
+        if s.direction in measures:
+            shown = f"{measures[s.direction]}({s.i},{s.j},{s.j})"
+            start = _start(b, b.markers[s.i or 0], b.markers[s.j or 0], "XYZ".index(s.direction), False)
+        elif s.level in ("VELOCITY", "ACCELERATION"):
+            b.unsupported(s, f"{s.direction} of a motion given by its {s.level}")
+            return
+        else:
+            shown = f"ORIENT(1,{(s.direction or 'B1')[1]},{s.i},{s.j})"
+            start = (0.0, 0.0)
+        b.mechanism.general_constraint(name, f"{shown} - ({_displacement(b, s, text, start)})")
+        return
+    joint = b.joints.get(s.joint)
+    if joint is None:
+        raise ValueError(f"JOINT/{s.joint} is not active")
+    if joint.kind not in ("revolute", "translational", "cylindrical"):
+        raise ValueError(f"JOINT/{s.joint} is {joint.kind}; it must be revolute, translational or cylindrical")
+    rotational = joint.kind == "revolute" or (joint.kind == "cylindrical" and s.direction == "ROTATIONAL")
+    if joint.kind == "cylindrical" and s.direction is None:
+        raise ValueError("give ROTATION or TRANSLATION for a motion of a cylindrical joint")
+    start = _start(b, joint.i, joint.j, 2, rotational)
+    moved = _displacement(b, s, text, start)
+    if rotational:
+        motion = b.mechanism.rotation(name, joint, expression(moved))
+    else:
+        motion = b.mechanism.translation(name, joint, expression(_scaled(moved, b.units.length)))
+    if s.level in ("VELOCITY", "ACCELERATION"):
+        motion.prescribed = _given(b, s, text, start, rotational)
+
+
+def _start(b: Builder, i: Marker, j: Marker, axis: int, rotational: bool) -> tuple[float, float]:
+    """Return the angle about z of J, or the displacement along an axis of J, and its rate, in the deck's units."""
+    ai, aj = i.global_orientation(), j.global_orientation()
+    e = aj[:, axis]
+    if rotational:
+        angle = float(np.arctan2(ai[:, 0] @ aj[:, 1], ai[:, 0] @ aj[:, 0]))
+        rate = float(e @ (i.body.angular_velocity - j.body.angular_velocity))
+        return angle, rate / b.units.factor("angular_velocity")
+    apart = i.global_position() - j.global_position()
+    rate = float(e @ (_velocity(i) - _velocity(j)) + apart @ np.cross(j.body.angular_velocity, e))
+    return float(e @ apart) / b.units.length, rate / b.units.factor("velocity")
+
+
+def _velocity(marker: Marker) -> np.ndarray:
+    body = marker.body
+    return body.velocity + np.cross(body.angular_velocity, marker.global_position() - body.position)
+
+
+def _displacement(b: Builder, s: st.Motion, text: str, start: tuple[float, float]) -> str:
+    """Return a motion's displacement; a velocity or acceleration is integrated from the present time."""
+    if s.level not in ("VELOCITY", "ACCELERATION"):
+        return text
+    first, last = b.span
+    # an analysis at one time needs no more of the integral than its rate there
+    last = max(last, first + SHORTEST * max(1.0, abs(first)))
+    where, speed = _at_start(b, s, start)
+    once = f"INTEGRAL({text}, {first!r}, {last!r})"
+    if s.level == "VELOCITY":
+        return f"({where!r}) + {once}"
+    # the second integral of f is (t - t0) int f - int (t - t0) f
+    since = f"(TIME - ({first!r}))"
+    return f"({where!r}) + ({speed!r})*{since} + {since}*{once} - INTEGRAL({since}*({text}), {first!r}, {last!r})"
+
+
+def _at_start(b: Builder, s: st.Motion, start: tuple[float, float]) -> tuple[float, float]:
+    """Return displacement and rate a motion by velocity or acceleration starts with, in the deck's units."""
+    where = s.icdisp if s.icdisp is not None and not b.state else start[0]
+    speed = s.icvel if s.icvel is not None and not b.state else start[1]
+    return where, speed
+
+
+def _given(b: Builder, s: st.Motion, text: str, start: tuple[float, float], rotational: bool) -> Prescribed:
+    """Return what a motion is given by, in SI."""
+    level = (s.level or "").lower()
+    dimensions = ("angle", "angular_velocity", f"angular_{level}") if rotational else ("length", "velocity", level)
+    size, rate, change = (b.units.factor(d) for d in dimensions)
+    where, speed = _at_start(b, s, start)
+    return Prescribed(level, expression(_scaled(text, change)), where * size, speed * rate)
+
+
+def _scaled(text: str, factor: float) -> str:
+    return text if factor == 1.0 else f"{factor!r}*({text})"
+
+
+CONSTRAINTS: dict[type, Callable[[Builder, Any], None]] = {
+    st.Joint: add_joint,
+    st.Jprim: add_jprim,
+    st.Coupler: add_coupler,
+    st.Gear: add_gear,
+    st.Gcon: add_gcon,
+    st.Motion: add_motion,
+}

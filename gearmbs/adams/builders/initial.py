@@ -1,0 +1,37 @@
+"""Where the parts of a deck are and how they move when an analysis starts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearmbs.adams.builders.model import AdamsModel, BodyState
+from gearmbs.mechanism.functions import polynomial
+
+
+def with_initial_motions(model: AdamsModel) -> dict[int, BodyState]:
+    """Return the state in which every joint with initial conditions has them."""
+    units = model.deck.units
+    mechanism = model.mechanism
+    for k, (joint, kind, value) in enumerate(model.initial_motions):
+        rate = value[1] if len(value) > 1 else 0.0
+        name = f"initial condition {k + 1} of {joint.name}"
+        if kind == "rotation":
+            mechanism.rotation(name, joint, polynomial([value[0], rate / units.time]))
+        else:
+            start, speed = value[0] * units.length, rate * units.factor("velocity")
+            mechanism.translation(name, joint, polynomial([start, speed]))
+    system = mechanism.compile(0.0)
+    system.initialise()
+    return part_states(model, system.pose)
+
+
+def part_states(model: AdamsModel, pose: np.ndarray) -> dict[int, BodyState]:
+    """Return the parts' states from R, A, v, omega of their centres of mass."""
+    found = {}
+    for row, (name, body) in zip(pose, model.mechanism.bodies.items()):
+        axes = row[3:12].reshape(3, 3)
+        arm = axes @ body.com
+        spin = row[15:18].copy()
+        number = model.sources[name].id
+        found[number] = BodyState(row[0:3] - arm, axes.copy(), row[12:15] - np.cross(spin, arm), spin)
+    return found

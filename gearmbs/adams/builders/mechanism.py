@@ -1,0 +1,82 @@
+"""From a deck to a mechanism, as the deck gives its initial conditions or from a given state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+from gearmbs.adams.builders.builder import Builder
+from gearmbs.adams.builders.constraints import CONSTRAINTS
+from gearmbs.adams.builders.forces import FORCES
+from gearmbs.adams.builders.initial import with_initial_motions
+from gearmbs.adams.builders.model import AdamsModel, BodyState
+from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
+from gearmbs.adams.parse.deck import Deck
+from gearmbs.dae.errors import ModelError
+from gearmbs.mechanism import Mechanism
+
+
+def build_mechanism(
+    deck: Deck, allow_unsupported: bool = False, inactive: frozenset[tuple[str, int]] = frozenset()
+) -> Mechanism:
+    """Return the mechanism a deck describes, its joints with the initial conditions given; see :func:`build_model`."""
+    model = build_model(deck, allow_unsupported, inactive)
+    if model.initial_motions:
+        try:
+            start = with_initial_motions(model)
+        except ModelError as error:
+            joint = model.sources[model.initial_motions[0][0].name]
+            message = f"{joint.label()}: its initial conditions cannot be met: {error}"
+            raise DeckError([Diagnostic(ERROR, message, deck.file, joint.line)]) from error
+        model = build_model(deck, allow_unsupported, inactive, start)
+    return model.mechanism
+
+
+def build_model(
+    deck: Deck,
+    allow_unsupported: bool = False,
+    inactive: frozenset[tuple[str, int]] = frozenset(),
+    state: Mapping[int, BodyState] | None = None,
+    span: tuple[float, float] = (0.0, 1.0),
+) -> AdamsModel:
+    """Build the mechanism of a deck.
+
+    Parameters
+    ----------
+    deck : Deck
+    allow_unsupported : bool
+        Build it without what is not supported instead of refusing.
+    inactive : set of (statement name, id)
+        Elements a script has deactivated.
+    state : mapping of int to BodyState, optional
+        Where the parts are and how they move, by part id, instead of the deck's initial conditions.
+    span : tuple of float
+        Start of the analysis and about its end, in the deck's unit; motions given by their velocity or acceleration
+        start from it.
+
+    Returns
+    -------
+    AdamsModel
+
+    Raises
+    ------
+    DeckError
+        Naming the line of what is not supported or cannot be built.
+    """
+    if deck.unsupported and not allow_unsupported:
+        raise DeckError(deck.unsupported)
+    builder = Builder(deck, inactive, state or {}, span)
+    if builder.add_bodies():
+        builder.name_elements()
+        builder.add_data()
+        for kind, make in (CONSTRAINTS | FORCES).items():
+            for statement in builder.active(kind):
+                builder.attempt(statement, partial(make, builder))
+    model = builder.model
+    left_out = [d for d in builder.problems if d.severity == UNSUPPORTED]
+    errors = [d for d in builder.problems if d.severity == ERROR]
+    remarks = [d for d in builder.problems if d.severity == WARNING]
+    if errors or (left_out and not allow_unsupported):
+        raise DeckError(errors + left_out)
+    deck.diagnostics.extend(d for d in left_out + remarks if d not in deck.diagnostics)
+    return model

@@ -1,0 +1,92 @@
+"""A mechanism built from a deck, with the way back from its names to the deck's ids."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.data import spline_data
+from gearmbs.adams.parse.deck import Deck
+from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.expression import Scope
+from gearmbs.mechanism.joints import Joint
+from gearmbs.mechanism.parts import Marker
+
+KINDS: dict[type, str] = {
+    st.Joint: "joint", st.Jprim: "jprim", st.Motion: "motion", st.Sforce: "sforce", st.Vforce: "vforce",
+    st.Vtorque: "vtorque", st.Gforce: "gforce", st.Bushing: "bushing", st.Field: "field",
+    st.SpringDamper: "springdamper", st.Gcon: "gcon", st.Coupler: "coupler", st.Gear: "gear",
+    st.Beam: "beam", st.Friction: "friction",
+}  # fmt: skip
+"""Kinds under which functions such as JOINT and SFORCE ask for an element's force."""
+
+
+class BodyState(NamedTuple):
+    """Where a part's frame is and how it moves: SI, global components.
+
+    Attributes
+    ----------
+    position, velocity, angular_velocity : ndarray, shape (3,)
+    orientation : ndarray, shape (3, 3)
+    """
+
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+
+
+@dataclass
+class AdamsModel:
+    """A mechanism built from a deck, with the way back from names to ids.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    deck : Deck
+    names : dict
+        (kind, id) -> name in the mechanism; parts and markers have the kinds "part" and "marker".
+    pairs : dict
+        (kind, id) -> (I marker id, J marker id or None) of everything that transmits a force.
+    sources : dict
+        Name in the mechanism -> statement.
+    initial_motions : list
+        Joints with initial conditions: joint, "rotation" or "translation", displacement and velocity in deck units.
+    """
+
+    mechanism: Mechanism
+    deck: Deck
+    names: dict[tuple[str, int], str] = field(default_factory=dict)
+    pairs: dict[tuple[str, int], tuple[int, int | None]] = field(default_factory=dict)
+    sources: dict[str, st.Statement] = field(default_factory=dict)
+    initial_motions: list[tuple[Joint, str, tuple[float, ...]]] = field(default_factory=list)
+
+    def scope(self, marker_index: dict[int, int], marker_body: list[int]) -> Scope:
+        """Return what the deck's expressions may name, for requests."""
+        deck = self.deck
+        markers: dict[Any, int] = {}
+        for m in markers_of(self.mechanism):
+            markers[m.name.upper()] = marker_index[id(m)]
+            if m.number is not None:
+                markers[m.number] = marker_index[id(m)]
+        variables = {v.id: v.function or "" for v in deck.of(st.Variable).values()}
+        return Scope(
+            markers=markers,
+            marker_body=marker_body,
+            variables=variables,  # type: ignore[arg-type]
+            diffs={d.id: None if d.implicit else d.function for d in deck.of(st.Diff).values()},
+            splines={s.id: spline_data(s) for s in deck.of(st.Spline).values()},
+            arrays=self.mechanism.arrays,
+            plants=self.mechanism.plants,
+            forces=dict(self.pairs),  # type: ignore[arg-type]
+            absent=frozenset((*key, base) for key in self.pairs if key not in self.names for base in (0, 3)),
+            units=deck.units,
+        )
+
+
+def markers_of(mechanism: Mechanism) -> list[Marker]:
+    """Return all markers of a mechanism."""
+    return [m for body in (mechanism.ground, *mechanism.bodies.values()) for m in body.markers]

@@ -1,0 +1,1 @@
+"""Text to typed statements: decks (.adm) and command scripts (.acf), read and checked."""

@@ -1,0 +1,268 @@
+"""Checks that a deck holds together: references, required arguments, units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields
+
+from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.data import spline_data
+from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
+from gearmbs.mechanism.expression import Call, Number, parse, walk
+
+REQUIRED: dict[type, tuple[str, ...]] = {
+    st.Marker: ("part",),
+    st.Joint: ("type", "i", "j"),
+    st.Jprim: ("type", "i", "j"),
+    st.Coupler: ("joints",),
+    st.Gear: ("joints", "cv"),
+    st.Gcon: ("function",),
+    st.Motion: ("function",),
+    st.Sforce: ("type", "i", "j", "function"),
+    st.Vforce: ("i", "rm"),
+    st.Vtorque: ("i", "rm"),
+    st.Gforce: ("i", "rm"),
+    st.SpringDamper: ("type", "i", "j"),
+    st.Bushing: ("i", "j"),
+    st.Field: ("i", "j"),
+    st.Variable: ("function",),
+    st.Diff: ("function",),
+    st.Beam: ("i", "j", "length", "ixx", "iyy", "izz", "area", "emodulus", "gmodulus"),
+    st.Friction: ("joint", "mu_static", "mu_dynamic"),
+}
+MEASURES = frozenset(
+    """DX DY DZ DM AX AY AZ PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
+    WDTX WDTY WDTZ WDTM""".split()
+)
+"""Functions of the places and motions of markers."""
+MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv")
+TWO_PARTS = (st.Joint, st.Jprim)
+UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
+    st.Marker: ("flex_body", "point_mass", "node_id", "curve"),
+    st.Joint: ("delta_v", "max_friction", "mu_dyn_rot", "mu_dyn_trans", "mu_stat_rot", "mu_stat_trans"),
+    st.Coupler: ("function",),
+    st.Field: ("function",),
+    st.Spline: ("data_file",),
+    st.Request: ("function",),
+    st.Part: ("planar",),
+}
+
+WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
+    st.Integrator: ("hratio", "pattern", "fixit", "adaptivity", "beta", "gamma", "alpha", "scale"),
+    st.InitialConditions: tuple(specs_of(st.InitialConditions)),
+    st.Kinematics: tuple(specs_of(st.Kinematics)),
+    st.Equilibrium: tuple(specs_of(st.Equilibrium)),
+    st.Output: ("dscale", "vscale", "ascale", "fscale", "dzero", "vzero", "azero", "fzero", "chart"),
+    st.Results: tuple(n for n in specs_of(st.Results) if n.startswith("no")),
+    st.Part: ("exact",),
+    st.Friction: ("formulation",),
+    st.Variable: ("ic",),
+}
+"""Arguments that are read and change nothing: each is remarked on."""
+WHY = {
+    st.Output: "values are written as they are",
+    st.Results: "everything is written",
+    st.Part: "the parts are moved as little as the joints allow",
+    st.Friction: "friction follows one law, see the documentation",
+    st.Variable: "variables need no starting value",
+}
+
+
+def check(deck: Deck) -> list[Diagnostic]:
+    """Return everything that makes a deck unusable; add warnings to the deck.
+
+    Parameters
+    ----------
+    deck : Deck
+
+    Returns
+    -------
+    list of Diagnostic
+    """
+    errors: list[Diagnostic] = []
+
+    def fail(statement: st.Statement, message: str, argument: str = "") -> None:
+        line = statement.given.get(argument, statement.line)
+        errors.append(Diagnostic(ERROR, f"{statement.label()}: {message}", deck.file, line))
+
+    _check_units(deck, errors)
+    _check_ground(deck, errors)
+    for statement in deck:
+        cls = type(statement)
+        required = REQUIRED.get(cls, ())
+        if cls is st.Marker and (statement.flex_body or statement.point_mass):  # type: ignore[attr-defined]
+            required = ()
+        for name in required:
+            if getattr(statement, name) in (None, ()):
+                keyword = name.upper() if name != "type" else _choices(cls)
+                fail(statement, f"{keyword} is missing")
+        for name in UNSUPPORTED_ARGUMENTS.get(cls, ()):
+            if name in statement.given:
+                message = f"{statement.label()}: {name.upper()} is not supported"
+                deck.diagnostics.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.given[name]))
+        idle = [name for name in WITHOUT_EFFECT.get(cls, ()) if name in statement.given]
+        if idle:
+            names = ", ".join(specs_of(cls)[name].keyword for name in idle)
+            why = WHY.get(cls, "the program's own settings are tight enough")
+            message = f"{statement.label()}: {names} without effect: {why}"
+            deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, statement.given[idle[0]]))
+        _check_markers(deck, statement, fail)
+    for part in deck.of(st.Part).values():
+        _check_part(deck, part, fail)
+    for marker in deck.of(st.Marker).values():
+        if marker.part is not None and marker.part not in deck.of(st.Part):
+            fail(marker, f"there is no PART/{marker.part}", "part")
+    _check_constraints(deck, fail)
+    _check_forces(deck, fail)
+    _check_data(deck, fail)
+    _check_floating(deck, fail)
+    return errors
+
+
+Fail = Callable[..., None]
+
+
+def _choices(cls: type) -> str:
+    choices = next(f.metadata["spec"].choices for f in fields(cls) if f.name == "type")
+    return "its type (" + ", ".join(choices) + ")"
+
+
+def _check_units(deck: Deck, errors: list[Diagnostic]) -> None:
+    statement = deck.only(st.Units)
+    try:
+        _ = deck.units
+    except ValueError as error:
+        errors.append(Diagnostic(ERROR, f"UNITS: {error}", deck.file, statement.line if statement else 0))
+    if statement is None:
+        message = "UNITS is missing; numbers are taken as kg, m, s and N"
+        deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, 0))
+
+
+def _check_ground(deck: Deck, errors: list[Diagnostic]) -> None:
+    grounds = [p for p in deck.of(st.Part).values() if p.ground]
+    if not grounds:
+        errors.append(Diagnostic(ERROR, "no PART is the GROUND; add PART/1, GROUND", deck.file, 0))
+    for extra in grounds[1:]:
+        message = f"{extra.label()}: PART/{grounds[0].id} is the GROUND already"
+        errors.append(Diagnostic(ERROR, message, deck.file, extra.line))
+
+
+def _check_markers(deck: Deck, statement: st.Statement, fail: Fail) -> None:
+    markers = deck.of(st.Marker)
+    for name in MARKER_FIELDS:
+        ref = getattr(statement, name, None)
+        if ref is None or (ref == 0 and isinstance(statement, st.Request)):
+            continue
+        if ref not in markers:
+            fail(statement, f"there is no MARKER/{ref} for {name.upper()}", name)
+    if isinstance(statement, TWO_PARTS) and statement.i in markers and statement.j in markers:
+        if markers[statement.i].part == markers[statement.j].part:
+            fail(statement, f"I and J are both on PART/{markers[statement.i].part}; it must join two parts")
+
+
+def _check_part(deck: Deck, part: st.Part, fail: Fail) -> None:
+    if part.mass < 0.0:
+        fail(part, f"MASS = {part.mass}; it cannot be negative", "mass")
+    if part.ground:
+        return
+    if (part.mass > 0.0 or part.ip) and part.cm is None:
+        fail(part, "CM is missing; a part with mass needs the id of its centre-of-mass marker")
+    for name in ("cm", "im"):
+        marker = deck.of(st.Marker).get(getattr(part, name) or -1)
+        if marker is not None and marker.part != part.id:
+            fail(part, f"{name.upper()} = {marker.id}, but MARKER/{marker.id} is on PART/{marker.part}", name)
+    if part.reuler is not None and (part.zg or part.xg):
+        fail(part, "give either REULER or ZG and XG, not both", "reuler")
+
+
+def _check_constraints(deck: Deck, fail: Fail) -> None:
+    joints = deck.of(st.Joint)
+    for joint in joints.values():
+        if joint.type == "SCREW" and joint.pitch is None:
+            fail(joint, "a SCREW joint needs PITCH")
+        if joint.type == "RACKPIN" and not joint.pd:
+            fail(joint, "a RACKPIN joint needs PD, the pitch diameter")
+    for gear in deck.of(st.Gear).values():
+        for ref in gear.joints:
+            if ref not in joints:
+                fail(gear, f"there is no JOINT/{ref}", "joints")
+    for coupler in deck.of(st.Coupler).values():
+        for ref in coupler.joints:
+            if ref not in joints:
+                fail(coupler, f"there is no JOINT/{ref}", "joints")
+        n = len(coupler.joints)
+        if coupler.joints and coupler.function is None and len(coupler.scales) not in (n - 1, n):
+            fail(coupler, f"SCALES needs {n - 1} or {n} values for {n} joints, got {len(coupler.scales)}", "scales")
+        if coupler.type and len(coupler.type) != n:
+            fail(coupler, f"TYPE needs {n} letters, got {len(coupler.type)}", "type")
+    for motion in deck.of(st.Motion).values():
+        if motion.joint is not None:
+            if motion.joint not in joints:
+                fail(motion, f"there is no JOINT/{motion.joint}", "joint")
+        elif motion.i is None or motion.j is None or motion.direction is None:
+            fail(motion, "give JOINT, or I, J and one of X, Y, Z, B1, B2, B3")
+
+
+def _check_forces(deck: Deck, fail: Fail) -> None:
+    for kind, names in ((st.Vforce, "fx fy fz"), (st.Vtorque, "tx ty tz"), (st.Gforce, "fx fy fz tx ty tz")):
+        for force in deck.of(kind).values():
+            if all(getattr(force, name) is None for name in names.split()):
+                fail(force, f"give at least one of {', '.join(names.upper().split())}")
+    for beam in deck.of(st.Beam).values():
+        for name in ("length", "area", "emodulus", "gmodulus"):
+            if not (getattr(beam, name) or 0.0) > 0.0:
+                fail(beam, f"{name.upper()} = {getattr(beam, name)}; it must be positive", name)
+    for friction in deck.of(st.Friction).values():
+        if friction.joint is not None and friction.joint not in deck.of(st.Joint):
+            fail(friction, f"there is no JOINT/{friction.joint}", "joint")
+    for field in deck.of(st.Field).values():
+        if field.kmatrix is None and field.cmatrix is None and field.function is None:
+            fail(field, "give KMATRIX or CMATRIX")
+
+
+def _check_data(deck: Deck, fail: Fail) -> None:
+    for spline in deck.of(st.Spline).values():
+        if spline.data_file is None:
+            try:
+                spline_data(spline)
+            except ValueError as error:
+                fail(spline, str(error), "x")
+    for kind in (st.PlantInput, st.PlantOutput):
+        for plant in deck.of(kind).values():
+            for ref in plant.variables:
+                if ref not in deck.of(st.Variable):
+                    fail(plant, f"there is no VARIABLE/{ref}", "variables")
+    for request in deck.of(st.Request).values():
+        if request.type is None and not any(request.functions()) and request.function is None:
+            fail(request, "give DISPLACEMENT, VELOCITY, ACCELERATION or FORCE, or F1 to F8")
+        if request.type is not None and request.i is None:
+            fail(request, "I is missing")
+
+
+def _check_floating(deck: Deck, fail: Fail) -> None:
+    """Refuse measures of floating markers: they follow a force's I marker, which is not tracked."""
+    floating = {m.id for m in deck.of(st.Marker).values() if m.floating}
+    if not floating:
+        return
+    for statement in deck:
+        for name, spec in specs_of(type(statement)).items():
+            text = getattr(statement, name)
+            if spec.kind != EXPRESSION or text is None:
+                continue
+            for ref in measured_markers(text):
+                if ref in floating:
+                    fail(statement, f"MARKER/{ref} is FLOATING; measure at the force's I marker instead", name)
+
+
+def measured_markers(text: str) -> list[int]:
+    """Return the markers whose place or motion an expression asks for, in order of appearance."""
+    found: list[int] = []
+    for node in walk(parse(text)):
+        if isinstance(node, Call) and node.name in MEASURES:
+            refs = node.args[2:] if node.name == "ORIENT" else node.args
+            for a in refs:
+                if isinstance(a, Number) and a.integer and a.integer not in found:
+                    found.append(a.integer)
+    return found

@@ -1,0 +1,78 @@
+"""A deck: its typed statements, and remarks on those that were not understood."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from gearmbs.adams.errors import UNSUPPORTED, Diagnostic
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.units import deck_units
+from gearmbs.mechanism.expression import Units
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism import Mechanism
+
+S = TypeVar("S", bound=st.Statement)
+
+
+@dataclass
+class Deck:
+    """The content of an .adm file.
+
+    Attributes
+    ----------
+    title : str
+    file : str
+    items : dict
+        Statement class -> id -> statement, in the order of the deck.
+    diagnostics : list of Diagnostic
+        Warnings, ignored and unsupported statements; errors raise.
+    """
+
+    title: str = ""
+    file: str = "<deck>"
+    items: dict[type, dict[int, Any]] = field(default_factory=dict)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+
+    def of(self, kind: type[S]) -> dict[int, S]:
+        """Return the statements of one class by id."""
+        return self.items.get(kind, {})
+
+    def only(self, kind: type[S]) -> S | None:
+        """Return the single statement of a class without id, or None."""
+        return next(iter(self.of(kind).values()), None)
+
+    def __iter__(self) -> Iterator[st.Statement]:
+        for group in self.items.values():
+            yield from group.values()
+
+    @cached_property
+    def units(self) -> Units:
+        """SI values of the deck's units."""
+        return deck_units(self.only(st.Units))
+
+    @property
+    def unsupported(self) -> list[Diagnostic]:
+        """Statements and arguments that change the physics and are not modelled."""
+        return [d for d in self.diagnostics if d.severity == UNSUPPORTED]
+
+    def ground(self) -> st.Part:
+        """Return the ground part."""
+        return next(p for p in self.of(st.Part).values() if p.ground)
+
+    def summary(self) -> str:
+        """Return a table of what the deck holds and what was left out."""
+        lines = [f"{self.title or '(no title)'}  [{self.file}]"]
+        lines += [f"  {st.KEYWORD_OF[kind]:14s} {len(group)}" for kind, group in self.items.items()]
+        lines += [f"  {d}" for d in self.diagnostics]
+        return "\n".join(lines)
+
+    def to_mechanism(self, allow_unsupported: bool = False) -> Mechanism:
+        """Build the mechanism; see :func:`gearmbs.adams.builders.mechanism.build_mechanism`."""
+        # the one arrow from reading to building: a facade, so that read_deck(path).to_mechanism() reads as one sentence
+        from gearmbs.adams.builders.mechanism import build_mechanism
+
+        return build_mechanism(self, allow_unsupported=allow_unsupported)

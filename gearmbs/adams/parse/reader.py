@@ -1,0 +1,173 @@
+"""Read a deck (.adm): every statement typed and checked, with everything that was not understood named."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, WARNING, DeckError, Diagnostic
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.check import check
+from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.grammar import ArgumentReader, Grammar, StatementError
+from gearmbs.adams.parse.source import RawStatement, read_file, statements
+
+_HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
+GRAMMARS: dict[type, Grammar] = {cls: Grammar(cls) for cls in st.STATEMENTS.values()}
+_NAMES = (*st.STATEMENTS, *sorted(st.IGNORED), *sorted(st.UNSUPPORTED), "END")
+
+
+def read_deck(path: str | Path) -> Deck:
+    """Read an .adm file.
+
+    Raises
+    ------
+    DeckError
+        Naming file and line of everything that is wrong.
+    """
+    return parse_deck(read_file(Path(path)), str(path))
+
+
+def parse_deck(text: str, file: str = "<deck>") -> Deck:
+    """Parse the text of an .adm file.
+
+    Parameters
+    ----------
+    text : str
+    file : str
+        Name for messages.
+
+    Returns
+    -------
+    Deck
+
+    Raises
+    ------
+    DeckError
+        Naming the line of everything that is wrong.
+    """
+    first = re.split(r"\r\n|\r|\n", text, maxsplit=1)[0]
+    deck = Deck(file=file)
+    errors: list[Diagnostic] = []
+    untitled = _is_statement(first)
+    if untitled:
+        deck.diagnostics.append(
+            Diagnostic(WARNING, "the first line is the deck's title in ADAMS; it was read as a statement", file, 1)
+        )
+    else:
+        deck.title = first.strip().lstrip("!").strip()
+    ended = False
+    for raw in statements(text, skip=0 if untitled else 1):
+        if _take(deck, raw, errors):
+            ended = True
+            break
+    if not ended:
+        deck.diagnostics.append(Diagnostic(WARNING, "END is missing; the deck may have been cut off", file, 0))
+    if not errors:
+        errors += check(deck)
+    if errors:
+        raise DeckError(sorted(errors, key=lambda d: d.line))
+    _count_ignored(deck)
+    return deck
+
+
+def resolve_statement(word: str, names: Iterable[str] = _NAMES) -> str | None:
+    """Return the full name of a possibly shortened statement, None when it is unknown or ambiguous."""
+    upper = word.upper()
+    names = tuple(names)
+    if upper in names:
+        return upper
+    found = [n for n in names if n.startswith(upper)]
+    return found[0] if len(found) == 1 else None
+
+
+def _is_statement(line: str) -> bool:
+    match = _HEAD.match(line)
+    return match is not None and match.group(2) is not None and resolve_statement(match.group(1)) is not None
+
+
+def _take(deck: Deck, raw: RawStatement, errors: list[Diagnostic]) -> bool:
+    """Add one statement to the deck; return True at END."""
+
+    def fail(message: str, line: int | None = None) -> None:
+        errors.append(Diagnostic(ERROR, message, deck.file, raw.line if line is None else line))
+
+    match = _HEAD.match(raw.text)
+    if match is None:
+        fail(f"expected a statement such as PART/1, found {raw.text.strip()[:40]!r}")
+        return False
+    name = resolve_statement(match.group(1))
+    if name is None:
+        fail(unknown_statement(match.group(1), _NAMES))
+        return False
+    if name == "END":
+        return True
+    if match.group(2) is None:
+        fail(f"{name} needs a slash: {name}/" + ("" if name in st.WITHOUT_ID else "id"))
+        return False
+    number = int(match.group(3)) if match.group(3) else 0
+    if name in st.UNSUPPORTED:
+        message = f"{name}/{number} is not supported; it changes the motion"
+        deck.diagnostics.append(Diagnostic(UNSUPPORTED, message, deck.file, raw.line))
+        return False
+    if name in st.IGNORED:
+        deck.diagnostics.append(Diagnostic(IGNORED, name, deck.file, raw.line))
+        return False
+    try:
+        statement = read_statement(name, number, raw, match.end(), deck.file)
+    except StatementError as error:
+        fail(f"{name}/{number or ''}: {error}", raw.line_at(error.offset))
+        return False
+    group = deck.items.setdefault(type(statement), {})
+    if number in group:
+        what = "is given twice" if name in st.WITHOUT_ID else "has an id that is in use"
+        fail(f"{statement.label()} {what}; it stands first in line {group[number].line}")
+        return False
+    group[number] = statement
+    return False
+
+
+def read_statement(name: str, number: int, raw: RawStatement, start: int, file: str) -> st.Statement:
+    """Read the arguments of one statement into its class.
+
+    Raises
+    ------
+    StatementError
+    """
+    cls = st.STATEMENTS[name]
+    if name in st.WITHOUT_ID:
+        if number:
+            raise StatementError(f"{name} has no id; write {name}/")
+    elif not number:
+        raise StatementError(f"an id is missing; write {name}/1")
+    reader = ArgumentReader(raw, start, GRAMMARS[cls])
+    values = reader.read()
+    return cls(id=number, file=file, line=raw.line, name=raw.view_name, given=reader.lines, **values)
+
+
+def unknown_statement(word: str, names: Iterable[str]) -> str:
+    """Return a message about a statement name that could not be resolved."""
+    upper = word.upper()
+    found = [n for n in names if n.startswith(upper)]
+    if found:
+        return f"{upper[:40]} is ambiguous: it could be {', '.join(found)}"
+    near = difflib.get_close_matches(upper[:40], list(names), 1)
+    return f"unknown statement {upper[:40]!r}" + (f"; did you mean {near[0]}?" if near else "")
+
+
+def _count_ignored(deck: Deck) -> None:
+    """Fold the ignored statements of one kind into one remark."""
+    counts: dict[str, list[int]] = {}
+    others = []
+    for d in deck.diagnostics:
+        if d.severity == IGNORED:
+            counts.setdefault(d.message, []).append(d.line)
+        else:
+            others.append(d)
+    for name, lines in counts.items():
+        plural = "statement" if len(lines) == 1 else "statements"
+        message = f"{len(lines)} {name} {plural} ignored: no effect on the results"
+        others.append(Diagnostic(IGNORED, message, deck.file, lines[0]))
+    deck.diagnostics = others

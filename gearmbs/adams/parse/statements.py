@@ -1,0 +1,138 @@
+"""The statements of a deck that this program understands, as typed records.
+
+Every field carries the keyword and kind it is read from; values stay in the deck's units (angles in
+radians).  ``given`` says which arguments stood in the deck.
+"""
+
+from __future__ import annotations
+
+from gearmbs.adams.parse.statement import Statement
+from gearmbs.adams.parse.statements_data import (
+    Array,
+    Diff,
+    Equilibrium,
+    InitialConditions,
+    Integrator,
+    Kinematics,
+    Output,
+    Plant,
+    PlantInput,
+    PlantOutput,
+    Request,
+    Results,
+    Spline,
+    Variable,
+)
+from gearmbs.adams.parse.statements_forces import (
+    Accgrav,
+    Beam,
+    Bushing,
+    Field,
+    Friction,
+    Gforce,
+    Sforce,
+    SpringDamper,
+    Vforce,
+    Vtorque,
+)
+from gearmbs.adams.parse.statements_model import (
+    Coupler,
+    Gcon,
+    Gear,
+    Joint,
+    Jprim,
+    Marker,
+    Motion,
+    Part,
+    Units,
+)
+
+STATEMENTS: dict[str, type[Statement]] = {
+    "ACCGRAV": Accgrav,
+    "ARRAY": Array,
+    "BEAM": Beam,
+    "BUSHING": Bushing,
+    "COUPLER": Coupler,
+    "DIFF": Diff,
+    "EQUILIBRIUM": Equilibrium,
+    "FIELD": Field,
+    "FRICTION": Friction,
+    "GCON": Gcon,
+    "GEAR": Gear,
+    "GFORCE": Gforce,
+    "IC": InitialConditions,
+    "INTEGRATOR": Integrator,
+    "JOINT": Joint,
+    "JPRIM": Jprim,
+    "KINEMATICS": Kinematics,
+    "MARKER": Marker,
+    "MOTION": Motion,
+    "OUTPUT": Output,
+    "PART": Part,
+    "PINPUT": PlantInput,
+    "POUTPUT": PlantOutput,
+    "REQUEST": Request,
+    "RESULTS": Results,
+    "SFORCE": Sforce,
+    "SPLINE": Spline,
+    "SPRINGDAMPER": SpringDamper,
+    "UNITS": Units,
+    "VARIABLE": Variable,
+    "VFORCE": Vforce,
+    "VTORQUE": Vtorque,
+}
+KEYWORD_OF = {cls: keyword for keyword, cls in STATEMENTS.items()}
+
+WITHOUT_ID = frozenset("ACCGRAV EQUILIBRIUM IC INTEGRATOR KINEMATICS OUTPUT RESULTS UNITS".split())
+"""Statements that stand once and have no id."""
+
+IGNORED = frozenset("GRAPHICS MATERIAL PREFERENCES DEBUG LSOLVER STRING".split())
+"""Statements without effect on the numbers computed here."""
+
+UNSUPPORTED = frozenset(
+    """CONTACT CURVE CVCV FE_LOAD FE_PART FLEX_BODY GSE LSE MATRIX MFORCE MREQUEST NFORCE POINT_MASS
+    PSTATE PTCV SENSOR SURFACE TFSISO TIRE UCON""".split()
+)
+"""Statements of ADAMS that change the motion and are not modelled here."""
+
+__all__ = [
+    "IGNORED",
+    "KEYWORD_OF",
+    "STATEMENTS",
+    "UNSUPPORTED",
+    "WITHOUT_ID",
+    "Accgrav",
+    "Array",
+    "Beam",
+    "Bushing",
+    "Coupler",
+    "Diff",
+    "Equilibrium",
+    "Field",
+    "Friction",
+    "Gcon",
+    "Gear",
+    "Gforce",
+    "InitialConditions",
+    "Integrator",
+    "Joint",
+    "Jprim",
+    "Kinematics",
+    "Marker",
+    "Motion",
+    "Output",
+    "Part",
+    "Plant",
+    "PlantInput",
+    "PlantOutput",
+    "Request",
+    "Results",
+    "Sforce",
+    "Spline",
+    "SpringDamper",
+    "Statement",
+    "Units",
+    "Variable",
+    "Vforce",
+    "Vtorque",
+]

@@ -1,0 +1,69 @@
+"""How far an analysis had to move the parts before it could start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearmbs.adams.builders.model import AdamsModel, markers_of
+from gearmbs.dae.results.solution import Solution
+
+FAR = 1e-3
+"""Displacement worth a warning, in sizes of the model."""
+TURNED = np.deg2rad(0.1)
+"""Rotation worth a warning, rad."""
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """The largest corrections of the initial conditions.
+
+    Attributes
+    ----------
+    distance : float
+        Of a part's centre of mass, in the deck's unit of length.
+    angle : float
+        Rad.
+    farthest, most_turned : str
+        Which parts they are, "" without any.
+    far : bool
+        Whether that is more than the rounded numbers of a deck explain.
+    """
+
+    distance: float = 0.0
+    angle: float = 0.0
+    farthest: str = ""
+    most_turned: str = ""
+    far: bool = False
+
+    def remark(self, time: float, unit: str) -> str:
+        """Return a sentence on parts that were moved far, "" when none was."""
+        if not self.far:
+            return ""
+        return (
+            f"at TIME = {time:g} the parts did not fit their joints and motions and were moved: {self.farthest} by "
+            f"{self.distance:.4g} {unit}, {self.most_turned} by {np.rad2deg(self.angle):.4g} degrees"
+        )
+
+
+def assembly_of(model: AdamsModel, solution: Solution) -> Assembly:
+    """Compare where the parts were put with where a solution starts."""
+    bodies = model.mechanism.bodies
+    distances, angles = {}, {}
+    for name, body in bodies.items():
+        label = model.sources[name].label()
+        distances[label] = float(
+            np.linalg.norm(solution.com_position(name)[0] - body.position - body.orientation @ body.com)
+        )
+        # |A - B| = 2 sqrt(2) sin(angle/2)
+        apart = float(np.linalg.norm(solution.orientation(name)[0] - body.orientation))
+        angles[label] = 2.0 * float(np.arcsin(min(1.0, apart / np.sqrt(8.0))))
+    if not bodies:
+        return Assembly()
+    places = np.array([m.global_position() for m in markers_of(model.mechanism)])
+    size = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
+    farthest, most_turned = max(distances, key=distances.__getitem__), max(angles, key=angles.__getitem__)
+    distance, angle = distances[farthest], angles[most_turned]
+    far = distance > FAR * size or angle > TURNED
+    return Assembly(distance / model.deck.units.length, angle, farthest, most_turned, far)

@@ -1,0 +1,141 @@
+"""The message file (.msg): what was read, the degrees of freedom, and how each analysis went."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearmbs.adams.parse.commands import Command, Simulate
+from gearmbs.adams.results.record import NEWTON, RunRecord, Segment
+
+RULE = "-" * 79
+TITLES = {"KINEMATICS": "Kinematic", "STATICS": "Static", "INITIAL_CONDITIONS": "Initial Conditions"}
+TABLE_HEAD = """\
+   Simulation      Step        Function    Cumulative   Integration     CPU
+      Time         Size       Evaluations  Steps Taken    Order        time
+   ___________  ___________   ___________  ___________   _________    ________"""
+
+
+INDEX = {"I3": "INDEX-3", "SI2": "stabilized INDEX-2", "SI1": "stabilized INDEX-1"}
+
+
+def message_text(result: RunRecord) -> str:
+    """Return the content of the message file: remarks on the model, then the commands in their order."""
+    out = [RULE, f"|{'Model Title':^77}|", f"|{'=' * 77}|", f"|{result.deck.title[:75]:^77}|", RULE, ""]
+    for d in (*result.deck.diagnostics, *result.script.diagnostics):
+        out += _block("ERROR" if d.severity == "unsupported" else "WARNING", str(d))
+    for command, outcome in result.log:
+        out += [f" command: {_echo(command)}", ""]
+        if isinstance(outcome, Segment):
+            out += _segment(result, outcome)
+        elif outcome is not None:
+            out += ["", "  E I G E N  A N A L Y S I S", "", *outcome.table().splitlines(), ""]
+    for d in result.errors:
+        out += _block("ERROR", str(d))
+    return "\n".join(out) + "\n"
+
+
+def _block(severity: str, text: str) -> list[str]:
+    return [f"---- START: {severity} ----", text, f"---- END: {severity} ----", ""]
+
+
+def _segment(result: RunRecord, segment: Segment) -> list[str]:
+    s = segment.solution
+    t = s.t / result.deck.units.time
+    out = _initial_conditions(result, segment, t[0])
+    title = TITLES.get(segment.kind, "Dynamic")
+    stats = s.stats.as_dict()
+    out += ["", "  Begin Simulation", ""]
+    if segment.options["integrator"] == NEWTON:
+        out += [f"  ****** Performing {title} Simulation ******", *_solved(segment, t, stats)]
+    else:
+        out += _integrated(segment, title, t, stats)
+    for remark in result.remarks(segment):
+        out += ["", *_block("WARNING", remark)]
+    if not s.success:
+        out += ["", *_block("ERROR", s.message)]
+    return [*out, "", "  End Simulation", ""]
+
+
+def _solved(segment: Segment, t: np.ndarray, stats: dict) -> list[str]:
+    """Return how an analysis went in which nothing is integrated."""
+    if segment.kind == "INITIAL_CONDITIONS":
+        return []
+    what = "position" if t.size == 1 else f"{t.size} positions from {t[0]:.5E} to {t[-1]:.5E}"
+    if segment.kind == "KINEMATICS":
+        return [f"   All motion is prescribed: {what}, {stats.get('residuals', 0)} Newton iterations."]
+    found = segment.equilibrium
+    if found is None:
+        return [f"   Equilibrium at {what}, {stats.get('steps', 0)} Newton iterations."]
+    out = [f"   Equilibrium found in {found.iterations} Newton iterations; relative imbalance {found.residual:.3E}."]
+    stability = {
+        True: "The equilibrium is stable.",
+        False: "The equilibrium is unstable.",
+        None: "Whether the equilibrium is stable was not looked into: the model is large.",
+    }
+    out.append(f"   {stability[found.stable]}")
+    if found.neutral:
+        names = ", ".join(segment.model.sources[name].label() for name in found.neutral)
+        out.append(f"   Nothing resists small displacements of {names}.")
+    return out
+
+
+def _integrated(segment: Segment, title: str, t: np.ndarray, stats: dict) -> list[str]:
+    """Return how an integration went."""
+    options = segment.options
+    name, form = options["integrator"].capitalize(), options["formulation"]
+    step = (t[-1] - t[0]) / max(1, stats.get("steps", 1))
+    seconds = float(stats.get("cpu_time", stats.get("time", 0.0)) or 0.0)
+    return [
+        f"  ****** Performing {title} Simulation using {name} {form} Integrator ******",
+        f"   The system is modelled with {INDEX[form]} DAEs.",
+        f"   The integrator is {name.upper()}, CORRECTOR = {options.get('corrector', 'original')}",
+        f"   Integration error =    {options['tol']:.6E}",
+        "",
+        TABLE_HEAD,
+        _row(t[0], 0.0, 0, 0, 0, 0.0),
+        _row(t[-1], step, stats.get("residuals", 0), stats.get("steps", 0), stats.get("order", 0), seconds),
+    ]
+
+
+def _row(time: float, step: float, evaluations: int, steps: int, order: int, cpu: float) -> str:
+    return f"   {time:11.5E}  {step:11.5E}  {evaluations:>11d}  {steps:>11d}  {order:>6d}  {cpu:14.2f}"
+
+
+def _echo(command: Command) -> str:
+    """Return a command as it stands in its script, or could stand there."""
+    if command.text or not isinstance(command, Simulate):
+        return command.text
+    words = [f"simulate/{(command.kind or 'DYNAMICS').lower()}"]
+    for key in ("end", "duration", "dtout", "steps"):
+        value = getattr(command, key)
+        if value is not None:
+            words.append(f"{key}={value:g}")
+    return ", ".join(words)
+
+
+def _initial_conditions(result: RunRecord, segment: Segment, time: float) -> list[str]:
+    """Return the report of the initial conditions analysis: redundant rows and degrees of freedom."""
+    report = segment.solution.system.report
+    out = ["", "  Begin Displacement Initial Conditions", "", f"  Time T={time:.9E}."]
+    if report is not None:
+        if report.redundant:
+            out.append("  Degree-of-freedom analysis identified redundant constraints in the model:")
+            out.append("  " + "-" * 73)
+            for name in report.redundant:
+                joint, _, label = name.rpartition(": ")
+                out.append(f"   -  deactivating constraint equation  {label} in {joint}")
+        out.append(f"  The model has {report.degrees_of_freedom} degrees of freedom.")
+        moved = segment.assembly
+        largest = ""
+        if moved is not None and moved.distance + moved.angle > 0.0:
+            largest = (
+                f"; largest corrections {moved.distance:.3E} {result.unit('length')} ({moved.farthest}) and "
+                f"{np.rad2deg(moved.angle):.3E} degrees ({moved.most_turned})"
+            )
+        out.append(f"  Assembled in {report.position_iterations} iterations{largest}.")
+    out += ["", "  End Displacement Initial Conditions", ""]
+    for what in ("Velocity", "Acceleration"):
+        out += ["", f"  Begin {what} Initial Conditions", "", "", f"  End {what} Initial Conditions", ""]
+    if np.any(~np.isfinite(segment.solution.com_acceleration(segment.solution.system.body_names[0])[0])):
+        out.append("  The initial accelerations are not finite.")
+    return out

@@ -1,0 +1,288 @@
+"""What the analyses of a deck give: requests over time, parts' motion, forces, messages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.adams.builders.model import AdamsModel
+from gearmbs.adams.errors import Diagnostic
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.commands import Command, Script, Simulate
+from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.units import RESULT_NAMES, unit_names
+from gearmbs.adams.results.assembly import Assembly
+from gearmbs.adams.results.requests import RequestSeries
+from gearmbs.dae.analyses.modes import Modes
+from gearmbs.dae.analyses.statics import StaticResult
+from gearmbs.dae.results.solution import Solution
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NEWTON = "Newton"
+"""What solves analyses in which nothing is integrated."""
+
+
+@dataclass
+class Segment:
+    """One SIMULATE command's outcome.
+
+    Attributes
+    ----------
+    command : Simulate
+    kind : str
+    model : AdamsModel
+    solution : Solution
+        SI values.
+    options : dict
+        What the integrator was given.
+    note : str or None
+    equilibrium : StaticResult or None
+        Of a single static analysis.
+    assembly : Assembly or None
+        How far the parts were moved at the start; None for statics, which moves them anyway.
+    requests : dict of int to RequestSeries
+        Values in the deck's units.
+    wrenches : dict
+        (kind, id) -> force and torque on the I side, global components, SI, shape (m, 6).
+    """
+
+    command: Simulate
+    kind: str
+    model: AdamsModel
+    solution: Solution
+    options: dict[str, Any]
+    note: str | None = None
+    requests: dict[int, RequestSeries] = field(default_factory=dict)
+    wrenches: dict[tuple[str, int], np.ndarray] = field(default_factory=dict)
+    equilibrium: StaticResult | None = None
+    assembly: Assembly | None = None
+
+    @property
+    def success(self) -> bool:
+        """True when the analysis reached its end."""
+        return self.solution.success
+
+
+@dataclass
+class RunRecord:
+    """All analyses of a run, one after the other.
+
+    Attributes
+    ----------
+    deck : Deck
+    script : Script
+    log : list of (Command, Segment or Modes or None)
+        The commands that were carried out, with what they gave.
+    errors : list of Diagnostic
+        What ended the script.
+    """
+
+    deck: Deck
+    script: Script
+    log: list[tuple[Command, Segment | Modes | None]] = field(default_factory=list)
+    errors: list[Diagnostic] = field(default_factory=list)
+
+    @property
+    def segments(self) -> list[Segment]:
+        """The analyses by SIMULATE, in order."""
+        return [outcome for _, outcome in self.log if isinstance(outcome, Segment)]
+
+    @property
+    def modes(self) -> list[Modes]:
+        """What each LINEAR/EIGENSOL gave, in rad/s and Hz."""
+        return [outcome for _, outcome in self.log if isinstance(outcome, Modes)]
+
+    @property
+    def success(self) -> bool:
+        """True when the script was carried out and every analysis reached its end."""
+        return not self.errors and all(s.success for s in self.segments)
+
+    @property
+    def messages(self) -> list[str]:
+        """What was left out, ignored or went wrong, one sentence each."""
+        found = [str(d) for d in (*self.deck.diagnostics, *self.script.diagnostics)]
+        for segment in self.segments:
+            found.extend(self.remarks(segment))
+            if not segment.success:
+                found.append(segment.solution.message)
+        return found + [str(d) for d in self.errors]
+
+    def remarks(self, segment: Segment) -> list[str]:
+        """Return what is to be said about an analysis: settings, parts that were moved, an equilibrium that is none."""
+        found = [segment.note] if segment.note else []
+        time = float(segment.solution.t[0] / self.deck.units.time)
+        if segment.assembly is not None and segment.assembly.far:
+            found.append(segment.assembly.remark(time, self.unit("length")))
+        if segment.equilibrium is not None and segment.equilibrium.stable is False:
+            found.append(f"the equilibrium at TIME = {time:g} is unstable: the parts leave it when they are touched")
+        return found
+
+    @cached_property
+    def t(self) -> np.ndarray:
+        """Output times in the deck's unit; where one analysis follows another the time stands twice."""
+        scale = self.deck.units.time
+        return np.concatenate([s.solution.t / scale for s in self.segments] or [np.zeros(0)])
+
+    def request(self, number: int) -> np.ndarray:
+        """Return the eight columns of REQUEST/number, shape (m, 8), deck units and radians.
+
+        Raises
+        ------
+        KeyError
+            If there is no such request.
+        """
+        if number not in self.deck.of(st.Request):
+            known = ", ".join(str(k) for k in self.deck.of(st.Request))
+            raise KeyError(f"there is no REQUEST/{number}; the deck has {known or 'none'}")
+        return np.concatenate([s.requests[number].values for s in self.segments] or [np.zeros((0, 8))])
+
+    def part(self, number: int) -> np.ndarray:
+        """Return position and velocity, angles and rates of a part's frame, shape (m, 18), deck units and radians.
+
+        Columns: X Y Z PSI THETA PHI VX VY VZ WX WY WZ ACCX ACCY ACCZ WDX WDY WDZ.
+        """
+        return np.concatenate([part_motion(s, number) for s in self.segments] or [np.zeros((0, 18))])
+
+    def force(self, kind: str, number: int) -> np.ndarray:
+        """Return what an element exerts on the part of its I marker, shape (m, 6), deck units.
+
+        Columns: FX FY FZ TX TY TZ, global components, the torque about the I marker; zero while it is inactive.
+
+        Parameters
+        ----------
+        kind : str
+            Such as "joint", "motion", "sforce", "bushing".
+        number : int
+        """
+        units = self.deck.units
+        scale = np.array([units.factor("force")] * 3 + [units.factor("torque")] * 3)
+        rows = [s.wrenches.get((kind, number), np.zeros((s.solution.t.size, 6))) for s in self.segments]
+        return np.concatenate(rows or [np.zeros((0, 6))]) / scale
+
+    @property
+    def elements(self) -> list[tuple[str, int]]:
+        """Kind and id of everything whose force is known."""
+        return list(dict.fromkeys(key for s in self.segments for key in s.wrenches))
+
+    def request_units(self, number: int) -> tuple[str, ...]:
+        """Return the units of the eight columns of REQUEST/number: CUNITS, or those of the quantities."""
+        request = self.deck.of(st.Request)[number]
+        if request.type is None:
+            given = request.cunits
+            return tuple(given[k] if k < len(given) and given[k] else "no_units" for k in range(8))
+        first, second = {
+            "DISPLACEMENT": ("length", "angle"),
+            "VELOCITY": ("velocity", "angular_velocity"),
+            "ACCELERATION": ("acceleration", "angular_acceleration"),
+            "FORCE": ("force", "torque"),
+        }[request.type]
+        return (self.unit(first),) * 4 + (self.unit(second),) * 4
+
+    def unit(self, dimension: str) -> str:
+        """Return how result files spell the unit of a dimension."""
+        names = unit_names(self.deck.only(st.Units))
+        spelled = {q: RESULT_NAMES.get(n, n.lower()) or "no_units" for q, n in names.items()}
+        length, time, force = spelled["length"], spelled["time"], spelled["force"]
+        return {
+            "time": time,
+            "length": length,
+            "angle": "rad",
+            "velocity": f"{length}/{time}",
+            "angular_velocity": f"rad/{time}",
+            "acceleration": f"{length}/{time}**2",
+            "angular_acceleration": f"rad/{time}**2",
+            "force": force,
+            "torque": f"{force}-{length}",
+            "mass": spelled["mass"],
+        }.get(dimension, "no_units")
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return requests, parts and forces as an :class:`xarray.Dataset` in the deck's units.
+
+        The columns of ``part_2`` (X, Y, ...), ``joint_1`` (FX, FY, ...) and ``request_3`` stand along dimensions with
+        their names; coordinates such as ``part_unit`` hold their units: ``data.part_2.sel(part_column="X")``.
+        """
+        import xarray as xr
+
+        data: dict[str, Any] = {}
+        coords: dict[str, Any] = {"time": ("time", self.t, {"units": self.unit("time")})}
+
+        def columns(dimension: str, names: tuple[str, ...], units: tuple[str, ...]) -> tuple[str, str]:
+            coords[f"{dimension}_column"] = (f"{dimension}_column", np.array(names, dtype=object))
+            coords[f"{dimension}_unit"] = (f"{dimension}_column", np.array(units, dtype=object))
+            return ("time", f"{dimension}_column")
+
+        for number, request in self.deck.of(st.Request).items() if self.segments else ():
+            names = self.segments[0].requests[number].names
+            along = columns(f"request_{number}", unique(names), self.request_units(number))
+            title = request.comment or request.name or request.label()
+            data[f"request_{number}"] = (along, self.request(number), {"long_name": title})
+        for number, part in self.deck.of(st.Part).items() if self.segments else ():
+            if not part.ground:
+                along = columns("part", PART_COLUMNS, tuple(self.unit(d) for d in PART_DIMENSIONS))
+                data[f"part_{number}"] = (along, self.part(number), {"long_name": part.name or part.label()})
+        for kind, number in self.elements:
+            along = columns("force", FORCE_COLUMNS, (self.unit("force"),) * 3 + (self.unit("torque"),) * 3)
+            data[f"{kind}_{number}"] = (along, self.force(kind, number), {"long_name": f"{kind.upper()}/{number}"})
+        out = xr.Dataset(data, coords=coords)
+        out.attrs["title"] = self.deck.title
+        out.attrs["units"] = ", ".join(f"{d}: {self.unit(d)}" for d in ("length", "mass", "time", "force", "angle"))
+        return out
+
+    def __repr__(self) -> str:
+        span = f"{self.t[0]:g} to {self.t[-1]:g}" if self.t.size else "nothing simulated"
+        return f"{type(self).__name__}({self.deck.title!r}: {len(self.segments)} analyses, {self.t.size} times, {span})"
+
+
+PART_COLUMNS = tuple("X Y Z PSI THETA PHI VX VY VZ WX WY WZ ACCX ACCY ACCZ WDX WDY WDZ".split())
+PART_DIMENSIONS = (
+    ("length",) * 3
+    + ("angle",) * 3
+    + ("velocity",) * 3
+    + ("angular_velocity",) * 3
+    + ("acceleration",) * 3
+    + ("angular_acceleration",) * 3
+)
+FORCE_COLUMNS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
+
+
+def unique(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return names of columns in which none stands twice: a second A becomes A_2."""
+    found: list[str] = []
+    for name in names:
+        other, n = name, 1
+        while other in found:
+            n += 1
+            other = f"{name}_{n}"
+        found.append(other)
+    return tuple(found)
+
+
+def part_motion(segment: Segment, number: int) -> np.ndarray:
+    """Return the 18 columns of a part's frame over an analysis, in the deck's units."""
+    from gearmbs.dae.equations.rotation import euler_from_matrix
+
+    s = segment.solution
+    name = segment.model.names["part", number]
+    body = segment.model.mechanism.bodies[name]
+    axes = s.orientation(name)
+    arm = axes @ body.com
+    spin, alpha = s.angular_velocity(name), s.angular_acceleration(name)
+    tip = np.cross(spin, arm)
+    motion = np.hstack(
+        [
+            s.com_position(name) - arm,
+            np.array([euler_from_matrix(a) for a in axes]),
+            s.com_velocity(name) - tip,
+            spin,
+            s.com_acceleration(name) - np.cross(alpha, arm) - np.cross(spin, tip),
+            alpha,
+        ]
+    )
+    units = segment.model.deck.units
+    return motion / np.array([units.factor(d) for d in PART_DIMENSIONS])

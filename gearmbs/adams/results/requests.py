@@ -1,0 +1,266 @@
+"""Evaluate a deck's REQUESTs on a solution: eight columns each, in the deck's units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from gearmbs.adams.builders.model import AdamsModel, markers_of
+from gearmbs.adams.parse import statements as st
+from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution
+from gearmbs.dae.equations import layout as tables
+from gearmbs.dae.equations.expressions import eval_gradient
+from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_R
+from gearmbs.dae.equations.expressions.tape import ExpressionError, Tape
+from gearmbs.dae.results.solution import Solution
+from gearmbs.mechanism.compile import starting_angles
+from gearmbs.mechanism.expression import Scope, compile_expression
+from gearmbs.mechanism.measures import evaluate_series, motion_tables
+
+COLUMNS = {
+    "DISPLACEMENT": ("DM", "DX", "DY", "DZ", "", "PSI", "THETA", "PHI"),
+    "VELOCITY": ("VM", "VX", "VY", "VZ", "WM", "WX", "WY", "WZ"),
+    "ACCELERATION": ("ACCM", "ACCX", "ACCY", "ACCZ", "WDTM", "WDTX", "WDTY", "WDTZ"),
+    "FORCE": ("FM", "FX", "FY", "FZ", "TM", "TX", "TY", "TZ"),
+}
+"""Functions behind the eight columns of the standard requests."""
+
+NAMES = ("F1", "F2", "F3", "F4", "F5", "F6", "F7", "F8")
+
+
+@dataclass(frozen=True)
+class RequestSeries:
+    """One evaluated REQUEST.
+
+    Attributes
+    ----------
+    statement : Request
+    names : tuple of str
+        Names of the eight columns.
+    values : ndarray, shape (m, 8)
+        In the deck's units, angles in radians; zero in columns that were not asked for.
+    """
+
+    statement: st.Request
+    names: tuple[str, ...]
+    values: np.ndarray
+
+
+CARDAN = {"PSI": "YAW", "THETA": "PITCH", "PHI": "ROLL"}
+"""Angles of displacements with OUTPUT/YPR."""
+
+
+def request_texts(request: st.Request, ypr: bool = False) -> tuple[str | None, ...]:
+    """Return the expressions of a request's eight columns; ``ypr`` asks for yaw, pitch and roll."""
+    if request.type is None:
+        return request.functions()
+    i, j, k = request.i or 0, request.j or 0, request.rm or 0
+    texts: list[str | None] = []
+    for name in COLUMNS[request.type]:
+        if not name:
+            texts.append(None)
+        elif name in ("PSI", "THETA", "PHI", "DM", "VM", "ACCM", "WM", "WDTM", "FM", "TM"):
+            texts.append(f"{CARDAN[name] if ypr and name in CARDAN else name}({i},{j})")
+        else:
+            texts.append(f"{name}({i},{j},{k})")
+    return tuple(texts)
+
+
+def column_names(request: st.Request, ypr: bool = False) -> tuple[str, ...]:
+    """Return the names of a request's columns: CNAMES, TITLE, or the functions'."""
+    standard: tuple[str, ...] = COLUMNS[request.type] if request.type else NAMES
+    if ypr:
+        standard = tuple(CARDAN.get(name, name) for name in standard)
+    given = request.cnames or request.title
+    return tuple(given[k] if k < len(given) and given[k] else (standard[k] or NAMES[k]) for k in range(8))
+
+
+class RequestEvaluator:
+    """Evaluates expressions of a deck on a solution.
+
+    Parameters
+    ----------
+    model : AdamsModel
+    solution : Solution
+    """
+
+    def __init__(self, model: AdamsModel, solution: Solution) -> None:
+        self.model = model
+        self.solution = solution
+        output = model.deck.only(st.Output)
+        self._ypr = output is not None and output.ypr
+        system = solution.system
+        builder = system.builder
+        self.marker_body = np.array(builder.marker_body, dtype=np.int64)
+        self.marker_frame = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float)
+        self.kin, self.acc = motion_tables(solution)
+        index: dict[int, int] = system.marker_index  # type: ignore[attr-defined]
+        self.scope: Scope = model.scope(index, builder.marker_body)
+        self._names = {index[id(m)]: m.name for m in markers_of(model.mechanism)}
+        self._turns = dict(model.mechanism.turns)
+        if isinstance(solution, EquilibriumSolution):
+            # the way to an equilibrium may have wound or unwound a spring
+            for (function, i, j), angle in solution.counted().items():
+                self._turns[function, self._marker_named(i), self._marker_named(j)] = angle
+        self._counted: dict[tuple[str, str, str], None] = dict.fromkeys(self._turns)
+        for tape in builder.tapes:
+            self._note(tape)
+        self._wrenches: dict[tuple[str, int], np.ndarray] = {}
+
+    def request(self, request: st.Request) -> RequestSeries:
+        """Evaluate all columns of a request.
+
+        Raises
+        ------
+        ExpressionError
+            When a column names something that does not exist.
+        """
+        values = np.zeros((self.solution.t.size, 8))
+        for column, text in enumerate(request_texts(request, self._ypr)):
+            if text is None:
+                continue
+            try:
+                values[:, column] = self.expression(text)
+            except ExpressionError as error:
+                if request.type == "FORCE" and "no force or joint acts" in str(error):
+                    continue
+                raise ExpressionError(f"{request.label()}: {NAMES[column]}: {error}") from error
+        return RequestSeries(request, column_names(request, self._ypr), values)
+
+    def expression(self, text: str) -> np.ndarray:
+        """Return the values of an expression over time, in the deck's units, shape (m,)."""
+        tape = compile_expression(text, self.scope, accelerations=True)
+        m = self.solution.t.size
+        y = np.zeros((m, max(1, len(tape.algebraic))))
+        for q, key in enumerate(tape.algebraic):
+            y[:, q] = self._unknown(key)
+        tape = tape.bind(tape.algebraic.index)
+        self._note(tape)
+        angles = np.zeros((3, max(1, tape.n_angles)))
+        angles[0, : tape.n_angles] = starting_angles(tape, self._turns, self._marker_named)
+        out = np.zeros(m)
+        evaluate_series(
+            tape.ints, tape.floats, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
+            angles, np.zeros(max(1, tape.gradient_size)), np.zeros(tape.work_size), out,
+        )  # fmt: skip
+        return out
+
+    def turns(self) -> dict[tuple[str, str, str], float]:
+        """Return where the angles counted so far between markers of the deck end, rad."""
+        numbered = {m.name for m in markers_of(self.model.mechanism) if m.number is not None}
+        found = {}
+        for function, i, j in self._counted:
+            if {i, j} <= numbered | {""}:
+                arguments = ", ".join(f'"{name}"' for name in (i, j) if name)
+                found[function, i, j] = float(self.expression(f"{function}({arguments})")[-1])
+        return found
+
+    def _note(self, tape: Tape) -> None:
+        """Remember the angles an expression counts."""
+        for function, i, j in tape.angles:
+            self._counted[function, self._marker_named(i), self._marker_named(j)] = None
+
+    def _marker_named(self, index: int) -> str:
+        return self._names.get(index, "")
+
+    def _unknown(self, key: tuple) -> np.ndarray:
+        if key[0] == "diff":
+            return self.state(key[1])
+        kind, ref, component = key
+        return self.wrench(kind, ref)[:, component]
+
+    def state(self, ref: int) -> np.ndarray:
+        """Return the value of DIFF/ref over time, shape (m,)."""
+        names = [str(s) for s in self.model.mechanism.states]
+        at = int(self.solution.problem.idata[tables.H_Z]) + names.index(str(ref))
+        return self.solution.result.y[:, at]
+
+    def wrench(self, kind: str, ref: int) -> np.ndarray:
+        """Return force and torque on the I side, then on the J side, global components, shape (m, 12), SI.
+
+        Torques are about the origin of the marker of their side.
+        """
+        if (kind, ref) in self._wrenches:
+            return self._wrenches[kind, ref]
+        i, j = self.model.pairs[kind, ref]
+        out = np.zeros((self.solution.t.size, 12))
+        name = self.model.names.get((kind, ref))
+        if name is None:
+            # inactive
+            return out
+        if kind == "gcon" or name in self.model.mechanism.constraints:
+            out[:, :6] = self._constraint_wrench(name, i)
+        elif kind in ("joint", "jprim", "motion", "coupler", "gear"):
+            out[:, :3], out[:, 3:6] = self._reaction(name)
+        elif name in self.solution.system.force_names:
+            out[:, :3], out[:, 3:6] = self.solution.load(name)
+        out[:, 6:9] = -out[:, 0:3]
+        out[:, 9:12] = -out[:, 3:6]
+        if j is not None and not self.model.deck.of(st.Marker)[j].floating:
+            # a floating marker stands where I is
+            out[:, 9:12] -= np.cross(self._origin(i) - self._origin(j), out[:, 0:3])
+        self._wrenches[kind, ref] = out
+        return out
+
+    def _reaction(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return a joint's reaction; zero when all its rows were redundant."""
+        try:
+            return self.solution.reaction(name)
+        except KeyError:
+            zero = np.zeros((self.solution.t.size, 3))
+            return zero, zero
+
+    def _origin(self, number: int) -> np.ndarray:
+        """Return a marker's origin over time, global components."""
+        index = self.scope.markers[number]
+        body = self.marker_body[index]
+        axes = self.kin[:, body, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
+        return self.kin[:, body, KIN_R : KIN_R + 3] + axes @ self.marker_frame[index, :3]
+
+    def _constraint_wrench(self, name: str, i: int) -> np.ndarray:
+        """Return -lambda dPhi/d(R, pi) of a general constraint on the body of marker I, about that marker.
+
+        The ground takes minus what the others feel, moments about the global origin: the constraint does not
+        change when everything moves together.
+        """
+        m = self.solution.t.size
+        rows = [k for k, row in enumerate(self.solution.system.row_names) if row.rsplit(": ", 1)[0] == name]
+        if not rows:
+            return np.zeros((m, 6))
+        lam = self.solution.multipliers[:, rows[0]]
+        tape = compile_expression(self.model.mechanism.constraints[name], self.scope)
+        grad = np.zeros((m, tape.gradient_size))
+        _gradient_series(
+            tape.ints, tape.floats, self.solution.t, self.kin, self.marker_body, self.marker_frame, np.zeros(1),
+            np.zeros(max(1, tape.n_angles)), np.zeros(tape.work_size), grad,
+        )  # fmt: skip
+        owner = int(self.marker_body[self.scope.markers[i]])
+        origin = self._origin(i)
+        out = np.zeros((m, 6))
+        for p, other in enumerate(tape.bodies):
+            if owner not in (0, other):
+                continue
+            force = -lam[:, None] * grad[:, 12 * p : 12 * p + 3]
+            torque = -lam[:, None] * grad[:, 12 * p + 3 : 12 * p + 6]
+            center = self.kin[:, other, KIN_R : KIN_R + 3]
+            sign = 1.0 if owner else -1.0
+            out[:, :3] += sign * force
+            out[:, 3:] += sign * (torque + np.cross(center - origin, force))
+        return out
+
+
+@njit(
+    "void(int64[::1], float64[::1], float64[::1], float64[:, :, ::1], int64[::1], float64[:, ::1], float64[::1],"
+    " float64[::1], float64[::1], float64[:, ::1])",
+    cache=True,
+    nogil=True,
+)
+def _gradient_series(ints, floats, t, kin, marker_body, marker_frame, y, ref, work, grad):
+    """Write a tape's spatial gradient at every time."""
+    for k in range(t.size):
+        eval_gradient(ints, floats, t[k], kin[k], marker_body, marker_frame, y, ref, grad[k], work)
+
+
+__all__ = ["RequestEvaluator", "RequestSeries", "column_names", "request_texts"]

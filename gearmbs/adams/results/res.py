@@ -1,0 +1,122 @@
+"""The results file (.res) in ADAMS's XML form (XRF): parts, joints, forces and requests by components."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime
+from importlib.metadata import PackageNotFoundError, version
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from gearmbs.adams.builders.model import KINDS
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.results.record import FORCE_COLUMNS, PART_COLUMNS, PART_DIMENSIONS, RunRecord
+
+NAMESPACE = "http://www.mscsoftware.com/:xrf10"
+ENTITY_TYPES = {
+    "joint": "Joint", "jprim": "Primitive_Joint", "motion": "Motion", "sforce": "SForce", "vforce": "VForce",
+    "vtorque": "VTorque", "gforce": "GForce", "bushing": "Bushing", "field": "Field",
+    "springdamper": "SpringDamper", "gcon": "GCon", "coupler": "Coupler", "gear": "Gear", "beam": "Beam",
+    "friction": "Friction",
+}  # fmt: skip
+PER_LINE = 6
+STEP_TYPES = {"KINEMATICS": "kinematic", "STATICS": "static", "INITIAL_CONDITIONS": "initialConditions"}
+
+
+class _Entity:
+    """One set of components and its values over time."""
+
+    def __init__(self, attributes: str, names: tuple[str, ...], units: tuple[str, ...], values: np.ndarray) -> None:
+        self.attributes = attributes
+        self.names = names
+        self.units = units
+        self.values = values
+
+
+def _entities(result: RunRecord) -> Iterator[_Entity]:
+    deck = result.deck
+    for number, part in deck.of(st.Part).items():
+        if part.ground:
+            continue
+        name = part.name or f"PART_{number}"
+        attributes = f'name={quoteattr(name + "_XFORM")} entity={quoteattr(name)} entType="Part" objectId="{number}"'
+        units = tuple(result.unit(d) for d in PART_DIMENSIONS)
+        yield _Entity(attributes, PART_COLUMNS, units, result.part(number))
+    wrench_units = (result.unit("force"),) * 3 + (result.unit("torque"),) * 3
+    kinds = {kind: cls for cls, kind in KINDS.items()}
+    for kind, number in result.elements:
+        name = deck.of(kinds[kind])[number].name or f"{kind.upper()}_{number}"
+        attributes = (
+            f'name={quoteattr(name)} entity={quoteattr(name)} entType="{ENTITY_TYPES[kind]}" objectId="{number}"'
+        )
+        yield _Entity(attributes, FORCE_COLUMNS, wrench_units, result.force(kind, number))
+    for number, request in deck.of(st.Request).items():
+        name = request.results_name or request.name or f"REQUEST_{number}"
+        names = result.segments[0].requests[number].names if result.segments else ()
+        attributes = f'name={quoteattr(name)} entity={quoteattr(name)} entType="Request" objectId="{number}"'
+        yield _Entity(attributes, names, result.request_units(number), result.request(number))
+
+
+def _package_version() -> str:
+    try:
+        return version("gearmbs")
+    except PackageNotFoundError:
+        return "0"
+
+
+def results_text(result: RunRecord, now: datetime | None = None) -> str:
+    """Return the content of the results file.
+
+    Forces act on the I marker's part and stand in global components, angles in radians.
+
+    Parameters
+    ----------
+    result : RunRecord
+    now : datetime, optional
+        Time stamp in the header.
+    """
+    stamp = (now or datetime.now()).strftime("%Y-%m-%d %H:%M:%S")
+    out = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        f'<Results xmlns="{NAMESPACE}">',
+        "<Bibliography>",
+        f'<File URI="" schema="xrf" version="2.0.0.0" publicationDate="{stamp}" />',
+        '<Revision version="1" derivedFrom="-unknown-">',
+        "<Comment>forces on the part of the I marker, global components; angles in radians</Comment>",
+        "</Revision>",
+        "</Bibliography>",
+        f'<Analysis name="Analysis" executionDate="{stamp}" Solver="gearmbs {_package_version()}" script="-unknown-">',
+        f'<ModelInfo title={quoteattr(result.deck.title)} creationDate="-unknown-" checksum="-unknown-" />',
+        f'<Units angle="rad" length="{result.unit("length")}" mass="{result.unit("mass")}" '
+        f'time="{result.unit("time")}" />',
+        '<StepMap name="map_001">',
+        '<Entity name="time">',
+        f'<Component name="TIME" unitsValue="{result.unit("time")}" id="1" />',
+        "</Entity>",
+    ]
+    entities = list(_entities(result))
+    number = 1
+    for entity in entities:
+        out.append(f"<Entity {entity.attributes}>")
+        for name, unit in zip(entity.names, entity.units):
+            number += 1
+            out.append(f'<Component name={quoteattr(name)} unitsValue={quoteattr(unit)} id="{number}" />')
+        out.append("</Entity>")
+    out.append("</StepMap>")
+    row = 0
+    for k, segment in enumerate(result.segments, 1):
+        kind = STEP_TYPES.get(segment.kind, "dynamic")
+        out.append(f'<Data name="{kind}_{k:03d}" id="{k}">')
+        for _ in range(segment.solution.t.size):
+            out.append(f'<Step type="{kind}">')
+            out.append(f"{result.t[row]:.17g}")
+            for entity in entities:
+                values = entity.values[row]
+                for c in range(0, values.size, PER_LINE):
+                    out.append(" ".join(f"{v:.17g}" for v in values[c : c + PER_LINE]))
+            out.append("</Step>")
+            row += 1
+        out.append("</Data>")
+    out += ["</Analysis>", "</Results>"]
+    return "\n".join(out) + "\n"

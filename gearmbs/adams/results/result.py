@@ -1,0 +1,49 @@
+"""The result of running a deck, with the files it can be written to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gearmbs.adams.results.msg import message_text
+from gearmbs.adams.results.record import RunRecord
+from gearmbs.adams.results.req import request_text
+from gearmbs.adams.results.res import results_text
+
+
+class AdamsResult(RunRecord):
+    """All analyses of a run, one after the other.
+
+    Attributes
+    ----------
+    deck : Deck
+    script : Script
+    log : list of (Command, Segment or Modes or None)
+        The commands that were carried out, with what they gave.
+    errors : list of Diagnostic
+        What ended the script.
+    """
+
+    def write(self, prefix: str | Path) -> list[Path]:
+        """Write .req, .res, .msg and .nc files; the message file alone when no analysis was carried out.
+
+        Parameters
+        ----------
+        prefix : path
+            File name without extension; its directory is made when it does not exist.
+
+        Returns
+        -------
+        list of Path
+        """
+        prefix = Path(prefix)
+        prefix.parent.mkdir(parents=True, exist_ok=True)
+        texts = {".msg": message_text(self)}
+        if self.segments:
+            texts |= {".req": request_text(self), ".res": results_text(self)}
+        files = [prefix.with_name(prefix.name + suffix) for suffix in texts]
+        for path, text in zip(files, texts.values()):
+            path.write_text(text, encoding="utf-8", newline="\n")
+        if self.segments:
+            files.append(prefix.with_name(prefix.name + ".nc"))
+            self.to_dataset().to_netcdf(files[-1], engine="h5netcdf")
+        return files

@@ -1,0 +1,345 @@
+"""Run a deck, by its script or for a given time: ``run_deck``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearmbs.adams.builders.initial import part_states, with_initial_motions
+from gearmbs.adams.builders.mechanism import build_model
+from gearmbs.adams.builders.model import AdamsModel
+from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.commands import Change, Command, Linear, Script, Simulate, Stop, Switch, read_script
+from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.reader import read_deck
+from gearmbs.adams.results.assembly import assembly_of
+from gearmbs.adams.results.record import NEWTON, Segment
+from gearmbs.adams.results.requests import RequestEvaluator
+from gearmbs.adams.results.result import AdamsResult
+from gearmbs.adams.run.script_check import check_linear, check_script, is_sequence
+from gearmbs.adams.run.session import Session, change, output_times, switch
+from gearmbs.dae.analyses.kinematic_analysis import kinematic
+from gearmbs.dae.analyses.modes import Modes
+from gearmbs.dae.analyses.quasi_static import initial_conditions, quasi_static
+from gearmbs.dae.analyses.statics import StaticResult, static_equilibrium
+from gearmbs.dae.equations.expressions import ExpressionError
+from gearmbs.dae.equations.layout import STATE_ALGEBRAIC
+from gearmbs.dae.errors import ModelError
+from gearmbs.dae.results.solution import Solution
+from gearmbs.mechanism.analyses import frozen_friction, linear_modes
+
+DEFAULT_TOLERANCE = 1e-8
+"""Local error where a deck gives no ERROR, tighter than ADAMS's 1e-3 so that results do not depend on it."""
+
+FIRST_STEP = 0.05
+"""ADAMS's default HINIT, in output steps."""
+
+STATIC_TOLERANCE = 1e-10
+"""Unbalanced load allowed at an equilibrium, relative to the heaviest weight or largest load."""
+
+METHODS = {"GSTIFF": "GSTIFF", "WSTIFF": "WSTIFF", "SI2_GSTIFF": "GSTIFF"}
+
+
+def run_deck(
+    adm: str | Path | Deck,
+    acf: str | Path | Script | None = None,
+    out: str | Path | None = None,
+    *,
+    end: float | None = None,
+    steps: int | None = None,
+    dtout: float | None = None,
+    tol: float | None = None,
+    allow_unsupported: bool = False,
+    progress: bool | Callable[[float], None] = False,
+) -> AdamsResult:
+    """Run an ADAMS deck.
+
+    Parameters
+    ----------
+    adm : path or Deck
+        The model.
+    acf : path or Script, optional
+        Commands; without them one dynamic analysis is run up to ``end``.
+    out : path, optional
+        Prefix of the files to write (.req, .res, .msg, .nc).
+    end : float, optional
+        End time in the deck's unit, when there is no script.
+    steps, dtout : int or float, optional
+        Number of output steps or their size in the deck's unit; default 100 steps.
+    tol : float, optional
+        Local error instead of INTEGRATOR's ERROR.
+    allow_unsupported : bool
+        Leave out what is not supported instead of refusing to run.
+    progress : bool or callable
+        As in :func:`gearmbs.mechanism.simulate`.
+
+    Returns
+    -------
+    AdamsResult
+        Also when an integration failed: see its ``success`` and ``messages``.
+
+    Raises
+    ------
+    DeckError
+        Naming file and line of what is wrong or not supported. Most of it is found before anything is run; what only
+        a run can tell (a position without equilibrium, for instance) comes with the ``result`` of the commands before,
+        whose files are written.
+    """
+    deck = adm if isinstance(adm, Deck) else read_deck(adm)
+    script = _script(acf, end, steps, dtout)
+    if script.unsupported and not allow_unsupported:
+        raise DeckError(script.unsupported)
+    result = AdamsResult(deck, script)
+    session = Session.of(deck)
+    command = Command(script.file)
+    try:
+        check_script(deck, script, allow_unsupported)
+        for command in script:
+            if isinstance(command, Stop):
+                break
+            if not _carry_out(command, session, result, tol, allow_unsupported, progress):
+                break
+    except DeckError as error:
+        result.errors.extend(error.diagnostics)
+        error.result = result
+        raise
+    except BaseException as error:
+        message = str(error) or type(error).__name__
+        result.errors.append(Diagnostic(ERROR, message, command.file, command.line))
+        raise
+    finally:
+        # whatever ends a script, what it has computed is kept
+        if out is not None:
+            result.write(out)
+    return result
+
+
+def _carry_out(
+    command: Command,
+    session: Session,
+    result: AdamsResult,
+    tol: float | None,
+    allow_unsupported: bool,
+    progress: bool | Callable[[float], None],
+) -> bool:
+    """Carry out one command of a script; return whether the next may follow."""
+    result.log.append((command, None))
+    if isinstance(command, Change):
+        change(session, command, allow_unsupported)
+    elif isinstance(command, Switch):
+        switch(session, command)
+    elif isinstance(command, Linear):
+        modes = _linear(session, command, allow_unsupported)
+        result.log[-1] = (command, modes)
+    elif isinstance(command, Simulate):
+        segment = _simulate(session, command, tol, allow_unsupported, progress)
+        result.log[-1] = (command, segment)
+        return segment.success
+    return True
+
+
+def _script(acf: str | Path | Script | None, end: float | None, steps: int | None, dtout: float | None) -> Script:
+    if acf is not None and (end, steps, dtout) != (None, None, None):
+        message = "a script has its own end times and steps; give either the script or end, steps and dtout"
+        raise DeckError([Diagnostic(ERROR, message, "", 0)])
+    if isinstance(acf, Script):
+        return acf
+    if acf is not None:
+        return read_script(acf)
+    if end is None:
+        message = "there is no script and no end time; give an .acf file, or end= and steps= (or dtout=)"
+        raise DeckError([Diagnostic(ERROR, message, "", 0)])
+    if not end > 0.0 or (dtout is not None and not dtout > 0.0) or (steps is not None and steps < 1):
+        message = f"end = {end}, steps = {steps}, dtout = {dtout}; they must be positive"
+        raise DeckError([Diagnostic(ERROR, message, "", 0)])
+    if steps is None and dtout is None:
+        steps = 100
+    return Script(commands=[Simulate(kind="DYNAMICS", end=end, steps=steps, dtout=dtout)])
+
+
+def _settings(session: Session, tol: float | None) -> tuple[dict[str, Any], str | None]:
+    """Return the integrator options and a remark when the method is another than asked for."""
+    integrator = session.deck.only(st.Integrator) or st.Integrator()
+    options: dict[str, Any] = {
+        "integrator": "WSTIFF",
+        "formulation": "SI2",
+        "tol": DEFAULT_TOLERANCE,
+        "corrector": "modified",
+    }
+    note = None
+    if integrator.method is not None:
+        options["integrator"] = METHODS.get(integrator.method, "WSTIFF")
+        if integrator.method not in METHODS:
+            note = f"{integrator.method} is not available; WSTIFF is used"
+        elif integrator.formulation is None and integrator.method != "SI2_GSTIFF":
+            options["formulation"] = "I3"
+    if integrator.formulation is not None:
+        options["formulation"] = integrator.formulation
+    if integrator.error is not None:
+        options["tol"] = integrator.error
+    if tol is not None:
+        options["tol"] = tol
+    scale = session.deck.units.time
+    for key, value in (("max_step", integrator.hmax), ("first_step", integrator.hinit), ("min_step", integrator.hmin)):
+        if value is not None:
+            options[key] = scale * value
+    if integrator.maxit is not None:
+        options["max_iterations"] = max(integrator.maxit, 1)
+    if integrator.interpolate is not None:
+        options["interpolate"] = integrator.interpolate in ("ON", "TRUE", "YES")
+    if integrator.kmax is not None:
+        options["max_order"] = min(max(integrator.kmax, 1), 6)
+    if integrator.corrector is not None:
+        options["corrector"] = "modified" if integrator.corrector.startswith("MOD") else "original"
+    return options, note
+
+
+def _simulate(
+    session: Session,
+    command: Simulate,
+    tol: float | None,
+    allow_unsupported: bool,
+    progress: bool | Callable[[float], None],
+) -> Segment:
+    """Carry out one SIMULATE."""
+    kind = command.kind or "DYNAMICS"
+    if kind in ("DISPLACEMENT", "VELOCITY", "ACCELERATION"):
+        # parts of the analysis of initial conditions, which is always done to the end
+        kind = "INITIAL_CONDITIONS"
+    times = output_times(session, command) if is_sequence(command) else np.array([session.time])
+    model = None
+    try:
+        model = _model(session, allow_unsupported, (session.time, float(times[-1])))
+        options, note = _settings(session, tol)
+        if kind == "STATICS":
+            note = _frozen(session, model)
+        solution, equilibrium = _solve(session, command, kind, model, times, options, progress)
+    except (ModelError, ArithmeticError) as error:
+        raise _failed(session, command, model, error) from error
+    evaluator = RequestEvaluator(model, solution)
+    segment = Segment(command, kind, model, solution, options, note, equilibrium=equilibrium)
+    if kind != "STATICS":
+        segment.assembly = assembly_of(model, solution)
+    for request in session.deck.of(st.Request).values():
+        try:
+            segment.requests[request.id] = evaluator.request(request)
+        except ExpressionError as error:
+            raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, request.line)]) from error
+    for kind_id in model.pairs:
+        segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
+    _remember(session, model, segment, evaluator)
+    return segment
+
+
+def _frozen(session: Session, model: AdamsModel) -> str | None:
+    """Return a remark on friction in a static analysis, unless the deck itself leaves it out there."""
+    active = [f for f in session.deck.of(st.Friction).values() if ("friction", f.id) in model.names]
+    return frozen_friction(model.mechanism) if any(f.inactive != "STATIC" for f in active) else None
+
+
+def _solve(
+    session: Session,
+    command: Simulate,
+    kind: str,
+    model: AdamsModel,
+    times: np.ndarray,
+    options: dict[str, Any],
+    progress: bool | Callable[[float], None],
+) -> tuple[Solution, StaticResult | None]:
+    """Solve one analysis at the output times, given in the deck's unit; of a single equilibrium return it, too."""
+    scale = session.deck.units.time
+    times = times * scale
+    options_without = {"integrator": NEWTON, "formulation": "I3"}
+    if kind == "INITIAL_CONDITIONS":
+        options.update(options_without)
+        return initial_conditions(model.mechanism.compile(float(times[0]))), None
+    if kind == "STATICS":
+        options.update(options_without, tol=STATIC_TOLERANCE)
+        system = model.mechanism.compile(float(times[0]))
+        if times.size > 1:
+            return quasi_static(system, times, tol=STATIC_TOLERANCE), None
+        equilibrium = static_equilibrium(system, tol=STATIC_TOLERANCE)
+        return equilibrium.solution, equilibrium
+    if kind == "KINEMATICS":
+        system = model.mechanism.compile(float(times[0]))
+        report = system.initialise()
+        if report.degrees_of_freedom > 0:
+            message = f"a kinematic analysis needs zero degrees of freedom; the model has {report.degrees_of_freedom}"
+            raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
+        if all(k == STATE_ALGEBRAIC for k, _ in system.builder.states):
+            options.update(options_without)
+            return kinematic(system, times), None
+    output_step = float(times[1] - times[0])
+    options.setdefault("first_step", FIRST_STEP * output_step)
+    options.setdefault("max_step", output_step)
+    solution = model.mechanism.simulate(
+        float(times[-1]), t_start=session.time * scale, t_eval=times, progress=progress, **options
+    )
+    return solution, None
+
+
+def _linear(session: Session, command: Linear, allow_unsupported: bool) -> Modes:
+    """Carry out LINEAR/EIGENSOL at the present position."""
+    check_linear(command)
+    model = None
+    try:
+        model = _model(session, allow_unsupported, (session.time, session.time))
+        return linear_modes(model.mechanism, t=session.time * session.deck.units.time)
+    except (ModelError, ArithmeticError) as error:
+        raise _failed(session, command, model, error) from error
+
+
+def _failed(session: Session, command: Command, model: AdamsModel | None, error: Exception) -> DeckError:
+    """Return an error with the line of the statement it names and the command it happened in."""
+    text = str(error)
+    where = f" (in {command.file}:{command.line})" if command.line else ""
+    return DeckError([Diagnostic(ERROR, text + where, session.deck.file, _line(model, text))])
+
+
+def _line(model: AdamsModel | None, message: str) -> int:
+    """Return the line of the first statement a message names, 0 when it names none."""
+    sources = model.sources if model is not None else {}
+    places = []
+    for name, statement in sources.items():
+        found = [at for at in (message.find(f"'{name}'"), message.find(f"{name}:")) if at >= 0]
+        if found:
+            places.append((min(found), statement.line))
+    return min(places, default=(0, 0))[1]
+
+
+def _model(session: Session, allow_unsupported: bool, span: tuple[float, float]) -> AdamsModel:
+    """Build the mechanism of the session's present state."""
+    inactive = frozenset(session.inactive)
+    if session.state is None:
+        session.state = {}
+        model = build_model(session.deck, allow_unsupported, inactive, span=span)
+        if not model.initial_motions:
+            return model
+        session.state = with_initial_motions(model)
+    model = build_model(session.deck, allow_unsupported, inactive, session.state, span)
+    model.mechanism.turns.update(session.turns)
+    for number, value in session.states.items():
+        if number in model.mechanism.states:
+            model.mechanism.states[number].start = value
+    return model
+
+
+def _remember(session: Session, model: AdamsModel, segment: Segment, evaluator: RequestEvaluator) -> None:
+    """Keep the final state as the start of the next analysis."""
+    s = segment.solution
+    names = s.system.body_names
+    last = [
+        np.concatenate(
+            [s.com_position(n)[-1], s.orientation(n)[-1].ravel(), s.com_velocity(n)[-1], s.angular_velocity(n)[-1]]
+        )
+        for n in names
+    ]
+    session.state = part_states(model, np.array(last))
+    session.turns = evaluator.turns()
+    for number in model.mechanism.states:
+        session.states[number] = float(evaluator.state(number)[-1])
+    session.time = float(s.t[-1]) / session.deck.units.time

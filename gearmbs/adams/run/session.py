@@ -1,0 +1,137 @@
+"""What a script changes: the deck, which elements act, the state analyses go on from, the time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from gearmbs.adams.builders.model import BodyState
+from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.check import UNSUPPORTED_ARGUMENTS, check
+from gearmbs.adams.parse.commands import Change, Simulate, Switch, apply_change
+from gearmbs.adams.parse.deck import Deck
+
+AT_START: dict[type, frozenset[str]] = {
+    st.Part: frozenset("qg reuler zg xg vx vy vz wx wy wz vm wm exact".split()),
+    st.Joint: frozenset(["ic", "ictran", "icrot"]),
+    st.Motion: frozenset(["icdisp", "icvel"]),
+    st.Diff: frozenset(["ic"]),
+}
+"""Arguments that say how the first analysis starts."""
+
+
+@dataclass
+class Session:
+    """What changes while a script is carried out.
+
+    Attributes
+    ----------
+    deck : Deck
+        As commands have left it.
+    inactive : set of (statement name, id)
+    state, states, turns
+        Where the last analysis ended: parts by id, DIFFs by id, counted angles; ``state`` is None before the first.
+    time : float
+        In the deck's unit.
+    places : dict
+        (statement class, id, argument) -> (file, line) of the command that gave it.
+    """
+
+    deck: Deck
+    inactive: set[tuple[str, int]] = field(default_factory=set)
+    state: dict[int, BodyState] | None = None
+    states: dict[int, float] = field(default_factory=dict)
+    turns: dict[tuple[str, str, str], float] = field(default_factory=dict)
+    time: float = 0.0
+    places: dict[tuple[type, int, str], tuple[str, int]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, deck: Deck) -> Session:
+        """Return the start of a session; what it changes leaves ``deck`` as it is."""
+        return cls(replace(deck, items={kind: dict(group) for kind, group in deck.items.items()}))
+
+
+def unsupported(command: Any, message: str) -> DeckError:
+    """Return the error that a command is not supported."""
+    return DeckError([Diagnostic(UNSUPPORTED, message, command.file, command.line)])
+
+
+def switch(session: Session, command: Switch) -> None:
+    """Activate or deactivate an element.
+
+    Raises
+    ------
+    DeckError
+        If the deck does not have it.
+    """
+    keyword, number = command.element or "", command.id or 0
+    if number not in session.deck.of(st.STATEMENTS[keyword]):
+        label = f"{keyword}/{number}" if number else keyword
+        raise DeckError([Diagnostic(ERROR, f"there is no {label} in the deck", command.file, command.line)])
+    (session.inactive.discard if command.on else session.inactive.add)((keyword, number))
+
+
+def change(session: Session, command: Change, allow_unsupported: bool) -> None:
+    """Put a command's arguments into the session's deck.
+
+    Raises
+    ------
+    DeckError
+        If there is nothing to change, or the deck does not hold together with the new arguments.
+    """
+    new = command.statement
+    assert new is not None
+    late = AT_START.get(type(new), frozenset()) & set(new.given)
+    if late and session.state is not None and not allow_unsupported:
+        what = ", ".join(sorted(name.upper() for name in late))
+        raise unsupported(
+            command,
+            f"{new.label()}: {what} after the first analysis; the mechanism goes on from where it is",
+        )
+    refused = [n for n in UNSUPPORTED_ARGUMENTS.get(type(new), ()) if n in new.given]
+    if refused and not allow_unsupported:
+        raise unsupported(command, f"{new.label()}: {', '.join(refused).upper()} is not supported")
+    group = session.deck.items.setdefault(type(new), {})
+    old = group.get(new.id)
+    if old is None:
+        if new.id:
+            message = f"there is no {new.label()} to change"
+            raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
+        group[0] = new
+    else:
+        group[new.id] = apply_change(old, new)
+    session.deck.__dict__.pop("units", None)
+    trial = replace(session.deck, diagnostics=[])
+    wrong = check(trial)
+    if wrong:
+        # the deck stays as it was
+        if old is None:
+            del group[new.id]
+        else:
+            group[new.id] = old
+        session.deck.__dict__.pop("units", None)
+        raise DeckError([Diagnostic(d.severity, d.message, command.file, command.line) for d in wrong])
+    session.places.update({(type(new), new.id, name): (command.file, line) for name, line in new.given.items()})
+
+
+def output_times(session: Session, command: Simulate) -> np.ndarray:
+    """Return the output times in the deck's unit.
+
+    Raises
+    ------
+    DeckError
+        If the analysis would end before it starts.
+    """
+    end = command.end if command.end is not None else session.time + (command.duration or 0.0)
+    if not end > session.time:
+        message = f"END = {end}, but the model is at time {session.time} already"
+        raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
+    span = end - session.time
+    if command.dtout is None:
+        return session.time + span * np.arange((command.steps or 100) + 1) / (command.steps or 100)
+    count = int(np.floor(span / command.dtout * (1.0 + 1e-12) + 1e-9))
+    times = session.time + command.dtout * np.arange(count + 1)
+    return times if end - times[-1] < 1e-9 * command.dtout else np.append(times, end)

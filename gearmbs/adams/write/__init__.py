@@ -1,0 +1,1 @@
+"""A mechanism to a deck (.adm)."""

@@ -1,0 +1,164 @@
+"""Elements that keep their statement in a deck: SPRINGDAMPER, BUSHING, FIELD, BEAM, FRICTION.
+
+A mechanism holds all loads as expressions; what they were made from stands beside them (``Load.parameters``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gearmbs.adams.write.context import WriterContext
+from gearmbs.adams.write.text import listed, number
+from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.elements import LINE, Load
+from gearmbs.mechanism.friction import INPUTS, JointFriction
+from gearmbs.mechanism.joints import Joint
+
+KEYWORDS = {
+    "springdamper": "SPRINGDAMPER", "bushing": "BUSHING", "field": "FIELD", "beam": "BEAM", "friction": "FRICTION",
+}  # fmt: skip
+MATTERS: dict[str, dict[str, str | None]] = {
+    "revolute": {"reaction_force": None, "bending_moment": "bending_arm"},
+    "universal": {"reaction_force": None, "bending_moment": "bending_arm"},
+    "translational": {"reaction_force": None, "bending_moment": "overlap", "torsional_moment": "reaction_arm"},
+    "cylindrical": {"reaction_force": None, "bending_moment": "overlap"},
+    "spherical": {"reaction_force": None},
+}
+"""What presses the surfaces of a joint together, with the length that must not be zero for it."""
+LENGTHS = {
+    "pin_radius": "PIN_RADIUS", "friction_arm": "FRICTION_ARM", "bending_arm": "BENDING_REACTION_ARM",
+    "reaction_arm": "REACTION_ARM", "overlap": "INITIAL_OVERLAP", "ball_radius": "BALL_RADIUS",
+}  # fmt: skip
+LENGTHS_OF = {
+    "revolute": ("pin_radius", "friction_arm", "bending_arm"),
+    "universal": ("pin_radius", "friction_arm", "bending_arm"),
+    "translational": ("reaction_arm", "overlap"),
+    "cylindrical": ("pin_radius", "overlap"),
+    "spherical": ("ball_radius",),
+}
+
+
+def kept(mechanism: Mechanism) -> dict[str, str]:
+    """Return the loads that keep their statement: name -> kind."""
+    found = {}
+    for name, load in mechanism.elements.items():
+        if isinstance(load, Load) and load.parameters is not None and load.kind in KEYWORDS and load.rm is load.j:
+            if load.kind != "friction" or not _used_elsewhere(mechanism, name, load):
+                found[name] = load.kind
+    return found
+
+
+def hidden(mechanism: Mechanism) -> set[str]:
+    """Return the names, in capitals, of the variables and states that FRICTION statements stand for."""
+    keys: set[str] = set()
+    for name, kind in kept(mechanism).items():
+        if kind == "friction":
+            keys |= {key.upper() for key in _parameters(mechanism.elements[name])["keys"]}
+    return keys
+
+
+def element_arguments(writer: WriterContext, load: Load) -> list[str]:
+    """Return the arguments of the statement a load was made from, numbers in the mechanism's units."""
+    p = _parameters(load)
+    if load.kind == "friction":
+        return _friction(writer, p["joint"], p["friction"])
+    ends = [f"I = {writer.markers[id(load.i)]}", f"J = {writer.markers[id(load.j)]}"]
+    if load.kind == "springdamper":
+        return [*_spring(load, p)[:1], *ends, *_spring(load, p)[1:]]
+    return [*ends, *{"bushing": _bushing, "field": _field, "beam": _beam}[load.kind](p)]
+
+
+def _parameters(load: Any) -> Mapping[str, Any]:
+    return load.parameters or {}
+
+
+def _used_elsewhere(mechanism: Mechanism, name: str, load: Load) -> bool:
+    """Whether other expressions use the variables of a friction, so that they must be written."""
+    keys = {key.upper() for key in _parameters(load)["keys"]}
+    texts = [str(text) for key, text in mechanism.variables.items() if str(key).upper() not in keys]
+    texts += [state.expression for key, state in mechanism.states.items() if str(key).upper() not in keys]
+    texts += mechanism.constraints.values()
+    for other, element in mechanism.elements.items():
+        if other != name and isinstance(element, Load):
+            texts += [text for text in element.expressions if text]
+    used = "\n".join(texts).upper()
+    return any(key in used for key in keys)
+
+
+def _spring(load: Load, p: Mapping[str, Any]) -> list[str]:
+    if load.mode == LINE:
+        words = {"K": "stiffness", "C": "damping", "LENGTH": "length", "FORCE": "preload"}
+        return ["TRANSLATIONAL", *(f"{w} = {number(p[key])}" for w, key in words.items())]
+    words = {"KT": "stiffness", "CT": "damping", "ANGLE": "angle", "TORQUE": "preload"}
+    return ["ROTATIONAL", *(f"{w} = {number(p[key])}" for w, key in words.items())]
+
+
+def _bushing(p: Mapping[str, Any]) -> list[str]:
+    words = {"K": "stiffness", "KT": "torsional_stiffness", "C": "damping", "CT": "torsional_damping"}
+    out = [f"{w} = {listed(p[key])}" for w, key in words.items()]
+    preload = p.get("preload")
+    if preload is not None and np.any(preload):
+        out += [f"FORCE = {listed(preload[:3])}", f"TORQUE = {listed(preload[3:])}"]
+    return out
+
+
+def _field(p: Mapping[str, Any]) -> list[str]:
+    """A FIELD's matrices stand by columns."""
+    out = [f"KMATRIX = {listed(np.asarray(p['stiffness']).T.ravel())}"]
+    if np.any(p["damping"]):
+        out.append(f"CMATRIX = {listed(np.asarray(p['damping']).T.ravel())}")
+    return [*out, f"LENGTH = {listed(p['free'])}", f"FORCE = {listed(p['preload'])}"]
+
+
+def _beam(p: Mapping[str, Any]) -> list[str]:
+    out = [f"{w} = {number(p[key])}" for w, key in (("LENGTH", "length"), ("AREA", "area"))]
+    out += [f"{w} = {number(v)}" for w, v in zip(("IXX", "IYY", "IZZ"), p["second_moments"])]
+    out += [f"{w} = {number(v)}" for w, v in zip(("ASY", "ASZ"), p["shear_ratios"])]
+    out += [f"EMODULUS = {number(p['modulus'])}", f"GMODULUS = {number(p['shear_modulus'])}"]
+    damping = p.get("damping")
+    if damping is None:
+        return [*out, f"CRATIO = {number(p['damping_ratio'])}"]
+    # the lower triangle by columns is the upper one by rows
+    return [*out, f"CMATRIX = {listed(damping[np.triu_indices(6)])}"]
+
+
+def _friction(writer: WriterContext, joint: Joint, f: JointFriction) -> list[str]:
+    inputs = [i for i in INPUTS if i in f.inputs and _matters(joint, f, i)]
+    out = [
+        f"JOINT = {writer.elements['joint', joint.name]}",
+        f"MU_STATIC = {number(f.mu_static)}",
+        f"MU_DYNAMIC = {number(f.mu_dynamic)}",
+        f"STICTION_TRANSITION_VELOCITY = {number(f.stiction_transition_velocity)}",
+        f"MAX_STICTION_DEFORMATION = {number(f.max_stiction_deformation)}",
+        f"EFFECT = {f.effect.upper()}",
+        f"INPUTS = {':'.join(i.upper() for i in inputs) or 'NONE'}",
+    ]
+    if joint.kind in ("translational", "cylindrical"):
+        out.append(f"FRICTION_FORCE_PRELOAD = {number(f.preload_force)}")
+    if joint.kind != "translational":
+        out.append(f"FRICTION_TORQUE_PRELOAD = {number(f.preload_torque)}")
+    for field in LENGTHS_OF[joint.kind]:
+        value = getattr(f, field)
+        if value > 0.0 or field == "friction_arm":
+            out.append(f"{LENGTHS[field]} = {number(value)}")
+    if joint.kind in ("translational", "cylindrical"):
+        out.append(f"OVERLAP_DELTA = {f.overlap_change.upper()}")
+    if joint.kind == "universal":
+        out.append(f"YOKE = {f.yoke.upper()}_YOKE")
+    for word, most in (("MAX_FRICTION_FORCE", f.max_force), ("MAX_FRICTION_TORQUE", f.max_torque)):
+        if most is not None:
+            out.append(f"{word} = {number(most)}")
+    return out
+
+
+def _matters(joint: Joint, f: JointFriction, item: str) -> bool:
+    """Whether an input has an effect on the joint: a length of zero switches a moment off."""
+    if item == "preload":
+        return True
+    if item not in MATTERS[joint.kind]:
+        return False
+    length = MATTERS[joint.kind][item]
+    return length is None or getattr(f, length) > 0.0
