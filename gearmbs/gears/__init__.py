@@ -9,6 +9,7 @@ from gearmbs.gears.pair import GearPair, Placement
 from gearmbs.gears.spec import GearSpec, Material, involute
 
 if TYPE_CHECKING:
+    from gearmbs.gears.contact_element import GearContact
     from gearmbs.gears.transmission import (
         TransmissionError,
         kinematic_transmission_error,
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ContactLaw",
     "FlankFriction",
+    "GearContact",
     "GearPair",
     "GearSpec",
     "Material",
@@ -33,6 +35,7 @@ __all__ = [
 __getattr__ = late(
     __name__,
     {
+        "GearContact": "gearmbs.gears.contact_element",
         "TransmissionError": "gearmbs.gears.transmission",
         "kinematic_transmission_error": "gearmbs.gears.transmission",
         "loaded_transmission_error": "gearmbs.gears.transmission",

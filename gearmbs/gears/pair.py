@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -15,6 +15,10 @@ from gearmbs.gears.spec import GearSpec, convert_fields, involute, require
 from gearmbs.gears.stiffness import iso_mesh_stiffness, iso_single_stiffness, pair_stiffness
 from gearmbs.gears.tables import compliance_roll_lengths, pack
 from gearmbs.units import Quantity
+
+if TYPE_CHECKING:
+    from gearmbs.gears.contact_element import GearContact
+    from gearmbs.mechanism.parts import Marker
 
 TILTED_SLICES = 11
 FAULTY_SLICES = 41
@@ -434,6 +438,20 @@ class GearPair:
             Length of the scratch array ``gear_contact`` needs.
         """
         return pack(self, self.face_slices if slices is None else slices)
+
+    def contact_element(self, name: str, i: Marker, j: Marker) -> GearContact:
+        """Return the contact of this pair as a force element between the frames of the driver and the driven wheel.
+
+        Raises
+        ------
+        ModelError
+            If the wheels stand in each other. Wheels out of reach give a warning.
+        """
+        from gearmbs.gears.contact_element import GearContact
+
+        element = GearContact(name, i, j, self)
+        element.check()
+        return element
 
     def frames(self, driver_angle: float, driven_angle: float) -> Placement:
         """Frames with the wheels turned by these angles about their own axes from tooth 0 on global x (rad)."""

@@ -4,7 +4,7 @@ import gearmbs._announce
 import gearmbs.mechanism.expression  # noqa: F401  (first, so that the function of that name below takes its place)
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
 from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
-from gearmbs.mechanism.elements import GearContact, Load, State, Torque
+from gearmbs.mechanism.elements import Compiled, ForceElement, Load, State, Torque
 from gearmbs.mechanism.friction import JointFriction
 from gearmbs.mechanism.functions import TimeFunction, constant, expression, harmonic, polynomial, ramp, step
 from gearmbs.mechanism.joints import Joint
@@ -15,7 +15,8 @@ from gearmbs.mechanism.simulate import simulate
 __all__ = [
     "AssemblyError",
     "Body",
-    "GearContact",
+    "Compiled",
+    "ForceElement",
     "Joint",
     "JointFriction",
     "Load",

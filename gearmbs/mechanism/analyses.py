@@ -86,7 +86,8 @@ def place(mechanism: Mechanism, equilibrium: StaticResult) -> None:
         body.position = row[0:3] - axes @ body.com
         body.velocity, body.angular_velocity = np.zeros(3), np.zeros(3)
     states = equilibrium.solution.result.y[0]
-    for value, state in zip(states[states.size - len(mechanism.states) :], mechanism.states.values()):
+    own = mechanism.every_state
+    for value, state in zip(states[states.size - len(own) :], own):
         state.start = float(value)
 
 

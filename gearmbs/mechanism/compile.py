@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.dae.equations import constraint_terms as terms
-from gearmbs.dae.equations import forces as force_kinds
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations import time_functions
 from gearmbs.dae.equations.builder import TableBuilder
+from gearmbs.dae.equations.counted_angles import AXES as COUNTED
 from gearmbs.dae.equations.expressions import ExpressionError, Tape
 from gearmbs.dae.equations.expressions.tape import LEVEL_ACCELERATION, LEVEL_TIME
-from gearmbs.dae.equations.reactions import REACTION
 from gearmbs.dae.equations.unknowns import I3, Counts, offsets
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.model.system import System
 from gearmbs.mechanism import elements as el
 from gearmbs.mechanism import joints as jt
-from gearmbs.mechanism.elements import GearContact, Load, Torque
+from gearmbs.mechanism.elements import ForceElement, Load, State
 from gearmbs.mechanism.expression import Scope, compile_expression
 from gearmbs.mechanism.functions import TimeFunction
 from gearmbs.mechanism.parts import Body, Marker
@@ -72,6 +71,7 @@ class _Compiler:
         self.marker_index: dict[int, int] = {}
         self.marker_names: list[str] = []
         self.row_names: list[str] = []
+        self.force_names: list[str] = []
         self._scope: Scope | None = None
 
     def run(self, t0: float) -> System:
@@ -91,19 +91,23 @@ class _Compiler:
                 )
             self.builder.add_tape_row(self.add_tape(tape))
             self.row_names.append(f"{name}: expression")
+        # the states given by expressions come first among the unknowns; their tapes are added with all else known
+        self.builder.states = [(_state_kind(state), -1) for state in m.states.values()]
         for element in m.elements.values():
             self.add_element(element)
         for name in self.measured:
             self.add_reaction(m.joints[name])
+        kinds: list[tuple[int, int]] = []
         for state in m.states.values():
             tape = self.tape(state.expression, f"state '{state.name}'", "number")
-            self.builder.add_state(T.STATE_ALGEBRAIC if state.algebraic else T.STATE_DIFFERENTIAL, self.add_tape(tape))
-        elements = [*m.elements, *(f"reaction of {name}" for name in self.measured)]
+            kinds.append((_state_kind(state), self.add_tape(tape)))
+        self.builder.states[: len(kinds)] = kinds
+        elements = [*self.force_names, *(f"reaction of {name}" for name in self.measured)]
         system = System(self.builder, pose, list(m.bodies), self.row_names, elements, t0)
         system.mechanism = m
         system.marker_index = self.marker_index
-        system.state_names = [str(s) for s in m.states]
-        system.state_start = np.array([s.start for s in m.states.values()])
+        system.state_names = m.state_names
+        system.state_start = np.array([s.start for s in m.every_state], dtype=float)
         return system
 
     # --- bodies and markers -------------------------------------------------------------------------
@@ -183,7 +187,7 @@ class _Compiler:
                     forces[(kind, _upper(joint.name))] = (joint.i.name.upper(), joint.j.name.upper())
             absent: set[tuple[str, int | str, int]] = set()
             for load in m.elements.values():
-                if isinstance(load, Load):
+                if load.j is not None and load.wrenches == 1:
                     forces[(load.kind, _upper(load.name))] = (load.i.name.upper(), load.j.name.upper())
                     for base, there in ((0, load.has_force), (3, load.has_torque)):
                         if not there:
@@ -193,7 +197,10 @@ class _Compiler:
                 marker_body=tuple(self.builder.marker_body),
                 variables={_upper(k): v for k, v in m.variables.items()},
                 states=frozenset(_upper(k) for k, s in m.states.items() if s.algebraic),
-                diffs={_upper(k): s.expression for k, s in m.states.items() if not s.algebraic},
+                diffs={
+                    **{_upper(k): s.expression for k, s in m.states.items() if not s.algebraic},
+                    **{_upper(s.name): None for s in m.every_state[len(m.states) :] if not s.algebraic},
+                },
                 splines={_upper(k): v for k, v in m.splines.items()},
                 arrays={_upper(k): v for k, v in m.arrays.items()},
                 plants={(kind, _upper(k)): v for (kind, k), v in m.plants.items()},
@@ -218,20 +225,20 @@ class _Compiler:
         m = self.mechanism
         at = self.offsets()
         if key[0] in ("diff", "variable"):
-            names = [_upper(k) for k in m.states]
-            if _upper(key[1]) in names:
-                return at["z"] + names.index(_upper(key[1]))
+            names = [name.upper() for name in m.state_names]
+            if str(key[1]).upper() in names:
+                return at["z"] + names.index(str(key[1]).upper())
         n_f, n_n = at["F"], at["N"]
         for element in m.elements.values():
-            force, torque = _blocks(element)
-            if isinstance(element, Load) and (element.kind, _upper(element.name)) == (key[0], _upper(key[1])):
+            force, torque = element.has_force, element.has_torque
+            if (element.kind, _upper(element.name)) == (key[0], _upper(key[1])):
                 component = key[2]
                 if component < 3 and force:
                     return n_f + component
                 if 3 <= component < 6 and torque:
                     return n_n + component - 3
-            n_f += 3 * force
-            n_n += 3 * torque
+            n_f += 3 * force * element.wrenches
+            n_n += 3 * torque * element.wrenches
         if key[0] in REACTION_KEYS:
             name = next((n for n in m.joints if _upper(n) == _upper(key[1])), None)
             if name in self.measured:
@@ -249,50 +256,50 @@ class _Compiler:
     def offsets(self) -> dict[str, int]:
         """Offsets of the blocks of y; the numbers of rows, elements and states are known before they are added."""
         m = self.mechanism
-        blocks = [_blocks(element) for element in m.elements.values()]
         counts = Counts(
             modes=tuple(self.builder.modes[1:]),
             rows=sum(len(j.rows) for j in m.joints.values()) + len(m.constraints),
-            forces=sum(force for force, _ in blocks) + len(self.measured),
-            torques=sum(torque for _, torque in blocks) + len(self.measured),
-            states=len(m.states),
+            forces=sum(e.wrenches * e.has_force for e in m.elements.values()) + len(self.measured),
+            torques=sum(e.wrenches * e.has_torque for e in m.elements.values()) + len(self.measured),
+            states=len(m.every_state),
         )
         return offsets(counts, I3)
 
     # --- force elements -----------------------------------------------------------------------------
 
-    def add_element(self, element) -> None:
-        i, j = self.index(element.i), self.index(element.j)
-        bi, bj = self.body_index[id(element.i.body)], self.body_index[id(element.j.body)]
-        if isinstance(element, Torque):
-            function = self.function(element.function, f"torque '{element.name}'")
-            body = self.body_index[id(element.axis.body)]
-            self.builder.add_force(
-                force_kinds.TORQUE,
-                i,
-                j,
-                force=False,
-                torque=True,
-                rm=self.index(element.axis),
-                function=function,
-                bodies=[body],
-            )
-        elif isinstance(element, GearContact):
-            integers, reals, work = element.pair.contact_tables()
-            self.builder.add_force(
-                force_kinds.GEAR_CONTACT,
-                i,
-                j,
-                force=True,
-                torque=True,
-                extra=self.builder.add_extra(integers, reals),
-                work=36 + work,
-                bodies=[bi, bj],
-            )
-        elif isinstance(element, Load):
-            self.add_load(element, i, j)
-        else:
+    def add_element(self, element: ForceElement | Load) -> None:
+        """Add a force element by its own tables, or a load by its expressions."""
+        self.force_names.append(element.name)
+        if isinstance(element, Load):
+            self.add_load(element)
+            return
+        if not isinstance(element, ForceElement):
             raise ModelError(f"force element {element!r}: its type is unknown to the mechanism")
+        self.force_names += [f"{element.name}[{k}]" for k in range(1, element.wrenches)]
+        made = element.compiled()
+        label = f"{element.kind} '{element.name}'"
+        turns = self.mechanism.turns
+        self.builder.add_element(
+            made.kernel,
+            [self.index(m) for m in element.markers],
+            sees=None if made.sees is None else [self.index(m) for m in made.sees],
+            force=element.has_force,
+            torque=element.has_torque,
+            integers=made.integers,
+            reals=made.reals,
+            functions=made.functions,
+            states=[_state_kind(state) for state in element.states],
+            unknowns=[self.unknown(("joint", name, c), label) for name in made.reactions for c in range(6)],
+            times=[self.function(function, label) for function in made.times],
+            angles=[
+                self.builder.add_angle(
+                    axis, self.index(i), self.index(j), turns.get((COUNTED[axis], i.name, j.name), 0.0)
+                )
+                for axis, i, j in made.angles
+            ],
+            scratch=made.scratch,
+            diagnostics=element.diagnostics,
+        )
 
     def add_reaction(self, joint: jt.Joint) -> None:
         """Make the force and moment of a joint on its I marker's body unknowns."""
@@ -301,7 +308,7 @@ class _Compiler:
         first = self.offsets()["lambda"] + before
         bodies = {self.body_index[id(m.body)] for row in joint.rows for t in row.terms for m in (t.i, t.j)} - {0}
         self.builder.add_force(
-            REACTION,
+            T.REACTION,
             self.index(joint.i),
             self.index(joint.j),
             force=True,
@@ -310,7 +317,7 @@ class _Compiler:
             unknowns=list(range(first, first + len(joint.rows))),
         )
 
-    def add_load(self, load: Load, i: int, j: int) -> None:
+    def add_load(self, load: Load) -> None:
         label = f"{load.kind} '{load.name}'"
         numbers: list[int] = []
         bodies: list[int] = []
@@ -324,14 +331,14 @@ class _Compiler:
             tape = self.tape(text, label, "torque" if torque else "force")
             numbers.append(self.add_tape(tape))
             bodies.extend(tape.bodies)
-            *_, at, n_bodies, n_unknowns = self.builder.tape_rows[-1]
+            at, n_bodies, n_unknowns = self.builder.tape_rows[-1][T.TAPE_BODIES : T.TAPE_ADDRESS]
             unknowns.extend(self.builder.extra_i[at + n_bodies : at + n_bodies + n_unknowns])
         directions = [load.i, load.j] if load.mode == el.LINE else [load.rm]
         bodies.extend(self.body_index[id(marker.body)] for marker in directions)
         self.builder.add_force(
-            force_kinds.EXPRESSION,
-            i,
-            j,
+            T.EXPRESSION,
+            self.index(load.i),
+            self.index(load.j),
             force=load.has_force,
             torque=load.has_torque,
             extra=self.builder.add_extra([load.mode, *numbers], []),
@@ -351,11 +358,8 @@ def starting_angles(
     return found
 
 
-def _blocks(element) -> tuple[bool, bool]:
-    """Whether the element's force and torque are unknowns."""
-    if isinstance(element, Load):
-        return element.has_force, element.has_torque
-    return isinstance(element, GearContact), True
+def _state_kind(state: State) -> int:
+    return T.STATE_ALGEBRAIC if state.algebraic else T.STATE_DIFFERENTIAL
 
 
 def _upper(name: Any) -> Any:

@@ -2,84 +2,113 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
-from gearmbs.dae.errors import ModelError
+from gearmbs.dae.equations.force_elements import Diagnostic
 from gearmbs.mechanism.functions import TimeFunction
 from gearmbs.mechanism.parts import Marker
 
 
-class ContactTables(Protocol):
-    """What a gear contact needs to know of a gear pair; `gearmbs.gears.GearPair` provides it."""
+@dataclass(frozen=True)
+class Compiled:
+    """What a force element hands to the equations, see `gearmbs.dae.equations.force_elements`.
 
-    def contact_tables(self) -> tuple[np.ndarray, np.ndarray, int]:
-        """Return the packed integers, reals and the scratch size of `gearmbs.contact.gear_contact`."""
-        ...
+    Attributes
+    ----------
+    kernel : compiled function
+        With the signature ``FORCE_SIG``.
+    integers, reals : sequence
+        The element's own tables, SI.
+    functions : tuple of (compiled function, signature)
+        Their addresses go before the integers.
+    sees : tuple of Marker, optional
+        Markers whose frames the kernel is given; default: those on which the element acts.
+    reactions : tuple of str
+        Names of joints whose reactions, F and N on I's body at marker I, are inputs: six each, before ``times``.
+    times : tuple of TimeFunction
+        Functions of time whose values are inputs.
+    angles : tuple of (int, Marker, Marker)
+        Counted angles AX, AY, AZ (0, 1, 2) of one marker about another, whose references are the last inputs.
+    scratch : int
+    """
+
+    kernel: Any
+    integers: Sequence[int] | np.ndarray = ()
+    reals: Sequence[float] | np.ndarray = ()
+    functions: tuple[tuple[Any, Any], ...] = ()
+    sees: tuple[Marker, ...] | None = None
+    reactions: tuple[str, ...] = ()
+    times: tuple[TimeFunction, ...] = ()
+    angles: tuple[tuple[int, Marker, Marker], ...] = ()
+    scratch: int = 0
 
 
 @dataclass(eq=False)
-class Torque:
-    """Torque f(t) about the z axis of marker ``axis`` on I's body, its reaction on J's body."""
+class ForceElement:
+    """A force element with a kernel of its own. A subclass says how it is compiled.
+
+    Attributes
+    ----------
+    name : str
+    i : Marker
+        Marker on whose body F and N act.
+    j : Marker or None
+        Marker whose body takes the reaction; None: the ground does.
+    """
 
     name: str
     i: Marker
-    j: Marker
+    j: Marker | None
+
+    kind: ClassVar[str] = "force"
+    """The element's name in messages and in the function language."""
+    diagnostics: ClassVar[tuple[Diagnostic, ...]] = ()
+    has_force: ClassVar[bool] = True
+    """Whether F is an unknown."""
+    has_torque: ClassVar[bool] = True
+    """Whether N is an unknown."""
+
+    @property
+    def markers(self) -> tuple[Marker, ...]:
+        """Markers on which the element acts."""
+        return (self.i,) if self.j is None else (self.i, self.j)
+
+    @property
+    def wrenches(self) -> int:
+        """How many wrenches it has: one a marker if there are more than two markers, else one."""
+        return len(self.markers) if len(self.markers) > 2 else 1
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The element's own states."""
+        return ()
+
+    def compiled(self) -> Compiled:
+        """Return what is handed to the equations; kernels are imported here."""
+        raise NotImplementedError
+
+
+@dataclass(eq=False, repr=False)
+class Torque(ForceElement):
+    """Torque f(t) about the z axis of marker ``axis`` on I's body, its reaction on J's body."""
+
     axis: Marker
     function: TimeFunction
 
+    kind = "torque"
+    has_force = False
+
+    def compiled(self) -> Compiled:
+        from gearmbs.mechanism.forces.torque_kernel import axis_torque
+
+        return Compiled(axis_torque, sees=(self.axis,), times=(self.function,))
+
     def __repr__(self) -> str:
         return f"Torque({self.name!r}, {self.function} N m on {self.i.body.name!r} about z of {self.axis.name!r})"
-
-
-@dataclass(eq=False)
-class GearContact:
-    """Tooth contact of the wheels whose frames are the markers I and J."""
-
-    name: str
-    i: Marker
-    j: Marker
-    pair: ContactTables
-
-    def __repr__(self) -> str:
-        return f"GearContact({self.name!r}, {self.i.body.name!r} with {self.j.body.name!r})"
-
-
-def check_wheels(contact: GearContact) -> None:
-    """Look at where two wheels stand at the start.
-
-    Raises
-    ------
-    ModelError
-        If they stand in each other: closer than the sum of their base radii.
-
-    Warns
-    -----
-    UserWarning
-        If they are out of each other's reach.
-    """
-    wheels = getattr(contact.pair, "wheels", None)
-    if wheels is None:
-        return
-    axis = contact.i.global_orientation()[:, 2]
-    apart = contact.j.global_position() - contact.i.global_position()
-    distance = float(np.linalg.norm(apart - axis * (axis @ apart)))
-    label = f"gear contact '{contact.name}': the axes are {1e3 * distance:.4g} mm apart"
-    least = sum(wheel.base_radius for wheel in wheels)
-    most = sum(wheel.tip_radius for wheel in wheels)
-    if distance <= least:
-        raise ModelError(
-            f"{label}, less than the sum of the base radii, {1e3 * least:.4g} mm; place the wheels as the pair's "
-            "placement() says"
-        )
-    if distance > most:
-        warnings.warn(
-            f"{label}, more than the tip radii together, {1e3 * most:.4g} mm: the teeth cannot touch", stacklevel=3
-        )
 
 
 LINE, AXIS_FORCE, AXIS_TORQUE, COMPONENTS = 0, 1, 2, 3
@@ -114,6 +143,8 @@ class Load:
     expressions: tuple[str | None, ...]
     parameters: Mapping[str, Any] | None = None
 
+    wrenches: ClassVar[int] = 1
+
     @property
     def has_force(self) -> bool:
         """Whether F is an unknown."""
@@ -131,9 +162,12 @@ class Load:
 
 @dataclass(eq=False)
 class State:
-    """A user-defined state: z' = expression from ``start``, or z = expression when it is algebraic."""
+    """A state: z' = expression from ``start``, or z = expression when it is algebraic.
+
+    That of a force element has no expression: its kernel knows it.
+    """
 
     name: str
-    expression: str
+    expression: str = ""
     start: float = 0.0
     algebraic: bool = False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,7 @@ from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.model.system import System
 from gearmbs.mechanism import joints as jt
-from gearmbs.mechanism.elements import ContactTables, GearContact, Load, State, Torque, check_wheels
+from gearmbs.mechanism.elements import ForceElement, Load, State, Torque
 from gearmbs.mechanism.expression import Units
 from gearmbs.mechanism.friction import add_friction, friction_of
 from gearmbs.mechanism.function_text import integrated
@@ -21,6 +21,16 @@ from gearmbs.mechanism.geometry import Vector, frame_along, vector
 from gearmbs.mechanism.load_methods import Expression, LoadMethods
 from gearmbs.mechanism.parts import Body, Marker, make_body
 from gearmbs.mechanism.quantities import quantity
+
+E = TypeVar("E", bound=ForceElement)
+
+
+class ContactPair(Protocol):
+    """Two wheels that can touch; `gearmbs.gears.GearPair` is one."""
+
+    def contact_element(self, name: str, i: Marker, j: Marker) -> ForceElement:
+        """Return the force element between the wheels' frames."""
+        ...
 
 
 class Mechanism(LoadMethods):
@@ -305,11 +315,9 @@ class Mechanism(LoadMethods):
         self._check_body(f"torque '{name}'", against)
         frame = frame_along(axis, f"torque '{name}': axis")
         other = against.marker_at(marker.global_position(), frame, name=f"{name}.J")
-        element = Torque(name, marker, other, other, as_function(function, "torque", f"torque '{name}'"))
-        self.elements[name] = element
-        return element
+        return self.add(Torque(name, marker, other, other, as_function(function, "torque", f"torque '{name}'")))
 
-    def gear_contact(self, name: str, wheel_1: Body | Marker, wheel_2: Body | Marker, pair: ContactTables):
+    def gear_contact(self, name: str, wheel_1: Body | Marker, wheel_2: Body | Marker, pair: ContactPair):
         """Let the teeth of two wheels touch.
 
         Parameters
@@ -317,7 +325,7 @@ class Mechanism(LoadMethods):
         wheel_1, wheel_2 : Body or Marker
             Wheel frames: origin at mid-face on the axis, z the axis, x through the middle of tooth 0. A body stands
             for its own frame.
-        pair : ContactTables
+        pair : ContactPair
             Usually a :class:`gearmbs.gears.GearPair`.
 
         Raises
@@ -330,9 +338,23 @@ class Mechanism(LoadMethods):
         j = wheel_2 if isinstance(wheel_2, Marker) else wheel_2.marker(name=f"{name}.J")
         for marker in (i, j):
             self._check_body(f"gear contact '{name}'", marker.body)
-        element = GearContact(name, i, j, pair)
-        check_wheels(element)
-        self.elements[name] = element
+        return self.add(pair.contact_element(name, i, j))
+
+    def add(self, element: E) -> E:
+        """Add a force element made elsewhere, of a class derived from `gearmbs.mechanism.elements.ForceElement`.
+
+        Raises
+        ------
+        ModelError
+            If the name is in use, or a marker belongs to another mechanism.
+        """
+        self._check_name(element.name)
+        label = f"{element.kind} '{element.name}'"
+        for marker in element.markers:
+            if not isinstance(marker, Marker):
+                raise ModelError(f"{label}: {marker!r} is not a marker; make one with body.marker(...)")
+            self._check_body(label, marker.body)
+        self.elements[element.name] = element
         return element
 
     def friction(self, name: str, joint: jt.Joint, mu_static: float, mu_dynamic: float, **parameters) -> list[Load]:
@@ -380,6 +402,17 @@ class Mechanism(LoadMethods):
     def array(self, name: str, numbers: npt.ArrayLike) -> None:
         """Name a list of numbers; expressions use them as ARYVAL(name, position), counted from 1."""
         self.arrays[name] = tuple(float(v) for v in np.asarray(numbers, dtype=float).ravel())
+
+    @property
+    def every_state(self) -> list[State]:
+        """All states in their order among the unknowns: those given by expressions, then those of force elements."""
+        own = [state for e in self.elements.values() if isinstance(e, ForceElement) for state in e.states]
+        return [*self.states.values(), *own]
+
+    @property
+    def state_names(self) -> list[str]:
+        """Names of `every_state`; of one given by an expression, that under which expressions know it."""
+        return [*(str(key) for key in self.states), *(state.name for state in self.every_state[len(self.states) :])]
 
     # --- translation into tables ------------------------------------------------------------------
 

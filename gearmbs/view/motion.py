@@ -143,7 +143,7 @@ def chosen_times(t: np.ndarray, start: float | None, stop: float | None, frames:
 
 def gear_contact_of(solution: Solution, element: str | None = None) -> Any:
     """Return the gear contact of a simulated mechanism by name, or its only one."""
-    from gearmbs.mechanism.elements import GearContact
+    from gearmbs.gears.contact_element import GearContact
 
     found = {n: e for n, e in mechanism_of(solution).elements.items() if isinstance(e, GearContact)}
     if element is not None and element not in found:

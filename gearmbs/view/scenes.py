@@ -257,7 +257,7 @@ def _body_parts(mechanism: Mechanism, poses: dict, shapes: Mapping[str, Mesh]) -
 
 def _wheels(mechanism: Mechanism) -> dict[str, tuple]:
     """Return mesh, marker and colour of every body that carries a wheel."""
-    from gearmbs.mechanism.elements import GearContact
+    from gearmbs.gears.contact_element import GearContact
 
     out: dict[str, tuple] = {}
     for element in mechanism.elements.values():
@@ -314,7 +314,7 @@ def _joint_parts(mechanism: Mechanism, solution: Solution | None, chosen: np.nda
 
 
 def _contact_forces(solution: Solution, chosen: np.ndarray) -> list[np.ndarray]:
-    from gearmbs.mechanism.elements import GearContact
+    from gearmbs.gears.contact_element import GearContact
 
     total: list[list[np.ndarray]] = [[] for _ in range(chosen.size)]
     for element in mechanism_of(solution).elements.values():

@@ -11,6 +11,7 @@ from gearmbs.adams.builders.model import AdamsModel, markers_of
 from gearmbs.adams.parse import statements as st
 from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution
 from gearmbs.dae.equations import layout as tables
+from gearmbs.dae.equations.counted_angles import AXES as ANGLE_NAMES
 from gearmbs.dae.equations.expressions import eval_gradient
 from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_R
 from gearmbs.dae.equations.expressions.tape import ExpressionError, Tape
@@ -107,6 +108,8 @@ class RequestEvaluator:
         self._counted: dict[tuple[str, str, str], None] = dict.fromkeys(self._turns)
         for tape in builder.tapes:
             self._note(tape)
+        for axis, i, j, _ in builder.angles:
+            self._counted[ANGLE_NAMES[axis], self._marker_named(i), self._marker_named(j)] = None
         self._wrenches: dict[tuple[str, int], np.ndarray] = {}
 
     def request(self, request: st.Request) -> RequestSeries:
@@ -171,10 +174,9 @@ class RequestEvaluator:
         kind, ref, component = key
         return self.wrench(kind, ref)[:, component]
 
-    def state(self, ref: int) -> np.ndarray:
-        """Return the value of DIFF/ref over time, shape (m,)."""
-        names = [str(s) for s in self.model.mechanism.states]
-        at = int(self.solution.problem.idata[tables.H_Z]) + names.index(str(ref))
+    def state(self, ref: int | str) -> np.ndarray:
+        """Return the value of DIFF/ref, or of a force element's state, over time, shape (m,)."""
+        at = int(self.solution.problem.idata[tables.H_Z]) + self.model.mechanism.state_names.index(str(ref))
         return self.solution.result.y[:, at]
 
     def wrench(self, kind: str, ref: int) -> np.ndarray:

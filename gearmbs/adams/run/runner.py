@@ -322,9 +322,8 @@ def _model(session: Session, allow_unsupported: bool, span: tuple[float, float])
         session.state = with_initial_motions(model)
     model = build_model(session.deck, allow_unsupported, inactive, session.state, span)
     model.mechanism.turns.update(session.turns)
-    for number, value in session.states.items():
-        if number in model.mechanism.states:
-            model.mechanism.states[number].start = value
+    for name, state in zip(model.mechanism.state_names, model.mechanism.every_state):
+        state.start = session.states.get(name, state.start)
     return model
 
 
@@ -340,6 +339,6 @@ def _remember(session: Session, model: AdamsModel, segment: Segment, evaluator: 
     ]
     session.state = part_states(model, np.array(last))
     session.turns = evaluator.turns()
-    for number in model.mechanism.states:
-        session.states[number] = float(evaluator.state(number)[-1])
+    for name in model.mechanism.state_names:
+        session.states[name] = float(evaluator.state(name)[-1])
     session.time = float(s.t[-1]) / session.deck.units.time

@@ -43,7 +43,7 @@ class Session:
     deck: Deck
     inactive: set[tuple[str, int]] = field(default_factory=set)
     state: dict[int, BodyState] | None = None
-    states: dict[int, float] = field(default_factory=dict)
+    states: dict[str, float] = field(default_factory=dict)
     turns: dict[tuple[str, str, str], float] = field(default_factory=dict)
     time: float = 0.0
     places: dict[tuple[type, int, str], tuple[str, int]] = field(default_factory=dict)

@@ -20,7 +20,7 @@ import numpy as np
 
 from gearmbs.adams.write.context import WriterContext
 from gearmbs.dae.errors import ModelError
-from gearmbs.mechanism.elements import GearContact
+from gearmbs.gears.contact_element import GearContact
 
 PARALLEL = 1e-9
 EDGE = 0.01

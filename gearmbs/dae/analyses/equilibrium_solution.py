@@ -10,6 +10,7 @@ import numpy as np
 from gearmbs.dae.analyses.linearised import Instant
 from gearmbs.dae.equations import accelerations
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.counted_angles import AXES
 from gearmbs.dae.model.evaluator import Records
 from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import DAEProblem
@@ -68,13 +69,15 @@ class EquilibriumSolution(Solution):
         return cls(rows, Snapshot.result(message, iterations, rows))
 
     def counted(self, row: int = 0) -> dict[tuple[str, int, int], float]:
-        """Return the counted angles of all expressions at one time, rad, by function and markers I and J."""
+        """Return all counted angles at one time, rad, by function and markers I and J."""
         snapshot, builder = self._rows[row], self.system.builder
         first = int(snapshot.idata[T.H_R_EXTRA])
         found: dict[tuple[str, int, int], float] = {}
         for tape, where in zip(builder.tapes, builder.tape_rows):
             at = first + where[T.TAPE_REFERENCE] + tape.n_angles
             found.update(zip(tape.angles, snapshot.rdata[at : at + tape.n_angles].tolist()))
+        for axis, i, j, at in builder.angles:
+            found[AXES[axis], i, j] = float(snapshot.rdata[first + at + 1])
         return found
 
     def _evaluate(self) -> Records:

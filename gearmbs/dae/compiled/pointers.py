@@ -1,14 +1,15 @@
 """Calls through addresses: kernels compiled apart meet at run time.
 
-Numba compiles everything a function calls into the function's own code. The contact and expression
-kernels are large and are called from several of the equations' kernels, which would make each of them
-large too, and would recompile all of them when one changes. So the equations call them through
-addresses that stand in the header of the tables, put there when the tables are packed in this process.
+Numba compiles everything a function calls into the function's own code. The kernels of force elements and of
+expressions are large and are called from several of the equations' kernels, which would make each of them large too,
+would recompile all of them when one changes, and would load them all for a mechanism that uses none. So the equations
+call them through addresses that stand in the rows of the tables, put there when the tables are packed in this process.
 """
 
 from __future__ import annotations
 
-import importlib
+from functools import cache
+from typing import Any
 
 from numba import types
 from numba.core import cgutils
@@ -20,33 +21,9 @@ IVEC = types.int64[::1]
 F8 = types.float64
 I8 = types.int64
 
-CONTACT, VALUE, GRADIENT, SECOND, TIME, ANGLES, ANGLE_RATES = range(7)
 
-_TABLES = (IVEC, VEC)
-_STATE = (F8, MAT, IVEC, MAT, VEC, VEC)
-
-SIGNATURES = (
-    types.void(IVEC, VEC, VEC, MAT, VEC, VEC, VEC, MAT, VEC, VEC, VEC, MAT, VEC, I8, VEC),
-    F8(*_TABLES, *_STATE, VEC),
-    F8(*_TABLES, *_STATE, VEC, VEC),
-    F8(*_TABLES, *_STATE, VEC, VEC, VEC),
-    types.void(*_TABLES, F8, VEC, VEC),
-    types.void(*_TABLES, *_STATE, VEC),
-    types.void(*_TABLES, *_STATE, VEC, VEC, VEC),
-)
-
-NAMES = (
-    ("gearmbs.contact", "gear_contact"),
-    ("gearmbs.dae.equations.expressions", "eval_value"),
-    ("gearmbs.dae.equations.expressions", "eval_gradient"),
-    ("gearmbs.dae.equations.expressions", "eval_second"),
-    ("gearmbs.dae.equations.expressions", "eval_time"),
-    ("gearmbs.dae.equations.expressions", "update_angles"),
-    ("gearmbs.dae.equations.expressions", "angle_rates"),
-)
-
-
-def _caller(signature):
+def caller(signature: Any) -> Any:
+    """Return what turns an address, in compiled code, into a function of ``signature`` that can be called."""
     function = types.FunctionType(signature)
 
     @intrinsic
@@ -64,20 +41,14 @@ def _caller(signature):
     return function_at
 
 
-contact_at = _caller(SIGNATURES[CONTACT])
-value_at = _caller(SIGNATURES[VALUE])
-gradient_at = _caller(SIGNATURES[GRADIENT])
-second_at = _caller(SIGNATURES[SECOND])
-time_at = _caller(SIGNATURES[TIME])
-angles_at = _caller(SIGNATURES[ANGLES])
-angle_rates_at = _caller(SIGNATURES[ANGLE_RATES])
+@cache
+def address(dispatcher: Any, signature: Any) -> int:
+    """Return the address of a compiled function in this process; the function is kept alive.
 
-
-def addresses() -> list[int]:
-    """Return the addresses of the kernels in this process, in the order of `NAMES`."""
-    out = []
-    for (module, name), signature in zip(NAMES, SIGNATURES):
-        dispatcher = getattr(importlib.import_module(module), name)
-        compiled = dispatcher.overloads[signature.args]
-        out.append(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
-    return out
+    Raises
+    ------
+    KeyError
+        If it was not compiled for ``signature``.
+    """
+    compiled = dispatcher.overloads[signature.args]
+    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)

@@ -16,10 +16,10 @@ from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.forces import TORQUE, element_wrench, torque
+from gearmbs.dae.equations.force_elements import DIAGNOSTICS
+from gearmbs.dae.equations.forces import evaluate_element
 from gearmbs.dae.equations.jacobian import NUMBERS, put
-from gearmbs.dae.equations.reactions import REACTION
-from gearmbs.dae.equations.residual import S_DIAG, S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR, S_WRENCH, arm_to
+from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR, S_WRENCH, arm_to
 from gearmbs.dae.equations.rotation import (
     KIN_A,
     KIN_ADOT,
@@ -39,8 +39,8 @@ from gearmbs.dae.equations.rotation import (
 from gearmbs.dae.equations.simple_terms import dot_motion, point_motion
 from gearmbs.dae.equations.update import inertia_times, update_bodies
 
-"""Per force element: F, N, then eight diagnostics of a contact."""
-FORCE_RECORD = 14
+FORCE_RECORD = 6
+"""Per force element: F, N, then its diagnostics."""
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -150,7 +150,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
     applied forces: enough for a projection.
 
     ``phi`` receives 3 values a row one after the other: Phi, Phi_q v + Phi_t, Phi_t.
-    ``loads[f]`` receives F, N and the diagnostics of force element f.
+    ``loads[f]`` receives F, N and the diagnostics of force element f; it need not be cleared.
     """
     mode = idata[T.H_MODE]
     bodies, rows = idata[T.H_BODIES], idata[T.H_ROWS]
@@ -224,29 +224,30 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
         rhs[base + r] = -gamma
         phi[3 * r], phi[3 * r + 1], phi[3 * r + 2] = value, rate, partial
     if mode == NUMBERS and with_loads != 0:
-        wrench = vector_at(tab.scratch, S_WRENCH, 6)
-        diag = vector_at(tab.scratch, S_DIAG, 8)
         for f in range(idata[T.H_FORCES]):
             row = tab.force[f]
-            width = row[T.FORCE_WIDTH]
-            jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, width)
-            for c in range(8):
-                diag[c] = 0.0
-            if row[T.FORCE_KIND] == REACTION:
+            wrench = vector_at(tab.scratch, S_WRENCH, 6)
+            if row[T.FORCE_KIND] == T.REACTION:
                 # it follows from the multipliers that this system is solved for; the integrator's is at hand
                 for c in range(3):
                     loads[f, c], loads[f, 3 + c] = y[row[T.FORCE_F] + c], y[row[T.FORCE_N] + c]
                 continue
-            if row[T.FORCE_KIND] == TORQUE:
+            if row[T.FORCE_KIND] == T.COMPILED:
+                if row[T.FORCE_PART] == 0:
+                    evaluate_element(row, t, y, tab, np.int64(DIAGNOSTICS))
+                    first = row[T.FORCE_WORK] + 6 * row[T.FORCE_WRENCHES] + row[T.FORCE_STATES]
+                    for c in range(row[T.FORCE_DIAGNOSTICS]):
+                        loads[f, FORCE_RECORD + c] = tab.scratch[first + c]
+                wrench = vector_at(tab.scratch, row[T.FORCE_WORK] + 6 * row[T.FORCE_PART], 6)
                 for c in range(3):
-                    wrench[c] = 0.0
-                torque(row, tab.fval, tab.frame, wrench)
+                    # what the kernel wrote for unknowns that it does not have
+                    wrench[c] = wrench[c] if row[T.FORCE_F] >= 0 else 0.0
+                    wrench[3 + c] = wrench[3 + c] if row[T.FORCE_N] >= 0 else 0.0
             else:
-                element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(0))
+                jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, row[T.FORCE_WIDTH])
+                expression_loads.load(row, t, y, tab, wrench, jac, np.int64(0))
             for c in range(6):
                 loads[f, c] = wrench[c]
-            for c in range(8):
-                loads[f, 6 + c] = diag[c]
             for side in range(2):
                 b = tab.marker_body[row[T.FORCE_I + side]]
                 apply_load(

@@ -14,6 +14,8 @@ from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import ANGLE, dot3, gradient
+from gearmbs.dae.equations.counted_angles import track_element_angles
+from gearmbs.dae.equations.forces import marker_pose
 from gearmbs.dae.equations.rotation import (
     KIN_A,
     KIN_AXES,
@@ -53,7 +55,9 @@ TURN_OF_MATRIX = 0.3
 
 @njit(cache=True, error_model="numpy")
 def counts_angles(tab):
-    """Return whether any constraint or expression counts an angle."""
+    """Return whether any constraint, force element or expression counts an angle."""
+    if tab.angle.shape[0] > 0:
+        return True
     for k in range(tab.tape.shape[0]):
         if tab.tape[k, T.TAPE_REFERENCE_SIZE] > 0:
             return True
@@ -72,6 +76,11 @@ def track(t, y, tab, moving):
     """
     predict_angles(t, tab)
     expression_loads.update_references(t, y, tab, moving)
+    first, second = vector_at(tab.scratch, 0, 18), vector_at(tab.scratch, 18, 18)
+    for k in range(tab.angle.shape[0]):
+        marker_pose(tab.angle[k, T.ANGLE_I], tab.marker_body, tab.kin, tab.frame, first, 0)
+        marker_pose(tab.angle[k, T.ANGLE_J], tab.marker_body, tab.kin, tab.frame, second, 0)
+        track_element_angles(tab.angle[k], tab.extra_r, first, second, vector_at(tab.scratch, 36, 3), moving)
     n = tab.reference.size
     tab.winding[0] = t
     for k in range(n):

@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
-from numba import njit
+from numba import njit, types
 
-from gearmbs.dae.compiled import pointers
-from gearmbs.dae.compiled.pointers import angle_rates_at, angles_at, gradient_at, second_at, value_at
+from gearmbs.dae.compiled.pointers import F8, IVEC, MAT, VEC, address, caller
 from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import layout as T
+
+_TABLES = (IVEC, VEC)
+_STATE = (F8, MAT, IVEC, MAT, VEC, VEC)
+KERNELS = {
+    "eval_value": F8(*_TABLES, *_STATE, VEC),
+    "eval_gradient": F8(*_TABLES, *_STATE, VEC, VEC),
+    "eval_second": F8(*_TABLES, *_STATE, VEC, VEC, VEC),
+    "eval_time": types.void(*_TABLES, F8, VEC, VEC),
+    "update_angles": types.void(*_TABLES, *_STATE, VEC),
+    "angle_rates": types.void(*_TABLES, *_STATE, VEC, VEC, VEC),
+}
+"""Kernels of `gearmbs.dae.equations.expressions` that the equations call, with their signatures."""
+VALUE, GRADIENT, SECOND, TIME, ANGLES, ANGLE_RATES = range(T.TAPE_ADDRESS, T.TAPE_ADDRESS + T.TAPE_KERNELS)
+value_at, gradient_at, second_at, time_at, angles_at, angle_rates_at = (caller(s) for s in KERNELS.values())
+
+
+def addresses() -> list[int]:
+    """Return the addresses of the kernels in this process, which loads them."""
+    from gearmbs.dae.equations.expressions import evaluate
+
+    return [address(getattr(evaluate, name), signature) for name, signature in KERNELS.items()]
+
 
 LINE = 0
 """Force f along the line from J to I."""
@@ -39,7 +60,7 @@ def parts(k, tab):
 def value(k, t, y, tab):
     """Return the value of tape k."""
     ints, floats, ref = parts(k, tab)
-    evaluate = value_at(tab.address[pointers.VALUE])
+    evaluate = value_at(tab.tape[k, VALUE])
     return evaluate(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, tab.tape_work)
 
 
@@ -47,7 +68,7 @@ def value(k, t, y, tab):
 def gradient(k, t, y, tab, grad):
     """Return the value of tape k; write its spatial gradient to ``grad``."""
     ints, floats, ref = parts(k, tab)
-    evaluate = gradient_at(tab.address[pointers.GRADIENT])
+    evaluate = gradient_at(tab.tape[k, GRADIENT])
     return evaluate(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, grad, tab.tape_work)
 
 
@@ -55,7 +76,7 @@ def gradient(k, t, y, tab, grad):
 def second(k, t, y, tab, grad, hess):
     """Return the value of tape k with gradient and Hessian over [R, theta] of its bodies and time."""
     ints, floats, ref = parts(k, tab)
-    evaluate = second_at(tab.address[pointers.SECOND])
+    evaluate = second_at(tab.tape[k, SECOND])
     return evaluate(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, grad, hess, tab.tape_work)
 
 
@@ -76,7 +97,7 @@ def update_references(t, y, tab, moving):
     for k in range(tab.tape.shape[0]):
         if tab.tape[k, T.TAPE_REFERENCE_SIZE] > 0:
             ints, floats, ref = parts(k, tab)
-            update = angles_at(tab.address[pointers.ANGLES])
+            update = angles_at(tab.tape[k, ANGLES])
             update(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, tab.tape_work)
             m = ref.size
             a = tab.tape[k, T.TAPE_REFERENCE] + m
@@ -85,7 +106,7 @@ def update_references(t, y, tab, moving):
             rates[:] = 0.0
             if moving:
                 grad = tail(tab, gradient_size(tab.tape[k]))
-                find = angle_rates_at(tab.address[pointers.ANGLE_RATES])
+                find = angle_rates_at(tab.tape[k, ANGLE_RATES])
                 find(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, rates, grad, tab.tape_work)
 
 
@@ -174,7 +195,16 @@ def line_direction_columns(row, f, ex, ey, ez, length, tab, jac):
 
 @njit(cache=True, error_model="numpy")
 def load(row, t, y, tab, wrench, jac, want_jac):
-    """Fill F and N of an expression element and, if wanted, their derivatives; both start from zero."""
+    """Fill F and N of an expression element and, if wanted, their derivatives.
+
+    The columns of ``jac`` are the 12 variations of each body of the dependency list, then its unknowns.
+    """
+    for c in range(6):
+        wrench[c] = 0.0
+    if want_jac != 0:
+        for r in range(6):
+            for c in range(jac.shape[1]):
+                jac[r, c] = 0.0
     at = row[T.FORCE_IEXTRA] + 2
     mode = tab.extra_i[at + LOAD_MODE]
     if mode == LINE:

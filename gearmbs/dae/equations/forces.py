@@ -1,79 +1,104 @@
-"""Force elements: the forces F and torques N of eq. (5) as functions of positions, velocities and time.
+"""Compiled force elements inside the equations: their kernels are called, their derivatives handed on.
 
-An element acts with force F at the origin of its marker I and torque N on I's body, and with -F at the
-same point and -N on J's body.  F and N are unknowns of eq. (9); their rows are F - F(q, q', t) = 0.
+What a kernel is given and gives is written in `gearmbs.dae.equations.force_elements`.
 """
 
 from __future__ import annotations
 
 from numba import njit
 
-from gearmbs.dae.compiled import pointers
-from gearmbs.dae.compiled.pointers import contact_at
+from gearmbs.dae.compiled.pointers import caller
 from gearmbs.dae.compiled.views import matrix_at, vector_at
-from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3
+from gearmbs.dae.equations.force_elements import (
+    DERIVATIVES,
+    FORCE_SIG,
+    FRAME_A,
+    FRAME_COLUMNS,
+    FRAME_P,
+    FRAME_V,
+    FRAME_W,
+)
 from gearmbs.dae.equations.rotation import KIN_R, KIN_V, KIN_W
 
-TORQUE = 0
-"""Torque f(t) about the z axis of marker RM."""
-GEAR_CONTACT = 1
-EXPRESSION = 2
-"""Components given by expressions, along a line or in the frame of marker RM."""
-
-DIAGNOSTICS = 8
-"""Length of the diagnostics record of a gear contact (see `gearmbs.contact`)."""
+force_at = caller(FORCE_SIG)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def marker_pose(m, marker_body, kin, frame, out):
-    """Write position (3), orientation (3x3 row-major), velocity (3), angular velocity (3) of marker m."""
+def marker_pose(m, marker_body, kin, frame, out, k):
+    """Write the frame of marker m, columns ``FRAME_*``, to ``out[k:]``."""
     row = kin[marker_body[m]]
-    cross3(row, KIN_W, frame[m], T.MK_ARM, out, 12)
+    cross3(row, KIN_W, frame[m], T.MK_ARM, out, k + FRAME_V)
     for c in range(3):
-        out[c] = row[KIN_R + c] + frame[m, T.MK_ARM + c]
+        out[k + FRAME_P + c] = row[KIN_R + c] + frame[m, T.MK_ARM + c]
         for axis in range(3):
-            out[3 + 3 * c + axis] = frame[m, T.MK_AXES + 3 * axis + c]
-        out[12 + c] += row[KIN_V + c]
-        out[15 + c] = row[KIN_W + c]
+            out[k + FRAME_A + 3 * c + axis] = frame[m, T.MK_AXES + 3 * axis + c]
+        out[k + FRAME_V + c] += row[KIN_V + c]
+        out[k + FRAME_W + c] = row[KIN_W + c]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def torque(row, fval, frame, wrench):
-    """Write the torque f(t) z_RM to ``wrench[3:6]``."""
-    f, axis = fval[row[T.FORCE_FUNCTION], 0], frame[row[T.FORCE_RM]]
-    for c in range(3):
-        wrench[3 + c] = f * axis[T.MK_AXES + 6 + c]
+def fill_inputs(row, y, extra_i, extra_r, angle, fval, sees, out, k):
+    """Write the unknowns, functions of time and references of angles that an element asks for to ``out[k:]``."""
+    at = row[T.FORCE_DEPENDS]
+    at += 1 + extra_i[at]
+    for q in range(at + 1 + row[T.FORCE_STATES], at + 1 + extra_i[at]):
+        out[k] = y[extra_i[q]]
+        k += 1
+    for q in range(sees + 1, sees + 1 + extra_i[sees]):
+        out[k] = fval[extra_i[q], 0]
+        k += 1
+    sees += 1 + extra_i[sees]
+    for q in range(sees + 1, sees + 1 + extra_i[sees]):
+        out[k] = extra_r[angle[extra_i[q], T.ANGLE_AT]]
+        k += 1
+    return k
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def contact_wrench(row, tab, wrench, jac, diag, want_jac):
-    """Evaluate a gear contact on the frames of its two markers; columns of ``jac`` are the markers' variations."""
-    i, j = row[T.FORCE_I], row[T.FORCE_J]
-    work = row[T.FORCE_WORK]
-    first, second = vector_at(tab.scratch, work, 18), vector_at(tab.scratch, work + 18, 18)
-    marker_pose(i, tab.marker_body, tab.kin, tab.frame, first)
-    marker_pose(j, tab.marker_body, tab.kin, tab.frame, second)
-    gi0, gr0 = row[T.FORCE_IEXTRA], row[T.FORCE_REXTRA]
-    ni, nr = tab.extra_i[gi0], tab.extra_i[gi0 + 1]
-    contact_at(tab.address[pointers.CONTACT])(
-        vector_at(tab.extra_i, gi0 + 2, ni),
-        vector_at(tab.extra_r, gr0, nr),
-        vector_at(first, 0, 3),
-        matrix_at(first, 3, 3, 3),
-        vector_at(first, 12, 3),
-        vector_at(first, 15, 3),
-        vector_at(second, 0, 3),
-        matrix_at(second, 3, 3, 3),
-        vector_at(second, 12, 3),
-        vector_at(second, 15, 3),
-        wrench,
+def evaluate_element(row, t, y, tab, want):
+    """Call the kernel of a compiled element; ``row`` is that of its first wrench.
+
+    Wrenches, rates and diagnostics are left one after the other in the scratch from ``row[FORCE_WORK]`` on, the
+    derivatives, if wanted, at ``SCRATCH_FIXED``: columns of the bodies' variations, then of the unknowns.
+    """
+    scratch, extra_i = tab.scratch, tab.extra_i
+    rates = row[T.FORCE_WORK] + 6 * row[T.FORCE_WRENCHES]
+    diagnostics = rates + row[T.FORCE_STATES]
+    poses = diagnostics + row[T.FORCE_DIAGNOSTICS]
+    for k in range(row[T.FORCE_WORK], poses):
+        scratch[k] = 0.0
+    sees = row[T.FORCE_SEES]
+    frames = extra_i[sees]
+    for k in range(frames):
+        marker_pose(extra_i[sees + 1 + k], tab.marker_body, tab.kin, tab.frame, scratch, poses + FRAME_COLUMNS * k)
+    inputs = poses + FRAME_COLUMNS * frames
+    end = fill_inputs(row, y, extra_i, tab.extra_r, tab.angle, tab.fval, sees + 1 + frames, scratch, inputs)
+    rows = 6 * row[T.FORCE_WRENCHES] + row[T.FORCE_STATES]
+    width = row[T.FORCE_WIDTH]
+    jac = matrix_at(scratch, T.SCRATCH_FIXED, rows, width)
+    if want & DERIVATIVES:
+        for k in range(T.SCRATCH_FIXED, T.SCRATCH_FIXED + rows * width):
+            scratch[k] = 0.0
+    at = row[T.FORCE_IEXTRA]
+    force_at(row[T.FORCE_ADDRESS])(
+        vector_at(extra_i, at + 2, extra_i[at]),
+        vector_at(tab.extra_r, row[T.FORCE_REXTRA], extra_i[at + 1]),
+        t,
+        matrix_at(scratch, poses, frames, FRAME_COLUMNS),
+        vector_at(y, row[T.FORCE_Z], row[T.FORCE_STATES]),
+        vector_at(scratch, inputs, end - inputs),
+        want,
+        vector_at(scratch, end, scratch.size - end),
+        matrix_at(scratch, row[T.FORCE_WORK], row[T.FORCE_WRENCHES], 6),
+        vector_at(scratch, rates, row[T.FORCE_STATES]),
         jac,
-        diag,
-        want_jac,
-        vector_at(tab.scratch, work + 36, tab.scratch.size - work - 36),
+        vector_at(scratch, diagnostics, row[T.FORCE_DIAGNOSTICS]),
     )
+    if want & DERIVATIVES:
+        for k in range(frames):
+            shift_to_body(extra_i[sees + 1 + k], tab.marker_body, tab.kin, tab.frame, jac, 12 * k)
 
 
 @njit(cache=True, error_model="numpy")
@@ -98,34 +123,3 @@ def shift_to_body(m, marker_body, kin, frame, jac, first):
         jac[r, first + 9] += sy * vz - sz * vy
         jac[r, first + 10] += sz * vx - sx * vz
         jac[r, first + 11] += sx * vy - sy * vx
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def element_wrench(row, t, y, tab, wrench, jac, diag, want_jac):
-    """Fill F in ``wrench[0:3]`` and N in ``wrench[3:6]`` and, if wanted, their derivatives in ``jac``.
-
-    The columns of ``jac`` are the 12 variations of each body the element depends on, in the order of its
-    dependency list, then the unknowns it depends on directly.
-    """
-    kind = row[T.FORCE_KIND]
-    for c in range(6):
-        wrench[c] = 0.0
-    if want_jac != 0:
-        for r in range(6):
-            for c in range(jac.shape[1]):
-                jac[r, c] = 0.0
-    if kind == TORQUE:
-        torque(row, tab.fval, tab.frame, wrench)
-        if want_jac != 0:
-            # d(f z) = f dpi x z
-            zx, zy, zz = wrench[3], wrench[4], wrench[5]
-            jac[3, 4], jac[3, 5] = zz, -zy
-            jac[4, 3], jac[4, 5] = -zz, zx
-            jac[5, 3], jac[5, 4] = zy, -zx
-    elif kind == GEAR_CONTACT:
-        contact_wrench(row, tab, wrench, jac, diag, want_jac)
-        if want_jac != 0:
-            shift_to_body(row[T.FORCE_I], tab.marker_body, tab.kin, tab.frame, jac, 0)
-            shift_to_body(row[T.FORCE_J], tab.marker_body, tab.kin, tab.frame, jac, 12)
-    else:
-        expression_loads.load(row, t, y, tab, wrench, jac, want_jac)

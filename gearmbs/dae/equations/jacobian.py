@@ -13,10 +13,10 @@ from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.forces import element_wrench
-from gearmbs.dae.equations.reactions import REACTION, reaction_wrench
+from gearmbs.dae.equations.force_elements import DERIVATIVES
+from gearmbs.dae.equations.forces import evaluate_element
+from gearmbs.dae.equations.reactions import reaction_wrench
 from gearmbs.dae.equations.residual import (
-    S_DIAG,
     S_GRADIENT,
     S_GRADIENT_T,
     S_HESSIAN,
@@ -315,26 +315,40 @@ def load_entries(mode, b, sign, row, y, tab, slot, vals, k):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k):
-    """Entries of the rows F - F(q, q', t) and N - N(q, q', t) of one force element."""
-    wrench = vector_at(tab.scratch, S_WRENCH, 6)
-    diag = vector_at(tab.scratch, S_DIAG, 8)
+    """Entries of the rows F - F(q, q', t) and N - N(q, q', t) of one force element, and of its own states."""
     width = row[T.FORCE_WIDTH]
-    jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, width)
     depends = row[T.FORCE_DEPENDS]
     bodies = tab.extra_i[depends]
-    if row[T.FORCE_KIND] == REACTION:
-        si1 = idata[T.H_FORMULATION] == SI1
-        source = yp if si1 else y
-        lam = idata[T.H_LAMBDA]
-        room = vector_at(tab.scratch, 0, 64)
-        reaction_wrench(row, source[lam : lam + idata[T.H_ROWS]], lam, tab, room, wrench, jac, np.int64(1))
-        if si1:
-            for c in range(12 * bodies, width):
-                for r in range(6):
-                    jac[r, c] *= cj
+    after = depends + 2 + bodies
+    unknowns = tab.extra_i[after - 1]
+    rows = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, width)
+    if row[T.FORCE_KIND] == T.COMPILED:
+        if row[T.FORCE_PART] == 0:
+            evaluate_element(row, t, y, tab, np.int64(DERIVATIVES))
+            rates = 6 * row[T.FORCE_WRENCHES]
+            own = matrix_at(tab.scratch, T.SCRATCH_FIXED + rates * width, row[T.FORCE_STATES], width)
+            for q in range(row[T.FORCE_STATES]):
+                z = row[T.FORCE_Z] + q
+                kind = tab.state[z - idata[T.H_Z], T.STATE_KIND]
+                k = put(mode, slot, vals, k, z, z, cj if kind == T.STATE_DIFFERENTIAL else 1.0)
+                k = chain_entries(
+                    mode, z, own[q], -1.0, bodies, depends + 1, unknowns, after, tab, slot, vals, k
+                )  # fmt: skip
+        rows = matrix_at(tab.scratch, T.SCRATCH_FIXED + 6 * row[T.FORCE_PART] * width, 6, width)
     else:
-        element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(1))
-    unknowns = tab.extra_i[depends + 1 + bodies]
+        wrench = vector_at(tab.scratch, S_WRENCH, 6)
+        if row[T.FORCE_KIND] == T.REACTION:
+            si1 = idata[T.H_FORMULATION] == SI1
+            source = yp if si1 else y
+            lam = idata[T.H_LAMBDA]
+            room = vector_at(tab.scratch, 0, 64)
+            reaction_wrench(row, source[lam : lam + idata[T.H_ROWS]], lam, tab, room, wrench, rows, np.int64(1))
+            if si1:
+                for c in range(12 * bodies, width):
+                    for r in range(6):
+                        rows[r, c] *= cj
+        else:
+            expression_loads.load(row, t, y, tab, wrench, rows, np.int64(1))
     for block in range(2):
         base = row[T.FORCE_F + block]
         if base < 0:
@@ -342,19 +356,9 @@ def element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k):
         for c in range(3):
             k = put(mode, slot, vals, k, base + c, base + c, 1.0)
             k = chain_entries(
-                mode,
-                base + c,
-                jac[3 * block + c],
-                -1.0,
-                bodies,
-                depends + 1,
-                unknowns,
-                depends + 2 + bodies,
-                tab,
-                slot,
-                vals,
+                mode, base + c, rows[3 * block + c], -1.0, bodies, depends + 1, unknowns, after, tab, slot, vals,
                 k,
-            )
+            )  # fmt: skip
     return k
 
 
@@ -385,12 +389,13 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
             k = tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k)
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]
-        if row[T.FORCE_KIND] != REACTION:
+        if row[T.FORCE_KIND] != T.REACTION:
             k = load_entries(mode, tab.marker_body[row[T.FORCE_I]], 1.0, row, y, tab, slot, vals, k)
             k = load_entries(mode, tab.marker_body[row[T.FORCE_J]], -1.0, row, y, tab, slot, vals, k)
         k = element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k)
     for s in range(idata[T.H_STATES]):
-        k = state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k)
+        if tab.state[s, T.STATE_TAPE] >= 0:
+            k = state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k)
     if mode == COUNT:
         vals[0] = k
 

@@ -65,17 +65,19 @@ H_W_TAPE = 46
 H_W_TAPE_SIZE = 47
 H_MODE = 48
 """What `jacobian` and `saddle` do with the entries: add up numbers, note places, count."""
-H_ADDRESS = 49
-"""Addresses of the kernels called from outside, in the order of `gearmbs.dae.compiled.pointers.NAMES`."""
-N_ADDRESSES = 7
-H_I_AT = 56
+H_ANGLES = 49
+"""Number of the angles that force elements count."""
+H_I_ANGLE = 50
+H_DIAGNOSTICS = 51
+"""Most diagnostics of a force element."""
+H_I_AT = 52
 """The table of the bodies' places among the unknowns, columns ``AT_*``."""
-H_PF = 57
-H_VF = 58
-H_QF = 59
-H_COORDINATES = 60
+H_PF = 53
+H_VF = 54
+H_QF = 55
+H_COORDINATES = 56
 """Number of coordinates: spatial displacements of the bodies, then modal coordinates."""
-H_SIZE = 61
+H_SIZE = 57
 
 AT_U = 0
 """Index in y of a body's first velocity; likewise the next four. Each is the first of three entries."""
@@ -133,13 +135,38 @@ FORCE_N = 4
 FORCE_IEXTRA = 5
 FORCE_REXTRA = 6
 FORCE_RM = 7
-FORCE_FUNCTION = 8
-FORCE_WORK = 9
-FORCE_DEPENDS = 10
+FORCE_WORK = 8
+"""Offset in the scratch of the element's wrenches, rates, diagnostics, frames and inputs, then its own."""
+FORCE_DEPENDS = 9
 """Offset in the extra integers of the dependency list: count and bodies, count and unknowns."""
-FORCE_WIDTH = 11
+FORCE_WIDTH = 10
 """Columns of the element's derivative matrix."""
-FORCE_COLUMNS = 12
+FORCE_ADDRESS = 11
+"""Address of the kernel in this process."""
+FORCE_SEES = 12
+"""Offset in the extra integers of what the kernel sees: count and markers, functions of time, counted angles."""
+FORCE_WRENCHES = 13
+FORCE_PART = 14
+"""Which of the wrenches acts here; the row of the first, 0, goes before those of the others."""
+FORCE_Z = 15
+"""Index in y of the first of the element's own states."""
+FORCE_STATES = 16
+FORCE_DIAGNOSTICS = 17
+FORCE_COLUMNS = 18
+
+COMPILED = 0
+"""Kind of a force element with a kernel of its own, see `gearmbs.dae.equations.force_elements`."""
+EXPRESSION = 1
+"""Components given by expressions, see `gearmbs.dae.equations.expression_loads`."""
+REACTION = 2
+"""What constraint rows exert, see `gearmbs.dae.equations.reactions`."""
+
+ANGLE_AXIS = 0
+ANGLE_I = 1
+ANGLE_J = 2
+ANGLE_AT = 3
+"""Offset in the extra reals of the angle's reference, last value and last rate."""
+ANGLE_COLUMNS = 4
 
 FUNCTION_KIND = 0
 FUNCTION_OFFSET = 1
@@ -156,7 +183,10 @@ TAPE_BODIES = 6
 """Offset in the extra integers of the bodies, then the unknowns, the tape depends on."""
 TAPE_N_BODIES = 7
 TAPE_N_UNKNOWNS = 8
-TAPE_COLUMNS = 9
+TAPE_ADDRESS = 9
+"""Addresses of the kernels that evaluate it, in the order of `gearmbs.dae.equations.expression_loads.KERNELS`."""
+TAPE_KERNELS = 6
+TAPE_COLUMNS = TAPE_ADDRESS + TAPE_KERNELS
 
 STATE_KIND = 0
 STATE_TAPE = 1
@@ -167,11 +197,12 @@ STATE_ALGEBRAIC = 1
 """z = f(...)"""
 
 SCRATCH_FIXED = 512
-"""Scratch for gradients, Hessians and small vectors; then the widest element's derivatives, then the elements' own."""
+"""Scratch for gradients, Hessians and small vectors; then an element's derivatives, then what elements have of their
+own."""
 
 Tables = namedtuple(
     "Tables",
-    "address at code marker_body row term force function extra_i slot state tape "
+    "at code marker_body row term force function extra_i slot state tape angle "
     "gravity body marker coef function_r extra_r reference winding seen kin frame fval scratch tape_work",
 )
 
@@ -193,7 +224,6 @@ def unpack(idata, rdata, work):
     r = rdata
     reference = i[H_R_REFERENCE]
     return Tables(
-        vector_at(i, H_ADDRESS, N_ADDRESSES),
         matrix_at(i, i[H_I_AT], bodies, AT_COLUMNS),
         vector_at(i, i[H_I_CODE], bodies),
         vector_at(i, i[H_I_MARKER_BODY], markers),
@@ -205,6 +235,7 @@ def unpack(idata, rdata, work):
         vector_at(i, i[H_I_SLOT], i[H_SLOTS]),
         matrix_at(i, i[H_I_STATE], i[H_STATES], STATE_COLUMNS),
         matrix_at(i, i[H_I_TAPE], i[H_TAPES], TAPE_COLUMNS),
+        matrix_at(i, i[H_I_ANGLE], i[H_ANGLES], ANGLE_COLUMNS),
         vector_at(r, i[H_R_GRAVITY], 3),
         matrix_at(r, i[H_R_BODY], bodies, BODY_COLUMNS),
         matrix_at(r, i[H_R_MARKER], markers, MARKER_COLUMNS),

@@ -19,9 +19,6 @@ from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
 
-REACTION = 3
-"""Kind of the element, next to those of `gearmbs.dae.equations.forces`."""
-
 
 @njit("void(float64[:, ::1], int64, int64, float64, float64[:, ::1], int64, int64, float64[::1], int64)",
       cache=True, error_model="numpy")  # fmt: skip
@@ -158,7 +155,7 @@ def renew_reactions(y, multipliers, idata, tab):
     room, wrench = vector_at(tab.scratch, 0, 64), vector_at(tab.scratch, 64, 6)
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]
-        if row[T.FORCE_KIND] != REACTION:
+        if row[T.FORCE_KIND] != T.REACTION:
             continue
         width = row[T.FORCE_WIDTH]
         jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, width)

@@ -26,8 +26,8 @@ from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.forces import TORQUE, element_wrench, torque
-from gearmbs.dae.equations.reactions import REACTION, reaction_wrench
+from gearmbs.dae.equations.forces import evaluate_element
+from gearmbs.dae.equations.reactions import reaction_wrench
 from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, KIN_H, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.equations.unknowns import SI1, has_rate_rows, multipliers_of_row
 from gearmbs.dae.equations.update import euler_component, update_tables
@@ -38,7 +38,6 @@ S_GRADIENT_T = 12
 S_TERM = 24
 S_HESSIAN = 128
 S_WRENCH = 280
-S_DIAG = 288
 S_PRODUCT = 300
 S_VECTOR = 320
 
@@ -218,6 +217,16 @@ def add_constraints(t, y, yp, idata, tab, out):
             out[mu0 + r] = rate
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_own_states(row, y, yp, idata, state, scratch, out):
+    """Write the equations z' - f or z - f of the states of a compiled element that has just been evaluated."""
+    rates = row[T.FORCE_WORK] + 6 * row[T.FORCE_WRENCHES]
+    for k in range(row[T.FORCE_STATES]):
+        z = row[T.FORCE_Z] + k
+        left = yp[z] if state[z - idata[T.H_Z], T.STATE_KIND] == T.STATE_DIFFERENTIAL else y[z]
+        out[z] = left - scratch[rates + k]
+
+
 @njit(RESIDUAL_SIG, cache=True, error_model="numpy")
 def residual(t, y, yp, out, idata, rdata, work):
     """Evaluate G(t, y, y') of eq. (8) into ``out``."""
@@ -234,35 +243,36 @@ def residual(t, y, yp, out, idata, rdata, work):
             out[r + c] = y[u + c] - yp[r + c]
             out[th + c] = y[e + c] - yp[th + c]
     add_constraints(t, y, yp, idata, tab, out)
-    wrench = vector_at(tab.scratch, S_WRENCH, 6)
-    diag = vector_at(tab.scratch, S_DIAG, 8)
     room = vector_at(tab.scratch, 0, 64)
     lam0 = idata[T.H_LAMBDA]
     source = yp if idata[T.H_FORMULATION] == SI1 else y
     multipliers = vector_at(source, lam0, idata[T.H_ROWS])
     for f in range(idata[T.H_FORCES]):
         row = tab.force[f]
-        width = row[T.FORCE_WIDTH]
-        jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, width)
-        if row[T.FORCE_KIND] == TORQUE:
-            # handing over the tables would cost more than the torque
-            for c in range(3):
-                wrench[c] = 0.0
-            torque(row, tab.fval, tab.frame, wrench)
-        elif row[T.FORCE_KIND] == REACTION:
-            reaction_wrench(row, multipliers, lam0, tab, room, wrench, jac, np.int64(0))
+        wrench = vector_at(tab.scratch, S_WRENCH, 6)
+        if row[T.FORCE_KIND] == T.COMPILED:
+            if row[T.FORCE_PART] == 0:
+                evaluate_element(row, t, y, tab, np.int64(0))
+                add_own_states(row, y, yp, idata, tab.state, tab.scratch, out)
+            wrench = vector_at(tab.scratch, row[T.FORCE_WORK] + 6 * row[T.FORCE_PART], 6)
         else:
-            element_wrench(row, t, y, tab, wrench, jac, diag, np.int64(0))
+            jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, row[T.FORCE_WIDTH])
+            if row[T.FORCE_KIND] == T.REACTION:
+                reaction_wrench(row, multipliers, lam0, tab, room, wrench, jac, np.int64(0))
+            else:
+                expression_loads.load(row, t, y, tab, wrench, jac, np.int64(0))
         for c in range(3):
             if row[T.FORCE_F] >= 0:
                 out[row[T.FORCE_F] + c] = y[row[T.FORCE_F] + c] - wrench[c]
             if row[T.FORCE_N] >= 0:
                 out[row[T.FORCE_N] + c] = y[row[T.FORCE_N] + c] - wrench[3 + c]
-        if row[T.FORCE_KIND] != REACTION:
+        if row[T.FORCE_KIND] != T.REACTION:
             for side in range(2):
                 b = tab.marker_body[row[T.FORCE_I + side]]
                 add_load(b, 1.0 - 2.0 * side, row, y, tab.at, tab.marker_body, tab.kin, tab.frame, tab.scratch, out)
     for k in range(idata[T.H_STATES]):
         z = idata[T.H_Z] + k
+        if tab.state[k, T.STATE_TAPE] < 0:
+            continue
         left = yp[z] if tab.state[k, T.STATE_KIND] == T.STATE_DIFFERENTIAL else y[z]
         out[z] = left - expression_loads.value(tab.state[k, T.STATE_TAPE], t, y, tab)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from numba import njit
 
-from gearmbs.dae.compiled import pointers
-from gearmbs.dae.compiled.pointers import time_at
 from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations import time_functions
 from gearmbs.dae.equations.constraint_terms import dot3
+from gearmbs.dae.equations.counted_angles import predict_element_angles
+from gearmbs.dae.equations.expression_loads import TIME, time_at
 from gearmbs.dae.equations.rotation import (
     KIN_A,
     KIN_AXES,
@@ -87,7 +87,7 @@ def update_functions(t, tab):
         if kind == time_functions.TAPE:
             row = tab.tape[at]
             i, r = row[T.TAPE_I], row[T.TAPE_R]
-            time_at(tab.address[pointers.TIME])(
+            time_at(row[TIME])(
                 vector_at(tab.extra_i, i, row[T.TAPE_I_SIZE]),
                 vector_at(tab.extra_r, r, row[T.TAPE_R_SIZE]),
                 t,
@@ -111,6 +111,7 @@ def predict_angles(t, tab):
         first = tab.tape[k, T.TAPE_REFERENCE]
         for a in range(first, first + m):
             tab.extra_r[a] = tab.extra_r[a + m] + past * tab.extra_r[a + 2 * m]
+    predict_element_angles(past, tab.angle, tab.extra_r)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

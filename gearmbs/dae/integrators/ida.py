@@ -30,7 +30,7 @@ DENSE_LIMIT = 150
 """Unknowns up to which the dense factorisation is used: SuperLU_MT waits busily and stalls on a loaded machine."""
 IDA_MAX_ORDER = 5
 MAX_STEPS = 100_000
-"""Steps allowed between two outputs: 15 s of a gear pair's run, which takes some tens of steps a mesh period."""
+"""Steps allowed between two outputs: 15 s of a vibration of 500 Hz at a dozen steps a period."""
 
 NOT_FINITE_LIMIT = 100
 """Evaluations without a finite result, at times it never gets past, after which a run is given up."""

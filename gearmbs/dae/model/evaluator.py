@@ -62,8 +62,8 @@ class Records(NamedTuple):
         R, A (row-major), v, omega of each moving body.
     solution : ndarray, shape (m, 6 bodies + rows)
         Accelerations a, alpha of each body, then the multipliers.
-    loads : ndarray, shape (m, elements, 14)
-        F, N and contact diagnostics.
+    loads : ndarray, shape (m, elements, 6 + diagnostics)
+        F, N and what each element tells beside them.
     phi : ndarray, shape (m, 3 rows)
         Phi, its rate and its partial time derivative, row by row.
     force, moment : ndarray, shape (m, rows, 3)
@@ -109,12 +109,12 @@ class Records(NamedTuple):
 RECORDS_TYPE = types.NamedTuple((_MAT, _MAT, _CUBE, _MAT, _CUBE, _CUBE, _VEC), Records)
 
 
-def new_records(m: int, bodies: int, rows: int, elements: int) -> Records:
-    """Return empty records for m output times."""
+def new_records(m: int, bodies: int, rows: int, elements: int, diagnostics: int) -> Records:
+    """Return empty records for m output times; ``diagnostics`` is the most that an element has."""
     return Records(
         np.zeros((m, POSE_COLUMNS * bodies)),
         np.zeros((m, 6 * bodies + rows)),
-        np.zeros((m, max(elements, 1), index1.FORCE_RECORD)),
+        np.zeros((m, max(elements, 1), index1.FORCE_RECORD + diagnostics)),
         np.zeros((m, 3 * rows)),
         np.zeros((m, rows, 3)),
         np.zeros((m, rows, 3)),
@@ -213,7 +213,7 @@ def pattern(idata, rdata, work_size: int) -> tuple[np.ndarray, np.ndarray, np.nd
 def assemble(t, y, slots, idata, rdata, work_size, vals) -> Records:
     """Assemble the index-1 system at ``t[0], y[0]`` into ``vals`` and the right-hand side in ``solution``."""
     bodies, rows, elements = int(idata[T.H_BODIES]) - 1, int(idata[T.H_ROWS]), int(idata[T.H_FORCES])
-    records = new_records(1, bodies, rows, elements)
+    records = new_records(1, bodies, rows, elements, int(idata[T.H_DIAGNOSTICS]))
     work = np.zeros(work_size)
     evaluate_rows(0, -1, t, y, slots, idata, rdata, work, vals, NO_PLAN, NO_FACTORS, records, GROWTH_LIMIT)
     return records

@@ -6,15 +6,15 @@ state alone. So the balance tests the integrated motion, not the algebra of one 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 from scipy.interpolate import CubicSpline
 
-from gearmbs.dae.equations import forces
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.reactions import REACTION
+from gearmbs.dae.equations.force_elements import DISSIPATED, STORED
 
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
@@ -31,12 +31,13 @@ def energy_balance(solution: Solution) -> xr.Dataset:
     Returns
     -------
     Dataset
-        In J over ``time``: ``kinetic``, ``gravity`` (potential), ``elastic`` (contacts); ``work_motion`` (done by
-        prescribed motions), ``work_applied`` (done by torques and expression loads, springs included),
-        ``dissipated_damping``, ``dissipated_friction``; ``imbalance``: work in less dissipation less change of
-        stored energy; ``work``: sum of |power| over time. Attribute ``relative_imbalance``: the largest imbalance over
-        all the work or, where more is exchanged than worked, over the largest change of a stored energy; NaN when
-        there is neither.
+        In J over ``time``: ``kinetic``, ``gravity`` (potential), ``elastic`` (stored in the force elements that tell
+        it, such as contacts); ``work_motion`` (done by prescribed motions), ``work_applied`` (done by all other force
+        elements, springs and expression loads among them), ``dissipated_damping``, ``dissipated_friction`` and what
+        else elements dissipate (``dissipated_x`` of a diagnostic ``x_power``); ``imbalance``: work in less dissipation
+        less change of stored energy; ``work``: sum of |power| over time. Attribute ``relative_imbalance``: the largest
+        imbalance over all the work or, where more is exchanged than worked, over the largest change of a stored
+        energy; NaN when there is neither.
     """
     t = solution.t
     powers = _powers(solution)
@@ -44,10 +45,11 @@ def energy_balance(solution: Solution) -> xr.Dataset:
     stored = {
         "kinetic": solution.kinetic_energy,
         "gravity": _gravity(solution),
-        "elastic": _contact_sum(solution, "elastic_energy"),
+        "elastic": sum((v for _, v in _told(solution, STORED)), np.zeros(t.size)),
     }
     change = sum(e - e[0] for e in stored.values())
-    net = works["work_motion"] + works["work_applied"] - works["dissipated_damping"] - works["dissipated_friction"]
+    net = works["work_motion"] + works["work_applied"]
+    net = net - sum(work for name, work in works.items() if name.startswith("dissipated"))
     size = _integral(t, np.abs(powers["work_motion"])) + _integral(t, np.abs(powers["work_applied"]))
     data = {**stored, **works, "imbalance": net - change, "work": size}
     out = xr.Dataset({name: ("time", values, {"units": "J"}) for name, values in data.items()}, {"time": t})
@@ -68,14 +70,27 @@ def _powers(solution: Solution) -> dict[str, np.ndarray]:
     motion = np.einsum("tr,tr->t", solution.multipliers, solution._phi[:, :, 2])
     applied = np.zeros(solution.t.size)
     for k, row in enumerate(solution.system.builder.forces):
-        if row[T.FORCE_KIND] not in (forces.GEAR_CONTACT, REACTION):
+        if row[T.FORCE_KIND] != T.REACTION and not _accounts(solution, k - row[T.FORCE_PART]):
             applied += _load_power(solution, k, row)
-    return {
-        "work_motion": motion,
-        "work_applied": applied,
-        "dissipated_damping": _contact_sum(solution, "damping_power"),
-        "dissipated_friction": _contact_sum(solution, "friction_power"),
-    }
+    zero = np.zeros(solution.t.size)
+    powers = {"work_motion": motion, "work_applied": applied, "dissipated_damping": zero, "dissipated_friction": zero}
+    for name, power in _told(solution, DISSIPATED):
+        key = f"dissipated_{name.removesuffix('_power')}"
+        powers[key] = powers.get(key, zero) + power
+    return powers
+
+
+def _accounts(solution: Solution, k: int) -> bool:
+    """Whether a force element tells what it stores and dissipates, so that the work of its wrench is known."""
+    return any(d.role in (STORED, DISSIPATED) for d in solution.system.builder.diagnostics[k])
+
+
+def _told(solution: Solution, role: str) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the names and values of all diagnostics of a role."""
+    for k, diagnostics in enumerate(solution.system.builder.diagnostics):
+        for c, d in enumerate(diagnostics):
+            if d.role == role:
+                yield d.name, solution._loads[:, k, 6 + c]
 
 
 def _load_power(solution: Solution, k: int, row: list[int]) -> np.ndarray:
@@ -102,11 +117,3 @@ def _gravity(solution: Solution) -> np.ndarray:
     builder = solution.system.builder
     masses = np.array([row[0] for row in builder.bodies[1:]])
     return -np.einsum("b,tbc,c->t", masses, solution._pose[:, :, 0:3], builder.gravity)
-
-
-def _contact_sum(solution: Solution, name: str) -> np.ndarray:
-    total = np.zeros(solution.t.size)
-    for element, row in zip(solution.system.force_names, solution.system.builder.forces):
-        if row[T.FORCE_KIND] == forces.GEAR_CONTACT:
-            total = total + solution.contact(element)[name]
-    return total

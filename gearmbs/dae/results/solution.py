@@ -24,18 +24,6 @@ if TYPE_CHECKING:
     from gearmbs.dae.model.system import System
     from gearmbs.dae.problem import DAEProblem
 
-CONTACT_DIAGNOSTICS = (
-    "elastic_energy",
-    "damping_power",
-    "friction_power",
-    "penetration_drive",
-    "penetration_back",
-    "pairs_drive",
-    "pairs_back",
-    "normal_force",
-)
-
-
 PART_SIZE = 512
 """Output times whose records fit the processor's cache."""
 
@@ -131,7 +119,10 @@ class Solution:
 
     def _new_records(self, m: int) -> outputs.Records:
         system = self.system
-        return outputs.new_records(m, len(system.body_names), len(system.row_names), len(system.force_names))
+        diagnostics = max((len(d) for d in system.builder.diagnostics), default=0)
+        return outputs.new_records(
+            m, len(system.body_names), len(system.row_names), len(system.force_names), diagnostics
+        )
 
     @property
     def _pose(self) -> np.ndarray:
@@ -272,10 +263,14 @@ class Solution:
         k = self._element(element)
         return self._loads[:, k, 0:3], self._loads[:, k, 3:6]
 
-    def contact(self, element: str) -> dict[str, np.ndarray]:
-        """Return the diagnostics of a gear contact over time: energy, powers, penetrations, pairs, normal force."""
+    def diagnostics(self, element: str) -> dict[str, np.ndarray]:
+        """Return what a force element tells beside its wrench, over time, by name; units are in :meth:`to_dataset`."""
         k = self._element(element)
-        return {name: self._loads[:, k, 6 + c] for c, name in enumerate(CONTACT_DIAGNOSTICS)}
+        return {d.name: self._loads[:, k, 6 + c] for c, d in enumerate(self.system.builder.diagnostics[k])}
+
+    def contact(self, element: str) -> dict[str, np.ndarray]:
+        """Return the diagnostics of a contact, as :meth:`diagnostics`."""
+        return self.diagnostics(element)
 
     def _element(self, name: str) -> int:
         try:
@@ -283,6 +278,17 @@ class Solution:
         except ValueError:
             known = ", ".join(self.system.force_names) or "none in this mechanism"
             raise KeyError(f"force element {name!r}; the force elements are {known}") from None
+
+    def _diagnostics_by_name(self) -> Iterator[tuple[str, str, np.ndarray]]:
+        """Yield name, unit and values (m, elements) of each diagnostic; zero for elements without it."""
+        found: dict[tuple[str, str], np.ndarray] = {}
+        for k, diagnostics in enumerate(self.system.builder.diagnostics):
+            for c, d in enumerate(diagnostics):
+                table = found.setdefault((d.name, d.unit), np.zeros((self.t.size, len(self.system.force_names))))
+                table[:, k] = self._loads[:, k, 6 + c]
+        for (name, unit), values in found.items():
+            shared = sum(other == name for other, _ in found) > 1
+            yield f"{name} ({unit})" if shared else name, unit, values
 
     # --- measurements -------------------------------------------------------------------------------
 
@@ -405,9 +411,8 @@ class Solution:
             element = ("time", "element", "xyz")
             data["load_force"] = var(element, self._loads[:, :, 0:3], "N", "applied force on I's body")
             data["load_torque"] = var(element, self._loads[:, :, 3:6], "N m", "applied torque on I's body at marker I")
-            units = ("J", "W", "W", "m", "m", "1", "1", "N")
-            for c, (name, unit) in enumerate(zip(CONTACT_DIAGNOSTICS, units)):
-                data[name] = var(("time", "element"), self._loads[:, :, 6 + c], unit, name.replace("_", " "))
+            for name, unit, values in self._diagnostics_by_name():
+                data[name] = var(("time", "element"), values, unit, name.replace("_", " "))
         coords = {
             "time": ("time", self.t, {"units": "s"}),
             "body": self.system.body_names,

@@ -1,0 +1,38 @@
+"""Tooth contact behind the door for force elements, see `gearmbs.dae.equations.force_elements`."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from gearmbs.contact.kernel import GEAR_CONTACT_SIG
+from gearmbs.dae.compiled.pointers import caller
+from gearmbs.dae.compiled.views import matrix_at, vector_at
+from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P, FRAME_V, FRAME_W
+
+contact_at = caller(GEAR_CONTACT_SIG)
+
+
+@njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
+def contact_force(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
+    """Hand the frames of the two wheels to `gear_contact`, whose address stands before its integers.
+
+    Called through it, the large kernel need not be compiled into this one.
+    """
+    first, second = frames[0], frames[1]
+    contact_at(ints[0])(
+        vector_at(ints, 1, ints.size - 1),
+        reals,
+        vector_at(first, FRAME_P, 3),
+        matrix_at(first, FRAME_A, 3, 3),
+        vector_at(first, FRAME_V, 3),
+        vector_at(first, FRAME_W, 3),
+        vector_at(second, FRAME_P, 3),
+        matrix_at(second, FRAME_A, 3, 3),
+        vector_at(second, FRAME_V, 3),
+        vector_at(second, FRAME_W, 3),
+        wrench[0],
+        jac,
+        diagnostics,
+        want & DERIVATIVES,
+        work,
+    )

@@ -1,0 +1,76 @@
+"""The contact of two wheels as a force element of a mechanism."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearmbs.dae.equations.force_elements import COUNT, DISSIPATED, STORED, Diagnostic
+from gearmbs.dae.errors import ModelError
+from gearmbs.mechanism.elements import Compiled, ForceElement
+
+if TYPE_CHECKING:
+    from gearmbs.gears.pair import GearPair
+
+
+@dataclass(eq=False, repr=False)
+class GearContact(ForceElement):
+    """Tooth contact of the wheels whose frames are the markers I and J."""
+
+    pair: GearPair
+
+    kind = "gear contact"
+    diagnostics = (
+        Diagnostic("elastic_energy", "J", STORED),
+        Diagnostic("damping_power", "W", DISSIPATED),
+        Diagnostic("friction_power", "W", DISSIPATED),
+        Diagnostic("penetration_drive", "m"),
+        Diagnostic("penetration_back", "m"),
+        Diagnostic("pairs_drive", "1", COUNT),
+        Diagnostic("pairs_back", "1", COUNT),
+        Diagnostic("normal_force", "N"),
+    )
+
+    def compiled(self) -> Compiled:
+        from gearmbs.contact import GEAR_CONTACT_SIG, gear_contact
+        from gearmbs.contact.force_kernel import contact_force
+
+        integers, reals, scratch = self.pair.contact_tables()
+        return Compiled(contact_force, integers, reals, ((gear_contact, GEAR_CONTACT_SIG),), scratch=scratch)
+
+    def check(self) -> None:
+        """Look at where the two wheels stand at the start.
+
+        Raises
+        ------
+        ModelError
+            If they stand in each other: closer than the sum of their base radii.
+
+        Warns
+        -----
+        UserWarning
+            If they are out of each other's reach.
+        """
+        assert self.j is not None
+        axis = self.i.global_orientation()[:, 2]
+        apart = self.j.global_position() - self.i.global_position()
+        distance = float(np.linalg.norm(apart - axis * (axis @ apart)))
+        label = f"gear contact '{self.name}': the axes are {1e3 * distance:.4g} mm apart"
+        least = sum(wheel.base_radius for wheel in self.pair.wheels)
+        most = sum(wheel.tip_radius for wheel in self.pair.wheels)
+        if distance <= least:
+            raise ModelError(
+                f"{label}, less than the sum of the base radii, {1e3 * least:.4g} mm; place the wheels as the pair's "
+                "placement() says"
+            )
+        if distance > most:
+            warnings.warn(
+                f"{label}, more than the tip radii together, {1e3 * most:.4g} mm: the teeth cannot touch", stacklevel=4
+            )
+
+    def __repr__(self) -> str:
+        assert self.j is not None
+        return f"GearContact({self.name!r}, {self.i.body.name!r} with {self.j.body.name!r})"
