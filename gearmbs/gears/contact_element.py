@@ -54,7 +54,6 @@ class GearContact(ForceElement):
         UserWarning
             If they are out of each other's reach.
         """
-        assert self.j is not None
         axis = self.i.global_orientation()[:, 2]
         apart = self.j.global_position() - self.i.global_position()
         distance = float(np.linalg.norm(apart - axis * (axis @ apart)))
@@ -72,5 +71,4 @@ class GearContact(ForceElement):
             )
 
     def __repr__(self) -> str:
-        assert self.j is not None
         return f"GearContact({self.name!r}, {self.i.body.name!r} with {self.j.body.name!r})"

@@ -187,7 +187,7 @@ class _Compiler:
                     forces[(kind, _upper(joint.name))] = (joint.i.name.upper(), joint.j.name.upper())
             absent: set[tuple[str, int | str, int]] = set()
             for load in m.elements.values():
-                if load.j is not None and load.wrenches == 1:
+                if len(load.markers) == 2:
                     forces[(load.kind, _upper(load.name))] = (load.i.name.upper(), load.j.name.upper())
                     for base, there in ((0, load.has_force), (3, load.has_torque)):
                         if not there:

@@ -56,13 +56,13 @@ class ForceElement:
     name : str
     i : Marker
         Marker on whose body F and N act.
-    j : Marker or None
-        Marker whose body takes the reaction; None: the ground does.
+    j : Marker
+        Marker whose body takes the reaction; see `markers` for elements with fewer or more.
     """
 
     name: str
     i: Marker
-    j: Marker | None
+    j: Marker
 
     kind: ClassVar[str] = "force"
     """The element's name in messages and in the function language."""
@@ -74,8 +74,8 @@ class ForceElement:
 
     @property
     def markers(self) -> tuple[Marker, ...]:
-        """Markers on which the element acts."""
-        return (self.i,) if self.j is None else (self.i, self.j)
+        """Markers on which the element acts; the ground takes the reaction of a single one."""
+        return (self.i, self.j)
 
     @property
     def wrenches(self) -> int:
@@ -144,6 +144,11 @@ class Load:
     parameters: Mapping[str, Any] | None = None
 
     wrenches: ClassVar[int] = 1
+
+    @property
+    def markers(self) -> tuple[Marker, ...]:
+        """Markers on which it acts."""
+        return (self.i, self.j)
 
     @property
     def has_force(self) -> bool:

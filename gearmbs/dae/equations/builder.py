@@ -344,7 +344,7 @@ class TableBuilder:
         """
         forces = np.array(self.forces, dtype=np.int64).reshape(-1, T.FORCE_COLUMNS)
         next_f, next_n, next_work = at["F"], at["N"], T.SCRATCH_FIXED + self.largest_jac
-        leader = None
+        leader = np.zeros(T.FORCE_COLUMNS, dtype=np.int64)
         for number, row in enumerate(forces):
             for column, advance in ((T.FORCE_F, 0), (T.FORCE_N, 1)):
                 if row[column]:
