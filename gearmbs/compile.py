@@ -10,10 +10,20 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
+
+PACKAGE = Path(__file__).parent
+
+
+def force_kernels() -> tuple[str, ...]:
+    """Return the modules with kernels of force elements, which end in ``_kernel``."""
+    files = sorted(PACKAGE.glob("[a-z]*/**/*_kernel.py"))
+    return tuple(".".join(("gearmbs", *file.relative_to(PACKAGE).with_suffix("").parts)) for file in files)
+
 
 STAGES = (
-    ("gearmbs.gears.transmission", "gearmbs.dae.equations.expressions", "gearmbs.dae.integrators.wstiff"),
-    ("gearmbs.dae.equations.jacobian", "gearmbs.dae.equations.residual"),
+    ("gearmbs.gears.transmission", "gearmbs.dae.equations.expressions.evaluate", "gearmbs.dae.integrators.wstiff"),
+    ("gearmbs.dae.equations.jacobian", "gearmbs.dae.equations.residual", *force_kernels()),
     ("gearmbs.dae.model.evaluator", "gearmbs.dae.equations.euler_switch"),
     ("gearmbs.studies.paper", "gearmbs.signals", "gearmbs.mechanism.measures"),
 )
