@@ -10,12 +10,14 @@ import numpy as np
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations import time_functions
-from gearmbs.dae.equations.builder import TableBuilder
 from gearmbs.dae.equations.counted_angles import AXES as COUNTED
 from gearmbs.dae.equations.expressions import ExpressionError, Tape
 from gearmbs.dae.equations.expressions.tape import LEVEL_ACCELERATION, LEVEL_TIME
 from gearmbs.dae.equations.unknowns import I3, Counts, offsets
 from gearmbs.dae.errors import ModelError
+from gearmbs.dae.model.builder import TableBuilder
+from gearmbs.dae.model.configuration import Configuration
+from gearmbs.dae.model.model import Names
 from gearmbs.dae.model.system import System
 from gearmbs.mechanism import elements as el
 from gearmbs.mechanism import joints as jt
@@ -103,12 +105,9 @@ class _Compiler:
             kinds.append((_state_kind(state), self.add_tape(tape)))
         self.builder.states[: len(kinds)] = kinds
         elements = [*self.force_names, *(f"reaction of {name}" for name in self.measured)]
-        system = System(self.builder, pose, list(m.bodies), self.row_names, elements, t0)
-        system.mechanism = m
-        system.marker_index = self.marker_index
-        system.state_names = m.state_names
-        system.state_start = np.array([s.start for s in m.every_state], dtype=float)
-        return system
+        names = Names(tuple(m.bodies), tuple(self.row_names), tuple(elements), tuple(m.state_names))
+        start = [s.start for s in m.every_state]
+        return System(self.builder.build(names), Configuration(pose), start, t0, m, self.marker_index)
 
     # --- bodies and markers -------------------------------------------------------------------------
 

@@ -256,7 +256,7 @@ def test_massless_free_body():
 @pytest.mark.parametrize("dense_up_to", [600, 6])
 def test_massless_free_body_at_the_end_of_a_chain(monkeypatch, dense_up_to):
     """The last of 20 slender rods hangs on a ball: nothing resists its turning about itself. A pin holds it."""
-    monkeypatch.setattr("gearmbs.dae.model.system.DENSE_COORDINATES", dense_up_to)
+    monkeypatch.setattr("gearmbs.dae.model.diagnosis.DENSE_COORDINATES", dense_up_to)
     for ball in (False, True):
         m = Mechanism("rods", gravity=(0, -9.81, 0))
         last = m.ground

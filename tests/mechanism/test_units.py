@@ -46,7 +46,7 @@ def test_texts_with_units_are_the_same_as_si():
     first, second = (model(si) for si in (True, False))
     a, b = (m.compile() for m in (first, second))
     np.testing.assert_allclose(b.pose, a.pose, rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(b.builder.bodies, a.builder.bodies, rtol=1e-12, atol=1e-18)
+    np.testing.assert_allclose(b.model.bodies, a.model.bodies, rtol=1e-12, atol=1e-18)
     acc = [system.accelerations(system.pose, 0.0)[0] for system in (a, b) if system.initialise()]
     np.testing.assert_allclose(acc[1], acc[0], rtol=1e-9, atol=1e-9)
     assert np.abs(acc[0]).max() > 1.0

@@ -93,12 +93,10 @@ class RequestEvaluator:
         output = model.deck.only(st.Output)
         self._ypr = output is not None and output.ypr
         system = solution.system
-        builder = system.builder
-        self.marker_body = np.array(builder.marker_body, dtype=np.int64)
-        self.marker_frame = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float)
+        self.marker_body, self.marker_frame = system.model.marker_body.copy(), system.model.marker_frame.copy()
         self.kin, self.acc = motion_tables(solution)
         index: dict[int, int] = system.marker_index  # type: ignore[attr-defined]
-        self.scope: Scope = model.scope(index, builder.marker_body)
+        self.scope: Scope = model.scope(index, list(self.marker_body))
         self._names = {index[id(m)]: m.name for m in markers_of(model.mechanism)}
         self._turns = dict(model.mechanism.turns)
         if isinstance(solution, EquilibriumSolution):
@@ -106,9 +104,9 @@ class RequestEvaluator:
             for (function, i, j), angle in solution.counted().items():
                 self._turns[function, self._marker_named(i), self._marker_named(j)] = angle
         self._counted: dict[tuple[str, str, str], None] = dict.fromkeys(self._turns)
-        for tape in builder.tapes:
+        for tape in system.model.tapes:
             self._note(tape)
-        for axis, i, j, _ in builder.angles:
+        for axis, i, j, _ in system.model.angles:
             self._counted[ANGLE_NAMES[axis], self._marker_named(i), self._marker_named(j)] = None
         self._wrenches: dict[tuple[str, int], np.ndarray] = {}
 

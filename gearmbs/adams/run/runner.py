@@ -27,7 +27,6 @@ from gearmbs.dae.analyses.modes import Modes
 from gearmbs.dae.analyses.quasi_static import initial_conditions, quasi_static
 from gearmbs.dae.analyses.statics import StaticResult, static_equilibrium
 from gearmbs.dae.equations.expressions import ExpressionError
-from gearmbs.dae.equations.layout import STATE_ALGEBRAIC
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.analyses import frozen_friction, linear_modes
@@ -270,7 +269,7 @@ def _solve(
         if report.degrees_of_freedom > 0:
             message = f"a kinematic analysis needs zero degrees of freedom; the model has {report.degrees_of_freedom}"
             raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
-        if all(k == STATE_ALGEBRAIC for k, _ in system.builder.states):
+        if not system.model.differential_states.any():
             options.update(options_without)
             return kinematic(system, times), None
     output_step = float(times[1] - times[0])

@@ -70,13 +70,13 @@ class EquilibriumSolution(Solution):
 
     def counted(self, row: int = 0) -> dict[tuple[str, int, int], float]:
         """Return all counted angles at one time, rad, by function and markers I and J."""
-        snapshot, builder = self._rows[row], self.system.builder
+        snapshot, model = self._rows[row], self.system.model
         first = int(snapshot.idata[T.H_R_EXTRA])
         found: dict[tuple[str, int, int], float] = {}
-        for tape, where in zip(builder.tapes, builder.tape_rows):
-            at = first + where[T.TAPE_REFERENCE] + tape.n_angles
+        for tape, where in zip(model.tapes, model.tape_rows):
+            at = first + int(where[T.TAPE_REFERENCE]) + tape.n_angles
             found.update(zip(tape.angles, snapshot.rdata[at : at + tape.n_angles].tolist()))
-        for axis, i, j, at in builder.angles:
+        for axis, i, j, at in model.angles:
             found[AXES[axis], i, j] = float(snapshot.rdata[first + at + 1])
         return found
 

@@ -13,6 +13,7 @@ from gearmbs.dae.equations import accelerations
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.rotation import KIN_AXES, POSE_COLUMNS
 from gearmbs.dae.errors import ModelError
+from gearmbs.dae.model.configuration import Configuration
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.system import System
@@ -39,10 +40,9 @@ class Instant:
         self.idata = self.problem.idata.copy()
         self.rdata = self.problem.rdata.copy()
         self.work = np.zeros(self.problem.work_size)
-        self.at = system.builder.layout(int(self.idata[T.H_FORMULATION]))
+        self.at = system.model.layout(int(self.idata[T.H_FORMULATION]))
         self.y = self.problem.y0.copy()
-        kinds = np.array([kind for kind, _ in system.builder.states], dtype=np.int64)
-        self.differential = kinds == T.STATE_DIFFERENTIAL
+        self.differential = system.model.differential_states
 
     def block(self, first: str, end: str) -> np.ndarray:
         """Return the indices from the start of one block of y to the start of another."""
@@ -92,6 +92,11 @@ class Instant:
         accelerations.pose_record(self.y, self.idata, self.rdata, self.work, out)
         return out.reshape(-1, POSE_COLUMNS)
 
+    def configuration(self) -> Configuration:
+        """Return the positions and velocities of y."""
+        q_f, v_f = (self.y[self.block(*ends)].copy() for ends in (("q_f", "lambda"), ("v_f", "R")))
+        return Configuration(self.pose(), q_f, v_f)
+
     def axes(self) -> np.ndarray:
         """Return the axes of the Euler angles, shape (bodies, 3, 3): row k turns with angle k."""
         self.pose()
@@ -110,7 +115,7 @@ class Instant:
         """Return the mass matrix of (R, theta) from the Jacobian of G."""
         from scipy.sparse import block_diag, diags_array
 
-        masses = np.repeat([row[0] for row in self.system.builder.bodies[1:]], 3)
+        masses = np.repeat(self.system.model.bodies[1:, T.BODY_MASS], 3)
         eps = self.block("eps", "R")
         return csc_array(block_diag([diags_array(masses), -matrix[eps][:, eps]], format="csc"))
 

@@ -23,6 +23,7 @@ from gearmbs._deprecation import former_name
 from gearmbs.dae.analyses.eigenvalues import free_motions
 from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution, Snapshot
 from gearmbs.dae.analyses.linearised import Instant, reduce
+from gearmbs.dae.equations import layout as T
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
 
 if TYPE_CHECKING:
@@ -141,11 +142,11 @@ def static_equilibrium(system: System, *, tol: float = 1e-10, max_iterations: in
         raise ModelError(f"tol = {tol}, max_iterations = {max_iterations}; both must be positive")
     if system.report is None:
         system.initialise()
-    system.pose[:, 12:18] = 0.0
+    system.start = system.start.at_rest()
     instant = Instant(system, "I3")
     instant.y = instant.settle(instant.stop(instant.y))
     iterations, size = Relaxation(instant, tol).run(max_iterations)
-    system.pose = instant.pose()
+    system.start = instant.configuration()
     system.state_start = instant.y[instant.block("z", "mu")].copy()
     return _result(instant, iterations, size)
 
@@ -165,7 +166,7 @@ class Relaxation:
         self.held = self._held()
         scale = instant.problem.scale
         force = float(scale[instant.at["lambda"]]) if inner.size else 0.0
-        weight = max((row[0] for row in system.builder.bodies[1:]), default=0.0)
+        weight = float(system.model.bodies[1:, T.BODY_MASS].max(initial=0.0))
         force = max(force, weight * 9.81, 1e-3)
         arm = min(self.length, 1.0)
         sizes = np.concatenate([np.full(3 * self.bodies, force), np.full(3 * self.bodies, force * arm)])

@@ -79,6 +79,12 @@ H_COORDINATES = 56
 """Number of coordinates: spatial displacements of the bodies, then modal coordinates."""
 H_SIZE = 57
 
+HEAD_OF_BLOCK = {
+    H_U: "u", H_P: "p", H_PF: "p_f", H_EPS: "eps", H_VF: "v_f", H_R: "R", H_THETA: "theta", H_QF: "q_f",
+    H_LAMBDA: "lambda", H_F: "F", H_N: "N", H_Z: "z", H_MU: "mu",
+}  # fmt: skip
+"""Where the header holds the offset of a block of y."""
+
 AT_U = 0
 """Index in y of a body's first velocity; likewise the next four. Each is the first of three entries."""
 AT_P = 1
@@ -172,6 +178,11 @@ FUNCTION_KIND = 0
 FUNCTION_OFFSET = 1
 """Offset of the parameters, or the tape of an expression of time."""
 FUNCTION_COLUMNS = 2
+FUNCTION_VALUES = 3
+"""Value and two derivatives, in scratch."""
+
+FRAME_VARIATIONS = 12
+"""Columns of derivatives a frame: displacement, rotation, and the changes of its velocity and angular velocity."""
 
 TAPE_I = 0
 TAPE_I_SIZE = 1

@@ -1,4 +1,4 @@
-"""Constraint rows set aside as redundant: do they contradict the motion the others leave?
+"""Constraint rows dropped as redundant: do they contradict the motion the others leave?
 
 An integrator's positions and velocities are off the constraints by its tolerance, and so are redundant rows, without
 any contradiction. Where one looks violated, the bodies are first put onto the other constraints, to rounding: what is
@@ -7,7 +7,6 @@ left then is a contradiction.
 
 from __future__ import annotations
 
-import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,12 +17,13 @@ from gearmbs.dae.errors import AssemblyError
 from gearmbs.dae.model import initial
 
 if TYPE_CHECKING:
+    from gearmbs.dae.model.configuration import Configuration
     from gearmbs.dae.model.system import System
 
 CONFLICT_SHARE = 1e-5
 """Rate of a redundant constraint, of the sum of its terms, from which it is not redundant but in conflict."""
 
-SETTLED = 1e-12
+ON_CONSTRAINTS = 1e-12
 """Violation, of the mechanism's length, at which bodies count as being on their constraints."""
 
 MAX_PASSES = 12
@@ -34,14 +34,14 @@ FARTHEST_COUNTED = 1e-3
 """Violation from which a counted angle is taken to be off by turns nobody counted; its row is then left alone."""
 
 
-def conflict(system: System, pose: np.ndarray, t: float) -> str | None:
-    """Return which row set aside as redundant contradicts the motion at a pose, or None.
+def conflict(system: System, place: Configuration, t: float) -> str | None:
+    """Return which row dropped as redundant contradicts the motion at a configuration, or None.
 
     The rates are compared, which do not depend on counted turns.
     """
-    if _violated(system, pose, t) is None:
+    if _violated(system, place, t) is None:
         return None
-    on_constraints = settled(system, pose, t)
+    on_constraints = projected(system, place, t)
     if on_constraints is None:
         return None
     found = _violated(system, on_constraints, t)
@@ -54,12 +54,13 @@ def conflict(system: System, pose: np.ndarray, t: float) -> str | None:
     )
 
 
-def _violated(system: System, pose: np.ndarray, t: float) -> tuple[str, float] | None:
+def _violated(system: System, place: Configuration, t: float) -> tuple[str, float] | None:
     """Return the name and rate of the redundant row most violated, None when none is."""
-    jacobian, rate, names = system.dropped_rates(pose, t)
-    speeds = np.abs(pose[:, 12:18])
-    moving = jacobian @ pose[:, 12:18].ravel()
-    size = abs(jacobian) @ speeds.ravel() + np.abs(rate - moving)
+    jacobian, rate, names = system.dropped_rates(place, t)
+    velocities = place.velocities
+    speeds = np.abs(velocities)
+    moving = jacobian @ velocities
+    size = abs(jacobian) @ speeds + np.abs(rate - moving)
     # a row whose own rate is rounding, as across the plane of a planar linkage, is held against all speeds
     floor = max(1e-3 * float(speeds.max(initial=0.0)), 1e-9)
     share = np.abs(rate) / np.maximum(size, floor)
@@ -67,20 +68,20 @@ def _violated(system: System, pose: np.ndarray, t: float) -> tuple[str, float] |
     return None if share[worst] <= CONFLICT_SHARE else (names[worst], float(abs(rate[worst])))
 
 
-def settled(system: System, pose: np.ndarray, t: float) -> np.ndarray | None:
-    """Return the pose put onto the constraints with velocities that keep it there, None where that is not possible."""
+def projected(system: System, place: Configuration, t: float) -> Configuration | None:
+    """Return the configuration put onto the constraints with velocities that keep it there, None where impossible."""
     weights = system.coordinate_weights()
     counted = _counted_rows(system)
     try:
         for _ in range(MAX_PASSES):
-            jacobian, phi, _ = system.constraint_jacobian(pose, t)
+            jacobian, phi, _ = system.constraint_jacobian(place, t)
             phi[counted & (np.abs(phi) > FARTHEST_COUNTED)] = 0.0
-            if np.abs(phi).max(initial=0.0) <= SETTLED * max(1.0, system.length):
-                return initial.consistent_velocity(system, pose, t)
+            if np.abs(phi).max(initial=0.0) <= ON_CONSTRAINTS * max(1.0, system.length):
+                return initial.consistent_velocity(system, place, t)
             step = initial.least_correction(jacobian, weights, phi)
             if not np.abs(step).max() <= FARTHEST:
                 return None
-            pose = system.displaced(pose, step)
+            place = place.displaced(step)
     except AssemblyError:
         pass
     return None
@@ -88,7 +89,6 @@ def settled(system: System, pose: np.ndarray, t: float) -> np.ndarray | None:
 
 def _counted_rows(system: System) -> np.ndarray:
     """Mark the rows with an angle whose full turns are counted."""
-    builder = system.builder
-    bounds = [row[0] for row in builder.rows] + [len(builder.terms)]
-    kinds = [[term[T.TERM_TYPE] for term in builder.terms[a:b]] for a, b in itertools.pairwise(bounds)]
-    return np.array([ANGLE in row for row in kinds], dtype=bool)
+    model = system.model
+    kinds = model.terms[:, T.TERM_TYPE]
+    return np.array([np.any(kinds[model.span(r)] == ANGLE) for r in range(len(model.rows))], dtype=bool)

@@ -14,9 +14,11 @@ from scipy.linalg import qr
 from scipy.sparse import block_array, csc_array, diags_array
 from scipy.sparse.linalg import splu
 
+from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.errors import AssemblyError, SingularModelError
 
 if TYPE_CHECKING:
+    from gearmbs.dae.model.configuration import Configuration
     from gearmbs.dae.model.system import System
 
 POSITION_TOLERANCE = 1e-12
@@ -29,7 +31,7 @@ CONFLICT = 1e-7
 """Violation of a redundant row, in m or of 1, above which it contradicts the others."""
 MAX_POSITION_ITERATIONS = 50
 VISIBLE = 1e-3
-"""Displacement, of the mechanism's length, from which a correction of the positions is told."""
+"""Displacement, relative to the mechanism's length, above which the report mentions a correction of positions."""
 
 VISIBLE_TURN = np.radians(0.1)
 DENSE_ROWS = 400
@@ -189,24 +191,29 @@ def least_correction(jacobian: csc_array, weights: np.ndarray, violation: np.nda
         ) from error
 
 
-def assemble_position(system: System, pose: np.ndarray, t: float) -> tuple[np.ndarray, InitialReport]:
-    """Move the bodies as little as possible onto the constraints; set redundant rows of ``system`` aside.
+def assemble_position(
+    system: System, place: Configuration, t: float
+) -> tuple[Configuration, np.ndarray, InitialReport]:
+    """Move the bodies as little as possible onto the constraints.
 
-    Parameters
-    ----------
-    pose : ndarray, shape (bodies, 18)
-        R, A (row-major), v, omega of each moving body.
+    Returns
+    -------
+    place : Configuration
+        With the velocities it had.
+    kept : ndarray of int
+        Independent constraint rows; the others follow from them.
+    report : InitialReport
     """
     weights = system.coordinate_weights()
-    jacobian, phi, _ = system.constraint_jacobian(pose, t)
+    jacobian, phi, _ = system.constraint_jacobian(place, t)
     if not np.all(np.isfinite(phi)):
         raise _not_finite(system, phi, t)
     kept = independent_rows(jacobian, weights)
     report = InitialReport(degrees_of_freedom=jacobian.shape[1] - kept.size)
-    start = pose
+    before = place
     length = np.sqrt(weights[3]) if weights.size else 1.0
     for _ in range(SELECTIONS):
-        pose, jacobian, phi, iterations = _closed(system, pose, t, kept, length)
+        place, jacobian, phi, iterations = _closed(system, place, t, kept, length)
         report.position_iterations += iterations
         dropped = np.setdiff1d(np.arange(jacobian.shape[0]), kept)
         if not dropped.size or np.abs(phi[dropped]).max() <= CONFLICT * max(1.0, length):
@@ -221,18 +228,17 @@ def assemble_position(system: System, pose: np.ndarray, t: float) -> tuple[np.nd
         raise _conflict(system, dropped, phi)
     report.redundant = [system.row_names[i] for i in dropped]
     report.violation = float(np.abs(phi).max(initial=0.0))
-    _note_correction(system, report, start, pose)
-    system.keep_rows(kept)
-    return pose, report
+    _note_correction(system, report, before.pose, place.pose)
+    return place, kept, report
 
 
-def _note_correction(system: System, report: InitialReport, start: np.ndarray, pose: np.ndarray) -> None:
+def _note_correction(system: System, report: InitialReport, before: np.ndarray, pose: np.ndarray) -> None:
     report.length = system.length
     if not len(pose):
         return
-    shift = np.linalg.norm(pose[:, 0:3] - start[:, 0:3], axis=1)
+    shift = np.linalg.norm(pose[:, POSE_R : POSE_R + 3] - before[:, POSE_R : POSE_R + 3], axis=1)
     # |A - A0| = 2 sqrt(2) |sin(angle / 2)|
-    apart = np.linalg.norm(pose[:, 3:12] - start[:, 3:12], axis=1)
+    apart = np.linalg.norm(pose[:, POSE_A:POSE_V] - before[:, POSE_A:POSE_V], axis=1)
     turn = 2.0 * np.arcsin(np.minimum(apart / np.sqrt(8.0), 1.0))
     far, most = int(np.argmax(shift)), int(np.argmax(turn))
     report.moved = (system.body_names[far], float(shift[far]))
@@ -241,22 +247,22 @@ def _note_correction(system: System, report: InitialReport, start: np.ndarray, p
 
 
 def _closed(
-    system: System, pose: np.ndarray, t: float, kept: np.ndarray, length: float
-) -> tuple[np.ndarray, csc_array, np.ndarray, int]:
-    """Solve the kept rows for the pose nearest; return it with the Jacobian, Phi and the iterations taken."""
+    system: System, place: Configuration, t: float, kept: np.ndarray, length: float
+) -> tuple[Configuration, csc_array, np.ndarray, int]:
+    """Solve the kept rows for the nearest position; return it with the Jacobian, Phi and the iterations taken."""
     weights = system.coordinate_weights()
-    jacobian, phi, _ = system.constraint_jacobian(pose, t)
+    jacobian, phi, _ = system.constraint_jacobian(place, t)
     size = 0.0
     for iteration in range(MAX_POSITION_ITERATIONS):
         size = float(np.abs(phi[kept]).max(initial=0.0))
         if not np.isfinite(size):
             raise _not_finite(system, phi, t)
         if size <= POSITION_TOLERANCE * max(1.0, length):
-            return pose, jacobian, phi, iteration
+            return place, jacobian, phi, iteration
         step = least_correction(csc_array(jacobian[kept]), weights, phi[kept])
-        turn = np.abs(step.reshape(-1, 6)[:, 3:]).max(initial=0.0)
-        pose = system.displaced(pose, step * min(1.0, 0.5 / max(turn, 1e-300)))
-        jacobian, phi, _ = system.constraint_jacobian(pose, t)
+        turn = np.abs(place.parts(step)[0][:, 3:]).max(initial=0.0)
+        place = place.displaced(step * min(1.0, 0.5 / max(turn, 1e-300)))
+        jacobian, phi, _ = system.constraint_jacobian(place, t)
     if size > 1e-9 * max(1.0, length):
         worst = kept[np.argmax(np.abs(phi[kept]))]
         raise AssemblyError(
@@ -264,7 +270,7 @@ def _closed(
             f"{system.row_names[worst]} is still violated by {abs(phi[worst]):.3g}; "
             "check the lengths and the markers of that joint"
         )
-    return pose, jacobian, phi, MAX_POSITION_ITERATIONS
+    return place, jacobian, phi, MAX_POSITION_ITERATIONS
 
 
 def _not_finite(system: System, phi: np.ndarray, t: float) -> AssemblyError:
@@ -284,20 +290,17 @@ def _conflict(system: System, dropped: np.ndarray, phi: np.ndarray) -> AssemblyE
     )
 
 
-def consistent_velocity(system: System, pose: np.ndarray, t: float) -> np.ndarray:
-    """Correct v and omega as little as possible so that Phi_q v + Phi_t = 0."""
+def consistent_velocity(system: System, place: Configuration, t: float) -> Configuration:
+    """Correct the velocities as little as possible so that Phi_q v + Phi_t = 0."""
     weights = system.coordinate_weights()
-    jacobian, _, rate = system.constraint_jacobian(pose, t)
+    jacobian, _, rate = system.constraint_jacobian(place, t)
     if jacobian.shape[0] == 0:
-        return pose
-    step = least_correction(jacobian, weights, rate)
-    pose = pose.copy()
-    pose[:, 12:18] += step.reshape(-1, 6)
-    return pose
+        return place
+    return place.pushed(least_correction(jacobian, weights, rate))
 
 
 def check_inertia(system: System) -> None:
-    """Raise if a body that can move freely in some direction has no inertia there."""
-    for name, row in zip(system.body_names, np.asarray(system.builder.bodies)[1:]):
+    """Raise if the mass or inertia of a body is not finite."""
+    for name, row in zip(system.body_names, system.model.bodies[1:]):
         if not np.all(np.isfinite(row)):
             raise SingularModelError(f"body '{name}': mass or inertia is not finite")

@@ -69,7 +69,7 @@ def _integral(t: np.ndarray, power: np.ndarray) -> np.ndarray:
 def _powers(solution: Solution) -> dict[str, np.ndarray]:
     motion = np.einsum("tr,tr->t", solution.multipliers, solution._phi[:, :, 2])
     applied = np.zeros(solution.t.size)
-    for k, row in enumerate(solution.system.builder.forces):
+    for k, row in enumerate(solution.system.model.forces):
         if row[T.FORCE_KIND] != T.REACTION and not _accounts(solution, k - row[T.FORCE_PART]):
             applied += _load_power(solution, k, row)
     zero = np.zeros(solution.t.size)
@@ -82,23 +82,23 @@ def _powers(solution: Solution) -> dict[str, np.ndarray]:
 
 def _accounts(solution: Solution, k: int) -> bool:
     """Whether a force element tells what it stores and dissipates, so that the work of its wrench is known."""
-    return any(d.role in (STORED, DISSIPATED) for d in solution.system.builder.diagnostics[k])
+    return any(d.role in (STORED, DISSIPATED) for d in solution.system.model.diagnostics[k])
 
 
 def _told(solution: Solution, role: str) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the names and values of all diagnostics of a role."""
-    for k, diagnostics in enumerate(solution.system.builder.diagnostics):
+    for k, diagnostics in enumerate(solution.system.model.diagnostics):
         for c, d in enumerate(diagnostics):
             if d.role == role:
                 yield d.name, solution._loads[:, k, 6 + c]
 
 
-def _load_power(solution: Solution, k: int, row: list[int]) -> np.ndarray:
+def _load_power(solution: Solution, k: int, row: np.ndarray) -> np.ndarray:
     """Power of a force element: F and N on I's body at marker I, the opposite on J's body at the same point."""
-    builder = solution.system.builder
+    model = solution.system.model
     force, torque = solution._loads[:, k, 0:3], solution._loads[:, k, 3:6]
-    bi, bj = (builder.marker_body[row[column]] for column in (T.FORCE_I, T.FORCE_J))
-    local = builder.marker_frame[row[T.FORCE_I]][:3]
+    bi, bj = (model.marker_body[row[column]] for column in (T.FORCE_I, T.FORCE_J))
+    local = model.marker_frame[row[T.FORCE_I]][:3]
     zero = np.zeros((solution.t.size, 3))
     point = local + zero
     if bi:
@@ -114,6 +114,6 @@ def _load_power(solution: Solution, k: int, row: list[int]) -> np.ndarray:
 
 
 def _gravity(solution: Solution) -> np.ndarray:
-    builder = solution.system.builder
-    masses = np.array([row[0] for row in builder.bodies[1:]])
-    return -np.einsum("b,tbc,c->t", masses, solution._pose[:, :, 0:3], builder.gravity)
+    model = solution.system.model
+    masses = model.bodies[1:, T.BODY_MASS]
+    return -np.einsum("b,tbc,c->t", masses, solution._pose[:, :, 0:3], model.gravity)

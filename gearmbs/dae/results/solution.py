@@ -119,7 +119,7 @@ class Solution:
 
     def _new_records(self, m: int) -> outputs.Records:
         system = self.system
-        diagnostics = max((len(d) for d in system.builder.diagnostics), default=0)
+        diagnostics = max((len(d) for d in system.model.diagnostics), default=0)
         return outputs.new_records(
             m, len(system.body_names), len(system.row_names), len(system.force_names), diagnostics
         )
@@ -266,7 +266,7 @@ class Solution:
     def diagnostics(self, element: str) -> dict[str, np.ndarray]:
         """Return what a force element tells beside its wrench, over time, by name; units are in :meth:`to_dataset`."""
         k = self._element(element)
-        return {d.name: self._loads[:, k, 6 + c] for c, d in enumerate(self.system.builder.diagnostics[k])}
+        return {d.name: self._loads[:, k, 6 + c] for c, d in enumerate(self.system.model.diagnostics[k])}
 
     def contact(self, element: str) -> dict[str, np.ndarray]:
         """Return the diagnostics of a contact, as :meth:`diagnostics`."""
@@ -282,7 +282,7 @@ class Solution:
     def _diagnostics_by_name(self) -> Iterator[tuple[str, str, np.ndarray]]:
         """Yield name, unit and values (m, elements) of each diagnostic; zero for elements without it."""
         found: dict[tuple[str, str], np.ndarray] = {}
-        for k, diagnostics in enumerate(self.system.builder.diagnostics):
+        for k, diagnostics in enumerate(self.system.model.diagnostics):
             for c, d in enumerate(diagnostics):
                 table = found.setdefault((d.name, d.unit), np.zeros((self.t.size, len(self.system.force_names))))
                 table[:, k] = self._loads[:, k, 6 + c]
@@ -345,7 +345,7 @@ class Solution:
     def kinetic_energy(self) -> np.ndarray:
         """Kinetic energy, shape (m,), J."""
         total = np.zeros(self.t.size)
-        for b, row in enumerate(self.system.builder.bodies[1:]):
+        for b, row in enumerate(self.system.model.bodies[1:]):
             v, w = self._pose[:, b, 12:15], self._pose[:, b, 15:18]
             a = self._pose[:, b, 3:12].reshape(-1, 3, 3)
             local = np.einsum("tji,tj->ti", a, w)

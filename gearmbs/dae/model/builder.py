@@ -1,22 +1,22 @@
-"""From the rows that a mechanism hands over one by one to the flat tables of `gearmbs.dae.equations.layout`."""
+"""Collects what a mechanism hands over piece by piece; the result is an immutable `Model`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from gearmbs.dae.compiled.pointers import address
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
-from gearmbs.dae.equations.force_elements import FORCE_SIG, FRAME_COLUMNS, Diagnostic
-from gearmbs.dae.equations.rotation import KIN_COLUMNS
-from gearmbs.dae.equations.unknowns import Counts, offsets, places
+from gearmbs.dae.equations.force_elements import FRAME_COLUMNS, Diagnostic
+from gearmbs.dae.equations.unknowns import Counts
+from gearmbs.dae.model.model import Model, Names, frozen
 
 
 class TableBuilder:
-    """Collects the rows of the tables in Python and packs them once.
+    """Collects the rows of the tables; `build` makes a `Model` of them.
 
     The methods return the index of what they add, for use in later rows.
     """
@@ -141,7 +141,7 @@ class TableBuilder:
         bodies: list[int],
         unknowns: list[int] | None = None,
     ) -> int:
-        """Add a load by expressions or the reactions of a joint; offsets in y are settled by :meth:`pack`.
+        """Add a load by expressions or the reactions of a joint; offsets in y are assigned by :meth:`Model.pack`.
 
         ``bodies`` and ``unknowns`` are what its derivative columns refer to.
         """
@@ -235,26 +235,6 @@ class TableBuilder:
         self.diagnostics.append(diagnostics)
         return len(self.forces) - 1
 
-    def renumber_unknowns(self, new: dict[int, int]) -> None:
-        """Point everything that depends on an unknown to its new place in y; those missing in ``new`` are dropped.
-
-        Only reactions depend on multipliers, and only multipliers are ever dropped. An element's own states have their
-        number less than 0 there, until the tables are packed.
-        """
-        for row in self.forces:
-            at = row[T.FORCE_DEPENDS]
-            bodies = self.extra_i[at]
-            first = at + 2 + bodies
-            places = self.extra_i[first : first + self.extra_i[first - 1]]
-            kept = [k if k < 0 else new[k] for k in places if k < 0 or k in new]
-            self.extra_i[first - 1] = len(kept)
-            self.extra_i[first : first + len(kept)] = kept
-            row[T.FORCE_WIDTH] = 12 * bodies + len(kept)
-        for tape in self.tape_rows:
-            codes, bodies, count = tape[T.TAPE_I], tape[T.TAPE_BODIES] + tape[T.TAPE_N_BODIES], tape[T.TAPE_N_UNKNOWNS]
-            for at in (bodies, codes + self.extra_i[codes + HEAD_ALGEBRAIC_LIST]):
-                self.extra_i[at : at + count] = [new[k] for k in self.extra_i[at : at + count]]
-
     def counts(self) -> Counts:
         """Return what the length of y depends on."""
         return Counts(
@@ -265,107 +245,37 @@ class TableBuilder:
             states=len(self.states),
         )
 
-    def layout(self, formulation: int) -> dict[str, int]:
-        """Return the offsets of the blocks of y, eq. (9)."""
-        return offsets(self.counts(), formulation)
+    def build(self, names: Names) -> Model:
+        """Return the tables as an immutable model."""
+        return Model(
+            gravity=frozen(self.gravity),
+            bodies=frozen(self.bodies),
+            modes=tuple(self.modes),
+            marker_body=_integers(self.marker_body),
+            marker_frame=frozen(np.array(self.marker_frame).reshape(-1, T.MARKER_COLUMNS)),
+            rows=_integers(self.rows, T.ROW_COLUMNS),
+            terms=_integers(self.terms, T.TERM_COLUMNS),
+            coef=frozen(self.coef),
+            reference=frozen(self.reference),
+            forces=_integers(self.forces, T.FORCE_COLUMNS),
+            functions=_integers(self.functions, T.FUNCTION_COLUMNS),
+            function_r=frozen(self.function_r),
+            extra_i=_integers(self.extra_i),
+            extra_r=frozen(self.extra_r),
+            states=_integers(self.states, T.STATE_COLUMNS),
+            tapes=tuple(self.tapes),
+            tape_rows=_integers(self.tape_rows, T.TAPE_COLUMNS),
+            tape_work=self.tape_work,
+            angles=_integers(self.angles, T.ANGLE_COLUMNS),
+            kernels=MappingProxyType(dict(self.kernels)),
+            own_functions=MappingProxyType(dict(self.own_functions)),
+            diagnostics=tuple(self.diagnostics),
+            largest_jac=self.largest_jac,
+            names=names,
+        )
 
-    def pack(self, formulation: int, slots: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, int]:
-        """Return (idata, rdata, work size) for a formulation and a Jacobian slot map."""
-        at = self.layout(formulation)
-        slots = np.zeros(0, dtype=np.int64) if slots is None else slots
-        bodies, markers = len(self.bodies), len(self.marker_body)
-        head = np.zeros(T.H_SIZE, dtype=np.int64)
-        head[:7] = bodies, markers, len(self.rows), len(self.terms), len(self.forces), len(self.functions), formulation
-        head[T.H_UNKNOWNS] = at["n"]
-        head[T.H_U : T.H_MU + 1] = [at[k] for k in ("u", "p", "eps", "R", "theta", "lambda", "F", "N", "mu")]
-        head[T.H_COORDINATES] = self.counts().coordinates
-        head[T.H_PF], head[T.H_VF], head[T.H_QF] = at["p_f"], at["v_f"], at["q_f"]
-        head[T.H_SLOTS] = slots.size
-        extra_i = np.array(self.extra_i, dtype=np.int64)
-        forces, need = self._packed_forces(at, extra_i)
-        tapes = np.array(self.tape_rows, dtype=np.int64).reshape(-1, T.TAPE_COLUMNS)
-        if self.tapes:
-            from gearmbs.dae.equations.expression_loads import addresses
 
-            tapes[:, T.TAPE_ADDRESS :] = addresses()
-        rows = np.array([*self.rows, (len(self.terms), -1, -1)], dtype=np.int64)
-        tables_i = [
-            (T.H_I_AT, places(self.counts(), formulation)),
-            (T.H_I_CODE, np.array(self.codes)),
-            (T.H_I_MARKER_BODY, np.array(self.marker_body)),
-            (T.H_I_ROW, rows),
-            (T.H_I_TERM, np.array(self.terms)),
-            (T.H_I_FORCE, forces),
-            (T.H_I_FUNCTION, np.array(self.functions)),
-            (T.H_I_EXTRA, extra_i),
-            (T.H_I_SLOT, slots),
-            (T.H_I_STATE, np.array(self.states)),
-            (T.H_I_TAPE, tapes),
-            (T.H_I_ANGLE, np.array(self.angles)),
-        ]
-        unseen = np.zeros(len(self.reference) + 3 * bodies)
-        tables_r = [
-            (T.H_R_GRAVITY, self.gravity),
-            (T.H_R_BODY, np.array(self.bodies)),
-            (T.H_R_MARKER, np.array(self.marker_frame)),
-            (T.H_R_COEF, np.array(self.coef)),
-            (T.H_R_FUNCTION, np.array(self.function_r)),
-            (T.H_R_EXTRA, np.array(self.extra_r)),
-            (T.H_R_REFERENCE, np.array([*self.reference, 0.0, *self.reference, *unseen])),
-        ]
-        head[T.H_ANGLES] = len(self.angles)
-        head[T.H_DIAGNOSTICS] = max((len(d) for d in self.diagnostics), default=0)
-        head[T.H_N_EXTRA_I], head[T.H_N_EXTRA_R] = len(self.extra_i), len(self.extra_r)
-        head[T.H_N_FUNCTION_R] = len(self.function_r)
-        head[T.H_Z], head[T.H_STATES], head[T.H_TAPES] = at["z"], len(self.states), len(self.tapes)
-        head[T.H_W_KIN] = 0
-        head[T.H_W_MARKER] = bodies * KIN_COLUMNS
-        head[T.H_W_FUNCTION] = head[T.H_W_MARKER] + markers * T.MK_COLUMNS
-        head[T.H_W_TAPE] = head[T.H_W_FUNCTION] + 3 * len(self.functions)
-        head[T.H_W_TAPE_SIZE] = self.tape_work
-        head[T.H_W_SCRATCH] = head[T.H_W_TAPE] + self.tape_work
-        head[T.H_WORK] = head[T.H_W_SCRATCH] + need
-        offset = T.H_SIZE
-        for key, table in tables_i:
-            head[key] = offset
-            offset += table.size
-        idata = np.concatenate([head, *(t.ravel().astype(np.int64) for _, t in tables_i)])
-        offset = 0
-        for key, table in tables_r:
-            idata[key] = offset
-            offset += table.size
-        rdata = np.concatenate([t.ravel().astype(np.float64) for _, t in tables_r])
-        return np.ascontiguousarray(idata), np.ascontiguousarray(rdata), int(head[T.H_WORK])
-
-    def _packed_forces(self, at: dict[str, int], extra_i: np.ndarray) -> tuple[np.ndarray, int]:
-        """Return the rows of the force elements with their places in y and in scratch, and the scratch needed.
-
-        Places and addresses that stand in ``extra_i`` are put there.
-        """
-        forces = np.array(self.forces, dtype=np.int64).reshape(-1, T.FORCE_COLUMNS)
-        next_f, next_n, next_work = at["F"], at["N"], T.SCRATCH_FIXED + self.largest_jac
-        leader = np.zeros(T.FORCE_COLUMNS, dtype=np.int64)
-        for number, row in enumerate(forces):
-            for column, advance in ((T.FORCE_F, 0), (T.FORCE_N, 1)):
-                if row[column]:
-                    row[column] = next_n if advance else next_f
-                    next_f += 0 if advance else 3
-                    next_n += 3 if advance else 0
-                else:
-                    row[column] = -1
-            if row[T.FORCE_KIND] != T.COMPILED:
-                continue
-            if row[T.FORCE_PART] == 0:
-                leader = row
-                row[T.FORCE_ADDRESS] = address(self.kernels[number], FORCE_SIG)
-                row[T.FORCE_Z] += at["z"]
-                row[T.FORCE_WORK], next_work = next_work, next_work + row[T.FORCE_WORK]
-            else:
-                row[T.FORCE_WORK] = leader[T.FORCE_WORK]
-            first = row[T.FORCE_DEPENDS] + 2 + extra_i[row[T.FORCE_DEPENDS]]
-            for k in range(first, first + extra_i[first - 1]):
-                if extra_i[k] < 0:
-                    extra_i[k] = leader[T.FORCE_Z] - 1 - extra_i[k]
-        for place, (function, signature) in self.own_functions.items():
-            extra_i[place] = address(function, signature)
-        return forces, next_work
+def _integers(rows: Sequence[Any], columns: int | None = None) -> np.ndarray:
+    """Return a table of integers that cannot be written to."""
+    table = np.array(rows, dtype=np.int64)
+    return frozen(table if columns is None else table.reshape(-1, columns))

@@ -1,0 +1,142 @@
+"""What is wrong with a model, in the modeller's words: locking positions, values that are not finite, no inertia."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import splu
+
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.errors import ModelError
+
+if TYPE_CHECKING:
+    from gearmbs.dae.model.configuration import Configuration
+    from gearmbs.dae.model.model import Model
+    from gearmbs.dae.model.system import System
+
+LARGEST_LOCK = 600
+"""Constraint rows up to which the cause of a failure is sought in a locking position."""
+LOCKED = 0.25
+"""Smallest singular value of the constraints, of its initial one, below which a position counts as near a lock."""
+DENSE_COORDINATES = 600
+"""Coordinates up to which motions without inertia are looked for by dense decompositions."""
+INVERSE_ITERATIONS = 3
+
+
+def locking(system: System, at: Configuration, t: float) -> str | None:
+    """Return which constraint rows are about to depend on each other at a position, None when they are not.
+
+    At a position where a mechanism locks the constraint Jacobian loses rank; near it, its smallest singular value
+    is well below that of the initial position.
+    """
+    names = system.row_names
+    if not names or len(names) > LARGEST_LOCK:
+        return None
+    scale = 1.0 / np.sqrt(system.coordinate_weights())
+
+    def smallest(place: Configuration, time: float) -> tuple[float, np.ndarray]:
+        left, values, _ = np.linalg.svd(system.constraint_jacobian(place, time)[0].toarray() * scale)
+        return float(values[-1]), left[:, -1]
+
+    value, direction = smallest(at, t)
+    if not np.isfinite(value) or value > LOCKED * smallest(system.start, system.t0)[0]:
+        return None
+    rows = np.argsort(-np.abs(direction))[:3]
+    named = ", ".join(names[r] for r in rows if abs(direction[r]) > 0.1 * np.abs(direction).max())
+    return (
+        f"The mechanism is near a position where it locks, or can branch: {named} come to depend on each other. "
+        "Check the lengths, and whether the motions ask for more than the mechanism can reach."
+    )
+
+
+def check_finite(system: System, rhs: np.ndarray, loads: np.ndarray, t: float) -> None:
+    """Raise a ModelError that names the load, constraint or body whose terms of the equations are not finite."""
+    names = system.model.names
+    bad = ~np.all(np.isfinite(loads[:, :6]), axis=1)
+    if np.any(bad[: len(names.forces)]):
+        name = names.forces[int(np.argmax(bad))]
+        element = system.mechanism.elements.get(name) if system.mechanism is not None else None
+        raise ModelError(
+            f"{getattr(element, 'kind', 'load')} '{name}': its value at t = {t:.6g} s is not finite; look for a "
+            f"division by zero, a root or logarithm of a negative number or coinciding markers in {element!r}"
+        )
+    base = rhs.size - len(names.rows)
+    wrong = np.flatnonzero(~np.isfinite(rhs))
+    if wrong.size and wrong[-1] >= base:
+        raise ModelError(
+            f"{names.rows[wrong[-1] - base]}: the derivatives of its function of time at t = {t:.6g} s are not "
+            "finite; let the motion begin smoothly"
+        )
+    if wrong.size:
+        body = body_of(system.model, int(wrong[0]))
+        raise ModelError(f"body '{body}': its forces at t = {t:.6g} s are not finite")
+
+
+def body_of(model: Model, coordinate: int) -> str:
+    """Return the name of the body a spatial displacement or modal coordinate belongs to."""
+    bodies = len(model.names.bodies)
+    if coordinate < 6 * bodies:
+        return model.names.bodies[coordinate // 6]
+    owners = np.repeat(np.arange(bodies), model.modes[1:])
+    return model.names.bodies[owners[coordinate - 6 * bodies]]
+
+
+def is_massless(model: Model, matrix: csc_array) -> bool:
+    """Return whether some motion allowed by the constraints has no inertia."""
+    inertia = model.bodies[1:, T.BODY_INERTIA :].reshape(-1, 3, 3)
+    if np.all(model.bodies[1:, T.BODY_MASS] > 0.0) and np.all(np.linalg.eigvalsh(inertia)[:, 0] > 0.0):
+        return False
+    return free_massless_body(model, matrix) is not None
+
+
+def free_massless_body(model: Model, matrix: csc_array) -> str | None:
+    """Return a body that the constraints let move without any inertia, None when there is none."""
+    from scipy.linalg import null_space
+
+    base = model.counts.coordinates
+    if base > DENSE_COORDINATES:
+        return _free_massless_body_of_many(model, matrix)
+    constraint = matrix[base:, :base].toarray()
+    free = null_space(constraint) if constraint.shape[0] else np.eye(base)
+    mass = matrix[:base, :base].toarray()
+    values, vectors = np.linalg.eigh(free.T @ mass @ free)
+    if values.size and values[0] <= 1e-14 * max(values[-1], 1e-300):
+        motion = np.abs(free @ vectors[:, 0])
+        return body_of(model, int(np.argmax(motion)))
+    return None
+
+
+def _free_massless_body_of_many(model: Model, matrix: csc_array) -> str | None:
+    """Look for a motion without inertia by inverse iteration, on masses raised by a trace that keeps it regular."""
+    base = model.counts.coordinates
+    heaviest = abs(matrix[:base, :base]).max()
+    raised = np.zeros(matrix.shape[0])
+    raised[:base] = 1e-15 * heaviest
+    try:
+        factors = splu(csc_array(matrix + diags_array(raised)))
+    except RuntimeError:
+        return None
+    motion = np.zeros(matrix.shape[0])
+    motion[:base] = np.random.default_rng(0).standard_normal(base)
+    answer = 1.0
+    for _ in range(INVERSE_ITERATIONS):
+        motion[base:] = 0.0
+        motion /= np.linalg.norm(motion)
+        motion = factors.solve(motion)
+        answer = float(np.linalg.norm(motion[:base]))
+    if not answer * heaviest >= 1e14:
+        return None
+    return body_of(model, int(np.argmax(np.abs(motion[:base]))))
+
+
+def singular_message(model: Model, matrix: csc_array) -> str:
+    """Say why the accelerations are not determined."""
+    name = free_massless_body(model, matrix)
+    if name is not None:
+        return (
+            f"body '{name}' can move without any inertia resisting it: check whether a massless part is "
+            "under-constrained, give it mass and inertia, or fix it with a joint"
+        )
+    return "the equations of motion have no unique solution: check for bodies without inertia and locked joints"

@@ -1,0 +1,311 @@
+"""The compiled, immutable model of a mechanism: typed tables and names, packed into arrays for the kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gearmbs.dae.compiled.pointers import address
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
+from gearmbs.dae.equations.force_elements import FORCE_SIG, Diagnostic
+from gearmbs.dae.equations.rotation import KIN_COLUMNS
+from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, Counts, Unknown, named, offsets, places
+
+
+def frozen(array: npt.ArrayLike) -> np.ndarray:
+    """Return a copy of an array that cannot be written to."""
+    out = np.array(array)
+    out.setflags(write=False)
+    return out
+
+
+@dataclass(frozen=True)
+class Names:
+    """Names of what the tables hold, for tables, results and messages.
+
+    A row's name is ``joint: what it enforces``.
+    """
+
+    bodies: tuple[str, ...] = ()
+    rows: tuple[str, ...] = ()
+    forces: tuple[str, ...] = ()
+    states: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Tables of a mechanism. Nothing changes them: dropping rows makes a new model.
+
+    Attributes
+    ----------
+    gravity : ndarray, shape (3,)
+        m/s^2.
+    bodies : ndarray, shape (1 + moving bodies, BODY_COLUMNS)
+        Mass and inertia about the centre of mass; the ground comes first.
+    modes : tuple of int
+        Number of modal coordinates of each body.
+    marker_body, marker_frame : ndarray
+        Body of each marker, its origin from the centre of mass and its axes in body components.
+    rows, terms, coef, reference : ndarray
+        Constraint rows, their terms, coefficients and, of counted angles, the values they start from.
+    forces, functions, function_r, states, tape_rows : ndarray
+        Force elements, functions of time with parameters, user-defined states, expressions.
+    extra_i, extra_r : ndarray
+        Tables that elements and expressions bring along.
+    tapes : tuple
+        The expressions as objects.
+    angles : ndarray
+        Angles that force elements count through full turns.
+    kernels : mapping of int to compiled function
+        Kernel of each compiled force element by its row.
+    own_functions : mapping of int to (compiled function, signature)
+        Functions that elements call, by the place of their address in ``extra_i``.
+    diagnostics : tuple
+        Of each force element, what it reports besides its wrench.
+    largest_jac : int
+        Entries of the largest matrix of derivatives of a force element.
+    """
+
+    gravity: np.ndarray
+    bodies: np.ndarray
+    modes: tuple[int, ...]
+    marker_body: np.ndarray
+    marker_frame: np.ndarray
+    rows: np.ndarray
+    terms: np.ndarray
+    coef: np.ndarray
+    reference: np.ndarray
+    forces: np.ndarray
+    functions: np.ndarray
+    function_r: np.ndarray
+    extra_i: np.ndarray
+    extra_r: np.ndarray
+    states: np.ndarray
+    tapes: tuple[Any, ...]
+    tape_rows: np.ndarray
+    tape_work: int
+    angles: np.ndarray
+    kernels: Mapping[int, Any]
+    own_functions: Mapping[int, tuple[Any, Any]]
+    diagnostics: tuple[tuple[Diagnostic, ...], ...]
+    largest_jac: int
+    names: Names = field(default_factory=Names)
+
+    @property
+    def counts(self) -> Counts:
+        """What the length of y depends on."""
+        return Counts(
+            modes=self.modes[1:],
+            rows=len(self.rows),
+            forces=int(np.sum(self.forces[:, T.FORCE_F])),
+            torques=int(np.sum(self.forces[:, T.FORCE_N])),
+            states=len(self.states),
+        )
+
+    def layout(self, formulation: int) -> dict[str, int]:
+        """Return the offsets of the blocks of y, eq. (9)."""
+        return offsets(self.counts, formulation)
+
+    def unknowns(self, formulation: str = "SI2") -> list[Unknown]:
+        """Return the table of the unknowns of eq. (9) in their order."""
+        names = self.names
+        forces = [name for name, row in zip(names.forces, self.forces) if row[T.FORCE_F]]
+        torques = [name for name, row in zip(names.forces, self.forces) if row[T.FORCE_N]]
+        owners = (names.bodies, names.rows, forces, torques, names.states)
+        return named(self.counts, FORMULATIONS[formulation], *owners)
+
+    @property
+    def differential_states(self) -> np.ndarray:
+        """Which user-defined states are given by their rates, shape (states,)."""
+        return self.states[:, T.STATE_KIND] == T.STATE_DIFFERENTIAL
+
+    def span(self, row: int) -> slice:
+        """Return where the terms of a constraint row are."""
+        end = self.rows[row + 1, T.ROW_FIRST] if row + 1 < len(self.rows) else len(self.terms)
+        return slice(int(self.rows[row, T.ROW_FIRST]), int(end))
+
+    def with_rows(self, kept: np.ndarray) -> Model:
+        """Return the model with the constraint rows ``kept`` alone.
+
+        What depends on an unknown is pointed to its new place in y; reactions lose the multipliers that are dropped.
+        """
+        spans = [self.span(int(i)) for i in kept]
+        sizes = [span.stop - span.start for span in spans]
+        places_of_terms = np.concatenate([np.arange(span.start, span.stop) for span in spans] or [np.zeros(0, int)])
+        terms = places_of_terms.astype(np.int64)
+        rows = self.rows[kept].copy()
+        rows[:, T.ROW_FIRST] = np.concatenate([[0], np.cumsum(sizes)[:-1]]) if len(sizes) else 0
+        old = self.layout(I3)
+        less = len(self.rows) - len(kept)
+        new = {old["lambda"] + int(i): old["lambda"] + k for k, i in enumerate(kept)}
+        new |= {k: k - less for k in range(old["F"], old["n"])}
+        forces, extra_i = self._renumbered(new)
+        return replace(
+            self,
+            rows=frozen(rows),
+            terms=frozen(self.terms[terms]),
+            coef=frozen(self.coef[terms]),
+            reference=frozen(self.reference[terms]),
+            forces=frozen(forces),
+            extra_i=frozen(extra_i),
+            names=replace(self.names, rows=tuple(self.names.rows[i] for i in kept)),
+        )
+
+    def _renumbered(self, new: dict[int, int]) -> tuple[np.ndarray, np.ndarray]:
+        """Return forces and extra integers in which unknowns have new places; those missing in ``new`` are gone.
+
+        Only reactions depend on multipliers, and only multipliers are ever dropped. An element's own states have their
+        number less than 0 there, until the tables are packed.
+        """
+        forces, extra_i = self.forces.copy(), self.extra_i.copy()
+        for row in forces:
+            at = row[T.FORCE_DEPENDS]
+            bodies = extra_i[at]
+            first = at + 2 + bodies
+            places = [int(k) for k in extra_i[first : first + extra_i[first - 1]]]
+            kept = [k if k < 0 else new[k] for k in places if k < 0 or k in new]
+            extra_i[first - 1] = len(kept)
+            extra_i[first : first + len(kept)] = kept
+            row[T.FORCE_WIDTH] = T.FRAME_VARIATIONS * bodies + len(kept)
+        for tape in self.tape_rows:
+            codes = tape[T.TAPE_I]
+            unknowns, count = tape[T.TAPE_BODIES] + tape[T.TAPE_N_BODIES], tape[T.TAPE_N_UNKNOWNS]
+            for at in (unknowns, codes + extra_i[codes + HEAD_ALGEBRAIC_LIST]):
+                extra_i[at : at + count] = [new[int(k)] for k in extra_i[at : at + count]]
+        return forces, extra_i
+
+    # --- for the kernels ----------------------------------------------------------------------------
+
+    def pack(
+        self, formulation: int, slots: np.ndarray | None = None, codes: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray, int]:
+        """Return new arrays for the kernels.
+
+        Parameters
+        ----------
+        formulation : int
+        slots : ndarray of int, optional
+            Place of each entry of the Jacobian among its values.
+        codes : ndarray of int, optional
+            Euler reference of each body, the ground first; default: the identity.
+
+        Returns
+        -------
+        idata, rdata : ndarray
+        work_size : int
+        """
+        head = self._head(formulation)
+        forces, extra_i, work = self._placed_forces(formulation)
+        codes = np.zeros(len(self.bodies), dtype=np.int64) if codes is None else codes
+        slots = np.zeros(0, dtype=np.int64) if slots is None else slots
+        head[T.H_SLOTS] = slots.size
+        head[T.H_WORK] = head[T.H_W_SCRATCH] + work
+        end = [(len(self.terms), -1, -1)]
+        integers = {
+            T.H_I_AT: places(self.counts, formulation),
+            T.H_I_CODE: codes,
+            T.H_I_MARKER_BODY: self.marker_body,
+            T.H_I_ROW: np.concatenate([self.rows, end]),
+            T.H_I_TERM: self.terms,
+            T.H_I_FORCE: forces,
+            T.H_I_FUNCTION: self.functions,
+            T.H_I_EXTRA: extra_i,
+            T.H_I_SLOT: slots,
+            T.H_I_STATE: self.states,
+            T.H_I_TAPE: self._addressed_tapes(),
+            T.H_I_ANGLE: self.angles,
+        }
+        # references of counted angles; time, values and rates where they were last counted; angles of the matrix
+        now, unseen = np.zeros(1), np.zeros(len(self.reference) + 3 * len(self.bodies))
+        reals = {
+            T.H_R_GRAVITY: self.gravity,
+            T.H_R_BODY: self.bodies,
+            T.H_R_MARKER: self.marker_frame,
+            T.H_R_COEF: self.coef,
+            T.H_R_FUNCTION: self.function_r,
+            T.H_R_EXTRA: self.extra_r,
+            T.H_R_REFERENCE: np.concatenate([self.reference, now, self.reference, unseen]),
+        }
+        _place(head, integers, T.H_SIZE)
+        _place(head, reals, 0)
+        idata = np.concatenate([head, *(np.ravel(table).astype(np.int64) for table in integers.values())])
+        rdata = np.concatenate([np.ravel(table).astype(np.float64) for table in reals.values()])
+        return np.ascontiguousarray(idata), np.ascontiguousarray(rdata), int(head[T.H_WORK])
+
+    def _head(self, formulation: int) -> np.ndarray:
+        """Return the header: counts, offsets of y and of the work array; the tables are placed later."""
+        at, counts = self.layout(formulation), self.counts
+        head = np.zeros(T.H_SIZE, dtype=np.int64)
+        head[T.H_BODIES], head[T.H_MARKERS] = len(self.bodies), len(self.marker_body)
+        head[T.H_ROWS], head[T.H_TERMS] = len(self.rows), len(self.terms)
+        head[T.H_FORCES], head[T.H_FUNCTIONS] = len(self.forces), len(self.functions)
+        head[T.H_STATES], head[T.H_TAPES] = len(self.states), len(self.tapes)
+        head[T.H_FORMULATION], head[T.H_UNKNOWNS], head[T.H_COORDINATES] = formulation, at["n"], counts.coordinates
+        for column, block in T.HEAD_OF_BLOCK.items():
+            head[column] = at[block]
+        head[T.H_ANGLES] = len(self.angles)
+        head[T.H_DIAGNOSTICS] = max((len(d) for d in self.diagnostics), default=0)
+        head[T.H_N_EXTRA_I], head[T.H_N_EXTRA_R] = len(self.extra_i), len(self.extra_r)
+        head[T.H_N_FUNCTION_R] = len(self.function_r)
+        head[T.H_W_KIN] = 0
+        head[T.H_W_MARKER] = len(self.bodies) * KIN_COLUMNS
+        head[T.H_W_FUNCTION] = head[T.H_W_MARKER] + len(self.marker_body) * T.MK_COLUMNS
+        head[T.H_W_TAPE] = head[T.H_W_FUNCTION] + T.FUNCTION_VALUES * len(self.functions)
+        head[T.H_W_TAPE_SIZE] = self.tape_work
+        head[T.H_W_SCRATCH] = head[T.H_W_TAPE] + self.tape_work
+        return head
+
+    def _addressed_tapes(self) -> np.ndarray:
+        """Return the rows of the expressions with the addresses of their evaluators, loaded only if there are any."""
+        rows = self.tape_rows.copy()
+        if self.tapes:
+            from gearmbs.dae.equations.expression_loads import addresses
+
+            rows[:, T.TAPE_ADDRESS :] = addresses()
+        return rows
+
+    def _placed_forces(self, formulation: int) -> tuple[np.ndarray, np.ndarray, int]:
+        """Return the force elements with their places in y and in scratch, the extra integers, the scratch needed.
+
+        Places of an element's own states and addresses of functions are put among the extra integers.
+        """
+        at = self.layout(formulation)
+        forces, extra_i = self.forces.copy(), self.extra_i.copy()
+        free = {T.FORCE_F: at["F"], T.FORCE_N: at["N"]}
+        work = T.SCRATCH_FIXED + self.largest_jac
+        leader = np.zeros(T.FORCE_COLUMNS, dtype=np.int64)
+        for number, row in enumerate(forces):
+            for column in (T.FORCE_F, T.FORCE_N):
+                if row[column]:
+                    row[column] = free[column]
+                    free[column] += 3
+                else:
+                    row[column] = -1
+            if row[T.FORCE_KIND] != T.COMPILED:
+                continue
+            if row[T.FORCE_PART] == 0:
+                leader = row
+                row[T.FORCE_ADDRESS] = address(self.kernels[number], FORCE_SIG)
+                row[T.FORCE_Z] += at["z"]
+                row[T.FORCE_WORK], work = work, work + int(row[T.FORCE_WORK])
+            else:
+                row[T.FORCE_WORK] = leader[T.FORCE_WORK]
+            first = row[T.FORCE_DEPENDS] + 2 + extra_i[row[T.FORCE_DEPENDS]]
+            depends = extra_i[first : first + extra_i[first - 1]]
+            own = depends < 0
+            depends[own] = leader[T.FORCE_Z] - 1 - depends[own]
+        for place, (function, signature) in self.own_functions.items():
+            extra_i[place] = address(function, signature)
+        return forces, extra_i, int(work)
+
+
+def _place(head: np.ndarray, tables: dict[int, np.ndarray], first: int) -> None:
+    """Note in the header where each table starts, one after the other."""
+    for key, table in tables.items():
+        head[key] = first
+        first += np.size(table)

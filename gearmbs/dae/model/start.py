@@ -1,0 +1,291 @@
+"""Consistent initial values: the acceleration (KKT) system at a configuration, loads, states, rates, the problem."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numba import njit
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
+
+from gearmbs.dae.equations import jacobian, residual, unknowns
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.constraint_terms import ANGLE, dot3
+from gearmbs.dae.equations.euler_switch import hook
+from gearmbs.dae.equations.reactions import reactions_from
+from gearmbs.dae.equations.rotation import (
+    KIN_A,
+    KIN_ADOT,
+    KIN_AXES,
+    KIN_H,
+    POSE_A,
+    POSE_R,
+    POSE_V,
+    POSE_W,
+    axes_and_velocity,
+    best_reference,
+    euler_angles,
+    euler_rates,
+)
+from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, SI1
+from gearmbs.dae.equations.update import inertia_times
+from gearmbs.dae.errors import SingularModelError
+from gearmbs.dae.model import diagnosis, evaluator
+from gearmbs.dae.problem import DAEProblem
+
+if TYPE_CHECKING:
+    from gearmbs.dae.model.configuration import Configuration
+    from gearmbs.dae.model.model import Model
+    from gearmbs.dae.model.system import System
+
+MAX_LOAD_ITERATIONS = 200
+"""Of loads that depend on each other, at the start; friction converges like a power of the friction coefficient."""
+MAX_STATE_ITERATIONS = 100
+
+
+class Assembled(NamedTuple):
+    """The acceleration system of a model at a configuration, with the unknowns and tables it was made from."""
+
+    matrix: csc_array
+    rhs: np.ndarray
+    phi: np.ndarray
+    loads: np.ndarray
+    y: np.ndarray
+    idata: np.ndarray
+    rdata: np.ndarray
+    work: np.ndarray
+
+
+@njit(
+    "void(float64[:, ::1], float64[::1], float64[::1], int64[::1], float64[::1], float64[::1], float64[::1])",
+    cache=True,
+    error_model="numpy",
+)
+def unknowns_from_pose(pose, q_f, v_f, idata, rdata, work, y):
+    """Fill positions, velocities and momenta of y from a configuration."""
+    tab = T.unpack(idata, rdata, work)
+    kin = tab.kin
+    s = tab.scratch
+    for b in range(1, idata[T.H_BODIES]):
+        row, at = pose[b - 1], tab.at[b]
+        th, e, p = at[T.AT_THETA], at[T.AT_EPS], at[T.AT_P]
+        for c in range(3):
+            y[at[T.AT_R] + c] = row[POSE_R + c]
+            y[at[T.AT_U] + c] = row[POSE_V + c]
+        for c in range(9):
+            kin[b, KIN_A + c] = row[POSE_A + c]
+        euler_angles(row, POSE_A, tab.code[b], y, th)
+        axes_and_velocity(y[th], y[th + 1], 0.0, 0.0, 0.0, kin, b)
+        euler_rates(kin, b, row, POSE_W, y, e)
+        inertia_times(kin[b], tab.body[b], row, POSE_W, kin[b], KIN_H, s)
+        for m in range(3):
+            y[p + m] = dot3(kin[b], KIN_AXES + 3 * m, kin[b], KIN_H)
+
+
+def euler_references(pose: np.ndarray) -> np.ndarray:
+    """Return, for the ground and each body, the Euler reference that is farther from its singularity."""
+    chosen = [best_reference(np.ascontiguousarray(row[POSE_A:POSE_V]), 0) for row in pose]
+    return np.array([0, *chosen], dtype=np.int64)
+
+
+class StartingSystem:
+    """Assembles the acceleration system of one model; its pattern is found once."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self._pattern: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+
+    def at(self, place: Configuration, t: float, inner: np.ndarray | None, states: np.ndarray) -> Assembled:
+        """Assemble at a configuration; ``inner`` holds loads and states, F to z of y; default: no loads, ``states``."""
+        idata, rdata, size = self.model.pack(I3, codes=euler_references(place.pose))
+        work = np.zeros(size)
+        y = np.zeros(int(idata[T.H_UNKNOWNS]))
+        y[int(idata[T.H_Z]) : int(idata[T.H_Z]) + states.size] = states
+        if inner is not None:
+            y[int(idata[T.H_F]) :] = inner
+        unknowns_from_pose(np.ascontiguousarray(place.pose), place.q_f, place.v_f, idata, rdata, work, y)
+        if self._pattern is None:
+            self._pattern = evaluator.pattern(idata, rdata, size)
+        indptr, indices, slots = self._pattern
+        n = indptr.size - 1
+        vals = np.zeros(indices.size)
+        records = evaluator.assemble(np.array([t]), y[None, :], slots, idata, rdata, size, vals)
+        matrix = csc_array((vals, indices, indptr), shape=(n, n))
+        return Assembled(matrix, records.solution[0], records.phi[0], records.loads[0], y, idata, rdata, work)
+
+    def constraints(
+        self, place: Configuration, t: float, states: np.ndarray
+    ) -> tuple[csc_array, np.ndarray, np.ndarray]:
+        """Return Phi_q in spatial displacements and modal coordinates, Phi, and Phi_q v + Phi_t."""
+        found = self.at(place, t, None, states)
+        base = place.coordinates
+        return csc_array(found.matrix[base:, :base]), found.phi[0::3].copy(), found.phi[1::3].copy()
+
+
+def accelerations(system: System, place: Configuration, t: float) -> tuple[np.ndarray, np.ndarray, Assembled]:
+    """Return the accelerations of the coordinates, lambda, and the system they solve with its loads in y.
+
+    Loads that depend on other loads or on reactions are iterated until they agree.
+
+    Raises
+    ------
+    SingularModelError
+        If a body can move without inertia.
+    ModelError
+        If a load or a function of time has no finite value.
+    """
+    base = place.coordinates
+    inner: np.ndarray | None = None
+    for attempt in range(MAX_LOAD_ITERATIONS if _coupled(system.model) else 1):
+        found = system.assembler.at(place, t, inner, system.state_start)
+        diagnosis.check_finite(system, found.rhs, found.loads, t)
+        try:
+            solution = splu(found.matrix).solve(found.rhs)
+        except RuntimeError:
+            solution = np.full(found.rhs.size, np.nan)
+        if not np.all(np.isfinite(solution)) or (attempt == 0 and diagnosis.is_massless(system.model, found.matrix)):
+            raise SingularModelError(diagnosis.singular_message(system.model, found.matrix))
+        y, idata = found.y, found.idata
+        last, inner = inner, _inner(y, found.loads, idata)
+        y[int(idata[T.H_F]) :] = inner
+        reactions_from(solution[base:].copy(), y, idata, found.rdata, found.work)
+        inner = y[int(idata[T.H_F]) :].copy()
+        if last is not None and np.abs(inner - last).max() <= 1e-13 * (1e-3 + np.abs(inner).max()):
+            break
+    return solution[:base], solution[base:], found
+
+
+def _coupled(model: Model) -> bool:
+    """Whether some load depends on unknowns other than positions, velocities and states."""
+    at = model.layout(I3)
+    for row in model.forces:
+        first = row[T.FORCE_DEPENDS]
+        first += 1 + model.extra_i[first]
+        count = model.extra_i[first]
+        if any(at["lambda"] <= k < at["z"] for k in model.extra_i[first + 1 : first + 1 + count]):
+            return True
+    return False
+
+
+def _inner(y: np.ndarray, loads: np.ndarray, idata: np.ndarray) -> np.ndarray:
+    """Return F, N and z of y with the loads of the force records."""
+    out = y[int(idata[T.H_F]) :].copy()
+    table = idata[int(idata[T.H_I_FORCE]) : int(idata[T.H_I_FUNCTION])].reshape(-1, T.FORCE_COLUMNS)
+    for f, row in enumerate(table):
+        for column, part in ((T.FORCE_F, loads[f, 0:3]), (T.FORCE_N, loads[f, 3:6])):
+            if row[column] >= 0:
+                at = int(row[column] - idata[T.H_F])
+                out[at : at + 3] = part
+    return out
+
+
+# --- the problem --------------------------------------------------------------------------------------
+
+
+def make_problem(system: System, formulation: str, rate_scale: float) -> DAEProblem:
+    """Return the DAE of a system in one of the formulations with consistent initial values.
+
+    See :meth:`gearmbs.dae.model.system.System.problem`.
+    """
+    model, form = system.model, FORMULATIONS[formulation]
+    acc, lam, found = accelerations(system, system.start, system.t0)
+    codes = euler_references(system.pose)
+    idata, rdata, size = model.pack(form, codes=codes)
+    indptr, indices, slots = jacobian.pattern(idata, rdata, size)
+    idata, rdata, size = model.pack(form, slots, codes)
+    at = model.layout(form)
+    y, yp, work = np.zeros(at["n"]), np.zeros(at["n"]), np.zeros(size)
+    first = int(found.idata[T.H_F])
+    y[: at["lambda"]] = found.y[: at["lambda"]]
+    y[at["F"] : at["mu"]] = found.y[first:]
+    (yp if form == SI1 else y)[at["lambda"] : at["lambda"] + len(lam)] = lam
+    differential = model.differential_states
+    _settle_states(system, y, yp, slice(at["z"], at["mu"]), idata, rdata, work)
+    _rates(y, yp, acc, system.t0, idata, rdata, work)
+    largest = float(np.abs(found.loads[:, :3]).max(initial=0.0))
+    scale = unknowns.scales(model.counts, form, model.bodies[1:], np.zeros((0, 2)), min(system.length, 1.0), largest)
+    allowed = scale.copy()
+    allowed[unknowns.velocities(at)] *= rate_scale
+    return DAEProblem(
+        n=at["n"],
+        residual=residual.residual,
+        jacobian=jacobian.jacobian,
+        indptr=indptr,
+        indices=indices,
+        idata=idata,
+        rdata=rdata,
+        work_size=size,
+        y0=y,
+        yp0=yp,
+        error_mask=unknowns.error_mask(at, form, differential),
+        atol_scale=allowed,
+        scale=scale,
+        differential=unknowns.differential_mask(at, form, differential),
+        t0=system.t0,
+        names=[unknown.name for unknown in model.unknowns(formulation)],
+        hook=hook,
+        hook_interval=_hook_interval(model, at),
+        restart_rates=restart_rates,
+    )
+
+
+def _hook_interval(model: Model, at: dict[str, int]):
+    """Time in which no Euler angle comes near its singularity, and no counted angle turns by half a turn."""
+    rates = slice(at["eps"], at["v_f"])
+    counted = bool(np.any(model.terms[:, T.TERM_TYPE] == ANGLE)) or any(tape.n_angles for tape in model.tapes)
+
+    def interval(y: np.ndarray) -> float:
+        rate = np.abs(y[rates]).reshape(-1, 3)
+        nearing = float(rate[:, 1].max(initial=0.0)) / 0.2
+        # two bodies may turn against each other: at most 2 rad between them
+        turning = float(rate.sum(axis=1).max(initial=0.0)) if counted else 0.0
+        return 1.0 / max(nearing, turning, 1e-12)
+
+    return interval
+
+
+def _settle_states(system: System, y, yp, z: slice, idata, rdata, work) -> None:
+    """Iterate algebraic states to their definitions; set the rates of the differential ones."""
+    out = np.zeros(y.size)
+    algebraic = ~system.model.differential_states
+    for _ in range(MAX_STATE_ITERATIONS if algebraic.any() else 1):
+        residual.residual(system.t0, y, yp, out, idata, rdata, work)
+        correction = out[z] * algebraic
+        y[z] -= correction
+        if np.abs(correction).max(initial=0.0) <= 1e-12 * (1.0 + np.abs(y[z]).max(initial=0.0)):
+            break
+    yp[z] -= out[z] * ~algebraic
+
+
+def _rates(y, yp, acc: np.ndarray, t: float, idata, rdata, work) -> None:
+    """Fill y' from the accelerations; p' and p_f' are what makes their own residuals vanish."""
+    tab = T.unpack(idata, rdata, work)
+    places = [[int(k) for k in row] for row in tab.at[1:]]
+    for at in places:
+        u, v, v_f, modal, modes = (at[k] for k in (T.AT_U, T.AT_V, T.AT_VF, T.AT_V_MODES, T.AT_MODES))
+        yp[u : u + 3] = acc[v : v + 3]
+        yp[v_f : v_f + modes] = acc[modal : modal + modes]
+    u, p, r, th = (int(idata[k]) for k in (T.H_U, T.H_P, T.H_R, T.H_THETA))
+    yp[r:th] = y[u:p]
+    _momentum_rates(t, y, yp, idata, rdata, work)
+    for b, at in enumerate(places, start=1):
+        e, alpha = at[T.AT_EPS], at[T.AT_V] + 3
+        adot = tab.kin[b, KIN_ADOT : KIN_ADOT + 9].reshape(3, 3)
+        euler_rates(tab.kin, b, acc[alpha : alpha + 3] - y[e : e + 3] @ adot, 0, yp, e)
+
+
+def _momentum_rates(t: float, y, yp, idata, rdata, work) -> None:
+    """Set theta' and q_f' to their velocities, p' and p_f' to what makes their own residuals vanish."""
+    e, r, th, p, lam = (int(idata[k]) for k in (T.H_EPS, T.H_R, T.H_THETA, T.H_P, T.H_LAMBDA))
+    out = np.zeros(y.size)
+    yp[th:lam] = y[e:r]
+    residual.residual(t, y, yp, out, idata, rdata, work)
+    yp[p:e] -= out[p:e]
+
+
+def restart_rates(t, y, yp, idata, rdata) -> np.ndarray:
+    """Return y' after a change of an Euler reference, which leaves the rates of all but angles and momenta alone."""
+    yp = yp.copy()
+    _momentum_rates(t, y, yp, idata, rdata, np.zeros(int(idata[T.H_WORK])))
+    return yp
