@@ -22,7 +22,8 @@ IDA_DEFAULT_OUTPUTS = 201
 SET_HERE = ("problem", "t_end", "error_probe")
 SETTLING_STEP = 1e-12
 SETTLING_SWEEPS = 3
-SETTLING_RATIO = 10.0
+SETTLING_RATIO = 100.0
+SETTLING_ROUNDS = 12
 
 
 def _takes(function: Callable, fewest: int, what: str) -> bool:
@@ -151,16 +152,18 @@ def _settle_rates(problem: DAEProblem, span: float) -> None:
         solve(*factored, out, delta)
         return delta[moving]
 
-    factored = _settling_factors(problem, gamma, tables)
-    if factored is None:
-        return
-    jump = sweep(gamma, factored)
-    large = np.abs(jump) > problem.atol_scale[moving]
-    if large.any():
-        # the move of a rate shrinks with the step, a jump does not
-        shorter = _settling_factors(problem, SETTLING_RATIO * gamma, tables)
-        if shorter is None or (np.abs(sweep(SETTLING_RATIO * gamma, shorter)) > 0.5 * np.abs(jump))[large].any():
+    tolerance = problem.atol_scale[moving]
+    for _ in range(SETTLING_ROUNDS):
+        factored = _settling_factors(problem, gamma, tables)
+        if factored is None:
             return
+        jump = sweep(gamma, factored)
+        if (np.abs(jump) <= tolerance).all():
+            break
+        gamma *= SETTLING_RATIO
+    else:
+        # the move of a rate shrinks with the step, a jump does not
+        return
     problem.yp0[moving] -= gamma * jump
     for _ in range(SETTLING_SWEEPS - 1):
         problem.yp0[moving] -= gamma * sweep(gamma, factored)
@@ -222,7 +225,8 @@ def as_problem(
     residual = functions.residual(fun)
     jacobian = functions.jacobian(jac, residual, len(indices), jac_sparsity is None)
     compiled_events = functions.events(events) if len(events) else None
-    idata, rdata, work_size = differences.pack_tables(indptr, indices, scales, parameters)
+    least = np.minimum(scales, atols / differences.INCREMENT)
+    idata, rdata, work_size = differences.pack_tables(indptr, indices, least, scales, parameters)
     for slot, address in functions.addresses.items():
         idata[slot] = address
     rates = np.zeros(n) if yp0 is None else _vector(yp0, n, "yp0")

@@ -4,7 +4,12 @@ A user's function is called with its own few arguments; what the integrator need
 increments, addresses of Python callbacks) stands in front of the user's parameters in the tables of the problem:
 
 * ``idata``: the header below, then colour pointers, columns by colour, ``indptr``, ``indices``
-* ``rdata``: magnitude of each unknown for the increments, then the user's parameters
+* ``rdata``: least and typical magnitude of each unknown for the increments, then the user's parameters
+
+An increment is a fixed part of the unknown or of what it changes by in a step, but no less than its tolerance, or the
+same part of its typical magnitude if that is smaller. A larger increment of an unknown that has become small, say a
+radical at 1e-13, would measure the slope at another place. Where the tolerance lies far below the typical magnitude a
+second difference, over that magnitude, supplies the entries that rounding hides in the first.
 """
 
 from __future__ import annotations
@@ -30,11 +35,18 @@ COLOUR_PTR = 5
 COLOUR_COLS = 6
 INDPTR = 7
 INDICES = 8
-N_HEADER = 9
+PARAMETERS = 9
+N_HEADER = 10
 
 INCREMENT = 1.4901161193847656e-08
+FAR_BELOW = 1e-3
+"""Part of the typical magnitude below which the least one counts as far below it."""
+VISIBLE = 100.0
+"""Units in the last place of the terms of an equation that a difference must exceed to be trusted."""
+EPS = 2.220446049250313e-16
 
 _IVEC = int64[::1]
+_VEC = types.float64[::1]
 
 
 @njit(int64(_IVEC, _IVEC, _IVEC), cache=True)
@@ -80,7 +92,7 @@ def colour_columns(indptr, indices, colours):
 
 
 def pack_tables(
-    indptr: np.ndarray, indices: np.ndarray, scale: np.ndarray, parameters: np.ndarray
+    indptr: np.ndarray, indices: np.ndarray, least: np.ndarray, typical: np.ndarray, parameters: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Lay out ``idata``, ``rdata`` and the length of ``work`` for a user's problem.
 
@@ -88,8 +100,8 @@ def pack_tables(
     ----------
     indptr, indices : ndarray of int64
         CSC pattern.
-    scale : ndarray, shape (n,)
-        Magnitude of each unknown, for the increments.
+    least, typical : ndarray, shape (n,)
+        Magnitudes of each unknown, for the increments.
     parameters : ndarray
         The user's parameters.
 
@@ -110,9 +122,89 @@ def pack_tables(
     header[COLOUR_COLS] = header[COLOUR_PTR] + len(pointers)
     header[INDPTR] = header[COLOUR_COLS] + n
     header[INDICES] = header[INDPTR] + n + 1
+    header[PARAMETERS] = 2 * n
     idata = np.concatenate((header, pointers, columns, indptr, indices)).astype(np.int64)
-    rdata = np.concatenate((scale, parameters)).astype(float)
-    return idata, rdata, 4 * n
+    rdata = np.concatenate((least, typical, parameters)).astype(float)
+    return idata, rdata, 5 * n
+
+
+@njit(types.float64(int64, _VEC, _VEC, types.float64, types.float64), cache=True, nogil=True, error_model="numpy")
+def _increment(j, y, yp, cj, magnitude):
+    """Return the increment of unknown j; the magnitude of y' enters through cj, as its increment is cj times that."""
+    return INCREMENT * max(abs(y[j]), max(magnitude, abs(yp[j]) / cj if cj > 0.0 else 0.0))
+
+
+@njit(types.boolean(int64, _VEC, _VEC, types.float64, _VEC, int64), cache=True, nogil=True, error_model="numpy")
+def _hidden(j, y, yp, cj, rdata, n):
+    """Return whether rounding may hide entries of column j at its increment."""
+    return _increment(j, y, yp, cj, rdata[j]) < FAR_BELOW * INCREMENT * rdata[n + j]
+
+
+@njit(
+    types.void(
+        types.FunctionType(RESIDUAL_SIG),
+        types.float64,
+        _VEC,
+        _VEC,
+        types.float64,
+        _VEC,
+        _IVEC,
+        _VEC,
+        _VEC,
+        int64,
+        types.boolean,
+    ),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def _difference_colour(residual, t, y, yp, cj, vals, idata, rdata, work, c, wide):
+    """Difference the columns of colour c; with ``wide`` over the typical magnitude, for entries that rounding hides.
+
+    Parameters
+    ----------
+    residual : function
+    t, y, yp, cj : float, ndarray, ndarray, float
+        Place, and factor of dG/dy'.
+    vals : ndarray
+        Written: the whole columns, or with ``wide`` the entries whose differences were within the rounding of the
+        terms of their equation.
+    idata, rdata, work : ndarray
+        Tables of `pack_tables`, with G in the first block of ``work`` and the sizes of its terms in the fifth.
+    c : int
+        Colour.
+    wide : bool
+    """
+    n = idata[N]
+    base = work[0:n]
+    moved = work[n : 2 * n]
+    y_moved = work[2 * n : 3 * n]
+    yp_moved = work[3 * n : 4 * n]
+    terms = work[4 * n : 5 * n]
+    for i in range(n):
+        y_moved[i] = y[i]
+        yp_moved[i] = yp[i]
+    colour_ptr = idata[idata[COLOUR_PTR] :]
+    columns = idata[idata[COLOUR_COLS] :]
+    indptr = idata[idata[INDPTR] :]
+    indices = idata[idata[INDICES] :]
+    for q in range(colour_ptr[c], colour_ptr[c + 1]):
+        j = columns[q]
+        if wide and not _hidden(j, y, yp, cj, rdata, n):
+            continue
+        y_moved[j] = y[j] + _increment(j, y, yp, cj, rdata[n + j] if wide else rdata[j])
+        yp_moved[j] = yp[j] + cj * (y_moved[j] - y[j])
+    residual(t, y_moved, yp_moved, moved, idata, rdata, work)
+    for q in range(colour_ptr[c], colour_ptr[c + 1]):
+        j = columns[q]
+        d = y_moved[j] - y[j]
+        if d == 0.0:
+            continue
+        narrow = _increment(j, y, yp, cj, rdata[j])
+        for p in range(indptr[j], indptr[j + 1]):
+            i = indices[p]
+            if not wide or abs(vals[p]) * narrow <= VISIBLE * EPS * terms[i]:
+                vals[p] = (moved[i] - base[i]) / d
 
 
 @njit(
@@ -138,32 +230,24 @@ def difference_matrix(residual, t, y, yp, cj, vals, idata, rdata, work):
     """
     n = idata[N]
     base = work[0:n]
-    moved = work[n : 2 * n]
-    y_moved = work[2 * n : 3 * n]
-    yp_moved = work[3 * n : 4 * n]
     residual(t, y, yp, base, idata, rdata, work)
-    for i in range(n):
-        y_moved[i] = y[i]
-        yp_moved[i] = yp[i]
-    colour_ptr = idata[idata[COLOUR_PTR] :]
-    columns = idata[idata[COLOUR_COLS] :]
+    for c in range(idata[N_COLOURS]):
+        _difference_colour(residual, t, y, yp, cj, vals, idata, rdata, work, c, False)
+    terms = work[4 * n : 5 * n]
     indptr = idata[idata[INDPTR] :]
     indices = idata[idata[INDICES] :]
+    terms[:] = 0.0
+    for j in range(n):
+        size = max(abs(y[j]), abs(yp[j]) / cj if cj > 0.0 else 0.0)
+        for p in range(indptr[j], indptr[j + 1]):
+            terms[indices[p]] += abs(vals[p]) * size
+    colour_ptr = idata[idata[COLOUR_PTR] :]
+    columns = idata[idata[COLOUR_COLS] :]
     for c in range(idata[N_COLOURS]):
         for q in range(colour_ptr[c], colour_ptr[c + 1]):
-            j = columns[q]
-            # the magnitude of y' enters through cj: its increment is cj times that of y
-            d = INCREMENT * max(abs(y[j]), max(rdata[j], abs(yp[j]) / cj if cj > 0.0 else 0.0))
-            y_moved[j] = y[j] + d
-            yp_moved[j] = yp[j] + cj * d
-        residual(t, y_moved, yp_moved, moved, idata, rdata, work)
-        for q in range(colour_ptr[c], colour_ptr[c + 1]):
-            j = columns[q]
-            d = INCREMENT * max(abs(y[j]), max(rdata[j], abs(yp[j]) / cj if cj > 0.0 else 0.0))
-            for p in range(indptr[j], indptr[j + 1]):
-                vals[p] = (moved[indices[p]] - base[indices[p]]) / d
-            y_moved[j] = y[j]
-            yp_moved[j] = yp[j]
+            if _hidden(columns[q], y, yp, cj, rdata, n):
+                _difference_colour(residual, t, y, yp, cj, vals, idata, rdata, work, c, True)
+                break
 
 
 @intrinsic
@@ -254,7 +338,7 @@ def adapt_residual(function: Callable, with_parameters: bool) -> Callable:
 
         @njit(RESIDUAL_SIG, nogil=True, error_model="numpy")
         def residual(t, y, yp, out, idata, rdata, work):
-            function(t, y, yp, out, rdata[idata[N] :])
+            function(t, y, yp, out, rdata[idata[PARAMETERS] :])
 
     else:
 
@@ -273,7 +357,7 @@ def adapt_jacobian(function: Callable, with_parameters: bool, dense: bool) -> Ca
         @njit(JACOBIAN_SIG, nogil=True, error_model="numpy")
         def jacobian(t, y, yp, cj, vals, idata, rdata, work):
             n = idata[N]
-            function(t, y, yp, cj, vals.reshape((n, n)).T, rdata[n:])
+            function(t, y, yp, cj, vals.reshape((n, n)).T, rdata[idata[PARAMETERS] :])
 
     elif dense:
 
@@ -286,7 +370,7 @@ def adapt_jacobian(function: Callable, with_parameters: bool, dense: bool) -> Ca
 
         @njit(JACOBIAN_SIG, nogil=True, error_model="numpy")
         def jacobian(t, y, yp, cj, vals, idata, rdata, work):
-            function(t, y, yp, cj, vals, rdata[idata[N] :])
+            function(t, y, yp, cj, vals, rdata[idata[PARAMETERS] :])
 
     else:
 
@@ -326,7 +410,7 @@ def _append_event(before: Callable, function: Callable, takes_p: bool, place: in
         @njit(EVENTS_SIG, nogil=True, error_model="numpy")
         def events(t, y, yp, out, idata, rdata, work):
             before(t, y, yp, out, idata, rdata, work)
-            out[place] = function(t, y, yp, rdata[idata[N] :])
+            out[place] = function(t, y, yp, rdata[idata[PARAMETERS] :])
 
     else:
 

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from gearmbs.dae.compiled.bound_functions import bind
-from gearmbs.dae.integrators import messages
+from gearmbs.dae.integrators import messages, start
 from gearmbs.dae.integrators import run_state as s
 from gearmbs.dae.integrators.arguments import check_choices, event_rules, output_times
 from gearmbs.dae.integrators.bdf import HISTORY
@@ -29,7 +29,6 @@ from gearmbs.dae.linalg.sparse_lu import (
     analyse,
     factor,
     new_factors,
-    solve,
 )
 from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, SolverStats, Status
@@ -44,14 +43,11 @@ CONSUMED_BYTES = 500_000
 Consumer = Callable[[np.ndarray, np.ndarray, np.ndarray], None]
 """Takes t, y of some accepted steps and the integer table valid there; the arrays are valid during the call only."""
 EVENT_BUFFER = 64
-START_JUMP_LIMIT = 100.0
-CHECK_STEP = 1e-10
-ROUNDED_RESIDUAL = 1e-10
 SINGULAR_RETRIES = 8
 DROP_ROUNDS_ALLOWED = 3
-REPAIR_SWEEPS = 4
+UNSATISFIED = 1e-3
+"""Part of its terms by which an equation set aside may be off at the end of a run."""
 DROP_TOLERANCES = (0.0, 1e-9, 1e-7, 1e-5)
-EPS = float(np.finfo(float).eps)
 
 
 @njit(HOOK_SIG, cache=True, nogil=True, error_model="numpy")
@@ -112,6 +108,7 @@ class Run:
         self.first_pivots = 0
         self.started = False
         self.start_note = ""
+        self.steps_given = (False, False)
         t0 = float(problem.t0)
         outputs, t_end = output_times(t_eval, t0, t_end)
         self.every_step = t_eval is None
@@ -168,7 +165,6 @@ class Run:
         st.real[s.T] = t0
         st.real[s.T_END] = t_end
         st.real[s.H_MAX] = max_step
-        st.real[s.H_MIN] = min_step if min_step is not None else _default_min_step(t0, t_end)
         st.real[s.RTOL] = rtol
         st.real[s.NEWTON_TOL] = NEWTON_TOLERANCE
         st.real[s.GAMMA_J] = 1.0
@@ -185,7 +181,7 @@ class Run:
         st.count[s.KEEP_ROWS] = keep
         st.count[s.MAX_STEPS] = max_steps or 0
         set_weights(st.real, st.hist[0], 1.0, st.vec)
-        st.real[s.H] = first_step if first_step is not None else self._first_step()
+        start.choose_steps(self, first_step, min_step)
         self.indptr = np.asarray(problem.indptr, dtype=np.int64)
         self.indices = np.asarray(problem.indices, dtype=np.int64)
         self.scale = np.asarray(problem.scale, dtype=float)
@@ -211,95 +207,7 @@ class Run:
             st.yp_out[0] = yp0
             st.count[s.NEXT_OUTPUT] = 1
 
-    def _first_step(self) -> float:
-        """Return a step that moves no controlled unknown by more than half its tolerance, within sane bounds."""
-        st = self.state
-        span = st.real[s.T_END] - st.real[s.T]
-        speed = float(np.max(np.abs(st.vec[s.YP_START]) * st.vec[s.W_ERROR]))
-        h = 0.5 / speed if speed > 0 else np.inf
-        return max(min(max(h, 1e-7 * span), 1e-3 * span, st.real[s.H_MAX]), st.real[s.H_MIN])
-
-    def _start(self) -> tuple[Status, str] | None:
-        """Evaluate the start, choose the first pivots and check consistency; return a failure or None."""
-        st, problem = self.state, self.problem
-        t0 = float(st.real[s.T])
-        res = st.vec[s.RES]
-        delta = st.vec[s.DELTA]
-        problem.residual(t0, st.vec[s.Y], st.vec[s.YP], res, st.idata, st.rdata, st.work)
-        st.count[s.RESIDUALS] += 1
-        if self._user_exception() is not None:
-            return self._user_failure()
-        bad = np.flatnonzero(~np.isfinite(res))
-        if len(bad):
-            return Status.NOT_FINITE, messages.not_finite(problem, t0, int(bad[0]))
-        if st.count[s.HAS_EVENTS] and problem.events is not None:
-            problem.events(t0, st.vec[s.Y], st.vec[s.YP], st.g_old, st.idata, st.rdata, st.work)
-            bad = np.flatnonzero(~np.isfinite(st.g_old))
-            if len(bad) and self._user_exception() is None:
-                return Status.NOT_FINITE, messages.event_not_finite(problem, t0, int(bad[0]))
-        # over a vanishing step wrong rates are harmless, but values off the constraints still have to jump
-        h_check = min(st.real[s.H], CHECK_STEP * (st.real[s.T_END] - t0)) if self.check_start else st.real[s.H]
-        failure = self._choose_first_pivots(h_check)
-        if failure is not None and h_check < st.real[s.H]:
-            # an index-3 matrix is singular to working precision at such a step: check over the first step itself
-            h_check = st.real[s.H]
-            failure = self._choose_first_pivots(h_check)
-        if failure is not None:
-            return failure
-        if not self.check_start:
-            return self._repair_start()
-        solve(self.plan, self.factors, res, delta)
-        jump = np.abs(delta) * st.vec[s.W_ERROR]
-        worst = int(np.argmax(jump))
-        if not jump[worst] <= START_JUMP_LIMIT:
-            assert self.plan is not None
-            row = int(np.argmax(np.abs(res[self.plan.row_from]) * self.plan.row_scale))
-            message = messages.inconsistent(problem, t0, worst, int(self.plan.row_from[row]), float(abs(delta[worst])))
-            return Status.INCONSISTENT_START, message
-        if self.error_probe is not None and h_check < st.real[s.H]:
-            self.start_note = self._algebraic_note(res, delta)
-        return self._choose_first_pivots(st.real[s.H]) if h_check < st.real[s.H] else None
-
-    def _algebraic_note(self, res: np.ndarray, delta: np.ndarray) -> str:
-        """Name the algebraic unknowns whose starting values the first step has to replace."""
-        st = self.state
-        y = st.vec[s.Y]
-        allowed = START_JUMP_LIMIT * (st.vec[s.ATOL] + st.real[s.RTOL] * np.abs(y))
-        replaced = (np.abs(delta) > allowed) & ~self.problem.differential
-        # over a vanishing step an equation that is satisfied up to rounding can move an unknown of a high index too
-        if not np.max(np.abs(res)) > ROUNDED_RESIDUAL * (1.0 + np.max(np.abs(y))):
-            replaced[:] = False
-        return messages.replaced_start(self.problem, np.flatnonzero(replaced))
-
-    def _repair_start(self) -> tuple[Status, str] | None:
-        """Move the initial values onto the constraints by Newton's method over the first step."""
-        st, problem = self.state, self.problem
-        t0, gamma = float(st.real[s.T]), 1.0 / st.real[s.H]
-        y, rates = st.vec[s.Y], st.vec[s.YP].copy()
-        for _ in range(REPAIR_SWEEPS):
-            st.vec[s.YP] = rates + gamma * (y - st.hist[0])
-            problem.residual(t0, y, st.vec[s.YP], st.vec[s.RES], st.idata, st.rdata, st.work)
-            st.count[s.RESIDUALS] += 1
-            solve(self.plan, self.factors, st.vec[s.RES], st.vec[s.DELTA])
-            if not np.isfinite(st.vec[s.DELTA]).all():
-                break
-            y -= st.vec[s.DELTA]
-        st.hist[0] = y
-        st.vec[s.YP] = rates
-        st.rec_y[0] = y
-        if st.count[s.NEXT_OUTPUT]:
-            st.y_out[0] = y
-        return self._choose_first_pivots(st.real[s.H])
-
-    def _choose_first_pivots(self, h: float) -> tuple[Status, str] | None:
-        """Factor the Newton matrix of a first step of size ``h``; return a failure or None."""
-        st = self.state
-        self.problem.jacobian(st.real[s.T], st.vec[s.Y], st.vec[s.YP], 1.0 / h, st.matrix, st.idata, st.rdata, st.work)
-        st.count[s.JACOBIANS] += 1
-        self.first_pivots += 1
-        return self._repivot()
-
-    def _repivot(self) -> tuple[Status, str] | None:
+    def repivot(self) -> tuple[Status, str] | None:
         """Choose new pivots for the current Newton matrix; return a failure or None."""
         st, problem = self.state, self.problem
         t = float(st.real[s.T])
@@ -321,7 +229,7 @@ class Run:
                 st.count[s.DROP_ROUNDS] += 1
                 st.count[s.DROP_LEVEL] = 1
                 st.count[s.DROP_AGE] = 0
-                return self._repivot()
+                return self.repivot()
             return Status.SINGULAR_JACOBIAN, messages.singular(problem, t, error.rows, error.cols)
         if st.count[s.DROP_LEVEL] == 0:
             st.count[s.DROP_ROUNDS] = 0
@@ -331,16 +239,29 @@ class Run:
         st.real[s.GROWTH_MAX] = max(GROWTH_LIMIT, 100.0 * growth)
         return None
 
+    def _unsatisfied(self) -> tuple[Status, str] | None:
+        """Return a failure if equations that were set aside at a singular position do not hold at the end."""
+        st, problem = self.state, self.problem
+        assert self.plan is not None
+        problem.residual(st.real[s.T], st.vec[s.Y], st.vec[s.YP], st.vec[s.RES], st.idata, st.rdata, st.work)
+        terms = np.zeros(problem.n)
+        np.add.at(terms, self.indices, np.abs(st.matrix * np.repeat(st.vec[s.Y], np.diff(self.indptr))))
+        left = self.plan.kept == 0.0
+        rows, cols = self.plan.row_from[left], self.plan.col_to[left]
+        if (np.abs(st.vec[s.RES][rows]) <= UNSATISFIED * terms[rows]).all():
+            return None
+        return Status.SINGULAR_JACOBIAN, messages.singular(problem, float(st.real[s.T]), rows, cols)
+
     def _retry_smaller(self) -> None:
         """Move the end of the step off a singular position."""
         self.state.count[s.SINGULAR_FAILS] += 1
         self.state.real[s.H] *= 0.6
 
-    def _user_exception(self) -> BaseException | None:
+    def user_exception(self) -> BaseException | None:
         return self.error_probe() if self.error_probe is not None else None
 
-    def _user_failure(self) -> tuple[Status, str]:
-        error = self._user_exception() or RuntimeError("unknown")
+    def user_failure(self) -> tuple[Status, str]:
+        error = self.user_exception() or RuntimeError("unknown")
         if isinstance(error, KeyboardInterrupt):
             return Status.INTERRUPTED, self._interrupted_message()
         return Status.USER_ERROR, messages.user_error(float(self.state.real[s.T]), error)
@@ -392,9 +313,9 @@ class Run:
     def _loop(self, interrupt: InterruptFlag) -> tuple[Status, str]:
         st = self.state
         if not self.started:
-            failure = self._start()
-            if self._user_exception() is not None:
-                return self._user_failure()
+            failure = start.begin(self)
+            if self.user_exception() is not None:
+                return self.user_failure()
             if failure is not None:
                 return failure
             self.started = True
@@ -402,10 +323,13 @@ class Run:
         while True:
             tic = time.perf_counter()
             code = advance(self.functions, st, self.plan, self.factors, chunk)
-            if self._user_exception() is not None:
-                return self._user_failure()
+            if self.user_exception() is not None:
+                return self.user_failure()
             if code == s.DONE:
                 self._report()
+                failure = self._unsatisfied() if st.count[s.DROP_LEVEL] else None
+                if failure is not None:
+                    return failure
                 return Status.SUCCESS, f"{Status.SUCCESS.sentence}{self.start_note}"
             if code == s.TERMINAL:
                 return (
@@ -419,9 +343,9 @@ class Run:
                 first = self._accepted_so_far() if self.every_step else int(st.count[s.NEXT_OUTPUT])
                 self.epochs.append((first, st.idata.copy()))
             elif code == s.REPIVOT:
-                failure = self._repivot()
-                if self._user_exception() is not None:
-                    return self._user_failure()
+                failure = self.repivot()
+                if self.user_exception() is not None:
+                    return self.user_failure()
                 if failure is not None:
                     return failure
             elif code == s.BUFFER_FULL:
@@ -554,7 +478,3 @@ class InterruptFlag:
     def __exit__(self, *_args) -> None:
         if self._previous is not None:
             signal.signal(signal.SIGINT, self._previous)
-
-
-def _default_min_step(t0: float, t_end: float) -> float:
-    return 1e-14 * (t_end - t0) + 16.0 * EPS * max(abs(t0), abs(t_end))

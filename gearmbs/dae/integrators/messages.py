@@ -72,6 +72,21 @@ def inconsistent(problem: DAEProblem, t: float, worst: int, row: int, jump: floa
     )
 
 
+def repaired_start(problem: DAEProblem, unknowns: np.ndarray, moves: np.ndarray) -> str:
+    """Say how far ``check_start=False`` has moved the initial values."""
+    listed = ", ".join(f"{unknown_name(problem, int(i))} by {moves[i]:.3g}" for i in unknowns[:NAMES_SHOWN])
+    more = len(unknowns) - NAMES_SHOWN
+    return f" The initial values were moved onto the equations: {listed}{f' and {more} more' if more > 0 else ''}."
+
+
+def not_repaired(problem: DAEProblem, t: float, worst: int) -> str:
+    """Explain initial values that Newton's method does not bring onto the equations."""
+    return (
+        f"{Status.INCONSISTENT_START.sentence} At t = {t:.9g} Newton's method does not bring them onto the equations "
+        f"either; the largest correction is in {unknown_name(problem, worst)}. Give values that satisfy the equations."
+    )
+
+
 def replaced_start(problem: DAEProblem, unknowns: np.ndarray) -> str:
     """Say which algebraic unknowns did not start on their equations, or nothing if there are none."""
     if not len(unknowns):

@@ -31,6 +31,8 @@ from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, PLAN_TYPE, factor
 from gearmbs.dae.problem import HISTORY_CHANGED, JACOBIAN_SIG
 
 EPS = 2.220446049250313e-16
+ROUNDED_STEP = 16.0 * EPS
+"""Smallest step in units of the time, whose last digit is as much as is left of smaller ones."""
 GAMMA_DRIFT = 0.2
 JAC_MAX_AGE = 50
 SLOPE_MAX_AGE = 20
@@ -233,12 +235,13 @@ def advance(functions, st, plan, factors, max_accepted):
             count[s.NEWTON_FAILS] = 0
             count[s.NAN_FAILS] = 0
             count[s.SINGULAR_FAILS] = 0
-            real[s.H] = max(real[s.H], real[s.H_MIN])
+            real[s.H] = max(real[s.H], real[s.H_MIN], ROUNDED_STEP * abs(times[1]))
             real[s.H_TRY] = real[s.H]
             real[s.H_REFUSED] = np.inf
             real[s.ERROR] = 0.0
         past = times[1:]
         t_old = past[0]
+        h_min = max(real[s.H_MIN], ROUNDED_STEP * abs(t_old))
         if count[s.ERROR_FAILS] + count[s.NEWTON_FAILS] + count[s.NAN_FAILS] > MAX_FAILS:
             return s.FAIL_TOO_MANY_REJECTIONS
 
@@ -252,11 +255,11 @@ def advance(functions, st, plan, factors, max_accepted):
             stop = min(stop, st.outputs[count[s.NEXT_OUTPUT]])
         t = _fit_step(real, count, t_old, stop)
         h = t - t_old
-        if h < real[s.H_MIN] and t < stop and real[s.H_REFUSED] > (1.0 + 1e-9) * real[s.H_MIN]:
-            real[s.H] = real[s.H_MIN]
+        if h < h_min and t < stop and real[s.H_REFUSED] > (1.0 + 1e-9) * h_min:
+            real[s.H] = h_min
             t = _fit_step(real, count, t_old, stop)
             h = t - t_old
-        if t <= t_old or (h < (1.0 - 1e-9) * real[s.H_MIN] and t < stop):
+        if t <= t_old or (h < (1.0 - 1e-9) * h_min and t < stop):
             if count[s.NAN_FAILS] > 0:
                 return s.FAIL_NOT_FINITE
             if count[s.NEWTON_FAILS] > count[s.ERROR_FAILS]:
