@@ -204,6 +204,9 @@ def paper(
 def run(
     case_file: Annotated[Path, typer.Argument(help="Case in TOML.")],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="NetCDF file; default: beside the case.")] = None,
+    lump: Annotated[
+        bool, typer.Option("--lump", help="Integrate bodies fixed to each other as one, as [solver] lump = true does.")
+    ] = False,
 ) -> None:
     """Simulate one case file and write its record as NetCDF."""
     with guarded():
@@ -211,6 +214,8 @@ def run(
         from gearmbs.studies.limits import check_record, remarks
 
         case = load_case(case_file)
+        if lump:
+            case = case.changed(solver={"lump": True})
         check_record(case, str(case_file))
 
         from gearmbs.studies.simulation import SimulationFailed, run_case

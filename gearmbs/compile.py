@@ -25,7 +25,7 @@ STAGES = (
     ("gearmbs.gears.transmission", "gearmbs.dae.equations.expressions.evaluate", "gearmbs.dae.integrators.wstiff"),
     ("gearmbs.dae.equations.jacobian", "gearmbs.dae.equations.residual", *force_kernels()),
     ("gearmbs.dae.model.evaluator", "gearmbs.dae.equations.euler_switch"),
-    ("gearmbs.studies.paper", "gearmbs.signals", "gearmbs.mechanism.measures"),
+    ("gearmbs.studies.paper", "gearmbs.signals", "gearmbs.mechanism.measures", "gearmbs.dae.model.members"),
 )
 """Modules whose kernels do not depend on each other within a stage."""
 

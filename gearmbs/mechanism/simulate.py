@@ -14,6 +14,7 @@ from gearmbs.dae.integrators.ida import solve_ida
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.results.stream import Stream
+from gearmbs.mechanism.lumping import lumped
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
 
@@ -54,6 +55,7 @@ def simulate(
     progress: bool | Callable[[float], None] = False,
     advice: Mapping[Status, str] | None = None,
     consumer: Callable[[Solution], None] | None = None,
+    lump: bool = False,
     **options,
 ) -> Solution:
     """Integrate a mechanism and return its motion and forces.
@@ -88,6 +90,9 @@ def simulate(
         With ``every_step``: called as ``consumer(part)`` with solutions of some steps at a time, in the order of time
         and each valid during the call only, instead of keeping all steps in memory; see
         `gearmbs.dae.results.stream.Stream`. The solution returned then holds nothing but the last step.
+    lump : bool
+        Integrate bodies that fixed joints connect, or fix to the ground, as one. Results are about all bodies and
+        joints as without it; reactions inside are recovered exactly. See `gearmbs.mechanism.lumping.lumped`.
     **options
         Handed to the integrator.
 
@@ -121,12 +126,14 @@ def simulate(
     if name not in INTEGRATORS:
         raise ModelError(f"integrator: {integrator!r} is unknown; choose one of {', '.join(INTEGRATORS)}")
     _check_options(name, options)
-    system = mechanism.compile(t_start)
-    problem = system.problem(formulation, rate_scale)
+    one = lumped(mechanism, t_start) if lump else None
+    system = mechanism.compile(t_start) if one is None else one.whole
+    members = None if one is None else one.members
+    problem = (system if one is None else one.system).problem(formulation, rate_scale)
     problem.advice = {**ADVICE, **(advice or {})}
     first, last = float(t_eval[0]), float(t_eval[-1])
     times = None if every_step else t_eval
-    stream = None if consumer is None else Stream(system, problem, last, consumer)
+    stream = None if consumer is None else Stream(system, problem, last, consumer, members)
     with _reporter(progress, first, last) as report:
         if name == "IDA":
             result = solve_ida(problem, times, t_end=last, tol=tol, progress=report, **options)
@@ -139,7 +146,7 @@ def simulate(
             result = solve_wstiff(
                 problem, times, t_end=last, tol=tol, method=name, progress=report, consumer=stream, **options
             )
-    solution = Solution(system, problem, result)
+    solution = Solution(system, problem, result, members)
     if stream is None or consumer is None:
         return solution
     if name == "IDA":
@@ -186,6 +193,7 @@ SETTINGS = (
     "rate_scale",
     "progress",
     "consumer",
+    "lump",
 )
 
 

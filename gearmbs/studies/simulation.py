@@ -101,6 +101,7 @@ def simulate_case(
         formulation=solver.formulation,
         tol=solver.used_tolerance,
         rate_scale=operation.speed * case.gears.teeth[0],
+        lump=solver.lump,
         progress=progress,
         advice=ADVICE,
         **options,

@@ -250,3 +250,14 @@ def test_energy_balance(fault):
     )
     balance = simulate_case(case).energy_balance()
     assert balance.attrs["relative_imbalance"] < 1e-6
+
+
+@pytest.mark.parametrize("fault", [{}, {"misalignment": "1 deg"}], ids=["healthy", "misaligned"])
+def test_gear_and_shaft_as_one_body_make_the_same_record(fault):
+    case = Case(operation=SHORT, fault=fault, solver={"tolerance": 1e-9})
+    full, lump = run_case(case), run_case(case.changed(solver={"lump": True}))
+    assert lump.attrs["solver_lump"] == 1
+    plane = ["line_of_action", "line_of_centres", "tangential"]
+    a, b = (record.gmf_rms.sel(component=plane).values for record in (lump, full))
+    np.testing.assert_allclose(a, b, rtol=1e-3, atol=1e-3 * b.max())
+    np.testing.assert_allclose(lump.force_2, full.force_2, atol=1e-3 * float(abs(full.force_2).max()))

@@ -67,6 +67,8 @@ class System:
         self.assembler = start.StartingSystem(model)
         self._of_whole = self.assembler
         self._dropped = np.zeros(0, dtype=np.int64)
+        self.typical_length: float | None = None
+        """A length that replaces the one found, for tolerances of another model of the same mechanism."""
 
     # --- names --------------------------------------------------------------------------------------
 
@@ -111,6 +113,8 @@ class System:
     @property
     def length(self) -> float:
         """A typical length in m: the largest marker arm or distance between bodies, at least 1 mm."""
+        if self.typical_length is not None:
+            return self.typical_length
         arms = np.abs(self.model.marker_frame[:, :3])
         spread = np.ptp(self.pose[:, :3], axis=0).max(initial=0.0)
         return float(max(arms.max(initial=0.0), spread, SHORTEST))

@@ -21,6 +21,7 @@ from gearmbs.dae.result import DAEResult, Status
 if TYPE_CHECKING:
     import xarray as xr
 
+    from gearmbs.dae.model.members import Members
     from gearmbs.dae.model.system import System
     from gearmbs.dae.problem import DAEProblem
 
@@ -41,13 +42,17 @@ class Solution:
     result : DAEResult
         The integrator's own account: y, y', status, message, statistics.
     system : System
-        Names and tables.
+        Names and tables of all bodies and joints.
+    members : Members or None
+        Where bodies fixed to each other were integrated as one: what they are made of. ``problem`` and ``result`` are
+        about the composites then, everything else about all bodies.
     """
 
-    def __init__(self, system: System, problem: DAEProblem, result: DAEResult) -> None:
+    def __init__(self, system: System, problem: DAEProblem, result: DAEResult, members: Members | None = None) -> None:
         self.system = system
         self.problem = problem
         self.result = result
+        self.members = members
         self.t = result.t
         self._shared: tuple[outputs.Evaluator, outputs.Records] | None = None
         samples = np.linspace(0, self.t.size - 1, min(self.t.size, CONFLICT_SAMPLES))
@@ -115,6 +120,10 @@ class Solution:
 
     def _evaluator(self) -> outputs.Evaluator:
         problem = self.problem
+        if self.members is not None:
+            from gearmbs.dae.model.members import MemberEvaluator
+
+            return MemberEvaluator(problem.idata, problem.rdata, problem.work_size, self.members)
         return outputs.Evaluator(problem.idata, problem.rdata, problem.work_size)
 
     def _new_records(self, m: int) -> outputs.Records:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, PART_SIZE, Solution
+
+if TYPE_CHECKING:
+    from gearmbs.dae.model.members import Members
 
 
 class Stream:
@@ -25,15 +29,26 @@ class Stream:
         Called as ``consumer(part)`` with a `Solution` of some accepted steps, in the order of time. It is valid until
         the next call: parts share their memory. Forces and accelerations are evaluated when first asked for.
 
+    members : Members, optional
+        Of bodies that are integrated as one.
+
     Attributes
     ----------
     conflict : str or None
         The first violation found of a constraint row set aside as redundant.
     """
 
-    def __init__(self, system: System, problem: DAEProblem, t_end: float, consumer: Callable[[Solution], None]) -> None:
+    def __init__(
+        self,
+        system: System,
+        problem: DAEProblem,
+        t_end: float,
+        consumer: Callable[[Solution], None],
+        members: Members | None = None,
+    ) -> None:
         nothing = np.empty((0, problem.n))
-        self.whole = Solution(system, problem, DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, ""))
+        result = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "")
+        self.whole = Solution(system, problem, result, members)
         self.whole.share(PART_SIZE)
         self.consumer = consumer
         self.conflict: str | None = None

@@ -1,0 +1,304 @@
+"""Motions and loads of bodies that were integrated as one: from those of the composite, exactly.
+
+Members of a group do not move against each other: the motion of each follows from that of its group. What a fixed joint
+inside the group transmits follows from the equations of Newton and Euler of the members beyond it, whose accelerations
+and other loads are known: per joint no equation is left to be solved.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import float64, int64, njit, types, void
+
+from gearmbs.dae.compiled.views import vector_at
+from gearmbs.dae.equations import constraint_terms as terms
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM
+from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W, POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
+from gearmbs.dae.equations.update import update_functions, update_markers
+from gearmbs.dae.model.evaluator import RECORDS_TYPE, Evaluator, Records, new_records
+
+PART = 512
+"""Output times evaluated at a time, whose records fit the processor's cache."""
+
+EDGE_CHILD, EDGE_PARENT, EDGE_I, EDGE_J, EDGE_CHILD_HAS_I = range(5)
+EDGE_AXES = 5
+"""Of the three rows that keep the orientation: 3 * axis of I + axis of J."""
+EDGE_ROWS = 8
+"""Six rows in the order of the joint: coincident x, y, z, then the orientation."""
+EDGE_COLUMNS = 14
+"""Of a fixed joint inside a group; members count from 0, -1 is the ground."""
+
+PLACE_R, PLACE_A = 0, 3
+PLACE_MASS, PLACE_INERTIA = 12, 13
+PLACE_COLUMNS = 22
+"""Of a member: its centre of mass and axes in the frame of its group, mass, inertia in its own axes."""
+
+_IVEC = int64[::1]
+_IMAT = int64[:, ::1]
+_VEC = float64[::1]
+_MAT = float64[:, ::1]
+
+
+class Members(NamedTuple):
+    """What bodies integrated as one are made of.
+
+    Attributes
+    ----------
+    group : ndarray of int, shape (members,)
+        Body of the integrated model that each body of the whole one belongs to; 0 is the ground.
+    place : ndarray, shape (members, PLACE_COLUMNS)
+        Where it is in it, and its inertia.
+    of_marker : ndarray of int, shape (markers,)
+        Member on which each marker of the integrated model lies, -1 for the ground itself.
+    row : ndarray of int, shape (rows,)
+        Number among all rows of each row of the integrated model.
+    edge : ndarray of int, shape (joints, EDGE_COLUMNS)
+        Fixed joints inside groups, outermost first.
+    """
+
+    group: np.ndarray
+    place: np.ndarray
+    of_marker: np.ndarray
+    row: np.ndarray
+    edge: np.ndarray
+
+
+MEMBERS_TYPE = types.NamedTuple((_IVEC, _MAT, _IVEC, _IVEC, _IMAT), Members)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _turned(kin_row, r, r_at, out, at):
+    """Write A r of a body's matrix A."""
+    for c in range(3):
+        out[at + c] = terms.dot3(kin_row, KIN_A + 3 * c, r, r_at)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _take_pose(pose, tab):
+    """Fill the kinematics table from a record of poses."""
+    for b in range(tab.kin.shape[0]):
+        kin = tab.kin[b]
+        for c in range(9):
+            kin[KIN_A + c] = 1.0 if c % 4 == 0 else 0.0
+        for c in range(3):
+            kin[KIN_R + c] = kin[KIN_V + c] = kin[KIN_W + c] = 0.0
+        if b == 0:
+            continue
+        p = POSE_COLUMNS * (b - 1)
+        for c in range(9):
+            kin[KIN_A + c] = pose[p + POSE_A + c]
+        for c in range(3):
+            kin[KIN_R + c] = pose[p + POSE_R + c]
+            kin[KIN_V + c] = pose[p + POSE_V + c]
+            kin[KIN_W + c] = pose[p + POSE_W + c]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _move_member(m, members, tab, solution, pose, acceleration, wrench, s):
+    """Write the pose and accelerations of a member, and the wrench about the global origin that moves it.
+
+    s : ndarray
+        Scratch, 24 places: acceleration of the group in s[0:6], arm in s[6:9].
+    """
+    b = members.group[m]
+    kin, place = tab.kin[b], members.place[m]
+    for c in range(6):
+        s[c] = solution[6 * (b - 1) + c] if b > 0 else 0.0
+    _turned(kin, place, PLACE_R, s, 6)
+    p = POSE_COLUMNS * m
+    for c in range(3):
+        pose[p + POSE_R + c] = kin[KIN_R + c] + s[6 + c]
+        pose[p + POSE_W + c] = kin[KIN_W + c]
+        for d in range(3):
+            total = 0.0
+            for e in range(3):
+                total += kin[KIN_A + 3 * c + e] * place[PLACE_A + 3 * e + d]
+            pose[p + POSE_A + 3 * c + d] = total
+    # v = v_g + w x r, a = a_g + alpha x r + w x (w x r)
+    terms.cross3(kin, KIN_W, s, 6, s, 9)
+    terms.cross3(kin, KIN_W, s, 9, s, 12)
+    terms.cross3(s, 3, s, 6, s, 15)
+    for c in range(3):
+        pose[p + POSE_V + c] = kin[KIN_V + c] + s[9 + c]
+        acceleration[6 * m + c] = s[c] + s[15 + c] + s[12 + c]
+        acceleration[6 * m + 3 + c] = s[3 + c]
+    # force m (a - g); moment J alpha + w x J w about the centre of mass, moved to the origin
+    mass = place[PLACE_MASS]
+    for c in range(3):
+        wrench[m, c] = mass * (acceleration[6 * m + c] - tab.gravity[c])
+        s[9 + c] = s[12 + c] = 0.0
+        for d in range(3):
+            s[9 + c] += pose[p + POSE_A + 3 * d + c] * s[3 + d]
+            s[12 + c] += pose[p + POSE_A + 3 * d + c] * kin[KIN_W + d]
+    for c in range(3):
+        s[15 + c] = terms.dot3(place, PLACE_INERTIA + 3 * c, s, 9)
+        s[18 + c] = terms.dot3(place, PLACE_INERTIA + 3 * c, s, 12)
+    terms.cross3(s, 12, s, 18, s, 21)
+    for c in range(3):
+        s[15 + c] += s[21 + c]
+    terms.cross3(pose, p + POSE_R, wrench[m], 0, s, 18)
+    for c in range(3):
+        wrench[m, 3 + c] = terms.dot3(pose, p + POSE_A + 3 * c, s, 15) + s[18 + c]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _deduct(m, factor, force, f_at, moment, m_at, point, wrench, s):
+    """Take a load on a member away from the wrench that moves it: a force at a point, and a moment."""
+    if m < 0:
+        return
+    terms.cross3(point, 0, force, f_at, s, 0)
+    for c in range(3):
+        wrench[m, c] -= factor * force[f_at + c]
+        wrench[m, 3 + c] -= factor * (moment[m_at + c] + s[c])
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _deduct_loads(loads, members, tab, wrench, s):
+    """Take what the force elements exert away from the wrenches; J's body feels the opposite at I's point."""
+    for f in range(tab.force.shape[0]):
+        row = tab.force[f]
+        if row[T.FORCE_KIND] == T.REACTION:
+            continue
+        i, j = row[T.FORCE_I], row[T.FORCE_J]
+        body = tab.kin[tab.marker_body[i]]
+        for c in range(3):
+            s[3 + c] = body[KIN_R + c] + tab.frame[i, T.MK_ARM + c]
+        _deduct(members.of_marker[i], 1.0, loads[f], 0, loads[f], 3, s[3:6], wrench, s)
+        _deduct(members.of_marker[j], -1.0, loads[f], 0, loads[f], 3, s[3:6], wrench, s)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _deduct_rows(multipliers, members, tab, wrench, s):
+    """Take what the constraints of the integrated model exert away from the wrenches."""
+    g = vector_at(tab.scratch, S_GRADIENT, 12)
+    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
+    work = vector_at(tab.scratch, S_TERM, 100)
+    for r in range(members.row.size):
+        for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
+            factor = -multipliers[r] * tab.coef[j]
+            terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, work, g, gt)
+            for side in range(2):
+                marker = tab.term[j, T.TERM_I + side]
+                body = tab.kin[tab.marker_body[marker]]
+                _deduct(
+                    members.of_marker[marker], factor, g, 6 * side, g, 6 * side + 3, body[KIN_R : KIN_R + 3], wrench, s
+                )
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _internal_reactions(members, tab, wrench, multipliers, phi, force, moment, s):
+    """Write what the fixed joints transmit, from the outermost members inwards."""
+    for e in range(members.edge.shape[0]):
+        edge = members.edge[e]
+        child, parent = edge[EDGE_CHILD], edge[EDGE_PARENT]
+        sign = 1.0 if edge[EDGE_CHILD_HAS_I] == 1 else -1.0
+        i, j = edge[EDGE_I], edge[EDGE_J]
+        body = tab.kin[tab.marker_body[i]]
+        for c in range(3):
+            s[c] = body[KIN_R + c] + tab.frame[i, T.MK_ARM + c]
+        terms.cross3(s, 0, wrench[child], 0, s, 3)
+        for c in range(3):
+            # moment on I's body about marker I
+            s[6 + c] = sign * (wrench[child, 3 + c] - s[3 + c])
+        for c in range(6):
+            row = edge[EDGE_ROWS + c]
+            phi[3 * row] = phi[3 * row + 1] = phi[3 * row + 2] = 0.0
+            for d in range(3):
+                force[row, d] = moment[row, d] = 0.0
+        for c in range(3):
+            row = edge[EDGE_ROWS + c]
+            force[row, c] = sign * wrench[child, c]
+            multipliers[row] = -force[row, c]
+            row, axes = edge[EDGE_ROWS + 3 + c], edge[EDGE_AXES + c]
+            terms.cross3(tab.frame[i], T.MK_AXES + 3 * (axes // 3), tab.frame[j], T.MK_AXES + 3 * (axes % 3), s, 9)
+            # the three axes are at right angles to each other
+            multipliers[row] = -terms.dot3(s, 6, s, 9)
+            for d in range(3):
+                moment[row, d] = -multipliers[row] * s[9 + d]
+        if parent >= 0:
+            for c in range(6):
+                wrench[parent, c] += wrench[child, c]
+
+
+@njit(
+    void(int64, int64, _VEC, _IVEC, _VEC, _VEC, MEMBERS_TYPE, RECORDS_TYPE, RECORDS_TYPE),
+    cache=True,
+    error_model="numpy",
+    nogil=True,
+)
+def expand(first, count, t, idata, rdata, work, members, narrow, wide):
+    """Write the records of all bodies and joints from those of the integrated model.
+
+    Parameters
+    ----------
+    first, count : int
+        Row of ``wide`` that belongs to row 0 of ``narrow``, and the number of rows.
+    t : ndarray, shape (count,)
+        Output times.
+    idata, rdata, work : ndarray
+        Tables of the integrated model.
+    members : Members
+    narrow, wide : Records
+        Of the integrated model, and of the whole one.
+    """
+    tab = T.unpack(idata, rdata, work)
+    n = members.group.size
+    wrench = np.zeros((n, 6))
+    s = np.zeros(24)
+    base = 6 * n
+    groups = narrow.solution.shape[1] - members.row.size
+    for k in range(count):
+        to = first + k
+        _take_pose(narrow.pose[k], tab)
+        update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+        update_functions(t[k], tab)
+        for m in range(n):
+            _move_member(m, members, tab, narrow.solution[k], wide.pose[to], wide.solution[to], wrench, s)
+        _deduct_loads(narrow.loads[k], members, tab, wrench, s)
+        _deduct_rows(narrow.solution[k, groups:], members, tab, wrench, s)
+        _internal_reactions(
+            members, tab, wrench, wide.solution[to, base:], wide.phi[to], wide.force[to], wide.moment[to], s
+        )
+        wide.strayed[to] = narrow.strayed[k]
+        for f in range(narrow.loads.shape[1]):
+            for c in range(narrow.loads.shape[2]):
+                wide.loads[to, f, c] = narrow.loads[k, f, c]
+        for r in range(members.row.size):
+            row = members.row[r]
+            wide.solution[to, base + row] = narrow.solution[k, groups + r]
+            for c in range(3):
+                wide.phi[to, 3 * row + c] = narrow.phi[k, 3 * r + c]
+                wide.force[to, row, c] = narrow.force[k, r, c]
+                wide.moment[to, row, c] = narrow.moment[k, r, c]
+
+
+class MemberEvaluator(Evaluator):
+    """Evaluator of the whole mechanism's records on the unknowns of one in which bodies are integrated as one."""
+
+    def __init__(self, idata: np.ndarray, rdata: np.ndarray, work_size: int, members: Members) -> None:
+        super().__init__(idata, rdata, work_size)
+        self.members = members
+        self.sizes = (
+            int(idata[T.H_BODIES]) - 1,
+            int(idata[T.H_ROWS]),
+            int(idata[T.H_FORCES]),
+            int(idata[T.H_DIAGNOSTICS]),
+        )
+        self.narrow = new_records(0, *self.sizes)
+
+    def fill(self, t: np.ndarray, y: np.ndarray, epochs, records: Records) -> None:
+        """Fill ``records`` of all bodies and joints; see `Evaluator.fill`."""
+        if len(self.narrow.pose) < min(PART, t.size):
+            self.narrow = new_records(min(PART, t.size), *self.sizes)
+        starts = [row for row, _ in epochs]
+        for first in range(0, t.size, PART):
+            last = min(first + PART, t.size)
+            here = int(np.searchsorted(starts, first, side="right")) - 1
+            now = [(max(row - first, 0), table) for row, table in epochs[here:] if row < last]
+            times = np.ascontiguousarray(t[first:last])
+            super().fill(times, y[first:last], now, self.narrow)
+            table = np.ascontiguousarray(now[0][1])
+            expand(first, last - first, times, table, self.rdata, self.work, self.members, self.narrow, records)
