@@ -53,7 +53,9 @@ DESCRIBED = {
 
 MORE = {
     "gearmbs.gears": {
+        "gearmbs.gears.fault": EVERYTHING,
         "gearmbs.gears.faults": EVERYTHING,
+        "gearmbs.gears.mesh": EVERYTHING,
         "gearmbs.gears.history": EVERYTHING,
         "gearmbs.gears.pattern": EVERYTHING,
         "gearmbs.gears.stiffness": EVERYTHING,

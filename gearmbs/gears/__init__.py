@@ -4,8 +4,11 @@ from typing import TYPE_CHECKING
 
 from gearmbs._lazy import late
 from gearmbs.gears import faults
+from gearmbs.gears.contact_model import ContactModel
+from gearmbs.gears.geometry import PairGeometry, Placement
 from gearmbs.gears.laws import ContactLaw, FlankFriction
-from gearmbs.gears.pair import GearPair, Placement
+from gearmbs.gears.operating_point import OperatingPoint
+from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, Material, involute
 
 if TYPE_CHECKING:
@@ -18,11 +21,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ContactLaw",
+    "ContactModel",
     "FlankFriction",
     "GearContact",
     "GearPair",
     "GearSpec",
     "Material",
+    "OperatingPoint",
+    "PairGeometry",
     "Placement",
     "TransmissionError",
     "faults",

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gearmbs.dae.equations.force_elements import COUNT, DISSIPATED, STORED, Diagnostic
 from gearmbs.dae.errors import ModelError
+from gearmbs.gears.mesh import Mesh
+from gearmbs.gears.tables import pack
 from gearmbs.mechanism.elements import Compiled, ForceElement
-
-if TYPE_CHECKING:
-    from gearmbs.gears.pair import GearPair
 
 
 @dataclass(eq=False, repr=False)
 class GearContact(ForceElement):
     """Tooth contact of the wheels whose frames are the markers I and J."""
 
-    pair: GearPair
+    pair: Mesh
 
     kind = "gear contact"
     diagnostics = (
@@ -38,7 +36,7 @@ class GearContact(ForceElement):
         from gearmbs.contact import GEAR_CONTACT_SIG, gear_contact
         from gearmbs.contact.force_kernel import contact_force
 
-        integers, reals, scratch = self.pair.contact_tables()
+        integers, reals, scratch = pack(self.pair)
         return Compiled(contact_force, integers, reals, ((gear_contact, GEAR_CONTACT_SIG),), scratch=scratch)
 
     def check(self) -> None:
@@ -58,8 +56,8 @@ class GearContact(ForceElement):
         apart = self.j.global_position() - self.i.global_position()
         distance = float(np.linalg.norm(apart - axis * (axis @ apart)))
         label = f"gear contact '{self.name}': the axes are {1e3 * distance:.4g} mm apart"
-        least = sum(wheel.base_radius for wheel in self.pair.wheels)
-        most = sum(wheel.tip_radius for wheel in self.pair.wheels)
+        geometry = self.pair.geometry
+        least, most = abs(geometry.base_radius_sum), abs(geometry.tip_radius_sum)
         if distance <= least:
             raise ModelError(
                 f"{label}, less than the sum of the base radii, {1e3 * least:.4g} mm; place the wheels as the pair's "

@@ -7,98 +7,21 @@ combine by addition. Lengths are in m or text with a unit, angles in rad or text
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
+from gearmbs.gears.fault import Fault, Flank
+from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.iso1328 import random_pitch, tolerances
-from gearmbs.gears.settings import choice, real, switch, tooth_numbers, whole
-from gearmbs.gears.spec import convert_fields, require
+from gearmbs.gears.spec import require
 from gearmbs.gears.stiffness import Crack, pair_stiffness
 from gearmbs.gears.tooth_deviations import ToothDeviations
 from gearmbs.units import Quantity
 
-if TYPE_CHECKING:
-    from gearmbs.gears.pair import GearPair
-
-Wheel = Literal["driver", "driven"]
-Flank = Literal["drive", "coast", "both"]
-
 POINTS_A_WAVE = 10
 """Points of the profile that a wave along the flank must be resolved by."""
-
-CHOICES: dict[str, tuple[Any, ...]] = {
-    "wheel": ("driver", "driven"),
-    "flank": ("drive", "coast", "both"),
-    "end": (1, -1),
-}
-COAST_ALIASES = {"back": "coast"}
-"""The former name of the coast flank, still understood."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fault:
-    """What all faults share.
-
-    Parameters
-    ----------
-    wheel : {"driver", "driven"}
-        The wheel that has it.
-
-    Raises
-    ------
-    ValueError
-        For a setting of the wrong kind; the message names the field, its value and what would do. What a wheel must
-        fit, such as a length along its face, is found when the fault is applied to its wheel.
-    """
-
-    label: ClassVar[str] = "fault"
-    units: ClassVar[dict[str, str]] = {}
-    least: ClassVar[dict[str, int]] = {}
-    along_face: ClassVar[bool] = False
-
-    wheel: Wheel = "driver"
-
-    def __post_init__(self) -> None:
-        name = type(self).__name__
-        for item in fields(self):
-            value, place = getattr(self, item.name), f"{name}.{item.name}"
-            if item.name in self.units:
-                require(value is not None or item.default is None, f"{place} is None; give a number")
-            elif item.name in CHOICES:
-                value = COAST_ALIASES.get(value, value) if item.name == "flank" and isinstance(value, str) else value
-                value = choice(value, place, CHOICES[item.name])
-            elif item.name == "teeth":
-                value = tooth_numbers(value, place)
-            elif isinstance(item.default, bool):
-                value = switch(value, place)
-            elif isinstance(item.default, int):
-                value = whole(value, place, self.least.get(item.name))
-            elif isinstance(item.default, float):
-                value = real(value, place)
-            object.__setattr__(self, item.name, value)
-        try:
-            convert_fields(self, self.units, name)
-        except TypeError as error:
-            raise ValueError(str(error)) from None
-        for key in self.units:
-            value = getattr(self, key)
-            require(value is None or math.isfinite(value), f"{name}.{key} is {value}; give a finite number")
-
-    @property
-    def severity(self) -> float:
-        """Size of the fault, by its own main parameter."""
-        return float(getattr(self, next(iter(self.units))))
-
-    @property
-    def description(self) -> dict[str, Any]:
-        """Label, severity and all parameters, for storing beside results."""
-        return {"label": self.label, "severity": self.severity, **asdict(self)}
-
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
-        """Add what the fault does to the deviations of its wheel."""
-        raise TypeError(f"{type(self).__name__} does not say what it does to a tooth")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +48,7 @@ class ChippedCorner(Fault):
     tooth: int = 0
     end: int = 1
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         gear = deviations.gear
         require(
             0 < self.length <= gear.face_width,
@@ -155,7 +78,7 @@ class BrokenTooth(Fault):
     lost: Quantity = 0.7
     tooth: int = 0
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         require(0 < self.lost <= 1, f"BrokenTooth.lost is {self.lost}; give a share of the height above 0 up to 1")
         gear = deviations.gear
         radius = gear.tip_radius - self.lost * (gear.tip_radius - gear.root_radius)
@@ -182,12 +105,12 @@ class RootCrack(Fault):
     angle: Quantity = "70 deg"
     tooth: int = 0
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         require(self.depth > 0, f"RootCrack.depth is {self.depth} m; it must be positive")
         crack = Crack(self.depth, self.angle)
         driver = self.wheel == "driver"
         own = deviations.compliance_roll_length
-        roll_length = own if driver else pair.line_of_action - own
+        roll_length = own if driver else pair.mate_roll_length(1, own)
         cracked = pair_stiffness(pair, roll_length, (crack, None) if driver else (None, crack))
         deviations.compliance[:, self.tooth % deviations.gear.teeth] += pair_stiffness(pair, roll_length) / cracked - 1
 
@@ -228,7 +151,7 @@ class Pit(Fault):
     tooth: int = 0
     flank: Flank = "drive"
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         for name in ("depth", "height", "width"):
             value = getattr(self, name)
             require(value > 0, f"Pit.{name} is {value} m; it must be positive")
@@ -264,11 +187,11 @@ class Wear(Fault):
     teeth: Any = "all"
     flank: Flank = "drive"
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         require(self.depth >= 0, f"Wear.depth is {self.depth} m; it must not be negative")
         gear = deviations.gear
         pitch_point = gear.base_radius * math.tan(pair.working_pressure_angle)
-        start = pair.line_of_action - pair.wheels[self.wheel == "driver"].tip_roll_length
+        start = pair.first_roll_lengths[self.wheel == "driven"]
         # specific sliding: way slid per way rolled over, finite from the start of the active profile on
         roll_length = np.maximum(deviations.roll_length, start)
         sliding = np.abs(roll_length - pitch_point) / roll_length
@@ -295,7 +218,7 @@ class Eccentricity(Fault):
     amount: Quantity = 20e-6
     phase: Quantity = 0.0
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         require(self.amount >= 0, f"Eccentricity.amount is {self.amount} m; it must not be negative")
         deviations.shift(self.amount * math.cos(self.phase), self.amount * math.sin(self.phase))
 
@@ -318,7 +241,7 @@ class Wobble(Fault):
     angle: Quantity = "0.05 deg"
     phase: Quantity = 0.0
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         lean = math.tan(self.angle) * deviations.section
         deviations.shift(lean * math.cos(self.phase), lean * math.sin(self.phase))
 
@@ -340,7 +263,7 @@ class PitchError(Fault):
     amount: Quantity = 20e-6
     tooth: int = 0
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         tooth = self.tooth % deviations.gear.teeth
         deviations.offset[deviations.drive, tooth] -= self.amount
         deviations.offset[1 - deviations.drive, tooth] += self.amount
@@ -367,7 +290,7 @@ class CumulativePitchError(Fault):
     order: int = 1
     phase: Quantity = 0.0
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         teeth = deviations.gear.teeth
         require(self.amount >= 0, f"CumulativePitchError.amount is {self.amount} m; it must not be negative")
         require(
@@ -407,7 +330,7 @@ class Waviness(Fault):
     phase: Quantity = 0.0
     flank: Flank = "both"
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         gear = deviations.gear
         step = (deviations.roll_length[1] - deviations.roll_length[0]) / gear.base_radius
         most = int(2 * math.pi / (POINTS_A_WAVE * step))
@@ -451,7 +374,7 @@ class GradedFlanks(Fault):
         good = self.grade in range(1, 12)
         require(good, f"GradedFlanks.grade is {self.grade}; ISO 1328-1 has the whole grades 1 to 11")
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         gear = deviations.gear
         grade = int(self.grade)
         limit = tolerances(gear, grade)
@@ -498,7 +421,7 @@ class TipRelief(Fault):
     teeth: Any = "all"
     flank: Flank = "both"
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         name = type(self).__name__
         require(self.length > 0, f"{name}.length is {self.length} m; it must be positive")
         require(self.power >= 1, f"{name}.power is {self.power}; give 1 (linear) or more")
@@ -506,7 +429,7 @@ class TipRelief(Fault):
         for flank in deviations.flanks(self.flank):
             deviations.shape[flank, deviations.tooth_list(self.teeth)] += relief
 
-    def _distance(self, deviations: ToothDeviations, pair: GearPair) -> np.ndarray:
+    def _distance(self, deviations: ToothDeviations, pair: PairGeometry) -> np.ndarray:
         return deviations.gear.tip_roll_length - deviations.roll_length
 
 
@@ -516,8 +439,8 @@ class RootRelief(TipRelief):
 
     label: ClassVar[str] = "root relief"
 
-    def _distance(self, deviations: ToothDeviations, pair: GearPair) -> np.ndarray:
-        start = pair.line_of_action - pair.wheels[self.wheel == "driver"].tip_roll_length
+    def _distance(self, deviations: ToothDeviations, pair: PairGeometry) -> np.ndarray:
+        start = pair.first_roll_lengths[self.wheel == "driven"]
         return np.maximum(deviations.roll_length - start, 0.0)
 
 
@@ -541,7 +464,7 @@ class Crowning(Fault):
     teeth: Any = "all"
     flank: Flank = "both"
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         relief = self.amount * (2 * deviations.section / deviations.gear.face_width) ** 2
         for flank in deviations.flanks(self.flank):
             deviations.shape[flank, deviations.tooth_list(self.teeth)] += relief[:, None]
@@ -567,7 +490,7 @@ class LeadCorrection(Fault):
     teeth: Any = "all"
     flank: Flank = "both"
 
-    def apply(self, deviations: ToothDeviations, pair: GearPair) -> None:
+    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         slope = self.amount * deviations.section / deviations.gear.face_width
         for flank in deviations.flanks(self.flank):
             deviations.shape[flank, deviations.tooth_list(self.teeth)] += slope[:, None]

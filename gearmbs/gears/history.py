@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numba import njit, types
 
 from gearmbs.contact import gear_contact
-
-if TYPE_CHECKING:
-    from gearmbs.gears.pair import GearPair
+from gearmbs.gears.mesh import Mesh
+from gearmbs.gears.tables import pack
 
 VEC = types.float64[::1]
 MAT = types.float64[:, ::1]
@@ -74,7 +73,7 @@ class ContactHistory:
 
 
 def contact_history(
-    pair: GearPair,
+    pair: Mesh,
     driver: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     driven: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
 ) -> ContactHistory:
@@ -82,7 +81,7 @@ def contact_history(
 
     Parameters
     ----------
-    pair : GearPair
+    pair : GearPair or Mesh
     driver, driven : tuple of ndarray
         Per wheel: origins (n, 3), axes (n, 3, 3), velocities of the origins (n, 3), angular velocities (n, 3); global
         components.
@@ -98,7 +97,7 @@ def contact_history(
     n = len(args[0])
     if any(len(a) != n for a in args):
         raise ValueError(f"driver and driven have {[len(a) for a in args]} instants; give as many of each")
-    gi, gr, size = pair.contact_tables()
+    gi, gr, size = pack(pair)
     wrench = np.zeros((n, 6))
     diag = np.zeros((n, 8))
     run: Any = _run

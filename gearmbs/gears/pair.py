@@ -1,58 +1,36 @@
-"""Two wheels in space: centre distance, backlash, misalignment, phase, and what a gear engineer reads from them."""
+"""A gear pair as a person states it: wheels and their places, contact, operating point and faults in one object."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gearmbs.gears.faults import Fault
+from gearmbs.gears.contact_model import ContactModel
+from gearmbs.gears.fault import Fault
+from gearmbs.gears.geometry import PairGeometry, Placement
 from gearmbs.gears.laws import ContactLaw, FlankFriction
-from gearmbs.gears.spec import GearSpec, convert_fields, involute, require
-from gearmbs.gears.stiffness import iso_mesh_stiffness, iso_single_stiffness, pair_stiffness
-from gearmbs.gears.tables import compliance_roll_lengths, pack
+from gearmbs.gears.operating_point import OperatingPoint
+from gearmbs.gears.show import pair_html, pair_table
+from gearmbs.gears.spec import GearSpec, require
+from gearmbs.gears.stiffness import compliance_roll_lengths, iso_mesh_stiffness, iso_single_stiffness, pair_stiffness
+from gearmbs.gears.tables import pack
 from gearmbs.units import Quantity
 
 if TYPE_CHECKING:
     from gearmbs.gears.contact_element import GearContact
     from gearmbs.mechanism.parts import Marker
 
-TILTED_SLICES = 11
-FAULTY_SLICES = 41
-JAM_ROUNDING = 1e-12
-"""Overlap of parallel wheels, m, that is taken for rounding: standard teeth at their nominal distance have none."""
-
 
 @dataclass(frozen=True)
-class Placement:
-    """Frames of both wheels: origins at mid-face, z the wheel's axis, x through the middle of tooth 0.
+class GearPair(PairGeometry):
+    """A driver and a driven wheel, placed in space, with their contact, operating point and faults.
 
-    Attributes
-    ----------
-    origin_1, origin_2 : ndarray, shape (3,)
-    axes_1, axes_2 : ndarray, shape (3, 3)
-        Columns are the wheel's axes in global components.
-    """
-
-    origin_1: np.ndarray
-    axes_1: np.ndarray
-    origin_2: np.ndarray
-    axes_2: np.ndarray
-
-
-def _turn_z(angle: float) -> np.ndarray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-@dataclass(frozen=True)
-class GearPair:
-    """A driver and a driven wheel, placed in space.
-
-    The driver stands at the global origin with its axis along global z; the driven wheel at +x, the working centre
+    The geometry is that of `PairGeometry`; everything else is composed: `contact_model`, `operating_point`, ``faults``.
+    The driver is at the global origin with its axis along global z; the driven wheel at +x, the working centre
     distance away, tilted by the misalignment about its pivot.
 
     Parameters
@@ -75,9 +53,9 @@ class GearPair:
     rotation : {1, -1}
         Sense in which the driver turns about +z.
     torque : float or str
-        Load torque on the driven wheel, N m, used by the static analyses.
+        Load torque on the driven wheel, N m, of the static analyses and, if it is given none, of the test stand.
     slices : int, optional
-        Slices along the face; default 1 for parallel axes without axial shift, 11 for
+        Slices along the face; default by `ContactModel.face_slices`: 1 for parallel axes without axial shift, 11 for
         others, 41 when faults vary along the face.
     load : {"slices", "adams"}
         How a tooth pair carries its load. ``slices``: pressure distributed over the face. ``adams``: one force at the
@@ -101,14 +79,6 @@ class GearPair:
     0.7733
     """
 
-    driver: GearSpec
-    driven: GearSpec
-    centre_distance_error: Quantity = 0.0
-    misalignment: Quantity = 0.0
-    plane: Literal["skew", "inclination"] = "skew"
-    pivot: Quantity = 0.0
-    axial_shift: Quantity = 0.0
-    backlash: Quantity = 0.0
     contact: ContactLaw = field(default_factory=ContactLaw.impact)
     friction: FlankFriction = field(default_factory=FlankFriction)
     rotation: Literal[1, -1] = 1
@@ -120,11 +90,32 @@ class GearPair:
     faults: tuple[Fault, ...] = ()
 
     def __post_init__(self) -> None:
-        lengths = ("centre_distance_error", "pivot", "axial_shift", "backlash")
-        units = {name: "length" for name in lengths} | {"misalignment": "angle", "torque": "torque"}
-        convert_fields(self, units, "GearPair")
         object.__setattr__(self, "faults", tuple(self.faults))
-        self._check()
+        # both check what they are made of
+        point, _ = self.operating_point, self.contact_model
+        object.__setattr__(self, "torque", point.torque)
+        for fault in self.faults:
+            require(isinstance(fault, Fault), f"GearPair.faults holds {fault!r}; give faults of gearmbs.gears.faults")
+        super().__post_init__()
+        if not self.root_contact:
+            self._check_clearance(0.0)
+
+    @cached_property
+    def geometry(self) -> PairGeometry:
+        """The wheels and their places alone."""
+        return PairGeometry(**{item.name: getattr(self, item.name) for item in fields(PairGeometry)})
+
+    @cached_property
+    def contact_model(self) -> ContactModel:
+        """How the wheels touch."""
+        return ContactModel(
+            self.contact, self.friction, self.slices, self.load, self.root_contact, self.stiffness_curve, "GearPair"
+        )
+
+    @cached_property
+    def operating_point(self) -> OperatingPoint:
+        """How they are driven and loaded."""
+        return OperatingPoint(self.torque, self.rotation, "GearPair")
 
     @classmethod
     def paper(cls, **changes: Any) -> GearPair:
@@ -161,7 +152,8 @@ class GearPair:
         damping, depth : float or str
             See `ContactLaw.linear`.
         """
-        largest = float(pair_stiffness(self, compliance_roll_lengths(self)).max())
+        geometry = self.geometry
+        largest = float(pair_stiffness(geometry, compliance_roll_lengths(geometry)).max())
         law = ContactLaw.linear(largest, damping, depth)
         return replace(self, contact=law, stiffness_curve="potential-energy")
 
@@ -184,243 +176,41 @@ class GearPair:
         >>> round(pair.contact.stiffness / 1e6, 1)
         254.9
         """
-        choices = {"single": iso_single_stiffness(self), "mesh": iso_mesh_stiffness(self) / self.contact_ratio}
+        choices = {
+            "single": iso_single_stiffness(self.geometry),
+            "mesh": iso_mesh_stiffness(self.geometry) / self.contact_ratio,
+        }
         require(kind in choices, f"kind is {kind!r}; choose 'single' or 'mesh'")
         law = ContactLaw.linear(choices[kind] * self.common_face_width, damping, depth)
         return replace(self, contact=law, stiffness_curve="constant")
 
-    def _check(self) -> None:
-        mm = 1e3
-        for name in ("centre_distance_error", "misalignment", "pivot", "axial_shift", "backlash", "torque"):
-            value = getattr(self, name)
-            require(math.isfinite(value), f"GearPair.{name} is {value}; give a finite number")
-        require(
-            self.backlash >= 0,
-            f"GearPair.backlash is {self.backlash * mm:.6g} mm: negative backlash; give 0 or more, or reduce "
-            "centre_distance_error to mesh tighter",
-        )
-        require(
-            self.plane in ("skew", "inclination"), f"GearPair.plane is {self.plane!r}; choose 'skew' or 'inclination'"
-        )
-        require(self.load in ("slices", "adams"), f"GearPair.load is {self.load!r}; choose 'slices' or 'adams'")
-        require(self.rotation in (1, -1), f"GearPair.rotation is {self.rotation!r}; give 1 or -1")
-        require(
-            self.stiffness_curve in ("constant", "potential-energy"),
-            f"GearPair.stiffness_curve is {self.stiffness_curve!r}; choose 'constant' or 'potential-energy'",
-        )
-        for fault in self.faults:
-            require(isinstance(fault, Fault), f"GearPair.faults holds {fault!r}; give faults of gearmbs.gears.faults")
-        require(
-            abs(self.misalignment) <= math.radians(10),
-            f"GearPair.misalignment is {math.degrees(self.misalignment):.3f} deg; spur wheels mesh up to 10 deg "
-            "(a plain number is in radians: write '1 deg')",
-        )
-        require(
-            self.slices is None or (isinstance(self.slices, int) and self.slices >= 1),
-            f"GearPair.slices is {self.slices!r}; give an integer of 1 or more",
-        )
-        one, two = self.driver, self.driven
-        require(
-            abs(one.base_pitch - two.base_pitch) <= 1e-9 * one.base_pitch,
-            f"GearPair: base pitches differ ({one.name} {one.base_pitch * mm:.6f} mm, {two.name} "
-            f"{two.base_pitch * mm:.6f} mm); give both wheels the same module and pressure_angle",
-        )
-        a = self.centre_distance
-        require(
-            a > (one.base_radius + two.base_radius) * 1.0005,
-            f"GearPair.centre_distance_error is {self.centre_distance_error * mm:.4f} mm: the base circles meet; "
-            "increase it",
-        )
-        # tips may be placed pressing into roots only when their contact is asked for
-        play = 0.05 * one.module if self.root_contact else 0.0
-        for near, far in ((one, two), (two, one)):
-            require(
-                a + play > near.tip_radius + far.root_radius,
-                f"GearPair: overlapping wheels: centre distance {a * mm:.4f} mm leaves no clearance between the tip of "
-                f"{near.name} ({near.tip_radius * mm:.4f} mm) and the root of {far.name} "
-                f"({far.root_radius * mm:.4f} mm); increase centre_distance_error or dedendum",
-            )
-        require(
-            a < one.tip_radius + two.tip_radius,
-            f"GearPair: the wheels do not reach each other: centre distance {a * mm:.4f} mm, tip radii sum up to "
-            f"{(one.tip_radius + two.tip_radius) * mm:.4f} mm; reduce centre_distance_error",
-        )
-        for thinned in self.wheels:
-            require(
-                thinned.tip_thickness > 0, f"GearPair.backlash is {self.backlash * mm:.4f} mm: teeth become pointed"
-            )
-        low, high = self.common_face
-        require(
-            high > low, f"GearPair.axial_shift is {self.axial_shift * mm:.4f} mm: the faces do not overlap; reduce it"
-        )
-        length = self.line_of_action
-        for far, near in ((one, two), (two, one)):
-            start = length - far.tip_roll_length
-            require(
-                start > near.form_roll_length - 1e-12 and start > 0,
-                f"GearPair: the tip of {far.name} meets {near.name} inside the start of its involute (length of roll "
-                f"{start * mm:.4f} mm, involute from {near.form_roll_length * mm:.4f} mm): interference; reduce the "
-                f"addendum of {far.name} or increase centre_distance_error",
-            )
-
-    @cached_property
-    def wheels(self) -> tuple[GearSpec, GearSpec]:
-        """Driver and driven with their teeth thinned for the backlash."""
-        if self.backlash == 0:
-            return self.driver, self.driven
-        cut = 0.5 * self.backlash / math.cos(self.driver.pressure_angle)
-        return (
-            replace(self.driver, thinning=self.driver.thinning + cut),
-            replace(self.driven, thinning=self.driven.thinning + cut),
-        )
-
-    @property
-    def ratio(self) -> float:
-        """Speed ratio, driven teeth over driver teeth."""
-        return self.driven.teeth / self.driver.teeth
-
-    @property
-    def nominal_centre_distance(self) -> float:
-        """Centre distance without backlash for unthinned teeth, m."""
-        one, two = self.driver, self.driven
-        shift = one.profile_shift + two.profile_shift
-        if shift == 0:
-            return one.pitch_radius + two.pitch_radius
-        target = involute(one.pressure_angle) + 2 * shift * math.tan(one.pressure_angle) / (one.teeth + two.teeth)
-        alpha = one.pressure_angle
-        for _ in range(50):
-            alpha -= (involute(alpha) - target) / math.tan(alpha) ** 2
-        return (one.base_radius + two.base_radius) / math.cos(alpha)
-
-    @property
-    def centre_distance(self) -> float:
-        """Working centre distance, m."""
-        return self.nominal_centre_distance + self.centre_distance_error
-
-    @property
-    def working_pressure_angle(self) -> float:
-        """Working pressure angle alpha', rad: cos alpha' = (r_b1 + r_b2) / a'."""
-        return math.acos((self.driver.base_radius + self.driven.base_radius) / self.centre_distance)
-
-    @property
-    def line_of_action(self) -> float:
-        """Length of the line of action between the base circles, m."""
-        return self.centre_distance * math.sin(self.working_pressure_angle)
-
-    @property
-    def path_of_contact(self) -> float:
-        """Length of the path of contact, m."""
-        return self.driver.tip_roll_length + self.driven.tip_roll_length - self.line_of_action
-
-    @property
-    def contact_ratio(self) -> float:
-        """Path of contact over base pitch."""
-        return self.path_of_contact / self.driver.base_pitch
-
-    @property
-    def start_of_active_profile(self) -> tuple[float, float]:
-        """Radii on driver and driven where the mate's tip begins to bear, m."""
-        one, two = self.driver, self.driven
-        return (
-            math.hypot(one.base_radius, self.line_of_action - two.tip_roll_length),
-            math.hypot(two.base_radius, self.line_of_action - one.tip_roll_length),
-        )
-
-    @property
-    def normal_backlash(self) -> float:
-        """Backlash j_bn along the line of action at the working centre distance, parallel axes, m."""
-        one, two = self.wheels
-        rb = one.base_radius + two.base_radius
-        angles = one.base_half_angle * one.base_radius + two.base_half_angle * two.base_radius
-        return 2 * (rb * involute(self.working_pressure_angle) - angles) + one.base_pitch
-
-    @property
-    def circumferential_backlash(self) -> float:
-        """Backlash j_wt on the working pitch circles, m."""
-        return self.normal_backlash / math.cos(self.working_pressure_angle)
-
-    @property
-    def jam_backlash(self) -> float:
-        """Normal backlash the misalignment needs, m: b gamma cos(alpha) (skew) or b gamma sin(alpha) (inclination).
-
-        This is the limit for small angles. At 1 deg the exact teeth of the paper's wheels need 0.7 um (skew) and 5 um
-        (inclination) less.
-        """
-        alpha = self.working_pressure_angle
-        part = math.cos(alpha) if self.plane == "skew" else math.sin(alpha)
-        return self.common_face_width * abs(self.misalignment) * part
-
-    @property
-    def jams(self) -> bool:
-        """Whether both flanks touch at once for want of backlash, by the centre distance or under the misalignment.
-
-        Under a misalignment by the first-order limit `jam_backlash`, which is a little on the safe side.
-        """
-        if self.misalignment == 0:
-            return self.normal_backlash < -JAM_ROUNDING
-        return self.normal_backlash < self.jam_backlash
-
-    @property
-    def tip_clearance(self) -> float:
-        """Smaller of the two clearances between a tip and the mate's root, m."""
-        one, two = self.driver, self.driven
-        return self.centre_distance - max(one.tip_radius + two.root_radius, two.tip_radius + one.root_radius)
+    # --- contact and load ---------------------------------------------------------------------------
 
     @property
     def tips_may_bottom(self) -> bool:
         """Whether contact of tips with roots is looked for."""
-        return self.tip_clearance < 0.1 * self.driver.module if self.root_contact is None else self.root_contact
+        return self.contact_model.tips_may_bottom(self.geometry)
 
     @property
-    def mesh_frequency_per_speed(self) -> float:
-        """Mesh frequency over driver speed, Hz per rad/s."""
-        return self.driver.teeth / (2 * math.pi)
+    def face_slices(self) -> int:
+        """Slices along the face in use; see `ContactModel.face_slices`."""
+        return self.contact_model.face_slices(self.geometry, self.faults)
 
     @property
     def normal_force(self) -> float:
         """Sum of normal forces that carries the load torque, N: F_n = T / r_b2."""
-        return self.torque / self.driven.base_radius
+        return self.operating_point.normal_force(self.geometry)
 
-    @property
-    def common_face_width(self) -> float:
-        """Face width both wheels share when aligned, m."""
-        return min(self.driver.face_width, self.driven.face_width)
-
-    @property
-    def common_face(self) -> tuple[float, float]:
-        """Range along the mean axis, from mid-way between the wheels, that both faces cover, m."""
-        half = 0.5 * self.axial_shift
-        low = max(-half - 0.5 * self.driver.face_width, half - 0.5 * self.driven.face_width)
-        high = min(-half + 0.5 * self.driver.face_width, half + 0.5 * self.driven.face_width)
-        return low, high
-
-    @property
-    def face_slices(self) -> int:
-        """Slices along the face in use."""
-        if self.slices is not None:
-            return self.slices
-        if any(fault.along_face for fault in self.faults):
-            return FAULTY_SLICES
-        plain = self.misalignment == 0 and self.axial_shift == 0
-        return 1 if plain else TILTED_SLICES
+    def _force(self, torque: float | None) -> float:
+        return self.normal_force if torque is None else torque / self.driven.base_radius
 
     def penetration(self, torque: float | None = None, pairs: int = 1) -> float:
         """Static penetration when ``pairs`` tooth pairs of parallel wheels share the load equally, m."""
-        force = self.normal_force if torque is None else torque / self.driven.base_radius
-        return (force / (pairs * self.contact.stiffness)) ** (1 / self.contact.exponent)
+        return self.contact_model.penetration(self._force(torque), pairs)
 
     def mesh_stiffness(self, torque: float | None = None, pairs: int = 1) -> float:
         """Tangent stiffness along the line of action of that many pairs of parallel wheels, N/m."""
-        force = self.normal_force if torque is None else torque / self.driven.base_radius
-        return self.contact.exponent * force / self.penetration(torque, pairs)
-
-    @cached_property
-    def tilt(self) -> np.ndarray:
-        """Rotation of the driven wheel's axis, shape (3, 3)."""
-        c, s = math.cos(self.misalignment), math.sin(self.misalignment)
-        if self.plane == "skew":
-            return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-        return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+        return self.contact_model.tangent_stiffness(self._force(torque), pairs)
 
     def contact_tables(self, slices: int | None = None) -> tuple[np.ndarray, np.ndarray, int]:
         """Tables of the contact kernel.
@@ -435,9 +225,9 @@ class GearPair:
         gi : ndarray of int64
         gr : ndarray of float64
         work_size : int
-            Length of the scratch array ``gear_contact`` needs.
+            Length of the work array ``gear_contact`` needs.
         """
-        return pack(self, self.face_slices if slices is None else slices)
+        return pack(self, slices)
 
     def contact_element(self, name: str, i: Marker, j: Marker) -> GearContact:
         """Return the contact of this pair as a force element between the frames of the driver and the driven wheel.
@@ -453,17 +243,6 @@ class GearPair:
         element.check()
         return element
 
-    def frames(self, driver_angle: float, driven_angle: float) -> Placement:
-        """Frames with the wheels turned by these angles about their own axes from tooth 0 on global x (rad)."""
-        origin = np.array([self.centre_distance, 0.0, self.axial_shift])
-        arm = np.array([0.0, 0.0, self.pivot])
-        return Placement(
-            np.zeros(3),
-            _turn_z(driver_angle),
-            origin + arm - self.tilt @ arm,
-            self.tilt @ _turn_z(driven_angle),
-        )
-
     def placement(self, driver_angle: float = 0.0) -> Placement:
         """Frames at which the drive flanks just touch, for a given driver angle (rad).
 
@@ -473,6 +252,7 @@ class GearPair:
 
     def driven_angle(self, driver_angle: float = 0.0) -> float:
         """Angle of the driven wheel at which the drive flanks just touch (kinematic contact, no load), rad."""
+        # the contact kernels are compiled for this only
         from gearmbs.gears.transmission import touching_angle
 
         return touching_angle(self, driver_angle)
@@ -491,11 +271,7 @@ class GearPair:
         return f"GearPair({', '.join(parts)})"
 
     def _repr_html_(self) -> str:
-        from gearmbs.gears.show import pair_html
-
         return pair_html(self)
 
     def __rich__(self) -> object:
-        from gearmbs.gears.show import pair_table
-
         return pair_table(self)

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.gears.faults import COAST_ALIASES
-from gearmbs.gears.transmission import StaticMesh, warn_of_unseen
-
-if TYPE_CHECKING:
-    from gearmbs.gears.pair import GearPair
+from gearmbs.gears.fault import COAST_ALIASES
+from gearmbs.gears.mesh import Mesh
+from gearmbs.gears.transmission import StaticMesh, static_lag, warn_of_unseen
 
 SIDE, SECTION, GAP, ROLL_LENGTH_1, SOFT = 0, 3, 4, 6, 11
 TEETH = slice(1, 3)
@@ -59,7 +56,7 @@ class ContactPattern:
 
 
 def contact_pattern(
-    pair: GearPair,
+    pair: Mesh,
     torque: float | None = None,
     points: int = 81,
     sections: int = 41,
@@ -70,9 +67,9 @@ def contact_pattern(
 
     Parameters
     ----------
-    pair : GearPair
+    pair : GearPair or Mesh
     torque : float, optional
-        On the driven wheel, N m; default the pair's.
+        On the driven wheel, N m; default that of the pair's operating point.
     points : int
         Positions over the engagement.
     sections : int
@@ -104,32 +101,33 @@ def contact_pattern(
         raise ValueError(f"side is {side!r}; choose 'drive' or 'coast'")
     if not 1 <= sections <= MAX_SECTIONS:
         raise ValueError(f"sections is {sections!r}; give 1 up to {MAX_SECTIONS}")
-    load = pair.torque if torque is None else torque
-    tooth %= pair.driver.teeth
+    load = pair.operating_point.torque if torque is None else torque
     mesh = StaticMesh(pair)
-    low, high = pair.common_face
+    geometry, rotation = mesh.geometry, mesh.rotation
+    tooth %= geometry.driver.teeth
+    low, high = geometry.common_face
     width = (high - low) / sections
     section = low + (np.arange(sections) + 0.5) * width
-    flank = pair.rotation * (1 if side == "drive" else -1)
-    gear = pair.wheels[0]
-    alpha = pair.working_pressure_angle
+    flank = rotation * (1 if side == "drive" else -1)
+    gear = geometry.wheels[0]
+    alpha = geometry.working_pressure_angle
     middle = gear.base_radius * math.tan(alpha)
     # tooth 0 touches at length of roll s when the driver is at s / r_b - psi - alpha, on the drive flank
-    offset = pair.rotation * (math.tan(alpha) - gear.base_half_angle - alpha)
+    offset = rotation * (math.tan(alpha) - gear.base_half_angle - alpha)
     offset -= 2 * math.pi * tooth / gear.teeth
     reach = 0.5 * gear.base_pitch
-    begin = pair.line_of_action - pair.wheels[1].tip_roll_length - middle - reach
+    begin = geometry.first_roll_lengths[0] - middle - reach
     end = gear.tip_roll_length - middle + reach
     roll = np.linspace(begin, end, points) / gear.base_radius
     pitch_angle = 2 * math.pi / gear.teeth
-    passed = [(pair.rotation * offset + turn) / pitch_angle for turn in (roll[0], roll[-1])]
+    passed = [(rotation * offset + turn) / pitch_angle for turn in (roll[0], roll[-1])]
     warn_of_unseen(pair, passed[0], passed[1], "give the number of another driver tooth to follow, tooth=...")
     pressure = np.zeros((points, sections))
     roll_length = np.full((points, sections), np.nan)
     total = np.zeros(points)
-    lag = pair.penetration(load) * pair.rotation / pair.driven.base_radius
+    lag = rotation * static_lag(pair, load)
     for k, turn in enumerate(roll):
-        angle = offset + pair.rotation * turn
+        angle = offset + rotation * turn
         ideal = mesh.ideal_angle(angle)
         driven = mesh.loaded_angle(angle, load, ideal + lag)
         lag = driven - ideal
@@ -147,7 +145,7 @@ def contact_pattern(
     return ContactPattern(roll, section, pressure, roll_length, pressure.sum(axis=1) * width, total)
 
 
-def _pair_load(pair: GearPair, rows: np.ndarray, ends: np.ndarray, low: float, width: float) -> np.ndarray:
+def _pair_load(pair: Mesh, rows: np.ndarray, ends: np.ndarray, low: float, width: float) -> np.ndarray:
     """Load of a pair of teeth per unit face width at the sections of its gap rows, N/m.
 
     What a face tilted sideways carries beyond the outermost sections counts to these.
@@ -165,8 +163,8 @@ def _pair_load(pair: GearPair, rows: np.ndarray, ends: np.ndarray, low: float, w
     share = np.diff(edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
     depth = np.maximum(0.0, -np.interp(middle, place, gap))
-    law, soft = pair.contact, rows[0, SOFT]
-    if pair.load == "adams":
+    law, soft = pair.contact_model.law, rows[0, SOFT]
+    if pair.contact_model.load == "adams":
         section = share * depth**1.5
         if not section.sum() > 0:
             return np.zeros(rows.shape[0])
@@ -174,5 +172,5 @@ def _pair_load(pair: GearPair, rows: np.ndarray, ends: np.ndarray, low: float, w
         force = law.stiffness * soft * max(0.0, -float(np.interp(centre, place, gap))) ** law.exponent
         loads = force * section / section.sum()
     else:
-        loads = law.stiffness / pair.common_face_width * soft * depth**law.exponent * share
+        loads = law.stiffness / pair.geometry.common_face_width * soft * depth**law.exponent * share
     return loads.reshape(-1, FINE).sum(axis=1) / width

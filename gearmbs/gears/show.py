@@ -6,21 +6,27 @@ import html
 import math
 from typing import TYPE_CHECKING
 
-from rich.table import Table
+from gearmbs.gears.mesh import Mesh
 
 if TYPE_CHECKING:
-    from gearmbs.gears.pair import GearPair
+    from rich.table import Table
 
 
-def pair_table(pair: GearPair) -> Table:
+def pair_table(pair: Mesh) -> Table:
     """Table of a gear pair for a terminal or a notebook."""
+    from rich.table import Table
+
     mm = 1e3
-    table = Table(title=f"Gear pair {pair.driver.teeth}/{pair.driven.teeth}")
-    for column in ("", pair.driver.name, pair.driven.name):
+    geometry, point = pair.geometry, pair.operating_point
+    force = point.normal_force(geometry)
+    one, two = geometry.driver, geometry.driven
+    tilt = geometry.plane if geometry.misalignment else ""
+    table = Table(title=f"Gear pair {one.teeth}/{two.teeth}")
+    for column in ("", one.name, two.name):
         table.add_column(column, justify="left" if not column else "right")
 
     def both(label: str, form: str, attribute: str, factor: float = mm) -> None:
-        table.add_row(label, *(format(getattr(w, attribute) * factor, form) for w in pair.wheels))
+        table.add_row(label, *(format(getattr(w, attribute) * factor, form) for w in geometry.wheels))
 
     both("teeth", "d", "teeth", 1)
     for label, attribute in (
@@ -36,25 +42,30 @@ def pair_table(pair: GearPair) -> Table:
     both("mass kg", ".4f", "mass", 1)
     table.add_section()
     for label, value in (
-        ("centre distance mm", f"{pair.centre_distance * mm:.4f}"),
-        ("working pressure angle deg", f"{math.degrees(pair.working_pressure_angle):.3f}"),
-        ("contact ratio", f"{pair.contact_ratio:.4f}"),
-        ("path of contact mm", f"{pair.path_of_contact * mm:.3f}"),
-        ("normal backlash mm", f"{pair.normal_backlash * mm:.4f}"),
-        ("misalignment deg", f"{math.degrees(pair.misalignment):.3f} {pair.plane if pair.misalignment else ''}"),
-        ("load torque N m", f"{pair.torque:.1f}"),
-        ("normal force N", f"{pair.normal_force:.1f}"),
-        ("penetration, one pair um", f"{pair.penetration() * 1e6:.2f}"),
+        ("centre distance mm", f"{geometry.centre_distance * mm:.4f}"),
+        ("working pressure angle deg", f"{math.degrees(geometry.working_pressure_angle):.3f}"),
+        ("contact ratio", f"{geometry.contact_ratio:.4f}"),
+        ("path of contact mm", f"{geometry.path_of_contact * mm:.3f}"),
+        ("normal backlash mm", f"{geometry.normal_backlash * mm:.4f}"),
+        (
+            "misalignment deg",
+            f"{math.degrees(geometry.misalignment):.3f} {tilt}",
+        ),
+        ("load torque N m", f"{point.torque:.1f}"),
+        ("normal force N", f"{force:.1f}"),
+        ("penetration, one pair um", f"{pair.contact_model.penetration(force) * 1e6:.2f}"),
     ):
         table.add_row(label, value, "")
-    if pair.jams:
+    if geometry.jams:
         table.add_row(
-            "jams", f"needs {pair.jam_backlash * mm:.4f} mm of normal backlash, has {pair.normal_backlash * mm:.4f}", ""
+            "jams",
+            f"needs {geometry.jam_backlash * mm:.4f} mm of normal backlash, has {geometry.normal_backlash * mm:.4f}",
+            "",
         )
     return table
 
 
-def pair_html(pair: GearPair) -> str:
+def pair_html(pair: Mesh) -> str:
     """Return the table as HTML for a notebook."""
     table = pair_table(pair)
     columns = [list(column.cells) for column in table.columns]

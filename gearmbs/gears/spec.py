@@ -261,6 +261,11 @@ class GearSpec:
         return self.base_half_angle - involute(math.acos(min(1.0, self.base_radius / radius)))
 
     @property
+    def sign(self) -> int:
+        """Sign of the wheel's radii in the sums over a pair (DIN 3960): 1, since its teeth point outwards."""
+        return 1
+
+    @property
     def tip_thickness(self) -> float:
         """Arc thickness at the tip circle, m."""
         return 2 * self.tip_radius * self.half_angle(self.tip_radius)

@@ -16,14 +16,13 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gearmbs.gears.geometry import PairGeometry
+from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.spec import GearSpec
-
-if TYPE_CHECKING:
-    from gearmbs.gears.pair import GearPair
+from gearmbs.gears.tooth_deviations import COMPLIANCE_POINTS
 
 POINTS = 200  # stations of the beam from root to tip
 SHEAR = 1.2  # shear correction of a rectangular section
@@ -161,14 +160,19 @@ def tooth_compliance(gear: GearSpec, crack: Crack | None = None, root_angle: flo
     return ToothCompliance(roll_length, bending, shear, axial, foundation)
 
 
-def hertz_stiffness(pair: GearPair) -> float:
+def hertz_stiffness(pair: PairGeometry) -> float:
     """Constant stiffness of the contact of two flanks, pi E b / (4 (1 - nu^2)) for equal materials, N/m."""
     parts = [(1 - w.material.poisson_ratio**2) / w.material.youngs_modulus for w in pair.wheels]
     return math.pi * pair.common_face_width / (2 * sum(parts))
 
 
+def compliance_roll_lengths(pair: PairGeometry) -> np.ndarray:
+    """Lengths of roll on wheel 1 at which the compliance of a tooth pair is tabulated, m."""
+    return np.linspace(pair.first_roll_lengths[0], pair.wheels[0].tip_roll_length, COMPLIANCE_POINTS)
+
+
 def pair_stiffness(
-    pair: GearPair,
+    pair: PairGeometry,
     roll_length: np.ndarray,
     cracks: tuple[Crack | None, Crack | None] = (None, None),
     root_angles: tuple[float | None, float | None] = (None, None),
@@ -177,13 +181,13 @@ def pair_stiffness(
 
     Parameters
     ----------
-    pair : GearPair
+    pair : PairGeometry
     roll_length : ndarray
         Contact on wheel 1, as length of roll, m; beyond the profiles' ends the end values are used.
     cracks, root_angles : tuple
         Per wheel, see `tooth_compliance`.
     """
-    mate = pair.line_of_action - roll_length
+    mate = pair.mate_roll_length(0, roll_length)
     total = np.full(np.shape(roll_length), 1 / hertz_stiffness(pair))
     for wheel, at, crack, angle in zip(pair.wheels, (roll_length, mate), cracks, root_angles):
         tooth = tooth_compliance(wheel, crack, angle)
@@ -224,7 +228,7 @@ class MeshStiffness:
 
 
 def mesh_stiffness(
-    pair: GearPair,
+    pair: Mesh,
     points: int = 400,
     root_angles: tuple[float | None, float | None] = (None, None),
 ) -> MeshStiffness:
@@ -242,20 +246,21 @@ def mesh_stiffness(
             "Crack, or loaded_transmission_error(pair, cycles=...).stiffness",
             stacklevel=2,
         )
-    begin = pair.line_of_action - pair.driven.tip_roll_length
-    pitch, ratio = pair.driver.base_pitch, pair.contact_ratio
+    geometry = pair.geometry
+    begin = geometry.first_roll_lengths[0]
+    pitch, ratio = geometry.driver.base_pitch, geometry.contact_ratio
     phase = np.arange(points) / points
     stiffness = np.zeros(points)
     for k in range(math.ceil(ratio)):
         travel = phase + k
         on_path = travel <= ratio
-        stiffness[on_path] += pair_stiffness(pair, begin + travel[on_path] * pitch, root_angles=root_angles)
+        stiffness[on_path] += pair_stiffness(geometry, begin + travel[on_path] * pitch, root_angles=root_angles)
     single_phase = np.linspace(0, ratio, points)
-    single = pair_stiffness(pair, begin + single_phase * pitch, root_angles=root_angles)
+    single = pair_stiffness(geometry, begin + single_phase * pitch, root_angles=root_angles)
     return MeshStiffness(phase, stiffness, single, single_phase)
 
 
-def iso_single_stiffness(pair: GearPair) -> float:
+def iso_single_stiffness(pair: PairGeometry) -> float:
     """Single stiffness c' of ISO 6336-1 (method B, solid discs, high load), N/(m of face width * m)."""
     one, two = pair.driver, pair.driven
     z1, z2, x1, x2 = one.teeth, two.teeth, one.profile_shift, two.profile_shift
@@ -268,6 +273,6 @@ def iso_single_stiffness(pair: GearPair) -> float:
     return 0.8 * rack / q * material * 1e9
 
 
-def iso_mesh_stiffness(pair: GearPair) -> float:
+def iso_mesh_stiffness(pair: PairGeometry) -> float:
     """Mesh stiffness c_gamma of ISO 6336-1, (0.75 epsilon_alpha + 0.25) c', N/(m of face width * m)."""
     return iso_single_stiffness(pair) * (0.75 * pair.contact_ratio + 0.25)

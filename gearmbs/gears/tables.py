@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.gears.stiffness import pair_stiffness
+from gearmbs.gears.contact_model import ContactModel
+from gearmbs.gears.mesh import Mesh
+from gearmbs.gears.spec import GearSpec
+from gearmbs.gears.stiffness import compliance_roll_lengths, pair_stiffness
 from gearmbs.gears.tooth_deviations import COMPLIANCE_POINTS, PROFILE_POINTS, ToothDeviations
-
-if TYPE_CHECKING:
-    from gearmbs.gears.pair import GearPair
-    from gearmbs.gears.spec import GearSpec
 
 LAWS = {
     "impact": L.LAW_IMPACT,
@@ -40,59 +37,67 @@ def _pack_wheel(gear: GearSpec, gr: np.ndarray, base: int) -> None:
     gr[base + L.PSI_FILLET] = gear.fillet_half_angle
 
 
-def pack(pair: GearPair, slices: int) -> tuple[np.ndarray, np.ndarray, int]:
-    """Tables ``gi``, ``gr`` and the length of the scratch array for ``gear_contact``."""
+def pack(pair: Mesh, slices: int | None = None) -> tuple[np.ndarray, np.ndarray, int]:
+    """Tables ``gi``, ``gr`` and the length of the work array for ``gear_contact``.
+
+    Parameters
+    ----------
+    pair : Mesh
+    slices : int, optional
+        Slices along the face, default the pair's own.
+    """
+    geometry, model, point = pair.geometry, pair.contact_model, pair.operating_point
+    slices = model.face_slices(geometry, pair.faults) if slices is None else slices
     gi = np.zeros(L.GI_HEADER, dtype=np.int64)
     gr = np.zeros(L.GR_HEADER)
-    first, second = pair.wheels
+    first, second = geometry.wheels
     gi[L.Z1] = first.teeth
     gi[L.Z2] = second.teeth
     gi[L.N_SLICES] = slices
-    gi[L.LAW] = LAWS[pair.contact.kind]
-    gi[L.FRICTION] = FRICTIONS[pair.friction.kind]
-    gi[L.DRIVE] = pair.rotation
-    gi[L.LOAD] = L.LOAD_ADAMS if pair.load == "adams" else L.LOAD_SLICES
-    gi[L.ROOT] = int(pair.tips_may_bottom)
+    gi[L.LAW] = LAWS[model.law.kind]
+    gi[L.FRICTION] = FRICTIONS[model.friction.kind]
+    gi[L.DRIVE] = point.rotation
+    gi[L.LOAD] = L.LOAD_ADAMS if model.load == "adams" else L.LOAD_SLICES
+    gi[L.ROOT] = int(model.tips_may_bottom(geometry))
     _pack_wheel(first, gr, 0)
     _pack_wheel(second, gr, L.WHEEL)
     gr[L.PITCH] = first.base_pitch
-    width = pair.common_face_width
-    law = pair.contact
-    gr[L.LAW_K] = law.stiffness / width
-    gr[L.LAW_E] = law.exponent
-    gr[L.LAW_C] = law.damping if law.kind == "hunt-crossley" else law.damping / width
-    gr[L.LAW_D] = law.depth
-    gr[L.MU_S] = pair.friction.static
-    gr[L.MU_D] = pair.friction.dynamic
-    gr[L.V_S] = pair.friction.static_speed
-    gr[L.V_D] = pair.friction.dynamic_speed
+    width = geometry.common_face_width
+    _pack_laws(model, width, gr)
     gr[L.WIDTH] = width
     gr[L.EDGE_BLEND] = EDGE_BLEND
-    low, high = pair.common_face
+    low, high = geometry.common_face
     gr[L.ZETA_LO] = low
     gr[L.ZETA_HI] = high
-    gr[L.AXIAL_SHIFT] = pair.axial_shift
-    if pair.faults or pair.stiffness_curve != "constant":
+    gr[L.AXIAL_SHIFT] = geometry.axial_shift
+    if pair.faults or model.stiffness_curve != "constant":
         gi, gr = _pack_teeth(pair, gi, gr)
     return gi, gr, L.work_size(slices)
 
 
-def compliance_roll_lengths(pair: GearPair) -> np.ndarray:
-    """Lengths of roll on wheel 1 at which the compliance of a tooth pair is tabulated, m."""
-    first, second = pair.wheels
-    return np.linspace(pair.line_of_action - second.tip_roll_length, first.tip_roll_length, COMPLIANCE_POINTS)
+def _pack_laws(model: ContactModel, width: float, gr: np.ndarray) -> None:
+    law, friction = model.law, model.friction
+    gr[L.LAW_K] = law.stiffness / width
+    gr[L.LAW_E] = law.exponent
+    gr[L.LAW_C] = law.damping if law.kind == "hunt-crossley" else law.damping / width
+    gr[L.LAW_D] = law.depth
+    gr[L.MU_S] = friction.static
+    gr[L.MU_D] = friction.dynamic
+    gr[L.V_S] = friction.static_speed
+    gr[L.V_D] = friction.dynamic_speed
 
 
-def tooth_deviations(pair: GearPair) -> tuple[ToothDeviations, ToothDeviations]:
+def tooth_deviations(pair: Mesh) -> tuple[ToothDeviations, ToothDeviations]:
     """Deviations of all teeth of both wheels, with every fault applied."""
+    geometry, rotation = pair.geometry, pair.operating_point.rotation
     along_face = any(fault.along_face for fault in pair.faults)
-    roll_length = compliance_roll_lengths(pair)
+    roll_length = compliance_roll_lengths(geometry)
     both = (
-        ToothDeviations(pair.wheels[0], pair.rotation, along_face, roll_length),
-        ToothDeviations(pair.wheels[1], pair.rotation, along_face, pair.line_of_action - roll_length),
+        ToothDeviations(geometry.wheels[0], rotation, along_face, roll_length),
+        ToothDeviations(geometry.wheels[1], rotation, along_face, geometry.mate_roll_length(0, roll_length)),
     )
     for fault in pair.faults:
-        fault.apply(both[fault.wheel == "driven"], pair)
+        fault.apply(both[fault.wheel == "driven"], geometry)
     return both
 
 
@@ -103,14 +108,14 @@ def _numbered(rows: np.ndarray, plain: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return np.where((rows == plain).all(axis=1), -1, number), distinct
 
 
-def _pack_teeth(pair: GearPair, gi: np.ndarray, gr: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _pack_teeth(pair: Mesh, gi: np.ndarray, gr: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     both = tooth_deviations(pair)
     nz = both[0].section.size
     records = [c.offset.size for c in both]
     tooth = np.full((sum(records), L.TOOTH), -1, dtype=np.int64)
     base_curve = np.ones(COMPLIANCE_POINTS)
-    if pair.stiffness_curve == "potential-energy":
-        stiffness = pair_stiffness(pair, compliance_roll_lengths(pair))
+    if pair.contact_model.stiffness_curve == "potential-energy":
+        stiffness = pair_stiffness(pair.geometry, compliance_roll_lengths(pair.geometry))
         base_curve = stiffness.max() / stiffness
     parts: dict[str, list[np.ndarray]] = {"offset": [], "shape": [], "tip": [], "compliance": []}
     counts = {"shape": 0, "tip": 0, "compliance": 0}
@@ -134,9 +139,9 @@ def _pack_teeth(pair: GearPair, gi: np.ndarray, gr: np.ndarray) -> tuple[np.ndar
         gr[k * L.WHEEL + L.SHAPE_DS] = deviations.roll_length[1] - deviations.roll_length[0]
         start += records[k]
     gr[L.GAP_MARGIN] = added
-    softened = pair.stiffness_curve != "constant" or (tooth[:, 2] >= 0).any()
+    softened = pair.contact_model.stiffness_curve != "constant" or (tooth[:, 2] >= 0).any()
     if softened:
-        at = compliance_roll_lengths(pair)
+        at = compliance_roll_lengths(pair.geometry)
         gr[L.COMPLIANCE_S0] = at[0]
         gr[L.COMPLIANCE_DS] = at[1] - at[0]
         parts["compliance"].insert(0, base_curve)

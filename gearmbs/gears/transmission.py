@@ -6,21 +6,20 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
-
-if TYPE_CHECKING:
-    from gearmbs.gears.pair import GearPair
+from gearmbs.gears.mesh import Mesh
+from gearmbs.gears.tables import pack
 
 MAX_ROWS = 4000
 NEWTON_STEPS = 100
 PHASE_STEPS = 50
 TOUCH_TOLERANCE = 1e-15  # m
 SEARCHED_FROM = 1e-11  # m
+TOUCHING = 1e-9  # m
 
 
 @dataclass(frozen=True)
@@ -72,12 +71,20 @@ class TransmissionError:
         return lines[self.cycles : (count + 1) * self.cycles : self.cycles]
 
 
+def static_lag(pair: Mesh, torque: float) -> float:
+    """Angle by which a torque (N m) on one tooth pair of parallel wheels lets the driven wheel lag, rad."""
+    radius = pair.geometry.driven.base_radius
+    return pair.contact_model.penetration(torque / radius) / radius
+
+
 class StaticMesh:
     """The contact kernel at rest with the wheels on their axes: torque on the driven wheel against its angle."""
 
-    def __init__(self, pair: GearPair, slices: int | None = None) -> None:
+    def __init__(self, pair: Mesh, slices: int | None = None) -> None:
         self.pair = pair
-        self.gi, self.gr, size = pair.contact_tables(slices)
+        self.geometry = pair.geometry
+        self.rotation = pair.operating_point.rotation
+        self.gi, self.gr, size = pack(pair, slices)
         self.gi[layout.FRICTION] = layout.FRICTION_NONE
         self.work = np.zeros(size)
         self.wrench = np.zeros(6)
@@ -88,7 +95,7 @@ class StaticMesh:
 
     def torque(self, driver_angle: float, driven_angle: float) -> tuple[float, float]:
         """Contact torque on the driven wheel about its axis, N m, and its derivative by the driven angle."""
-        place = self.pair.frames(driver_angle, driven_angle)
+        place = self.geometry.frames(driver_angle, driven_angle)
         zero = self._zero
         gear_contact(
             self.gi, self.gr, place.origin_1, place.axes_1, zero, zero, place.origin_2, place.axes_2, zero, zero,
@@ -103,7 +110,7 @@ class StaticMesh:
 
     def gaps(self, driver_angle: float, driven_angle: float, sections: np.ndarray | None = None) -> np.ndarray:
         """Rows of ``gearmbs.contact.pair_gaps`` (by default at the ends of the common face, mid-face for one slice)."""
-        place = self.pair.frames(driver_angle, driven_angle)
+        place = self.geometry.frames(driver_angle, driven_angle)
         if sections is None:
             sections = np.zeros(1 if self.gi[layout.N_SLICES] == 1 else 0)
         count = pair_gaps(
@@ -113,17 +120,16 @@ class StaticMesh:
 
     def ideal_angle(self, driver_angle: float) -> float:
         """Driven angle of exact ratio, through kinematic contact of endless perfect flanks on parallel axes."""
-        one, two = self.pair.wheels
-        alpha = self.pair.working_pressure_angle
-        slack = (one.base_radius + two.base_radius) * (math.tan(alpha) - alpha)
-        slack -= one.base_radius * one.base_half_angle + two.base_radius * two.base_half_angle
-        slack -= round(slack / one.base_pitch) * one.base_pitch
-        return math.pi + self.pair.rotation * slack / two.base_radius - driver_angle / self.pair.ratio
+        geometry = self.geometry
+        alpha, pitch = geometry.working_pressure_angle, geometry.driver.base_pitch
+        slack = geometry.base_radius_sum * (math.tan(alpha) - alpha) - geometry.base_arc_sum
+        slack -= round(slack / pitch) * pitch
+        return math.pi + self.rotation * slack / geometry.driven.base_radius - driver_angle / geometry.ratio
 
     def touching_angle(self, driver_angle: float) -> float:
         """Driven angle at which the drive flanks just touch."""
-        side = self.pair.rotation
-        rb = self.pair.driven.base_radius
+        side = self.rotation
+        rb = self.geometry.driven.base_radius
         angle = self.ideal_angle(driver_angle)
         for _ in range(PHASE_STEPS):
             rows = self.gaps(driver_angle, angle)
@@ -135,9 +141,9 @@ class StaticMesh:
 
     def loaded_angle(self, driver_angle: float, torque: float, start: float) -> float:
         """Driven angle at which the contact carries ``torque``, by Newton's method kept inside a bracket."""
-        side = self.pair.rotation
+        side = self.rotation
         lag = side * start
-        longest = self.pair.penetration(torque) / self.pair.driven.base_radius
+        longest = static_lag(self.pair, torque)
         low, high = -math.inf, math.inf
         for _ in range(NEWTON_STEPS):
             value, slope = self.torque(driver_angle, side * lag)
@@ -158,13 +164,13 @@ class StaticMesh:
         return side * lag
 
 
-def touching_angle(pair: GearPair, driver_angle: float = 0.0) -> float:
+def touching_angle(pair: Mesh, driver_angle: float = 0.0) -> float:
     """Driven angle at which the drive flanks just touch, rad."""
     return StaticMesh(pair).touching_angle(driver_angle)
 
 
 def kinematic_transmission_error(
-    pair: GearPair, points: int = 400, slices: int | None = None, *, start: float = 0.0, cycles: int = 1
+    pair: Mesh, points: int = 400, slices: int | None = None, *, start: float = 0.0, cycles: int = 1
 ) -> TransmissionError:
     """Transmission error at vanishing load: the wheels touch without pressing.
 
@@ -173,7 +179,7 @@ def kinematic_transmission_error(
 
     Parameters
     ----------
-    pair : GearPair
+    pair : GearPair or Mesh
     points : int
         Positions over one mesh cycle.
     slices : int, optional
@@ -188,29 +194,81 @@ def kinematic_transmission_error(
     UserWarning
         If faults sit on teeth that do not pass the mesh.
     """
-    mesh = StaticMesh(pair, slices)
     phase = _phases(pair, points, start, cycles)
-    error = np.empty(phase.size)
-    pairs = np.empty(phase.size)
-    rb = pair.driven.base_radius
-    pitch_angle = pair.rotation * 2 * math.pi / pair.driver.teeth
+    mesh = StaticMesh(pair, slices)
+    side, rb = mesh.rotation, mesh.geometry.driven.base_radius
 
-    def lag(step: float) -> float:
-        angle = step * pitch_angle
-        return pair.rotation * (mesh.touching_angle(angle) - mesh.ideal_angle(angle)) * rb
+    def touching(angle: float) -> tuple[float, float]:
+        driven = mesh.touching_angle(angle)
+        rows = mesh.gaps(angle, driven)
+        on_drive = rows[(rows[:, 0] == side) & (rows[:, 4] < TOUCHING)]
+        return side * (driven - mesh.ideal_angle(angle)) * rb, np.unique(on_drive[:, 1]).size
 
-    for k, step in enumerate(phase):
-        error[k] = lag(step)
-        angle = step * pitch_angle
-        rows = mesh.gaps(angle, mesh.touching_angle(angle))
-        touching = rows[(rows[:, 0] == pair.rotation) & (rows[:, 4] < 1e-9)]
-        pairs[k] = np.unique(touching[:, 1]).size
+    error, pairs = _over_phases(mesh, phase, touching)
     none = np.zeros(phase.size)
-    extremes = _extremes(lag, phase, error, points)
+    extremes = _extremes(lambda step: touching(_driver_angle(mesh, step))[0], phase, error, points)
     return TransmissionError(phase, error, 0.0, none, pairs, none.copy(), cycles, extremes)
 
 
-def _phases(pair: GearPair, points: int, start: float, cycles: int) -> np.ndarray:
+def loaded_transmission_error(
+    pair: Mesh,
+    torque: float | None = None,
+    points: int = 400,
+    slices: int | None = None,
+    *,
+    start: float = 0.0,
+    cycles: int = 1,
+) -> TransmissionError:
+    """Quasi-static transmission error under load: rigid wheels, contact compliance only, no friction.
+
+    Parameters
+    ----------
+    pair : GearPair or Mesh
+    torque : float, optional
+        On the driven wheel, N m; default that of the pair's operating point.
+    points, slices, start, cycles
+        As for `kinematic_transmission_error`.
+
+    Raises
+    ------
+    ValueError
+        For a torque that is not positive.
+
+    Warns
+    -----
+    UserWarning
+        If faults sit on teeth that do not pass the mesh.
+    """
+    load = pair.operating_point.torque if torque is None else torque
+    if not load > 0:
+        raise ValueError(f"torque is {load} N m; give a positive load, or use kinematic_transmission_error for none")
+    phase = _phases(pair, points, start, cycles)
+    mesh = StaticMesh(pair, slices)
+    side, rb = mesh.rotation, mesh.geometry.driven.base_radius
+    lag = side * static_lag(pair, load)
+
+    def loaded(angle: float) -> tuple[float, float, float, float]:
+        nonlocal lag
+        ideal = mesh.ideal_angle(angle)
+        driven = mesh.loaded_angle(angle, load, ideal + lag)
+        lag = driven - ideal
+        _, slope = mesh.torque(angle, driven)
+        return side * lag * rb, mesh.diag[7], mesh.diag[5], -slope / rb**2
+
+    error, forces, pairs, stiffness = _over_phases(mesh, phase, loaded)
+    return TransmissionError(phase, error, load, forces, pairs, stiffness, cycles)
+
+
+def _driver_angle(mesh: StaticMesh, phase: float) -> float:
+    return phase * (mesh.rotation * 2 * math.pi / mesh.geometry.driver.teeth)
+
+
+def _over_phases(mesh: StaticMesh, phase: np.ndarray, at: Callable[[float], tuple[float, ...]]) -> np.ndarray:
+    """Columns of what a function of the driver's angle returns, at each phase."""
+    return np.array([at(_driver_angle(mesh, step)) for step in phase]).T
+
+
+def _phases(pair: Mesh, points: int, start: float, cycles: int) -> np.ndarray:
     if cycles < 1 or cycles != int(cycles):
         raise ValueError(f"cycles is {cycles!r}; give a whole number of mesh cycles from 1 up")
     warn_of_unseen(pair, start, start + cycles, "give cycles={turn} for a whole turn, or another start", 4)
@@ -236,7 +294,7 @@ def _extremes(
     return ends[0], ends[1]
 
 
-def warn_of_unseen(pair: GearPair, begin: float, end: float, remedy: str, level: int = 3) -> None:
+def warn_of_unseen(pair: Mesh, begin: float, end: float, remedy: str, level: int = 3) -> None:
     """Warn of faults on teeth that do not pass the mesh between two driver angles, in its pitch angles.
 
     ``{turn}`` in the remedy stands for the teeth of the faulty wheel, ``level`` for the callers up to the user's line.
@@ -247,7 +305,7 @@ def warn_of_unseen(pair: GearPair, begin: float, end: float, remedy: str, level:
     passing = _passing(pair, begin, end)
     for fault in faulty:
         wheel = int(fault.wheel == "driven")
-        z = (pair.driver, pair.driven)[wheel].teeth
+        z = pair.geometry.wheels[wheel].teeth
         teeth = getattr(fault, "tooth", None)
         numbers = {n % z for n in np.atleast_1d(getattr(fault, "teeth", 0) if teeth is None else teeth).tolist()}
         unseen = sorted(numbers - passing[wheel])
@@ -260,70 +318,19 @@ def warn_of_unseen(pair: GearPair, begin: float, end: float, remedy: str, level:
             )
 
 
-def _passing(pair: GearPair, begin: float, end: float) -> tuple[set[int], set[int]]:
+def _passing(pair: Mesh, begin: float, end: float) -> tuple[set[int], set[int]]:
     """Numbers of the teeth of both wheels that are on the path of contact at some time in the range."""
-    gear, mate = pair.wheels
-    alpha = pair.working_pressure_angle
+    mesh = StaticMesh(pair)
+    side, geometry = mesh.rotation, mesh.geometry
+    gear, mate = geometry.wheels
+    alpha = geometry.working_pressure_angle
     middle = gear.base_radius * math.tan(alpha)
     centre = (math.tan(alpha) - gear.base_half_angle - alpha) * gear.teeth / (2 * math.pi)
-    first = (pair.line_of_action - mate.tip_roll_length - middle) / gear.base_pitch
+    first = (geometry.first_roll_lengths[0] - middle) / gear.base_pitch
     last = (gear.tip_roll_length - middle) / gear.base_pitch
     # the tooth of the driven wheel that tooth 0 of the driver meets
-    mesh = StaticMesh(pair)
-    angle = pair.rotation * centre * 2 * math.pi / gear.teeth
+    angle = side * centre * 2 * math.pi / gear.teeth
     rows = mesh.gaps(angle, mesh.ideal_angle(angle))
-    met = int(rows[(rows[:, 0] == pair.rotation) & (rows[:, 1] == 0)][0, 2])
+    met = int(rows[(rows[:, 0] == side) & (rows[:, 1] == 0)][0, 2])
     turns = range(math.ceil(begin - centre - last), math.floor(end - centre - first) + 1)
-    side = pair.rotation
     return {-side * m % gear.teeth for m in turns}, {(met + side * m) % mate.teeth for m in turns}
-
-
-def loaded_transmission_error(
-    pair: GearPair,
-    torque: float | None = None,
-    points: int = 400,
-    slices: int | None = None,
-    *,
-    start: float = 0.0,
-    cycles: int = 1,
-) -> TransmissionError:
-    """Quasi-static transmission error under load: rigid wheels, contact compliance only, no friction.
-
-    Parameters
-    ----------
-    pair : GearPair
-    torque : float, optional
-        On the driven wheel, N m; default the pair's.
-    points : int
-        Positions over one mesh cycle.
-    slices : int, optional
-        Slices along the face, default the pair's own.
-    start : float
-        Driver angle to begin with, in pitch angles of the driver.
-    cycles : int
-        Mesh cycles; as many as the driver's teeth for a turn of it, to see faults of all teeth.
-
-    Warns
-    -----
-    UserWarning
-        If faults sit on teeth that do not pass the mesh.
-    """
-    load = pair.torque if torque is None else torque
-    if not load > 0:
-        raise ValueError(f"torque is {load} N m; give a positive load, or use kinematic_transmission_error for none")
-    mesh = StaticMesh(pair, slices)
-    phase = _phases(pair, points, start, cycles)
-    error, forces, pairs, stiffness = (np.empty(phase.size) for _ in range(4))
-    rb = pair.driven.base_radius
-    lag = pair.penetration(load) * pair.rotation / rb
-    for k, step in enumerate(phase):
-        angle = pair.rotation * step * 2 * math.pi / pair.driver.teeth
-        ideal = mesh.ideal_angle(angle)
-        loaded = mesh.loaded_angle(angle, load, ideal + lag)
-        lag = loaded - ideal
-        _, slope = mesh.torque(angle, loaded)
-        error[k] = pair.rotation * lag * rb
-        forces[k] = mesh.diag[7]
-        pairs[k] = mesh.diag[5]
-        stiffness[k] = -slope / rb**2
-    return TransmissionError(phase, error, load, forces, pairs, stiffness, cycles)

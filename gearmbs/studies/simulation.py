@@ -114,7 +114,6 @@ def case_mechanism(case: Case):
     return rig.gear_rig(
         case.pair(),
         speed=operation.speed,
-        torque=operation.torque,
         run_up=operation.run_up,
         shaft_radius=shafts.radius,
         shaft_length=shafts.length,
@@ -280,7 +279,9 @@ def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any
                 if key in units and not isinstance(value, str):
                     out[f"{name}_units"] = units[key]
     out["solver_tolerance"] = case.solver.used_tolerance
-    out["contact_ratio"] = case.pair().contact_ratio
+    pair = case.pair()
+    out["contact_ratio"] = pair.contact_ratio
+    out["face_slices"] = pair.face_slices
     out["remarks"] = "; ".join(remarks(case)) or "none"
     out["mesh_frequency"] = case.mesh_frequency
     out["mesh_frequency_units"] = "Hz"

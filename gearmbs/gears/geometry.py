@@ -1,0 +1,372 @@
+"""Two wheels in space, as values: centre distance, backlash, misalignment and all that follows from them alone.
+
+Sums over the two wheels are signed as in DIN 3960: the radii of an external wheel count positive, those of an internal
+one would count negative, and with them centre distance and line of action of the pair. One set of formulas then holds
+for both.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, overload
+
+import numpy as np
+
+from gearmbs.gears.spec import GearSpec, convert_fields, involute, require
+from gearmbs.units import Quantity
+
+JAM_ROUNDING = 1e-12
+"""Overlap of parallel wheels, m, that is taken for rounding: standard teeth at their nominal distance have none."""
+
+BASE_CIRCLES_APART = 1.0005
+"""Least centre distance over the sum of the base radii; below it the pressure angle vanishes."""
+
+PRESSED_IN = 0.05
+"""Overlap of a tip with the mate's root, in modules, that is a place wheels can be pressed into."""
+
+LARGEST_MISALIGNMENT = math.radians(10)
+MM = 1e3
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Frames of both wheels: origins at mid-face, z the wheel's axis, x through the middle of tooth 0.
+
+    Attributes
+    ----------
+    origin_1, origin_2 : ndarray, shape (3,)
+    axes_1, axes_2 : ndarray, shape (3, 3)
+        Columns are the wheel's axes in global components.
+    """
+
+    origin_1: np.ndarray
+    axes_1: np.ndarray
+    origin_2: np.ndarray
+    axes_2: np.ndarray
+
+
+def _turn_z(angle: float) -> np.ndarray:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True)
+class PairGeometry:
+    """A driver and a driven wheel, placed in space.
+
+    The driver is at the global origin with its axis along global z; the driven wheel is at +x, the working centre
+    distance away, tilted by the misalignment about its pivot.
+
+    Parameters
+    ----------
+    driver, driven : GearSpec
+    centre_distance_error : float or str
+        Added to the nominal centre distance, m.
+    misalignment : float or str
+        Angle between the axes, rad or text such as ``"1 deg"``.
+    plane : {"skew", "inclination"}
+        Skew: axes in parallel planes (turned about the line of centres). Inclination: axes in one plane.
+    pivot : float or str
+        Where on the driven wheel's axis the misalignment turns it, from its mid-face, m.
+    axial_shift : float or str
+        Shift of the driven wheel along global z, m.
+    backlash : float or str
+        Normal backlash made by thinning both wheels' teeth equally, m; at the nominal centre distance.
+
+    Raises
+    ------
+    ValueError
+        For wheels that do not mesh; the message names the field, its value and a remedy.
+    """
+
+    driver: GearSpec
+    driven: GearSpec
+    centre_distance_error: Quantity = 0.0
+    misalignment: Quantity = 0.0
+    plane: Literal["skew", "inclination"] = "skew"
+    pivot: Quantity = 0.0
+    axial_shift: Quantity = 0.0
+    backlash: Quantity = 0.0
+
+    def __post_init__(self) -> None:
+        lengths = ("centre_distance_error", "pivot", "axial_shift", "backlash")
+        convert_fields(self, {name: "length" for name in lengths} | {"misalignment": "angle"}, self._name)
+        for name in (*lengths, "misalignment"):
+            value = getattr(self, name)
+            require(math.isfinite(value), f"{self._name}.{name} is {value}; give a finite number")
+        self._check_settings()
+        self._check_distance()
+        self._check_engagement()
+
+    @property
+    def _name(self) -> str:
+        return type(self).__name__
+
+    # --- checks -------------------------------------------------------------------------------------
+
+    def _check_settings(self) -> None:
+        name = self._name
+        require(
+            self.backlash >= 0,
+            f"{name}.backlash is {self.backlash * MM:.6g} mm: negative backlash; give 0 or more, or reduce "
+            "centre_distance_error to mesh tighter",
+        )
+        require(
+            self.plane in ("skew", "inclination"), f"{name}.plane is {self.plane!r}; choose 'skew' or 'inclination'"
+        )
+        require(
+            abs(self.misalignment) <= LARGEST_MISALIGNMENT,
+            f"{name}.misalignment is {math.degrees(self.misalignment):.3f} deg; spur wheels mesh up to 10 deg "
+            "(a plain number is in radians: write '1 deg')",
+        )
+        one, two = self.driver, self.driven
+        require(
+            abs(one.base_pitch - two.base_pitch) <= 1e-9 * one.base_pitch,
+            f"{name}: base pitches differ ({one.name} {one.base_pitch * MM:.6f} mm, {two.name} "
+            f"{two.base_pitch * MM:.6f} mm); give both wheels the same module and pressure_angle",
+        )
+
+    def _check_distance(self) -> None:
+        name, a = self._name, self.centre_distance
+        require(
+            a > abs(self.base_radius_sum) * BASE_CIRCLES_APART,
+            f"{name}.centre_distance_error is {self.centre_distance_error * MM:.4f} mm: the base circles meet; "
+            "increase it",
+        )
+        self._check_clearance(PRESSED_IN * self.driver.module)
+        reach = self.tip_radius_sum
+        require(
+            self.sign * a < reach,
+            f"{name}: the wheels do not reach each other: centre distance {a * MM:.4f} mm, tip radii sum up to "
+            f"{reach * MM:.4f} mm; reduce centre_distance_error",
+        )
+
+    def _check_clearance(self, overlap: float) -> None:
+        """Refuse tips that reach into the mate's root by more than ``overlap``, m."""
+        for near, far, clearance in zip((self.driver, self.driven), (self.driven, self.driver), self.tip_clearances):
+            require(
+                clearance + overlap > 0,
+                f"{self._name}: overlapping wheels: centre distance {self.centre_distance * MM:.4f} mm leaves no "
+                f"clearance between the tip of {near.name} ({near.tip_radius * MM:.4f} mm) and the root of {far.name} "
+                f"({far.root_radius * MM:.4f} mm); increase centre_distance_error or dedendum",
+            )
+
+    def _check_engagement(self) -> None:
+        name = self._name
+        for thinned in self.wheels:
+            require(thinned.tip_thickness > 0, f"{name}.backlash is {self.backlash * MM:.4f} mm: teeth become pointed")
+        low, high = self.common_face
+        require(
+            high > low, f"{name}.axial_shift is {self.axial_shift * MM:.4f} mm: the faces do not overlap; reduce it"
+        )
+        for near, far, start in zip((self.driver, self.driven), (self.driven, self.driver), self.first_roll_lengths):
+            require(
+                start > near.form_roll_length - 1e-12 and start > 0,
+                f"{name}: the tip of {far.name} meets {near.name} inside the start of its involute (length of roll "
+                f"{start * MM:.4f} mm, involute from {near.form_roll_length * MM:.4f} mm): interference; reduce the "
+                f"addendum of {far.name} or increase centre_distance_error",
+            )
+
+    # --- signed sums --------------------------------------------------------------------------------
+
+    @property
+    def sign(self) -> int:
+        """Sign of the pair's centre distance: 1 for two external wheels, -1 if one is internal."""
+        return self.driver.sign * self.driven.sign
+
+    def _sum(self, radius: str) -> float:
+        one, two = self.driver, self.driven
+        return one.sign * getattr(one, radius) + two.sign * getattr(two, radius)
+
+    @property
+    def base_radius_sum(self) -> float:
+        """Signed sum of the base radii r_b1 + r_b2, m."""
+        return self._sum("base_radius")
+
+    @property
+    def tip_radius_sum(self) -> float:
+        """Signed sum of the tip radii r_a1 + r_a2, m."""
+        return self._sum("tip_radius")
+
+    @property
+    def base_arc_sum(self) -> float:
+        """Signed sum of half the teeth's thickness on the base circles, r_b1 psi_1 + r_b2 psi_2, m, thinned teeth."""
+        one, two = self.wheels
+        return one.sign * one.base_radius * one.base_half_angle + two.sign * two.base_radius * two.base_half_angle
+
+    # --- transverse section -------------------------------------------------------------------------
+
+    @cached_property
+    def wheels(self) -> tuple[GearSpec, GearSpec]:
+        """Driver and driven with their teeth thinned for the backlash."""
+        if self.backlash == 0:
+            return self.driver, self.driven
+        cut = 0.5 * self.backlash / math.cos(self.driver.pressure_angle)
+        return (
+            replace(self.driver, thinning=self.driver.thinning + cut),
+            replace(self.driven, thinning=self.driven.thinning + cut),
+        )
+
+    @property
+    def ratio(self) -> float:
+        """Speed ratio, driven teeth over driver teeth."""
+        return self.driven.teeth / self.driver.teeth
+
+    @property
+    def nominal_centre_distance(self) -> float:
+        """Centre distance without backlash for unthinned teeth, m."""
+        one, two = self.driver, self.driven
+        shift = one.sign * one.profile_shift + two.sign * two.profile_shift
+        if shift == 0:
+            return abs(self._sum("pitch_radius"))
+        alpha = one.pressure_angle
+        target = involute(alpha) + 2 * shift * math.tan(alpha) / self._sum("teeth")
+        for _ in range(50):
+            alpha -= (involute(alpha) - target) / math.tan(alpha) ** 2
+        return abs(self.base_radius_sum) / math.cos(alpha)
+
+    @property
+    def centre_distance(self) -> float:
+        """Working centre distance, m."""
+        return self.nominal_centre_distance + self.centre_distance_error
+
+    @property
+    def working_pressure_angle(self) -> float:
+        """Working pressure angle alpha', rad: cos alpha' = (r_b1 + r_b2) / a'."""
+        return math.acos(self.base_radius_sum / (self.sign * self.centre_distance))
+
+    @property
+    def line_of_action(self) -> float:
+        """Length of the line of action between the base circles, m, with the sign of the pair."""
+        return self.sign * self.centre_distance * math.sin(self.working_pressure_angle)
+
+    @property
+    def path_of_contact(self) -> float:
+        """Length of the path of contact, m."""
+        return self._sum("tip_roll_length") - self.line_of_action
+
+    @property
+    def contact_ratio(self) -> float:
+        """Path of contact over base pitch."""
+        return self.path_of_contact / self.driver.base_pitch
+
+    @overload
+    def mate_roll_length(self, wheel: int, roll_length: float) -> float: ...
+
+    @overload
+    def mate_roll_length(self, wheel: int, roll_length: np.ndarray) -> np.ndarray: ...
+
+    def mate_roll_length(self, wheel: int, roll_length: float | np.ndarray) -> float | np.ndarray:
+        """Length of roll on the mate where a wheel touches it, m.
+
+        Parameters
+        ----------
+        wheel : {0, 1}
+            0 for the driver, 1 for the driven wheel.
+        roll_length : float or ndarray
+            On that wheel, m.
+        """
+        own, mate = (self.driver, self.driven) if wheel == 0 else (self.driven, self.driver)
+        return mate.sign * (self.line_of_action - own.sign * roll_length)
+
+    @property
+    def first_roll_lengths(self) -> tuple[float, float]:
+        """Lengths of roll on driver and driven where the mate's tip begins to bear, m."""
+        return (
+            self.mate_roll_length(1, self.driven.tip_roll_length),
+            self.mate_roll_length(0, self.driver.tip_roll_length),
+        )
+
+    @property
+    def start_of_active_profile(self) -> tuple[float, float]:
+        """Radii on driver and driven where the mate's tip begins to bear, m."""
+        first = self.first_roll_lengths
+        return math.hypot(self.driver.base_radius, first[0]), math.hypot(self.driven.base_radius, first[1])
+
+    @property
+    def normal_backlash(self) -> float:
+        """Backlash j_bn along the line of action at the working centre distance, parallel axes, m."""
+        alpha = self.working_pressure_angle
+        return 2 * (self.base_radius_sum * involute(alpha) - self.base_arc_sum) + self.driver.base_pitch
+
+    @property
+    def circumferential_backlash(self) -> float:
+        """Backlash j_wt on the working pitch circles, m."""
+        return self.normal_backlash / math.cos(self.working_pressure_angle)
+
+    @property
+    def tip_clearances(self) -> tuple[float, float]:
+        """Clearances between the driver's tip and the driven wheel's root, and the reverse, m."""
+        one, two = self.driver, self.driven
+        a = self.sign * self.centre_distance
+        return (
+            a - (one.sign * one.tip_radius + two.sign * two.root_radius),
+            a - (two.sign * two.tip_radius + one.sign * one.root_radius),
+        )
+
+    @property
+    def tip_clearance(self) -> float:
+        """Smaller of the two clearances between a tip and the mate's root, m."""
+        return min(self.tip_clearances)
+
+    # --- along the face -----------------------------------------------------------------------------
+
+    @property
+    def jam_backlash(self) -> float:
+        """Normal backlash the misalignment needs, m: b gamma cos(alpha) (skew) or b gamma sin(alpha) (inclination).
+
+        This is the limit for small angles. At 1 deg the exact teeth of the paper's wheels need 0.7 um (skew) and 5 um
+        (inclination) less.
+        """
+        alpha = self.working_pressure_angle
+        part = math.cos(alpha) if self.plane == "skew" else math.sin(alpha)
+        return self.common_face_width * abs(self.misalignment) * part
+
+    @property
+    def jams(self) -> bool:
+        """Whether both flanks touch at once for want of backlash, by the centre distance or under the misalignment.
+
+        Under a misalignment by the first-order limit `jam_backlash`, which is a little on the safe side.
+        """
+        if self.misalignment == 0:
+            return self.normal_backlash < -JAM_ROUNDING
+        return self.normal_backlash < self.jam_backlash
+
+    @property
+    def common_face_width(self) -> float:
+        """Face width both wheels share when aligned, m."""
+        return min(self.driver.face_width, self.driven.face_width)
+
+    @property
+    def common_face(self) -> tuple[float, float]:
+        """Range along the mean axis, from mid-way between the wheels, that both faces cover, m."""
+        half = 0.5 * self.axial_shift
+        low = max(-half - 0.5 * self.driver.face_width, half - 0.5 * self.driven.face_width)
+        high = min(-half + 0.5 * self.driver.face_width, half + 0.5 * self.driven.face_width)
+        return low, high
+
+    @property
+    def uniform_along_face(self) -> bool:
+        """Whether the gap between perfect flanks is the same in all sections: parallel axes, faces opposite."""
+        return self.misalignment == 0 and self.axial_shift == 0
+
+    @cached_property
+    def tilt(self) -> np.ndarray:
+        """Rotation of the driven wheel's axis, shape (3, 3)."""
+        c, s = math.cos(self.misalignment), math.sin(self.misalignment)
+        if self.plane == "skew":
+            return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+        return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+
+    def frames(self, driver_angle: float, driven_angle: float) -> Placement:
+        """Frames with the wheels turned by these angles about their own axes from tooth 0 on global x (rad)."""
+        origin = np.array([self.centre_distance, 0.0, self.axial_shift])
+        arm = np.array([0.0, 0.0, self.pivot])
+        return Placement(
+            np.zeros(3),
+            _turn_z(driver_angle),
+            origin + arm - self.tilt @ arm,
+            self.tilt @ _turn_z(driven_angle),
+        )

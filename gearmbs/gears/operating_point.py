@@ -1,0 +1,49 @@
+"""How a pair of wheels is driven and loaded."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import InitVar, dataclass
+from typing import Literal
+
+from gearmbs.gears.geometry import PairGeometry
+from gearmbs.gears.spec import require
+from gearmbs.units import Quantity, to_si
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """Load and sense of rotation of a pair.
+
+    Parameters
+    ----------
+    torque : float or str
+        Load torque on the driven wheel, N m.
+    rotation : {1, -1}
+        Sense in which the driver turns about +z; it decides which flanks drive.
+    owner : str
+        What messages call the fields' owner.
+
+    Raises
+    ------
+    ValueError
+        For a torque that is not finite, or another sense of rotation.
+
+    Examples
+    --------
+    >>> OperatingPoint("60 N m", rotation=-1).torque
+    60.0
+    """
+
+    torque: Quantity = 100.0
+    rotation: Literal[1, -1] = 1
+    owner: InitVar[str] = "OperatingPoint"
+
+    def __post_init__(self, owner: str) -> None:
+        object.__setattr__(self, "torque", to_si(self.torque, "torque", f"{owner}.torque"))
+        require(math.isfinite(self.torque), f"{owner}.torque is {self.torque}; give a finite number")
+        require(self.rotation in (1, -1), f"{owner}.rotation is {self.rotation!r}; give 1 or -1")
+
+    def normal_force(self, geometry: PairGeometry) -> float:
+        """Sum of normal forces that carries the load torque, N: F_n = T / r_b2."""
+        return self.torque / geometry.driven.base_radius
