@@ -56,7 +56,7 @@ class SolverStats:
         spent on a differenced Jacobian are not in ``residuals``.
     repivots : int
         Times the sparse factorisation had to choose new pivots.
-    settled : int
+    noise_limited : int
         Steps taken at the level of rounding, near singular positions, where no step could satisfy the tolerance.
     wall_time : float
         Seconds spent in the integrator.
@@ -72,7 +72,7 @@ class SolverStats:
     factorizations: int = 0
     solves: int = 0
     repivots: int = 0
-    settled: int = 0
+    noise_limited: int = 0
     wall_time: float = 0.0
     t_steps: np.ndarray = field(default_factory=lambda: np.empty(0))
     h_steps: np.ndarray = field(default_factory=lambda: np.empty(0))
@@ -91,7 +91,7 @@ class SolverStats:
                 "factorizations",
                 "solves",
                 "repivots",
-                "settled",
+                "noise_limited",
                 "wall_time",
             )
         }
@@ -101,7 +101,7 @@ class SolverStats:
             f"{self.steps} steps ({self.error_rejections} rejected for error, {self.newton_rejections} for the "
             f"corrector), {self.residuals} residuals, {self.jacobians} Jacobians, {self.factorizations} "
             f"factorisations ({self.repivots} re-pivoted), "
-            + (f"{self.settled} steps at the level of rounding, " if self.settled else "")
+            + (f"{self.noise_limited} steps at the level of rounding, " if self.noise_limited else "")
             + f"{self.wall_time:.3g} s"
         )
 

@@ -55,12 +55,22 @@ def event_rules(
     direction: Sequence[int] | None,
     action: Sequence[int] | None,
     count: Sequence[int] | None = None,
-) -> np.ndarray:
-    rules = np.zeros((3, max(1, n_events)), dtype=np.int64)
-    rules[2] = 1
-    for row, (name, given, allowed) in enumerate(
-        (("event_direction", direction, (-1, 0, 1)), ("event_action", action, (0, 1, 2)), ("event_count", count, None))
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return direction, action and count of each event, of at least one place; zeros and a count of one if not given.
+
+    Raises
+    ------
+    ValueError
+        For a list of the wrong length or with a value that means nothing.
+    """
+    rules = []
+    for name, given, allowed, default in (
+        ("event_direction", direction, (-1, 0, 1), 0),
+        ("event_action", action, (0, 1, 2), 0),
+        ("event_count", count, None, 1),
     ):
+        rule = np.full(max(1, n_events), default, dtype=np.int64)
+        rules.append(rule)
         if given is None:
             continue
         if len(given) != n_events:
@@ -70,5 +80,6 @@ def event_rules(
                 raise ValueError(f"{name} may hold {allowed}, has {value!r}")
             if allowed is None and (value != int(value) or value < 1):
                 raise ValueError(f"{name} may hold whole numbers from 1 on, has {value!r}")
-        rules[row, :n_events] = given
-    return rules
+        rule[:n_events] = given
+    direction_rule, action_rule, count_rule = rules
+    return direction_rule, action_rule, count_rule

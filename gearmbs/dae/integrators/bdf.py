@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from numba import float64, int64, njit, types
 
+from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 from gearmbs.dae.dense_output import lagrange_weights
 
 MAX_ORDER = 6
@@ -26,7 +27,6 @@ MAX_STEP_RATIO = 8.0
 STEP_SEARCH_SWEEPS = 3
 
 _VEC = float64[::1]
-_MAT = float64[:, ::1]
 
 
 @njit(float64(float64, _VEC, int64), cache=True, nogil=True, error_model="numpy")
@@ -52,23 +52,25 @@ def step_coefficients(t, nodes, k, value, slope):
     return leading_coefficient(t, nodes, k)
 
 
-@njit(types.void(_VEC, _VEC, int64, _MAT, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def predict(value, slope, count, hist, y, yp):
-    """Write ``y = sum value[j] hist[j]`` and ``yp = sum slope[j] hist[j]`` over ``count`` rows."""
+    """Write ``y = sum value[j] hist[j]`` and ``yp = sum slope[j] hist[j]`` over ``count`` rows, three at a time."""
     n = y.shape[0]
-    a = value[0]
-    b = slope[0]
-    for i in range(n):
-        v = hist[0, i]
-        y[i] = a * v
-        yp[i] = b * v
-    for j in range(1, count):
-        a = value[j]
-        b = slope[j]
-        for i in range(n):
-            v = hist[j, i]
-            y[i] += a * v
-            yp[i] += b * v
+    for j in range(0, count, 3):
+        rows = min(3, count - j)
+        # a missing row enters as the first of its three, times zero
+        r0, r1, r2 = hist[j], hist[j + (1 if rows > 1 else 0)], hist[j + (2 if rows > 2 else 0)]
+        a0, b0 = value[j], slope[j]
+        a1, b1 = (value[j + 1], slope[j + 1]) if rows > 1 else (0.0, 0.0)
+        a2, b2 = (value[j + 2], slope[j + 2]) if rows > 2 else (0.0, 0.0)
+        if j == 0:
+            for i in range(n):
+                y[i] = a0 * r0[i] + a1 * r1[i] + a2 * r2[i]
+                yp[i] = b0 * r0[i] + b1 * r1[i] + b2 * r2[i]
+        else:
+            for i in range(n):
+                y[i] = y[i] + a0 * r0[i] + a1 * r1[i] + a2 * r2[i]
+                yp[i] = yp[i] + b0 * r0[i] + b1 * r1[i] + b2 * r2[i]
 
 
 @njit(types.void(_VEC, int64, _VEC), cache=True, nogil=True, error_model="numpy")
@@ -82,22 +84,43 @@ def divided_difference_weights(nodes, count, weights):
         weights[j] = 1.0 / product
 
 
-@njit(float64(_VEC, int64, _MAT, _VEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
-def divided_difference_norm(nodes, count, hist, inv_weight, weights, scratch):
-    """Return max_i inv_weight[i] |f_i[t_1 .. t_count]| over the rows of ``hist``."""
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _combination_norm(weights, hist, inv_weight, count):
+    top = int64(0)
+    for i in range(inv_weight.shape[0]):
+        v = 0.0
+        for j in range(count):
+            v += weights[j] * hist[j, i]
+        top = max(top, bits_of(abs(v * inv_weight[i])))
+    return double_of(top)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def combination_norm(weights, count, hist, inv_weight):
+    """Return max_i inv_weight[i] |sum_j weights[j] hist[j, i]| over the first 2 to HISTORY rows.
+
+    The count of rows is a constant in each branch: the compiler unrolls the sum and vectorises over the unknowns.
+    """
+    if count == 2:
+        return _combination_norm(weights, hist, inv_weight, 2)
+    if count == 3:
+        return _combination_norm(weights, hist, inv_weight, 3)
+    if count == 4:
+        return _combination_norm(weights, hist, inv_weight, 4)
+    if count == 5:
+        return _combination_norm(weights, hist, inv_weight, 5)
+    if count == 6:
+        return _combination_norm(weights, hist, inv_weight, 6)
+    if count == 7:
+        return _combination_norm(weights, hist, inv_weight, 7)
+    return _combination_norm(weights, hist, inv_weight, count)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def divided_difference_norm(nodes, count, hist, inv_weight, weights):
+    """Return max_i inv_weight[i] |f_i[t_1 .. t_count]| over the rows of ``hist``; ``weights`` is overwritten."""
     divided_difference_weights(nodes, count, weights)
-    n = inv_weight.shape[0]
-    a = weights[0]
-    for i in range(n):
-        scratch[i] = a * hist[0, i]
-    for j in range(1, count):
-        a = weights[j]
-        for i in range(n):
-            scratch[i] += a * hist[j, i]
-    top = 0.0
-    for i in range(n):
-        top = max(top, abs(scratch[i]) * inv_weight[i])
-    return top
+    return combination_norm(weights, count, hist, inv_weight)
 
 
 @njit(float64(float64, _VEC, int64, float64), cache=True, nogil=True, error_model="numpy")

@@ -19,8 +19,11 @@ from gearmbs.dae.integrators import messages, start
 from gearmbs.dae.integrators import run_state as s
 from gearmbs.dae.integrators.arguments import check_choices, event_rules, output_times
 from gearmbs.dae.integrators.bdf import HISTORY
-from gearmbs.dae.integrators.corrector import rounding_level, set_weights
-from gearmbs.dae.integrators.step import SLOPE_MAX_AGE, advance
+from gearmbs.dae.integrators.history import newest_point
+from gearmbs.dae.integrators.newton_matrix import SLOPE_MAX_AGE
+from gearmbs.dae.integrators.rounding import rounding_level
+from gearmbs.dae.integrators.step import advance
+from gearmbs.dae.integrators.weights import set_weights
 from gearmbs.dae.linalg.sparse_lu import (
     GROWTH_LIMIT,
     LUFactors,
@@ -119,16 +122,28 @@ class Run:
         rows = int(np.clip(size // (8 * n), 8 * HISTORY, 8192)) if keep else 8192
         n_events = int(problem.n_events) if problem.events is not None else 0
 
-        st = s.RunState(
-            real=np.zeros(s.N_REAL),
-            count=np.zeros(s.N_COUNT, dtype=np.int64),
-            times=np.zeros(HISTORY),
-            hist=np.zeros((HISTORY, n)),
-            vec=np.zeros((s.N_VEC, n)),
-            small=np.zeros((s.N_SMALL, 16)),
-            jac=np.zeros(len(problem.indices)),
-            jac_slope=np.zeros(len(problem.indices)),
-            matrix=np.zeros(len(problem.indices)),
+        y0 = np.array(problem.y0, dtype=float)
+        yp0 = np.array(problem.yp0, dtype=float)
+        atol = tol * np.asarray(problem.atol_scale, dtype=float)
+        if not (atol > 0).all():
+            raise ValueError(f"atol_scale must be positive, is {problem.atol_scale[int(np.argmin(atol))]:g} somewhere")
+        controlled = np.array(problem.error_mask, dtype=float)
+        differential = np.array(problem.differential, dtype=float)
+        tested = controlled.copy() if corrector == "modified" else np.ones(n)
+        coupled = np.maximum(controlled, differential)
+        directions, actions, left = event_rules(n_events, event_direction, event_action, event_count)
+        crossings = EVENT_BUFFER + n_events
+        st = s.new_state(
+            n,
+            len(problem.indices),
+            y=y0.copy(),
+            yp=yp0.copy(),
+            yp_start=yp0.copy(),
+            atol=atol,
+            controlled=controlled,
+            tested=tested,
+            differential=differential,
+            coupled=coupled,
             idata=np.array(problem.idata, dtype=np.int64),
             rdata=np.array(problem.rdata, dtype=float),
             work=np.zeros(max(1, problem.work_size)),
@@ -136,51 +151,42 @@ class Run:
             outputs=outputs,
             y_out=np.empty((len(outputs), n)),
             yp_out=np.empty((len(outputs), n)),
-            rec_t=np.zeros(rows),
-            rec_h=np.zeros(rows),
-            rec_y=np.zeros((rows if keep else 1, n)),
-            rec_order=np.zeros(rows, dtype=np.int64),
+            record_t=np.zeros(rows),
+            record_h=np.zeros(rows),
+            record_order=np.zeros(rows, dtype=np.int64),
+            record_y=np.zeros((rows if keep else 1, n)),
             g_old=np.zeros(max(1, n_events)),
             g_new=np.zeros(max(1, n_events)),
-            event_rules=event_rules(n_events, event_direction, event_action, event_count),
-            hit_t=np.zeros(EVENT_BUFFER + n_events),
-            hit_which=np.zeros(EVENT_BUFFER + n_events, dtype=np.int64),
-            hit_y=np.zeros((EVENT_BUFFER + n_events if n_events else 1, n)),
+            event_direction=directions,
+            event_action=actions,
+            event_left=left,
+            crossing_t=np.zeros(crossings),
+            crossing_event=np.zeros(crossings, dtype=np.int64),
+            crossing_y=np.zeros((crossings if n_events else 1, n)),
         )
         self.state = st
-        y0 = np.array(problem.y0, dtype=float)
-        yp0 = np.array(problem.yp0, dtype=float)
-        atol = tol * np.asarray(problem.atol_scale, dtype=float)
-        if not (atol > 0).all():
-            raise ValueError(f"atol_scale must be positive, is {problem.atol_scale[int(np.argmin(atol))]:g} somewhere")
-        st.vec[s.ATOL] = atol
-        st.vec[s.IS_CONTROLLED] = problem.error_mask
-        st.vec[s.IS_TESTED] = problem.error_mask if corrector == "modified" else 1.0
-        st.vec[s.IS_DIFFERENTIAL] = problem.differential
-        st.vec[s.Y] = y0
-        st.vec[s.YP] = yp0
-        st.vec[s.YP_START] = yp0
-        st.hist[0] = y0
-        st.times[0] = t0
-        st.real[s.T] = t0
-        st.real[s.T_END] = t_end
-        st.real[s.H_MAX] = max_step
-        st.real[s.RTOL] = rtol
-        st.real[s.NEWTON_TOL] = NEWTON_TOLERANCE
-        st.real[s.GAMMA_J] = 1.0
-        st.count[s.ORDER] = 1
-        st.count[s.NPAST] = 1
-        st.count[s.JAC_WANTED] = 1
-        st.count[s.SLOPE_AGE] = SLOPE_MAX_AGE
-        st.count[s.MAX_ORDER_ALLOWED] = max_order
-        st.count[s.MAX_ITERATIONS] = max_iterations
-        st.count[s.FIXED_LEADING] = method == "GSTIFF"
-        st.count[s.INTERPOLATE] = interpolate
-        st.count[s.HAS_HOOK] = problem.hook is not None
-        st.count[s.HAS_EVENTS] = n_events
-        st.count[s.KEEP_ROWS] = keep
-        st.count[s.MAX_STEPS] = max_steps or 0
-        set_weights(st.real, st.hist[0], 1.0, st.vec)
+        newest_point(st)[:] = y0
+        st.window_t[st.newest] = t0
+        st.t_end = t_end
+        st.h_max = max_step
+        st.rtol = rtol
+        st.newton_tolerance = NEWTON_TOLERANCE
+        st.max_order = max_order
+        st.max_iterations = max_iterations
+        st.max_steps = max_steps or 0
+        st.n_events = n_events
+        st.fixed_leading = method == "GSTIFF"
+        st.interpolate = interpolate
+        st.has_hook = problem.hook is not None
+        st.keep_rows = keep
+        st.step_in_weights = bool((tested > coupled).any())
+        st.t = t0
+        st.order = 1
+        st.n_past = 1
+        st.gamma_factored = 1.0
+        st.matrix_wanted = True
+        st.slope_age = SLOPE_MAX_AGE
+        set_weights(st, newest_point(st), 1.0)
         start.choose_steps(self, first_step, min_step)
         self.indptr = np.asarray(problem.indptr, dtype=np.int64)
         self.indices = np.asarray(problem.indices, dtype=np.int64)
@@ -199,21 +205,21 @@ class Run:
         self.hits: list[tuple[float, int, np.ndarray]] = []
         self.epochs: list[tuple[int, np.ndarray]] = [(0, st.idata.copy())]
         self.accepted_rows = 1
-        st.count[s.N_RECORDS] = 1
-        st.rec_t[0] = t0
-        st.rec_y[0] = y0
+        st.n_records = 1
+        st.record_t[0] = t0
+        st.record_y[0] = y0
         if len(outputs) and outputs[0] == t0:
             st.y_out[0] = y0
             st.yp_out[0] = yp0
-            st.count[s.NEXT_OUTPUT] = 1
+            st.next_output = 1
 
     def repivot(self) -> tuple[Status, str] | None:
         """Choose new pivots for the current Newton matrix; return a failure or None."""
         st, problem = self.state, self.problem
-        t = float(st.real[s.T])
+        t = float(st.t)
         self.repivots += 1
         bad = np.flatnonzero(~np.isfinite(st.matrix))
-        retry = st.count[s.STEPS] > 0 and st.count[s.SINGULAR_FAILS] < SINGULAR_RETRIES
+        retry = st.steps > 0 and st.singular_fails < SINGULAR_RETRIES
         if len(bad):
             if retry:
                 self._retry_smaller()
@@ -222,40 +228,40 @@ class Run:
                 problem, t, int(self.indices[bad[0]]), "the Jacobian of equation"
             )
         try:
-            drop = DROP_TOLERANCES[st.count[s.DROP_LEVEL]]
+            drop = DROP_TOLERANCES[st.drop_level]
             self.plan = analyse(self.indptr, self.indices, st.matrix, self.scale, drop)
         except SingularMatrixError as error:
-            if st.count[s.STEPS] > 0 and st.count[s.DROP_ROUNDS] < DROP_ROUNDS_ALLOWED:
-                st.count[s.DROP_ROUNDS] += 1
-                st.count[s.DROP_LEVEL] = 1
-                st.count[s.DROP_AGE] = 0
+            if st.steps > 0 and st.drop_rounds < DROP_ROUNDS_ALLOWED:
+                st.drop_rounds += 1
+                st.drop_level = 1
+                st.drop_age = 0
                 return self.repivot()
             return Status.SINGULAR_JACOBIAN, messages.singular(problem, t, error.rows, error.cols)
-        if st.count[s.DROP_LEVEL] == 0:
-            st.count[s.DROP_ROUNDS] = 0
+        if st.drop_level == 0:
+            st.drop_rounds = 0
         self.factors = new_factors(self.plan)
         growth = factor(self.plan, self.factors, st.matrix)
-        st.count[s.FACTORIZATIONS] += 1
-        st.real[s.GROWTH_MAX] = max(GROWTH_LIMIT, 100.0 * growth)
+        st.factorizations += 1
+        st.growth_limit = max(GROWTH_LIMIT, 100.0 * growth)
         return None
 
     def _unsatisfied(self) -> tuple[Status, str] | None:
         """Return a failure if equations that were set aside at a singular position do not hold at the end."""
         st, problem = self.state, self.problem
         assert self.plan is not None
-        problem.residual(st.real[s.T], st.vec[s.Y], st.vec[s.YP], st.vec[s.RES], st.idata, st.rdata, st.work)
+        problem.residual(st.t, st.y, st.yp, st.res, st.idata, st.rdata, st.work)
         terms = np.zeros(problem.n)
-        np.add.at(terms, self.indices, np.abs(st.matrix * np.repeat(st.vec[s.Y], np.diff(self.indptr))))
+        np.add.at(terms, self.indices, np.abs(st.matrix * np.repeat(st.y, np.diff(self.indptr))))
         left = self.plan.kept == 0.0
         rows, cols = self.plan.row_from[left], self.plan.col_to[left]
-        if (np.abs(st.vec[s.RES][rows]) <= UNSATISFIED * terms[rows]).all():
+        if (np.abs(st.res[rows]) <= UNSATISFIED * terms[rows]).all():
             return None
-        return Status.SINGULAR_JACOBIAN, messages.singular(problem, float(st.real[s.T]), rows, cols)
+        return Status.SINGULAR_JACOBIAN, messages.singular(problem, float(st.t), rows, cols)
 
     def _retry_smaller(self) -> None:
         """Move the end of the step off a singular position."""
-        self.state.count[s.SINGULAR_FAILS] += 1
-        self.state.real[s.H] *= 0.6
+        self.state.singular_fails += 1
+        self.state.h *= 0.6
 
     def user_exception(self) -> BaseException | None:
         return self.error_probe() if self.error_probe is not None else None
@@ -264,37 +270,37 @@ class Run:
         error = self.user_exception() or RuntimeError("unknown")
         if isinstance(error, KeyboardInterrupt):
             return Status.INTERRUPTED, self._interrupted_message()
-        return Status.USER_ERROR, messages.user_error(float(self.state.real[s.T]), error)
+        return Status.USER_ERROR, messages.user_error(float(self.state.t), error)
 
     def _interrupted_message(self) -> str:
-        return f"{Status.INTERRUPTED.sentence} Reached t = {self.state.real[s.T]:.9g}."
+        return f"{Status.INTERRUPTED.sentence} Reached t = {self.state.t:.9g}."
 
     def _drain(self) -> None:
         """Take the records and crossings out of the buffers of the compiled loop."""
         st = self.state
-        m = int(st.count[s.N_RECORDS])
+        m = int(st.n_records)
         if m:
-            self.records.append((st.rec_t[:m].copy(), st.rec_h[:m].copy(), st.rec_order[:m].copy()))
+            self.records.append((st.record_t[:m].copy(), st.record_h[:m].copy(), st.record_order[:m].copy()))
             if self.consumer is not None:
                 self._hand_over(m)
-            elif st.count[s.KEEP_ROWS]:
-                self.row_blocks.append(st.rec_y[:m].copy())
-            st.count[s.N_RECORDS] = 0
-        for e in range(int(st.count[s.N_CROSSINGS])):
-            self.hits.append((float(st.hit_t[e]), int(st.hit_which[e]), st.hit_y[e].copy()))
-        st.count[s.N_CROSSINGS] = 0
+            elif st.keep_rows:
+                self.row_blocks.append(st.record_y[:m].copy())
+            st.n_records = 0
+        for e in range(int(st.n_crossings)):
+            self.hits.append((float(st.crossing_t[e]), int(st.crossing_event[e]), st.crossing_y[e].copy()))
+        st.n_crossings = 0
 
     def _hand_over(self, m: int) -> None:
         """Give the steps among the first m records to the consumer; keep the last of them for the result."""
         assert self.consumer is not None
         st = self.state
-        is_step = st.rec_order[:m] > 0
+        is_step = st.record_order[:m] > 0
         # the start is an output, too
         is_step[0] |= len(self.records) == 1
         if not is_step.any():
             return
         whole = bool(is_step.all())
-        t, y = (st.rec_t[:m], st.rec_y[:m]) if whole else (st.rec_t[:m][is_step], st.rec_y[:m][is_step])
+        t, y = (st.record_t[:m], st.record_y[:m]) if whole else (st.record_t[:m][is_step], st.record_y[:m][is_step])
         begin = time.perf_counter()
         self.consumer(t, y, self.epochs[-1][1])
         self.consumed_time += time.perf_counter() - begin
@@ -327,20 +333,20 @@ class Run:
                 return self.user_failure()
             if code == s.DONE:
                 self._report()
-                failure = self._unsatisfied() if st.count[s.DROP_LEVEL] else None
+                failure = self._unsatisfied() if st.drop_level else None
                 if failure is not None:
                     return failure
                 return Status.SUCCESS, f"{Status.SUCCESS.sentence}{self.start_note}"
             if code == s.TERMINAL:
                 return (
                     Status.TERMINAL_EVENT,
-                    f"{Status.TERMINAL_EVENT.sentence} t = {st.real[s.T]:.9g}.{self.start_note}",
+                    f"{Status.TERMINAL_EVENT.sentence} t = {st.t:.9g}.{self.start_note}",
                 )
             if code == s.PAUSED:
                 if self.consumer is not None:
                     # what was stored so far belongs to the old table
                     self._drain()
-                first = self._accepted_so_far() if self.every_step else int(st.count[s.NEXT_OUTPUT])
+                first = self._accepted_so_far() if self.every_step else int(st.next_output)
                 self.epochs.append((first, st.idata.copy()))
             elif code == s.REPIVOT:
                 failure = self.repivot()
@@ -366,52 +372,51 @@ class Run:
                     chunk //= 2
 
     def _accepted_so_far(self) -> int:
-        return 1 + int(self.state.count[s.STEPS])
+        return 1 + int(self.state.steps)
 
     def _report(self) -> None:
         if self.progress is not None:
-            self.progress(float(self.state.real[s.T]))
+            self.progress(float(self.state.t))
 
     def _failure(self, code: int) -> tuple[Status, str]:
         st, problem = self.state, self.problem
-        t = float(st.real[s.T])
-        h = float(st.real[s.H])
-        worst = int(st.count[s.WORST])
+        t = float(st.t)
+        h = float(st.h)
+        worst = int(st.worst)
         status = Status(code)  # type: ignore[call-arg]
         if status is Status.NOT_FINITE and worst < 0:
             return status, messages.event_not_finite(problem, t, -1 - worst)
         if status is Status.NOT_FINITE:
             return status, messages.not_finite(problem, t, worst)
         if status is Status.STEP_TOO_SMALL:
-            worst = int(st.count[s.WORST_ERROR])
-            told = messages.step_too_small(problem, t, h, worst, float(st.real[s.ERROR]), self._noise())
+            worst = int(st.worst_error)
+            told = messages.step_too_small(problem, t, h, worst, float(st.error), self._noise())
             return status, told
         if status is Status.NEWTON_FAILURE:
             return status, messages.newton(problem, t, h, worst, self._noise())
         if status is Status.TOO_MANY_STEPS:
-            return status, messages.too_many_steps(problem, t, int(st.count[s.STEPS]))
+            return status, messages.too_many_steps(problem, t, int(st.steps))
         return status, messages.too_many_rejections(problem, t, h, worst, self._noise())
 
     def _noise(self) -> float:
         """Return how far rounding alone moves the solution where the run stopped, in units of the tolerance."""
         st = self.state
-        if self.plan is None or self.factors is None or not np.isfinite(st.vec[s.Y]).all():
+        if self.plan is None or self.factors is None or not np.isfinite(st.y).all():
             return 0.0
-        level = float(rounding_level(st.vec, st.matrix, self.plan, self.factors))
+        level = float(rounding_level(st, self.plan, self.factors))
         return level if np.isfinite(level) else 0.0
 
     def _stats(self, wall_time: float) -> SolverStats:
-        count = self.state.count
         return SolverStats(
-            steps=int(count[s.STEPS]),
-            error_rejections=int(count[s.ERROR_REJECTIONS]),
-            newton_rejections=int(count[s.NEWTON_REJECTIONS]),
-            residuals=int(count[s.RESIDUALS]),
-            jacobians=int(count[s.JACOBIANS]),
-            factorizations=int(count[s.FACTORIZATIONS]),
-            solves=int(count[s.SOLVES]),
+            steps=int(self.state.steps),
+            error_rejections=int(self.state.error_rejections),
+            newton_rejections=int(self.state.newton_rejections),
+            residuals=int(self.state.residuals),
+            jacobians=int(self.state.jacobians),
+            factorizations=int(self.state.factorizations),
+            solves=int(self.state.solves),
             repivots=max(0, self.repivots - self.first_pivots),
-            settled=int(count[s.SETTLED]),
+            noise_limited=int(self.state.noise_limited),
             wall_time=wall_time,
         )
 
@@ -437,12 +442,12 @@ class Run:
                 yp_out = sol.derivative(t_out)
                 yp_out[0] = problem.yp0
         else:
-            m = int(st.count[s.NEXT_OUTPUT])
+            m = int(st.next_output)
             t_out, y_out, yp_out = st.outputs[:m], st.y_out[:m], st.yp_out[:m]
             if status is not Status.SUCCESS:
                 # the run may go on, or the arrays are mostly empty; those of a finished run are handed over as they are
                 t_out, y_out, yp_out = t_out.copy(), y_out.copy(), yp_out.copy()
-        n_events = int(st.count[s.HAS_EVENTS])
+        n_events = int(st.n_events)
         return DAEResult(
             t=t_out,
             y=y_out,
@@ -456,7 +461,7 @@ class Run:
                 np.array([hit[2] for hit in self.hits if hit[1] == e]).reshape(-1, problem.n) for e in range(n_events)
             ],
             epochs=[(0 if consumed else first, table.copy()) for first, table in self.epochs[-1 if consumed else 0 :]],
-            t_last=float(st.real[s.T]),
+            t_last=float(st.t),
             checkpoint=self if status in (Status.INTERRUPTED, Status.TOO_MANY_STEPS) else None,
         )
 

@@ -2,21 +2,11 @@
 
 from __future__ import annotations
 
-from numba import float64, int64, njit, types
+import numpy as np
+from numba import njit
 
 from gearmbs.dae.dense_output import combine, lagrange_weights
-from gearmbs.dae.integrators.run_state import (
-    HAS_EVENTS,
-    N_CROSSINGS,
-    NEXT_OUTPUT,
-    SLOPE,
-    VALUE,
-    Y_INT,
-    YP,
-    YP_INT,
-    Y,
-)
-from gearmbs.dae.problem import EVENTS_SIG
+from gearmbs.dae.integrators.history import copy, rows_from, times_from
 
 ROOT_ITERATIONS = 80
 ROOT_EPS = 4e-16
@@ -25,55 +15,39 @@ RECORD = 0
 STOP = 1
 RESTART = 2
 
-_VEC = float64[::1]
-_IVEC = int64[::1]
-_MAT = float64[:, ::1]
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def interpolate(st, t, y, yp):
+    """Write y and y' at ``t`` from the polynomial of the last step, of its order through the newest points."""
+    count = st.order + 1
+    lagrange_weights(t, times_from(st, 0), count, st.value, st.slope)
+    combine(st.value, st.slope, count, rows_from(st, 0), 0, y, yp)
 
 
-@njit(types.void(float64, int64, _VEC, _MAT, _MAT, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
-def interpolate(t, k, times, hist, small, y, yp):
-    """Write y and y' at ``t`` from the order-k polynomial through the newest k + 1 points."""
-    lagrange_weights(t, times, k + 1, small[VALUE], small[SLOPE])
-    combine(small[VALUE], small[SLOPE], k + 1, hist, 0, y, yp)
-
-
-@njit(
-    types.void(float64, int64, _IVEC, _VEC, _MAT, _MAT, _MAT, _VEC, _MAT, _MAT),
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def write_outputs(t, k, count, times, hist, vec, small, outputs, y_out, yp_out):
+@njit(cache=True, nogil=True, error_model="numpy")
+def write_outputs(t, st):
     """Write all outputs up to ``t``, which lies in the last step; at its very end the corrector's values."""
-    n = hist.shape[1]
-    while count[NEXT_OUTPUT] < outputs.shape[0] and outputs[count[NEXT_OUTPUT]] <= t:
-        row = count[NEXT_OUTPUT]
-        if outputs[row] == times[0]:
-            for i in range(n):
-                y_out[row, i] = vec[Y, i]
-                yp_out[row, i] = vec[YP, i]
+    while st.next_output < st.outputs.shape[0] and st.outputs[st.next_output] <= t:
+        row = st.next_output
+        if st.outputs[row] == st.t_new:
+            copy(st.y, st.y_out[row])
+            copy(st.yp, st.yp_out[row])
         else:
-            interpolate(outputs[row], k, times, hist, small, y_out[row], yp_out[row])
-        count[NEXT_OUTPUT] = row + 1
+            interpolate(st, st.outputs[row], st.y_out[row], st.yp_out[row])
+        st.next_output = row + 1
 
 
-@njit(
-    float64(types.FunctionType(EVENTS_SIG), int64, int64, _VEC, _MAT, _MAT, _MAT, _VEC, _VEC, _IVEC, _VEC, _VEC),
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def _root(events, which, k, times, hist, vec, small, g_old, g_work, idata, rdata, work):
+@njit(cache=True, nogil=True, error_model="numpy")
+def _root(functions, st, which):
     """Return the time in the last step where event ``which`` changes sign (Illinois method on the polynomial).
 
-    ``g_work`` comes in with the event functions at the end of the step.
+    ``st.g_new`` comes in with the event functions at the end of the step, and is overwritten.
     """
-    y = vec[Y_INT]
-    yp = vec[YP_INT]
-    a = times[1]
-    b = times[0]
-    fa = g_old[which]
-    fb = g_work[which]
+    y, yp, g = st.y_between, st.yp_between, st.g_new
+    a = st.t_old
+    b = st.t_new
+    fa = st.g_old[which]
+    fb = g[which]
     side = 0
     for _ in range(ROOT_ITERATIONS):
         if fb == 0.0 or abs(b - a) <= ROOT_EPS * max(abs(a), abs(b)):
@@ -83,9 +57,9 @@ def _root(events, which, k, times, hist, vec, small, g_old, g_work, idata, rdata
             t = 0.5 * (a + b)
             if t == a or t == b:
                 break
-        interpolate(t, k, times, hist, small, y, yp)
-        events(t, y, yp, g_work, idata, rdata, work)
-        f = g_work[which]
+        interpolate(st, t, y, yp)
+        functions.events(t, y, yp, g, st.idata, st.rdata, st.work)
+        f = g[which]
         if f == 0.0:
             return t
         if (f > 0.0) == (fb > 0.0):
@@ -103,73 +77,75 @@ def _root(events, which, k, times, hist, vec, small, g_old, g_work, idata, rdata
     return b
 
 
-@njit(
-    types.UniTuple(float64, 2)(
-        types.FunctionType(EVENTS_SIG),
-        float64,
-        int64,
-        _IVEC,
-        _VEC,
-        _MAT,
-        _MAT,
-        _MAT,
-        _VEC,
-        _VEC,
-        int64[:, ::1],
-        _VEC,
-        _IVEC,
-        _MAT,
-        _IVEC,
-        _VEC,
-        _VEC,
-    ),
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def locate_events(
-    events, t, k, count, times, hist, vec, small, g_old, g_new, rules, hit_t, hit_which, hit_y, idata, rdata, work
-):
-    """Find and store the crossings of the last step.
+@njit(cache=True, nogil=True, error_model="numpy")
+def _store_crossing(st, first, root, which):
+    """Insert a crossing among those of the step, from place ``first`` on, in order of time."""
+    p = st.n_crossings
+    while p > first and st.crossing_t[p - 1] > root:
+        st.crossing_t[p] = st.crossing_t[p - 1]
+        st.crossing_event[p] = st.crossing_event[p - 1]
+        p -= 1
+    st.crossing_t[p] = root
+    st.crossing_event[p] = which
+    st.n_crossings += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def locate_events(functions, st):
+    """Find and store the crossings of the last step; leave the event functions at its end in ``st.g_new``.
 
     Returns
     -------
     cut : float
-        Time of the first crossing that stops or restarts the run, ``t`` without one.
-    action : float
+        Time of the first crossing that stops or restarts the run, the end of the step without one.
+    action : int
         RECORD, STOP or RESTART at that time.
     """
-    n_events = count[HAS_EVENTS]
-    n = hist.shape[1]
-    first = count[N_CROSSINGS]
+    t = st.t_new
+    first = st.n_crossings
     cut = t
     action = RECORD
-    for e in range(n_events):
-        events(t, vec[Y], vec[YP], g_new, idata, rdata, work)
-        rising = g_old[e] < 0.0 and g_new[e] >= 0.0
-        falling = g_old[e] > 0.0 and g_new[e] <= 0.0
-        if not ((rising and rules[0, e] >= 0) or (falling and rules[0, e] <= 0)):
+    for e in range(st.n_events):
+        functions.events(t, st.y, st.yp, st.g_new, st.idata, st.rdata, st.work)
+        rising = st.g_old[e] < 0.0 and st.g_new[e] >= 0.0
+        falling = st.g_old[e] > 0.0 and st.g_new[e] <= 0.0
+        if not ((rising and st.event_direction[e] >= 0) or (falling and st.event_direction[e] <= 0)):
             continue
-        root = _root(events, e, k, times, hist, vec, small, g_old, g_new, idata, rdata, work)
-        acts = rules[1, e] == RESTART or (rules[1, e] == STOP and rules[2, e] <= 1)
+        root = _root(functions, st, e)
+        does = st.event_action[e]
+        acts = does == RESTART or (does == STOP and st.event_left[e] <= 1)
         if acts and (action == RECORD or root < cut):
             cut = root
-            action = rules[1, e]
-        # insertion keeps the crossings of one step in order of time
-        p = count[N_CROSSINGS]
-        while p > first and hit_t[p - 1] > root:
-            hit_t[p] = hit_t[p - 1]
-            hit_which[p] = hit_which[p - 1]
-            p -= 1
-        hit_t[p] = root
-        hit_which[p] = e
-        count[N_CROSSINGS] += 1
-    while count[N_CROSSINGS] > first and hit_t[count[N_CROSSINGS] - 1] > cut:
-        count[N_CROSSINGS] -= 1
-    for p in range(first, count[N_CROSSINGS]):
-        rules[2, hit_which[p]] -= 1
-        interpolate(hit_t[p], k, times, hist, small, vec[Y_INT], vec[YP_INT])
-        for i in range(n):
-            hit_y[p, i] = vec[Y_INT, i]
-    events(t, vec[Y], vec[YP], g_new, idata, rdata, work)
-    return cut, float(action)
+            action = does
+        _store_crossing(st, first, root, e)
+    while st.n_crossings > first and st.crossing_t[st.n_crossings - 1] > cut:
+        st.n_crossings -= 1
+    for p in range(first, st.n_crossings):
+        st.event_left[st.crossing_event[p]] -= 1
+        interpolate(st, st.crossing_t[p], st.y_between, st.yp_between)
+        copy(st.y_between, st.crossing_y[p])
+    functions.events(t, st.y, st.yp, st.g_new, st.idata, st.rdata, st.work)
+    return cut, action
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def end_of_step(st):
+    """Keep the event functions of the end of the step for the next one; return whether they are finite."""
+    for e in range(st.n_events):
+        if not np.isfinite(st.g_new[e]):
+            st.worst = -1 - e
+            return False
+        st.g_old[e] = st.g_new[e]
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cut_step(functions, st, cut):
+    """Let the last step end at a crossing: replace its end by the polynomial's value there."""
+    interpolate(st, cut, st.y_between, st.yp_between)
+    copy(st.y_between, st.y)
+    copy(st.yp_between, st.yp)
+    copy(st.y_between, rows_from(st, 0)[0])
+    times_from(st, 0)[0] = cut
+    st.t = cut
+    functions.events(cut, st.y, st.yp, st.g_old, st.idata, st.rdata, st.work)

@@ -1,14 +1,14 @@
-"""Layout of an integration in arrays: everything the compiled loop needs to stop anywhere and go on.
+"""State of an integration: everything the compiled loop needs to stop anywhere and go on.
 
-The names below are indices into the arrays of `RunState`.
+Its members are attributes, ``st.order``, ``st.y_pred``, in compiled code and in Python alike.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numba import float64, int64, types
+
+from gearmbs.dae.compiled.structs import IntVector, Matrix, Struct, Vector
+from gearmbs.dae.integrators.bdf import HISTORY
 
 # return codes of the compiled loop; zero and above are not failures
 RUNNING = 0
@@ -23,114 +23,43 @@ FAIL_TOO_MANY_REJECTIONS = -5
 FAIL_TOO_MANY_STEPS = -7
 FAIL_NEWTON = -9
 
-# RunState.real
-T = 0
-H = 1
-T_END = 2
-H_MAX = 3
-H_MIN = 4
-RTOL = 5
-GAMMA_J = 6
-RATE = 7
-GROWTH_MAX = 8
-ERROR = 9
-H_USED = 10
-NEWTON_TOL = 11
-GAMMA_BASE = 12
-H_TRY = 13
-H_REFUSED = 14
-NOISE = 15
-N_REAL = 16
+WINDOW = 4 * HISTORY
+"""Rows of the window that slides over the history; the longer, the more seldom it is moved back."""
 
-# RunState.count
-ORDER = 0
-NPAST = 1
-SINCE_CHANGE = 2
-JAC_WANTED = 3
-JAC_AGE = 4
-ERROR_FAILS = 5
-NEWTON_FAILS = 6
-NAN_FAILS = 7
-FRESH = 8
-WORST_ERROR = 9
-STEPS = 10
-ERROR_REJECTIONS = 11
-NEWTON_REJECTIONS = 12
-RESIDUALS = 13
-JACOBIANS = 14
-FACTORIZATIONS = 15
-SOLVES = 16
-NEXT_OUTPUT = 17
-NEXT_STOP = 18
-N_RECORDS = 19
-N_CROSSINGS = 20
-WORST = 21
-MAX_ORDER_ALLOWED = 22
-MAX_ITERATIONS = 23
-FIXED_LEADING = 24
-INTERPOLATE = 25
-HAS_HOOK = 26
-HAS_EVENTS = 27
-KEEP_ROWS = 28
-MAX_STEPS = 29
-CAUTION = 30
-SINGULAR_FAILS = 31
-SHIFTED = 32
-STALE = 33
-SLOPE_AGE = 34
-DROP_LEVEL = 35
-DROP_AGE = 36
-DROP_ROUNDS = 37
-NOISY = 38
-NOISY_RUN = 39
-SETTLED = 40
-N_COUNT = 41
-
-# rows of RunState.vec
-Y = 0
-YP = 1
-Y_PRED = 2
-YP_PRED = 3
-RES = 4
-DELTA = 5
-W_ERROR = 6
-W_NEWTON = 7
-ATOL = 8
-Y_INT = 9
-YP_INT = 10
-YP_START = 11
-IS_CONTROLLED = 12
-IS_TESTED = 13
-IS_DIFFERENTIAL = 14
-N_VEC = 15
-
-# rows of RunState.small
-VALUE = 0
-SLOPE = 1
-NODES = 2
-WEIGHTS = 3
-N_SMALL = WEIGHTS + 8
-
-_VEC = float64[::1]
-_IVEC = int64[::1]
-_MAT = float64[:, ::1]
+MAX_NODES = 2 * HISTORY
+"""Length of the vectors that hold coefficients of a step."""
 
 
-class RunState(NamedTuple):
-    """Arrays of one run.
+class RunState(Struct):
+    """Scalars and arrays of one run; the scalars are described where they are declared.
 
     Attributes
     ----------
-    real, count : ndarray
-        Scalars, indexed by the names of this module.
-    times : ndarray, shape (8,)
-        Times of the stored points, newest first. During a step the first is the step's end (SHIFTED is 1).
-    hist : ndarray, shape (8, n)
-        Values at these times.
-    vec : ndarray, shape (N_VEC, n)
-        Vectors of the current step.
-    small : ndarray, shape (N_SMALL, 16)
-        Coefficients of the current step.
+    window_t : ndarray, shape (WINDOW,)
+        Times of the stored points. From ``newest`` on, newest first; see `history`.
+    window_y : ndarray, shape (WINDOW * n,)
+        Values at these times, row after row.
+    y, yp : ndarray, shape (n,)
+        Iterate of the corrector, in the end its result.
+    y_pred, yp_pred : ndarray, shape (n,)
+        Prediction.
+    res, delta : ndarray, shape (n,)
+        Residual; last correction, or corrector minus predictor.
+    y_between, yp_between : ndarray, shape (n,)
+        Values inside the last step.
+    yp_start : ndarray, shape (n,)
+        Rates with which a run starts, or starts afresh.
+    w_error, w_newton : ndarray, shape (n,)
+        Weights of the error test and of the corrector test.
+    weight : ndarray, shape (n,)
+        Reciprocal tolerances of all unknowns.
+    atol : ndarray, shape (n,)
+        Absolute tolerances.
+    controlled, tested, differential, coupled : ndarray, shape (n,)
+        1 for unknowns under error control, for those the corrector test looks at, for those whose derivative appears,
+        and for those that are controlled or differential; else 0.
+    value, slope, nodes, respacing : ndarray, shape (MAX_NODES,), and (HISTORY, MAX_NODES) for the last
+        Coefficients: of interpolation for values and slopes, times of points, weights of re-interpolation.
     jac, jac_slope, matrix : ndarray
         CSC values: the Newton matrix at its last evaluation, its derivative dG/dy' by the leading coefficient, and the
         matrix carried over to the current leading coefficient, which is the one that is factored.
@@ -142,72 +71,158 @@ class RunState(NamedTuple):
         Output times.
     y_out, yp_out : ndarray, shape (m, n)
         Outputs.
-    rec_t, rec_h, rec_y, rec_order : ndarray
-        Accepted points since the last call.
+    record_t, record_h, record_order, record_y : ndarray
+        End, size, order and result of accepted steps since the last call; rows of order 0 are history alone.
     g_old, g_new : ndarray
         Event functions at the last accepted point and at the new one.
-    event_rules : ndarray of int64, shape (3, n_events)
-        Direction and action of each event, and the crossings left until a stop.
-    hit_t, hit_which, hit_y : ndarray
+    event_direction, event_action, event_left : ndarray of int64, shape (n_events,)
+        Crossings that count, what they do, and how many are left until a stop.
+    crossing_t, crossing_event, crossing_y : ndarray
         Crossings since the last call.
     """
 
-    real: np.ndarray
-    count: np.ndarray  # type: ignore[assignment]
-    times: np.ndarray
-    hist: np.ndarray
-    vec: np.ndarray
-    small: np.ndarray
-    jac: np.ndarray
-    jac_slope: np.ndarray
-    matrix: np.ndarray
-    idata: np.ndarray
-    rdata: np.ndarray
-    work: np.ndarray
-    stops: np.ndarray
-    outputs: np.ndarray
-    y_out: np.ndarray
-    yp_out: np.ndarray
-    rec_t: np.ndarray
-    rec_h: np.ndarray
-    rec_y: np.ndarray
-    rec_order: np.ndarray
-    g_old: np.ndarray
-    g_new: np.ndarray
-    event_rules: np.ndarray
-    hit_t: np.ndarray
-    hit_which: np.ndarray
-    hit_y: np.ndarray
+    # what is asked for
+    t_end: float
+    h_max: float
+    h_min: float
+    rtol: float
+    newton_tolerance: float  # of the corrector, in units of the error tolerance
+    max_order: int
+    max_iterations: int
+    max_steps: int  # 0: no limit
+    n_events: int
+    fixed_leading: bool  # GSTIFF
+    interpolate: bool  # outputs by interpolation, or by steps that land on them
+    has_hook: bool
+    keep_rows: bool  # whether y of every step is recorded
+    step_in_weights: bool  # whether the size of the step enters the weights of the corrector test
+    # where the run stands
+    t: float  # end of the last accepted step
+    h: float  # size wanted of the next step
+    h_used: float  # of the last accepted step
+    order: int
+    newest: int  # row of the window with the newest point, or with the end of the open step
+    n_past: int  # points accepted and not forgotten, at most HISTORY
+    since_change: int  # steps since order or size last changed
+    caution: int  # steps without growth still to come after a failure
+    # the open step
+    open: bool  # its row is taken
+    t_old: float
+    t_new: float
+    step: float  # t_new - t_old
+    h_wanted: float  # size before it was fitted to a stop
+    h_first: float  # size of the first attempt
+    h_refused: float  # size of the last attempt
+    gamma: float  # leading coefficient: y' = y'_pred + gamma (y - y_pred)
+    error_constant: float  # local error in units of corrector minus predictor
+    error: float  # of the last refused attempt, in units of the tolerance
+    error_fails: int
+    newton_fails: int
+    nan_fails: int
+    singular_fails: int
+    worst: int  # unknown, or equation, behind the last failure; -1 - e for event e
+    worst_error: int  # unknown behind the last failure of the error test
+    # the Newton matrix
+    matrix_wanted: bool  # to be evaluated at the next prediction
+    matrix_fresh: bool  # evaluated in this step
+    matrix_age: int  # steps since its evaluation
+    slope_age: int  # evaluations since that of its derivative by gamma
+    gamma_evaluated: float
+    gamma_factored: float
+    growth_limit: float  # growth of its factors beyond which pivots are chosen anew
+    rate: float  # of convergence of the corrector, as last seen
+    drop_level: int  # how large pivots may be to be left out near a singular position
+    drop_age: int
+    drop_rounds: int
+    # steps limited by rounding
+    noise: float  # passed on to the history, in units of the tolerance
+    noise_left: int  # steps until it has left the history
+    noise_run: int  # such steps in a row
+    noise_before: float  # both before this step
+    noise_left_before: int
+    noisy: bool  # whether this step was taken so
+    # outputs and records
+    next_output: int
+    next_stop: int
+    n_records: int
+    n_crossings: int
+    # what it has cost
+    steps: int
+    error_rejections: int
+    newton_rejections: int
+    residuals: int
+    jacobians: int
+    factorizations: int
+    solves: int
+    noise_limited: int
+    # arrays
+    window_t: Vector
+    window_y: Vector
+    y: Vector
+    yp: Vector
+    y_pred: Vector
+    yp_pred: Vector
+    res: Vector
+    delta: Vector
+    y_between: Vector
+    yp_between: Vector
+    yp_start: Vector
+    w_error: Vector
+    w_newton: Vector
+    weight: Vector
+    atol: Vector
+    controlled: Vector
+    tested: Vector
+    differential: Vector
+    coupled: Vector
+    value: Vector
+    slope: Vector
+    nodes: Vector
+    respacing: Matrix
+    jac: Vector
+    jac_slope: Vector
+    matrix: Vector
+    idata: IntVector
+    rdata: Vector
+    work: Vector
+    stops: Vector
+    outputs: Vector
+    y_out: Matrix
+    yp_out: Matrix
+    record_t: Vector
+    record_h: Vector
+    record_order: IntVector
+    record_y: Matrix
+    g_old: Vector
+    g_new: Vector
+    event_direction: IntVector
+    event_action: IntVector
+    event_left: IntVector
+    crossing_t: Vector
+    crossing_event: IntVector
+    crossing_y: Matrix
 
 
-STATE_TYPE = types.NamedTuple(
-    (
-        _VEC,
-        _IVEC,
-        _VEC,
-        _MAT,
-        _MAT,
-        _MAT,
-        _VEC,
-        _VEC,
-        _VEC,
-        _IVEC,
-        _VEC,
-        _VEC,
-        _VEC,
-        _VEC,
-        _MAT,
-        _MAT,
-        _VEC,
-        _VEC,
-        _MAT,
-        _IVEC,
-        _VEC,
-        _VEC,
-        int64[:, ::1],
-        _VEC,
-        _IVEC,
-        _MAT,
-    ),
-    RunState,
-)
+STATE_TYPE = RunState.numba_type
+
+
+def new_state(n: int, nnz: int, **given: np.ndarray) -> RunState:
+    """Return the state of a run of ``n`` unknowns with ``nnz`` entries in its matrix.
+
+    Parameters
+    ----------
+    n, nnz : int
+    **given
+        Fields that are not zeros of a length that follows from ``n`` and ``nnz``.
+    """
+    shapes: dict[str, int | tuple[int, int]] = {
+        "window_t": WINDOW,
+        "window_y": WINDOW * n,
+        **dict.fromkeys(("value", "slope", "nodes"), MAX_NODES),
+        "respacing": (HISTORY, MAX_NODES),
+        **dict.fromkeys(("jac", "jac_slope", "matrix"), nnz),
+    }
+    made = {}
+    for name in RunState.array_members:
+        made[name] = given[name] if name in given else np.zeros(shapes.get(name, n))
+    return RunState(**made)

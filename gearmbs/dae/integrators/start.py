@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.dae.integrators import messages
-from gearmbs.dae.integrators import run_state as s
+from gearmbs.dae.integrators.history import newest_point
 from gearmbs.dae.linalg.sparse_lu import solve
 from gearmbs.dae.result import Status
 
@@ -50,15 +50,15 @@ def choose_steps(run: Run, first_step: float | None, min_step: float | None) -> 
         HINIT and HMIN.
     """
     st = run.state
-    span = st.real[s.T_END] - st.real[s.T]
+    span = st.t_end - st.t
     natural = FIRST_OF_SPAN * span
-    speed = float(np.max(np.abs(st.vec[s.YP_START]) * st.vec[s.W_ERROR]))
+    speed = float(np.max(np.abs(st.yp_start) * st.w_error))
     if speed > 0.0:
         natural = min(natural, FIRST_MOVE / speed)
     smallest = min(SMALLEST_OF_SPAN * span, SMALLEST_OF_FIRST * natural)
     run.steps_given = first_step is not None, min_step is not None
-    st.real[s.H_MIN] = smallest if min_step is None else min_step
-    st.real[s.H] = max(min(natural, st.real[s.H_MAX]), st.real[s.H_MIN]) if first_step is None else first_step
+    st.h_min = smallest if min_step is None else min_step
+    st.h = max(min(natural, st.h_max), st.h_min) if first_step is None else first_step
 
 
 def begin(run: Run) -> Failure | None:
@@ -69,23 +69,23 @@ def begin(run: Run) -> Failure | None:
     failure : (Status, str) or None
     """
     st, problem = run.state, run.problem
-    t0 = float(st.real[s.T])
+    t0 = float(st.t)
     _residual(run)
     if run.user_exception() is not None:
         return run.user_failure()
-    bad = np.flatnonzero(~np.isfinite(st.vec[s.RES]))
+    bad = np.flatnonzero(~np.isfinite(st.res))
     if len(bad):
         return Status.NOT_FINITE, messages.not_finite(problem, t0, int(bad[0]))
-    if st.count[s.HAS_EVENTS] and problem.events is not None:
-        problem.events(t0, st.vec[s.Y], st.vec[s.YP], st.g_old, st.idata, st.rdata, st.work)
+    if st.n_events and problem.events is not None:
+        problem.events(t0, st.y, st.yp, st.g_old, st.idata, st.rdata, st.work)
         bad = np.flatnonzero(~np.isfinite(st.g_old))
         if len(bad) and run.user_exception() is None:
             return Status.NOT_FINITE, messages.event_not_finite(problem, t0, int(bad[0]))
     # over a vanishing step wrong rates are harmless, but values off the constraints still have to jump
-    span = st.real[s.T_END] - t0
-    tried = [min(st.real[s.H], CHECK_STEP * span), st.real[s.H]]
+    span = st.t_end - t0
+    tried = [min(st.h, CHECK_STEP * span), st.h]
     if not run.steps_given[0]:
-        tried.append(min(FIRST_TRIED * span, st.real[s.H_MAX]))
+        tried.append(min(FIRST_TRIED * span, st.h_max))
     failure = None
     for h in tried:
         # an index-3 matrix is singular to working precision at a very short step: check over a longer one
@@ -94,33 +94,33 @@ def begin(run: Run) -> Failure | None:
             break
     if failure is not None:
         return failure
-    st.real[s.H] = max(st.real[s.H], h)
+    st.h = max(st.h, h)
     failure = _check(run, h) if run.check_start else _repair(run, h)
     if failure is None:
-        failure = choose_first_pivots(run, st.real[s.H])
+        failure = choose_first_pivots(run, st.h)
     return failure if failure is not None else _lengthen(run)
 
 
 def choose_first_pivots(run: Run, h: float) -> Failure | None:
     """Factor the Newton matrix of a first step of size ``h``; return a failure or None."""
     st = run.state
-    run.problem.jacobian(st.real[s.T], st.vec[s.Y], st.vec[s.YP], 1.0 / h, st.matrix, st.idata, st.rdata, st.work)
-    st.count[s.JACOBIANS] += 1
+    run.problem.jacobian(st.t, st.y, st.yp, 1.0 / h, st.matrix, st.idata, st.rdata, st.work)
+    st.jacobians += 1
     run.first_pivots += 1
     return run.repivot()
 
 
 def _residual(run: Run) -> None:
     st = run.state
-    run.problem.residual(st.real[s.T], st.vec[s.Y], st.vec[s.YP], st.vec[s.RES], st.idata, st.rdata, st.work)
-    st.count[s.RESIDUALS] += 1
+    run.problem.residual(st.t, st.y, st.yp, st.res, st.idata, st.rdata, st.work)
+    st.residuals += 1
 
 
 def _correction(run: Run) -> float:
     """Solve for the Newton correction of the start; return its size in units of the tolerance."""
     st = run.state
-    solve(run.plan, run.factors, st.vec[s.RES], st.vec[s.DELTA])
-    return float(np.max(np.abs(st.vec[s.DELTA]) * st.vec[s.W_ERROR]))
+    solve(run.plan, run.factors, st.res, st.delta)
+    return float(np.max(np.abs(st.delta) * st.w_error))
 
 
 def _shrink_while_moving(run: Run, h: float, move: float, limit: float) -> tuple[float, float]:
@@ -144,22 +144,22 @@ def _check(run: Run, h: float) -> Failure | None:
     st, problem = run.state, run.problem
     move = _correction(run)
     if not move <= JUMP_LIMIT:
-        delta = st.vec[s.DELTA]
+        delta = st.delta
         assert run.plan is not None
-        worst = int(np.argmax(np.abs(delta) * st.vec[s.W_ERROR]))
-        row = int(np.argmax(np.abs(st.vec[s.RES][run.plan.row_from]) * run.plan.row_scale))
+        worst = int(np.argmax(np.abs(delta) * st.w_error))
+        row = int(np.argmax(np.abs(st.res[run.plan.row_from]) * run.plan.row_scale))
         message = messages.inconsistent(
-            problem, float(st.real[s.T]), worst, int(run.plan.row_from[row]), float(abs(delta[worst]))
+            problem, float(st.t), worst, int(run.plan.row_from[row]), float(abs(delta[worst]))
         )
         h, move = _shrink_while_moving(run, h, move, JUMP_LIMIT)
         if not move <= JUMP_LIMIT:
             return Status.INCONSISTENT_START, message
         first_given, smallest_given = run.steps_given
         if not smallest_given:
-            st.real[s.H_MIN] = min(st.real[s.H_MIN], SMALLEST_OF_FIRST * h)
+            st.h_min = min(st.h_min, SMALLEST_OF_FIRST * h)
         if not first_given:
-            st.real[s.H] = max(min(st.real[s.H], h * min(1.0, FIRST_MOVE / move)), st.real[s.H_MIN])
-    if run.error_probe is not None and h < st.real[s.H]:
+            st.h = max(min(st.h, h * min(1.0, FIRST_MOVE / move)), st.h_min)
+    if run.error_probe is not None and h < st.h:
         run.start_note = _algebraic_note(run)
     return None
 
@@ -170,9 +170,9 @@ def _lengthen(run: Run) -> Failure | None:
     Very short steps are no safer: rounding is divided by them, twice in equations of index three.
     """
     st = run.state
-    least = st.real[s.H]
-    span = st.real[s.T_END] - st.real[s.T]
-    h = min(FIRST_TRIED * span, st.real[s.H_MAX])
+    least = st.h
+    span = st.t_end - st.t
+    h = min(FIRST_TRIED * span, st.h_max)
     if run.steps_given[0]:
         return None
     for _ in range(TRIALS):
@@ -181,7 +181,7 @@ def _lengthen(run: Run) -> Failure | None:
         if choose_first_pivots(run, h) is None:
             error = _euler_error(run, h)
             if error <= FIRST_ERROR:
-                st.real[s.H] = h
+                st.h = h
                 return None
         else:
             error = np.inf
@@ -192,21 +192,21 @@ def _lengthen(run: Run) -> Failure | None:
 def _euler_error(run: Run, h: float) -> float:
     """Return the error of a step of implicit Euler from the start, in units of the tolerance."""
     st = run.state
-    rates = st.vec[s.YP]
-    y = st.vec[s.Y] + h * rates
-    run.problem.residual(st.real[s.T] + h, y, rates, st.vec[s.RES], st.idata, st.rdata, st.work)
-    st.count[s.RESIDUALS] += 1
-    if not np.isfinite(st.vec[s.RES]).all():
+    rates = st.yp
+    y = st.y + h * rates
+    run.problem.residual(st.t + h, y, rates, st.res, st.idata, st.rdata, st.work)
+    st.residuals += 1
+    if not np.isfinite(st.res).all():
         return np.inf
-    solve(run.plan, run.factors, st.vec[s.RES], st.vec[s.DELTA])
-    return 0.5 * float(np.max(np.abs(st.vec[s.DELTA]) * st.vec[s.W_ERROR] * st.vec[s.IS_DIFFERENTIAL]))
+    solve(run.plan, run.factors, st.res, st.delta)
+    return 0.5 * float(np.max(np.abs(st.delta) * st.w_error * st.differential))
 
 
 def _algebraic_note(run: Run) -> str:
     """Name the algebraic unknowns whose starting values the first step has to replace."""
     st = run.state
-    y, res, delta = st.vec[s.Y], st.vec[s.RES], st.vec[s.DELTA]
-    allowed = JUMP_LIMIT * (st.vec[s.ATOL] + st.real[s.RTOL] * np.abs(y))
+    y, res, delta = st.y, st.res, st.delta
+    allowed = JUMP_LIMIT * (st.atol + st.rtol * np.abs(y))
     replaced = (np.abs(delta) > allowed) & ~run.problem.differential
     # over a vanishing step an equation that is satisfied up to rounding can move an unknown of a high index too
     if not np.max(np.abs(res)) > ROUNDED_RESIDUAL * (1.0 + np.max(np.abs(y))):
@@ -221,26 +221,26 @@ def _repair(run: Run, h: float) -> Failure | None:
     if move <= REPAIR_FROM:
         return None
     gamma = 1.0 / h
-    y, rates, start = st.vec[s.Y], st.vec[s.YP].copy(), st.hist[0].copy()
+    y, rates, start = st.y, st.yp.copy(), newest_point(st).copy()
     for sweep in range(REPAIR_SWEEPS + 1):
         if sweep == REPAIR_SWEEPS:
             # multipliers have taken the jump for a rate: solve for them once more from where it has led
-            st.hist[0] = y
-        st.vec[s.YP] = rates + gamma * (y - st.hist[0])
+            newest_point(st)[:] = y
+        st.yp[:] = rates + gamma * (y - newest_point(st))
         _residual(run)
         if not np.isfinite(_correction(run)):
             break
-        y -= st.vec[s.DELTA] if sweep < REPAIR_SWEEPS else np.where(run.problem.differential, 0.0, st.vec[s.DELTA])
-    st.vec[s.YP] = rates
-    st.hist[0] = y
-    st.rec_y[0] = y
-    if st.count[s.NEXT_OUTPUT]:
+        y -= st.delta if sweep < REPAIR_SWEEPS else np.where(run.problem.differential, 0.0, st.delta)
+    st.yp[:] = rates
+    newest_point(st)[:] = y
+    st.record_y[0] = y
+    if st.next_output:
         st.y_out[0] = y
     _residual(run)
-    off = float(np.max(np.abs(y - start) * st.vec[s.W_ERROR])) if np.isfinite(y).all() else np.inf
+    off = float(np.max(np.abs(y - start) * st.w_error)) if np.isfinite(y).all() else np.inf
     if np.isfinite(off) and _correction(run) <= max(REPAIR_FROM, CHECK_RATIO * off):
-        moved = np.flatnonzero(np.abs(y - start) * st.vec[s.W_ERROR] > REPAIR_FROM)
+        moved = np.flatnonzero(np.abs(y - start) * st.w_error > REPAIR_FROM)
         run.start_note = messages.repaired_start(run.problem, moved, y - start)
         return None
-    worst = int(np.argmax(np.abs(np.where(np.isfinite(y), st.vec[s.DELTA], np.inf)) * st.vec[s.W_ERROR]))
-    return Status.INCONSISTENT_START, messages.not_repaired(run.problem, float(st.real[s.T]), worst)
+    worst = int(np.argmax(np.abs(np.where(np.isfinite(y), st.delta, np.inf)) * st.w_error))
+    return Status.INCONSISTENT_START, messages.not_repaired(run.problem, float(st.t), worst)

@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from gearmbs.dae.integrators import run_state as s
 from gearmbs.dae.integrators.bdf import MAX_ORDER
 from gearmbs.dae.integrators.driver import Run
 from gearmbs.dae.problem import DAEProblem
@@ -151,5 +150,5 @@ def resume(result: DAEResult, *, max_steps: int | None = None) -> DAEResult:
     run = result.checkpoint
     if not isinstance(run, Run):
         raise ValueError(f"this run ended with {result.status.name} and cannot be resumed; start a new one")
-    run.state.count[s.MAX_STEPS] = max_steps or 0
+    run.state.max_steps = max_steps or 0
     return run.drive()

@@ -7,11 +7,10 @@ caller analyses again with the current values.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import float64, int64, njit, types, uint32
 
+from gearmbs.dae.compiled.structs import IndexVector, IntVector, Struct, Vector
 from gearmbs.dae.linalg.pivoting import CANCELLED, GROWTH_ALLOWED, THRESHOLDS, choose_pivots, equilibrate
 
 GROWTH_LIMIT = 1e5
@@ -21,7 +20,7 @@ _IVEC = int64[::1]
 _UVEC = uint32[::1]
 
 
-class LUPlan(NamedTuple):
+class LUPlan(Struct):
     """Frozen pivots and index lists of one pattern, in pivot order.
 
     Attributes
@@ -43,34 +42,32 @@ class LUPlan(NamedTuple):
         One for a proper pivot; zero for an equation and an unknown set aside because the matrix is nearly singular.
     """
 
-    a_ptr: np.ndarray
-    a_pos: np.ndarray
-    a_src: np.ndarray
-    a_scale: np.ndarray
-    u_ptr: np.ndarray
-    u_pos: np.ndarray
-    l_ptr: np.ndarray
-    l_pos: np.ndarray
-    row_from: np.ndarray
-    col_to: np.ndarray
-    row_scale: np.ndarray
-    col_scale: np.ndarray
-    kept: np.ndarray
+    a_ptr: IntVector
+    a_pos: IndexVector
+    a_src: IndexVector
+    a_scale: Vector
+    u_ptr: IntVector
+    u_pos: IndexVector
+    l_ptr: IntVector
+    l_pos: IndexVector
+    row_from: IndexVector
+    col_to: IndexVector
+    row_scale: Vector
+    col_scale: Vector
+    kept: Vector
 
 
-class LUFactors(NamedTuple):
+class LUFactors(Struct):
     """Numbers of one factorisation: L below its unit diagonal, U above its diagonal, inverse pivots, scratch."""
 
-    l_vals: np.ndarray
-    u_vals: np.ndarray
-    pivot_inv: np.ndarray
-    x: np.ndarray
+    l_vals: Vector
+    u_vals: Vector
+    pivot_inv: Vector
+    x: Vector
 
 
-PLAN_TYPE = types.NamedTuple(
-    (_IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _VEC, _VEC, _VEC), LUPlan
-)
-FACTORS_TYPE = types.NamedUniTuple(_VEC, 4, LUFactors)
+PLAN_TYPE = LUPlan.numba_type
+FACTORS_TYPE = LUFactors.numba_type
 
 
 class SingularMatrixError(ValueError):
@@ -234,13 +231,15 @@ def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np
     if rank < len(indptr) - 1 and drop == 0.0:
         rows, cols = (np.asarray(plan[i], dtype=np.int64)[rank:] for i in (8, 9))
         raise SingularMatrixError(rows, cols)
-    return LUPlan(*plan)
+    return LUPlan(**dict(zip(LUPlan.array_members, plan, strict=True)))
 
 
 def new_factors(plan: LUPlan) -> LUFactors:
     """Return empty factors for a plan."""
     n = len(plan.row_from)
-    return LUFactors(np.zeros(len(plan.l_pos)), np.zeros(len(plan.u_pos)), np.zeros(n), np.zeros(n))
+    return LUFactors(
+        l_vals=np.zeros(len(plan.l_pos)), u_vals=np.zeros(len(plan.u_pos)), pivot_inv=np.zeros(n), x=np.zeros(n)
+    )
 
 
 @njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")

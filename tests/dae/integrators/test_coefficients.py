@@ -59,7 +59,7 @@ def test_divided_difference_of_a_power(count, gaps):
     # f[t_1 .. t_m] of t^(m-1) is 1
     nodes = -np.cumsum(gaps)
     hist = (nodes[:, None] ** (count - 1)) * np.ones((1, 3))
-    norm = bdf.divided_difference_norm(nodes, count, hist, np.array([1.0, 0.0, 0.5]), np.zeros(16), np.zeros(3))
+    norm = bdf.divided_difference_norm(nodes, count, hist, np.array([1.0, 0.0, 0.5]), np.zeros(16))
     assert norm == pytest.approx(1.0, rel=1e-6)
 
 

@@ -53,7 +53,7 @@ def test_threads_give_the_same_result():
 
 def test_the_loop_releases_the_gil():
     """While a run is inside the compiled loop another thread goes on counting."""
-    long_chunk = 200_000
+    long_chunk = 2_000_000
     ticks = []
     stop = threading.Event()
 
@@ -66,7 +66,7 @@ def test_the_loop_releases_the_gil():
     run.FIRST_CHUNK = long_chunk
     try:
         thread.start()
-        result = solve_wstiff(pendulum(), np.array([0.0, 400.0]), tol=1e-9)
+        result = solve_wstiff(pendulum(), np.array([0.0, 4000.0]), tol=1e-9)
     finally:
         stop.set()
         thread.join()

@@ -123,7 +123,7 @@ def test_chain_passes_at_the_level_of_rounding(formulation, loops, tol):
     assert reference.error(result.t, result.y) < 400 * tol + 5e-9
     assert result.stats.newton_rejections <= 2
     if tol >= 1e-8:
-        assert result.stats.settled == 0
+        assert result.stats.noise_limited == 0
 
 
 def test_a_tolerance_below_rounding_is_told():

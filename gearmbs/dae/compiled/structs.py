@@ -1,0 +1,197 @@
+"""Structs of named scalars and arrays, the same object in Python and in compiled code.
+
+A tuple of arrays is costly in compiled code: each function that takes it counts a reference of each array, tens of
+atomic operations a call, and the compiler works through all of them. A `Struct` crosses over as one pointer to a record
+that holds the scalars, and address and shape of each array. ``st.order`` and ``st.y[i]`` read the same in Python and in
+compiled code, ``st.order = 2`` too; an array can be replaced in Python only. The Python object owns the arrays and has
+to outlive the call.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+from llvmlite import ir
+from numba import from_dtype, types
+from numba.core import cgutils
+from numba.core.imputils import lower_getattr_generic, lower_setattr_generic
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import NativeValue, infer_getattr, models, register_model, typeof_impl, unbox
+from numba.np.arrayobj import make_array, populate_array
+
+Vector: TypeAlias = np.ndarray
+"""Annotation of a member: doubles with one dimension."""
+Matrix: TypeAlias = np.ndarray
+"""Doubles with two dimensions."""
+IntVector: TypeAlias = np.ndarray
+"""64-bit integers."""
+IndexVector: TypeAlias = np.ndarray
+"""Unsigned 32-bit integers."""
+
+SCALARS = {"float": "f8", "int": "i8", "bool": "?"}
+ARRAYS = {"Vector": ("f8", 1), "Matrix": ("f8", 2), "IntVector": ("i8", 1), "IndexVector": ("u4", 1)}
+_WORD = 8
+
+
+class StructType(types.Type):
+    """Numba's type of a `Struct`.
+
+    Parameters
+    ----------
+    name : str
+        Name of the class.
+    scalars : tuple of (str, str)
+        Names and numpy kinds.
+    arrays : tuple of (str, str, int)
+        Names, numpy kinds and numbers of dimensions.
+    """
+
+    def __init__(self, name: str, scalars: tuple, arrays: tuple) -> None:
+        self.layout = np.dtype(
+            [*scalars, *((f"{a}:", "i8", (1 + dimensions,)) for a, _, dimensions in arrays)], align=True
+        )
+        self.members: dict[str, types.Type] = {field: from_dtype(np.dtype(kind)) for field, kind in scalars}
+        for field, kind, dimensions in arrays:
+            self.members[field] = types.Array(from_dtype(np.dtype(kind)), dimensions, "C")
+        super().__init__(name=f"{name}({scalars}, {arrays})")
+
+    def offset(self, member: str) -> int:
+        """Return the place of a scalar, or of an array's address and shape, in bytes."""
+        assert self.layout.fields is not None
+        key = member if member in self.layout.fields else f"{member}:"
+        return self.layout.fields[key][1]
+
+
+class Struct:
+    """Base of structs; a subclass annotates its members with float, int, bool, or an array of this module.
+
+    Scalars start at zero unless they are given; arrays have to be given.
+
+    Attributes
+    ----------
+    scalar_members, array_members : mapping
+        Numpy kind of each scalar; kind and number of dimensions of each array.
+    numba_type : StructType
+        For signatures of compiled functions.
+    """
+
+    scalar_members: ClassVar[Mapping[str, str]]
+    array_members: ClassVar[Mapping[str, tuple[str, int]]]
+    numba_type: ClassVar[StructType]
+
+    def __init_subclass__(cls) -> None:
+        kinds = inspect.get_annotations(cls)
+        cls.scalar_members = {name: SCALARS[kind] for name, kind in kinds.items() if kind in SCALARS}
+        cls.array_members = {name: ARRAYS[kind] for name, kind in kinds.items() if kind not in SCALARS}
+        cls.numba_type = StructType(
+            cls.__name__,
+            tuple(cls.scalar_members.items()),
+            tuple((name, *kind) for name, kind in cls.array_members.items()),
+        )
+
+    def __init__(self, **members: Any) -> None:
+        memory = np.zeros(1, dtype=self.numba_type.layout)
+        self.__dict__.update(_memory=memory, _record=memory[0], _address=memory.__array_interface__["data"][0])
+        missing = set(self.array_members) - set(members)
+        if missing:
+            raise TypeError(f"{type(self).__name__} is missing {', '.join(sorted(missing))}")
+        for name, value in members.items():
+            setattr(self, name, value)
+
+    def __getattr__(self, name: str) -> Any:
+        if name in type(self).scalar_members:
+            return self._record[name].item()
+        raise AttributeError(f"{type(self).__name__} has no member {name!r}")
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in self.scalar_members:
+            self._record[name] = value
+            return
+        if name not in self.array_members:
+            raise AttributeError(f"{type(self).__name__} has no member {name!r}")
+        kind, dimensions = self.array_members[name]
+        if value.dtype != kind or value.ndim != dimensions or not value.flags.c_contiguous:
+            raise TypeError(
+                f"{name} must be a contiguous array of type {kind} with {dimensions} dimensions, "
+                f"is one of {value.dtype} of shape {value.shape}"
+            )
+        self.__dict__[name] = value
+        self._record[f"{name}:"] = (value.__array_interface__["data"][0], *value.shape)
+
+    def __reduce__(self) -> tuple:
+        # addresses do not travel
+        return _rebuild, (
+            type(self),
+            {name: getattr(self, name) for name in (*self.array_members, *self.scalar_members)},
+        )
+
+
+def _rebuild(cls: type[Struct], members: dict[str, Any]) -> Struct:
+    return cls(**members)
+
+
+@typeof_impl.register(Struct)
+def _typeof(value, context):
+    return value.numba_type
+
+
+register_model(StructType)(models.OpaqueModel)
+
+
+@unbox(StructType)
+def _unbox(typ, value, c):
+    address = c.pyapi.object_getattr_string(value, "_address")
+    pointer = c.builder.inttoptr(c.pyapi.long_as_longlong(address), cgutils.voidptr_t)
+    c.pyapi.decref(address)
+    return NativeValue(pointer)
+
+
+@infer_getattr
+class _Members(AttributeTemplate):
+    key = StructType
+
+    def generic_resolve(self, typ, attribute):
+        return typ.members.get(attribute)
+
+
+def _place(builder, value, offset, pointee):
+    byte = ir.IntType(8)
+    place = builder.gep(value, [ir.Constant(ir.IntType(64), offset)], inbounds=True, source_etype=byte)
+    return builder.bitcast(place, pointee.as_pointer())
+
+
+@lower_getattr_generic(StructType)
+def _get(context, builder, typ, value, attribute):
+    member = typ.members[attribute]
+    offset = typ.offset(attribute)
+    if not isinstance(member, types.Array):
+        return context.unpack_value(builder, member, _place(builder, value, offset, context.get_data_type(member)))
+    word = ir.IntType(64)
+
+    def fixed(index):
+        # arrays are not replaced while compiled code runs
+        load = builder.load(_place(builder, value, offset + _WORD * index, word))
+        load.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return load
+
+    out = make_array(member)(context, builder)
+    item = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(member.dtype)))
+    shape = [fixed(1 + d) for d in range(member.ndim)]
+    strides = [item]
+    for size in shape[:0:-1]:
+        strides.insert(0, builder.mul(strides[0], size))
+    data = builder.inttoptr(fixed(0), context.get_data_type(member.dtype).as_pointer())
+    populate_array(out, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
+    return out._getvalue()
+
+
+@lower_setattr_generic(StructType)
+def _set(context, builder, signature, args, attribute):
+    typ, member = signature.args
+    if isinstance(member, types.Array):
+        raise NotImplementedError(f"arrays of {typ} are replaced in Python only")
+    place = _place(builder, args[0], typ.offset(attribute), context.get_data_type(member))
+    context.pack_value(builder, member, args[1], place)

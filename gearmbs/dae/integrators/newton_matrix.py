@@ -1,0 +1,88 @@
+"""The Newton matrix of a run: when it is evaluated, how it is carried over to another leading coefficient."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from gearmbs.dae.integrators.run_state import REPIVOT, RUNNING
+from gearmbs.dae.linalg.sparse_lu import factor
+
+GAMMA_DRIFT = 0.2
+MATRIX_MAX_AGE = 50
+SLOPE_MAX_AGE = 20
+RATE_OF_FRESH = 0.1
+DROPPED_STEPS = 5
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def evaluate_matrix(functions, st):
+    """Evaluate the Newton matrix at ``st.y``, and now and then its slope dG/dy' by a second evaluation."""
+    jacobian = functions.jacobian
+    t, gamma = st.t_new, st.gamma
+    jac, slope = st.jac, st.jac_slope
+    jacobian(t, st.y, st.yp, gamma, jac, st.idata, st.rdata, st.work)
+    st.jacobians += 1
+    st.slope_age += 1
+    if st.slope_age >= SLOPE_MAX_AGE:
+        jacobian(t, st.y, st.yp, 2.0 * gamma, slope, st.idata, st.rdata, st.work)
+        st.jacobians += 1
+        st.slope_age = 0
+        for p in range(jac.shape[0]):
+            slope[p] = (slope[p] - jac[p]) / gamma
+    st.gamma_evaluated = gamma
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def factor_matrix(st, plan, factors):
+    """Factor the matrix carried over to the step's leading coefficient; return whether its pivots still fit."""
+    change = st.gamma - st.gamma_evaluated
+    jac, slope, matrix = st.jac, st.jac_slope, st.matrix
+    for p in range(jac.shape[0]):
+        matrix[p] = jac[p] + change * slope[p]
+    growth = factor(plan, factors, matrix)
+    st.factorizations += 1
+    return growth <= st.growth_limit
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def form_matrix(functions, st, plan, factors):
+    """Bring the factored matrix up to date for the open step, if it has to be.
+
+    Returns
+    -------
+    code : int
+        RUNNING, or REPIVOT where pivots have to be chosen anew.
+    """
+    drift = st.gamma / st.gamma_factored
+    whole_again = st.drop_level > 0 and st.drop_age >= DROPPED_STEPS
+    wanted = st.matrix_wanted or st.matrix_age >= MATRIX_MAX_AGE or whole_again
+    if not (wanted or drift > 1.0 + GAMMA_DRIFT or drift < 1.0 / (1.0 + GAMMA_DRIFT)):
+        return RUNNING
+    if wanted:
+        st.matrix_wanted = True
+        evaluate_matrix(functions, st)
+    fits = factor_matrix(st, plan, factors)
+    if whole_again:
+        st.drop_level = 0
+        st.drop_age = 0
+    if whole_again or not fits:
+        st.h = st.h_wanted
+        return REPIVOT
+    st.gamma_factored = st.gamma
+    if wanted:
+        st.matrix_wanted = False
+        st.matrix_age = 0
+        st.matrix_fresh = True
+        st.rate = RATE_OF_FRESH
+    return RUNNING
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def renew_matrix(functions, st, plan, factors):
+    """Evaluate and factor the matrix at the iterate in ``st.y``; return whether its pivots fit."""
+    evaluate_matrix(functions, st)
+    if not factor_matrix(st, plan, factors):
+        return False
+    st.gamma_factored = st.gamma
+    st.rate = RATE_OF_FRESH
+    return True
