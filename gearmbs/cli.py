@@ -173,7 +173,8 @@ def paper(
         tilt = to_si(angle, "angle", "--angle")
         check_record(base.changed(operation={"torque": 2.0 * low}, fault={"misalignment": tilt}), "options")
 
-        from gearmbs.studies.paper import paper_cases, run_paper
+        from gearmbs.studies.paper import run_paper
+        from gearmbs.studies.preset import paper_cases
         from gearmbs.studies.simulation import SimulationFailed
         from gearmbs.studies.store import write_dataset
 

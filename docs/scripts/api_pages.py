@@ -31,7 +31,7 @@ EXPORTED = ["__all__"]
 CONSTANTS = {
     "gearmbs.signals": {
         "COMPONENTS": "gearmbs.signals.shaft_force",
-        "EXPECTED": "gearmbs.signals.comparison_report",
+        "EXPECTED": "gearmbs.signals.expectations",
         "FORMATS": "gearmbs.signals.io",
         "INDICATORS": "gearmbs.signals.indicators",
     },

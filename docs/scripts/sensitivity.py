@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from gearmbs.signals import COMPONENTS
 from gearmbs.studies import Case, SimulationFailed, make_case, run_cases
-from gearmbs.studies.paper import MUCH
+from gearmbs.studies.claims import MUCH
 from gearmbs.studies.store import write_text
 from gearmbs.view.figure_style import new_figure
 

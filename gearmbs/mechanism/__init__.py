@@ -1,7 +1,6 @@
 """What a person builds: bodies, markers, joints, motions, forces."""
 
-import gearmbs._announce
-import gearmbs.mechanism.expression  # noqa: F401  (first, so that the function of that name below takes its place)
+import gearmbs._announce  # noqa: F401  (tells that kernels are being compiled)
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
 from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
 from gearmbs.mechanism.elements import Compiled, ForceElement, Load, State, Torque

@@ -22,7 +22,8 @@ from gearmbs.dae.model.system import System
 from gearmbs.mechanism import elements as el
 from gearmbs.mechanism import joints as jt
 from gearmbs.mechanism.elements import ForceElement, Load, State
-from gearmbs.mechanism.expression import Scope, compile_expression
+from gearmbs.mechanism.expression_compiler import compile_expression
+from gearmbs.mechanism.expression_syntax import Scope
 from gearmbs.mechanism.functions import TimeFunction
 from gearmbs.mechanism.parts import Body, Marker
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NoReturn
 
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.tape import ExpressionError, TapeBuilder
-from gearmbs.mechanism.expression import (
+from gearmbs.mechanism.expression_syntax import (
     Call,
     Chain,
     Name,
@@ -45,6 +45,10 @@ UNSUPPORTED = frozenset(
 """Functions of ADAMS that exist but are not evaluated here."""
 
 
+Function = tuple[Callable[["Lowering", Call], int], int, int]
+"""A function of the language: what writes its call to the tape, least and most number of arguments."""
+
+
 class Lowering:
     """Writes the syntax tree of one expression to a tape.
 
@@ -54,12 +58,15 @@ class Lowering:
     scope : Scope
     text : str
         The source, for messages.
+    functions : mapping
+        Functions of several arguments by name; see `gearmbs.mechanism.expression_library`.
     """
 
-    def __init__(self, builder: TapeBuilder, scope: Scope, text: str) -> None:
+    def __init__(self, builder: TapeBuilder, scope: Scope, text: str, functions: Mapping[str, Function]) -> None:
         self.builder = builder
         self.scope = scope
         self.text = text
+        self.functions = functions
         self._open: list[tuple[str, Ref]] = []
         self._inlined: dict[tuple[str, Ref], int] = {}
 
@@ -110,8 +117,6 @@ class Lowering:
         self.fail(f"{node.text} is not TIME, PI, DTOR or RTOD and stands where a value is expected", node.at)
 
     def _call(self, node: Call) -> int:
-        from gearmbs.mechanism.expression_library import FUNCTIONS
-
         name = node.name
         if name in UNARY:
             self.count(node, 1, 1)
@@ -121,13 +126,13 @@ class Lowering:
             return self.guarded(node.at, self.builder.binary, BINARY[name], *self._both(*node.args))
         if name in ELEMENT_FORCES:
             return self._element_force(node)
-        if name in FUNCTIONS:
-            function, low, high = FUNCTIONS[name]
+        if name in self.functions:
+            function, low, high = self.functions[name]
             self.count(node, low, high)
             return self.guarded(node.at, lambda: function(self, node))
         if name in UNSUPPORTED:
             self.fail(f"the function {name} is not supported", node.at)
-        known = [*UNARY, *BINARY, *ELEMENT_FORCES, *FUNCTIONS]
+        known = [*UNARY, *BINARY, *ELEMENT_FORCES, *self.functions]
         near = difflib.get_close_matches(name, known, 1)
         self.fail(f"unknown function {name}" + (f"; did you mean {near[0]}?" if near else ""), node.at)
 

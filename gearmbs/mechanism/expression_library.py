@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import partial
 
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.mechanism.expression import Call, Ref
-from gearmbs.mechanism.expression_functions import EULER_SEQUENCES, Lowering
-
-Function = Callable[[Lowering, Call], int]
+from gearmbs.mechanism.expression_functions import EULER_SEQUENCES, Function, Lowering
+from gearmbs.mechanism.expression_syntax import Call, Ref
 
 
 def _vector(code: int, dimension: str, axis: int, low: Lowering, call: Call) -> int:
@@ -272,8 +269,8 @@ def _between(torque: bool, axis: int, low: Lowering, call: Call) -> int:
     return low.force_between(call, torque, axis)
 
 
-def _table() -> dict[str, tuple[Function, int, int]]:
-    functions: dict[str, tuple[Function, int, int]] = {}
+def _table() -> dict[str, Function]:
+    functions: dict[str, Function] = {}
     vectors = (
         ("D", "", op.DISPLACEMENT, "length", 3),
         ("V", "", op.VELOCITY, "velocity", 4),

@@ -35,7 +35,7 @@ import numpy as np
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import elements as el
 from gearmbs.mechanism.elements import Load, State
-from gearmbs.mechanism.expression import Units
+from gearmbs.mechanism.expression_syntax import Units
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Marker
 from gearmbs.mechanism.quantities import quantity

@@ -16,7 +16,7 @@ from gearmbs.mechanism.parts import Marker
 from gearmbs.mechanism.quantities import expression_text, quantity
 
 if TYPE_CHECKING:
-    from gearmbs.mechanism.expression import Units
+    from gearmbs.mechanism.expression_syntax import Units
 
 Expression = str | float | None
 

@@ -12,7 +12,7 @@ from gearmbs.dae.equations.expressions import ExpressionError, angle_rates, eval
 from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.elements import State
-from gearmbs.mechanism.expression import compile_expression
+from gearmbs.mechanism.expression_compiler import compile_expression
 from gearmbs.mechanism.joints import Joint, kinds_with_angle, kinds_with_displacement
 from gearmbs.mechanism.parts import Body, Marker
 

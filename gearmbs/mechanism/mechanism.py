@@ -13,7 +13,7 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.dae.model.system import System
 from gearmbs.mechanism import joints as jt
 from gearmbs.mechanism.elements import ForceElement, Load, State, Torque
-from gearmbs.mechanism.expression import Units
+from gearmbs.mechanism.expression_syntax import Units
 from gearmbs.mechanism.friction import add_friction, friction_of
 from gearmbs.mechanism.function_text import integrated
 from gearmbs.mechanism.functions import TimeFunction, as_function, constant

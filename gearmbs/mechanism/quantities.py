@@ -96,7 +96,7 @@ def expression_text(value: Any, unit: str, field: str, factor: float = 1.0) -> s
     ModelError
         If it is neither an expression nor a quantity.
     """
-    from gearmbs.mechanism.expression import parse
+    from gearmbs.mechanism.expression_syntax import parse
 
     if not isinstance(value, str):
         return repr(quantity(value, unit, field, factor))

@@ -9,10 +9,11 @@ from .angular import angular_resample, order_spectrum, time_synchronous_average
 from .bands import band_rms, gmf_rms, order_rms, rms
 from .cepstrum import power_cepstrum
 from .comparison import compare, compare_files
-from .comparison_report import EXPECTED, ComparisonReport
+from .comparison_report import ComparisonReport
 from .conversion import convert
 from .envelope import envelope, envelope_spectrum, kurtogram, spectral_kurtosis
 from .errors import MissingMetadataError, SignalError, SignalFileError
+from .expectations import EXPECTED
 from .filters import bandpass, decimate, resample
 from .indicators import (
     INDICATORS,

@@ -10,20 +10,11 @@ import pandas as pd
 import xarray as xr
 
 from .comparison_summary import summary
+from .expectations import EXPECTED
 from .ordinal import level_distance, ordinal_agreement
 from .report import markdown_table, significant
 from .signal import UNKNOWN_UNITS
 
-# What each fault is expected to do, by harmonic or indicator: +1 rises, 0 stays, by name of the state.
-# Misalignment and centre distance after the paper; local tooth faults after the usual reading: a short disturbance once
-# a revolution spreads over many sidebands and leaves the mesh harmonics, averages over all teeth, much as they were.
-EXPECTED: dict[str, dict[int | str, int]] = {
-    "misaligned": {2: 1},
-    "distance": {1: 1, 2: 1, 3: 1},
-    "broken": {1: 0, 2: 0, 3: 0, "sideband_level": 1, "energy_ratio": 1, "fm4": 1, "kurtosis": 1},
-    "chipped": {1: 0, 2: 0, 3: 0, "sideband_level": 1, "energy_ratio": 1, "fm4": 1, "kurtosis": 1},
-}
-"""What each fault is expected to do; see `ComparisonReport.expectations`."""
 CHANGE_DB = 1.0
 STAYS_DB = 3.0
 INDICATOR_TIE = 0.05

@@ -2,19 +2,36 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 
-if TYPE_CHECKING:
-    from .comparison_report import ComparisonReport
+from .expectations import EXPECTED
+
+
+class Compared(Protocol):
+    """What the summary needs of a comparison; `ComparisonReport` has it."""
+
+    data: xr.Dataset
+
+    @property
+    def faults(self) -> list[str]:
+        """The states but the reference."""
+
+    def changes(self, side: str = "experiment") -> xr.DataArray:
+        """Change of each harmonic against the reference state, dB."""
+
+    def expectations(self) -> pd.DataFrame:
+        """Expected against found."""
 
 
 MOSTLY = 0.75
 """Share of values from which "mostly" is said."""
 
 
-def summary(report: ComparisonReport, change_db: float) -> list[str]:
+def summary(report: Compared, change_db: float) -> list[str]:
     """Two sentences for each fault: which harmonics move the same way at every load, and how much of it was expected.
 
     Parameters
@@ -36,7 +53,7 @@ def summary(report: ComparisonReport, change_db: float) -> list[str]:
     return lines
 
 
-def _moves(report: ComparisonReport, state: str, k: int) -> tuple[list[str], np.ndarray]:
+def _moves(report: Compared, state: str, k: int) -> tuple[list[str], np.ndarray]:
     """Channel names, and changes in dB of shape (loads, channels)."""
     change = report.changes().sel(state=state, harmonic=k)
     if "channel" not in change.dims:
@@ -45,7 +62,7 @@ def _moves(report: ComparisonReport, state: str, k: int) -> tuple[list[str], np.
     return names, np.asarray(change.transpose("load", "channel").values, dtype=float)
 
 
-def _harmonic(report: ComparisonReport, state: str, k: int, change_db: float) -> str:
+def _harmonic(report: Compared, state: str, k: int, change_db: float) -> str:
     names, change = _moves(report, state, k)
     known = change[np.isfinite(change).all(axis=1)]
     if not known.size:
@@ -59,7 +76,7 @@ def _harmonic(report: ComparisonReport, state: str, k: int, change_db: float) ->
     return f"{k} x GMF " + " and ".join(parts) if parts else ""
 
 
-def _still(report: ComparisonReport, state: str, change_db: float) -> str:
+def _still(report: Compared, state: str, change_db: float) -> str:
     """Name the channels on which no harmonic moves the same way at every load."""
     names, _ = _moves(report, state, int(report.data["harmonic"].values[0]))
     if names == [""]:
@@ -76,12 +93,10 @@ def _still(report: ComparisonReport, state: str, change_db: float) -> str:
     return f" On {_listed(still)} nothing does."
 
 
-def _verdict(report: ComparisonReport, state: str) -> str:
+def _verdict(report: Compared, state: str) -> str:
     table = report.expectations()
     table = table[table["state"] == state]
     if not len(table):
-        from .comparison_report import EXPECTED
-
         return f"no expectation is known for {state!r}; it is for {', '.join(EXPECTED)}."
     parts = []
     for word, rows in table.groupby("expected", sort=False):

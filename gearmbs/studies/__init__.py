@@ -7,8 +7,10 @@ from gearmbs.studies.case import Case, CaseError, load_case, make_case
 
 if TYPE_CHECKING:
     from gearmbs.signals.simulated import record_signal
-    from gearmbs.studies.paper import Claim, PaperStudy, paper_cases, run_paper
+    from gearmbs.studies.claims import Claim
+    from gearmbs.studies.paper import PaperStudy, run_paper
     from gearmbs.studies.parallel import run_cases
+    from gearmbs.studies.preset import paper_cases
     from gearmbs.studies.rig import gear_rig
     from gearmbs.studies.simulation import SimulationFailed, SimulationInterrupted, run_case, simulate_case
 
@@ -35,9 +37,9 @@ __getattr__ = late(
     __name__,
     {
         "record_signal": "gearmbs.signals.simulated",
-        "Claim": "gearmbs.studies.paper",
+        "Claim": "gearmbs.studies.claims",
         "PaperStudy": "gearmbs.studies.paper",
-        "paper_cases": "gearmbs.studies.paper",
+        "paper_cases": "gearmbs.studies.preset",
         "run_paper": "gearmbs.studies.paper",
         "run_cases": "gearmbs.studies.parallel",
         "gear_rig": "gearmbs.studies.rig",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearmbs.studies.case import Case
+from gearmbs.studies.preset import DEFAULT_COMPONENT, paper_cases
 
 
 @dataclass(frozen=True)
@@ -62,12 +63,10 @@ def choices(cases: list[Case], component: str) -> list[Choice]:
     Parameters
     ----------
     cases : list of Case
-        As :func:`gearmbs.studies.paper.paper_cases` returns them.
+        As :func:`gearmbs.studies.preset.paper_cases` returns them.
     component : str
         Force component of the figures.
     """
-    from gearmbs.studies.paper import DEFAULT_COMPONENT, paper_cases
-
     chosen, preset = _values(cases, component), _values(paper_cases(), DEFAULT_COMPONENT)
     return [Choice(what, chosen[what], preset[what], why) for what, why in WHY.items()]
 

@@ -1,4 +1,4 @@
-"""The paper's study: healthy, misaligned and +3 mm, at 100 and 200 N m; GMF harmonics; the three claims."""
+"""The paper's study: its six cases simulated, their GMF harmonics in one dataset, tables, figures and report."""
 
 from __future__ import annotations
 
@@ -7,84 +7,19 @@ from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
-import numpy as np
 import xarray as xr
 
 from gearmbs.dae.result import SolverStats
 from gearmbs.signals import COMPONENTS, rms_factor
-from gearmbs.studies.case import Case, CaseError, make_case
+from gearmbs.studies.case import Case, CaseError
+from gearmbs.studies.claims import Claim, judge
 from gearmbs.studies.parallel import run_cases
+from gearmbs.studies.preset import DEFAULT_COMPONENT, LOAD_NAMES, LOADS, MISALIGNMENT, STATES, paper_cases
+from gearmbs.studies.report import paper_report
 from gearmbs.studies.store import write_dataset, write_text
 
-STATES = ("healthy", "misaligned", "distance")
-LOADS = (100.0, 200.0)
-LOAD_NAMES = ("low", "high")
-DEFAULT_COMPONENT = "line_of_action"
 TARGET_RMS = 1.0
 """RMS, m/s^2, to which the healthy signal at low load is scaled; the paper's own value is not published."""
-
-MUCH = 1.5
-"""Ratio of amplitudes at high and low load from which the latter count as "much smaller"; the paper gives none."""
-
-MISALIGNMENT = np.deg2rad(1.0)
-DISTANCE = 3e-3
-
-
-def paper_cases(
-    *, base: Case | None = None, torques: tuple[float, float] = LOADS, misalignment: float = MISALIGNMENT
-) -> list[Case]:
-    """Return the six cases of the paper, built on a base case that holds everything else.
-
-    Raises
-    ------
-    CaseError
-        If one of them is impossible.
-    """
-    data = (base or Case()).model_dump()
-    faults = {
-        "healthy": {"misalignment": 0.0, "centre_distance_error": 0.0},
-        "misaligned": {"misalignment": misalignment, "centre_distance_error": 0.0},
-        "distance": {"misalignment": 0.0, "centre_distance_error": DISTANCE},
-    }
-    if len(torques) != 2 or not 0.0 < torques[0] < torques[1]:
-        raise CaseError(f"torques {torques}: give a low and a high torque, both positive")
-    return [
-        make_case(
-            {
-                **data,
-                "name": f"{state}, {load} load",
-                "operation": {**data["operation"], "torque": torque},
-                "fault": {**data["fault"], **faults[state]},
-            },
-            f"{state}, {load} load",
-        )
-        for torque, load in zip(torques, LOAD_NAMES)
-        for state in STATES
-    ]
-
-
-@dataclass(frozen=True)
-class Claim:
-    """One claim of the paper, judged for one force component.
-
-    Attributes
-    ----------
-    name : str
-        What the paper says.
-    component : str
-        Force component the acceleration is made of.
-    held : bool
-    numbers : str
-        What it was judged on.
-    rule : str
-        When it counts as held.
-    """
-
-    name: str
-    component: str
-    held: bool
-    numbers: str
-    rule: str
 
 
 @dataclass(frozen=True)
@@ -129,7 +64,6 @@ class PaperStudy:
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write dataset, table, figures and report to a folder; return the paths."""
-        from gearmbs.studies.report import paper_report
         from gearmbs.view import gmf_bars, save_figure
 
         folder = Path(folder)
@@ -146,47 +80,6 @@ class PaperStudy:
             paths += save_figure(figure, folder / stem)
         write_text(folder / "report.md", paper_report(self))
         return [*paths, folder / "report.md"]
-
-
-def judge(table: xr.DataArray, component: str) -> list[Claim]:
-    """Judge the three claims on a table of dims (load, state, harmonic)."""
-    healthy, tilted, apart = (table.sel(state=state) for state in STATES)
-    ratio_2 = (tilted / healthy).sel(harmonic=2)
-    rises = apart / healthy
-    high_low = table.sel(load="high") / table.sel(load="low")
-
-    def numbers(values: xr.DataArray) -> str:
-        return ", ".join(f"{float(v):.3g}" for v in np.ravel(values.values))
-
-    return [
-        Claim(
-            "misalignment raises the 2nd GMF harmonic",
-            component,
-            bool((ratio_2 > 1.0).all()),
-            f"misaligned / healthy at 2 x GMF: {numbers(ratio_2)} (low, high load); "
-            f"at 1 x: {numbers((tilted / healthy).sel(harmonic=1))}; "
-            f"at 3 x: {numbers((tilted / healthy).sel(harmonic=3))}",
-            "above 1 at both loads",
-        ),
-        Claim(
-            "+3 mm centre distance raises all three harmonics",
-            component,
-            bool((rises > 1.0).all()),
-            "distance / healthy at 1, 2, 3 x GMF: "
-            f"{numbers(rises.sel(load='low'))} (low); {numbers(rises.sel(load='high'))} (high)",
-            "above 1 for every harmonic at both loads",
-        ),
-        Claim(
-            "amplitudes at low load are much smaller than at high load",
-            component,
-            bool((high_low >= MUCH).all()),
-            "high / low at 1, 2, 3 x GMF: "
-            + "; ".join(f"{numbers(high_low.sel(state=state))} ({state})" for state in STATES)
-            + f"; {int((high_low > 1.0).sum())} of {high_low.size} amplitudes are smaller at low load, "
-            f"{int((high_low >= MUCH).sum())} by {MUCH:g} times or more",
-            f"at least {MUCH:g} for every state and harmonic",
-        ),
-    ]
 
 
 def run_paper(
@@ -253,7 +146,7 @@ def combine(cases: list[Case], records: list[xr.Dataset], component: str) -> xr.
     }
     for key in ("operation_torque", "operation_torque_units"):
         together.attrs.pop(key)
-    for key in ("fault_misalignment", "fault_centre_distance_error", "contact_ratio"):
+    for key in ("fault_misalignment", "fault_centre_distance_error", "contact_ratio", "face_slices"):
         together.attrs.pop(key)
         units = {"units": together.attrs.pop(f"{key}_units", "1")}
         together = together.assign_coords({key: ("state", [r.attrs[key] for r in rows[0]], units)})
@@ -271,13 +164,3 @@ def combine(cases: list[Case], records: list[xr.Dataset], component: str) -> xr.
         for item in ("steps", "residuals", "jacobians", "wall_time"):
             together.attrs[f"solver_{key}_{item}"] = record.attrs[f"solver_{item}"]
     return together
-
-
-__all__ = [
-    "Claim",
-    "PaperStudy",
-    "combine",
-    "judge",
-    "paper_cases",
-    "run_paper",
-]

@@ -9,8 +9,8 @@ import json
 import sys
 
 from gearmbs.studies.case import make_case
-from gearmbs.studies.paper import paper_cases
 from gearmbs.studies.parallel import run_cases
+from gearmbs.studies.preset import paper_cases
 from gearmbs.studies.store import write_text
 
 DURATION = 0.1

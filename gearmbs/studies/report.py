@@ -2,18 +2,39 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 import xarray as xr
 
+from gearmbs.studies.case import Case
 from gearmbs.studies.choices import choices
-
-if TYPE_CHECKING:
-    from gearmbs.studies.paper import PaperStudy
+from gearmbs.studies.claims import Claim
 
 
-def paper_report(study: PaperStudy) -> str:
+class StudyTables(Protocol):
+    """What the report needs of a study; :class:`gearmbs.studies.PaperStudy` has it."""
+
+    @property
+    def records(self) -> xr.Dataset:
+        """All cases, over load and state."""
+
+    @property
+    def component(self) -> str:
+        """The default component."""
+
+    @property
+    def cases(self) -> list[Case]:
+        """The six cases."""
+
+    def table(self, component: str | None = None, way: str = "band") -> xr.DataArray:
+        """Scaled RMS of the harmonics."""
+
+    def claims(self, component: str | None = None, way: str = "band") -> list[Claim]:
+        """The three claims, judged."""
+
+
+def paper_report(study: StudyTables) -> str:
     """Return the report of a study: verdicts, tables, settings, choices.
 
     Returns
@@ -104,7 +125,7 @@ def paper_report(study: PaperStudy) -> str:
     return "\n".join(parts) + "\n"
 
 
-def _table(study: PaperStudy, component: str) -> list[str]:
+def _table(study: StudyTables, component: str) -> list[str]:
     lines = ["| load | state | 1 x band | 2 x band | 3 x band | 1 x orders | 2 x orders | 3 x orders |"]
     lines.append("|---|---|---|---|---|---|---|---|")
     band, orders = study.table(component, "band"), study.table(component, "orders")
@@ -115,7 +136,7 @@ def _table(study: PaperStudy, component: str) -> list[str]:
     return lines
 
 
-def _contact_table(study: PaperStudy) -> list[str]:
+def _contact_table(study: StudyTables) -> list[str]:
     """Mean sum of normal forces against torque over base radius, shares of the record in each kind of contact."""
     lines = [
         "| load | state | mean normal force, N | torque / base radius, N | both flanks, % of time | no contact, % |",

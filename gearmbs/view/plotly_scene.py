@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from gearmbs.view.figure_style import VERMILLION
-from gearmbs.view.scene import Scene
+from gearmbs.view.scene_data import SceneData
 from gearmbs.view.shading import feature_edges
 
 ARROW = 0.22
 LIGHT = {"ambient": 0.55, "diffuse": 0.75, "specular": 0.15, "roughness": 0.6}
 
 
-def plotly_figure(scene: Scene, frames: int = 24) -> Any:
+def plotly_figure(scene: SceneData, frames: int = 24) -> Any:
     """Return a plotly figure of a scene, animated over at most ``frames`` of its instants.
 
     Raises
@@ -59,7 +59,7 @@ def plotly_figure(scene: Scene, frames: int = 24) -> Any:
     return figure
 
 
-def _moving(go: Any, scene: Scene, instant: int) -> list:
+def _moving(go: Any, scene: SceneData, instant: int) -> list:
     traces = []
     for part in scene.parts:
         mesh = part.mesh.placed(part.origins[instant], part.axes[instant])
@@ -84,7 +84,7 @@ def _line(go: Any, name: str, colour: str, ends: np.ndarray, width: float = 2.0,
     return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=style, name=name, showlegend=legend, hoverinfo="name")
 
 
-def _controls(figure: Any, scene: Scene) -> None:
+def _controls(figure: Any, scene: SceneData) -> None:
     timing = {"frame": {"duration": 60, "redraw": True}, "transition": {"duration": 0}, "fromcurrent": True}
     pause = {"frame": {"duration": 0, "redraw": False}, "mode": "immediate", "transition": {"duration": 0}}
     steps = [

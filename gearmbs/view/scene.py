@@ -1,53 +1,29 @@
-"""Solids that move: what a 3-D view shows, whichever way it is shown."""
+"""A scene and the ways to show it: a shaded figure, a page to turn and play, a plotly figure."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from gearmbs.view.figure_style import VERMILLION, look, new_figure
-from gearmbs.view.mesh import Mesh
+from gearmbs.view.page import Page
+from gearmbs.view.plotly_scene import plotly_figure
 from gearmbs.view.render import Camera, render
+from gearmbs.view.scene_data import AZIMUTH, ELEVATION, Part, SceneData
 from gearmbs.view.shading import corner_normals
+from gearmbs.view.viewer import scene_page
 
-if TYPE_CHECKING:
-    from gearmbs.view.page import Page
-
-AZIMUTH, ELEVATION = 38.0, 22.0
-UP = (0.0, 1.0, 0.0)
 BORDER = 1.0
 """Height of heading and legend, inches."""
 
 
-@dataclass(frozen=True)
-class Part:
-    """A rigid solid and where it is.
-
-    Attributes
-    ----------
-    name : str
-    mesh : Mesh
-        In the part's own frame.
-    colour : str
-        As matplotlib understands it.
-    origins, axes : ndarray, shape (n, 3) and (n, 3, 3)
-        Frame at each instant, global, m.
-    """
-
-    name: str
-    mesh: Mesh
-    colour: str
-    origins: np.ndarray
-    axes: np.ndarray
-
-
 @dataclass
-class Scene:
+class Scene(SceneData):
     """Parts, forces and lines over n instants.
 
     Attributes
@@ -64,35 +40,6 @@ class Scene:
     up : tuple of float
         Direction drawn upwards.
     """
-
-    parts: list[Part]
-    title: str = "view"
-    label: str = ""
-    unit: str = ""
-    value: np.ndarray = field(default_factory=lambda: np.zeros(1))
-    forces: list[np.ndarray] = field(default_factory=list)
-    lines: list[tuple[str, str, np.ndarray]] = field(default_factory=list)
-    up: tuple[float, float, float] = UP
-
-    def __post_init__(self) -> None:
-        if not self.parts:
-            raise ValueError("parts: a scene needs at least one part; the mechanism has no body to draw")
-        for part in self.parts:
-            if len(part.origins) != self.value.size or len(part.axes) != self.value.size:
-                raise ValueError(f"part {part.name!r} has {len(part.origins)} poses for {self.value.size} instants")
-
-    def __len__(self) -> int:
-        return self.value.size
-
-    def corners(self, instant: int = 0) -> np.ndarray:
-        """Return all vertices at an instant, global, shape (n, 3), m."""
-        return np.concatenate([p.mesh.placed(p.origins[instant], p.axes[instant]).vertices for p in self.parts])
-
-    @property
-    def size(self) -> float:
-        """Largest extent at the start, m."""
-        points = self.corners(0)
-        return float(np.ptp(points, axis=0).max())
 
     def still(
         self,
@@ -162,8 +109,6 @@ class Scene:
 
     def page(self) -> Page:
         """Return the scene as a page to turn, zoom and play, which stands alone as an HTML file."""
-        from gearmbs.view.viewer import scene_page
-
         return scene_page(self)
 
     def save_html(self, path: str | Path) -> Path:
@@ -172,8 +117,6 @@ class Scene:
 
     def plotly(self, frames: int = 24) -> Any:
         """Return a plotly figure (needs the extra ``view``), animated over at most so many instants."""
-        from gearmbs.view.plotly_scene import plotly_figure
-
         return plotly_figure(self, frames)
 
     def _repr_html_(self) -> str:
@@ -188,3 +131,6 @@ class Scene:
             ends = camera.project(np.stack([start, start + scale * force]), columns, rows)
             style = {"arrowstyle": "-|>", "color": VERMILLION, "linewidth": 2.0, "shrinkA": 0, "shrinkB": 0}
             ax.annotate("", ends[1, :2], ends[0, :2], arrowprops=style, zorder=5)
+
+
+__all__ = ["Part", "Scene"]

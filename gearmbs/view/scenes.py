@@ -13,7 +13,8 @@ from gearmbs.view.contacts import ContactProbe
 from gearmbs.view.figure_style import BLUE, COLOURS, GREY, ORANGE
 from gearmbs.view.mesh import Mesh, ball, box, cylinder, joined, rod
 from gearmbs.view.motion import PairMotion, chosen_times, marker_motion, mechanism_of, static_motion
-from gearmbs.view.scene import UP, Part, Scene
+from gearmbs.view.scene import Part, Scene
+from gearmbs.view.scene_data import UP
 from gearmbs.view.solid import pair_solids
 
 if TYPE_CHECKING:

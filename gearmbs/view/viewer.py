@@ -7,19 +7,19 @@ from matplotlib.colors import to_rgb
 
 from gearmbs.view.figure_style import unit_text
 from gearmbs.view.page import Page, packed, rounded
-from gearmbs.view.scene import AZIMUTH, ELEVATION, Part, Scene
+from gearmbs.view.scene_data import AZIMUTH, ELEVATION, Part, SceneData
 from gearmbs.view.shading import corner_normals, feature_edges
 
 ARROW = 0.22
 """Length of the largest force, as a part of the scene's size."""
 
 
-def scene_page(scene: Scene, *, azimuth: float = AZIMUTH, elevation: float = ELEVATION, height: int = 560) -> Page:
+def scene_page(scene: SceneData, *, azimuth: float = AZIMUTH, elevation: float = ELEVATION, height: int = 560) -> Page:
     """Return a scene as a self-contained page.
 
     Parameters
     ----------
-    scene : Scene
+    scene : SceneData
     azimuth, elevation : float
         First view, degrees.
     height : int

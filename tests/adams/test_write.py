@@ -15,7 +15,7 @@ from gearmbs.adams.write.deck_writer import write_deck
 from gearmbs.adams.write.text import wrapped
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism, harmonic, polynomial, ramp, step
-from gearmbs.mechanism.expression import Units
+from gearmbs.mechanism.expression_syntax import Units
 
 from .decks import PENDULUM
 
@@ -81,7 +81,8 @@ def test_every_joint_is_written_and_read(kind):
                  polynomial([1.0, -2.0, 3.0]), ramp(4.0, 0.3, 0.5), ramp(4.0, 0.3, 0.5, quintic=True)],
 )  # fmt: skip
 def test_functions_of_time_are_written_as_expressions(function):
-    from gearmbs.mechanism.expression import Scope, compile_expression
+    from gearmbs.mechanism.expression_compiler import compile_expression
+    from gearmbs.mechanism.expression_syntax import Scope
     from gearmbs.mechanism.function_text import function_text
     from gearmbs.mechanism.functions import as_function
     from tests.dae.equations.expressions.support import time_series

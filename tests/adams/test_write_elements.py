@@ -8,7 +8,7 @@ import pytest
 from gearmbs.adams import parse_deck, read_deck, run_deck, write_deck
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.expression import Units
+from gearmbs.mechanism.expression_syntax import Units
 
 from .test_run import model
 from .test_writers import ELEMENTS as STATEMENTS

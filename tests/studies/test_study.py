@@ -14,7 +14,8 @@ from gearmbs.studies import Case, SimulationFailed, run_case, run_paper, simulat
 from gearmbs.studies import rig as parts
 from gearmbs.studies.case import CaseError, make_case
 from gearmbs.studies.choices import choices
-from gearmbs.studies.paper import judge, paper_cases
+from gearmbs.studies.claims import judge
+from gearmbs.studies.preset import paper_cases
 from gearmbs.studies.store import whole_file, write_dataset
 
 SHORT = {"run_up": 0.03, "settling": 0.01, "duration": 0.06}

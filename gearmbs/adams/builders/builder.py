@@ -21,8 +21,8 @@ from gearmbs.adams.parse.deck import Deck
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.elements import State
-from gearmbs.mechanism.expression import Call, Name, Node, Number, parse, unparse
 from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
+from gearmbs.mechanism.expression_syntax import Call, Name, Node, Number, parse, unparse
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Marker
 

@@ -11,7 +11,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.expression import Scope
+from gearmbs.mechanism.expression_syntax import Scope
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Marker
 

@@ -10,7 +10,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
-from gearmbs.mechanism.expression import Call, Number, parse, walk
+from gearmbs.mechanism.expression_syntax import Call, Number, parse, walk
 
 REQUIRED: dict[type, tuple[str, ...]] = {
     st.Marker: ("part",),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from gearmbs.adams.errors import UNSUPPORTED, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.units import deck_units
-from gearmbs.mechanism.expression import Units
+from gearmbs.mechanism.expression_syntax import Units
 
 if TYPE_CHECKING:
     from gearmbs.mechanism import Mechanism

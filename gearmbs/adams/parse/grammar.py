@@ -13,7 +13,7 @@ from dataclasses import MISSING, Field, dataclass, field, fields
 from typing import Any
 
 from gearmbs.adams.parse.source import CONTINUED, RawStatement
-from gearmbs.mechanism.expression import ExpressionError, parse
+from gearmbs.mechanism.expression_syntax import ExpressionError, parse
 
 REALS, REAL, INT, ID, IDS, FLAG, CHOICE, EXPRESSION, TEXT, WORD, WORDS, STRINGS, TABLE = range(13)
 """Kinds of arguments."""

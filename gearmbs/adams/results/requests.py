@@ -17,7 +17,8 @@ from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_R
 from gearmbs.dae.equations.expressions.tape import ExpressionError, Tape
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.compile import starting_angles
-from gearmbs.mechanism.expression import Scope, compile_expression
+from gearmbs.mechanism.expression_compiler import compile_expression
+from gearmbs.mechanism.expression_syntax import Scope
 from gearmbs.mechanism.measures import evaluate_series, motion_tables
 
 COLUMNS = {

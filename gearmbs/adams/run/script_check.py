@@ -11,7 +11,7 @@ from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
 from gearmbs.adams.run.session import Session, change, output_times, switch, unsupported
 from gearmbs.dae.equations.expressions.tape import LEVEL_TIME, ExpressionError, Tape
-from gearmbs.mechanism.expression import compile_expression
+from gearmbs.mechanism.expression_compiler import compile_expression
 
 SINGLE = ("STATICS", "INITIAL_CONDITIONS", "DISPLACEMENT", "VELOCITY", "ACCELERATION")
 """Analyses that may stand at the present time."""

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.expression import Units
+from gearmbs.mechanism.expression_syntax import Units
 from gearmbs.mechanism.parts import Body
 
 

@@ -21,8 +21,8 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism, Torque
 from gearmbs.mechanism.elements import AXIS_FORCE, AXIS_TORQUE, LINE, Load
 from gearmbs.mechanism.elements import COMPONENTS as COMPONENT_MODE
-from gearmbs.mechanism.expression import Call, Name, Node, Number, parse, shown, unparse
 from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
+from gearmbs.mechanism.expression_syntax import Call, Name, Node, Number, parse, shown, unparse
 from gearmbs.mechanism.function_text import function_text
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Body, Marker

@@ -7,7 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from gearmbs.dae.equations.expressions import eval_gradient, eval_request, eval_second, eval_time, eval_value
 from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
-from gearmbs.mechanism.expression import Scope, compile_expression
+from gearmbs.mechanism.expression_compiler import compile_expression
+from gearmbs.mechanism.expression_syntax import Scope
 
 MARKERS = {1: 0, 2: 1, 3: 2, 4: 3, 10: 4, "CM": 1}
 MARKER_BODY = np.array([1, 2, 3, 2, 0], dtype=np.int64)

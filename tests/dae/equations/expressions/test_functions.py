@@ -10,7 +10,8 @@ from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
 from gearmbs.dae.equations.expressions import ExpressionError, SplineData
 from gearmbs.dae.equations.expressions.splines import spline_table, spline_value
-from gearmbs.mechanism.expression import Scope, Units, compile_expression
+from gearmbs.mechanism.expression_compiler import compile_expression
+from gearmbs.mechanism.expression_syntax import Scope, Units
 
 from .support import World, time_series
 

@@ -1,8 +1,8 @@
-"""ADAMS's function language: from text to a compiled tape.
+"""ADAMS's function language: from text to a syntax tree, and the names and units its meaning depends on.
 
-``parse`` reads the text into a syntax tree (and finds every syntax error without a model);
-``compile_expression`` resolves names in a ``Scope`` and writes the tape of
-``gearmbs.dae.equations.expressions``.  Case does not matter; angles are radians, ``90D`` is ninety degrees.
+``parse`` reads the text (and finds every syntax error without a model); a ``Scope`` holds what names stand for;
+``gearmbs.mechanism.expression_compiler`` makes a tape of both.  Case does not matter; angles are radians, ``90D`` is
+ninety degrees.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.splines import SplineData
-from gearmbs.dae.equations.expressions.tape import ExpressionError, Tape, TapeBuilder
+from gearmbs.dae.equations.expressions.tape import ExpressionError
 
 MAX_DEPTH = 100
 """Deepest nesting of brackets, functions and signs."""
@@ -370,39 +369,4 @@ def walk(node: Node) -> Iterator[Node]:
         yield from walk(child)
 
 
-def compile_expression(text: str, scope: Scope, dimension: str = "number", accelerations: bool = False) -> Tape:
-    """Compile a function expression to a tape that returns SI values.
-
-    Parameters
-    ----------
-    text : str
-        The expression, in the units of ``scope.units``.
-    scope : Scope
-    dimension : str
-        What the value is ("force", "torque", "length", "angle", ...): its unit is converted to SI.
-    accelerations : bool
-        Allow ACCX, WDTX and their kin: only requests know accelerations.
-
-    Returns
-    -------
-    Tape
-
-    Raises
-    ------
-    ExpressionError
-        When the text is malformed or names something the scope does not hold.
-    """
-    from gearmbs.dae.equations.expressions.tape import LEVEL_ACCELERATION
-    from gearmbs.mechanism.expression_functions import Lowering
-
-    builder = TapeBuilder(scope.marker_body)
-    lowering = Lowering(builder, scope, text)
-    result = lowering.node(parse(text))
-    result = builder.binary(op.MUL, builder.constant(scope.units.factor(dimension)), result)
-    tape = builder.finish(result, text)
-    if tape.level == LEVEL_ACCELERATION and not accelerations:
-        raise ExpressionError(f"accelerations can only be asked for in a REQUEST, not in {shown(text)}")
-    return tape
-
-
-__all__ = ["ExpressionError", "Scope", "SplineData", "Units", "compile_expression", "parse", "unparse", "walk"]
+__all__ = ["ExpressionError", "Scope", "SplineData", "Units", "parse", "unparse", "walk"]
