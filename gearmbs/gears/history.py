@@ -24,6 +24,21 @@ BOX = types.float64[:, :, ::1]
     error_model="numpy",
 )
 def _run(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, diag, work):
+    """Evaluate the contact of a pair at each instant of a motion.
+
+    Parameters
+    ----------
+    gi, gr : ndarray
+        Tables of the pair.
+    R1, A1, v1, w1, R2, A2, v2, w2 : ndarray, first axis of length n
+        Position, orientation, velocity and angular velocity of driver and driven wheel.
+    wrench : ndarray, shape (n, 6)
+        Receives force and torque on the driver.
+    diag : ndarray, shape (n, 8)
+        Receives the diagnostics.
+    work : ndarray
+        Scratch of the contact.
+    """
     jac = np.zeros((6, 24))
     for k in range(R1.shape[0]):
         gear_contact(

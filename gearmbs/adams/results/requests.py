@@ -259,7 +259,31 @@ class RequestEvaluator:
     nogil=True,
 )
 def _gradient_series(ints, floats, t, kin, marker_body, marker_frame, y, ref, work, grad):
-    """Write a tape's spatial gradient at every time."""
+    """Write a tape's spatial gradient at every time.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    floats : ndarray
+        Real table of the expression (`Tape.floats`).
+    t : ndarray
+        Times, s.
+    kin : ndarray, shape (times, bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    y : ndarray, shape (times, unknowns)
+        Unknowns.
+    ref : ndarray
+        References of the counted angles.
+    work : ndarray
+        Scratch, `Tape.work_size` entries.
+    grad : ndarray
+        Receives the gradient: 12 spatial variations of each body of the tape, then its unknowns.
+    """
     for k in range(t.size):
         eval_gradient(ints, floats, t[k], kin[k], marker_body, marker_frame, y, ref, grad[k], work)
 

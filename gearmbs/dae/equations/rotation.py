@@ -48,6 +48,17 @@ SWITCH_SINE = 0.5
     "void(float64, float64, float64, float64, float64, float64, float64[::1], int64)", cache=True, error_model="numpy"
 )
 def cross_into(ax, ay, az, bx, by, bz, out, k):
+    """Write a x b to ``out[k:]``.
+
+    Parameters
+    ----------
+    ax, ay, az, bx, by, bz : float
+        Components of a and b.
+    out : ndarray
+        Receives the three components.
+    k : int
+        Where the first is written.
+    """
     out[k] = ay * bz - az * by
     out[k + 1] = az * bx - ax * bz
     out[k + 2] = ax * by - ay * bx

@@ -50,7 +50,27 @@ STATE = "float64[:, ::1], int64[::1], float64[:, ::1], float64[::1], float64[::1
     error_model="numpy",
 )
 def _leaf_value(ints, at, kin, acc, marker_body, marker_frame, y, w):
-    """Return the value of a leaf that depends on bodies or on algebraic unknowns."""
+    """Return the value of a leaf that depends on bodies or on algebraic unknowns.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    at : int
+        Offset of the leaf in ``ints``.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    acc : ndarray, shape (bodies, 6)
+        Accelerations a and alpha of the bodies; not used where none are asked for.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    y : ndarray
+        Unknowns, for states and for loads asked for by name.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    """
     code = ints[at]
     if code == op.ALGEBRAIC:
         return y[ints[ints[op.HEAD_ALGEBRAIC_LIST] + ints[at + 1]]]
@@ -90,7 +110,33 @@ def _selected(ints, at, work):
     error_model="numpy",
 )
 def _forward(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, work, order):
-    """Run the tape: values to work[0:n]; first partials behind them for order 1, second for order 2."""
+    """Run the tape: values to work[0:n]; first partials behind them for order 1, second for order 2.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    floats : ndarray
+        Real table of the expression (`Tape.floats`).
+    t : float
+        Time, s.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    acc : ndarray, shape (bodies, 6)
+        Accelerations a and alpha of the bodies; not used where none are asked for.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    y : ndarray
+        Unknowns, for states and for loads asked for by name.
+    ref : ndarray
+        References of the counted angles.
+    work : ndarray
+        Scratch, `Tape.work_size` entries.
+    order : int
+        Highest order of the derivatives, 0 to 2.
+    """
     n = ints[op.HEAD_COUNT]
     at = ints[op.HEAD_CODE]
     leaf = work[n * (1 if order == 0 else (3 if order == 1 else 6)) :]
@@ -163,7 +209,29 @@ def _backward(ints, work, adjoint, result):
 
 @njit(f"float64({TABLES}, float64, {STATE}, float64[::1])", cache=True, nogil=True, error_model="numpy")
 def eval_value(ints, floats, t, kin, marker_body, marker_frame, y, ref, work):
-    """Return the expression's value; accelerations are not available here (see ``eval_request``)."""
+    """Return the expression's value; accelerations are not available here (see ``eval_request``).
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    floats : ndarray
+        Real table of the expression (`Tape.floats`).
+    t : float
+        Time, s.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    y : ndarray
+        Unknowns, for states and for loads asked for by name.
+    ref : ndarray
+        References of the counted angles.
+    work : ndarray
+        Scratch, `Tape.work_size` entries.
+    """
     _forward(ints, floats, t, kin, kin, marker_body, marker_frame, y, ref, work, 0)
     return work[ints[op.HEAD_RESULT]]
 
@@ -176,7 +244,31 @@ def eval_value(ints, floats, t, kin, marker_body, marker_frame, y, ref, work):
     error_model="numpy",
 )
 def eval_request(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, work):
-    """Return the expression's value with the accelerations ``acc`` (one row a body: a, alpha)."""
+    """Return the expression's value with the accelerations ``acc`` (one row a body: a, alpha).
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    floats : ndarray
+        Real table of the expression (`Tape.floats`).
+    t : float
+        Time, s.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    acc : ndarray, shape (bodies, 6)
+        Accelerations a and alpha of the bodies; not used where none are asked for.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    y : ndarray
+        Unknowns, for states and for loads asked for by name.
+    ref : ndarray
+        References of the counted angles.
+    work : ndarray
+        Scratch, `Tape.work_size` entries.
+    """
     _forward(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, work, 0)
     return work[ints[op.HEAD_RESULT]]
 
@@ -223,6 +315,29 @@ def eval_gradient(ints, floats, t, kin, marker_body, marker_frame, y, ref, grad,
 
     ``grad[12 p + 0:12]`` holds the derivatives by [dR, dpi, dv, dw] of the p-th body of the tape's
     list, ``grad[12 n_bodies + q]`` the derivative by its q-th algebraic unknown.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    floats : ndarray
+        Real table of the expression (`Tape.floats`).
+    t : float
+        Time, s.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    y : ndarray
+        Unknowns, for states and for loads asked for by name.
+    ref : ndarray
+        References of the counted angles.
+    grad : ndarray
+        Receives the gradient: 12 spatial variations of each body of the tape, then its unknowns.
+    work : ndarray
+        Scratch, `Tape.work_size` entries.
     """
     _forward(ints, floats, t, kin, kin, marker_body, marker_frame, y, ref, work, 1)
     _backward(ints, work, 3 * ints[op.HEAD_COUNT], ints[op.HEAD_RESULT])
@@ -237,7 +352,33 @@ def eval_gradient(ints, floats, t, kin, marker_body, marker_frame, y, ref, grad,
     error_model="numpy",
 )
 def angle_rates(ints, floats, t, kin, marker_body, marker_frame, y, ref, rates, grad, work):
-    """Write the time rates of the tape's counted angles to ``rates``; ``grad`` is scratch of the gradient's size."""
+    """Write the time rates of the tape's counted angles to ``rates``; ``grad`` is scratch of the gradient's size.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    floats : ndarray
+        Real table of the expression (`Tape.floats`).
+    t : float
+        Time, s.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    y : ndarray
+        Unknowns, for states and for loads asked for by name.
+    ref : ndarray
+        References of the counted angles.
+    rates : ndarray
+        Receives the rates, rad/s.
+    grad : ndarray
+        Scratch of the size of the gradient.
+    work : ndarray
+        Scratch, `Tape.work_size` entries.
+    """
     if ints[op.HEAD_ANGLES] == 0:
         return
     n = ints[op.HEAD_COUNT]
@@ -373,6 +514,31 @@ def eval_second(ints, floats, t, kin, marker_body, marker_frame, y, ref, grad, h
     With n = 6 n_bodies + 1, ``grad[0:n]`` and ``hess[0:n*n]`` (row-major) are ordered
     [R(3), theta(3)] body by body, then t.  ``kin`` must hold the Euler axes (``KIN_AXES``).  Only
     position-level leaves are allowed; the parser checks that (``Tape.level``).
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    floats : ndarray
+        Real table of the expression (`Tape.floats`).
+    t : float
+        Time, s.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    y : ndarray
+        Unknowns, for states and for loads asked for by name.
+    ref : ndarray
+        References of the counted angles.
+    grad : ndarray
+        Receives the gradient over R and theta of the bodies of the tape, and time.
+    hess : ndarray
+        Receives the Hessian over R and theta of the bodies of the tape, and time, row by row.
+    work : ndarray
+        Scratch, `Tape.work_size` entries.
     """
     count = ints[op.HEAD_COUNT]
     columns = 6 * ints[op.HEAD_BODIES] + 1
@@ -423,7 +589,29 @@ def eval_second(ints, floats, t, kin, marker_body, marker_frame, y, ref, grad, h
     error_model="numpy",
 )
 def update_angles(ints, floats, t, kin, marker_body, marker_frame, y, ref, work):
-    """Move the reference of every wound angle to its present value; call it after an accepted step."""
+    """Move the reference of every wound angle to its present value; call it after an accepted step.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    floats : ndarray
+        Real table of the expression (`Tape.floats`).
+    t : float
+        Time, s.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    y : ndarray
+        Unknowns, for states and for loads asked for by name.
+    ref : ndarray
+        References of the counted angles.
+    work : ndarray
+        Scratch, `Tape.work_size` entries.
+    """
     if ints[op.HEAD_ANGLES] == 0:
         return
     _forward(ints, floats, t, kin, kin, marker_body, marker_frame, y, ref, work, 0)

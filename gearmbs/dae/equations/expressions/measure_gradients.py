@@ -41,7 +41,25 @@ def _point_weight(slot, gx, gy, gz, w, arm, grad):
     nogil=True,
 )
 def _velocity_weight(slot, body, gx, gy, gz, kin, w, arm, grad):
-    """Add the gradient of g . v for a point at arm s: g on dv, s x g on dw, s x (g x w) on dpi."""
+    """Add the gradient of g . v for a point at arm s: g on dv, s x g on dw, s x (g x w) on dpi.
+
+    Parameters
+    ----------
+    slot : int
+        Number of the body in the list of the tape.
+    body : int
+        Number of the body.
+    gx, gy, gz : float
+        Vector g.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    arm : int
+        Offset of the arm s in ``w``.
+    grad : ndarray
+        Receives the gradient: 12 spatial variations of each body of the tape, then its unknowns.
+    """
     if slot < 0:
         return
     k = 12 * slot
@@ -77,7 +95,27 @@ def _axis_weight(slot, weight, w, axis, vector, grad):
     error_model="numpy",
 )
 def vector_gradient(ints, at, weight, kin, marker_body, marker_frame, w, grad):
-    """Add ``weight`` times the gradient of the vector leaf at instruction offset ``at`` to ``grad``."""
+    """Add ``weight`` times the gradient of the vector leaf at instruction offset ``at`` to ``grad``.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    at : int
+        Offset of the leaf in ``ints``.
+    weight : float
+        Factor.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    grad : ndarray
+        Receives the gradient: 12 spatial variations of each body of the tape, then its unknowns.
+    """
     code, i, j, l, k, axis = ints[at], ints[at + 1], ints[at + 2], ints[at + 3], ints[at + 4], ints[at + 5]
     slot_i, slot_j, slot_l, slot_k = ints[at + 6], ints[at + 7], ints[at + 8], ints[at + 9]
     relative_vector(code, i, j, l, kin, kin, marker_body, marker_frame, w)
@@ -124,7 +162,27 @@ def vector_gradient(ints, at, weight, kin, marker_body, marker_frame, w, grad):
     error_model="numpy",
 )
 def radial_gradient(ints, at, weight, kin, marker_body, marker_frame, w, grad):
-    """Add the gradient of VR: n on the relative velocity, (u - n VR)/|r| on the relative position."""
+    """Add the gradient of VR: n on the relative velocity, (u - n VR)/|r| on the relative position.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    at : int
+        Offset of the leaf in ``ints``.
+    weight : float
+        Factor.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    grad : ndarray
+        Receives the gradient: 12 spatial variations of each body of the tape, then its unknowns.
+    """
     i, j, slot_i, slot_j = ints[at + 1], ints[at + 2], ints[at + 6], ints[at + 7]
     f = radial_velocity(i, j, kin, marker_body, marker_frame, w)
     r = w[OTHER]
@@ -146,7 +204,27 @@ def radial_gradient(ints, at, weight, kin, marker_body, marker_frame, w, grad):
     nogil=True,
 )
 def cosine_gradient(ints, at, weight, kin, marker_body, marker_frame, w, grad):
-    """Add the gradient of the cosine of axis a of marker i with axis b of marker j."""
+    """Add the gradient of the cosine of axis a of marker i with axis b of marker j.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    at : int
+        Offset of the leaf in ``ints``.
+    weight : float
+        Factor.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    grad : ndarray
+        Receives the gradient: 12 spatial variations of each body of the tape, then its unknowns.
+    """
     i, a, j, b = ints[at + 1], ints[at + 2], ints[at + 3], ints[at + 4]
     marker_axis(i, a, kin, marker_body, marker_frame, w, AXIS)
     marker_axis(j, b, kin, marker_body, marker_frame, w, VECTOR)
@@ -160,7 +238,27 @@ def cosine_gradient(ints, at, weight, kin, marker_body, marker_frame, w, grad):
     nogil=True,
 )
 def euler_parameter_gradient(ints, at, weight, kin, marker_body, marker_frame, w, grad):
-    """Add the gradient of an Euler parameter: de0 = -d.e/2, de = (e0 d + d x e)/2, d the turn in frame j."""
+    """Add the gradient of an Euler parameter: de0 = -d.e/2, de = (e0 d + d x e)/2, d the turn in frame j.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    at : int
+        Offset of the leaf in ``ints``.
+    weight : float
+        Factor.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    grad : ndarray
+        Receives the gradient: 12 spatial variations of each body of the tape, then its unknowns.
+    """
     i, j, component = ints[at + 1], ints[at + 2], ints[at + 3]
     euler_parameter(i, j, component, kin, marker_body, marker_frame, w)
     e0, ex, ey, ez = w[0], w[1], w[2], w[3]
@@ -190,7 +288,29 @@ def euler_parameter_gradient(ints, at, weight, kin, marker_body, marker_frame, w
     error_model="numpy",
 )
 def force_gradient(ints, at, weight, kin, marker_body, marker_frame, w, grad, first):
-    """Add the gradient of a force component: e on the three unknowns (X stands in the scratch), e x X on dpi_k."""
+    """Add the gradient of a force component: e on the three unknowns (X stands in the scratch), e x X on dpi_k.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    at : int
+        Offset of the leaf in ``ints``.
+    weight : float
+        Factor.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    grad : ndarray
+        Receives the gradient: 12 spatial variations of each body of the tape, then its unknowns.
+    first : int
+        Column of the first of the three unknowns.
+    """
     slot, k, axis = ints[at + 1], ints[at + 4], ints[at + 5]
     resolve(k, axis, kin, marker_body, marker_frame, w)
     if axis != op.MAGNITUDE:

@@ -32,7 +32,29 @@ def _turn(kin, body, k, w, at, out):
     nogil=True,
 )
 def _add_columns(slot, body, sign, kin, w, arm, translate, jac, n):
-    """Add d(vector)/dq to the 3 x n block at ``w[jac]``: the identity on R (a point) and turns on theta."""
+    """Add d(vector)/dq to the 3 x n block at ``w[jac]``: the identity on R (a point) and turns on theta.
+
+    Parameters
+    ----------
+    slot : int
+        Number of the body in the list of the tape.
+    body : int
+        Number of the body.
+    sign : float
+        Factor.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    arm : int
+        Offset of the arm in ``w``.
+    translate : bool
+        Whether the vector ends at a point that moves with R; axes only turn.
+    jac : int
+        Offset of the block in ``w``.
+    n : int
+        Its columns.
+    """
     if slot < 0:
         return
     first = 6 * slot
@@ -51,7 +73,29 @@ def _add_columns(slot, body, sign, kin, w, arm, translate, jac, n):
     nogil=True,
 )
 def _add_second(slot, body, weight, kin, w, arm, along, tmp, hess):
-    """Add weight * w[along] . d2 w[arm]/dtheta2 to the Hessian."""
+    """Add weight * w[along] . d2 w[arm]/dtheta2 to the Hessian.
+
+    Parameters
+    ----------
+    slot : int
+        Number of the body in the list of the tape.
+    body : int
+        Number of the body.
+    weight : float
+        Factor.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    arm : int
+        Offset of the arm in ``w``.
+    along : int
+        Offset of the vector it is multiplied with.
+    tmp : int
+        Offset of free scratch.
+    hess : ndarray
+        Receives the Hessian over R and theta of the bodies of the tape, and time, row by row.
+    """
     if slot < 0:
         return
     first = 6 * slot + 3
@@ -71,7 +115,27 @@ def _add_second(slot, body, weight, kin, w, arm, along, tmp, hess):
     nogil=True,
 )
 def _shifted_columns(slot, body, kin, w, arm, jac, block, n):
-    """Add the turns of an axis to the block at ``block``; ``jac - 6`` is free scratch."""
+    """Add the turns of an axis to the block at ``block``; ``jac - 6`` is free scratch.
+
+    Parameters
+    ----------
+    slot : int
+        Number of the body in the list of the tape.
+    body : int
+        Number of the body.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    arm : int
+        Offset of the axis in ``w``.
+    jac : int
+        Offset of the Jacobian blocks in ``w``.
+    block : int
+        Offset of the block that is added to.
+    n : int
+        Its columns.
+    """
     if slot < 0:
         return
     first = 6 * slot + 3
@@ -88,7 +152,27 @@ def _shifted_columns(slot, body, kin, w, arm, jac, block, n):
     error_model="numpy",
 )
 def leaf_jacobians(ints, at, kin, marker_body, marker_frame, w, jac, n):
-    """Fill the blocks dX/dq and de/dq (3 x n each, at ``jac``) of a leaf and return its value."""
+    """Fill the blocks dX/dq and de/dq (3 x n each, at ``jac``) of a leaf and return its value.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    at : int
+        Offset of the leaf in ``ints``.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    jac : int
+        Offset of the blocks in ``w``.
+    n : int
+        Their columns.
+    """
     for c in range(6 * n):
         w[jac + c] = 0.0
     second = jac + 3 * n
@@ -118,7 +202,31 @@ def leaf_jacobians(ints, at, kin, marker_body, marker_frame, w, jac, n):
     error_model="numpy",
 )
 def leaf_gradient(ints, at, kin, marker_body, marker_frame, w, jac, n, rows, row):
-    """Write the gradient of a leaf in (R, theta) to ``rows[row]``; its Jacobian blocks stand at ``jac``."""
+    """Write the gradient of a leaf in (R, theta) to ``rows[row]``; its Jacobian blocks stand at ``jac``.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    at : int
+        Offset of the leaf in ``ints``.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    jac : int
+        Offset of the blocks in ``w``.
+    n : int
+        Their columns.
+    rows : ndarray
+        Gradients of the leaves, one a row.
+    row : int
+        The row to write.
+    """
     for q in range(n):
         g = 0.0
         for c in range(3):
@@ -134,7 +242,35 @@ def leaf_gradient(ints, at, kin, marker_body, marker_frame, w, jac, n, rows, row
     error_model="numpy",
 )
 def leaf_hessian(ints, at, weight, kin, marker_body, marker_frame, w, jac, n, rows, row, hess):
-    """Add ``weight`` times the Hessian of a position-level leaf to ``hess``."""
+    """Add ``weight`` times the Hessian of a position-level leaf to ``hess``.
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    at : int
+        Offset of the leaf in ``ints``.
+    weight : float
+        Factor.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    jac : int
+        Offset of the blocks in ``w``.
+    n : int
+        Their columns.
+    rows : ndarray
+        Gradients of the leaves, one a row.
+    row : int
+        That of this leaf.
+    hess : ndarray
+        Receives the Hessian over R and theta of the bodies of the tape, and time, row by row.
+    """
     f = leaf_jacobians(ints, at, kin, marker_body, marker_frame, w, jac, n)
     tmp = jac - 6
     if ints[at] == op.COSINE:

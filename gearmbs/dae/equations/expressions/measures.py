@@ -90,7 +90,27 @@ def _add_omega(m, sign, kin, marker_body, w, out):
     nogil=True,
 )
 def _add_acceleration(m, sign, kin, acc, marker_body, w, arm, out):
-    """Add sign * (a + alpha x s + w x (w x s)) of a marker."""
+    """Add sign * (a + alpha x s + w x (w x s)) of a marker.
+
+    Parameters
+    ----------
+    m : int
+        Marker, or -1 for the global frame.
+    sign : float
+        Factor.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    acc : ndarray, shape (bodies, 6)
+        Accelerations a and alpha of the bodies; not used where none are asked for.
+    marker_body : ndarray of int
+        Body of each marker.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    arm : int
+        Offset of its arm s in ``w``.
+    out : int
+        Offset in ``w`` of the vector that is added to.
+    """
     if m < 0:
         return
     b = marker_body[m]
@@ -148,7 +168,27 @@ def _relative_acceleration(i, j, l, kin, acc, marker_body, w):
     nogil=True,
 )
 def relative_vector(code, i, j, l, kin, acc, marker_body, marker_frame, w):
-    """Write the vector X of a leaf between markers i and j, seen in frame l, to the scratch."""
+    """Write the vector X of a leaf between markers i and j, seen in frame l, to the scratch.
+
+    Parameters
+    ----------
+    code : int
+        Kind of the leaf, `opcodes`.
+    i, j : int
+        Markers between which the vector is taken, -1 for the global frame.
+    l : int
+        Marker in whose frame rates are seen, or -1.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    acc : ndarray, shape (bodies, 6)
+        Accelerations a and alpha of the bodies; not used where none are asked for.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    w : ndarray
+        Scratch of a leaf, its vectors of three at the offsets of `measures`.
+    """
     for c in range(3):
         w[VECTOR + c] = 0.0
     if code == op.ANGULAR_VELOCITY:
