@@ -1,8 +1,150 @@
-"""gearmbs: an open, ADAMS-style multibody DAE solver for gear dynamics."""
+"""gearmbs: an open, ADAMS-style multibody DAE solver for gear dynamics.
 
-from gearmbs._kernel_cache import drop_stale
+``import gearmbs as gm`` gives what most programs need; everything is loaded when it is first used::
+
+    import gearmbs as gm
+
+    data = gm.run_case(gm.Case(operation={"speed": "1000 rpm"}))
+    report = gm.analyse(gm.read_signal("gearbox.csv", rate=12800.0), teeth=29)
+
+Studies
+    `Case`, `CaseError`, `load_case`, `make_case`, `run_case`, `run_cases`, `run_paper`, `gear_rig`
+Gears
+    `GearPair`, `GearSpec`, `Material`, `ContactLaw`, `FlankFriction`, `faults`
+Mechanisms
+    `Mechanism`, `JointFriction`, `simulate`, `static_equilibrium`, `linear_modes`, `Solution`
+Differential-algebraic equations
+    `solve_dae`, `DAEProblem`, `DAEResult`, `Status`
+Signals
+    `read_signal`, `write_signal`, `make_signal`, `analyse`, `compare`, `spectrum`, `envelope_spectrum`
+ADAMS decks
+    `read_deck`, `run_deck`, `write_deck`
+Views
+    `gear_scene`, `mechanism_scene`, `solution_scene`, `mesh_animation`
+Units
+    `to_si`
+
+The subpackages hold the rest: `gearmbs.studies`, `gearmbs.gears`, `gearmbs.mechanism`, `gearmbs.dae`,
+`gearmbs.signals`, `gearmbs.adams`, `gearmbs.view`.
+"""
+
+from typing import TYPE_CHECKING
+
+from gearmbs._lazy import late
+
+if TYPE_CHECKING:
+    from gearmbs.adams import read_deck, run_deck, write_deck
+    from gearmbs.dae import DAEProblem, DAEResult, Status, solve_dae
+    from gearmbs.dae.results.solution import Solution
+    from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, Material, faults
+    from gearmbs.mechanism import JointFriction, Mechanism, linear_modes, simulate, static_equilibrium
+    from gearmbs.signals import (
+        analyse,
+        compare,
+        envelope_spectrum,
+        make_signal,
+        read_signal,
+        spectrum,
+        write_signal,
+    )
+    from gearmbs.studies import (
+        Case,
+        CaseError,
+        gear_rig,
+        load_case,
+        make_case,
+        run_case,
+        run_cases,
+        run_paper,
+    )
+    from gearmbs.units import to_si
+    from gearmbs.view import gear_scene, mechanism_scene, mesh_animation, solution_scene
 
 __version__ = "0.1.0"
 
-drop_stale()
-del drop_stale
+__all__ = [
+    "Case",
+    "CaseError",
+    "ContactLaw",
+    "DAEProblem",
+    "DAEResult",
+    "FlankFriction",
+    "GearPair",
+    "GearSpec",
+    "JointFriction",
+    "Material",
+    "Mechanism",
+    "Solution",
+    "Status",
+    "analyse",
+    "compare",
+    "envelope_spectrum",
+    "faults",
+    "gear_rig",
+    "gear_scene",
+    "linear_modes",
+    "load_case",
+    "make_case",
+    "make_signal",
+    "mechanism_scene",
+    "mesh_animation",
+    "read_deck",
+    "read_signal",
+    "run_case",
+    "run_cases",
+    "run_deck",
+    "run_paper",
+    "simulate",
+    "solution_scene",
+    "solve_dae",
+    "spectrum",
+    "static_equilibrium",
+    "to_si",
+    "write_deck",
+    "write_signal",
+]
+
+late(
+    __name__,
+    {
+        "Case": ".studies",
+        "CaseError": ".studies",
+        "ContactLaw": ".gears",
+        "DAEProblem": ".dae",
+        "DAEResult": ".dae",
+        "FlankFriction": ".gears",
+        "GearPair": ".gears",
+        "GearSpec": ".gears",
+        "JointFriction": ".mechanism",
+        "Material": ".gears",
+        "Mechanism": ".mechanism",
+        "Solution": ".dae.results.solution",
+        "Status": ".dae",
+        "analyse": ".signals",
+        "compare": ".signals",
+        "envelope_spectrum": ".signals",
+        "faults": ".gears",
+        "gear_rig": ".studies",
+        "gear_scene": ".view",
+        "linear_modes": ".mechanism",
+        "load_case": ".studies",
+        "make_case": ".studies",
+        "make_signal": ".signals",
+        "mechanism_scene": ".view",
+        "mesh_animation": ".view",
+        "read_deck": ".adams",
+        "read_signal": ".signals",
+        "run_case": ".studies",
+        "run_cases": ".studies",
+        "run_deck": ".adams",
+        "run_paper": ".studies",
+        "simulate": ".mechanism",
+        "solution_scene": ".view",
+        "solve_dae": ".dae",
+        "spectrum": ".signals",
+        "static_equilibrium": ".mechanism",
+        "to_si": ".units",
+        "write_deck": ".adams",
+        "write_signal": ".signals",
+    },
+)

@@ -1,30 +1,54 @@
-"""Names of a package that are imported when they are first used, so that importing the package compiles nothing."""
+"""Names of a package that are imported when they are first used, so that importing the package loads nothing heavy."""
 
 from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from types import ModuleType
 from typing import Any
 
 
-def late(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return the ``__getattr__`` of a package for names that live elsewhere.
+class _LatePackage(ModuleType):
+    """A package whose public names are found when asked for.
+
+    A public name may be that of the module it lives in, as `gearmbs.signals.envelope`: the name is then what the
+    package says it is, whether or not the module has been imported.
+    """
+
+    _homes: Mapping[str, str]
+
+    def __getattr__(self, name: str) -> Any:
+        home = self._homes.get(name)
+        if home is None:
+            raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+        module, colon, other = home.partition(":")
+        value = importlib.import_module(module, self.__name__)
+        if other or not colon:
+            value = getattr(value, other or name)
+        ModuleType.__setattr__(self, name, value)
+        return value
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        # the import system binds each submodule to its name
+        if not (isinstance(value, ModuleType) and name in self._homes):
+            ModuleType.__setattr__(self, name, value)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*self.__dict__, *self._homes} - {"_homes"})
+
+
+def late(package: str, homes: Mapping[str, str]) -> None:
+    """Have names of a package imported from elsewhere at their first use.
 
     Parameters
     ----------
     package : str
         Its ``__name__``.
     homes : mapping
-        Module by name; ``"module:other"`` where the name is another there.
+        Module by name, ``".module"`` for one of the package; ``"module:other"`` where the name is another there,
+        ``"module:"`` for the module itself.
     """
-
-    def get(name: str) -> Any:
-        if name not in homes:
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        module, _, other = homes[name].partition(":")
-        value = getattr(importlib.import_module(module), other or name)
-        setattr(sys.modules[package], name, value)
-        return value
-
-    return get
+    module = sys.modules[package]
+    module.__dict__["_homes"] = dict(homes)
+    module.__class__ = _LatePackage

@@ -1,64 +1,227 @@
-"""Compile the numba kernels ahead of use: ``python -m gearmbs.compile``.
+"""Compile the numerical kernels ahead of use: ``python -m gearmbs.compile``.
 
-The kernels are compiled on first import and cached on disk. This does it at once, independent rooms side by
-side, so that a fresh machine waits for the longest chain only.
+Kernels are compiled when they are first called and kept on disk. This does it at once and on all cores: kernels whose
+callees are ready are handed to helper processes, longest chain first, so that each is compiled once. A program that
+meets missing kernels does the same for those that it has imported.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import subprocess
 import sys
 import time
-from pathlib import Path
+import traceback
+from collections.abc import Callable, Iterable
+from threading import Condition, Thread
+from typing import TYPE_CHECKING
 
-PACKAGE = Path(__file__).parent
+if TYPE_CHECKING:
+    from gearmbs._jit import Kernel
 
+HELPER = "GEARMBS_COMPILING"
+"""Set in the environment of helper processes, which start none themselves."""
 
-def force_kernels() -> tuple[str, ...]:
-    """Return the modules with kernels of force elements, which end in ``_kernel``."""
-    files = sorted(PACKAGE.glob("[a-z]*/**/*_kernel.py"))
-    return tuple(".".join(("gearmbs", *file.relative_to(PACKAGE).with_suffix("").parts)) for file in files)
-
-
-STAGES = (
-    ("gearmbs.gears.transmission", "gearmbs.dae.equations.expressions.evaluate", "gearmbs.dae.integrators.wstiff"),
-    ("gearmbs.dae.equations.jacobian", "gearmbs.dae.equations.residual", *force_kernels()),
-    ("gearmbs.dae.model.evaluator", "gearmbs.dae.equations.euler_switch"),
-    ("gearmbs.studies.paper", "gearmbs.signals", "gearmbs.mechanism.measures", "gearmbs.dae.model.members"),
-)
-"""Modules whose kernels do not depend on each other within a stage."""
+Report = Callable[[str], None]
 
 
-def compile_all(report=None) -> float:
-    """Compile and cache every kernel; return the seconds it took.
+def compile_all(
+    report: Report | None = None, modules: Iterable[str] | None = None, workers: int | None = None
+) -> float:
+    """Compile and cache every kernel that is not yet on disk; return the seconds it took.
 
     Parameters
     ----------
     report : callable, optional
-        Called with a line of text as each stage begins.
+        Called with a line of text for each kernel that is ready.
+    modules : iterable of str, optional
+        Compile what these modules need; by default, all of the package.
+    workers : int, optional
+        Processes at a time; by default, as many as there are cores for this process.
 
     Raises
     ------
     RuntimeError
-        If a module cannot be imported; with its traceback.
+        If a kernel cannot be compiled; with its traceback.
     """
+    from gearmbs._kernel_calls import entries, kernel_modules, kernels
+
     start = time.perf_counter()
-    environment = {**os.environ, "GEARMBS_COMPILING": "1"}
-    for stage in STAGES:
-        if report is not None:
-            report("compiling " + ", ".join(stage))
-        running = [
-            subprocess.Popen([sys.executable, "-c", f"import {module}"], env=environment, stderr=subprocess.PIPE)
-            for module in stage
-        ]
-        for module, process in zip(stage, running):
-            _, error = process.communicate()
-            if process.returncode:
-                raise RuntimeError(f"{module} could not be compiled:\n{error.decode(errors='replace')}")
+    found = kernels(kernel_modules() if modules is None else modules)
+    compile_entries(entries(found), report, workers)
     return time.perf_counter() - start
 
 
-if __name__ == "__main__":
-    seconds = compile_all(print)
+def compile_missing(kernel: Kernel) -> bool:
+    """Compile what a program lacks that has imported a kernel and found it missing; tell so on standard error.
+
+    Returns
+    -------
+    bool
+        False if nothing was done: in a helper process, where nothing can be kept, or if the helpers failed.
+    """
+    from gearmbs import _kernel_cache as cache
+    from gearmbs._kernel_calls import entries, kernels
+
+    package = kernel.__module__.partition(".")[0]
+    if HELPER in os.environ or package != __package__ or not cache.writable(package):
+        return False
+    loaded = [name for name in list(sys.modules) if name.partition(".")[0] == package]
+    wanted = entries(kernels(loaded), loaded)
+    start = time.perf_counter()
+    told = [0.0]
+
+    def report(line: str) -> None:
+        now = time.perf_counter() - start
+        if now - told[0] > 10.0:
+            told[0] = now
+            print(f"gearmbs: {line.partition(' ')[0]} kernels after {now:.0f} s", file=sys.stderr, flush=True)
+
+    print("gearmbs: compiling the numerical kernels that are needed, once", file=sys.stderr, flush=True)
+    try:
+        compile_entries([*{kernel, *wanted}], report)
+    except (RuntimeError, OSError):
+        return False
+    print(f"gearmbs: compiled in {time.perf_counter() - start:.0f} s", file=sys.stderr, flush=True)
+    return True
+
+
+def compile_entries(wanted: list[Kernel], report: Report | None = None, workers: int | None = None) -> None:
+    """Compile entries, and all parts below them, that are not on disk; see `compile_all`."""
+    tasks = _Tasks(wanted, report)
+    if not tasks.waiting:
+        return
+    count = min(workers or _cores(), len(tasks.waiting))
+    threads = [Thread(target=tasks.work, daemon=True) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    if tasks.errors:
+        raise RuntimeError(tasks.errors[0])
+
+
+def _cores() -> int:
+    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(available, 8)
+
+
+class _Tasks:
+    """What is to be compiled, and what has to be ready before."""
+
+    def __init__(self, wanted: list[Kernel], report: Report | None) -> None:
+        from gearmbs import _kernel_cache as cache
+        from gearmbs._kernel_calls import address, below
+
+        self.report = report or (lambda line: None)
+        self.errors: list[str] = []
+        self.lock = Condition()
+        self.running = 0
+        self.waiting: dict[str, set[str]] = {}
+        self.order: dict[str, int] = {}
+        wanted = [k for k in wanted if not cache.stored(k, "entry", k.declared_types()[0])]
+        parts = {
+            k
+            for entry in wanted
+            for k in below(entry)
+            if k.declared is not None and not cache.stored(k, "part", k.declared_types()[0])
+        }
+        for kind, kernels in (("part", parts), ("entry", wanted)):
+            for kernel in kernels:
+                task = f"{kind} {address(kernel)}"
+                self.waiting[task] = {f"part {address(k)}" for k in below(kernel) & parts}
+        # what much else waits for goes first, then what is large
+        for task, before in self.waiting.items():
+            self.order[task] = self.order.get(task, 0) + len(before)
+            for other in before:
+                self.order[other] = self.order.get(other, 0) + 1000
+        self.total = len(self.waiting)
+
+    def work(self) -> None:
+        """Feed one helper process until nothing is left."""
+        command = [sys.executable, "-m", "gearmbs.compile", "--helper"]
+        environment = {**os.environ, HELPER: "1"}
+        pipe = subprocess.PIPE
+        with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=environment) as helper:
+            assert helper.stdin is not None
+            assert helper.stdout is not None
+            while (task := self._next()) is not None:
+                start = time.perf_counter()
+                try:
+                    helper.stdin.write(task + "\n")
+                    helper.stdin.flush()
+                    answer = helper.stdout.readline().strip()
+                except OSError as error:
+                    answer = str(error)
+                self._done(task, answer, time.perf_counter() - start)
+            helper.stdin.close()
+
+    def _next(self) -> str | None:
+        with self.lock:
+            while True:
+                ready = [task for task, before in self.waiting.items() if not before]
+                if ready and not self.errors:
+                    task = max(ready, key=lambda t: self.order[t])
+                    del self.waiting[task]
+                    self.running += 1
+                    return task
+                if not self.running or self.errors:
+                    self.lock.notify_all()
+                    return None
+                self.lock.wait()
+
+    def _done(self, task: str, answer: str, seconds: float) -> None:
+        with self.lock:
+            self.running -= 1
+            if answer == "ok":
+                for before in self.waiting.values():
+                    before.discard(task)
+                self.report(f"{self.total - len(self.waiting) - self.running}/{self.total} {task} {seconds:.1f} s")
+            else:
+                text = answer.encode().decode("unicode_escape") if answer else "the helper process ended"
+                self.errors.append(f"{task} could not be compiled:\n{text}")
+            self.lock.notify_all()
+
+
+def _help() -> None:
+    """Compile what is asked for on standard input, line by line."""
+    import gc
+
+    from gearmbs._kernel_calls import find
+
+    # the compiler makes millions of objects that live on; looking for cycles among them is time lost
+    gc.disable()
+    answers, sys.stdout = sys.stdout, sys.stderr
+    for line in sys.stdin:
+        kind, _, address = line.strip().partition(" ")
+        try:
+            kernel = find(*address.split(":"))
+            if kernel is None:
+                raise LookupError(address)
+            if kind == "part":
+                kernel.part(kernel.declared_types()[0])
+            else:
+                kernel.ready()
+            answer = "ok"
+        except Exception:
+            answer = traceback.format_exc().encode("unicode_escape").decode()
+        print(answer, file=answers, flush=True)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line of this module."""
+    parser = argparse.ArgumentParser(prog="python -m gearmbs.compile", description="Compile the numerical kernels.")
+    parser.add_argument("--helper", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--workers", type=int, help="processes at a time; default: the cores")
+    parser.add_argument("--quiet", action="store_true", help="print the last line only")
+    given = parser.parse_args(arguments)
+    if given.helper:
+        _help()
+        return
+    seconds = compile_all(None if given.quiet else print, workers=given.workers)
     print(f"kernels ready after {seconds:.1f} s")
+
+
+if __name__ == "__main__":
+    main()

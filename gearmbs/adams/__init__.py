@@ -1,12 +1,17 @@
 """ADAMS decks in and out: .adm and .acf read and run, .res, .req and .msg written, mechanisms written as .adm."""
 
-from gearmbs.adams.errors import DeckError, Diagnostic
-from gearmbs.adams.parse.commands import Script, parse_script, read_script
-from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.reader import parse_deck, read_deck
-from gearmbs.adams.results.result import AdamsResult
-from gearmbs.adams.run.runner import run_deck
-from gearmbs.adams.write.deck_writer import write_deck
+from typing import TYPE_CHECKING
+
+from gearmbs._lazy import late
+
+if TYPE_CHECKING:
+    from gearmbs.adams.errors import DeckError, Diagnostic
+    from gearmbs.adams.parse.commands import Script, parse_script, read_script
+    from gearmbs.adams.parse.deck import Deck
+    from gearmbs.adams.parse.reader import parse_deck, read_deck
+    from gearmbs.adams.results.result import AdamsResult
+    from gearmbs.adams.run.runner import run_deck
+    from gearmbs.adams.write.deck_writer import write_deck
 
 __all__ = [
     "AdamsResult",
@@ -21,3 +26,20 @@ __all__ = [
     "run_deck",
     "write_deck",
 ]
+
+late(
+    __name__,
+    {
+        "AdamsResult": ".results.result",
+        "Deck": ".parse.deck",
+        "DeckError": ".errors",
+        "Diagnostic": ".errors",
+        "Script": ".parse.commands",
+        "parse_deck": ".parse.reader",
+        "parse_script": ".parse.commands",
+        "read_deck": ".parse.reader",
+        "read_script": ".parse.commands",
+        "run_deck": ".run.runner",
+        "write_deck": ".write.deck_writer",
+    },
+)

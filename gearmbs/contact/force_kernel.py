@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from gearmbs._jit import njit
 from gearmbs.contact.kernel import GEAR_CONTACT_SIG
 from gearmbs.dae.compiled.pointers import caller
 from gearmbs.dae.compiled.views import matrix_at, vector_at

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from numba import njit, types
+from numba import types
 
+from gearmbs._jit import njit
 from gearmbs.contact import layout as L
 from gearmbs.contact.flanks import side_contacts
 from gearmbs.contact.jit import kernel

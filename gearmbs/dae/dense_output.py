@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, njit, types
+from numba import float64, int64, types
+
+from gearmbs._jit import njit
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]

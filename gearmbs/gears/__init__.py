@@ -3,21 +3,17 @@
 from typing import TYPE_CHECKING
 
 from gearmbs._lazy import late
-from gearmbs.gears import faults
-from gearmbs.gears.contact_model import ContactModel
-from gearmbs.gears.geometry import PairGeometry, Placement
-from gearmbs.gears.laws import ContactLaw, FlankFriction
-from gearmbs.gears.operating_point import OperatingPoint
-from gearmbs.gears.pair import GearPair
-from gearmbs.gears.spec import GearSpec, Material, involute
 
 if TYPE_CHECKING:
+    from gearmbs.gears import faults
     from gearmbs.gears.contact_element import GearContact
-    from gearmbs.gears.transmission import (
-        TransmissionError,
-        kinematic_transmission_error,
-        loaded_transmission_error,
-    )
+    from gearmbs.gears.contact_model import ContactModel
+    from gearmbs.gears.geometry import PairGeometry, Placement
+    from gearmbs.gears.laws import ContactLaw, FlankFriction
+    from gearmbs.gears.operating_point import OperatingPoint
+    from gearmbs.gears.pair import GearPair
+    from gearmbs.gears.spec import GearSpec, Material, involute
+    from gearmbs.gears.transmission import TransmissionError, kinematic_transmission_error, loaded_transmission_error
 
 __all__ = [
     "ContactLaw",
@@ -37,13 +33,23 @@ __all__ = [
     "loaded_transmission_error",
 ]
 
-# the contact kernels are compiled for these
-__getattr__ = late(
+late(
     __name__,
     {
-        "GearContact": "gearmbs.gears.contact_element",
-        "TransmissionError": "gearmbs.gears.transmission",
-        "kinematic_transmission_error": "gearmbs.gears.transmission",
-        "loaded_transmission_error": "gearmbs.gears.transmission",
+        "ContactLaw": ".laws",
+        "ContactModel": ".contact_model",
+        "FlankFriction": ".laws",
+        "GearContact": ".contact_element",
+        "GearPair": ".pair",
+        "GearSpec": ".spec",
+        "Material": ".spec",
+        "OperatingPoint": ".operating_point",
+        "PairGeometry": ".geometry",
+        "Placement": ".geometry",
+        "TransmissionError": ".transmission",
+        "faults": ".faults:",
+        "involute": ".spec",
+        "kinematic_transmission_error": ".transmission",
+        "loaded_transmission_error": ".transmission",
     },
 )

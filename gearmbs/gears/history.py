@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
+from gearmbs._jit import njit
 from gearmbs.contact import gear_contact
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.tables import pack

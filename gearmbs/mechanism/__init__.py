@@ -1,15 +1,19 @@
 """What a person builds: bodies, markers, joints, motions, forces."""
 
-import gearmbs._announce  # noqa: F401  (tells that kernels are being compiled)
-from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
-from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
-from gearmbs.mechanism.elements import Compiled, ForceElement, Load, State, Torque
-from gearmbs.mechanism.friction import JointFriction
-from gearmbs.mechanism.functions import TimeFunction, constant, expression, harmonic, polynomial, ramp, step
-from gearmbs.mechanism.joints import Joint
-from gearmbs.mechanism.mechanism import Mechanism
-from gearmbs.mechanism.parts import Body, Marker
-from gearmbs.mechanism.simulate import simulate
+from typing import TYPE_CHECKING
+
+from gearmbs._lazy import late
+
+if TYPE_CHECKING:
+    from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
+    from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
+    from gearmbs.mechanism.elements import Compiled, ForceElement, Load, State, Torque
+    from gearmbs.mechanism.friction import JointFriction
+    from gearmbs.mechanism.functions import TimeFunction, constant, expression, harmonic, polynomial, ramp, step
+    from gearmbs.mechanism.joints import Joint
+    from gearmbs.mechanism.mechanism import Mechanism
+    from gearmbs.mechanism.parts import Body, Marker
+    from gearmbs.mechanism.simulate import simulate
 
 __all__ = [
     "AssemblyError",
@@ -38,3 +42,34 @@ __all__ = [
     "static_equilibrium",
     "step",
 ]
+
+late(
+    __name__,
+    {
+        "AssemblyError": "gearmbs.dae.errors",
+        "Body": ".parts",
+        "Compiled": ".elements",
+        "ForceElement": ".elements",
+        "Joint": ".joints",
+        "JointFriction": ".friction",
+        "Load": ".elements",
+        "Marker": ".parts",
+        "Mechanism": ".mechanism",
+        "ModelError": "gearmbs.dae.errors",
+        "SingularModelError": "gearmbs.dae.errors",
+        "State": ".elements",
+        "TimeFunction": ".functions",
+        "Torque": ".elements",
+        "constant": ".functions",
+        "expression": ".functions",
+        "harmonic": ".functions",
+        "kinematic": ".analyses",
+        "linear_modes": ".analyses",
+        "polynomial": ".functions",
+        "quasi_static": ".analyses",
+        "ramp": ".functions",
+        "simulate": ".simulate",
+        "static_equilibrium": ".analyses",
+        "step": ".functions",
+    },
+)

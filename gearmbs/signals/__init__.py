@@ -3,69 +3,74 @@
 A signal is an `xarray.DataArray` with dimensions (time, channel); see `gearmbs.signals.signal`.
 """
 
-from .analysis import analyse, analyse_file
-from .analysis_report import AnalysisReport
-from .angular import angular_resample, order_spectrum, time_synchronous_average
-from .bands import band_rms, gmf_rms, order_rms, rms
-from .cepstrum import power_cepstrum
-from .comparison import compare, compare_files
-from .comparison_report import ComparisonReport
-from .conversion import convert
-from .envelope import envelope, envelope_spectrum, kurtogram, spectral_kurtosis
-from .errors import MissingMetadataError, SignalError, SignalFileError
-from .expectations import EXPECTED
-from .filters import bandpass, decimate, resample
-from .indicators import (
-    INDICATORS,
-    condition_indicators,
-    crest_factor,
-    energy_ratio,
-    fm0,
-    fm4,
-    kurtosis,
-    m6a,
-    m8a,
-    mesh_envelope,
-    na4,
-    nb4,
-    peak_to_peak,
-    sideband_index,
-    sideband_level,
-)
-from .io import FORMATS, read_signal, write_signal
-from .orders import harmonic_amplitudes
-from .ordinal import level_distance, ordinal_agreement
-from .phase import instantaneous_speed, phase_from_line, phase_from_speed, phase_from_tacho
-from .scaling import dynamic_rms, remove_mean, rms_factor, scale, scale_states
-from .sections import sections, trend, trend_table
-from .sensors import (
-    FrfPath,
-    ModalPath,
-    Mode,
-    accelerometer,
-    add_noise,
-    joint_force,
-    laser_vibrometer,
-    measure,
-    quantise,
-    sample,
-)
-from .shaft_force import COMPONENTS, force_components, force_to_acceleration
-from .signal import (
-    as_signal,
-    common_unit,
-    make_signal,
-    mesh_frequency,
-    rate_of,
-    require,
-    trim,
-    units_of,
-    with_metadata,
-)
-from .spectra import spectrum
-from .speed import SpeedEstimate, estimate_speed
-from .tsa import difference_signal, regular_signal, remove_orders, residual_signal
-from .uneven import even_signal
+from typing import TYPE_CHECKING
+
+from gearmbs._lazy import late
+
+if TYPE_CHECKING:
+    from gearmbs.signals.analysis import analyse, analyse_file
+    from gearmbs.signals.analysis_report import AnalysisReport
+    from gearmbs.signals.angular import angular_resample, order_spectrum, time_synchronous_average
+    from gearmbs.signals.bands import band_rms, gmf_rms, order_rms, rms
+    from gearmbs.signals.cepstrum import power_cepstrum
+    from gearmbs.signals.comparison import compare, compare_files
+    from gearmbs.signals.comparison_report import ComparisonReport
+    from gearmbs.signals.conversion import convert
+    from gearmbs.signals.envelope import envelope, envelope_spectrum, kurtogram, spectral_kurtosis
+    from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
+    from gearmbs.signals.expectations import EXPECTED
+    from gearmbs.signals.filters import bandpass, decimate, resample
+    from gearmbs.signals.indicators import (
+        INDICATORS,
+        condition_indicators,
+        crest_factor,
+        energy_ratio,
+        fm0,
+        fm4,
+        kurtosis,
+        m6a,
+        m8a,
+        mesh_envelope,
+        na4,
+        nb4,
+        peak_to_peak,
+        sideband_index,
+        sideband_level,
+    )
+    from gearmbs.signals.io import FORMATS, read_signal, write_signal
+    from gearmbs.signals.orders import harmonic_amplitudes
+    from gearmbs.signals.ordinal import level_distance, ordinal_agreement
+    from gearmbs.signals.phase import instantaneous_speed, phase_from_line, phase_from_speed, phase_from_tacho
+    from gearmbs.signals.scaling import dynamic_rms, remove_mean, rms_factor, scale, scale_states
+    from gearmbs.signals.sections import sections, trend, trend_table
+    from gearmbs.signals.sensors import (
+        FrfPath,
+        ModalPath,
+        Mode,
+        accelerometer,
+        add_noise,
+        joint_force,
+        laser_vibrometer,
+        measure,
+        quantise,
+        sample,
+    )
+    from gearmbs.signals.shaft_force import COMPONENTS, force_components, force_to_acceleration
+    from gearmbs.signals.signal import (
+        as_signal,
+        common_unit,
+        make_signal,
+        mesh_frequency,
+        rate_of,
+        require,
+        trim,
+        units_of,
+        with_metadata,
+    )
+    from gearmbs.signals.spectra import spectrum
+    from gearmbs.signals.speed import SpeedEstimate, estimate_speed
+    from gearmbs.signals.tsa import difference_signal, regular_signal, remove_orders, residual_signal
+    from gearmbs.signals.uneven import even_signal
 
 __all__ = [
     "COMPONENTS",
@@ -158,3 +163,98 @@ __all__ = [
     "with_metadata",
     "write_signal",
 ]
+
+late(
+    __name__,
+    {
+        "COMPONENTS": ".shaft_force",
+        "EXPECTED": ".expectations",
+        "FORMATS": ".io",
+        "INDICATORS": ".indicators",
+        "AnalysisReport": ".analysis_report",
+        "ComparisonReport": ".comparison_report",
+        "FrfPath": ".sensors",
+        "MissingMetadataError": ".errors",
+        "ModalPath": ".sensors",
+        "Mode": ".sensors",
+        "SignalError": ".errors",
+        "SignalFileError": ".errors",
+        "SpeedEstimate": ".speed",
+        "accelerometer": ".sensors",
+        "add_noise": ".sensors",
+        "analyse": ".analysis",
+        "analyse_file": ".analysis",
+        "angular_resample": ".angular",
+        "as_signal": ".signal",
+        "band_rms": ".bands",
+        "bandpass": ".filters",
+        "common_unit": ".signal",
+        "compare": ".comparison",
+        "compare_files": ".comparison",
+        "condition_indicators": ".indicators",
+        "convert": ".conversion",
+        "crest_factor": ".indicators",
+        "decimate": ".filters",
+        "difference_signal": ".tsa",
+        "dynamic_rms": ".scaling",
+        "energy_ratio": ".indicators",
+        "envelope": ".envelope",
+        "envelope_spectrum": ".envelope",
+        "estimate_speed": ".speed",
+        "even_signal": ".uneven",
+        "fm0": ".indicators",
+        "fm4": ".indicators",
+        "force_components": ".shaft_force",
+        "force_to_acceleration": ".shaft_force",
+        "gmf_rms": ".bands",
+        "harmonic_amplitudes": ".orders",
+        "instantaneous_speed": ".phase",
+        "joint_force": ".sensors",
+        "kurtogram": ".envelope",
+        "kurtosis": ".indicators",
+        "laser_vibrometer": ".sensors",
+        "level_distance": ".ordinal",
+        "m6a": ".indicators",
+        "m8a": ".indicators",
+        "make_signal": ".signal",
+        "measure": ".sensors",
+        "mesh_envelope": ".indicators",
+        "mesh_frequency": ".signal",
+        "na4": ".indicators",
+        "nb4": ".indicators",
+        "order_rms": ".bands",
+        "order_spectrum": ".angular",
+        "ordinal_agreement": ".ordinal",
+        "peak_to_peak": ".indicators",
+        "phase_from_line": ".phase",
+        "phase_from_speed": ".phase",
+        "phase_from_tacho": ".phase",
+        "power_cepstrum": ".cepstrum",
+        "quantise": ".sensors",
+        "rate_of": ".signal",
+        "read_signal": ".io",
+        "regular_signal": ".tsa",
+        "remove_mean": ".scaling",
+        "remove_orders": ".tsa",
+        "require": ".signal",
+        "resample": ".filters",
+        "residual_signal": ".tsa",
+        "rms": ".bands",
+        "rms_factor": ".scaling",
+        "sample": ".sensors",
+        "scale": ".scaling",
+        "scale_states": ".scaling",
+        "sections": ".sections",
+        "sideband_index": ".indicators",
+        "sideband_level": ".indicators",
+        "spectral_kurtosis": ".envelope",
+        "spectrum": ".spectra",
+        "time_synchronous_average": ".angular",
+        "trend": ".sections",
+        "trend_table": ".sections",
+        "trim": ".signal",
+        "units_of": ".signal",
+        "with_metadata": ".signal",
+        "write_signal": ".io",
+    },
+)

@@ -12,10 +12,10 @@ from fractions import Fraction
 from typing import Literal
 
 import numpy as np
-import scipy.signal as ss
 import xarray as xr
 
 from .errors import SignalError
+from .fir import convolve_valid, kaiser_order, windowed_sinc
 from .signal import check_rate, like, rate_of
 
 Edges = Literal["trim", "extend"]
@@ -50,8 +50,8 @@ def kaiser_taps(
     ----------
     .. [1] J. F. Kaiser, Nonrecursive digital filter design using the I0-sinh window function, ISCAS 1974.
     """
-    count, beta = ss.kaiserord(attenuation, width / (0.5 * rate))
-    return ss.firwin(count | 1, cutoffs, window=("kaiser", beta), pass_zero=kind, fs=rate)
+    count, beta = kaiser_order(attenuation, width / (0.5 * rate))
+    return windowed_sinc(count | 1, cutoffs, kind, rate, beta)
 
 
 def apply_zero_phase(values: np.ndarray, taps: np.ndarray, edges: Edges, step: int = 1) -> tuple[np.ndarray, int]:
@@ -105,7 +105,7 @@ def _valid(source: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:
     block = max(1, BLOCK // step) * step
     for start in range(0, count, block):
         stop = min(start + block, count)
-        piece = ss.oaconvolve(source[start : stop + taps.size - 1], taps, mode="valid")[::step]
+        piece = convolve_valid(source[start : stop + taps.size - 1], taps)[::step]
         out[start // step : start // step + piece.size] = piece
     return out
 
@@ -166,7 +166,7 @@ def filtered_mean_square(column: np.ndarray, taps: np.ndarray, count: int) -> fl
     total = 0.0
     for start in range(0, count, BLOCK):
         stop = min(start + BLOCK, count)
-        piece = ss.oaconvolve(column[start : stop + taps.size - 1] - mean, taps, mode="valid")
+        piece = convolve_valid(column[start : stop + taps.size - 1] - mean, taps)
         total += float(piece @ piece)
     return total / count
 
@@ -261,6 +261,8 @@ def resample(signal: xr.DataArray, rate: float, *, attenuation: float = ATTENUAT
         "lowpass",
         attenuation,
     )
-    columns = [ss.resample_poly(column, up, down, window=taps, padtype="line") for column in signal.values.T]
+    from scipy.signal import resample_poly
+
+    columns = [resample_poly(column, up, down, window=taps, padtype="line") for column in signal.values.T]
     count = math.ceil(signal.sizes["time"] * up / down)
     return like(signal, np.stack(columns, axis=1)[:count], rate=new)

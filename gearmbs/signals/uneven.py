@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import PchipInterpolator
 
 from .errors import SignalError
 from .filters import decimate
+from .monotone_cubic import monotone_cubic
 from .signal import check_rate, make_signal
 
 FINE_RATE = 400e3
@@ -76,9 +76,8 @@ def even_signal(
     if first < low or last > high:
         raise SignalError(f"start, stop: {start:g} to {stop:g} s is not within the times {t[0]:g} to {t[-1]:g} s")
     fine = np.arange(low * factor, high * factor + 1) / (factor * rate)
-    spline = PchipInterpolator(t, values, axis=0)
     signal = make_signal(
-        spline(np.clip(fine, t[0], t[-1])),
+        monotone_cubic(t, values, np.clip(fine, t[0], t[-1])),
         factor * rate,
         units=units,
         channels=channels,

@@ -3,10 +3,10 @@
 from typing import TYPE_CHECKING
 
 from gearmbs._lazy import late
-from gearmbs.studies.case import Case, CaseError, load_case, make_case
 
 if TYPE_CHECKING:
     from gearmbs.signals.simulated import record_signal
+    from gearmbs.studies.case import Case, CaseError, load_case, make_case
     from gearmbs.studies.claims import Claim
     from gearmbs.studies.paper import PaperStudy, run_paper
     from gearmbs.studies.parallel import run_cases
@@ -32,20 +32,23 @@ __all__ = [
     "simulate_case",
 ]
 
-# what simulates compiles; a case can be made and checked without
-__getattr__ = late(
+late(
     __name__,
     {
+        "Case": ".case",
+        "CaseError": ".case",
+        "Claim": ".claims",
+        "PaperStudy": ".paper",
+        "SimulationFailed": ".simulation",
+        "SimulationInterrupted": ".simulation",
+        "gear_rig": ".rig",
+        "load_case": ".case",
+        "make_case": ".case",
+        "paper_cases": ".preset",
         "record_signal": "gearmbs.signals.simulated",
-        "Claim": "gearmbs.studies.claims",
-        "PaperStudy": "gearmbs.studies.paper",
-        "paper_cases": "gearmbs.studies.preset",
-        "run_paper": "gearmbs.studies.paper",
-        "run_cases": "gearmbs.studies.parallel",
-        "gear_rig": "gearmbs.studies.rig",
-        "SimulationFailed": "gearmbs.studies.simulation",
-        "SimulationInterrupted": "gearmbs.studies.simulation",
-        "run_case": "gearmbs.studies.simulation",
-        "simulate_case": "gearmbs.studies.simulation",
+        "run_case": ".simulation",
+        "run_cases": ".parallel",
+        "run_paper": ".paper",
+        "simulate_case": ".simulation",
     },
 )

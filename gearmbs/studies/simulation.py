@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import PchipInterpolator
 
 import gearmbs
 from gearmbs.dae.result import Status
@@ -25,6 +24,7 @@ from gearmbs.signals import (
     make_signal,
     trim,
 )
+from gearmbs.signals.monotone_cubic import monotone_cubic
 from gearmbs.studies import rig
 from gearmbs.studies.case import Case, units_of_fields
 from gearmbs.studies.limits import check_record, edge, remarks, slip
@@ -237,7 +237,7 @@ def _evaluated(case: Case, solution: Solution, known: Measured, *, even: bool) -
     dataset = _time_series(
         t,
         forces.values[inside],
-        PchipInterpolator(known.t, known.error)(t),
+        monotone_cubic(known.t, known.error, t),
         {**between, **{name: known.contact[name][latest] for name in COUNTS}},
     )
     plain = acceleration.drop_vars(["channel_units", "units"], errors="ignore")

@@ -5,8 +5,9 @@ Everything public is importable from here; a module, and matplotlib with it, is 
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from gearmbs._lazy import late
 
 if TYPE_CHECKING:
     from gearmbs.view.animation import MeshAnimation, mesh_animation
@@ -29,47 +30,6 @@ if TYPE_CHECKING:
     from gearmbs.view.signals import order_plot, spectrum_plot, time_plot
     from gearmbs.view.solid import gear_solid, pair_solids
     from gearmbs.view.transverse import mesh_view
-
-_HOMES = {
-    "COLOURS": "figure_style",
-    "ContactPoints": "contacts",
-    "ContactProbe": "contacts",
-    "Mesh": "mesh",
-    "MeshAnimation": "animation",
-    "Page": "page",
-    "PairMotion": "motion",
-    "Part": "scene",
-    "Scene": "scene",
-    "analysis_figures": "reports",
-    "average_plot": "revolution",
-    "comparison_bars": "bars",
-    "comparison_figures": "reports",
-    "contact_pattern_plot": "curves",
-    "gear_outline": "outline",
-    "gear_scene": "scenes",
-    "gear_solid": "solid",
-    "gmf_bars": "bars",
-    "load_sharing_plot": "curves",
-    "mechanism_scene": "scenes",
-    "mesh_animation": "animation",
-    "mesh_view": "transverse",
-    "order_plot": "signals",
-    "pair_solids": "solid",
-    "profile_area": "outline",
-    "read_stl": "export_stl",
-    "save_figure": "figure_style",
-    "sensitivity_map": "maps",
-    "solution_motion": "motion",
-    "solution_scene": "scenes",
-    "spectrum_plot": "signals",
-    "static_motion": "motion",
-    "stiffness_plot": "curves",
-    "time_plot": "signals",
-    "transmission_error_plot": "curves",
-    "write_dxf": "export_dxf",
-    "write_step": "export_step",
-    "write_stl": "export_stl",
-}
 
 __all__ = [
     "COLOURS",
@@ -112,14 +72,46 @@ __all__ = [
     "write_stl",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+late(
+    __name__,
+    {
+        "COLOURS": ".figure_style",
+        "ContactPoints": ".contacts",
+        "ContactProbe": ".contacts",
+        "Mesh": ".mesh",
+        "MeshAnimation": ".animation",
+        "Page": ".page",
+        "PairMotion": ".motion",
+        "Part": ".scene",
+        "Scene": ".scene",
+        "analysis_figures": ".reports",
+        "average_plot": ".revolution",
+        "comparison_bars": ".bars",
+        "comparison_figures": ".reports",
+        "contact_pattern_plot": ".curves",
+        "gear_outline": ".outline",
+        "gear_scene": ".scenes",
+        "gear_solid": ".solid",
+        "gmf_bars": ".bars",
+        "load_sharing_plot": ".curves",
+        "mechanism_scene": ".scenes",
+        "mesh_animation": ".animation",
+        "mesh_view": ".transverse",
+        "order_plot": ".signals",
+        "pair_solids": ".solid",
+        "profile_area": ".outline",
+        "read_stl": ".export_stl",
+        "save_figure": ".figure_style",
+        "sensitivity_map": ".maps",
+        "solution_motion": ".motion",
+        "solution_scene": ".scenes",
+        "spectrum_plot": ".signals",
+        "static_motion": ".motion",
+        "stiffness_plot": ".curves",
+        "time_plot": ".signals",
+        "transmission_error_plot": ".curves",
+        "write_dxf": ".export_dxf",
+        "write_step": ".export_step",
+        "write_stl": ".export_stl",
+    },
+)

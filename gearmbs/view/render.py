@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
+
+from gearmbs._jit import njit
 
 OVERSAMPLING = 2
 EDGE = 0.35

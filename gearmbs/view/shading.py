@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from gearmbs._jit import njit
 from gearmbs.view.mesh import Mesh
 
 CREASE = math.cos(math.radians(28.0))

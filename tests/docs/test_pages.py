@@ -111,19 +111,3 @@ def test_quick_examples(path, in_folder):
 @pytest.mark.parametrize("path", [p for p in WITH_EXAMPLES if p.name not in QUICK], ids=name_of)
 def test_examples(path, in_folder):
     _examples(path, in_folder)
-
-
-def test_the_first_run_says_that_it_compiles(tmp_path, capsys, monkeypatch):
-    """Nothing cached: one line; cached, cached elsewhere, or told by the compiler: none."""
-    from gearmbs._announce import announce
-
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    monkeypatch.delenv("GEARMBS_COMPILING", raising=False)
-    announce(tmp_path)
-    assert "compiling the numerical kernels" in capsys.readouterr().err
-    (tmp_path / "contact" / "__pycache__").mkdir(parents=True)
-    (tmp_path / "contact" / "__pycache__" / "kernel.gear_contact-1.py311.nbi").touch()
-    announce(tmp_path)
-    monkeypatch.setenv("NUMBA_CACHE_DIR", "elsewhere")
-    announce(tmp_path / "none")
-    assert capsys.readouterr().err == ""

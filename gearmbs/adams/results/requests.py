@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from gearmbs._jit import njit
 from gearmbs.adams.builders.model import AdamsModel, markers_of
 from gearmbs.adams.parse import statements as st
 from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from numba import njit, types
+from numba import types
 from numba.experimental import structref
 
+from gearmbs._jit import njit
 from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, JACOBIAN_SIG, RESIDUAL_SIG
 
 BOUND = 64

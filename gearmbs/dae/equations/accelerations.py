@@ -10,8 +10,8 @@ per output time, it gives reaction forces that are free of the integrator's nois
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads

@@ -9,8 +9,8 @@ respect to the bodies' [R, theta], from which the derivatives of Phi_q^T lambda 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from gearmbs._jit import njit
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.rotation import KIN_AXES, KIN_R, KIN_V, KIN_W
 

@@ -7,8 +7,8 @@ nearest to a reference is meant, which the hook moves along with the motion; see
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from gearmbs._jit import njit
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.force_elements import FRAME_A
 

@@ -8,8 +8,8 @@ momentum are the same before and after, so this is a change of coordinates and n
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from numba import njit, types
+from numba import types
 
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.pointers import F8, IVEC, MAT, VEC, address, caller
 from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import layout as T

@@ -5,8 +5,7 @@ What a kernel is given and gives is written in `gearmbs.dae.equations.force_elem
 
 from __future__ import annotations
 
-from numba import njit
-
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.pointers import caller
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import layout as T

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 
-from numba import njit
-
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations.rotation import KIN_COLUMNS
 

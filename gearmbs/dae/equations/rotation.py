@@ -17,8 +17,8 @@ d2s/dtheta_k dtheta_l = a_min x (a_max x s).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from gearmbs._jit import njit
 from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_R, KIN_V, KIN_W
 
 KIN_AXES = 18

@@ -6,8 +6,7 @@ w x (w x r) = (w . r) w - (w . w) r.
 
 from __future__ import annotations
 
-from numba import njit
-
+from gearmbs._jit import njit
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3, dot3
 from gearmbs.dae.equations.rotation import KIN_R, KIN_V, KIN_W

@@ -6,7 +6,8 @@ The kinds are closed forms; ``TAPE`` evaluates a parsed expression of time.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from gearmbs._jit import njit
 
 CONSTANT = 0
 STEP = 1

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations import time_functions

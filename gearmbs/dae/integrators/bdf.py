@@ -16,8 +16,9 @@ References
 
 from __future__ import annotations
 
-from numba import float64, int64, njit, types
+from numba import float64, int64, types
 
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 from gearmbs.dae.dense_output import lagrange_weights
 

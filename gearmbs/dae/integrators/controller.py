@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from gearmbs._jit import njit
 from gearmbs.dae.integrators.bdf import divided_difference_norm, step_for_error
 from gearmbs.dae.integrators.history import rows_from, times_from
 

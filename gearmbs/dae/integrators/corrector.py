@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import int64, njit
+from numba import int64
 
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 from gearmbs.dae.integrators.weights import weighted_max
 from gearmbs.dae.linalg.sparse_lu import solve

@@ -20,9 +20,10 @@ from functools import cache
 
 import numpy as np
 from llvmlite import ir
-from numba import int64, njit, types
+from numba import int64, types
 from numba.extending import intrinsic
 
+from gearmbs._jit import njit
 from gearmbs.dae.problem import EVENTS_SIG, JACOBIAN_SIG, RESIDUAL_SIG
 
 # header of idata

@@ -12,8 +12,8 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numba import njit
 
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.bound_functions import bind
 from gearmbs.dae.integrators import messages, start
 from gearmbs.dae.integrators import run_state as s

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from gearmbs._jit import njit
 from gearmbs.dae.dense_output import combine, lagrange_weights
 from gearmbs.dae.integrators.history import copy, rows_from, times_from
 

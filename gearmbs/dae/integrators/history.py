@@ -7,8 +7,8 @@ window the rows still needed are moved to its end, once in many steps.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.run_state import WINDOW, RunState

@@ -15,14 +15,17 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csc_array
-from sksundae.ida import IDA
 
 from gearmbs.dae.integrators.messages import advice, unknown_name
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
+
+if TYPE_CHECKING:
+    from sksundae.ida import IDA
 
 UNCONTROLLED = 1e10
 SMALLEST_RTOL = 1e-14
@@ -138,6 +141,8 @@ class _Callbacks:
 
 
 def _solver(problem: DAEProblem, calls: _Callbacks, atol: np.ndarray, rtol: float, options: dict) -> IDA:
+    from sksundae.ida import IDA
+
     # the binding insists on 32-bit indices
     places = problem.indices.astype(np.int32), problem.indptr.astype(np.int32)
     pattern = csc_array((np.ones(problem.indices.size), *places), shape=(problem.n,) * 2)

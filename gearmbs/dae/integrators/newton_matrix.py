@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from gearmbs._jit import njit
 from gearmbs.dae.integrators.run_state import REPIVOT, RUNNING
 from gearmbs.dae.linalg.sparse_lu import factor
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, njit
+from numba import float64
 
+from gearmbs._jit import njit
 from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.corrector import ROUNDING_LEVEL
 from gearmbs.dae.integrators.run_state import STATE_TYPE

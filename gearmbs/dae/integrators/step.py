@@ -9,8 +9,9 @@ Python can help: for new pivots, when a buffer is full, and after a change of co
 from __future__ import annotations
 
 import numpy as np
-from numba import int64, njit
+from numba import int64
 
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.bound_functions import FUNCTIONS_TYPE
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 from gearmbs.dae.integrators import bdf

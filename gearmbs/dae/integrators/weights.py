@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from numba import float64, int64, njit
+from numba import float64, int64
 
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 
 _VEC = float64[::1]

@@ -8,8 +8,9 @@ caller analyses again with the current values.
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, njit, types, uint32
+from numba import float64, int64, types, uint32
 
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.structs import IndexVector, IntVector, Struct, Vector
 from gearmbs.dae.linalg.pivoting import CANCELLED, GROWTH_ALLOWED, THRESHOLDS, choose_pivots, equilibrate
 

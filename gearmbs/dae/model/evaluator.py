@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, int64, njit, types
+from numba import float64, int64, types
 from scipy.sparse import csc_array
 
+from gearmbs._jit import njit
 from gearmbs.dae.equations import accelerations as index1
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.euler_switch import track
@@ -193,8 +195,11 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
     return last
 
 
-NO_PLAN = analyse(np.array([0, 1]), np.array([0]), np.ones(1), np.ones(1))
-NO_FACTORS = new_factors(NO_PLAN)
+@cache
+def _no_factors() -> tuple[LUPlan, LUFactors]:
+    """Return a plan and factors of the types that `evaluate_rows` takes, for when it factors nothing."""
+    plan = analyse(np.array([0, 1]), np.array([0]), np.ones(1), np.ones(1))
+    return plan, new_factors(plan)
 
 
 def pattern(idata, rdata, work_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -215,7 +220,7 @@ def assemble(t, y, slots, idata, rdata, work_size, vals) -> Records:
     bodies, rows, elements = int(idata[T.H_BODIES]) - 1, int(idata[T.H_ROWS]), int(idata[T.H_FORCES])
     records = new_records(1, bodies, rows, elements, int(idata[T.H_DIAGNOSTICS]))
     work = np.zeros(work_size)
-    evaluate_rows(0, -1, t, y, slots, idata, rdata, work, vals, NO_PLAN, NO_FACTORS, records, GROWTH_LIMIT)
+    evaluate_rows(0, -1, t, y, slots, idata, rdata, work, vals, *_no_factors(), records, GROWTH_LIMIT)
     return records
 
 

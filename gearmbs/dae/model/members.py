@@ -10,8 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, int64, njit, types, void
+from numba import float64, int64, types, void
 
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import layout as T

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from gearmbs._jit import njit
 from gearmbs.dae.equations import jacobian, residual, unknowns
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import ANGLE, dot3

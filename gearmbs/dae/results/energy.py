@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import CubicSpline
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.force_elements import DISSIPATED, STORED
@@ -62,6 +61,8 @@ def energy_balance(solution: Solution) -> xr.Dataset:
 def _integral(t: np.ndarray, power: np.ndarray) -> np.ndarray:
     if t.size < 2:
         return np.zeros_like(t)
+    from scipy.interpolate import CubicSpline
+
     work = CubicSpline(t, power).antiderivative()(t)
     return work - work[0]
 

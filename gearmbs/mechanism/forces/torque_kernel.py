@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from gearmbs._jit import njit
 from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG, FRAME_A
 
 

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING
 
 from gearmbs._lazy import late
-from gearmbs.dae.equations.expressions.tape import ExpressionError, Tape, TapeBuilder
 
 if TYPE_CHECKING:
     from gearmbs.dae.equations.expressions.evaluate import (
@@ -16,6 +15,7 @@ if TYPE_CHECKING:
         update_angles,
     )
     from gearmbs.dae.equations.expressions.splines import SplineData
+    from gearmbs.dae.equations.expressions.tape import ExpressionError, Tape, TapeBuilder
 
 __all__ = [
     "ExpressionError",
@@ -31,19 +31,19 @@ __all__ = [
     "update_angles",
 ]
 
-_EVALUATE = "gearmbs.dae.equations.expressions.evaluate"
-
-# the kernels are loaded by those who evaluate something
-__getattr__ = late(
+late(
     __name__,
     {
-        "SplineData": "gearmbs.dae.equations.expressions.splines",
-        "angle_rates": _EVALUATE,
-        "eval_gradient": _EVALUATE,
-        "eval_request": _EVALUATE,
-        "eval_second": _EVALUATE,
-        "eval_time": _EVALUATE,
-        "eval_value": _EVALUATE,
-        "update_angles": _EVALUATE,
+        "ExpressionError": ".tape",
+        "SplineData": ".splines",
+        "Tape": ".tape",
+        "TapeBuilder": ".tape",
+        "angle_rates": ".evaluate",
+        "eval_gradient": ".evaluate",
+        "eval_request": ".evaluate",
+        "eval_second": ".evaluate",
+        "eval_time": ".evaluate",
+        "eval_value": ".evaluate",
+        "update_angles": ".evaluate",
     },
 )

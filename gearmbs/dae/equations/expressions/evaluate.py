@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from gearmbs._jit import njit
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.integrals import integral
 from gearmbs.dae.equations.expressions.marker_motion import KIN_V, KIN_W

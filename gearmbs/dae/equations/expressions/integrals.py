@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
+from gearmbs._jit import njit
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.scalar import binary, unary
 from gearmbs.dae.equations.expressions.splines import spline_value

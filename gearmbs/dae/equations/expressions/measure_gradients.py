@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from gearmbs._jit import njit
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.marker_motion import KIN_W
 from gearmbs.dae.equations.expressions.measures import (

@@ -8,8 +8,7 @@ e_ab . X + e_a . X_b + e_b . X_a + e . X_ab.
 
 from __future__ import annotations
 
-from numba import njit
-
+from gearmbs._jit import njit
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.marker_motion import KIN_AXES
 from gearmbs.dae.equations.expressions.measures import ARM_I, ARM_J, AXIS, VECTOR, marker_axis, relative_vector, resolve

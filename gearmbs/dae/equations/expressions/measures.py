@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from gearmbs._jit import njit
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.marker_motion import ACC_A, ACC_ALPHA, KIN_A, KIN_R, KIN_V, KIN_W
 

@@ -20,7 +20,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from gearmbs._jit import njit
 
 TABLE_HEAD = 3
 

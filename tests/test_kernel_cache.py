@@ -1,0 +1,255 @@
+"""Compiled kernels on disk: found when nothing they are made of has changed, and never otherwise."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+CALLEES = """
+    from typing import NamedTuple
+    from gearmbs._jit import njit
+    from . import numbers
+
+    class Pair(NamedTuple):
+        first: float
+        second: float
+
+    @njit(cache=True)
+    def scaled(x):
+        '''Return a multiple.'''
+        return numbers.FACTOR * x
+
+    @njit("float64(float64)", cache=True)
+    def unrelated(x):
+        return x + 1.0
+"""
+
+CALLERS = """
+    import numpy as np
+    from numba import float64, types
+    from gearmbs._jit import njit
+    from smallpackage.callees import Pair, scaled, unrelated
+
+    PAIR = types.NamedUniTuple(float64, 2, Pair)
+
+    @njit("float64(float64)", cache=True)
+    def caller(x):
+        return scaled(x) + 1.0
+
+    @njit(float64(PAIR), cache=True)
+    def second(pair):
+        return pair.second
+
+    @njit("float64(float64[::1], int64)", cache=True)
+    def checked(x, k):
+        if k < 0:
+            raise ValueError("negative")
+        return x[k]
+"""
+
+RUN = """
+    import json, sys
+    from gearmbs import _jit
+    made = []
+    compile_ = _jit.Kernel._compile
+    def counted(self, *rest):
+        made.append(self.__name__)
+        return compile_(self, *rest)
+    _jit.Kernel._compile = counted
+    from smallpackage import callees, callers
+    result = {expression}
+    print(json.dumps([result, sorted(made)]))
+"""
+
+
+class Package:
+    """A small package of two modules with kernels, and a way to call them in a process of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder / "smallpackage"
+        self.folder.mkdir()
+        self.environment = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+        self.environment["PYTHONPATH"] = os.pathsep.join([str(folder), *sys.path])
+        self.environment["HOME"] = str(folder / "home")
+        for name, text in (
+            ("__init__", ""),
+            ("numbers", "FACTOR = 2.0\nOTHER = 5.0\n"),
+            ("callees", CALLEES),
+            ("callers", CALLERS),
+        ):
+            self.write(name, textwrap.dedent(text))
+
+    def write(self, name: str, text: str) -> None:
+        """Write a module."""
+        (self.folder / f"{name}.py").write_text(text)
+
+    def edit(self, name: str, old: str, new: str) -> None:
+        """Change a module as a person would."""
+        text = (self.folder / f"{name}.py").read_text()
+        assert old in text
+        self.write(name, text.replace(old, new))
+
+    def start(self, expression: str) -> subprocess.Popen:
+        """Start a process that evaluates an expression."""
+        code = textwrap.dedent(RUN).format(expression=expression)
+        # whether byte code is fresh goes by seconds, and edits come faster
+        command = [sys.executable, "-B", "-c", code]
+        return subprocess.Popen(
+            command, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd="/"
+        )
+
+    def call(self, expression: str = "callers.caller(3.0)") -> list:
+        """Return the value of an expression and the names of what had to be compiled."""
+        return self.answer(self.start(expression))
+
+    @staticmethod
+    def answer(process: subprocess.Popen) -> list:
+        import json
+
+        out, error = process.communicate(timeout=300)
+        assert process.returncode == 0, error
+        return json.loads(out)
+
+
+@pytest.fixture
+def package(tmp_path):
+    return Package(tmp_path)
+
+
+def test_edits(package):
+    """What is called stands in another file; callers are compiled again when, and only when, it changes."""
+    assert package.call() == [7.0, ["caller", "scaled"]]
+    assert package.call() == [7.0, []]
+    package.edit("numbers", "FACTOR = 2.0", "FACTOR = 3.0")
+    assert package.call() == [10.0, ["caller", "scaled"]]
+    package.edit("callees", "numbers.FACTOR * x", "x - numbers.FACTOR")
+    assert package.call() == [1.0, ["caller", "scaled"]]
+    # what does not bear on the code
+    package.edit("callees", "Return a multiple.", "Return a\n    difference.")
+    package.edit("callees", "return x + 1.0", "return x + 2.0")
+    package.edit("numbers", "OTHER = 5.0", "OTHER = 6.0")
+    assert package.call() == [1.0, []]
+    # back: what was compiled once is still there
+    package.edit("callees", "x - numbers.FACTOR", "numbers.FACTOR * x")
+    package.edit("numbers", "FACTOR = 3.0", "FACTOR = 2.0")
+    assert package.call() == [7.0, []]
+
+
+def test_fields_of_named_tuples(package):
+    """Types of the same name whose fields change places are other types."""
+    expression = "callers.second(callees.Pair(first=1.0, second=2.0))"
+    assert package.call(expression) == [2.0, ["second"]]
+    package.edit("callees", "    first: float\n    second: float\n", "    second: float\n    first: float\n")
+    assert package.call(expression) == [2.0, ["second"]]
+
+
+def test_errors_and_conversions(package):
+    """From the cache as from the compiler: exceptions arrive, and arguments that do not fit are refused."""
+    package.write(
+        "__init__",
+        textwrap.dedent("""
+            import numpy as np
+            def tried(kernel, *arguments):
+                try:
+                    return kernel(*arguments)
+                except (TypeError, ValueError) as error:
+                    return type(error).__name__
+        """),
+    )
+    calls = "[tried(callers.checked, x, k) for x, k in ((v, 2), (v, -1), (v[::2], 0), (list(v), 0))]"
+    expression = f"(lambda tried, v: {calls})(sys.modules['smallpackage'].tried, callers.np.arange(4.0))"
+    expected = [2.0, "ValueError", "TypeError", "TypeError"]
+    assert package.call(expression) == [expected, ["checked"]]
+    assert package.call(expression) == [expected, []]
+
+
+def test_two_processes(package):
+    """Processes that start together compile each kernel once, and both get it."""
+    together = [package.start("callers.caller(3.0)") for _ in range(3)]
+    answers = [package.answer(process) for process in together]
+    assert [value for value, _ in answers] == [7.0] * 3
+    assert sorted(name for _, made in answers for name in made) == ["caller", "scaled"]
+    left = {path.suffix for path in (package.folder / "__pycache__" / "kernels").iterdir()}
+    assert left == {".entry", ".part"}
+
+
+def test_named_folder(package, tmp_path):
+    package.environment["NUMBA_CACHE_DIR"] = str(tmp_path / "elsewhere")
+    assert package.call() == [7.0, ["caller", "scaled"]]
+    assert package.call() == [7.0, []]
+    assert len(list((tmp_path / "elsewhere").rglob("*.entry"))) == 1
+    assert not (package.folder / "__pycache__" / "kernels").exists()
+
+
+def test_folders_that_cannot_be_written(package, tmp_path):
+    """What is there is used; what is not goes to the user's folder, or is compiled for the process alone."""
+    assert package.call() == [7.0, ["caller", "scaled"]]
+    kernels = package.folder / "__pycache__" / "kernels"
+    before = {path.name: path.stat().st_mtime_ns for path in kernels.iterdir()}
+    # a file in the place of a folder stands for one that is read-only, which root could write
+    package.environment["GEARMBS_READ_ONLY"] = "1"
+    package.edit("callees", "from typing", "from gearmbs import _kernel_cache\nfrom typing")
+    package.edit(
+        "callees",
+        "class Pair",
+        "_can = _kernel_cache._writable\n"
+        "_kernel_cache._writable = lambda f: 'smallpackage/__pycache__' not in str(f) and _can(f)\n"
+        "class Pair",
+    )
+    assert package.call() == [7.0, []]
+    package.edit("numbers", "FACTOR = 2.0", "FACTOR = 3.0")
+    assert package.call() == [10.0, ["caller", "scaled"]]
+    assert package.call() == [10.0, []]
+    assert {path.name: path.stat().st_mtime_ns for path in kernels.iterdir()} == before
+    package.environment["XDG_CACHE_HOME"] = "/dev/null/none"
+    assert package.call() == [10.0, ["caller", "scaled"]]
+
+
+def test_damaged_files(package):
+    """A file that was cut short is compiled anew."""
+    package.call()
+    for path in (package.folder / "__pycache__" / "kernels").iterdir():
+        path.write_bytes(path.read_bytes()[:-7])
+    assert package.call() == [7.0, ["caller", "scaled"]]
+    assert package.call() == [7.0, []]
+
+
+def test_numba_calls_kernels(package):
+    """A user's own numba function may call a kernel that calls others."""
+    package.write(
+        "__init__", "import numba\ndef doubled(kernel):\n    return numba.njit(lambda x: 2.0 * kernel(x))(3.0)\n"
+    )
+    expression = "sys.modules['smallpackage'].doubled(callers.caller)"
+    assert package.call(expression) == [14.0, ["caller", "scaled"]]
+    assert package.call(expression) == [14.0, []]
+
+
+def test_importing_looks_at_no_files(package):
+    """Nothing is compiled, loaded or looked for before a kernel is called."""
+    package.write("__init__", "")
+    assert package.call("0") == [0, []]
+    assert not (package.folder / "__pycache__" / "kernels").exists()
+
+
+def test_kernels_as_arguments(package):
+    """A kernel handed to a user's numba function as a typed pointer, inside compiled code."""
+    package.write(
+        "__init__",
+        textwrap.dedent("""
+            import numba
+            pointer = numba.types.FunctionType(numba.float64(numba.float64))
+            def twice(kernel):
+                @numba.njit(numba.float64(pointer, numba.float64))
+                def applied(function, x):
+                    return function(function(x))
+                return numba.njit(lambda x: applied(kernel, x))(3.0)
+        """),
+    )
+    expression = "sys.modules['smallpackage'].twice(callers.caller)"
+    assert package.call(expression) == [15.0, ["caller", "scaled"]]
+    assert package.call(expression) == [15.0, []]
