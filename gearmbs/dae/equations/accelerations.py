@@ -36,8 +36,8 @@ from gearmbs.dae.equations.rotation import (
     euler_rates,
     momentum_from_conjugate,
 )
-from gearmbs.dae.equations.simple_terms import dot_motion, point_motion
-from gearmbs.dae.equations.update import inertia_times, update_bodies
+from gearmbs.dae.equations.simple_terms import OFFSET, QUADRATIC, RATE, RELATIVE, dot_motion, relative_motion
+from gearmbs.dae.equations.update import update_bodies
 
 FORCE_RECORD = 6
 """Per force element: F, N, then its diagnostics."""
@@ -142,6 +142,49 @@ def put_dot(mode, slot, vals, k, row, coef, term, at, marker_body, cross):
     return k
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def world_inertia(kin_row, body_row, out):
+    """Write the inertia about the centre of mass in global components, symmetric: xx, yy, zz, xy, xz, yz."""
+    for c in range(3):
+        for d in range(3):
+            total = 0.0
+            for e in range(3):
+                total += kin_row[KIN_A + 3 * c + e] * body_row[T.BODY_INERTIA + 3 * e + d]
+            out[6 + 3 * c + d] = total
+    for c in range(3):
+        d = c + 1 if c < 2 else 0
+        own, mixed = 0.0, 0.0
+        for e in range(3):
+            own += out[6 + 3 * c + e] * kin_row[KIN_A + 3 * c + e]
+            mixed += out[6 + 3 * c + e] * kin_row[KIN_A + 3 * d + e]
+        out[c] = own
+        # xy, yz, zx
+        out[3 if c == 0 else 5 if c == 1 else 4] = mixed
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def put_inertia(mode, slot, vals, k, i, mass, j):
+    """Hand over the mass matrix of a body whose coordinates begin at i; return the number of the next entry."""
+    if mode == NUMBERS:
+        for c in range(3):
+            vals[slot[k + 4 * c]] += mass
+        vals[slot[k + 1]] += j[0]
+        vals[slot[k + 2]] += j[3]
+        vals[slot[k + 3]] += j[4]
+        vals[slot[k + 5]] += j[3]
+        vals[slot[k + 6]] += j[1]
+        vals[slot[k + 7]] += j[5]
+        vals[slot[k + 9]] += j[4]
+        vals[slot[k + 10]] += j[5]
+        vals[slot[k + 11]] += j[2]
+        return k + 12
+    for c in range(3):
+        k = put(mode, slot, vals, k, i + c, i + c, mass)
+        for d in range(3):
+            k = put(mode, slot, vals, k, i + 3 + d, i + 3 + c, mass)
+    return k
+
+
 @njit(cache=True, error_model="numpy")
 def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
     """Assemble the saddle-point matrix (by slots) and right-hand side; return the number of entries.
@@ -164,16 +207,14 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
         i = tab.at[b, T.AT_V]
         mass = tab.body[b, T.BODY_MASS]
         for c in range(3):
-            k = put(mode, slot, vals, k, i + c, i + c, mass)
             rhs[i + c] = mass * tab.gravity[c]
-            s[0] = s[1] = s[2] = 0.0
-            s[c] = 1.0
-            inertia_times(kin, tab.body[b], s, 0, s, 3, s[6:9])
-            for d in range(3):
-                k = put(mode, slot, vals, k, i + 3 + d, i + 3 + c, s[3 + d])
+        world_inertia(kin, tab.body[b], s)
+        k = put_inertia(mode, slot, vals, k, i, mass, s)
         terms.cross3(kin, KIN_H, kin, KIN_W, rhs, i + 3)
     g = vector_at(tab.scratch, S_GRADIENT, 12)
     gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
+    apart = vector_at(tab.scratch, S_VECTOR, RELATIVE)
+    last_i = last_j = np.int64(-1)
     for r in range(rows):
         value, rate, partial, gamma = 0.0, 0.0, 0.0, 0.0
         if tab.row[r, T.ROW_FUNCTION] >= 0:
@@ -185,7 +226,12 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
             kind = tab.term[j, T.TERM_TYPE]
             if kind == terms.POINT or kind == terms.DOT1:
                 if kind == terms.POINT:
-                    p, d, q2 = point_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame)
+                    # the rows of a joint share their markers
+                    if tab.term[j, T.TERM_I] != last_i or tab.term[j, T.TERM_J] != last_j:
+                        last_i, last_j = tab.term[j, T.TERM_I], tab.term[j, T.TERM_J]
+                        relative_motion(last_i, last_j, tab.marker_body, tab.kin, tab.frame, apart)
+                    c = tab.term[j, T.TERM_AXES]
+                    p, d, q2 = apart[OFFSET + c], apart[RATE + c], apart[QUADRATIC + c]
                     k = put_point(mode, slot, vals, k, base + r, coef, tab.term[j], tab.at, tab.marker_body, tab.frame)
                 else:
                     p, d, q2 = dot_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame, s)
@@ -254,6 +300,15 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
                     b, 1.0 - 2.0 * side, row, wrench, tab.at, tab.marker_body, tab.kin, tab.frame, tab.scratch, rhs
                 )
     return k
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def has_reactions(tab):
+    """Whether some load is the reaction of a joint, which follows from the multipliers that are solved for."""
+    found = False
+    for f in range(tab.force.shape[0]):
+        found |= tab.force[f, T.FORCE_KIND] == T.REACTION
+    return found
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -336,6 +391,8 @@ def violations(t, y, phi, idata, tab):
     g = vector_at(tab.scratch, S_GRADIENT, 12)
     gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
     s = vector_at(tab.scratch, S_TERM, 100)
+    apart = vector_at(tab.scratch, S_VECTOR, RELATIVE)
+    last_i = last_j = np.int64(-1)
     for r in range(idata[T.H_ROWS]):
         value, rate = 0.0, 0.0
         if tab.row[r, T.ROW_FUNCTION] >= 0:
@@ -346,7 +403,11 @@ def violations(t, y, phi, idata, tab):
             kind = tab.term[j, T.TERM_TYPE]
             if kind == terms.POINT or kind == terms.DOT1:
                 if kind == terms.POINT:
-                    p, d, _ = point_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame)
+                    if tab.term[j, T.TERM_I] != last_i or tab.term[j, T.TERM_J] != last_j:
+                        last_i, last_j = tab.term[j, T.TERM_I], tab.term[j, T.TERM_J]
+                        relative_motion(last_i, last_j, tab.marker_body, tab.kin, tab.frame, apart)
+                    c = tab.term[j, T.TERM_AXES]
+                    p, d = apart[OFFSET + c], apart[RATE + c]
                 else:
                     p, d, _ = dot_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame, s)
                 value += coef * p

@@ -67,6 +67,17 @@ def counts_angles(tab):
     return False
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def turns_are_counted(tab):
+    """Whether some angle is counted through full turns, so that `track` has something to do."""
+    counted = tab.angle.shape[0] > 0
+    for k in range(tab.term.shape[0]):
+        counted |= tab.term[k, T.TERM_TYPE] == ANGLE
+    for k in range(tab.tape.shape[0]):
+        counted |= tab.tape[k, T.TAPE_REFERENCE_SIZE] > 0
+    return counted
+
+
 @njit(cache=True, error_model="numpy")
 def track(t, y, tab, moving):
     """Count the turns of all counted angles up to a later point, less than half a turn from where it is expected.

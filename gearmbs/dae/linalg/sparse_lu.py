@@ -17,6 +17,7 @@ from gearmbs.dae.linalg.pivoting import CANCELLED, GROWTH_ALLOWED, THRESHOLDS, c
 GROWTH_LIMIT = 1e5
 
 _VEC = float64[::1]
+_MAT = float64[:, ::1]
 _IVEC = int64[::1]
 _UVEC = uint32[::1]
 
@@ -331,3 +332,38 @@ def solve(plan, factors, b, out):
         if v != 0.0:
             for p in range(np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])):
                 x[u_pos[p]] -= u_vals[p] * v
+
+
+@njit(types.void(PLAN_TYPE, FACTORS_TYPE, _MAT), cache=True, nogil=True, error_model="numpy")
+def solve_pair(plan, factors, pair):
+    """Solve for two right-hand sides at once.
+
+    Parameters
+    ----------
+    plan : LUPlan
+    factors : LUFactors
+        From `factor`.
+    pair : ndarray, shape (4, n)
+        Right-hand sides in the first two rows, overwritten by the solutions; the others are scratch.
+    """
+    l_vals, u_vals = factors.l_vals, factors.u_vals
+    l_pos, u_pos = plan.l_pos, plan.u_pos
+    n = factors.x.shape[0]
+    for k in range(n):
+        row, size = plan.row_from[k], plan.row_scale[k]
+        pair[2, k] = pair[0, row] * size
+        pair[3, k] = pair[1, row] * size
+    for k in range(n):
+        v, w = pair[2, k], pair[3, k]
+        for q in range(np.uint64(plan.l_ptr[k]), np.uint64(plan.l_ptr[k + 1])):
+            pair[2, l_pos[q]] -= l_vals[q] * v
+            pair[3, l_pos[q]] -= l_vals[q] * w
+    for m in range(n):
+        k = n - 1 - m
+        inv, size, to = factors.pivot_inv[k], plan.col_scale[k], plan.col_to[k]
+        v, w = pair[2, k] * inv, pair[3, k] * inv
+        pair[0, to] = v * size
+        pair[1, to] = w * size
+        for p in range(np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])):
+            pair[2, u_pos[p]] -= u_vals[p] * v
+            pair[3, u_pos[p]] -= u_vals[p] * w

@@ -12,7 +12,7 @@ from scipy.sparse import csc_array
 from gearmbs._jit import njit
 from gearmbs.dae.equations import accelerations as index1
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.euler_switch import track
+from gearmbs.dae.equations.euler_switch import track, turns_are_counted
 from gearmbs.dae.equations.jacobian import COUNT, NUMBERS, PLACES, compressed
 from gearmbs.dae.equations.reactions import renew_reactions
 from gearmbs.dae.equations.residual import update
@@ -28,6 +28,7 @@ from gearmbs.dae.linalg.sparse_lu import (
     factor,
     new_factors,
     solve,
+    solve_pair,
 )
 
 _VEC = float64[::1]
@@ -143,9 +144,11 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
     size = records.solution.shape[1]
     base = size - rows
     tab = T.unpack(idata, rdata, work)
-    rhs, moved, pushed = np.zeros(size), np.zeros(size), np.zeros(size)
+    rhs, pair = np.zeros(size), np.zeros((4, size))
     at = np.zeros(y.shape[1])
     only_assemble = last < first or idata[T.H_MODE] != NUMBERS
+    # a call that is handed all tables costs a tenth of a microsecond
+    counts_turns, has_reactions = turns_are_counted(tab), index1.has_reactions(tab)
     for k in range(first, first + 1 if only_assemble else last):
         for c in range(at.size):
             at[c] = y[k, c]
@@ -159,7 +162,8 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
             if idata[T.H_MODE] == COUNT:
                 vals[0] = count
             return last
-        track(t[k], at, tab, False)
+        if counts_turns:
+            track(t[k], at, tab, False)
         if rows > 0:
             # the nearest position and velocity, in the metric of the masses, that satisfy the constraints; the
             # factors of the row before serve while the bodies have hardly turned since
@@ -169,22 +173,20 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
                 if not factor(plan, factors, vals) <= growth:
                     return k
                 vals[:] = 0.0
-            rhs[:base] = 0.0
+            pair[:2, :base] = 0.0
             records.strayed[k] = 0.0
             for r in range(rows):
                 records.strayed[k] = max(records.strayed[k], abs(phi[3 * r]))
-                rhs[base + r] = 0.0 if abs(phi[3 * r]) > FARTHEST else -phi[3 * r]
-            solve(plan, factors, rhs, moved)
-            for r in range(rows):
-                rhs[base + r] = -phi[3 * r + 1]
-            solve(plan, factors, rhs, pushed)
-            index1.displace(at, moved, pushed, idata, tab)
+                pair[0, base + r] = 0.0 if abs(phi[3 * r]) > FARTHEST else -phi[3 * r]
+                pair[1, base + r] = -phi[3 * r + 1]
+            solve_pair(plan, factors, pair)
+            index1.displace(at, pair[0], pair[1], idata, tab)
             update_tables(t[k], at, tab)
         index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
         if not factor(plan, factors, vals) <= growth:
             return k
         solve(plan, factors, rhs, records.solution[k])
-        for _ in range(REACTION_PASSES):
+        for _ in range(REACTION_PASSES if has_reactions else 0):
             # loads that depend on reactions change the right-hand side only
             if renew_reactions(at, records.solution[k, base:], idata, tab) <= 1e-12:
                 break

@@ -180,13 +180,34 @@ def _deduct_rows(multipliers, members, tab, wrench, s):
     for r in range(members.row.size):
         for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
             factor = -multipliers[r] * tab.coef[j]
-            terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, work, g, gt)
+            kind = tab.term[j, T.TERM_TYPE]
+            if kind == terms.DOT1:
+                axes = tab.term[j, T.TERM_AXES]
+                i_axes, j_axes = tab.frame[tab.term[j, T.TERM_I]], tab.frame[tab.term[j, T.TERM_J]]
+                terms.cross3(i_axes, T.MK_AXES + 3 * (axes // 3), j_axes, T.MK_AXES + 3 * (axes % 3), s, 0)
+            elif kind != terms.POINT:
+                terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, work, g, gt)
             for side in range(2):
                 marker = tab.term[j, T.TERM_I + side]
+                m = members.of_marker[marker]
+                if m < 0:
+                    continue
                 body = tab.kin[tab.marker_body[marker]]
-                _deduct(
-                    members.of_marker[marker], factor, g, 6 * side, g, 6 * side + 3, body[KIN_R : KIN_R + 3], wrench, s
-                )
+                signed = factor if side == 0 else -factor
+                if kind == terms.POINT:
+                    c = tab.term[j, T.TERM_AXES]
+                    c1, c2 = c + 1 if c < 2 else 0, c - 1 if c > 0 else 2
+                    wrench[m, c] -= signed
+                    wrench[m, 3 + c1] -= signed * (body[KIN_R + c2] + tab.frame[marker, T.MK_ARM + c2])
+                    wrench[m, 3 + c2] += signed * (body[KIN_R + c1] + tab.frame[marker, T.MK_ARM + c1])
+                elif kind == terms.DOT1:
+                    for c in range(3):
+                        wrench[m, 3 + c] -= signed * s[c]
+                else:
+                    com = vector_at(s, 3, 3)
+                    for c in range(3):
+                        com[c] = body[KIN_R + c]
+                    _deduct(m, factor, g, 6 * side, g, 6 * side + 3, com, wrench, s)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
