@@ -46,6 +46,11 @@ class Placement:
     origin_2: np.ndarray
     axes_2: np.ndarray
 
+    @property
+    def frames(self) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """Origin and axes of the driver, and of the driven wheel."""
+        return (self.origin_1, self.axes_1), (self.origin_2, self.axes_2)
+
 
 def _turn_z(angle: float) -> np.ndarray:
     c, s = math.cos(angle), math.sin(angle)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
-    from gearmbs.signals.analysis import analyse, analyse_file
+    from gearmbs.signals.analysis import AnalysisOptions, analyse, analyse_file
     from gearmbs.signals.analysis_report import AnalysisReport
     from gearmbs.signals.angular import angular_resample, order_spectrum, time_synchronous_average
     from gearmbs.signals.bands import band_rms, gmf_rms, order_rms, rms
@@ -77,6 +77,7 @@ __all__ = [
     "EXPECTED",
     "FORMATS",
     "INDICATORS",
+    "AnalysisOptions",
     "AnalysisReport",
     "ComparisonReport",
     "FrfPath",
@@ -171,6 +172,7 @@ late(
         "EXPECTED": ".expectations",
         "FORMATS": ".io",
         "INDICATORS": ".indicators",
+        "AnalysisOptions": ".analysis",
         "AnalysisReport": ".analysis_report",
         "ComparisonReport": ".comparison_report",
         "FrfPath": ".sensors",

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -25,25 +27,36 @@ from .speed import MIN_QUALITY, SpeedEstimate, estimate_speed
 
 Progress = Callable[[float, str], None]
 SPEED_TOLERANCE = 0.02
+"""How far from its nominal speed a drive is looked for, as a part of it."""
+
 LINE_SECONDS = 2.0
 SIDEBANDS = 3
 MIN_AVERAGES = 2
 KURTOGRAM_LEVELS = 6
 
 
+@dataclass(frozen=True, kw_only=True)
+class AnalysisOptions:
+    """Settings of `analyse`; see there for what they mean."""
+
+    teeth: int | Sequence[int] | None = None
+    speed: float | None = None
+    speed_range: tuple[float, float] | None = None
+    tacho: str | None = None
+    pulses_per_rev: float = 1.0
+    wheel: int = 1
+    harmonics: int = 3
+    half_width: float = HALF_WIDTH
+    lines: int = 5
+
+
 def analyse(
     signal: xr.DataArray,
     teeth: int | Sequence[int] | None = None,
     *,
-    speed: float | None = None,
-    speed_range: tuple[float, float] | None = None,
-    tacho: str | None = None,
-    pulses_per_rev: float = 1.0,
-    wheel: int = 1,
-    harmonics: int = 3,
-    half_width: float = HALF_WIDTH,
-    lines: int = 5,
     progress: Progress | None = None,
+    options: AnalysisOptions | None = None,
+    **settings: Any,
 ) -> AnalysisReport:
     """Analyse a record of a running gear pair.
 
@@ -53,6 +66,10 @@ def analyse(
         Dimensions (time, channel).
     teeth : int or sequence, optional
         Tooth counts, the wheel of the reference shaft first; default the signal's.
+    progress : callable, optional
+        Called as progress(fraction, stage).
+    options : AnalysisOptions, optional
+        The settings below in one object, instead of keywords.
     speed : float, optional
         Speed of that wheel in rad/s; default the signal's. The mesh line is looked for within 2 % of it, and used if
         found, for no drive holds its nominal speed exactly. Without a speed, see `estimate_speed`.
@@ -61,17 +78,17 @@ def analyse(
     tacho : str, optional
         Name of a tacho channel; it gives the angle and is left out of the analysis.
     pulses_per_rev : float
-        Of the tacho.
+        Of the tacho, default 1.
     wheel : int
-        Which wheel's shaft the average, its indicators and the sidebands follow: 1 is the first of `teeth`, 2 its mate.
+        Which wheel's shaft the average, its indicators and the sidebands follow: 1, the default, is the first of
+        `teeth`, 2 its mate.
     harmonics : int
-        Gear mesh harmonics wanted; those that do not fit below half the sampling rate are left out with a note.
+        Gear mesh harmonics wanted, default 3; those that do not fit below half the sampling rate are left out with a
+        note.
     half_width : float
-        Half width of the harmonics' bands, as a fraction of GMF.
+        Half width of the harmonics' bands, as a fraction of GMF, default 0.25.
     lines : int
-        How many of the strongest spectral lines to list per channel.
-    progress : callable, optional
-        Called as progress(fraction, stage).
+        How many of the strongest spectral lines to list per channel, default 5.
 
     Returns
     -------
@@ -83,67 +100,14 @@ def analyse(
         If the tooth count is unknown.
     SignalError
         If no mesh line is found and no speed given, or the record is too short for the bands.
+    TypeError
+        For settings there are not.
     """
-    counts = require(signal, "teeth", teeth, needed_for="the gear mesh frequency")
-    tell = _Stages(progress)
-    notes: list[str] = []
-    phase, mean_speed, origin, estimate, signal = _angle(
-        signal, counts, speed, speed_range, tacho, pulses_per_rev, notes, tell
-    )
-    gmf = counts[0] * mean_speed / (2.0 * math.pi)
-    rate = rate_of(signal)
-    fitting = math.floor((rate / 2 / gmf - half_width - TRANSITION) * (1 - 1e-9))
-    if fitting < 1:
-        raise SignalError(
-            f"gmf: the band around {gmf:g} Hz does not fit below half the sampling rate ({rate / 2:g} Hz)"
-        )
-    if fitting < harmonics:
-        notes.append(f"Only {fitting} of {harmonics} mesh harmonics fit below half the sampling rate.")
-        harmonics = fitting
-    tell("averaging")
-    if not 1 <= wheel <= len(counts):
-        raise SignalError(f"wheel: must be 1 to {len(counts)}, the number of tooth counts given, got {wheel!r}")
-    own = counts[wheel - 1]
-    if wheel > 1:
-        phase = phase * (counts[0] / own)
-        notes.append(f"Averages, indicators and sidebands follow wheel {wheel} with {own} teeth.")
-    average = _average(signal, phase, own, harmonics, mean_speed * counts[0] / own, notes, tell)
-    band = []
-    for k in range(1, harmonics + 1):
-        tell("bands", (k - 1) / harmonics)
-        widths = {"half_width": half_width * gmf, "transition": TRANSITION * gmf, "period": 1.0 / gmf}
-        band.append(band_rms(signal, k * gmf, **widths).values)
-    sidebands = None if average is None else _line_table(average, own, harmonics)
-    if sidebands is not None:
-        by_orders = sidebands.sel(sideband=0).values
-    else:
-        by_orders = np.full((harmonics, signal.sizes["channel"]), np.nan)
-    table = _harmonic_table(signal, np.stack(band), by_orders, gmf, half_width)
-    tell("lines")
-    strongest = _strongest(signal, gmf, lines)
-    tell("kurtogram")
-    impulsive = None
-    if signal.sizes["time"] // 2 >= 16 << KURTOGRAM_LEVELS:
-        impulsive = kurtogram(signal, levels=KURTOGRAM_LEVELS, progress=lambda f, _: tell("kurtogram", f))
-    tell("done", 1.0)
-    return AnalysisReport(
-        source=str(signal.attrs.get("source", signal.name or "signal")),
-        rate=rate,
-        duration=signal.sizes["time"] / rate,
-        teeth=counts,
-        speed=mean_speed,
-        gmf=gmf,
-        speed_origin=origin,
-        harmonics=table,
-        levels=_levels(signal),
-        lines=strongest,
-        sidebands=sidebands,
-        indicators=None if average is None else condition_indicators(average, own, harmonics=harmonics),
-        impulsive=impulsive,
-        average=average,
-        estimate=estimate,
-        notes=notes,
-    )
+    if options is None:
+        options = AnalysisOptions(teeth=teeth, **settings)
+    elif settings or teeth is not None:
+        raise TypeError(f"analyse: give options or {', '.join(['teeth'] * (teeth is not None) + list(settings))}")
+    return _report(signal, options, _Stages(progress))
 
 
 def analyse_file(
@@ -153,18 +117,20 @@ def analyse_file(
     rate: float | None = None,
     units: str | Sequence[str] | Mapping[str, str] | None = None,
     speed: float | None = None,
-    speed_range: tuple[float, float] | None = None,
     channels: Sequence[str] | None = None,
-    tacho: str | None = None,
-    pulses_per_rev: float = 1.0,
-    wheel: int = 1,
-    harmonics: int = 3,
-    half_width: float = HALF_WIDTH,
-    lines: int = 5,
     format: str | None = None,
     progress: Progress | None = None,
+    **settings: Any,
 ) -> AnalysisReport:
-    """Read a file (`read_signal`) and analyse it (`analyse`); the parameters are theirs.
+    """Read a file (`read_signal`) and analyse it.
+
+    Parameters
+    ----------
+    path : str or Path
+    teeth, rate, units, speed, channels, format, progress
+        As for `read_signal`.
+    **settings
+        The other settings of `analyse`.
 
     Returns
     -------
@@ -175,21 +141,82 @@ def analyse_file(
     SignalFileError, MissingMetadataError, SignalError
         See `read_signal` and `analyse`.
     """
+    options = AnalysisOptions(speed=speed, **settings)
     signal = read_signal(
         path, rate=rate, units=units, speed=speed, teeth=teeth, channels=channels, format=format, progress=progress
     )
-    return analyse(
-        signal,
-        speed=speed,
-        speed_range=speed_range,
-        tacho=tacho,
-        pulses_per_rev=pulses_per_rev,
-        wheel=wheel,
-        harmonics=harmonics,
-        half_width=half_width,
-        lines=lines,
-        progress=progress,
+    return analyse(signal, options=options, progress=progress)
+
+
+def _report(signal: xr.DataArray, options: AnalysisOptions, tell: _Stages) -> AnalysisReport:
+    """Carry out the stages of an analysis."""
+    counts = require(signal, "teeth", options.teeth, needed_for="the gear mesh frequency")
+    notes: list[str] = []
+    tell("speed")
+    shaft, signal = _shaft_angle(signal, counts, options, notes)
+    gmf = counts[0] * shaft.speed / (2.0 * math.pi)
+    rate = rate_of(signal)
+    harmonics = _fitting_harmonics(rate, gmf, options, notes)
+    tell("averaging")
+    if not 1 <= options.wheel <= len(counts):
+        raise SignalError(f"wheel: must be 1 to {len(counts)}, the number of tooth counts given, got {options.wheel!r}")
+    own, phase = counts[options.wheel - 1], shaft.phase
+    if options.wheel > 1:
+        phase = phase * (counts[0] / own)
+        notes.append(f"Averages, indicators and sidebands follow wheel {options.wheel} with {own} teeth.")
+    average = _average(signal, phase, own, harmonics, shaft.speed * counts[0] / own, notes, tell)
+    sidebands = None if average is None else _line_table(average, own, harmonics)
+    by_orders = np.full((harmonics, signal.sizes["channel"]), np.nan)
+    if sidebands is not None:
+        by_orders = sidebands.sel(sideband=0).values
+    bands = _band_levels(signal, gmf, harmonics, options.half_width, tell)
+    tell("lines")
+    strongest = _strongest(signal, gmf, options.lines)
+    tell("kurtogram")
+    impulsive = None
+    if signal.sizes["time"] // 2 >= 16 << KURTOGRAM_LEVELS:
+        impulsive = kurtogram(signal, levels=KURTOGRAM_LEVELS, progress=lambda f, _: tell("kurtogram", f))
+    tell("done", 1.0)
+    return AnalysisReport(
+        source=str(signal.attrs.get("source", signal.name or "signal")),
+        rate=rate,
+        duration=signal.sizes["time"] / rate,
+        teeth=counts,
+        speed=shaft.speed,
+        gmf=gmf,
+        speed_origin=shaft.origin,
+        harmonics=_harmonic_table(signal, bands, by_orders, gmf, options.half_width),
+        levels=_levels(signal),
+        lines=strongest,
+        sidebands=sidebands,
+        indicators=None if average is None else condition_indicators(average, own, harmonics=harmonics),
+        impulsive=impulsive,
+        average=average,
+        estimate=shaft.estimate,
+        notes=notes,
     )
+
+
+def _fitting_harmonics(rate: float, gmf: float, options: AnalysisOptions, notes: list[str]) -> int:
+    """Return how many of the harmonics wanted have their bands below half the sampling rate."""
+    fitting = math.floor((rate / 2 / gmf - options.half_width - TRANSITION) * (1 - 1e-9))
+    if fitting < 1:
+        raise SignalError(
+            f"gmf: the band around {gmf:g} Hz does not fit below half the sampling rate ({rate / 2:g} Hz)"
+        )
+    if fitting < options.harmonics:
+        notes.append(f"Only {fitting} of {options.harmonics} mesh harmonics fit below half the sampling rate.")
+    return min(fitting, options.harmonics)
+
+
+def _band_levels(signal: xr.DataArray, gmf: float, harmonics: int, half_width: float, tell: _Stages) -> np.ndarray:
+    """Return the RMS in the band of each harmonic, shape (harmonics, channels)."""
+    widths = {"half_width": half_width * gmf, "transition": TRANSITION * gmf, "period": 1.0 / gmf}
+    levels = []
+    for k in range(1, harmonics + 1):
+        tell("bands", (k - 1) / harmonics)
+        levels.append(band_rms(signal, k * gmf, **widths).values)
+    return np.stack(levels)
 
 
 class _Stages:
@@ -209,55 +236,60 @@ class _Stages:
         self.progress(start + fraction * (stop - start), stage)
 
 
-def _angle(
-    signal: xr.DataArray,
-    counts: tuple[int, ...],
-    speed: float | None,
-    speed_range: tuple[float, float] | None,
-    tacho: str | None,
-    pulses_per_rev: float,
-    notes: list[str],
-    tell: _Stages,
-) -> tuple[xr.DataArray, float, str, SpeedEstimate | None, xr.DataArray]:
-    tell("speed")
-    if tacho is not None:
-        phase = phase_from_tacho(signal, tacho, pulses_per_rev=pulses_per_rev)
-        rest = [c for c in signal["channel"].values.tolist() if c != tacho]
-        if not rest:
-            raise SignalError(f"tacho: {tacho!r} is the only channel, nothing is left to analyse")
-        mean = float(phase.values[-1] - phase.values[0]) / float(phase["time"].values[-1] - phase["time"].values[0])
-        return phase, mean, f"from the tacho {tacho!r}", None, signal.sel(channel=rest)
-    nominal = speed if speed is not None else signal.attrs.get("speed")
-    if nominal is None:
-        estimate = estimate_speed(signal, counts, speed_range=speed_range)
-        if estimate.phase is None:
-            notes.append("The mesh line is too weak to follow in phase; the speed is taken as constant.")
-        phase = phase_from_speed(signal, estimate.speed) if estimate.phase is None else estimate.phase
-        return phase, estimate.speed, "estimated from the mesh line", estimate, signal
-    found: SpeedEstimate | None = None
+class _Shaft(NamedTuple):
+    """Angle of the reference shaft over time, its mean speed (rad/s) and where they are from."""
+
+    phase: xr.DataArray
+    speed: float
+    origin: str
+    estimate: SpeedEstimate | None = None
+
+
+def _shaft_angle(
+    signal: xr.DataArray, counts: tuple[int, ...], options: AnalysisOptions, notes: list[str]
+) -> tuple[_Shaft, xr.DataArray]:
+    """Return the shaft's angle from the tacho, the given speed or the mesh line, and the channels left to analyse."""
+    if options.tacho is not None:
+        return _from_tacho(signal, options.tacho, options.pulses_per_rev)
+    nominal = options.speed if options.speed is not None else signal.attrs.get("speed")
+    if nominal is not None:
+        return _near_speed(signal, counts, float(nominal), notes), signal
+    estimate = estimate_speed(signal, counts, speed_range=options.speed_range)
+    if estimate.phase is None:
+        notes.append("The mesh line is too weak to follow in phase; the speed is taken as constant.")
+    phase = phase_from_speed(signal, estimate.speed) if estimate.phase is None else estimate.phase
+    return _Shaft(phase, estimate.speed, "estimated from the mesh line", estimate), signal
+
+
+def _from_tacho(signal: xr.DataArray, tacho: str, pulses_per_rev: float) -> tuple[_Shaft, xr.DataArray]:
+    phase = phase_from_tacho(signal, tacho, pulses_per_rev=pulses_per_rev)
+    rest = [c for c in signal["channel"].values.tolist() if c != tacho]
+    if not rest:
+        raise SignalError(f"tacho: {tacho!r} is the only channel, nothing is left to analyse")
+    mean = float(phase.values[-1] - phase.values[0]) / float(phase["time"].values[-1] - phase["time"].values[0])
+    return _Shaft(phase, mean, f"from the tacho {tacho!r}"), signal.sel(channel=rest)
+
+
+def _near_speed(signal: xr.DataArray, counts: tuple[int, ...], nominal: float, notes: list[str]) -> _Shaft:
+    """Return the angle by the mesh line near a given speed, or at that speed where there is none."""
+    around = (nominal * (1.0 - SPEED_TOLERANCE), nominal * (1.0 + SPEED_TOLERANCE))
     try:
-        around = (nominal * (1.0 - SPEED_TOLERANCE), nominal * (1.0 + SPEED_TOLERANCE))
         found = estimate_speed(signal, counts, speed_range=around)
     except SignalError:
-        pass
+        found = None
     if found is not None and found.phase is not None:
         words = f"from the mesh line, {100 * (found.speed / nominal - 1):+.3f} % off the given speed"
-        return found.phase, found.speed, words, found, signal
-    gmf = nominal * counts[0] / (2.0 * math.pi)
+        return _Shaft(found.phase, found.speed, words, found)
     try:
-        phase = phase_from_line(signal, gmf, counts[0])
-        if phase.attrs["quality"] >= MIN_QUALITY and abs(phase.attrs["mean_speed"] / nominal - 1) < SPEED_TOLERANCE:
-            return (
-                phase,
-                float(phase.attrs["mean_speed"]),
-                "from the given speed, followed by the mesh line",
-                None,
-                signal,
-            )
+        phase = phase_from_line(signal, nominal * counts[0] / (2.0 * math.pi), counts[0])
     except SignalError:
-        pass
+        phase = None
+    if phase is not None and phase.attrs["quality"] >= MIN_QUALITY:
+        followed = float(phase.attrs["mean_speed"])
+        if abs(followed / nominal - 1) < SPEED_TOLERANCE:
+            return _Shaft(phase, followed, "from the given speed, followed by the mesh line")
     notes.append("No mesh line could be followed near the given speed; it is taken as constant.")
-    return phase_from_speed(signal, nominal), float(nominal), "as given", None, signal
+    return _Shaft(phase_from_speed(signal, nominal), nominal, "as given")
 
 
 def _average(

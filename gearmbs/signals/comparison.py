@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -99,21 +99,27 @@ def compare(
             done += 1
     data = _tabulate(found["experiment"], loads, states, "experiment")
     if model is not None:
-        data = data.isel(channel=0, drop=True)
-        other = _tabulate(found["model"], loads, states, "model").isel(channel=0, drop=True)
-        if data.attrs["units"] != other.attrs["units"] and "unknown" not in (data.attrs["units"], other.attrs["units"]):
-            raise SignalError(
-                f"units: the experiment is in {data.attrs['units']!r}, the model in {other.attrs['units']!r}; "
-                "bring both to one with convert or force_to_acceleration"
-            )
-        factor = _factors(data["level"], other["level"], reference, scope)
-        data["model"] = other["rms"] * factor
-        data["factor"] = factor
-        data["model_unscaled"] = other["rms"]
-        data["model_gmf"] = other["gmf"]
+        data = _with_model(data, _tabulate(found["model"], loads, states, "model"), reference, scope)
     data = data.rename(rms="experiment")
     data.attrs.update(reference=reference, scope=scope, way=way, half_width=half_width)
     return ComparisonReport(data, reference, left_out)
+
+
+def _with_model(data: xr.Dataset, model: xr.Dataset, reference: str, scope: str) -> xr.Dataset:
+    """Put the model's levels beside the experiment's, scaled."""
+    data, model = data.isel(channel=0, drop=True), model.isel(channel=0, drop=True)
+    units = (data.attrs["units"], model.attrs["units"])
+    if units[0] != units[1] and "unknown" not in units:
+        raise SignalError(
+            f"units: the experiment is in {units[0]!r}, the model in {units[1]!r}; "
+            "bring both to one with convert or force_to_acceleration"
+        )
+    factor = _factors(data["level"], model["level"], reference, scope)
+    data["model"] = model["rms"] * factor
+    data["factor"] = factor
+    data["model_unscaled"] = model["rms"]
+    data["model_gmf"] = model["gmf"]
+    return data
 
 
 def compare_files(
@@ -124,15 +130,7 @@ def compare_files(
     rate: float | None = None,
     units: str | None = None,
     speed: float | None = None,
-    reference: str = "healthy",
-    scope: Scope = "load",
-    channel: str | None = None,
-    model_channel: str | None = None,
-    way: Literal["band", "orders"] = "band",
-    harmonics: int = 3,
-    half_width: float = HALF_WIDTH,
-    wheel: int = 1,
-    progress: Progress | None = None,
+    **settings: Any,
 ) -> ComparisonReport:
     """Read the files and `compare` them.
 
@@ -141,8 +139,8 @@ def compare_files(
     experiment, model : mapping of load to mapping of state to path
     teeth, rate, units, speed
         Metadata that the experiment's files lack (`read_signal`); the model's files must know theirs.
-    reference, scope, channel, model_channel, way, harmonics, half_width, wheel, progress
-        As for `compare`.
+    **settings
+        The settings of `compare`.
 
     Returns
     -------
@@ -155,19 +153,7 @@ def compare_files(
     simulated = None
     if model is not None:
         simulated = {load: {s: read_signal(p) for s, p in cases.items()} for load, cases in model.items()}
-    return compare(
-        measured,
-        simulated,
-        reference=reference,
-        scope=scope,
-        channel=channel,
-        model_channel=model_channel,
-        way=way,
-        harmonics=harmonics,
-        half_width=half_width,
-        wheel=wheel,
-        progress=progress,
-    )
+    return compare(measured, simulated, **settings)
 
 
 def _common_cases(experiment: States, model: States | None, reference: str) -> tuple[list[str], list[str], list[str]]:

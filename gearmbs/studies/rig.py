@@ -77,8 +77,7 @@ def gear_rig(
     mass = shaft_density * np.pi * shaft_radius**2 * shaft_length
     across = mass * (3.0 * shaft_radius**2 + shaft_length**2) / 12.0
     moments = (across, across, 0.5 * mass * shaft_radius**2)
-    frames = ((place.origin_1, place.axes_1), (place.origin_2, place.axes_2))
-    for k, ((origin, axes), wheel) in enumerate(zip(frames, pair.wheels)):
+    for k, ((origin, axes), wheel) in enumerate(zip(place.frames, pair.wheels)):
         gear = rig.body(GEARS[k], wheel.mass, wheel.inertia, position=origin, orientation=axes)
         shaft = rig.body(SHAFTS[k], mass, moments, position=origin, orientation=axes)
         rig.fixed(SEATS[k], gear, shaft, at=origin, axis=axes[:, 2])

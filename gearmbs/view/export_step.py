@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from gearmbs.gears import GearPair, GearSpec
-from gearmbs.gears.pair import Placement
 from gearmbs.view.edges import DEGREE, Arc, Edge, Spline, bore_edges, profile_edges
 from gearmbs.view.files import write_whole
+from gearmbs.view.solid import title_of
 
 MM = 1e3
 UP = (0.0, 0.0, 1.0)
@@ -49,14 +49,13 @@ def write_step(gears: GearSpec | GearPair, path: str | Path, *, driver_angle: fl
                 "gears: the pair has faults of single teeth, which STEP curves cannot follow; use write_stl, or "
                 "with_changes(faults=())"
             )
-        place = gears.placement(driver_angle)
-        solids = [_solid(writer, wheel, *_frame(place, k)) for k, wheel in enumerate(gears.wheels)]
-        name = f"gear pair {gears.driver.teeth}/{gears.driven.teeth}"
+        placed = zip(gears.wheels, gears.placement(driver_angle).frames)
+        solids = [_solid(writer, wheel, *frame) for wheel, frame in placed]
     elif isinstance(gears, GearSpec):
         solids = [_solid(writer, gears, np.zeros(3), np.eye(3))]
-        name = f"{gears.name} z={gears.teeth}"
     else:
         raise ValueError(f"gears is a {type(gears).__name__}; give a GearSpec or a GearPair")
+    name = title_of(gears)
     _product(writer, solids, name)
     header = [
         "ISO-10303-21;",
@@ -68,10 +67,6 @@ def write_step(gears: GearSpec | GearPair, path: str | Path, *, driver_angle: fl
         "DATA;",
     ]
     return write_whole(path, "\n".join([*header, *writer.lines, "ENDSEC;", "END-ISO-10303-21;"]) + "\n")
-
-
-def _frame(place: Placement, wheel: int) -> tuple[np.ndarray, np.ndarray]:
-    return (place.origin_2, place.axes_2) if wheel else (place.origin_1, place.axes_1)
 
 
 class _Writer:

@@ -10,7 +10,7 @@ from gearmbs.gears import GearPair, GearSpec
 from gearmbs.view.files import whole_file
 from gearmbs.view.mesh import Mesh, joined
 from gearmbs.view.outline import TOLERANCE
-from gearmbs.view.solid import gear_solid, pair_solids
+from gearmbs.view.solid import gear_solid, pair_solids, title_of
 
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 LENGTH_UNITS = {"mm": 1e3, "m": 1.0, "cm": 1e2, "in": 1.0 / 0.0254}
@@ -52,20 +52,18 @@ def write_stl(
     if unit not in LENGTH_UNITS:
         raise ValueError(f"unit is {unit!r}; choose one of {', '.join(LENGTH_UNITS)}")
     if isinstance(solid, GearPair):
-        place = solid.placement(driver_angle)
-        first, second = pair_solids(solid, tolerance)
-        mesh = joined([first.placed(place.origin_1, place.axes_1), second.placed(place.origin_2, place.axes_2)])
-        name = f"gear pair {solid.driver.teeth}/{solid.driven.teeth}"
+        frames = solid.placement(driver_angle).frames
+        mesh = joined([wheel.placed(*frame) for wheel, frame in zip(pair_solids(solid, tolerance), frames)])
     elif isinstance(solid, GearSpec):
-        mesh, name = gear_solid(solid, tolerance), f"{solid.name} z={solid.teeth}"
+        mesh = gear_solid(solid, tolerance)
     elif isinstance(solid, Mesh):
-        mesh, name = solid, "mesh"
+        mesh = solid
     else:
         raise ValueError(f"solid is a {type(solid).__name__}; give a GearSpec, a GearPair or a Mesh")
     records = np.zeros(len(mesh.triangles), dtype=RECORD)
     records["corners"] = mesh.corners * LENGTH_UNITS[unit]
     records["normal"] = mesh.normals
-    header = f"{name}, {unit}".encode("ascii", "replace")[:80].ljust(80)
+    header = f"{title_of(solid)}, {unit}".encode("ascii", "replace")[:80].ljust(80)
     path = Path(path)
     with whole_file(path) as part, part.open("wb") as file:
         file.write(header)

@@ -33,6 +33,13 @@ class _Teeth:
     angle: tuple[np.ndarray, np.ndarray]
 
 
+def title_of(solid: GearSpec | GearPair | Mesh) -> str:
+    """Return what a geometry file calls a wheel, a pair or a mesh."""
+    if isinstance(solid, GearPair):
+        return f"gear pair {solid.driver.teeth}/{solid.driven.teeth}"
+    return f"{solid.name} z={solid.teeth}" if isinstance(solid, GearSpec) else "mesh"
+
+
 def pair_solids(pair: GearPair, tolerance: float = TOLERANCE, exaggeration: float = 1.0) -> tuple[Mesh, Mesh]:
     """Return driver and driven, each in its own frame, with backlash thinning and all faults of the pair.
 
