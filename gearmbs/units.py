@@ -103,6 +103,7 @@ def to_si(value: Any, unit: str, field: str = "value") -> float:
     return number
 
 
+@functools.lru_cache(maxsize=1024)
 def _parse(text: str, target: str, field: str) -> float:
     import pint
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import platform
 from collections.abc import Callable
@@ -256,6 +257,9 @@ def _is_even(t: np.ndarray, rate: float) -> bool:
     return bool(np.allclose(np.diff(t) * rate, 1.0, atol=1e-6))
 
 
+_version = functools.cache(version)
+
+
 def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any]:
     """Return every parameter of a case, the versions and the solver's statistics as flat attributes.
 
@@ -288,7 +292,7 @@ def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any
     out["case_json"] = case.model_dump_json()
     out["gearmbs_version"] = gearmbs.__version__
     for package in ("numpy", "scipy", "numba", "scikit-sundae", "xarray"):
-        out[f"{package.replace('-', '_')}_version"] = version(package)
+        out[f"{package.replace('-', '_')}_version"] = _version(package)
     out["python_version"] = platform.python_version()
     if solution is not None:
         out.update({f"solver_{key}": value for key, value in solution.stats.as_dict().items()})

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
 from gearmbs.signals import SignalError, even_signal
+from gearmbs.signals.monotone_cubic import monotone_cubic
 
 RATE = 51200.0
 
@@ -53,3 +55,15 @@ def test_tones_above_half_the_rate_do_not_fold_back():
 def test_wrong_input(t, values, span, words):
     with pytest.raises(SignalError, match=words):
         even_signal(np.array(t), np.array(values), RATE, start=span[0], stop=span[1])
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 500])
+def test_the_cubic_is_pchip(n):
+    rng = np.random.default_rng(n)
+    x = np.cumsum(rng.uniform(0.1, 1.0, n))
+    y = np.cumsum(rng.normal(size=(n, 3)), axis=0)
+    y[n // 2 : n // 2 + 3] = y[n // 2]
+    at = np.concatenate([x, rng.uniform(x[0], x[-1], 300)])
+    expected = PchipInterpolator(x, y, axis=0)(at)
+    np.testing.assert_allclose(monotone_cubic(x, y, at), expected, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(monotone_cubic(x, y[:, 1], at), expected[:, 1], rtol=1e-12, atol=1e-12)

@@ -265,7 +265,9 @@ class Solution:
                     f"{', '.join(known)} carry all of it"
                 )
             raise KeyError(f"joint {joint!r}; the joints are {', '.join(known) or 'none in this mechanism'}")
-        return self._records.force[:, rows].sum(axis=1), self._records.moment[:, rows].sum(axis=1)
+        # the rows of a joint follow one another
+        own = slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] == len(rows) - 1 else rows
+        return self._records.force[:, own].sum(axis=1), self._records.moment[:, own].sum(axis=1)
 
     def load(self, element: str) -> tuple[np.ndarray, np.ndarray]:
         """Return force F (N) and torque N (N m) of a force element on I's body at marker I, each (m, 3), global."""

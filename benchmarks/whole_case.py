@@ -1,0 +1,156 @@
+"""A whole case, from the mechanism to the table of mesh harmonics with reactions at every step, in several checkouts.
+
+    python -m benchmarks.whole_case before=/path/to/checkout after=. --repeats 7
+
+Each measurement runs in a process of its own, the checkouts in turn, so that a busy machine slows all of them alike.
+What counts are processor times and the medians of their ratios to the first checkout.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.markdown import number, table
+
+STATES = ("healthy", "misaligned")
+PARTS = ("residual", "Jacobian", "factorisation", "substitution", "rest of the step", "reactions", "set-up and signals")
+
+CHILD = """
+import json, sys, time
+from gearmbs.studies import Case, run_case, simulate_case
+from benchmarks.gear_pair import call_costs
+
+state, lump, seconds = sys.argv[1], sys.argv[2] == "lump", float(sys.argv[3])
+fault = {"misalignment": "1 deg"} if state == "misaligned" else {}
+settings = {"fault": fault, **({"solver": {"lump": True}} if lump else {})}
+run_case(Case(name="warm", operation={"duration": 0.08}, **settings))
+case = Case(name=state, operation={"duration": seconds}, **settings)
+start = time.process_time()
+record = run_case(case)
+whole = time.process_time() - start
+
+start, wall = time.process_time(), time.perf_counter()
+solution = simulate_case(case, every_step=True)
+share = (time.process_time() - start) / (time.perf_counter() - wall)
+inside = solution.stats.wall_time * min(share, 1.0)
+start = time.process_time()
+for part in solution.parts():
+    part.multipliers
+reactions = time.process_time() - start
+stats, cost = solution.stats, call_costs(solution)
+parts = {
+    "residual": stats.residuals * cost["residual"],
+    "Jacobian": stats.jacobians * cost["jacobian"],
+    "factorisation": stats.factorizations * cost["factorisation"],
+    "substitution": stats.solves * cost["substitution"],
+}
+parts["rest of the step"] = inside - sum(parts.values())
+parts["reactions"] = reactions
+parts["set-up and signals"] = whole - inside - reactions
+levels = record.gmf_rms.sel(way="orders", component=["line_of_action", "line_of_centres", "tangential"]).values
+print(json.dumps({"whole": whole, "steps": stats.steps, "unknowns": solution.problem.n, "gmf": levels.tolist(),
+                  "parts": {name: 1e6 * value / stats.steps for name, value in parts.items()}}))
+"""
+
+
+def measure(folder: Path, state: str, lump: bool, seconds: float) -> dict:
+    """Run one case in a fresh process of a checkout and return its numbers."""
+    python = folder / ".venv" / "bin" / "python"
+    threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")}
+    interpreter = str(python if python.exists() else sys.executable)
+    done = subprocess.run(
+        [
+            str(python if python.exists() else sys.executable),
+            "-c",
+            CHILD,
+            state,
+            "lump" if lump else "all",
+            str(seconds),
+        ],
+        cwd=folder,
+        env={**os.environ, **threads, "PYTHONPATH": str(folder)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode != 0:
+        raise RuntimeError(f"{folder}: {done.stderr[-2000:]}")
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def compare(checkouts: dict[str, Path], repeats: int, seconds: float) -> list[dict]:
+    """Measure all checkouts in turn; the first with all bodies is what the others are compared with."""
+    rows = []
+    last = list(checkouts)[-1]
+    for state in STATES:
+        runs = [(name, False) for name in checkouts] + [(last, True)]
+        found: dict[tuple[str, bool], list[dict]] = {run: [] for run in runs}
+        for _ in range(repeats):
+            for name, lump in runs:
+                found[name, lump].append(measure(checkouts[name], state, lump, seconds))
+        first = [one["whole"] for one in found[runs[0]]]
+        reference = np.array(found[runs[0]][0]["gmf"])
+        for (name, lump), many in found.items():
+            ratios = [a / one["whole"] for a, one in zip(first, many, strict=True)]
+            rows.append(
+                {
+                    "state": state,
+                    "checkout": name,
+                    "lump": lump,
+                    "unknowns": many[0]["unknowns"],
+                    "steps": many[0]["steps"],
+                    "seconds": float(np.median([one["whole"] for one in many])),
+                    "times_faster": float(np.median(ratios)),
+                    "off": float(np.max(np.abs(np.array(many[0]["gmf"]) / reference - 1.0))),
+                    "parts": {part: float(np.median([one["parts"][part] for one in many])) for part in PARTS},
+                }
+            )
+    return rows
+
+
+def render(rows: list[dict]) -> str:
+    """Return the tables in Markdown."""
+    whole, split = [], []
+    for row in rows:
+        label = [row["state"], row["checkout"] + (", lumped" if row["lump"] else "")]
+        whole.append(
+            [
+                *label,
+                str(row["unknowns"]),
+                str(row["steps"]),
+                number(row["seconds"], 3),
+                number(row["times_faster"], 3),
+                number(100.0 * row["off"], 2),
+            ]
+        )
+        split.append(
+            [*label, *(number(row["parts"][part], 3) for part in PARTS), number(sum(row["parts"].values()), 3)]
+        )
+    header = ["state", "program", "unknowns", "steps", "processor s", "times faster", "harmonics differ by %"]
+    return table(header, whole) + "\n" + table(["state", "program", *PARTS, "sum"], split)
+
+
+def main() -> None:
+    """Compare the checkouts named on the command line and print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("checkouts", nargs="+", help="name=folder; the first is what the others are compared with")
+    parser.add_argument("--repeats", type=int, default=7)
+    parser.add_argument("--seconds", type=float, default=1.0, help="length of the record")
+    parser.add_argument("--json", type=Path, help="write the numbers here, too")
+    given = parser.parse_args()
+    checkouts = {name: Path(folder).resolve() for name, folder in (text.split("=", 1) for text in given.checkouts)}
+    rows = compare(checkouts, given.repeats, given.seconds)
+    if given.json:
+        given.json.write_text(json.dumps(rows, indent=1))
+    print(render(rows))
+
+
+if __name__ == "__main__":
+    main()
