@@ -67,7 +67,7 @@ def measure(folder: Path, state: str, lump: bool, seconds: float) -> dict:
     interpreter = str(python if python.exists() else sys.executable)
     done = subprocess.run(
         [
-            str(python if python.exists() else sys.executable),
+            interpreter,
             "-c",
             CHILD,
             state,
