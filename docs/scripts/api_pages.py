@@ -65,7 +65,8 @@ MORE = {
         "gearmbs.contact.laws": ["normal_law", "friction_law"],
     },
     "gearmbs.dae": {
-        "gearmbs.dae.solve": ["solve_dae", "as_problem"],
+        "gearmbs.dae.solve": ["solve_dae"],
+        "gearmbs.dae.user_problem": ["as_problem"],
         "gearmbs.dae.equations.expressions": EXPORTED,
         "gearmbs.dae.integrators.wstiff": ["solve_wstiff", "resume"],
         "gearmbs.dae.integrators.ida": ["solve_ida"],

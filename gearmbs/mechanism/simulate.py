@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.integrators.ida import solve_ida
+from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.results.stream import Stream
@@ -165,11 +165,7 @@ def _sampled(start: float, end: float, rate: float) -> np.ndarray:
 
 def _check_options(name: str, options: Mapping[str, Any]) -> None:
     """Raise a ModelError for an option the integrator does not have."""
-    if name == "IDA":
-        solver: Callable = solve_ida
-    else:
-        from gearmbs.dae.integrators.wstiff import solve_wstiff as solver
-    known = [p for p in inspect.signature(solver).parameters if p not in ("problem", "t_eval", "t_end", "method")]
+    known = Options.names(name)
     for option in options:
         if option in known:
             continue

@@ -14,13 +14,14 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import csc_array
 
 from gearmbs.dae.integrators.messages import advice, unknown_name
+from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 
@@ -31,7 +32,7 @@ UNCONTROLLED = 1e10
 SMALLEST_RTOL = 1e-14
 DENSE_LIMIT = 150
 """Unknowns up to which the dense factorisation is used: SuperLU_MT waits busily and stalls on a loaded machine."""
-IDA_MAX_ORDER = 5
+MAX_ITERATIONS = 4
 MAX_STEPS = 100_000
 """Steps allowed between two outputs: 15 s of a vibration of 500 Hz at a dozen steps a period."""
 
@@ -161,49 +162,13 @@ def _solver(problem: DAEProblem, calls: _Callbacks, atol: np.ndarray, rtol: floa
         )
 
 
-def check_ida(
-    tol: float,
-    rtol: float,
-    max_order: int,
-    max_step: float,
-    first_step: float,
-    min_step: float,
-    max_iterations: int,
-    max_steps: int,
-) -> None:
-    """Refuse what IDA would pass over or reject in words of its own."""
-    if not (np.isfinite(tol) and tol > 0):
-        raise ValueError(f"tol (ERROR) must be positive, is {tol!r}")
-    if not (np.isfinite(rtol) and rtol >= 0):
-        raise ValueError(f"rtol must not be negative, is {rtol!r}")
-    if not 1 <= max_order <= IDA_MAX_ORDER:
-        raise ValueError(f"max_order (KMAX) must be 1 to {IDA_MAX_ORDER} for IDA, is {max_order!r}")
-    for name, value in (
-        ("max_step (HMAX)", max_step),
-        ("first_step (HINIT)", first_step),
-        ("min_step (HMIN)", min_step),
-    ):
-        if not value >= 0:
-            raise ValueError(f"{name} must not be negative, is {value!r}")
-    for name, count in (("max_iterations (MAXIT)", max_iterations), ("max_steps", max_steps)):
-        if not count >= 1:
-            raise ValueError(f"{name} must be at least 1, is {count!r}")
-
-
 def solve_ida(
     problem: DAEProblem,
     t_eval: np.ndarray | None = None,
+    options: Options | None = None,
     *,
     t_end: float | None = None,
-    tol: float = 1e-6,
-    rtol: float = 0.0,
-    max_order: int = 5,
-    max_step: float = 0.0,
-    first_step: float = 0.0,
-    min_step: float = 0.0,
-    max_iterations: int = 4,
-    max_steps: int = MAX_STEPS,
-    progress: Callable[[float], None] | None = None,
+    **settings: Any,
 ) -> DAEResult:
     """Integrate a DAE with IDA and return it at the times ``t_eval``, or at every step IDA takes.
 
@@ -215,18 +180,12 @@ def solve_ida(
         With consistent initial values at ``t_eval[0]``.
     t_eval : array_like, shape (m,), optional
         Increasing output times, s; the first is the start. Default: the end of every step.
+    options : Options, optional
+        With the method "IDA". Steps of size 0 are left to IDA.
     t_end : float, optional
         End of the run when ``t_eval`` is not given, s.
-    tol : float
-        Absolute tolerance of unknown i is ``tol * problem.atol_scale[i]`` where the error mask is set.
-    rtol : float
-        Relative tolerance of all unknowns; 0 gives the smallest IDA accepts (see the module's text).
-    max_order, max_step, first_step, min_step, max_iterations
-        Handed to IDA; 0 leaves a size to IDA.
-    max_steps : int
-        Steps allowed between two outputs, so that a run that gets stuck ends.
-    progress : callable, optional
-        Called with the time reached, at most a few hundred times a run.
+    **settings
+        Single options by name, before those of ``options``: see `gearmbs.dae.Options`.
 
     Returns
     -------
@@ -239,77 +198,120 @@ def solve_ida(
     ValueError
         For arguments that make no sense.
     """
-    check_ida(tol, rtol, max_order, max_step, first_step, min_step, max_iterations, max_steps)
-    every_step = t_eval is None
-    if every_step and t_end is None:
+    gathered = Options.gather("IDA", options, settings)
+    if t_eval is None and t_end is None:
         raise ValueError("t_end: give it when t_eval is left out")
     times = np.asarray([problem.t0, t_end] if t_eval is None else t_eval, dtype=float)
     if times.ndim != 1 or times.size < 2 or np.any(np.diff(times) <= 0.0):
         raise ValueError("t_eval: give at least two strictly increasing times")
-    idata, rdata = problem.idata.copy(), problem.rdata.copy()
-    calls = _Callbacks(problem, idata, rdata)
-    atol = np.where(problem.error_mask, tol * problem.atol_scale, UNCONTROLLED)
-    options = {
-        "max_order": max_order,
-        "max_step": max_step,
-        "first_step": first_step,
-        "min_step": min_step,
-        "max_nonlin_iters": max_iterations,
-        "max_num_steps": max_steps,
-    }
-    rows = _Rows(times, problem, every_step)
-    epochs = [(0, idata.copy())]
-    hist = np.zeros((1, problem.n))
-    status, message = Status.SUCCESS, Status.SUCCESS.sentence
-    start = time.perf_counter()
-    t, end = float(times[0]), float(times[-1])
-    with _listening() as messages:
-        try:
-            solver = _solver(problem, calls, atol, rtol, options)
-            solver.init_step(t, problem.y0, problem.yp0)
-            y = problem.y0
-            while t < end:
-                target = rows.next_time
-                if problem.hook_interval is not None and not every_step:
-                    target = min(target, t + problem.hook_interval(y))
-                answer = solver.step(target, method="onestep" if every_step else "normal", tstop=end)
-                if not answer.success:
-                    status, message = _failure(problem, calls, float(answer.t), messages.text or answer.message, atol)
-                    break
-                t, y, yp = float(answer.t) if every_step else target, answer.y, answer.yp
-                if rows.take(t, y, yp) and progress is not None:
-                    progress(t)
-                if problem.hook is not None:
-                    hist[0] = y
-                    if problem.hook(t, hist, 1, idata, rdata, calls.work):
-                        epochs.append((rows.done, idata.copy()))
-                        y = hist[0].copy()
-                        yp = np.array(yp)
-                        if problem.restart_rates is not None:
-                            yp = problem.restart_rates(t, y, yp, idata, rdata)
-                        solver = _solver(problem, calls, atol, rtol, options)
-                        solver.init_step(t, y, yp)
-        except KeyboardInterrupt:
-            status, message = Status.INTERRUPTED, f"{Status.INTERRUPTED.sentence} Reached t = {t:.6g} s."
-        except (_NotFiniteError, RuntimeError) as error:
-            status, message = _failure(problem, calls, max(t, calls.last_t), messages.text or str(error), atol)
-    stats = SolverStats(
-        steps=calls.steps,
-        residuals=calls.residuals,
-        jacobians=calls.jacobians,
-        factorizations=calls.jacobians,
-        wall_time=time.perf_counter() - start,
-    )
-    return DAEResult(
-        t=rows.t[: rows.done],
-        y=rows.y[: rows.done],
-        yp=rows.yp[: rows.done],
-        status=status,
-        message=message,
-        stats=stats,
-        epochs=epochs,
-        t_last=t,
-    )
+    return _Run(problem, times, t_eval is None, gathered).drive()
+
+
+class _Run:
+    """One integration with IDA, restarted where the hook rewrites the unknowns."""
+
+    def __init__(self, problem: DAEProblem, times: np.ndarray, every_step: bool, options: Options) -> None:
+        self.problem = problem
+        self.every_step = every_step
+        self.options = options
+        self.idata, self.rdata = problem.idata.copy(), problem.rdata.copy()
+        self.calls = _Callbacks(problem, self.idata, self.rdata)
+        self.atol = np.where(problem.error_mask, options.tol * problem.atol_scale, UNCONTROLLED)
+        self.rows = _Rows(times, problem, every_step)
+        self.epochs = [(0, self.idata.copy())]
+        self.t, self.end = float(times[0]), float(times[-1])
+
+    def drive(self) -> DAEResult:
+        """Run to the end, a failure or an interruption, and return everything computed so far."""
+        start = time.perf_counter()
+        with _listening() as messages:
+            try:
+                status, message = self._loop(messages)
+            except KeyboardInterrupt:
+                status, message = Status.INTERRUPTED, f"{Status.INTERRUPTED.sentence} Reached t = {self.t:.6g} s."
+            except (_NotFiniteError, RuntimeError) as error:
+                status, message = self._failure(max(self.t, self.calls.last_t), messages.text or str(error))
+        stats = SolverStats(
+            steps=self.calls.steps,
+            residuals=self.calls.residuals,
+            jacobians=self.calls.jacobians,
+            factorizations=self.calls.jacobians,
+            wall_time=time.perf_counter() - start,
+        )
+        rows = self.rows
+        return DAEResult(
+            t=rows.t[: rows.done],
+            y=rows.y[: rows.done],
+            yp=rows.yp[: rows.done],
+            status=status,
+            message=message,
+            stats=stats,
+            epochs=self.epochs,
+            t_last=self.t,
+        )
+
+    def _loop(self, messages: _Messages) -> tuple[Status, str]:
+        """Take steps until the end or a failure; return how the run has ended."""
+        problem, rows = self.problem, self.rows
+        y = problem.y0
+        solver = self._start(y, problem.yp0)
+        while self.t < self.end:
+            target = rows.next_time
+            if problem.hook_interval is not None and not self.every_step:
+                target = min(target, self.t + problem.hook_interval(y))
+            answer = solver.step(target, method="onestep" if self.every_step else "normal", tstop=self.end)
+            if not answer.success:
+                return self._failure(float(answer.t), messages.text or answer.message)
+            self.t, y, yp = float(answer.t) if self.every_step else target, answer.y, answer.yp
+            if rows.take(self.t, y, yp) and self.options.progress is not None:
+                self.options.progress(self.t)
+            changed = self._call_hook(y, yp)
+            if changed is not None:
+                y, yp = changed
+                solver = self._start(y, yp)
+        return Status.SUCCESS, Status.SUCCESS.sentence
+
+    def _start(self, y: np.ndarray, yp: np.ndarray) -> IDA:
+        """Return IDA, set up at the time reached."""
+        o = self.options
+        settings = {
+            "max_order": o.highest_order if o.max_order is None else o.max_order,
+            "max_step": 0.0 if o.max_step is None or np.isinf(o.max_step) else o.max_step,
+            "first_step": o.first_step or 0.0,
+            "min_step": o.min_step or 0.0,
+            "max_nonlin_iters": MAX_ITERATIONS if o.max_iterations is None else o.max_iterations,
+            "max_num_steps": MAX_STEPS if o.max_steps is None else o.max_steps,
+        }
+        solver = _solver(self.problem, self.calls, self.atol, o.rtol, settings)
+        solver.init_step(self.t, y, yp)
+        return solver
+
+    def _call_hook(self, y: np.ndarray, yp: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Let the hook look at the unknowns; return them and their rates if it has rewritten them."""
+        problem = self.problem
+        hist = y[None, :].copy()
+        if problem.hook is None or not problem.hook(self.t, hist, 1, self.idata, self.rdata, self.calls.work):
+            return None
+        self.epochs.append((self.rows.done, self.idata.copy()))
+        y, yp = hist[0], np.array(yp)
+        if problem.restart_rates is not None:
+            yp = problem.restart_rates(self.t, y, yp, self.idata, self.rdata)
+        return y, yp
+
+    def _failure(self, t: float, why: str) -> tuple[Status, str]:
+        """Say when the run failed, which unknown is the least satisfied, and what to try."""
+        problem, calls = self.problem, self.calls
+        if calls.bad_count:
+            return Status.NOT_FINITE, (
+                f"{Status.NOT_FINITE.sentence} IDA stopped at t = {t:.6g} s: the equation of "
+                f"{unknown_name(problem, calls.bad_row)} is not a finite number. {advice(problem, Status.NOT_FINITE)}"
+            )
+        moving = np.where(problem.error_mask, np.abs(calls.yp) / np.maximum(self.atol, 1e-300), 0.0)
+        worst = int(np.argmax(moving))
+        return Status.SOLVER_FAILURE, (
+            f"IDA stopped at t = {t:.6g} s ({why.rstrip('.')}). The unknown that changes fastest for its tolerance is "
+            f"{unknown_name(problem, worst)}. {advice(problem, Status.SOLVER_FAILURE)}"
+        )
 
 
 class _Rows:
@@ -344,18 +346,3 @@ class _Rows:
             return False
         self.told = t
         return True
-
-
-def _failure(problem: DAEProblem, calls: _Callbacks, t: float, why: str, atol: np.ndarray) -> tuple[Status, str]:
-    """Say when the run failed, which unknown is the least satisfied, and what to try."""
-    if calls.bad_count:
-        return Status.NOT_FINITE, (
-            f"{Status.NOT_FINITE.sentence} IDA stopped at t = {t:.6g} s: the equation of "
-            f"{unknown_name(problem, calls.bad_row)} is not a finite number. {advice(problem, Status.NOT_FINITE)}"
-        )
-    moving = np.where(problem.error_mask, np.abs(calls.yp) / np.maximum(atol, 1e-300), 0.0)
-    worst = int(np.argmax(moving))
-    return Status.SOLVER_FAILURE, (
-        f"IDA stopped at t = {t:.6g} s ({why.rstrip('.')}). The unknown that changes fastest for its tolerance is "
-        f"{unknown_name(problem, worst)}. {advice(problem, Status.SOLVER_FAILURE)}"
-    )

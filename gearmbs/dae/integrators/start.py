@@ -39,15 +39,13 @@ REPAIR_SWEEPS = 4
 ROUNDED_RESIDUAL = 1e-10
 
 
-def choose_steps(run: Run, first_step: float | None, min_step: float | None) -> None:
+def choose_steps(run: Run) -> None:
     """Set the smallest step, and a first one that can do no harm, where the caller has not.
 
     Parameters
     ----------
     run : Run
         With weights set at the start.
-    first_step, min_step : float or None
-        HINIT and HMIN.
     """
     st = run.state
     span = st.t_end - st.t
@@ -56,7 +54,7 @@ def choose_steps(run: Run, first_step: float | None, min_step: float | None) -> 
     if speed > 0.0:
         natural = min(natural, FIRST_MOVE / speed)
     smallest = min(SMALLEST_OF_SPAN * span, SMALLEST_OF_FIRST * natural)
-    run.steps_given = first_step is not None, min_step is not None
+    first_step, min_step = run.options.first_step, run.options.min_step
     st.h_min = smallest if min_step is None else min_step
     st.h = max(min(natural, st.h_max), st.h_min) if first_step is None else first_step
 
@@ -95,7 +93,7 @@ def begin(run: Run) -> Failure | None:
     if failure is not None:
         return failure
     st.h = max(st.h, h)
-    failure = _check(run, h) if run.check_start else _repair(run, h)
+    failure = _check(run, h) if run.options.check_start else _repair(run, h)
     if failure is None:
         failure = choose_first_pivots(run, st.h)
     return failure if failure is not None else _lengthen(run)
@@ -159,7 +157,7 @@ def _check(run: Run, h: float) -> Failure | None:
             st.h_min = min(st.h_min, SMALLEST_OF_FIRST * h)
         if not first_given:
             st.h = max(min(st.h, h * min(1.0, FIRST_MOVE / move)), st.h_min)
-    if run.error_probe is not None and h < st.h:
+    if run.options.error_probe is not None and h < st.h:
         run.start_note = _algebraic_note(run)
     return None
 

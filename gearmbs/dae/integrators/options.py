@@ -1,0 +1,241 @@
+"""What an integration is asked for: one frozen object, checked once, for every integrator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from gearmbs.dae.integrators.bdf import MAX_ORDER
+
+METHODS = ("WSTIFF", "GSTIFF", "IDA")
+CORRECTORS = ("original", "modified")
+IDA_MAX_ORDER = 5
+MOST_ITERATIONS = 100
+IDA_TAKES = (
+    "tol",
+    "rtol",
+    "max_order",
+    "max_step",
+    "first_step",
+    "min_step",
+    "max_iterations",
+    "max_steps",
+    "progress",
+)
+
+Consumer = Callable[[np.ndarray, np.ndarray, np.ndarray], None]
+"""Takes t, y of some accepted steps and the integer table valid there; the arrays are valid during the call only."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Tolerances, limits and outputs of an integration.
+
+    Parameters
+    ----------
+    method : {"WSTIFF", "GSTIFF", "IDA"}
+        Variable-coefficient BDF, fixed leading coefficients on a re-interpolated equidistant history, or SUNDIALS IDA.
+    tol : float
+        Local error per step in units of the problem's ``atol_scale`` (ADAMS: ERROR).
+    rtol : float
+        Relative part: the tolerance of unknown i is ``tol * atol_scale[i] + rtol * |y[i]|``. IDA takes no less than
+        1e-14, and applies it to all unknowns.
+    corrector : {"original", "modified"}
+        Whether the corrector test looks at all unknowns or only at those under error control.
+    max_order : int, optional
+        KMAX; default 6, for IDA 5.
+    max_step, first_step, min_step : float, optional
+        HMAX, HINIT and HMIN; default no limit, and steps from the problem's own scale.
+    max_iterations : int, optional
+        MAXIT: iterations of the corrector; default 10, for IDA 4.
+    max_steps : int, optional
+        Limit on accepted steps; default none. For IDA the limit between two outputs, default 100 000.
+    interpolate : bool
+        INTERPOLATE: outputs from the interpolating polynomial (True) or by steps that land on them (False).
+    breakpoints : sequence of float
+        Known discontinuities: the run lands on each and starts afresh at order one.
+    event_direction, event_action : sequence of int, optional
+        For each event function: crossings that count (-1 falling, 1 rising, 0 both), and what they do (0 record,
+        1 stop, 2 land on the crossing and start afresh).
+    event_count : sequence of int, optional
+        For each event function that stops the run: at which of its crossings; default the first.
+    dense_output : bool
+        Keep every step, for ``result.sol``.
+    slopes : bool
+        With outputs at every step: whether y' is wanted too; it costs as much memory as y.
+    check_start : bool
+        Refuse initial values that do not satisfy the equations.
+    progress : callable, optional
+        Called now and then as ``progress(t)``.
+    consumer : callable, optional
+        With outputs at every step: called as ``consumer(t, y, idata)`` with some accepted steps at a time and the
+        integer table valid there, instead of keeping them; the arrays are valid during the call only. The result then
+        holds nothing but the last step.
+    error_probe : callable, optional
+        Returns the exception that a Python callback has stored, or None.
+
+    Raises
+    ------
+    ValueError
+        For a value that makes no sense; the message names the option, the value and what is allowed.
+    """
+
+    method: str = "WSTIFF"
+    tol: float = 1e-6
+    rtol: float = 0.0
+    corrector: str = "original"
+    max_order: int | None = None
+    max_step: float | None = None
+    first_step: float | None = None
+    min_step: float | None = None
+    max_iterations: int | None = None
+    max_steps: int | None = None
+    interpolate: bool = True
+    breakpoints: Sequence[float] = ()
+    event_direction: Sequence[int] | None = None
+    event_action: Sequence[int] | None = None
+    event_count: Sequence[int] | None = None
+    dense_output: bool = False
+    slopes: bool = True
+    check_start: bool = True
+    progress: Callable[[float], None] | None = None
+    consumer: Consumer | None = None
+    error_probe: Callable[[], BaseException | None] | None = None
+
+    def __post_init__(self) -> None:
+        _check_choice("method", self.method, METHODS)
+        _check_choice("corrector", self.corrector, CORRECTORS)
+        if not (np.isfinite(self.tol) and self.tol > 0):
+            raise ValueError(f"tol (ERROR) must be positive, is {self.tol!r}")
+        if not (np.isfinite(self.rtol) and self.rtol >= 0):
+            raise ValueError(f"rtol must not be negative, is {self.rtol!r}")
+        if self.max_order is not None and not 1 <= self.max_order <= self.highest_order:
+            kind = " for IDA" if self.uses_ida else ""
+            raise ValueError(f"max_order (KMAX) must be 1 to {self.highest_order}{kind}, is {self.max_order!r}")
+        self._check_steps()
+        most = np.inf if self.uses_ida else MOST_ITERATIONS
+        if self.max_iterations is not None and not 1 <= self.max_iterations <= most:
+            allowed = "at least 1" if self.uses_ida else f"1 to {MOST_ITERATIONS}"
+            raise ValueError(f"max_iterations (MAXIT) must be {allowed}, is {self.max_iterations!r}")
+        if self.max_steps is not None and not self.max_steps >= (1 if self.uses_ida else 0):
+            raise ValueError(f"max_steps must be at least 1, is {self.max_steps!r}")
+
+    def _check_steps(self) -> None:
+        sizes = {
+            "max_step (HMAX)": self.max_step,
+            "first_step (HINIT)": self.first_step,
+            "min_step (HMIN)": self.min_step,
+        }
+        for name, value in sizes.items():
+            if value is None:
+                continue
+            # IDA takes zero for a size that it may choose
+            if self.uses_ida or "HMIN" in name:
+                if not value >= 0:
+                    raise ValueError(f"{name} must not be negative, is {value!r}")
+            elif not value > 0:
+                raise ValueError(f"{name} must be positive, is {value!r}")
+
+    @property
+    def uses_ida(self) -> bool:
+        """Whether the integrator is SUNDIALS IDA."""
+        return self.method == "IDA"
+
+    @property
+    def highest_order(self) -> int:
+        """Order the method goes up to."""
+        return IDA_MAX_ORDER if self.uses_ida else MAX_ORDER
+
+    @staticmethod
+    def names(method: str) -> list[str]:
+        """Return the options that a method takes, without ``method`` itself."""
+        return [f.name for f in fields(Options) if f.name != "method" and (method != "IDA" or f.name in IDA_TAKES)]
+
+    @classmethod
+    def gather(cls, method: str | None, base: Options | None, settings: Mapping[str, Any], more: str = "") -> Options:
+        """Return options from an object and single settings, which count before it.
+
+        Parameters
+        ----------
+        method : str or None
+            Counts before that of ``base``; default "WSTIFF".
+        base : Options or None
+        settings : mapping
+            Options by name.
+        more : str
+            What to say of arguments beside the options in a message.
+
+        Raises
+        ------
+        ValueError
+            For a setting that the method does not have.
+        """
+        chosen = method if method is not None else base.method if base is not None else "WSTIFF"
+        _check_choice("method", chosen, METHODS)
+        known = cls.names(chosen)
+        unknown = sorted(set(settings) - set(known))
+        if unknown:
+            raise ValueError(f"method={chosen!r} does not know {', '.join(unknown)}; {more}it takes {', '.join(known)}")
+        return replace(base if base is not None else cls(method=chosen), method=chosen, **settings)
+
+
+def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise ValueError(f"{name} is {value!r}; choose one of {', '.join(choices)}")
+
+
+def output_times(t_eval: np.ndarray | None, t0: float, t_end: float | None) -> tuple[np.ndarray, float]:
+    """Return the output times, none for outputs at every step, and the end of the run.
+
+    Raises
+    ------
+    ValueError
+        For times that do not increase, or that lie outside the run.
+    """
+    if t_eval is None:
+        if t_end is None:
+            raise ValueError("give t_eval, or t_end for output at every step")
+        outputs = np.empty(0)
+    else:
+        outputs = np.array(t_eval, dtype=float).ravel()
+        if not len(outputs) or not np.isfinite(outputs).all() or (np.diff(outputs) <= 0).any():
+            raise ValueError("t_eval must be finite and strictly increasing, with at least one time")
+        if outputs[0] < t0:
+            raise ValueError(f"t_eval starts at {outputs[0]:g}, before the problem's t0 = {t0:g}")
+        if t_end is None:
+            t_end = float(outputs[-1])
+        elif outputs[-1] > t_end:
+            raise ValueError(f"t_eval ends at {outputs[-1]:g}, after t_end = {t_end:g}")
+    if not (np.isfinite(t_end) and t_end > t0):
+        raise ValueError(f"the end time {t_end:g} must lie after the start {t0:g}")
+    return outputs, float(t_end)
+
+
+def event_rules(n_events: int, options: Options) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return direction, action and count of each event, of at least one place; zeros and a count of one if not given.
+
+    Raises
+    ------
+    ValueError
+        For a list of the wrong length or with a value that means nothing.
+    """
+
+    def rule(name: str, allowed: tuple[int, ...] | None, default: int) -> np.ndarray:
+        values = np.full(max(1, n_events), default, dtype=np.int64)
+        given = getattr(options, name)
+        if given is None:
+            return values
+        if len(given) != n_events:
+            raise ValueError(f"{name} has {len(given)} entries for {n_events} event functions")
+        for value in given:
+            if allowed is not None and value not in allowed:
+                raise ValueError(f"{name} may hold {allowed}, has {value!r}")
+            if allowed is None and (value != int(value) or value < 1):
+                raise ValueError(f"{name} may hold whole numbers from 1 on, has {value!r}")
+        values[:n_events] = given
+        return values
+
+    return rule("event_direction", (-1, 0, 1), 0), rule("event_action", (0, 1, 2), 0), rule("event_count", None, 1)

@@ -1,0 +1,128 @@
+"""What a run has put into its buffers, collected in Python and made a `DAEResult`."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from gearmbs.dae.integrators.options import Options
+from gearmbs.dae.integrators.run_state import RunState
+from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.result import DAEResult, DenseOutput, SolverStats, Status
+
+
+class Records:
+    """Steps and crossings of one run, from its start on.
+
+    Parameters
+    ----------
+    problem : DAEProblem
+    st : RunState
+        With the start as its first record.
+    options : Options
+    every_step : bool
+        Whether outputs are wanted at every step.
+    """
+
+    def __init__(self, problem: DAEProblem, st: RunState, options: Options, every_step: bool) -> None:
+        self.problem = problem
+        self.state = st
+        self.options = options
+        self.every_step = every_step
+        self.consumed_time = 0.0
+        self.steps: list[tuple[np.ndarray, ...]] = []
+        self.row_blocks: list[np.ndarray] = []
+        self.crossings: list[tuple[float, int, np.ndarray]] = []
+        self.epochs: list[tuple[int, np.ndarray]] = [(0, st.idata.copy())]
+
+    def drain(self) -> None:
+        """Take records and crossings out of the buffers of the compiled loop."""
+        st = self.state
+        m = st.n_records
+        if m:
+            self.steps.append((st.record_t[:m].copy(), st.record_h[:m].copy(), st.record_order[:m].copy()))
+            if self.options.consumer is not None:
+                self._hand_over(m)
+            elif st.keep_rows:
+                self.row_blocks.append(st.record_y[:m].copy())
+            st.n_records = 0
+        for e in range(st.n_crossings):
+            self.crossings.append((float(st.crossing_t[e]), int(st.crossing_event[e]), st.crossing_y[e].copy()))
+        st.n_crossings = 0
+
+    def _hand_over(self, m: int) -> None:
+        """Give the steps among the first m records to the consumer; keep the last of them for the result."""
+        assert self.options.consumer is not None
+        st = self.state
+        is_step = st.record_order[:m] > 0
+        # the start is an output, too
+        is_step[0] |= len(self.steps) == 1
+        if not is_step.any():
+            return
+        whole = bool(is_step.all())
+        t, y = (st.record_t[:m], st.record_y[:m]) if whole else (st.record_t[:m][is_step], st.record_y[:m][is_step])
+        begin = time.perf_counter()
+        self.options.consumer(t, y, self.epochs[-1][1])
+        self.consumed_time += time.perf_counter() - begin
+        self.row_blocks = [y[-1:].copy()]
+
+    def change_table(self) -> None:
+        """Note that another integer table is valid from here on."""
+        st = self.state
+        if self.options.consumer is not None:
+            # what was stored so far belongs to the old table
+            self.drain()
+        self.epochs.append((1 + st.steps if self.every_step else st.next_output, st.idata.copy()))
+
+    def result(self, status: Status, message: str, stats: SolverStats) -> DAEResult:
+        """Return everything computed so far; histories of steps are put into ``stats``."""
+        st, n = self.state, self.problem.n
+        t, h, order = (np.concatenate(parts) for parts in zip(*self.steps, strict=True))
+        is_step = order > 0
+        stats.t_steps, stats.h_steps, stats.orders = t[is_step], h[is_step], order[is_step]
+        rows = np.concatenate(self.row_blocks) if self.row_blocks else None
+        consumed = self.options.consumer is not None
+        sol = DenseOutput(t, rows, order) if rows is not None and not consumed else None
+        outputs: tuple[np.ndarray, np.ndarray, np.ndarray]
+        if consumed and rows is not None:
+            outputs = t[np.append(0, np.flatnonzero(is_step))[-1:]], rows, np.empty((0, n))
+        elif self.every_step:
+            assert rows is not None
+            assert sol is not None
+            outputs = self._at_steps(t, is_step, rows, sol)
+        else:
+            m = st.next_output
+            outputs = st.outputs[:m], st.y_out[:m], st.yp_out[:m]
+            if status is not Status.SUCCESS:
+                # the run may go on, or the arrays are mostly empty; those of a finished run are handed over as they are
+                outputs = outputs[0].copy(), outputs[1].copy(), outputs[2].copy()
+        t_out, y_out, yp_out = outputs
+        by_event = [[hit for hit in self.crossings if hit[1] == e] for e in range(st.n_events)]
+        return DAEResult(
+            t=t_out,
+            y=y_out,
+            yp=yp_out,
+            status=status,
+            message=message,
+            stats=stats,
+            sol=sol if self.options.dense_output else None,
+            t_events=[np.array([hit[0] for hit in hits]) for hits in by_event],
+            y_events=[np.array([hit[2] for hit in hits]).reshape(-1, n) for hits in by_event],
+            epochs=[(0 if consumed else first, table.copy()) for first, table in self.epochs[-1 if consumed else 0 :]],
+            t_last=st.t,
+        )
+
+    def _at_steps(
+        self, t: np.ndarray, is_step: np.ndarray, rows: np.ndarray, sol: DenseOutput
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return time, unknowns and rates at the start and at the end of every step."""
+        ends = np.concatenate(([0], np.flatnonzero(is_step)))
+        t_out = t[ends]
+        # the rows themselves where nothing but steps was stored
+        y_out = rows if ends.size == len(rows) else rows[ends]
+        if not self.options.slopes:
+            return t_out, y_out, np.empty((0, self.problem.n))
+        yp_out = sol.derivative(t_out)
+        yp_out[0] = self.problem.yp0
+        return t_out, y_out, yp_out

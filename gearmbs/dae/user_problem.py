@@ -1,0 +1,283 @@
+"""A user's functions, compiled by numba or plain Python, made a `DAEProblem`."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numba.core.registry import CPUDispatcher
+from scipy.sparse import csc_array, issparse
+
+from gearmbs.dae.integrators import differences
+from gearmbs.dae.linalg.sparse_lu import LUFactors, LUPlan, SingularMatrixError, analyse, factor, new_factors, solve
+from gearmbs.dae.problem import DAEProblem
+
+RATES_STEP = 1e-12
+RATES_SWEEPS = 3
+RATES_RATIO = 100.0
+RATES_ROUNDS = 12
+
+
+def _takes(function: Callable, fewest: int, what: str) -> bool:
+    """Return whether ``function`` takes the parameters ``p`` beside its ``fewest`` arguments."""
+    inner = function.py_func if isinstance(function, CPUDispatcher) else function
+    try:
+        count = len(inspect.signature(inner).parameters)
+    except (TypeError, ValueError):
+        return False
+    if count not in (fewest, fewest + 1):
+        raise ValueError(
+            f"{what} takes {count} arguments; it must take {fewest}, or {fewest + 1} with the parameters p last"
+        )
+    return count == fewest + 1
+
+
+class _UserFunctions:
+    """Compiled functions of one user's problem, and the exceptions its Python callbacks have raised."""
+
+    def __init__(self, n: int, parameters: np.ndarray):
+        self.n = n
+        self.parameters = parameters
+        self.errors: list[BaseException] = []
+        self.callbacks: list[differences.PythonCallback] = []
+        self.addresses: dict[int, int] = {}
+
+    def _register(self, slot: int, function: Callable, n_out: int) -> None:
+        callback = differences.PythonCallback(function, self.n, n_out, self.errors)
+        self.callbacks.append(callback)
+        assert callback.address is not None
+        self.addresses[slot] = callback.address
+
+    def residual(self, fun: Callable) -> Callable:
+        takes_p = _takes(fun, 4, "the residual")
+        if isinstance(fun, CPUDispatcher):
+            return differences.adapt_residual(fun, takes_p)
+        extra = (self.parameters,) if takes_p else ()
+
+        def call(t, y, yp, _unused, out):
+            answer = fun(t, y, yp, out, *extra)
+            if answer is not None and answer is not out:
+                raise TypeError(
+                    f"the residual returned {type(answer).__name__}; it must write G into its argument out and return "
+                    "nothing"
+                )
+
+        self._register(differences.RESIDUAL_ADDRESS, call, self.n)
+        return differences.python_residual
+
+    def jacobian(self, jac: Callable | None, residual: Callable, nnz: int, dense: bool) -> Callable:
+        if jac is None:
+            return differences.differenced(residual)
+        takes_p = _takes(jac, 5, "the Jacobian")
+        if isinstance(jac, CPUDispatcher):
+            return differences.adapt_jacobian(jac, takes_p, dense)
+        extra = (self.parameters,) if takes_p else ()
+        n = self.n
+
+        def call(t, y, yp, cj, vals):
+            jac(t, y, yp, cj, vals.reshape((n, n)).T if dense else vals, *extra)
+
+        self._register(differences.JACOBIAN_ADDRESS, call, nnz)
+        return differences.python_jacobian
+
+    def events(self, functions: Sequence[Callable]) -> Callable:
+        takes_p = [_takes(g, 3, "an event function") for g in functions]
+        if all(isinstance(g, CPUDispatcher) for g in functions):
+            return differences.adapt_events(list(functions), takes_p)
+        extras = [(self.parameters,) if p else () for p in takes_p]
+
+        def call(t, y, yp, _unused, out):
+            for i, (g, extra) in enumerate(zip(functions, extras, strict=True)):
+                out[i] = g(t, y, yp, *extra)
+
+        self._register(differences.EVENTS_ADDRESS, call, len(functions))
+        return differences.python_events
+
+    def probe(self) -> BaseException | None:
+        """Return the first exception a callback has raised."""
+        return self.errors[0] if self.errors else None
+
+
+def _vector(value: Any, n: int, name: str) -> np.ndarray:
+    array = np.asarray(value, dtype=float)
+    if array.ndim == 0:
+        array = np.full(n, float(array))
+    if array.shape != (n,):
+        raise ValueError(
+            f"{name} has shape {array.shape}; it must be a number or have one entry for each of {n} unknowns"
+        )
+    return array.copy()
+
+
+def _mask(value: Any, n: int, name: str) -> np.ndarray:
+    mask = np.asarray(value)
+    if mask.dtype != bool or mask.shape != (n,):
+        raise ValueError(f"{name} must be {n} booleans, has shape {mask.shape} and type {mask.dtype}")
+    return mask.copy()
+
+
+def _pattern(jac_sparsity: Any, n: int) -> tuple[np.ndarray, np.ndarray]:
+    if jac_sparsity is None:
+        return np.arange(0, n * n + 1, n, dtype=np.int64), np.tile(np.arange(n, dtype=np.int64), n)
+    pattern = csc_array(jac_sparsity if issparse(jac_sparsity) else np.asarray(jac_sparsity) != 0)
+    if pattern.shape != (n, n):
+        raise ValueError(f"jac_sparsity has shape {pattern.shape}; it must be ({n}, {n})")
+    pattern.sort_indices()
+    return pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64)
+
+
+def _find_rates(problem: DAEProblem, span: float) -> None:
+    """Set y' of differential unknowns by a few Newton sweeps on a vanishing implicit Euler step.
+
+    Where the values are off the constraints, the sweeps take the jump onto them for a rate, which would hide the
+    inconsistency from the check of the start: then the rates stay zero.
+    """
+    work = np.zeros(problem.work_size)
+    tables = (problem.idata, problem.rdata, work)
+    moving = problem.differential
+    gamma = 1.0 / (RATES_STEP * span)
+    out = np.empty(problem.n)
+
+    def sweep(gamma: float, factored: tuple[LUPlan, LUFactors]) -> np.ndarray:
+        problem.residual(problem.t0, problem.y0, problem.yp0, out, *tables)
+        delta = np.empty(problem.n)
+        solve(*factored, out, delta)
+        return delta[moving]
+
+    tolerance = problem.atol_scale[moving]
+    for _ in range(RATES_ROUNDS):
+        factored = _factors_at_start(problem, gamma, tables)
+        if factored is None:
+            return
+        jump = sweep(gamma, factored)
+        if (np.abs(jump) <= tolerance).all():
+            break
+        gamma *= RATES_RATIO
+    else:
+        # the move of a rate shrinks with the step, a jump does not
+        return
+    problem.yp0[moving] -= gamma * jump
+    for _ in range(RATES_SWEEPS - 1):
+        problem.yp0[moving] -= gamma * sweep(gamma, factored)
+
+
+def _factors_at_start(problem: DAEProblem, gamma: float, tables: tuple) -> tuple[LUPlan, LUFactors] | None:
+    """Factor the Newton matrix at the start for a step of size 1 / ``gamma``; None if that cannot be done."""
+    out, vals = np.empty(problem.n), np.empty(len(problem.indices))
+    problem.residual(problem.t0, problem.y0, problem.yp0, out, *tables)
+    problem.jacobian(problem.t0, problem.y0, problem.yp0, gamma, vals, *tables)
+    if not (np.isfinite(out).all() and np.isfinite(vals).all()):
+        return None
+    try:
+        plan = analyse(problem.indptr, problem.indices, vals, problem.scale)
+    except SingularMatrixError:
+        return None
+    factors = new_factors(plan)
+    factor(plan, factors, vals)
+    return plan, factors
+
+
+def as_problem(
+    fun: Callable,
+    t0: float,
+    y0: np.ndarray,
+    yp0: np.ndarray | None,
+    span: float,
+    *,
+    p: np.ndarray | None = None,
+    atol: float | np.ndarray = 1e-8,
+    scale: float | np.ndarray = 1.0,
+    error_mask: np.ndarray | None = None,
+    differential: np.ndarray | None = None,
+    jac: Callable | None = None,
+    jac_sparsity: Any = None,
+    events: Sequence[Callable] = (),
+    names: Sequence[str] = (),
+) -> tuple[DAEProblem, Callable[[], BaseException | None]]:
+    """Turn a user's functions into a `DAEProblem`.
+
+    Parameters
+    ----------
+    fun, t0, y0, yp0
+        Residual and start, as in `solve_dae`.
+    span : float
+        Length of the run.
+    p : array_like, optional
+        Parameters handed to ``fun``, ``jac`` and ``events``.
+    atol : float or ndarray
+        Absolute tolerances.
+    scale : float or ndarray
+        Typical magnitude of the unknowns, for increments and for scaling the Newton matrix.
+    error_mask : ndarray of bool, optional
+        Unknowns under error control; default those whose derivative appears (multipliers are left out). For a system
+        of index three only the positions.
+    differential : ndarray of bool, optional
+        Unknowns whose derivative appears in G; found by probing G at the start if not given.
+    jac : callable, optional
+        ``jac(t, y, yp, cj, out[, p])`` writes dG/dy + cj dG/dy' into ``out``: the (n, n) matrix, or with
+        ``jac_sparsity`` its entries in CSC order. Without it coloured differences are used.
+    jac_sparsity : array_like or sparse matrix, shape (n, n), optional
+        Pattern of dG/dy and dG/dy' together.
+    events : sequence of callable
+        ``g(t, y, yp[, p])``.
+    names : sequence of str
+        Names of the unknowns, for messages.
+
+    Returns
+    -------
+    problem : DAEProblem
+        With ``atol_scale`` set to ``atol``: integrate with ``tol=1``.
+    error_probe : callable
+        Returns the first exception raised by a Python callback, or None.
+    """
+    y0 = np.array(y0, dtype=float).ravel()
+    n = len(y0)
+    if n == 0:
+        raise ValueError("y0 is empty")
+    parameters = np.array([] if p is None else p, dtype=float).ravel()
+    scales = _vector(scale, n, "scale")
+    atols = _vector(atol, n, "atol")
+    if not (atols > 0).all():
+        raise ValueError(f"atol must be positive, is {atols.min():g} for unknown {int(np.argmin(atols))}")
+    indptr, indices = _pattern(jac_sparsity, n)
+    functions = _UserFunctions(n, parameters)
+    residual = functions.residual(fun)
+    jacobian = functions.jacobian(jac, residual, len(indices), jac_sparsity is None)
+    compiled_events = functions.events(events) if len(events) else None
+    least = np.minimum(scales, atols / differences.INCREMENT)
+    idata, rdata, work_size = differences.pack_tables(indptr, indices, least, scales, parameters)
+    for slot, address in functions.addresses.items():
+        idata[slot] = address
+    rates = np.zeros(n) if yp0 is None else _vector(yp0, n, "yp0")
+    if differential is None:
+        differential = np.empty(n, dtype=np.bool_)
+        differences.find_differential(residual, float(t0), y0, rates, differential, idata, rdata, np.zeros(work_size))
+    else:
+        differential = _mask(differential, n, "differential")
+    problem = DAEProblem(
+        n=n,
+        residual=residual,
+        jacobian=jacobian,
+        indptr=indptr,
+        indices=indices,
+        idata=idata,
+        rdata=rdata,
+        work_size=work_size,
+        y0=y0,
+        yp0=rates,
+        error_mask=differential.copy() if error_mask is None else _mask(error_mask, n, "error_mask"),
+        atol_scale=atols,
+        scale=scales,
+        differential=differential,
+        t0=float(t0),
+        names=list(names),
+        events=compiled_events,
+        n_events=len(events),
+    )
+    if not problem.error_mask.any():
+        raise ValueError("error_mask leaves no unknown under error control")
+    if yp0 is None:
+        _find_rates(problem, span)
+    return problem, functions.probe
