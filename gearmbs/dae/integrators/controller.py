@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gearmbs._jit import njit
-from gearmbs.dae.integrators.bdf import divided_difference_norm, step_for_error
+from gearmbs.dae.integrators.bdf import HISTORY, divided_difference_norm, step_for_error
 from gearmbs.dae.integrators.history import rows_from, times_from
 
 TARGET = 0.2
@@ -33,11 +33,23 @@ def step_at_order(st, k, h, nodes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def step_below(st, k, h, nodes):
+    """Return the step size at which the two orders below k agree: the smaller of theirs.
+
+    One difference may be small by chance, where its derivative passes through zero; two rarely are. Parameters are
+    those of `step_at_order`.
+    """
+    below = step_at_order(st, k - 1, h, nodes)
+    return min(below, step_at_order(st, k - 2, h, nodes)) if k > 2 else below
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def after_success(st):
     """Set order and step size after an accepted step, the newest point of the history.
 
     The order is raised only after order + 1 steps without a change or a failure, and only for a clear gain; it is
-    lowered as soon as the lower order allows the same step.
+    lowered as soon as the lower orders allow the same step. Order one lets the step grow without such a pause only at
+    the start: later a step that doubles and halves by turns would keep it there for good.
     """
     k, h, n_past = st.order, st.h, st.n_past
     st.since_change += 1
@@ -50,11 +62,9 @@ def after_success(st):
     nodes = times_from(st, 0)
     best = k
     h_best = step_at_order(st, k, h, nodes)
-    if k > 1:
-        h_low = step_at_order(st, k - 1, h, nodes)
-        if h_low >= h_best:
-            best = k - 1
-            h_best = h_low
+    if k > 1 and h_best <= step_below(st, k, h, nodes):
+        best = k - 1
+        h_best = step_at_order(st, k - 1, h, nodes)
     if best == k and k < st.max_order and n_past >= k + 3 and unchanged and st.caution == 0:
         h_high = step_at_order(st, k + 1, h, nodes)
         if h_high > RAISE_GAIN * h_best:
@@ -65,7 +75,7 @@ def after_success(st):
         st.order = best
         st.since_change = 0
     if ratio > GROW_FROM:
-        if (unchanged or k == 1 or best != k) and st.caution == 0:
+        if (unchanged or (k == 1 and n_past < HISTORY) or best != k) and st.caution == 0:
             st.h = h * min(ratio, GROW_AT_MOST)
             st.since_change = 0
     elif ratio < SHRINK_FROM:
@@ -100,15 +110,12 @@ def after_error_failure(st, error, fails):
         past = times_from(st, 1)
         for m in range(min(n_past, k + 1)):
             nodes[m] = past[m]
-        best = 0
-        h_best = 0.0
+        best = k
+        h_best = step_at_order(st, k, h, nodes)
         lowest = max(1, k - 1) if fails == 1 else 1
-        for m in range(k - lowest + 1):
-            j = k - m
-            h_j = step_at_order(st, j, h, nodes)
-            if h_j >= h_best:
-                best = j
-                h_best = h_j
+        while best > lowest and h_best <= step_below(st, best, h, nodes):
+            best -= 1
+            h_best = step_at_order(st, best, h, nodes)
         factor = h_best / h
         if fails > 1:
             factor = min(factor, 0.5)

@@ -17,9 +17,11 @@ NOT_FINITE = 2
 RATE_LIMIT = 0.9
 RATE_FLOOR = 0.02
 RATE_MEMORY = 0.3
+RATE_AGEING = 1.5
+RATE_UNKNOWN = 0.1
 ROUNDING_LEVEL = 0.1
 ROUNDING_LEVEL_FRESH = 0.5
-LOOSEST = 0.1
+LOOSEST = 0.03
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -106,6 +108,9 @@ def correct(functions, st, plan, factors):
             st.rate = max(rate, RATE_MEMORY * st.rate)
         trust = max(st.rate, RATE_FLOOR)
         if trust < 1.0 and norm * trust <= limit * (1.0 - trust):
+            if m == 0:
+                # a rate that nothing has confirmed is worth less each time
+                st.rate = max(st.rate, min(RATE_AGEING * trust, RATE_UNKNOWN))
             return CONVERGED
         if m > 0:
             # would the iterations left suffice at this rate?
