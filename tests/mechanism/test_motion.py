@@ -241,3 +241,24 @@ def test_the_last_output_is_the_end(t_end, rate, count):
     assert t.size == count
     assert t[-1] == pytest.approx(t_end, abs=1e-12)
     np.testing.assert_allclose(np.diff(t)[:-1], 1.0 / rate)
+
+
+@pytest.mark.parametrize(("tol", "off"), [(1e-6, 0.2), (1e-7, 0.06), (1e-8, 5e-3), (1e-9, 1e-3)])
+def test_flips_of_a_tumbling_body(tol, off):
+    """Moments of 1, 2, 3 kg m^2, spun at w about the middle axis with a about the first.
+
+    The spin about the middle axis goes with sn of modulus k^2 = w^2/(a^2 + w^2): a flip takes
+    2 K(k^2) sqrt(3/(a^2 + w^2)). It depends on the logarithm of a, and an error of the step acts like one of a: the
+    default tolerance of 1e-6 keeps no more than the first digit of five flips.
+    """
+    a, w = 0.01, 10.0
+    flip = 2.0 * ellipk(w**2 / (a**2 + w**2)) * np.sqrt(3.0 / (a**2 + w**2))
+    m = Mechanism("free")
+    m.body("plate", 1.0, (1.0, 2.0, 3.0), angular_velocity=(a, w, 0.0))
+    solution = m.simulate(5.9 * flip, rate=200, tol=tol)
+    assert solution.success
+    spin = np.einsum("tji,tj->ti", solution.orientation("plate"), solution.angular_velocity("plate"))[:, 1]
+    k = np.flatnonzero(spin[1:] * spin[:-1] < 0)
+    times = solution.t[k] - spin[k] * (solution.t[k + 1] - solution.t[k]) / (spin[k + 1] - spin[k])
+    assert len(times) >= 6
+    assert abs(times[5] - times[0] - 5.0 * flip) < off * flip
