@@ -80,6 +80,16 @@ def turned_axis(frame, j, f, out, k):
         out[k + m] = c * frame[j, T.MK_AXES + 3 + m] - s * frame[j, T.MK_AXES + m]
 
 
+@njit("void(float64[:, ::1], int64, float64, float64[::1], int64, int64)", cache=True, error_model="numpy")
+def turned_axes(frame, j, f, out, k, k2):
+    """Write n = y_J cos f - x_J sin f to ``out[k:k+3]`` and its derivative dn/df to ``out[k2:k2+3]``."""
+    c, s = np.cos(f), np.sin(f)
+    for m in range(3):
+        x, y = frame[j, T.MK_AXES + m], frame[j, T.MK_AXES + 3 + m]
+        out[k + m] = c * y - s * x
+        out[k2 + m] = -s * y - c * x
+
+
 @njit(cache=True, error_model="numpy")
 def gradient(k, term, fval, reference, marker_body, kin, frame, scratch, g, gt):
     """Return (phi, phi_t); write the spatial gradient to ``g[0:12]`` and that of phi_t to ``gt[0:12]``."""
@@ -106,8 +116,7 @@ def gradient(k, term, fval, reference, marker_body, kin, frame, scratch, g, gt):
     if kind == ROTATION:
         fun = term[k, T.TERM_FUNCTION]
         f, f1 = fval[fun, 0], fval[fun, 1]
-        turned_axis(frame, j, f, scratch, 0)
-        turned_axis(frame, j, f + 0.5 * np.pi, scratch, 3)
+        turned_axes(frame, j, f, scratch, 0, 3)
         copy3(scratch, 3, scratch, 3, f1)
         a = T.MK_AXES
         cross3(frame[i], a, scratch, 0, g, 3)
@@ -173,8 +182,7 @@ def quadratic_part(k, term, fval, marker_body, kin, frame, s):
         if kind == ROTATION:
             fun = term[k, T.TERM_FUNCTION]
             f, f1, f2 = fval[fun, 0], fval[fun, 1], fval[fun, 2]
-            turned_axis(frame, j, f, s, 0)
-            turned_axis(frame, j, f + 0.5 * np.pi, s, 12)
+            turned_axes(frame, j, f, s, 0, 12)
         if kind == ANGLE:
             # the angle's rate is a ratio, so its second derivative follows from those of sine and cosine
             sn = dot3(frame[i], a, frame[j], a + 3)

@@ -52,6 +52,12 @@ SAME_POSITION = 0.05
 SINGULAR = 1e-8
 """Relative singular value of the index-1 matrix below which a direction counts as undetermined."""
 
+ROUNDED = 1e-15
+"""Change of an entry of the scaled matrix that is rounding.
+
+Of wheels that spin about fixed axes the mass matrix and the constraints' gradients stay what they are in global
+components, and so do the factors."""
+
 REACTION_PASSES = 30
 """Most corrections of loads that depend on reactions, such as joint friction, to the multipliers of one output."""
 
@@ -125,6 +131,15 @@ def new_records(m: int, bodies: int, rows: int, elements: int, diagnostics: int)
     )
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def unchanged(vals, before, allowed):
+    """Whether no entry differs from another matrix's by more than allowed: most matrices that change do so early on."""
+    for p in range(vals.size):
+        if not abs(vals[p] - before[p]) <= allowed[p]:
+            return False
+    return True
+
+
 @njit(
     int64(int64, int64, _VEC, _MAT, _IVEC, _IVEC, _VEC, _VEC, _VEC, PLAN_TYPE, FACTORS_TYPE, RECORDS_TYPE, float64),
     cache=True,
@@ -147,6 +162,10 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
     rhs, pair = np.zeros(size), np.zeros((4, size))
     at = np.zeros(y.shape[1])
     only_assemble = last < first or idata[T.H_MODE] != NUMBERS
+    factored, allowed = np.full(vals.size, np.inf), np.zeros(vals.size)
+    if not only_assemble:
+        for p in range(plan.a_src.size):
+            allowed[plan.a_src[p]] = ROUNDED / plan.a_scale[p]
     # a call that is handed all tables costs a tenth of a microsecond
     counts_turns, has_reactions = turns_are_counted(tab), index1.has_reactions(tab)
     for k in range(first, first + 1 if only_assemble else last):
@@ -172,6 +191,7 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
                 index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(0))
                 if not factor(plan, factors, vals) <= growth:
                     return k
+                factored[:] = vals
                 vals[:] = 0.0
             pair[:2, :base] = 0.0
             records.strayed[k] = 0.0
@@ -183,8 +203,10 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
             index1.displace(at, pair[0], pair[1], idata, tab)
             update_tables(t[k], at, tab)
         index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
-        if not factor(plan, factors, vals) <= growth:
-            return k
+        if not unchanged(vals, factored, allowed):
+            if not factor(plan, factors, vals) <= growth:
+                return k
+            factored[:] = vals
         solve(plan, factors, rhs, records.solution[k])
         for _ in range(REACTION_PASSES if has_reactions else 0):
             # loads that depend on reactions change the right-hand side only
