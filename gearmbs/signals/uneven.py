@@ -8,7 +8,8 @@ import numpy as np
 import xarray as xr
 
 from .errors import SignalError
-from .filters import decimate
+from .filters import decimation_taps
+from .fir import convolve_valid
 from .monotone_cubic import monotone_cubic
 from .signal import check_rate, make_signal
 
@@ -17,6 +18,9 @@ FINE_RATE = 400e3
 
 MARGIN = 64
 """Samples interpolated beyond the span where the times reach so far, so that the filter's ends lie outside."""
+
+BLOCK = 4096
+"""Samples that come out of the filter at a time, so that what it looks at stays in the processor's cache."""
 
 
 def even_signal(
@@ -75,15 +79,47 @@ def even_signal(
     low, high = max(low, int(np.ceil(t[0] * rate - 1e-6))), min(high, int(np.floor(t[-1] * rate + 1e-6)))
     if first < low or last > high:
         raise SignalError(f"start, stop: {start:g} to {stop:g} s is not within the times {t[0]:g} to {t[-1]:g} s")
-    fine = np.arange(low * factor, high * factor + 1) / (factor * rate)
-    signal = make_signal(
-        monotone_cubic(t, values, np.clip(fine, t[0], t[-1])),
-        factor * rate,
+    columns = values.reshape(t.size, -1)
+    even = np.empty((high - low + 1, columns.shape[1]))
+    taps = decimation_taps(factor, factor * rate)
+    for k in range(0, len(even), BLOCK):
+        rows = slice(k, min(k + BLOCK, len(even)))
+        fine = _fine(t, columns, rate, factor, (low, high), (low + rows.start, low + rows.stop - 1), taps.size // 2)
+        for column, source in zip(even.T, fine.T, strict=True):
+            column[rows] = convolve_valid(np.ascontiguousarray(source), taps)[::factor]
+    return make_signal(
+        even[first - low : last - low + 1],
+        rate,
         units=units,
         channels=channels,
-        t0=float(fine[0]),
+        t0=first / rate,
         speed=speed,
         teeth=teeth,
     )
-    even = decimate(signal, rate, edges="extend")
-    return even.isel(time=slice(first - low, last - low + 1))
+
+
+def _fine(
+    t: np.ndarray,
+    columns: np.ndarray,
+    rate: float,
+    factor: int,
+    span: tuple[int, int],
+    wanted: tuple[int, int],
+    half: int,
+) -> np.ndarray:
+    """Return the samples at ``factor`` times the rate that a filter of half length ``half`` looks at.
+
+    ``span`` and ``wanted`` are the first and last sample, at the rate itself, of what is known and of what is to come
+    out of the filter. Beyond the span the values are continued by point reflection in its end samples.
+    """
+    first, last = wanted[0] * factor - half, wanted[1] * factor + half
+    low, high = span[0] * factor, span[1] * factor
+    grid = np.arange(max(first, low), min(last, high) + 1) / (factor * rate)
+    known = monotone_cubic(t, columns, np.clip(grid, t[0], t[-1]))
+    before, after = max(low - first, 0), max(last - high, 0)
+    parts = [known]
+    if before:
+        parts.insert(0, 2.0 * known[0] - known[before:0:-1])
+    if after:
+        parts.append(2.0 * known[-1] - known[-2 : -after - 2 : -1])
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
