@@ -16,9 +16,19 @@ from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.elastic import (
+    apply_frame_load,
+    bias_rate,
+    is_elastic,
+    own_rate,
+    put_spatial,
+    touches_elastic,
+    wrench_at,
+)
+from gearmbs.dae.equations.entries import NUMBERS, put, put_pair
 from gearmbs.dae.equations.force_elements import DIAGNOSTICS
 from gearmbs.dae.equations.forces import evaluate_element
-from gearmbs.dae.equations.jacobian import NUMBERS, put
+from gearmbs.dae.equations.modal_inertia import modal_acceleration_terms
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM, S_VECTOR, S_WRENCH, arm_to
 from gearmbs.dae.equations.rotation import (
     KIN_A,
@@ -44,8 +54,13 @@ FORCE_RECORD = 6
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def apply_load(b, sign, row, wrench, at, marker_body, kin, frame, scratch, rhs):
+def apply_load(b, sign, row, wrench, at, marker_body, kin, frame, partial, scratch, rhs):
     if b == 0:
+        return
+    if is_elastic(b, at):
+        room = scratch[S_VECTOR : S_VECTOR + 9]
+        wrench_at(b, row[T.FORCE_I], wrench, wrench[3:6], sign, marker_body, kin, frame, room)
+        apply_frame_load(b, room, at, kin, partial, rhs)
         return
     s = scratch[S_VECTOR : S_VECTOR + 12]
     arm_to(b, row[T.FORCE_I], marker_body, kin, frame, s, 0)
@@ -71,28 +86,24 @@ def tape_row_rates(k, t, y, tab, room):
     rate, gamma = partial, hess[n * n - 1]
     for i in range(n - 1):
         b = tab.extra_i[row[T.TAPE_BODIES] + i // 6]
-        speed = y[(tab.at[b, T.AT_EPS] if i % 6 >= 3 else tab.at[b, T.AT_U]) + i % 3]
+        speed = own_rate(b, i % 6, y, tab.at, tab.kin)
         rate += grad[i] * speed
         gamma += 2.0 * hess[i * n + n - 1] * speed
         for j in range(n - 1):
             b2 = tab.extra_i[row[T.TAPE_BODIES] + j // 6]
-            gamma += speed * hess[i * n + j] * y[(tab.at[b2, T.AT_EPS] if j % 6 >= 3 else tab.at[b2, T.AT_U]) + j % 3]
+            gamma += speed * hess[i * n + j] * own_rate(b2, j % 6, y, tab.at, tab.kin)
     for p in range(bodies):
         b = tab.extra_i[row[T.TAPE_BODIES] + p]
         kin = tab.kin[b]
         # Phi_pi from Phi_theta_k = a_k . Phi_pi; omega' = sum a_k eps_k' + adot_k eps_k
-        momentum_from_conjugate(tab.kin, b, grad, 6 * p + 3, grad, 6 * p + 3)
+        if is_elastic(b, tab.at):
+            gamma += bias_rate(b, grad, 6 * p, tab.at, tab.partial)
+        else:
+            momentum_from_conjugate(tab.kin, b, grad, 6 * p + 3, grad, 6 * p + 3)
         for m in range(3):
-            eps = y[tab.at[b, T.AT_EPS] + m]
+            eps = own_rate(b, 3 + m, y, tab.at, tab.kin)
             gamma -= eps * terms.dot3(kin, KIN_ADOT + 3 * m, grad, 6 * p + 3)
     return value, rate, partial, gamma
-
-
-@njit(cache=True, error_model="numpy")
-def put_pair(mode, slot, vals, k, row, col, value):
-    """Hand over an entry of Phi_q and its mirror image in Phi_q^T; return the number of the next entry."""
-    k = put(mode, slot, vals, k, row, col, value)
-    return put(mode, slot, vals, k, col, row, value)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -186,6 +197,31 @@ def put_inertia(mode, slot, vals, k, i, mass, j):
 
 
 @njit(cache=True, error_model="numpy")
+def put_modal_body(mode, slot, vals, k, y, at, modal, kin_row, rhs):
+    """Hand over the modal inertia of a body and add its forces to ``rhs``; return the number of the next entry.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.entries.put`.
+    at, modal, kin_row
+        The body's places, the table of all integrals, its row of the kinematics table.
+    """
+    n, first, turn = at[T.AT_MODES], at[T.AT_V_MODES], at[T.AT_V] + 3
+    mass, h, force, moment = np.empty((n, n)), np.empty((n, 3)), np.empty(n), np.empty(3)
+    modal_acceleration_terms(y, at, modal, kin_row, mass, h, force, moment)
+    for c in range(3):
+        rhs[turn + c] += moment[c]
+    for i in range(n):
+        rhs[first + i] = force[i]
+        for c in range(3):
+            k = put_pair(mode, slot, vals, k, first + i, turn + c, h[i, c])
+        for l in range(n):
+            k = put(mode, slot, vals, k, first + i, first + l, mass[i, l])
+    return k
+
+
+@njit(cache=True, error_model="numpy")
 def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
     """Assemble the saddle-point matrix (by slots) and right-hand side; return the number of entries.
 
@@ -198,6 +234,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
     mode = idata[T.H_MODE]
     bodies, rows = idata[T.H_BODIES], idata[T.H_ROWS]
     base = idata[T.H_COORDINATES]
+    frames_are_elastic = idata[T.H_FRAMES] > bodies
     s = vector_at(tab.scratch, S_TERM, 100)
     for c in range(rhs.size):
         rhs[c] = 0.0
@@ -211,6 +248,8 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
         world_inertia(kin, tab.body[b], s)
         k = put_inertia(mode, slot, vals, k, i, mass, s)
         terms.cross3(kin, KIN_H, kin, KIN_W, rhs, i + 3)
+        if tab.at[b, T.AT_MODES] > 0:
+            k = put_modal_body(mode, slot, vals, k, y, tab.at[b], tab.modal, kin, rhs)
     g = vector_at(tab.scratch, S_GRADIENT, 12)
     gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
     apart = vector_at(tab.scratch, S_VECTOR, RELATIVE)
@@ -224,7 +263,8 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
         for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
             coef = tab.coef[j]
             kind = tab.term[j, T.TERM_TYPE]
-            if kind == terms.POINT or kind == terms.DOT1:
+            elastic = frames_are_elastic and touches_elastic(tab.term[j], tab.marker_body, bodies)
+            if (kind == terms.POINT or kind == terms.DOT1) and not elastic:
                 if kind == terms.POINT:
                     # the rows of a joint share their markers
                     if tab.term[j, T.TERM_I] != last_i or tab.term[j, T.TERM_J] != last_j:
@@ -252,6 +292,10 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
                 h, q = 6 * side, tab.at[b, T.AT_V]
                 kin = tab.kin[b]
                 rate += coef * (terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W))
+                if is_elastic(b, tab.at):
+                    gamma += coef * bias_rate(b, g, h, tab.at, tab.partial)
+                    k = put_spatial(mode, slot, vals, k, base + r, b, g, h, coef, tab.at, tab.kin, tab.partial)
+                    continue
                 for c in range(6):
                     k = put_pair(mode, slot, vals, k, base + r, q + c, coef * g[h + c])
         if tab.row[r, T.ROW_TAPE] >= 0:
@@ -264,7 +308,11 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
             partial += p
             gamma += q2
             for b in range(tape[T.TAPE_N_BODIES]):
-                q = tab.at[tab.extra_i[tape[T.TAPE_BODIES] + b], T.AT_V]
+                f = tab.extra_i[tape[T.TAPE_BODIES] + b]
+                if is_elastic(f, tab.at):
+                    k = put_spatial(mode, slot, vals, k, base + r, f, room, 6 * b, 1.0, tab.at, tab.kin, tab.partial)
+                    continue
+                q = tab.at[f, T.AT_V]
                 for c in range(6):
                     k = put_pair(mode, slot, vals, k, base + r, q + c, room[6 * b + c])
         rhs[base + r] = -gamma
@@ -297,8 +345,9 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
             for side in range(2):
                 b = tab.marker_body[row[T.FORCE_I + side]]
                 apply_load(
-                    b, 1.0 - 2.0 * side, row, wrench, tab.at, tab.marker_body, tab.kin, tab.frame, tab.scratch, rhs
-                )
+                    b, 1.0 - 2.0 * side, row, wrench, tab.at, tab.marker_body, tab.kin, tab.frame, tab.partial,
+                    tab.scratch, rhs,
+                )  # fmt: skip
     return k
 
 
@@ -362,9 +411,19 @@ def joint_loads(y, idata, rdata, work, multipliers, force, moment):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def poses(kin, out):
-    """Write R, A (row-major), v, omega of each body (18 values, the ground left out) from an up-to-date table."""
-    for b in range(1, kin.shape[0]):
+def poses(y, at, code, kin, out):
+    """Write R, A (row-major), v, omega of each body (18 values, the ground left out) from an up-to-date table.
+
+    The modal coordinates and their velocities come last.
+    """
+    bodies = code.size
+    for b in range(1, bodies):
+        modes, first = at[b, T.AT_MODES], at[b, T.AT_V_MODES] - 6 * (bodies - 1)
+        half = (out.size - POSE_COLUMNS * (bodies - 1)) // 2
+        for m in range(modes):
+            place = POSE_COLUMNS * (bodies - 1) + first + m
+            out[place] = y[at[b, T.AT_QF] + m]
+            out[place + half] = y[at[b, T.AT_VF] + m]
         k = POSE_COLUMNS * (b - 1)
         for c in range(3):
             out[k + POSE_R + c] = kin[b, KIN_R + c]
@@ -378,8 +437,8 @@ def poses(kin, out):
 def pose_record(y, idata, rdata, work, out):
     """Write the record of `poses` for y."""
     tab = T.unpack(idata, rdata, work)
-    update_bodies(y, tab.at, tab.code, tab.body, tab.kin, tab.scratch)
-    poses(tab.kin, out)
+    update_bodies(y, tab.at, tab.code, tab.body, tab.modal, tab.kin, tab.partial, tab.scratch)
+    poses(y, tab.at, tab.code, tab.kin, out)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -450,6 +509,9 @@ def displace(y, d, w, idata, tab):
         euler_rates(tab.kin, b, s, 0, s, 6)
         for c in range(3):
             y[th + c] += s[6 + c]
+        for m in range(at[T.AT_MODES]):
+            y[at[T.AT_QF] + m] += d[at[T.AT_V_MODES] + m]
+            y[at[T.AT_VF] + m] += w[at[T.AT_V_MODES] + m]
         # the new rates give the corrected velocity about the displaced axes
         axes_and_velocity(y[th], y[th + 1], 0.0, 0.0, 0.0, tab.kin, b)
         euler_rates(tab.kin, b, s, 3, y, e)

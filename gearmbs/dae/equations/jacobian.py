@@ -13,8 +13,11 @@ from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.elastic import is_elastic, load_at, put_arm, put_chain, put_load, put_row, touches_elastic
+from gearmbs.dae.equations.entries import COUNT, NUMBERS, PLACES, compressed, put
 from gearmbs.dae.equations.force_elements import DERIVATIVES
 from gearmbs.dae.equations.forces import evaluate_element
+from gearmbs.dae.equations.modal_inertia import modal_body_entries
 from gearmbs.dae.equations.reactions import reaction_wrench
 from gearmbs.dae.equations.residual import (
     S_GRADIENT,
@@ -31,20 +34,7 @@ from gearmbs.dae.equations.unknowns import SI1, has_rate_rows, multiplier_factor
 from gearmbs.dae.equations.update import euler_component, inertia_times, update_tables
 from gearmbs.dae.problem import JACOBIAN_SIG
 
-NUMBERS, PLACES, COUNT = 0, 1, 2
-
 HESSIAN_BLOCKS = terms.HESSIAN_BLOCKS
-
-
-@njit("int64(int64, int64[::1], float64[::1], int64, int64, int64, float64)", cache=True, error_model="numpy")
-def put(mode, slot, vals, k, row, col, value):
-    """Hand over entry k; return the number of the next."""
-    if mode == NUMBERS:
-        vals[slot[k]] += value
-    elif mode == PLACES:
-        vals[2 * k] = row
-        vals[2 * k + 1] = col
-    return k + 1
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -94,6 +84,40 @@ def body_entries(mode, b, cj, tab, slot, vals, k):
     return k
 
 
+@njit(cache=True, error_model="numpy")
+def elastic_term_entries(mode, j, coef, lam, mu, factor, rate_rows, row_lam, row_mu, y, g, gt, tab, slot, vals, k):
+    """Entries of a constraint term between frames of which one at least is elastic; see `row_entries`.
+
+    Parameters
+    ----------
+    j : int
+        The term; its Hessian has just been evaluated.
+    coef : float
+        Its coefficient in the row.
+    lam, mu, factor : float
+        Multipliers, and their derivative by the unknowns they are made from.
+    row_lam, row_mu : int
+        Places of the multipliers in y.
+    g, gt : ndarray
+        Spatial gradients of the term and of its partial time derivative; made those by the frames' own coordinates.
+    """
+    frames = np.empty(2, dtype=np.int64)
+    turn, turn_t = np.empty(3), np.empty(3)
+    for side in range(2):
+        b = tab.marker_body[tab.term[j, T.TERM_I + side]]
+        frames[side] = b
+        if b > 0 and not is_elastic(b, tab.at):
+            for c in range(3):
+                turn[c] = euler_component(tab.kin[b], c, g, 6 * side + 3)
+                turn_t[c] = euler_component(tab.kin[b], c, gt, 6 * side + 3)
+            for c in range(3):
+                g[6 * side + 3 + c], gt[6 * side + 3 + c] = turn[c], turn_t[c]
+    return put_row(
+        mode, slot, vals, k, frames, 2, g, gt, vector_at(tab.scratch, S_HESSIAN, 144), 12, coef,
+        np.array([row_lam, row_mu]), lam, mu, factor, rate_rows, y, tab.at, tab.partial,
+    )  # fmt: skip
+
+
 @njit(cache=True, error_model="numpy", forceinline=True)
 def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
     """Entries of one constraint row, its derivative, and the forces of its multipliers."""
@@ -106,11 +130,17 @@ def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
     s = vector_at(tab.scratch, S_TERM, 100)
     hess = matrix_at(tab.scratch, S_HESSIAN, 12, 12)
     w = vector_at(tab.scratch, S_VECTOR, 12)
+    frames_are_elastic = idata[T.H_FRAMES] > idata[T.H_BODIES]
     for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
         coef = tab.coef[j]
         terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
         terms.hessian(j, tab.term, tab.fval, tab.marker_body, tab.kin, tab.frame, hess, s)
         kind = tab.term[j, T.TERM_TYPE]
+        if frames_are_elastic and touches_elastic(tab.term[j], tab.marker_body, tab.code.size):
+            k = elastic_term_entries(
+                mode, j, coef, lam_value, mu_value, factor, rate_rows, lam, mu, y, g, gt, tab, slot, vals, k
+            )
+            continue
         for side in range(2):
             b = tab.marker_body[tab.term[j, T.TERM_I + side]]
             h, at = 6 * side, tab.at[b]
@@ -183,6 +213,15 @@ def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k):
     room = expression_loads.tail(tab, n * (n + 1))
     grad, hess = room[0:n], room[n:]
     expression_loads.second(tape, t, y, tab, grad, hess)
+    if idata[T.H_FRAMES] > idata[T.H_BODIES]:
+        frames = vector_at(tab.extra_i, first, bodies)
+        in_time = np.empty(n)
+        for i in range(n):
+            in_time[i] = hess[i * n + n - 1]
+        return put_row(
+            mode, slot, vals, k, frames, bodies, grad, in_time, hess, n, 1.0, np.array([lam, mu]),
+            lam_value, mu_value, factor, rate_rows, y, tab.at, tab.partial,
+        )  # fmt: skip
     for i in range(n - 1):
         at = tab.at[tab.extra_i[first + i // 6]]
         turn = i % 6 >= 3
@@ -214,8 +253,11 @@ def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, tab, slot
         b = tab.extra_i[first + q]
         if b == 0:
             continue
-        kin, at = tab.kin[b], tab.at[b]
         col = 12 * q
+        if is_elastic(b, tab.at):
+            k = put_chain(mode, slot, vals, k, base, b, d, col, sign, tab.at, tab.kin, tab.partial)
+            continue
+        kin, at = tab.kin[b], tab.at[b]
         for m in range(3):
             turn = euler_component(kin, m, d, col + 3) + terms.dot3(kin, KIN_DW + 3 * m, d, col + 9)
             spin = euler_component(kin, m, d, col + 9)
@@ -262,6 +304,13 @@ def load_entries(mode, b, sign, row, y, tab, slot, vals, k):
     at = tab.at[b]
     u, p, th = at[T.AT_U], at[T.AT_P], at[T.AT_THETA]
     f, n = row[T.FORCE_F], row[T.FORCE_N]
+    if is_elastic(b, tab.at):
+        arm = vector_at(tab.scratch, S_VECTOR, 18)
+        load_at(b, sign, row, y, tab.marker_body, tab.kin, tab.frame, arm)
+        return put_load(
+            mode, slot, vals, k, b, sign, f, n, row[T.FORCE_I], arm, tab.at, tab.marker_body, tab.kin, tab.frame,
+            tab.partial,
+        )  # fmt: skip
     kin = tab.kin[b]
     point = row[T.FORCE_I]
     owner = tab.marker_body[point]
@@ -304,7 +353,12 @@ def load_entries(mode, b, sign, row, y, tab, slot, vals, k):
             terms.cross3(s, 3, kin, a, s, 9)
             for l in range(3):
                 k = put(mode, slot, vals, k, p + m, at[T.AT_R] + l, s[9 + l])
-            if owner > 0:
+            if is_elastic(owner, tab.at):
+                k = put_arm(
+                    mode, slot, vals, k, p + m, owner, point, s, -1.0, tab.at, tab.marker_body, tab.kin, tab.frame,
+                    tab.partial, False,
+                )  # fmt: skip
+            elif owner > 0:
                 owners = tab.at[owner]
                 for l in range(3):
                     terms.cross3(tab.kin[owner], KIN_AXES + 3 * l, tab.frame[point], 0, s, 12)
@@ -383,6 +437,8 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
         for l in range(3):
             tab.scratch[S_PRODUCT + l] = y[tab.at[b, T.AT_EPS] + l]
         k = body_entries(mode, b, cj, tab, slot, vals, k)
+        if tab.at[b, T.AT_MODES] > 0:
+            k = modal_body_entries(mode, cj, y, tab.at[b], tab.modal, tab.kin[b], slot, vals, k)
     for r in range(idata[T.H_ROWS]):
         k = row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k)
         if tab.row[r, T.ROW_TAPE] >= 0:
@@ -411,11 +467,3 @@ def pattern(idata: np.ndarray, rdata: np.ndarray, work_size: int) -> tuple[np.nd
     ask[T.H_MODE] = PLACES
     jacobian(0.0, y, y, 1.0, places, ask, rdata.copy(), work)
     return compressed(places.reshape(-1, 2).astype(np.int64), n)
-
-
-def compressed(places: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the CSC pattern of a list of (row, column) places and the slot of each place in it."""
-    unique, slots = np.unique(places[:, 1] * n + places[:, 0], return_inverse=True)
-    columns, rows = np.divmod(unique, n)
-    indptr = np.searchsorted(columns, np.arange(n + 1)).astype(np.int64)
-    return indptr, rows.astype(np.int64), slots.astype(np.int64)

@@ -76,7 +76,15 @@ H_VF = 54
 H_QF = 55
 H_COORDINATES = 56
 """Number of coordinates: spatial displacements of the bodies, then modal coordinates."""
-H_SIZE = 57
+H_FRAMES = 57
+"""Rows of the kinematics table: the bodies, then the elastic frames of modal bodies."""
+H_R_MODAL = 58
+"""Integrals of modal bodies and shapes of elastic frames."""
+H_N_MODAL = 59
+H_W_PARTIAL = 60
+"""Partial derivatives of elastic frames, see `gearmbs.dae.equations.elastic`."""
+H_N_PARTIAL = 61
+H_SIZE = 62
 
 HEAD_OF_BLOCK = {
     H_U: "u", H_P: "p", H_PF: "p_f", H_EPS: "eps", H_VF: "v_f", H_R: "R", H_THETA: "theta", H_QF: "q_f",
@@ -100,10 +108,19 @@ AT_V = 9
 """Place of the first of v, omega (six entries) among the spatial accelerations and displacements."""
 AT_V_MODES = 10
 """Place of the first modal acceleration or displacement there."""
-AT_COLUMNS = 11
+AT_BODY = 11
+"""The body an elastic frame belongs to; a body's own number."""
+AT_SHAPE = 12
+"""Offset of an elastic frame's shapes among the modal reals: s0, phi_k, psi_k; -1 of a body."""
+AT_PARTIAL = 13
+"""Offset of an elastic frame's partial derivatives; -1 of a body."""
+AT_MODAL = 14
+"""Offset of a modal body's integrals among the modal reals; -1 of a rigid body."""
+AT_COLUMNS = 15
 
 BODY_MASS = 0
 BODY_INERTIA = 1
+"""About the centre of mass, body components; of a modal body as it is deformed at present."""
 BODY_COLUMNS = 10
 
 MARKER_COLUMNS = 12
@@ -213,7 +230,7 @@ own."""
 Tables = namedtuple(
     "Tables",
     "at code marker_body row term force function extra_i slot state tape angle "
-    "gravity body marker coef function_r extra_r reference winding seen kin frame fval scratch tape_work",
+    "gravity body marker coef function_r extra_r reference winding seen modal kin frame fval scratch tape_work partial",
 )
 
 
@@ -234,7 +251,7 @@ def unpack(idata, rdata, work):
     r = rdata
     reference = i[H_R_REFERENCE]
     return Tables(
-        matrix_at(i, i[H_I_AT], bodies, AT_COLUMNS),
+        matrix_at(i, i[H_I_AT], i[H_FRAMES], AT_COLUMNS),
         vector_at(i, i[H_I_CODE], bodies),
         vector_at(i, i[H_I_MARKER_BODY], markers),
         matrix_at(i, i[H_I_ROW], rows + 1, ROW_COLUMNS),
@@ -255,9 +272,11 @@ def unpack(idata, rdata, work):
         vector_at(r, reference, terms),
         vector_at(r, reference + terms, 2 * terms + 1),
         vector_at(r, reference + 3 * terms + 1, 3 * bodies),
-        matrix_at(work, i[H_W_KIN], bodies, KIN_COLUMNS),
+        vector_at(r, i[H_R_MODAL], i[H_N_MODAL]),
+        matrix_at(work, i[H_W_KIN], i[H_FRAMES], KIN_COLUMNS),
         matrix_at(work, i[H_W_MARKER], markers, MK_COLUMNS),
         matrix_at(work, i[H_W_FUNCTION], functions, 3),
         vector_at(work, i[H_W_SCRATCH], work.size - i[H_W_SCRATCH]),
         vector_at(work, i[H_W_TAPE], i[H_W_TAPE_SIZE]),
+        vector_at(work, i[H_W_PARTIAL], i[H_N_PARTIAL]),
     )

@@ -26,7 +26,9 @@ from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.elastic import add_frame_load, add_row_forces, is_elastic, load_at, own_rate, touches_elastic
 from gearmbs.dae.equations.forces import evaluate_element
+from gearmbs.dae.equations.modal_inertia import modal_residual
 from gearmbs.dae.equations.reactions import reaction_wrench
 from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, KIN_H, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.equations.unknowns import SI1, has_rate_rows, multipliers_of_row
@@ -60,9 +62,14 @@ def arm_to(b, point_marker, marker_body, kin, frame, out, k):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def add_load(b, sign, row, y, at, marker_body, kin, frame, scratch, out):
+def add_load(b, sign, row, y, at, marker_body, kin, frame, partial, scratch, out):
     """Subtract the generalised loads of one force element on body b (eq. (5), H_F^T F and H_N^T N)."""
     if b == 0:
+        return
+    if is_elastic(b, at):
+        room = scratch[S_VECTOR : S_VECTOR + 18]
+        load_at(b, sign, row, y, marker_body, kin, frame, room)
+        add_frame_load(b, room, at, partial, out)
         return
     s = scratch[S_VECTOR : S_VECTOR + 12]
     for c in range(6):
@@ -90,6 +97,13 @@ def add_tape_row(k, t, lam, mu, y, tab, out):
     grad, hess = room[0:n], room[n:]
     value = expression_loads.second(k, t, y, tab, grad, hess)
     rate = grad[n - 1]
+    if tab.at.shape[0] > tab.code.size:
+        # elastic frames may be among the bodies
+        frames = vector_at(tab.extra_i, row[T.TAPE_BODIES], row[T.TAPE_N_BODIES])
+        add_row_forces(frames, frames.size, grad, lam, mu, tab.at, tab.partial, out)
+        for i in range(n - 1):
+            rate += grad[i] * own_rate(frames[i // 6], i % 6, y, tab.at, tab.kin)
+        return value, rate
     for p in range(row[T.TAPE_N_BODIES]):
         at = tab.at[tab.extra_i[row[T.TAPE_BODIES] + p]]
         for c in range(3):
@@ -158,6 +172,7 @@ def add_constraints(t, y, yp, idata, tab, out):
     """Constraint rows, their derivatives, and the constraint forces of lambda and mu."""
     rate_rows = has_rate_rows(idata[T.H_FORMULATION])
     lam0, mu0 = idata[T.H_LAMBDA], idata[T.H_MU]
+    frames_are_elastic = idata[T.H_FRAMES] > idata[T.H_BODIES]
     g = vector_at(tab.scratch, S_GRADIENT, 12)
     gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
     s = vector_at(tab.scratch, S_TERM, 100)
@@ -171,12 +186,13 @@ def add_constraints(t, y, yp, idata, tab, out):
         for k in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
             coef = tab.coef[k]
             kind = tab.term[k, T.TERM_TYPE]
-            if kind == terms.POINT:
+            elastic = frames_are_elastic and touches_elastic(tab.term[k], tab.marker_body, tab.code.size)
+            if kind == terms.POINT and not elastic:
                 v, d = add_point_term(k, coef, lam, mu, tab.at, tab.term, tab.marker_body, tab.kin, tab.frame, out)
                 value += v
                 rate += d
                 continue
-            if kind == terms.DOT1:
+            if kind == terms.DOT1 and not elastic:
                 v, d = add_dot_term(k, coef, lam, mu, tab.at, tab.term, tab.marker_body, tab.kin, tab.frame, s, out)
                 value += v
                 rate += d
@@ -202,6 +218,10 @@ def add_constraints(t, y, yp, idata, tab, out):
                 kin, at = tab.kin[b], tab.at[b]
                 h = 6 * side
                 rate += coef * (terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W))
+                if is_elastic(b, tab.at):
+                    own = vector_at(g, h, 6)
+                    add_row_forces(np.array([b]), 1, own, coef * lam, coef * mu, tab.at, tab.partial, out)
+                    continue
                 for c in range(3):
                     angle = coef * euler_component(kin, c, g, h + 3)
                     out[at[T.AT_U] + c] += coef * lam * g[h + c]
@@ -242,6 +262,8 @@ def residual(t, y, yp, out, idata, rdata, work):
             out[e + c] = y[p + c] - terms.dot3(kin, KIN_AXES + 3 * c, kin, KIN_H)
             out[r + c] = y[u + c] - yp[r + c]
             out[th + c] = y[e + c] - yp[th + c]
+        if at[T.AT_MODES] > 0:
+            modal_residual(y, yp, at, tab.modal, kin, out)
     add_constraints(t, y, yp, idata, tab, out)
     room = vector_at(tab.scratch, 0, 64)
     lam0 = idata[T.H_LAMBDA]
@@ -269,7 +291,10 @@ def residual(t, y, yp, out, idata, rdata, work):
         if row[T.FORCE_KIND] != T.REACTION:
             for side in range(2):
                 b = tab.marker_body[row[T.FORCE_I + side]]
-                add_load(b, 1.0 - 2.0 * side, row, y, tab.at, tab.marker_body, tab.kin, tab.frame, tab.scratch, out)
+                add_load(
+                    b, 1.0 - 2.0 * side, row, y, tab.at, tab.marker_body, tab.kin, tab.frame, tab.partial, tab.scratch,
+                    out,
+                )  # fmt: skip
     for k in range(idata[T.H_STATES]):
         z = idata[T.H_Z] + k
         if tab.state[k, T.STATE_TAPE] < 0:

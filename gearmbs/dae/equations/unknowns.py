@@ -141,11 +141,13 @@ def places(counts: Counts, formulation: int) -> np.ndarray:
     Returns
     -------
     ndarray of int, shape (1 + bodies, AT_COLUMNS)
-        Columns ``AT_*`` of `gearmbs.dae.equations.layout`; -1 in the ground's row, which has none.
+        Columns ``AT_*`` of `gearmbs.dae.equations.layout`; -1 in the ground's row, which has none. Columns about
+        elastic frames and modal integrals are left at -1.
     """
     at = offsets(counts, formulation)
     table = np.full((1 + counts.bodies, T.AT_COLUMNS), -1, dtype=np.int64)
     table[:, T.AT_MODES] = (0, *counts.modes)
+    table[:, T.AT_BODY] = np.arange(1 + counts.bodies)
     mode = 0
     for b, modes in enumerate(counts.modes):
         row = table[1 + b]

@@ -8,7 +8,9 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations import time_functions
 from gearmbs.dae.equations.constraint_terms import dot3
 from gearmbs.dae.equations.counted_angles import predict_element_angles
+from gearmbs.dae.equations.elastic import update_frame
 from gearmbs.dae.equations.expression_loads import TIME, time_at
+from gearmbs.dae.equations.modal_inertia import add_momentum, update_inertia
 from gearmbs.dae.equations.rotation import (
     KIN_A,
     KIN_AXES,
@@ -49,10 +51,12 @@ def update_ground(kin):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def update_bodies(y, at, code, body, kin, scratch):
-    """Fill the kinematics table from u, eps, R, theta in y."""
+def update_bodies(y, at, code, body, modal, kin, partial, scratch):
+    """Fill the kinematics table from the positions and velocities in y."""
     update_ground(kin)
-    for b in range(1, at.shape[0]):
+    for b in range(1, code.size):
+        if at[b, T.AT_MODES] > 0:
+            update_inertia(y, at[b], modal, body[b])
         u, e, r, th = at[b, T.AT_U], at[b, T.AT_EPS], at[b, T.AT_R], at[b, T.AT_THETA]
         row = kin[b]
         for c in range(3):
@@ -62,6 +66,10 @@ def update_bodies(y, at, code, body, kin, scratch):
         rotation_matrix(psi, theta, phi, code[b], row, KIN_A)
         axes_and_velocity(psi, theta, y[e], y[e + 1], y[e + 2], kin, b)
         inertia_times(row, body[b], row, KIN_W, row, KIN_H, scratch)
+        if at[b, T.AT_MODES] > 0:
+            add_momentum(y, at[b], modal, row)
+    for f in range(code.size, at.shape[0]):
+        update_frame(f, y, at, modal, kin, partial)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -116,7 +124,7 @@ def predict_angles(t, tab):
 @njit(cache=True, error_model="numpy", forceinline=True)
 def update_tables(t, y, tab):
     """Bring bodies, markers, functions of time and expected angles up to date with t and y."""
-    update_bodies(y, tab.at, tab.code, tab.body, tab.kin, tab.scratch)
+    update_bodies(y, tab.at, tab.code, tab.body, tab.modal, tab.kin, tab.partial, tab.scratch)
     update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
     update_functions(t, tab)
     predict_angles(t, tab)

@@ -11,6 +11,7 @@ import numpy as np
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.force_elements import FRAME_COLUMNS, Diagnostic
+from gearmbs.dae.equations.modal_inertia import ModalInertia
 from gearmbs.dae.equations.unknowns import Counts
 from gearmbs.dae.model.model import Model, Names, frozen
 
@@ -25,7 +26,11 @@ class TableBuilder:
         self.gravity = np.zeros(3)
         self.bodies: list[np.ndarray] = []
         self.modes: list[int] = []
-        self.codes: list[int] = []
+        self.modal: list[float] = []
+        self.modal_at: list[int] = []
+        self.modal_inertia: list[ModalInertia | None] = []
+        self.frame_body: list[int] = []
+        self.shape_at: list[int] = []
         self.marker_body: list[int] = []
         self.marker_frame: list[np.ndarray] = []
         self.rows: list[tuple[int, int, int]] = []
@@ -52,13 +57,33 @@ class TableBuilder:
         self._ground_marker: int | None = None
         self.add_body(0.0, np.zeros((3, 3)))
 
-    def add_body(self, mass: float, inertia: np.ndarray, code: int = 0) -> int:
+    def add_body(self, mass: float, inertia: np.ndarray, modal: ModalInertia | None = None) -> int:
+        """Add a body; its inertia is about the centre of mass, undeformed. All bodies go before the first marker."""
         self.bodies.append(np.concatenate([[mass], np.asarray(inertia, dtype=float).ravel()]))
-        self.modes.append(0)
-        self.codes.append(code)
+        self.modes.append(0 if modal is None else modal.modes)
+        self.modal_inertia.append(modal)
+        self.modal_at.append(-1 if modal is None else len(self.modal))
+        if modal is not None:
+            self.modal.extend(modal.table(inertia).tolist())
         return len(self.bodies) - 1
 
-    def add_marker(self, body: int, position: np.ndarray, orientation: np.ndarray) -> int:
+    def add_marker(
+        self,
+        body: int,
+        position: np.ndarray,
+        orientation: np.ndarray,
+        shape: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> int:
+        """Add a marker, given from the centre of mass in body components.
+
+        ``shape`` holds displacements and rotations of a modal body there, a row a mode.
+        """
+        if shape is not None:
+            # a modal body's marker is the origin of an elastic frame
+            self.frame_body.append(body)
+            self.shape_at.append(len(self.modal))
+            self.modal.extend(np.concatenate([position, *(np.ravel(part) for part in shape)]).tolist())
+            body, position = len(self.bodies) + len(self.frame_body) - 1, np.zeros(3)
         self.marker_body.append(body)
         self.marker_frame.append(np.concatenate([position, np.asarray(orientation, dtype=float).ravel()]))
         return len(self.marker_body) - 1
@@ -271,6 +296,11 @@ class TableBuilder:
             own_functions=MappingProxyType(dict(self.own_functions)),
             diagnostics=tuple(self.diagnostics),
             largest_jac=self.largest_jac,
+            modal=frozen(self.modal),
+            modal_at=tuple(self.modal_at),
+            modal_inertia=tuple(self.modal_inertia),
+            frame_body=tuple(self.frame_body),
+            shape_at=tuple(self.shape_at),
             names=names,
         )
 

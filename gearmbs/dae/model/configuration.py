@@ -26,6 +26,13 @@ class Configuration:
     q_f: np.ndarray = field(default_factory=lambda: np.zeros(0))
     v_f: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
+    @classmethod
+    def of(cls, record: np.ndarray, bodies: int) -> Configuration:
+        """Return the configuration of a record: the bodies' poses one after the other, then q_f and v_f."""
+        end = POSE_COLUMNS * bodies
+        half = (record.size - end) // 2
+        return cls(record[:end].reshape(-1, POSE_COLUMNS), record[end : end + half], record[end + half :])
+
     @property
     def bodies(self) -> int:
         """Number of moving bodies."""

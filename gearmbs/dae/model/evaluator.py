@@ -12,8 +12,8 @@ from scipy.sparse import csc_array
 from gearmbs._jit import njit
 from gearmbs.dae.equations import accelerations as index1
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.entries import COUNT, NUMBERS, PLACES, compressed
 from gearmbs.dae.equations.euler_switch import track, turns_are_counted
-from gearmbs.dae.equations.jacobian import COUNT, NUMBERS, PLACES, compressed
 from gearmbs.dae.equations.reactions import renew_reactions
 from gearmbs.dae.equations.residual import update
 from gearmbs.dae.equations.rotation import POSE_COLUMNS
@@ -92,12 +92,28 @@ class Records(NamedTuple):
     @property
     def by_body(self) -> np.ndarray:
         """`pose` as (m, bodies, 18)."""
-        return self.pose.reshape(len(self.pose), self.pose.shape[1] // POSE_COLUMNS, POSE_COLUMNS)
+        bodies = self.bodies
+        return self.pose[:, : POSE_COLUMNS * bodies].reshape(len(self.pose), bodies, POSE_COLUMNS)
+
+    @property
+    def bodies(self) -> int:
+        """Number of moving bodies."""
+        coordinates = self.solution.shape[1] - self.force.shape[1]
+        # 18 places a body and two a mode in one, 6 and one in the other
+        return (self.pose.shape[1] - 2 * coordinates) // 6
+
+    @property
+    def modal(self) -> np.ndarray:
+        """q_f, v_f and their accelerations, shape (3, m, modal coordinates)."""
+        first, bodies = POSE_COLUMNS * self.bodies, self.bodies
+        half = (self.pose.shape[1] - first) // 2
+        accelerations = self.solution[:, 6 * bodies : 6 * bodies + half]
+        return np.stack([self.pose[:, first : first + half], self.pose[:, first + half :], accelerations])
 
     @property
     def accelerations(self) -> np.ndarray:
         """a and alpha, shape (m, bodies, 6)."""
-        m, bodies = len(self.pose), self.pose.shape[1] // POSE_COLUMNS
+        m, bodies = len(self.pose), self.bodies
         return self.solution[:, : 6 * bodies].reshape(m, bodies, 6)
 
     @property
@@ -118,11 +134,11 @@ class Records(NamedTuple):
 RECORDS_TYPE = types.NamedTuple((_MAT, _MAT, _CUBE, _MAT, _CUBE, _CUBE, _VEC), Records)
 
 
-def new_records(m: int, bodies: int, rows: int, elements: int, diagnostics: int) -> Records:
+def new_records(m: int, bodies: int, rows: int, elements: int, diagnostics: int, modes: int = 0) -> Records:
     """Return empty records for m output times; ``diagnostics`` is the most that an element has."""
     return Records(
-        np.zeros((m, POSE_COLUMNS * bodies)),
-        np.zeros((m, 6 * bodies + rows)),
+        np.zeros((m, POSE_COLUMNS * bodies + 2 * modes)),
+        np.zeros((m, 6 * bodies + modes + rows)),
         np.zeros((m, max(elements, 1), index1.FORCE_RECORD + diagnostics)),
         np.zeros((m, 3 * rows)),
         np.zeros((m, rows, 3)),
@@ -215,7 +231,7 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
             index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
             solve(plan, factors, rhs, records.solution[k])
         index1.loads_of_rows(records.solution[k, base:], idata, tab, records.force[k], records.moment[k])
-        index1.poses(tab.kin, records.pose[k])
+        index1.poses(at, tab.at, tab.code, tab.kin, records.pose[k])
     return last
 
 
@@ -242,7 +258,8 @@ def pattern(idata, rdata, work_size: int) -> tuple[np.ndarray, np.ndarray, np.nd
 def assemble(t, y, slots, idata, rdata, work_size, vals) -> Records:
     """Assemble the index-1 system at ``t[0], y[0]`` into ``vals`` and the right-hand side in ``solution``."""
     bodies, rows, elements = int(idata[T.H_BODIES]) - 1, int(idata[T.H_ROWS]), int(idata[T.H_FORCES])
-    records = new_records(1, bodies, rows, elements, int(idata[T.H_DIAGNOSTICS]))
+    modes = int(idata[T.H_LAMBDA] - idata[T.H_QF])
+    records = new_records(1, bodies, rows, elements, int(idata[T.H_DIAGNOSTICS]), modes)
     work = np.zeros(work_size)
     evaluate_rows(0, -1, t, y, slots, idata, rdata, work, vals, *_no_factors(), records, GROWTH_LIMIT)
     return records

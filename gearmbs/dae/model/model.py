@@ -11,8 +11,10 @@ import numpy.typing as npt
 
 from gearmbs.dae.compiled.pointers import address
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.elastic import partials_size
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.force_elements import FORCE_SIG, Diagnostic
+from gearmbs.dae.equations.modal_inertia import ModalInertia
 from gearmbs.dae.equations.rotation import KIN_COLUMNS
 from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, Counts, Unknown, named, offsets, places
 
@@ -69,6 +71,12 @@ class Model:
         Of each force element, what it reports besides its wrench.
     largest_jac : int
         Entries of the largest matrix of derivatives of a force element.
+    modal : ndarray
+        Integrals of modal bodies and shapes of elastic frames, as the kernels read them.
+    modal_at, modal_inertia : tuple
+        For each body the offset of its integrals there, -1 of a rigid one, and the integrals; None of a rigid one.
+    frame_body, shape_at : tuple of int
+        Of each elastic frame its body and the offset of its shapes; frames are numbered on from the bodies.
     """
 
     gravity: np.ndarray
@@ -94,6 +102,11 @@ class Model:
     own_functions: Mapping[int, tuple[Any, Any]]
     diagnostics: tuple[tuple[Diagnostic, ...], ...]
     largest_jac: int
+    modal: np.ndarray = field(default_factory=lambda: frozen(np.zeros(0)))
+    modal_at: tuple[int, ...] = ()
+    modal_inertia: tuple[ModalInertia | None, ...] = ()
+    frame_body: tuple[int, ...] = ()
+    shape_at: tuple[int, ...] = ()
     names: Names = field(default_factory=Names)
 
     @property
@@ -123,6 +136,20 @@ class Model:
     def differential_states(self) -> np.ndarray:
         """Which user-defined states are given by their rates, shape (states,)."""
         return self.states[:, T.STATE_KIND] == T.STATE_DIFFERENTIAL
+
+    def modal_sizes(self) -> np.ndarray:
+        """Return for each modal coordinate a typical value and the modal mass, shape (modal coordinates, 2).
+
+        Typical is what moves the mass of the body as much as a displacement of its radius of gyration would.
+        """
+        rows = []
+        for body, modal in zip(self.bodies, self.modal_inertia):
+            if modal is None:
+                continue
+            inertia = float(np.abs(body[T.BODY_INERTIA :]).max())
+            for mass in np.diag(modal.mass):
+                rows.append((np.sqrt(inertia / mass) if inertia > 0.0 else 1.0, mass))
+        return np.array(rows).reshape(-1, 2)
 
     def span(self, row: int) -> slice:
         """Return where the terms of a constraint row are."""
@@ -207,7 +234,7 @@ class Model:
         head[T.H_WORK] = head[T.H_W_SCRATCH] + work
         end = [(len(self.terms), -1, -1)]
         integers = {
-            T.H_I_AT: places(self.counts, formulation),
+            T.H_I_AT: self._places(formulation),
             T.H_I_CODE: codes,
             T.H_I_MARKER_BODY: self.marker_body,
             T.H_I_ROW: np.concatenate([self.rows, end]),
@@ -229,6 +256,7 @@ class Model:
             T.H_R_COEF: self.coef,
             T.H_R_FUNCTION: self.function_r,
             T.H_R_EXTRA: self.extra_r,
+            T.H_R_MODAL: self.modal,
             T.H_R_REFERENCE: np.concatenate([self.reference, now, self.reference, unseen]),
         }
         _place(head, integers, T.H_SIZE)
@@ -252,13 +280,27 @@ class Model:
         head[T.H_DIAGNOSTICS] = max((len(d) for d in self.diagnostics), default=0)
         head[T.H_N_EXTRA_I], head[T.H_N_EXTRA_R] = len(self.extra_i), len(self.extra_r)
         head[T.H_N_FUNCTION_R] = len(self.function_r)
+        head[T.H_FRAMES], head[T.H_N_MODAL] = len(self.bodies) + len(self.frame_body), self.modal.size
+        head[T.H_N_PARTIAL] = sum(partials_size(self.modes[b]) for b in self.frame_body)
         head[T.H_W_KIN] = 0
-        head[T.H_W_MARKER] = len(self.bodies) * KIN_COLUMNS
+        head[T.H_W_MARKER] = head[T.H_FRAMES] * KIN_COLUMNS
         head[T.H_W_FUNCTION] = head[T.H_W_MARKER] + len(self.marker_body) * T.MK_COLUMNS
         head[T.H_W_TAPE] = head[T.H_W_FUNCTION] + T.FUNCTION_VALUES * len(self.functions)
         head[T.H_W_TAPE_SIZE] = self.tape_work
-        head[T.H_W_SCRATCH] = head[T.H_W_TAPE] + self.tape_work
+        head[T.H_W_PARTIAL] = head[T.H_W_TAPE] + self.tape_work
+        head[T.H_W_SCRATCH] = head[T.H_W_PARTIAL] + head[T.H_N_PARTIAL]
         return head
+
+    def _places(self, formulation: int) -> np.ndarray:
+        """Return the table ``at``: bodies, then the elastic frames, which have the places of their bodies."""
+        bodies = places(self.counts, formulation)
+        bodies[:, T.AT_MODAL] = self.modal_at
+        frames = bodies[list(self.frame_body)]
+        partial = 0
+        for row, body, shape in zip(frames, self.frame_body, self.shape_at):
+            row[T.AT_BODY], row[T.AT_SHAPE], row[T.AT_PARTIAL] = body, shape, partial
+            partial += partials_size(self.modes[body])
+        return np.concatenate([bodies, frames])
 
     def _addressed_tapes(self) -> np.ndarray:
         """Return the rows of the expressions with the addresses of their evaluators, loaded only if there are any."""

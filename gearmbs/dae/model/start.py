@@ -13,12 +13,14 @@ from gearmbs.dae.equations import jacobian, residual, unknowns
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import ANGLE, dot3
 from gearmbs.dae.equations.euler_switch import hook
+from gearmbs.dae.equations.modal_inertia import add_momentum, set_modal_momenta, update_inertia
 from gearmbs.dae.equations.reactions import reactions_from
 from gearmbs.dae.equations.rotation import (
     KIN_A,
     KIN_ADOT,
     KIN_AXES,
     KIN_H,
+    KIN_W,
     POSE_A,
     POSE_R,
     POSE_V,
@@ -42,6 +44,8 @@ if TYPE_CHECKING:
 MAX_LOAD_ITERATIONS = 200
 """Of loads that depend on each other, at the start; friction converges like a power of the friction coefficient."""
 MAX_STATE_ITERATIONS = 100
+POSE_PLACES = 6
+"""Spatial displacements of a body, after which the modal coordinates come."""
 
 
 class Assembled(NamedTuple):
@@ -69,6 +73,12 @@ def unknowns_from_pose(pose, q_f, v_f, idata, rdata, work, y):
     s = tab.scratch
     for b in range(1, idata[T.H_BODIES]):
         row, at = pose[b - 1], tab.at[b]
+        first = at[T.AT_V_MODES] - POSE_PLACES * pose.shape[0]
+        for m in range(at[T.AT_MODES]):
+            y[at[T.AT_QF] + m] = q_f[first + m]
+            y[at[T.AT_VF] + m] = v_f[first + m]
+        if at[T.AT_MODES] > 0:
+            update_inertia(y, at, tab.modal, tab.body[b])
         th, e, p = at[T.AT_THETA], at[T.AT_EPS], at[T.AT_P]
         for c in range(3):
             y[at[T.AT_R] + c] = row[POSE_R + c]
@@ -79,6 +89,11 @@ def unknowns_from_pose(pose, q_f, v_f, idata, rdata, work, y):
         axes_and_velocity(y[th], y[th + 1], 0.0, 0.0, 0.0, kin, b)
         euler_rates(kin, b, row, POSE_W, y, e)
         inertia_times(kin[b], tab.body[b], row, POSE_W, kin[b], KIN_H, s)
+        if at[T.AT_MODES] > 0:
+            for c in range(3):
+                kin[b, KIN_W + c] = row[POSE_W + c]
+            add_momentum(y, at, tab.modal, kin[b])
+            set_modal_momenta(y, at, tab.modal, kin[b])
         for m in range(3):
             y[p + m] = dot3(kin[b], KIN_AXES + 3 * m, kin[b], KIN_H)
 
@@ -204,7 +219,7 @@ def make_problem(system: System, formulation: str, rate_scale: float) -> DAEProb
     _settle_states(system, y, yp, slice(at["z"], at["mu"]), idata, rdata, work)
     _rates(y, yp, acc, system.t0, idata, rdata, work)
     largest = float(np.abs(found.loads[:, :3]).max(initial=0.0))
-    scale = unknowns.scales(model.counts, form, model.bodies[1:], np.zeros((0, 2)), min(system.length, 1.0), largest)
+    scale = unknowns.scales(model.counts, form, model.bodies[1:], model.modal_sizes(), min(system.length, 1.0), largest)
     allowed = scale.copy()
     allowed[unknowns.velocities(at)] *= rate_scale
     return DAEProblem(

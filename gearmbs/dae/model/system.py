@@ -17,6 +17,8 @@ from gearmbs.dae.model.conflicts import conflict
 from gearmbs.dae.model.model import Model
 from gearmbs.dae.problem import DAEProblem
 
+STIFFENED = 1e4
+"""Weight of modal coordinates over that of displacements."""
 SHORTEST = 1e-3
 """Least length of a mechanism, m."""
 
@@ -120,9 +122,12 @@ class System:
         return float(max(arms.max(initial=0.0), spread, SHORTEST))
 
     def coordinate_weights(self) -> np.ndarray:
-        """Weights of the coordinates: 1 for metres, L^2 for radians."""
-        one = np.concatenate([np.ones(3), np.full(3, min(self.length, 1.0) ** 2)])
-        return np.tile(one, self.pose.shape[0])
+        """Weights of the coordinates: 1 for metres, L^2 for radians, more for bending by the same way."""
+        length = min(self.length, 1.0)
+        one = np.concatenate([np.ones(3), np.full(3, length**2)])
+        sizes = self.model.modal_sizes()[:, 0]
+        # assembly moves bodies rather than bending them
+        return np.concatenate([np.tile(one, self.pose.shape[0]), STIFFENED * (length / sizes) ** 2])
 
     def constraint_jacobian(self, place: Configuration | np.ndarray, t: float):
         """Return Phi_q in spatial displacements, Phi, and Phi_q v + Phi_t at a configuration."""
