@@ -14,6 +14,7 @@ from gearmbs.dae.analyses import statics as _statics
 from gearmbs.dae.analyses.modes import Modes
 from gearmbs.dae.analyses.statics import StaticResult
 from gearmbs.dae.errors import ModelError
+from gearmbs.mechanism.modal import ModalBody
 
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
@@ -83,7 +84,12 @@ def place(mechanism: Mechanism, equilibrium: StaticResult) -> None:
     for row, body in zip(equilibrium.pose, mechanism.bodies.values()):
         axes = row[3:12].reshape(3, 3).copy()
         body.orientation = axes
-        body.position = row[0:3] - axes @ body.com
+        arm = body.com
+        if isinstance(body, ModalBody):
+            body.start = equilibrium.solution.modal_coordinates(body.name)[0].copy()
+            body.rate = np.zeros_like(body.start)
+            arm = arm + body.start @ body.mean
+        body.position = row[0:3] - axes @ arm
         body.velocity, body.angular_velocity = np.zeros(3), np.zeros(3)
     states = equilibrium.solution.result.y[0]
     own = mechanism.every_state

@@ -25,6 +25,7 @@ from gearmbs.mechanism.elements import ForceElement, Load, State
 from gearmbs.mechanism.expression_compiler import compile_expression
 from gearmbs.mechanism.expression_syntax import Scope
 from gearmbs.mechanism.functions import TimeFunction
+from gearmbs.mechanism.modal import ModalBody
 from gearmbs.mechanism.parts import Body, Marker
 
 if TYPE_CHECKING:
@@ -80,6 +81,9 @@ class _Compiler:
     def run(self, t0: float) -> System:
         m = self.mechanism
         pose = np.array([self.add_body(body) for body in m.bodies.values()])
+        bent = [body for body in m.bodies.values() if isinstance(body, ModalBody)]
+        q_f = np.concatenate([np.zeros(0), *(body.start for body in bent)])
+        v_f = np.concatenate([np.zeros(0), *(body.rate for body in bent)])
         self.index_all_markers()
         for joint in m.joints.values():
             for row in joint.rows:
@@ -108,27 +112,22 @@ class _Compiler:
         elements = [*self.force_names, *(f"reaction of {name}" for name in self.measured)]
         names = Names(tuple(m.bodies), tuple(self.row_names), tuple(elements), tuple(m.state_names))
         start = [s.start for s in m.every_state]
-        return System(self.builder.build(names), Configuration(pose), start, t0, m, self.marker_index)
+        return System(self.builder.build(names), Configuration(pose, q_f, v_f), start, t0, m, self.marker_index)
 
     # --- bodies and markers -------------------------------------------------------------------------
 
     def add_body(self, body: Body) -> np.ndarray:
-        self.body_index[id(body)] = self.builder.add_body(body.mass, body.inertia)
-        arm = body.orientation @ body.com
-        return np.concatenate(
-            [
-                body.position + arm,
-                body.orientation.ravel(),
-                body.velocity + np.cross(body.angular_velocity, arm),
-                body.angular_velocity,
-            ]
-        )
+        modal = body.modal if isinstance(body, ModalBody) else None
+        self.body_index[id(body)] = self.builder.add_body(body.mass, body.inertia, modal)
+        position, velocity = body.centre_of_mass()
+        return np.concatenate([position, body.orientation.ravel(), velocity, body.angular_velocity])
 
     def index_all_markers(self) -> None:
         for body in (self.mechanism.ground, *self.mechanism.bodies.values()):
             for marker in body.markers:
+                shape = body.shape_at(marker) if isinstance(body, ModalBody) else None
                 self.marker_index[id(marker)] = self.builder.add_marker(
-                    self.body_index[id(body)], marker.position - body.com, marker.orientation
+                    self.body_index[id(body)], marker.position - body.com, marker.orientation, shape
                 )
                 self.marker_names.append(marker.name)
 

@@ -71,6 +71,7 @@ def _joints_inside(mechanism: Mechanism, whole: System) -> list[Joint]:
     kept = set(whole.row_names)
     model = whole.model
     names = ["", *whole.body_names]
+    names += [names[b] for b in model.frame_body]
     tapes = [k for k in model.rows[:, T.ROW_TAPE] if k >= 0]
     constrained = {names[b] for k in tapes for b in model.tapes[k].bodies}
     found = []

@@ -11,9 +11,12 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.expressions import ExpressionError, angle_rates, eval_request, update_angles
 from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.errors import ModelError
+from gearmbs.dae.model.model import Names
+from gearmbs.dae.results.frames import body_motion, elastic_motion, frame_motion, modal_slice
 from gearmbs.mechanism.elements import State
 from gearmbs.mechanism.expression_compiler import compile_expression
 from gearmbs.mechanism.joints import Joint, kinds_with_angle, kinds_with_displacement
+from gearmbs.mechanism.modal import ModalBody
 from gearmbs.mechanism.parts import Body, Marker
 
 if TYPE_CHECKING:
@@ -64,29 +67,44 @@ class Measures:
 
     def place(self, marker: Marker | Body | str) -> np.ndarray:
         """Return the origin of a marker, or of a body's frame, global components, shape (m, 3), m."""
-        body, point, _ = self._frame(marker)
-        if body.is_ground:
-            return np.tile(point, (self.solution.t.size, 1))
-        return self.solution.com_position(body.name) + self.solution.orientation(body.name) @ point
+        return self._motion(marker)[:, KIN_R : KIN_R + 3]
 
     def velocity(self, marker: Marker | Body | str) -> np.ndarray:
         """Return the velocity of a marker's, or of a body's frame's, origin, global components, shape (m, 3), m/s."""
-        body, point, _ = self._frame(marker)
-        if body.is_ground:
-            return np.zeros((self.solution.t.size, 3))
-        arm = self.solution.orientation(body.name) @ point
-        spin = self.solution.angular_velocity(body.name)
-        return self.solution.com_velocity(body.name) + np.cross(spin, arm)
+        return self._motion(marker)[:, KIN_V : KIN_V + 3]
 
-    def _frame(self, marker: Marker | Body | str) -> tuple[Body, np.ndarray, np.ndarray]:
-        """Return body, origin from the centre of mass and axes in the body."""
+    def _axes(self, marker: Marker) -> np.ndarray:
+        return self._motion(marker)[:, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
+
+    def _spin(self, marker: Marker) -> np.ndarray:
+        return self._motion(marker)[:, KIN_W : KIN_W + 3]
+
+    def _motion(self, marker: Marker | Body | str) -> np.ndarray:
+        """Return the motion of a marker's frame, or of a body's, columns ``KIN_*``, shape (m, 18)."""
         if isinstance(marker, str):
             marker = self._find(marker)
         if isinstance(marker, Body):
-            return marker, -marker.com, np.eye(3)
+            marker = Marker(f"{marker.name}.frame", marker, np.zeros(3), np.eye(3))
         if not isinstance(marker, Marker):
             raise ModelError(f"{marker!r} is not a marker, a body or the name of a marker")
-        return marker.body, marker.position - marker.body.com, marker.orientation
+        body, local = marker.body, marker.position - marker.body.com
+        out = np.zeros((self.solution.t.size, KIN_AXES))
+        if body.is_ground:
+            out[:, KIN_R : KIN_R + 3], out[:, KIN_A : KIN_A + 9] = local, marker.orientation.ravel()
+            return out
+        host = body_motion(self.solution, body.name)
+        if isinstance(body, ModalBody):
+            number = self.solution.system.body_names.index(body.name) + 1
+            modal = self.solution._records.modal[:, :, modal_slice(self.solution.system.model, number)]
+            host, _ = elastic_motion(host, None, modal, local, *body.shape_at(marker))
+            local = np.zeros(3)
+        axes = host[:, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
+        arm = axes @ local
+        out[:, KIN_R : KIN_R + 3] = host[:, KIN_R : KIN_R + 3] + arm
+        out[:, KIN_V : KIN_V + 3] = host[:, KIN_V : KIN_V + 3] + np.cross(host[:, KIN_W : KIN_W + 3], arm)
+        out[:, KIN_W : KIN_W + 3] = host[:, KIN_W : KIN_W + 3]
+        out[:, KIN_A : KIN_A + 9] = (axes @ marker.orientation).reshape(-1, 9)
+        return out
 
     def _find(self, name: str) -> Marker:
         bodies = (self.mechanism.ground, *self.mechanism.bodies.values())
@@ -99,17 +117,6 @@ class Measures:
             )
         known = [m.name for body in bodies for m in body.markers]
         raise KeyError(f"marker {name!r}; the markers are {', '.join(known) or 'none'}")
-
-    def _axes(self, marker: Marker) -> np.ndarray:
-        axes = marker.orientation
-        if marker.body.is_ground:
-            return np.tile(axes, (self.solution.t.size, 1, 1))
-        return self.solution.orientation(marker.body.name) @ axes
-
-    def _spin(self, marker: Marker) -> np.ndarray:
-        if marker.body.is_ground:
-            return np.zeros((self.solution.t.size, 3))
-        return self.solution.angular_velocity(marker.body.name)
 
     # --- states and expressions ---------------------------------------------------------------------
 
@@ -140,7 +147,7 @@ class Measures:
         angles[0, : tape.n_angles] = starting_angles(tape, self.mechanism.turns, marker_named)
         bodies = np.array(builder.marker_body, dtype=np.int64)
         frames = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float).reshape(-1, 12)
-        kin, acc = motion_tables(self.solution)
+        kin, acc = frame_motion(self.solution, builder.build(Names()))
         out = np.zeros(t.size)
         evaluate_series(
             tape.ints, tape.floats, t, kin, acc, bodies, frames, y, angles, np.zeros(max(1, tape.gradient_size)),
@@ -163,23 +170,6 @@ class Measures:
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.einsum("ti,ti->t", a, b)
-
-
-def motion_tables(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
-    """Return the kinematics (m, bodies + 1, 27) and acceleration (m, bodies + 1, 6) tables over time."""
-    names = solution.system.body_names
-    m = solution.t.size
-    kin = np.zeros((m, len(names) + 1, KIN_AXES + 9))
-    acc = np.zeros((m, len(names) + 1, 6))
-    kin[:, 0, KIN_A : KIN_A + 9] = np.eye(3).ravel()
-    for b, name in enumerate(names, 1):
-        kin[:, b, KIN_R : KIN_R + 3] = solution.com_position(name)
-        kin[:, b, KIN_V : KIN_V + 3] = solution.com_velocity(name)
-        kin[:, b, KIN_A : KIN_A + 9] = solution.orientation(name).reshape(m, 9)
-        kin[:, b, KIN_W : KIN_W + 3] = solution.angular_velocity(name)
-        acc[:, b, :3] = solution.com_acceleration(name)
-        acc[:, b, 3:] = solution.angular_acceleration(name)
-    return kin, acc
 
 
 @njit(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -19,6 +20,7 @@ from gearmbs.mechanism.function_text import integrated
 from gearmbs.mechanism.functions import TimeFunction, as_function, constant
 from gearmbs.mechanism.geometry import Vector, frame_along, vector
 from gearmbs.mechanism.load_methods import Expression, LoadMethods
+from gearmbs.mechanism.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
 from gearmbs.mechanism.parts import Body, Marker, make_body
 from gearmbs.mechanism.quantities import quantity
 
@@ -114,6 +116,46 @@ class Mechanism(LoadMethods):
         if name in self.bodies or name == "ground":
             raise ModelError(f"body '{name}': the name is in use; choose another")
         body = make_body(name, mass, inertia, com, position, orientation, velocity, angular_velocity)
+        self.bodies[name] = body
+        return body
+
+    def modal_body(
+        self,
+        name: str,
+        mass: float,
+        inertia: npt.ArrayLike,
+        modes: Sequence[Mode],
+        shapes: Shapes,
+        *,
+        integrals: ShapeIntegrals | None = None,
+        **where: Any,
+    ) -> ModalBody:
+        """Add a body that deforms by modes; its markers move and turn with their shapes.
+
+        Deformations are small: displacements are linear in the modal coordinates. The equations are those of
+        `gearmbs.dae.equations.modal_inertia` and `gearmbs.dae.equations.elastic`.
+
+        Parameters
+        ----------
+        name, mass, inertia
+            As of :meth:`body`, of the undeformed body.
+        modes : sequence of Mode
+            Stiffness, modal mass, damping, and what each mode carries of momentum and angular momentum.
+        shapes : callable
+            From a point of the body's frame (m) to displacements (m) and rotations (rad) there by one unit of each
+            mode, two arrays of shape (modes, 3) in the body's axes. It is asked at the markers.
+        integrals : ShapeIntegrals, optional
+            All integrals of the shapes, in place of the masses and momenta of the modes, which leave out the change of
+            the inertia with the deformation: see :meth:`ShapeIntegrals.of_points`.
+        **where
+            ``com``, ``position``, ``orientation``, ``velocity``, ``angular_velocity`` as of :meth:`body`.
+
+        Raises
+        ------
+        ModelError
+            As :meth:`body`, and for modes that no body of this mass and inertia can have.
+        """
+        body = make_modal_body(self.body(name, mass, inertia, **where), modes, shapes, integrals)
         self.bodies[name] = body
         return body
 

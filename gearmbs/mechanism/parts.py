@@ -108,6 +108,11 @@ class Body:
         self.markers.append(marker)
         return marker
 
+    def centre_of_mass(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return position and velocity of the centre of mass at the start, global components, m and m/s."""
+        arm = self.orientation @ self.com
+        return self.position + arm, self.velocity + np.cross(self.angular_velocity, arm)
+
     def marker_at(self, point: Vector, matrix: np.ndarray, name: str | None = None) -> Marker:
         """Add a marker given in global components at the initial position of the body."""
         local = self.orientation.T @ (vector(point, f"body '{self.name}': marker position", "length") - self.position)

@@ -15,11 +15,12 @@ from gearmbs.dae.equations.counted_angles import AXES as ANGLE_NAMES
 from gearmbs.dae.equations.expressions import eval_gradient
 from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_R
 from gearmbs.dae.equations.expressions.tape import ExpressionError, Tape
+from gearmbs.dae.results.frames import frame_motion
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.compile import starting_angles
 from gearmbs.mechanism.expression_compiler import compile_expression
 from gearmbs.mechanism.expression_syntax import Scope
-from gearmbs.mechanism.measures import evaluate_series, motion_tables
+from gearmbs.mechanism.measures import evaluate_series
 
 COLUMNS = {
     "DISPLACEMENT": ("DM", "DX", "DY", "DZ", "", "PSI", "THETA", "PHI"),
@@ -95,7 +96,7 @@ class RequestEvaluator:
         self._ypr = output is not None and output.ypr
         system = solution.system
         self.marker_body, self.marker_frame = system.model.marker_body.copy(), system.model.marker_frame.copy()
-        self.kin, self.acc = motion_tables(solution)
+        self.kin, self.acc = frame_motion(solution)
         index: dict[int, int] = system.marker_index  # type: ignore[attr-defined]
         self.scope: Scope = model.scope(index, list(self.marker_body))
         self._names = {index[id(m)]: m.name for m in markers_of(model.mechanism)}

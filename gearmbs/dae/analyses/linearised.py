@@ -88,31 +88,32 @@ class Instant:
 
     def pose(self) -> np.ndarray:
         """Return R, A (row-major), v, omega of each moving body, shape (bodies, 18)."""
-        out = np.zeros(POSE_COLUMNS * len(self.system.body_names))
-        accelerations.pose_record(self.y, self.idata, self.rdata, self.work, out)
-        return out.reshape(-1, POSE_COLUMNS)
+        return self.configuration().pose
 
     def configuration(self) -> Configuration:
         """Return the positions and velocities of y."""
-        q_f, v_f = (self.y[self.block(*ends)].copy() for ends in (("q_f", "lambda"), ("v_f", "R")))
-        return Configuration(self.pose(), q_f, v_f)
+        counts = self.system.model.counts
+        out = np.zeros(POSE_COLUMNS * counts.bodies + 2 * sum(counts.modes))
+        accelerations.pose_record(self.y, self.idata, self.rdata, self.work, out)
+        return Configuration.of(out, counts.bodies)
 
     def axes(self) -> np.ndarray:
         """Return the axes of the Euler angles, shape (bodies, 3, 3): row k turns with angle k."""
         self.pose()
         kin = T.unpack(self.idata, self.rdata, self.work).kin
-        return kin[1:, KIN_AXES : KIN_AXES + 9].reshape(-1, 3, 3).copy()
+        return kin[1 : len(self.system.model.bodies), KIN_AXES : KIN_AXES + 9].reshape(-1, 3, 3).copy()
 
     def spatial(self, coordinates: np.ndarray) -> np.ndarray:
-        """Turn changes of (R, theta), shape (6 bodies, k), into displacements and rotations, (k, bodies, 6)."""
-        bodies = len(self.system.body_names)
-        moved = coordinates[: 3 * bodies].reshape(bodies, 3, coordinates.shape[1])
-        angles = coordinates[3 * bodies :].reshape(bodies, 3, coordinates.shape[1])
+        """Turn changes of (R, theta, q_f), a column each, into displacements and rotations, shape (k, bodies, 6)."""
+        bodies, first = len(self.system.body_names), self.at["R"]
+        angle, mode = self.at["theta"] - first, self.at["q_f"] - first
+        moved = coordinates[:angle].reshape(bodies, 3, coordinates.shape[1])
+        angles = coordinates[angle:mode].reshape(bodies, 3, coordinates.shape[1])
         turned = np.einsum("bmc,bmk->bck", self.axes(), angles)
         return np.moveaxis(np.concatenate([moved, turned], axis=1), 2, 0)
 
     def mass_matrix(self, matrix: csc_array) -> csc_array:
-        """Return the mass matrix of (R, theta) from the Jacobian of G."""
+        """Return the mass matrix of (R, theta, q_f) from the Jacobian of G."""
         from scipy.sparse import block_diag, diags_array
 
         masses = np.repeat(self.system.model.bodies[1:, T.BODY_MASS], 3)
@@ -141,8 +142,8 @@ def allowed_motions(constraint: np.ndarray) -> np.ndarray:
 class Reduced:
     """M x'' + C x' + K x + H z = 0 and z' = P x + Q x' + S z in the motions the constraints allow.
 
-    ``basis`` has a column of changes of (R, theta) for each entry of x; ``stiffness_terms`` and ``damping_terms`` are
-    the sums of the absolute values of the terms each coefficient is made of, against which rounding is to be held.
+    ``basis`` has a column of changes of (R, theta, q_f) for each entry of x; ``stiffness_terms`` and ``damping_terms``
+    are the sums of the absolute values of the terms each coefficient is made of, against which rounding is to be held.
     """
 
     basis: np.ndarray
@@ -171,7 +172,7 @@ def reduce(instant: Instant) -> Reduced:
     full = matrix.toarray()
     q, v = instant.block("R", "lambda"), np.concatenate([instant.block("u", "p"), instant.block("eps", "R")])
     force = instant.block("u", "eps")
-    half = force.size // 2
+    half = instant.at["p"] - instant.at["u"]
     rows, eps = instant.block("lambda", "F"), instant.block("eps", "R")
     inner = instant.block("F", "mu")
     kept = np.zeros(inner.size, dtype=bool)
@@ -198,7 +199,9 @@ def reduce(instant: Instant) -> Reduced:
     damping[half:, half:] -= moved
     damping_terms[half:, half:] += np.abs(moved)
     constraint = full[np.ix_(rows, q)]
-    weight = np.concatenate([np.ones(half), np.full(half, max(min(instant.system.length, 1.0), 1e-3))])
+    arm = max(min(instant.system.length, 1.0), 1e-3)
+    sizes = instant.system.model.modal_sizes()[:, 0]
+    weight = np.concatenate([np.ones(half), np.full(half, arm), arm / sizes])
     basis = allowed_motions(constraint / weight) / weight[:, None]
     absolute = np.abs(basis)
     return Reduced(

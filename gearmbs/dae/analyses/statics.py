@@ -27,6 +27,7 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
 
 if TYPE_CHECKING:
+    from gearmbs.dae.model.model import Model
     from gearmbs.dae.model.system import System
 
 LARGEST_TURN = 0.5
@@ -157,8 +158,9 @@ class Relaxation:
     def __init__(self, instant: Instant, tol: float) -> None:
         self.instant, self.tol = instant, tol
         system = instant.system
-        self.bodies = len(system.body_names)
-        self.coordinates = 6 * self.bodies
+        self.coordinates = system.model.counts.coordinates
+        self.angles = instant.at["theta"] - instant.at["R"]
+        self.modes = instant.at["q_f"] - instant.at["R"]
         inner = instant.block("lambda", "mu")
         self.rows = np.concatenate([instant.block("u", "eps"), inner])
         self.columns = np.concatenate([instant.block("R", "lambda"), inner])
@@ -169,14 +171,21 @@ class Relaxation:
         weight = float(system.model.bodies[1:, T.BODY_MASS].max(initial=0.0))
         force = max(force, weight * 9.81, 1e-3)
         arm = min(self.length, 1.0)
-        sizes = np.concatenate([np.full(3 * self.bodies, force), np.full(3 * self.bodies, force * arm)])
+        typical = system.model.modal_sizes()
+        sizes = np.concatenate([self._by_kind(force, force * arm), force * arm / typical[:, 0]])
         kinds = {"lambda": self.length, "F": force, "N": force * arm, "z": 1.0}
         ends = ("F", "N", "z", "mu")
         for (name, value), end in zip(kinds.items(), ends):
             sizes = np.concatenate([sizes, np.full(instant.block(name, end).size, value)])
         self.sizes = sizes
         heaviest = weight if weight > 0.0 else 1.0
-        self.floor = 1e-3 * heaviest * np.repeat([1.0, arm**2], 3 * self.bodies)
+        light = self._by_kind(heaviest, heaviest * arm**2)
+        self.floor = 1e-3 * np.concatenate([light, typical[:, 1]])
+        self.reach = np.concatenate([self._by_kind(self.length, 1.0), typical[:, 0]])
+
+    def _by_kind(self, displacement: float, rotation: float) -> np.ndarray:
+        """Return one number for each displacement and another for each rotation of the bodies."""
+        return np.repeat([displacement, rotation], [self.angles, self.modes - self.angles])
 
     def _inertia(self, matrix: csc_array) -> csc_array:
         mass = self.instant.mass_matrix(matrix)
@@ -213,7 +222,7 @@ class Relaxation:
         n, high = self.coordinates, 1e-300
         ratio = np.abs(stiffness.diagonal()[:n]).max(initial=0.0) / mass.diagonal().max(initial=1.0)
         arm = min(self.length, 1.0)
-        net = np.abs(rest[:n]) / mass.diagonal() / np.repeat([self.length, 1.0], 3 * self.bodies)
+        net = np.abs(rest[:n]) / mass.diagonal() / self.reach
         high = max(float(net.max(initial=0.0)) / 0.1, 1e-6 * 9.81 / arm)
         return high, 1e-12 * max(high, ratio)
 
@@ -282,8 +291,8 @@ class Relaxation:
         return None
 
     def _too_far(self, step: np.ndarray, limit: float) -> bool:
-        moved = np.abs(step[: 3 * self.bodies]).max(initial=0.0)
-        turned = np.abs(step[3 * self.bodies : self.coordinates]).max(initial=0.0)
+        moved = np.abs(step[: self.angles]).max(initial=0.0)
+        turned = np.abs(step[self.angles : self.modes]).max(initial=0.0)
         return moved > limit or turned > LARGEST_TURN
 
     def _uphill(self, step: np.ndarray, rest: np.ndarray, stiffness: csc_array, size: float) -> bool:
@@ -307,12 +316,20 @@ class Relaxation:
                     "hold it by a joint, a motion or a spring, or set the initial position nearer to the equilibrium"
                 )
         worst = int(np.argmax(np.abs(rest[:n] / self.sizes[:n])))
-        name = names[(worst % (3 * self.bodies)) // 3]
+        name = unbalanced_body(self.instant.system.model, worst)
         return AssemblyError(
             f"no equilibrium was found: body '{name}' is left with an unbalanced load of "
-            f"{abs(rest[worst]):.3g} {'N' if worst < 3 * self.bodies else 'N m'}; "
+            f"{abs(rest[worst]):.3g} {'N' if worst < self.angles else 'N m'}; "
             "start nearer to the equilibrium, or add damping and simulate until the mechanism rests"
         )
+
+
+def unbalanced_body(model: Model, row: int) -> str:
+    """Return the name of the body that row ``row`` of the balance of forces belongs to."""
+    names, three = model.names.bodies, 3 * len(model.names.bodies)
+    if row < 2 * three:
+        return names[(row % three) // 3]
+    return names[int(np.repeat(np.arange(len(names)), model.modes[1:])[row - 2 * three])]
 
 
 def describe(shape: np.ndarray, names: list[str], length: float) -> tuple[str, str]:
@@ -336,7 +353,7 @@ def _result(instant: Instant, iterations: int, size: float) -> StaticResult:
     loads = {name: (solution.load(name)[0][0], solution.load(name)[1][0]) for name in system.force_names}
     neutral: list[str] = []
     stable = None
-    if 6 * len(system.body_names) <= DENSE_LIMIT:
+    if system.model.counts.coordinates <= DENSE_LIMIT:
         stable, motion = free_motions(reduce(instant))
         shapes = instant.spatial(motion)
         neutral = list(dict.fromkeys(describe(s, system.body_names, system.length)[0] for s in shapes))

@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+from gearmbs._jit import njit
 
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import layout as T
@@ -57,6 +57,24 @@ class ModalInertia:
     def modes(self) -> int:
         """Number of modal coordinates."""
         return self.mass.shape[0]
+
+    def kinetic_energy(self, w: np.ndarray, q_f: np.ndarray, v_f: np.ndarray) -> np.ndarray:
+        """Return what the kinetic energy has beyond that of the undeformed rigid body, shape (m,), J.
+
+        ``w`` is the angular velocity in body components, shape (m, 3); q_f and v_f have shape (m, n).
+        """
+        change = np.einsum("tk,kij->tij", q_f, self.j1) + 0.5 * np.einsum("tk,tl,klij->tij", q_f, q_f, self.j2)
+        couplings = self.c0 + np.einsum("tl,lkc->tkc", q_f, self.c1)
+        turning = 0.5 * np.einsum("ti,tij,tj->t", w, change, w) + np.einsum("ti,tki,tk->t", w, couplings, v_f)
+        return turning + 0.5 * np.einsum("tk,kl,tl->t", v_f, self.mass, v_f)
+
+    def strain_energy(self, q_f: np.ndarray) -> np.ndarray:
+        """Return the strain energy over time, shape (m,), J."""
+        return 0.5 * np.einsum("tk,kl,tl->t", q_f, self.stiffness, q_f)
+
+    def damping_power(self, v_f: np.ndarray) -> np.ndarray:
+        """Return the power dissipated by the damping of the modes, shape (m,), W."""
+        return np.einsum("tk,kl,tl->t", v_f, self.damping, v_f)
 
     def table(self, inertia: np.ndarray) -> np.ndarray:
         """Return the numbers as the kernels read them, see `integrals`; ``inertia`` is that of the undeformed body."""

@@ -276,7 +276,7 @@ def _settle_states(system: System, y, yp, z: slice, idata, rdata, work) -> None:
 def _rates(y, yp, acc: np.ndarray, t: float, idata, rdata, work) -> None:
     """Fill y' from the accelerations; p' and p_f' are what makes their own residuals vanish."""
     tab = T.unpack(idata, rdata, work)
-    places = [[int(k) for k in row] for row in tab.at[1:]]
+    places = [[int(k) for k in row] for row in tab.at[1 : int(idata[T.H_BODIES])]]
     for at in places:
         u, v, v_f, modal, modes = (at[k] for k in (T.AT_U, T.AT_V, T.AT_VF, T.AT_V_MODES, T.AT_MODES))
         yp[u : u + 3] = acc[v : v + 3]

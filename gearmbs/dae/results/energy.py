@@ -6,7 +6,7 @@ state alone. So the balance tests the integrated motion, not the algebra of one 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,8 +14,11 @@ import xarray as xr
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.force_elements import DISSIPATED, STORED
+from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.results.frames import frame_motion, modal_slice
 
 if TYPE_CHECKING:
+    from gearmbs.dae.equations.modal_inertia import ModalInertia
     from gearmbs.dae.results.solution import Solution
 
 
@@ -30,13 +33,13 @@ def energy_balance(solution: Solution) -> xr.Dataset:
     Returns
     -------
     Dataset
-        In J over ``time``: ``kinetic``, ``gravity`` (potential), ``elastic`` (stored in the force elements that tell
-        it, such as contacts); ``work_motion`` (done by prescribed motions), ``work_applied`` (done by all other force
-        elements, springs and expression loads among them), ``dissipated_damping``, ``dissipated_friction`` and what
-        else elements dissipate (``dissipated_x`` of a diagnostic ``x_power``); ``imbalance``: work in less dissipation
-        less change of stored energy; ``work``: sum of |power| over time. Attribute ``relative_imbalance``: the largest
-        imbalance over all the work or, where more is exchanged than worked, over the largest change of a stored
-        energy; NaN when there is neither.
+        In J over ``time``: ``kinetic``, ``gravity`` (potential), ``elastic`` (strain energy of modal bodies, and what
+        force elements tell, such as contacts); ``work_motion`` (done by prescribed motions), ``work_applied`` (done by
+        all other force elements, springs and expression loads among them), ``dissipated_damping``,
+        ``dissipated_friction`` and what else elements dissipate (``dissipated_x`` of a diagnostic ``x_power``);
+        ``imbalance``: work in less dissipation less change of stored energy; ``work``: sum of |power| over time.
+        Attribute ``relative_imbalance``: the largest imbalance over all the work or, where more is exchanged than
+        worked, over the largest change of a stored energy; NaN when there is neither.
     """
     t = solution.t
     powers = _powers(solution)
@@ -44,7 +47,7 @@ def energy_balance(solution: Solution) -> xr.Dataset:
     stored = {
         "kinetic": solution.kinetic_energy,
         "gravity": _gravity(solution),
-        "elastic": sum((v for _, v in _told(solution, STORED)), np.zeros(t.size)),
+        "elastic": sum((v for _, v in _told(solution, STORED)), _strain(solution)),
     }
     change = sum(e - e[0] for e in stored.values())
     net = works["work_motion"] + works["work_applied"]
@@ -70,11 +73,13 @@ def _integral(t: np.ndarray, power: np.ndarray) -> np.ndarray:
 def _powers(solution: Solution) -> dict[str, np.ndarray]:
     motion = np.einsum("tr,tr->t", solution.multipliers, solution._phi[:, :, 2])
     applied = np.zeros(solution.t.size)
+    kin, _ = frame_motion(solution)
     for k, row in enumerate(solution.system.model.forces):
         if row[T.FORCE_KIND] != T.REACTION and not _accounts(solution, k - row[T.FORCE_PART]):
-            applied += _load_power(solution, k, row)
+            applied += _load_power(solution, kin, k, row)
     zero = np.zeros(solution.t.size)
-    powers = {"work_motion": motion, "work_applied": applied, "dissipated_damping": zero, "dissipated_friction": zero}
+    powers = {"work_motion": motion, "work_applied": applied, "dissipated_friction": zero}
+    powers["dissipated_damping"] = _modal_damping(solution)
     for name, power in _told(solution, DISSIPATED):
         key = f"dissipated_{name.removesuffix('_power')}"
         powers[key] = powers.get(key, zero) + power
@@ -94,24 +99,44 @@ def _told(solution: Solution, role: str) -> Iterator[tuple[str, np.ndarray]]:
                 yield d.name, solution._loads[:, k, 6 + c]
 
 
-def _load_power(solution: Solution, k: int, row: np.ndarray) -> np.ndarray:
-    """Power of a force element: F and N on I's body at marker I, the opposite on J's body at the same point."""
+def _load_power(solution: Solution, kin: np.ndarray, k: int, row: np.ndarray) -> np.ndarray:
+    """Power of a force element: F and N on I's body at marker I, the opposite on J's body at the same point.
+
+    ``kin`` holds the motion of all frames, see `gearmbs.dae.results.frames`.
+    """
     model = solution.system.model
     force, torque = solution._loads[:, k, 0:3], solution._loads[:, k, 3:6]
-    bi, bj = (model.marker_body[row[column]] for column in (T.FORCE_I, T.FORCE_J))
+    bi, bj = (int(model.marker_body[row[column]]) for column in (T.FORCE_I, T.FORCE_J))
     local = model.marker_frame[row[T.FORCE_I]][:3]
-    zero = np.zeros((solution.t.size, 3))
-    point = local + zero
-    if bi:
-        pose_i = solution._pose[:, bi - 1]
-        point = pose_i[:, 0:3] + pose_i[:, 3:12].reshape(-1, 3, 3) @ local
+    point = kin[:, bi, KIN_R : KIN_R + 3] + kin[:, bi, KIN_A : KIN_A + 9].reshape(-1, 3, 3) @ local
     power = np.zeros(solution.t.size)
     for body, sign in ((bi, 1.0), (bj, -1.0)):
         if body:
-            pose = solution._pose[:, body - 1]
-            velocity = pose[:, 12:15] + np.cross(pose[:, 15:18], point - pose[:, 0:3])
-            power += sign * (np.sum(force * velocity, axis=1) + np.sum(torque * pose[:, 15:18], axis=1))
+            place, spin = kin[:, body, KIN_R : KIN_R + 3], kin[:, body, KIN_W : KIN_W + 3]
+            velocity = kin[:, body, KIN_V : KIN_V + 3] + np.cross(spin, point - place)
+            power += sign * (np.sum(force * velocity, axis=1) + np.sum(torque * spin, axis=1))
     return power
+
+
+def _modal_damping(solution: Solution) -> np.ndarray:
+    """Power dissipated by the damping of modal bodies."""
+    return _over_modal_bodies(solution, lambda modal, q_f, v_f: modal.damping_power(v_f))
+
+
+def _strain(solution: Solution) -> np.ndarray:
+    """Strain energy of modal bodies."""
+    return _over_modal_bodies(solution, lambda modal, q_f, v_f: modal.strain_energy(q_f))
+
+
+def _over_modal_bodies(
+    solution: Solution, of_body: Callable[[ModalInertia, np.ndarray, np.ndarray], np.ndarray]
+) -> np.ndarray:
+    model, total = solution.system.model, np.zeros(solution.t.size)
+    for b, modal in enumerate(model.modal_inertia):
+        if modal is not None:
+            q_f, v_f, _ = solution._records.modal[:, :, modal_slice(model, b)]
+            total = total + of_body(modal, q_f, v_f)
+    return total
 
 
 def _gravity(solution: Solution) -> np.ndarray:

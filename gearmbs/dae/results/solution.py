@@ -17,6 +17,7 @@ import numpy as np
 from gearmbs._deprecation import former_name
 from gearmbs.dae.model import evaluator as outputs
 from gearmbs.dae.result import DAEResult, Status
+from gearmbs.dae.results.frames import modal_slice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -130,8 +131,9 @@ class Solution:
         system = self.system
         diagnostics = max((len(d) for d in system.model.diagnostics), default=0)
         return outputs.new_records(
-            m, len(system.body_names), len(system.row_names), len(system.force_names), diagnostics
-        )
+            m, len(system.body_names), len(system.row_names), len(system.force_names), diagnostics,
+            sum(system.model.modes),
+        )  # fmt: skip
 
     @property
     def _pose(self) -> np.ndarray:
@@ -283,6 +285,21 @@ class Solution:
         """Return the diagnostics of a contact, as :meth:`diagnostics`."""
         return self.diagnostics(element)
 
+    def modal_coordinates(self, body: str) -> np.ndarray:
+        """Return the modal coordinates of a body over time, shape (m, modes)."""
+        return self._modal(body)[0]
+
+    def modal_velocities(self, body: str) -> np.ndarray:
+        """Return the rates of the modal coordinates of a body over time, shape (m, modes), 1/s."""
+        return self._modal(body)[1]
+
+    def _modal(self, body: str) -> np.ndarray:
+        """Return q_f, v_f and their accelerations of a body, shape (3, m, modes)."""
+        model, number = self.system.model, self._body(body) + 1
+        if not model.modes[number]:
+            raise KeyError(f"body {body!r} is rigid: it has no modal coordinates")
+        return self._records.modal[:, :, modal_slice(model, number)]
+
     def _element(self, name: str) -> int:
         try:
             return self.system.force_names.index(name)
@@ -356,12 +373,17 @@ class Solution:
     def kinetic_energy(self) -> np.ndarray:
         """Kinetic energy, shape (m,), J."""
         total = np.zeros(self.t.size)
-        for b, row in enumerate(self.system.model.bodies[1:]):
+        model = self.system.model
+        for b, row in enumerate(model.bodies[1:]):
             v, w = self._pose[:, b, 12:15], self._pose[:, b, 15:18]
             a = self._pose[:, b, 3:12].reshape(-1, 3, 3)
             local = np.einsum("tji,tj->ti", a, w)
             total += 0.5 * row[0] * np.sum(v * v, axis=1)
             total += 0.5 * np.einsum("ti,ij,tj->t", local, row[1:].reshape(3, 3), local)
+            modal = model.modal_inertia[b + 1]
+            if modal is not None:
+                q_f, v_f, _ = self._records.modal[:, :, modal_slice(model, b + 1)]
+                total += modal.kinetic_energy(local, q_f, v_f)
         return total
 
     def energy_balance(self) -> xr.Dataset:
@@ -415,6 +437,10 @@ class Solution:
             data["constraint_violation"] = var(
                 ("time",), self.constraint_violation, "1", "largest |Phi| before projection"
             )
+        if sum(self.system.model.modes):
+            q_f, v_f, _ = self._records.modal
+            data["modal_coordinate"] = var(("time", "mode"), q_f, "1", "modal coordinate")
+            data["modal_velocity"] = var(("time", "mode"), v_f, "1/s", "rate of the modal coordinate")
         if self.system.state_names and self.system.mechanism is not None:
             values = np.stack([self.state(name) for name in self.system.state_names], 1)
             data["states"] = var(("time", "state"), values, "-", "user-defined state")
@@ -432,6 +458,11 @@ class Solution:
             "joint": joints,
             "state": self.system.state_names,
             "element": self.system.force_names,
+            "mode": [
+                f"{name} {k + 1}"
+                for name, n in zip(self.system.body_names, self.system.model.modes[1:])
+                for k in range(n)
+            ],
         }
         used = {d for v in data.values() for d in v[0]}
         out = xr.Dataset(data, coords={k: v for k, v in coords.items() if k in used})

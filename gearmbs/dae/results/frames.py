@@ -1,0 +1,110 @@
+"""Motion of all frames over time: the ground, the bodies, and the elastic frames of modal bodies' markers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearmbs.dae.equations.expressions.marker_motion import ACC_A, ACC_ALPHA
+from gearmbs.dae.equations.rotation import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W, POSE_A, POSE_R, POSE_V, POSE_W
+
+if TYPE_CHECKING:
+    from gearmbs.dae.model.model import Model
+    from gearmbs.dae.results.solution import Solution
+
+KIN_PLACES = KIN_AXES + 9
+ACC_PLACES = 6
+
+
+def frame_motion(solution: Solution, model: Model | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Return the kinematics (m, frames, 27) and acceleration (m, frames, 6) tables over time, the ground first.
+
+    Frames are numbered as in ``Model.marker_body``; columns are those of the compiled tables. ``model`` may have more
+    markers than that of the solution.
+    """
+    records = solution._records
+    model = solution.system.model if model is None else model
+    poses, accelerations = records.by_body, records.accelerations
+    m, bodies = poses.shape[:2]
+    frames = 1 + bodies + len(model.frame_body)
+    kin, acc = np.zeros((m, frames, KIN_PLACES)), np.zeros((m, frames, ACC_PLACES))
+    kin[:, 0, KIN_A : KIN_A + 9] = np.eye(3).ravel()
+    moving = slice(1, 1 + bodies)
+    kin[:, moving, KIN_R : KIN_R + 3] = poses[:, :, POSE_R : POSE_R + 3]
+    kin[:, moving, KIN_V : KIN_V + 3] = poses[:, :, POSE_V : POSE_V + 3]
+    kin[:, moving, KIN_A : KIN_A + 9] = poses[:, :, POSE_A : POSE_A + 9]
+    kin[:, moving, KIN_W : KIN_W + 3] = poses[:, :, POSE_W : POSE_W + 3]
+    acc[:, moving] = accelerations
+    for k, body in enumerate(model.frame_body):
+        n = model.modes[body]
+        shapes = model.modal[model.shape_at[k] : model.shape_at[k] + 3 + 6 * n]
+        parts = shapes[:3], shapes[3 : 3 + 3 * n].reshape(n, 3), shapes[3 + 3 * n :].reshape(n, 3)
+        modal = records.modal[:, :, modal_slice(model, body)]
+        f = 1 + bodies + k
+        kin[:, f], acc[:, f] = elastic_motion(kin[:, body], acc[:, body], modal, *parts)
+    return kin, acc
+
+
+def modal_slice(model: Model, body: int) -> slice:
+    """Return where a body's modal coordinates are among those of all; the ground is body 0."""
+    first = sum(model.modes[:body])
+    return slice(first, first + model.modes[body])
+
+
+def body_motion(solution: Solution, body: str) -> np.ndarray:
+    """Return the motion of a body's frame at its centre of mass, columns ``KIN_*``, shape (m, 27)."""
+    kin = np.zeros((solution.t.size, KIN_PLACES))
+    kin[:, KIN_R : KIN_R + 3] = solution.com_position(body)
+    kin[:, KIN_V : KIN_V + 3] = solution.com_velocity(body)
+    kin[:, KIN_A : KIN_A + 9] = solution.orientation(body).reshape(-1, 9)
+    kin[:, KIN_W : KIN_W + 3] = solution.angular_velocity(body)
+    return kin
+
+
+def elastic_motion(
+    kin: np.ndarray, acc: np.ndarray | None, modal: np.ndarray, s0: np.ndarray, phi: np.ndarray, psi: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return motion (m, 27) and accelerations (m, 6) of an elastic frame from those of its body.
+
+    The equations are those of `gearmbs.dae.equations.elastic`.
+
+    Parameters
+    ----------
+    kin, acc : ndarray, shapes (m, 27), (m, 6)
+        Of the body; without accelerations those returned are meaningless.
+    modal : ndarray, shape (3, m, n)
+        q_f, v_f and their accelerations.
+    s0 : ndarray, shape (3,)
+        Place of the frame in the undeformed body, from the centre of mass.
+    phi, psi : ndarray, shape (n, 3)
+        Displacements and rotations of the frame by the modes.
+    """
+    from scipy.spatial.transform import Rotation
+
+    q, v, a = modal
+    acc = np.zeros((len(kin), ACC_PLACES)) if acc is None else acc
+    axes = kin[:, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
+    w, alpha = kin[:, KIN_W : KIN_W + 3], acc[:, ACC_ALPHA : ACC_ALPHA + 3]
+
+    def to_global(local: np.ndarray) -> np.ndarray:
+        return np.einsum("tij,tj->ti", axes, local)
+
+    arm, rate, push = to_global(s0 + q @ phi), to_global(v @ phi), to_global(a @ phi)
+    spin = np.cross(w, arm)
+    frame, accelerations = np.zeros_like(kin), np.zeros_like(acc)
+    frame[:, KIN_R : KIN_R + 3] = kin[:, KIN_R : KIN_R + 3] + arm
+    frame[:, KIN_V : KIN_V + 3] = kin[:, KIN_V : KIN_V + 3] + spin + rate
+    accelerations[:, ACC_A : ACC_A + 3] = (
+        acc[:, ACC_A : ACC_A + 3] + np.cross(alpha, arm) + np.cross(w, spin + 2.0 * rate) + push
+    )
+    turned, spun, spun_up = axes.copy(), w.copy(), alpha.copy()
+    for i in range(len(psi)):
+        axis = turned @ psi[i]
+        spun_up += axis * a[:, i : i + 1] + np.cross(spun, axis) * v[:, i : i + 1]
+        spun += axis * v[:, i : i + 1]
+        turned = Rotation.from_rotvec(axis * q[:, i : i + 1]).as_matrix() @ turned
+    frame[:, KIN_A : KIN_A + 9] = turned.reshape(-1, 9)
+    frame[:, KIN_W : KIN_W + 3] = spun
+    accelerations[:, ACC_ALPHA : ACC_ALPHA + 3] = spun_up
+    return frame, accelerations

@@ -1,0 +1,240 @@
+"""Bodies with modal coordinates: modes, integrals of shapes, and the body made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gearmbs.dae.equations.modal_inertia import ModalInertia
+from gearmbs.dae.errors import ModelError
+from gearmbs.mechanism.geometry import Vector
+from gearmbs.mechanism.parts import Body, Marker
+
+Shapes = Callable[[np.ndarray], tuple[npt.ArrayLike, npt.ArrayLike]]
+"""From a point of the body's frame, m, to displacements and rotations there by one unit of each mode, each (n, 3)."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode of a body.
+
+    Parameters
+    ----------
+    frequency : float, optional
+        Of the body held in its frame, Hz; or give
+    stiffness : float, optional
+        Modal stiffness, N m (of a coordinate without a unit).
+    mass : float
+        Modal mass, the sum of mass times displacement squared, kg m^2.
+    damping_ratio : float
+        Of critical damping of the mode in the frame.
+    momentum : array_like of 3 floats
+        Sum of mass times displacement, kg m, body components.
+    angular_momentum : array_like of 3 floats
+        Sum of mass times arm from the centre of mass cross displacement, kg m^2, body components.
+    start, rate : float
+        Modal coordinate and its rate (1/s) at the start.
+    """
+
+    frequency: float | None = None
+    stiffness: float | None = None
+    mass: float = 1.0
+    damping_ratio: float = 0.0
+    momentum: Vector = (0.0, 0.0, 0.0)
+    angular_momentum: Vector = (0.0, 0.0, 0.0)
+    start: float = 0.0
+    rate: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeIntegrals:
+    """Integrals of the shapes phi_k over a body, about its centre of mass, body components.
+
+    Attributes
+    ----------
+    mass : ndarray, shape (n, n)
+        Sum of phi_k . phi_l dm, kg m^2.
+    momentum, angular_momentum : ndarray, shape (n, 3)
+        Sums of phi_k dm and s x phi_k dm.
+    cross : ndarray, shape (n, n, 3)
+        Sum of phi_k x phi_l dm.
+    first, second : ndarray, shapes (n, 3, 3), (n, n, 3, 3)
+        Derivatives of the inertia by the modal coordinates.
+    """
+
+    mass: np.ndarray
+    momentum: np.ndarray
+    angular_momentum: np.ndarray
+    cross: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+
+    @classmethod
+    def of_modes(cls, modes: Sequence[Mode]) -> ShapeIntegrals:
+        """Return what modes know: all integrals of first order; those that change the inertia are left out."""
+        n = len(modes)
+        return cls(
+            np.diag([m.mass for m in modes]).astype(float).reshape(n, n),
+            np.array([m.momentum for m in modes], dtype=float).reshape(n, 3),
+            np.array([m.angular_momentum for m in modes], dtype=float).reshape(n, 3),
+            np.zeros((n, n, 3)),
+            np.zeros((n, 3, 3)),
+            np.zeros((n, n, 3, 3)),
+        )
+
+    @classmethod
+    def of_points(cls, masses: npt.ArrayLike, positions: npt.ArrayLike, displacements: npt.ArrayLike) -> ShapeIntegrals:
+        """Return all integrals of a body made of mass points.
+
+        Parameters
+        ----------
+        masses : array_like, shape (p,)
+            kg.
+        positions : array_like, shape (p, 3)
+            From the centre of mass, m.
+        displacements : array_like, shape (n, p, 3)
+            By one unit of each mode, m.
+        """
+        m, s = np.asarray(masses, dtype=float), np.asarray(positions, dtype=float)
+        phi = np.asarray(displacements, dtype=float)
+        one = np.eye(3)
+        along = np.einsum("p,pi,kpi->k", m, s, phi)
+        mixed = np.einsum("p,pi,kpj->kij", m, s, phi)
+        products = np.einsum("p,kpi,lpj->klij", m, phi, phi)
+        mass = np.einsum("klii->kl", products)
+        return cls(
+            mass,
+            np.einsum("p,kpi->ki", m, phi),
+            np.einsum("p,kpi->ki", m, np.cross(s, phi)),
+            np.einsum("p,klpi->kli", m, np.cross(phi[:, None], phi[None, :])),
+            2.0 * along[:, None, None] * one - mixed - np.swapaxes(mixed, 1, 2),
+            2.0 * mass[:, :, None, None] * one - products - np.swapaxes(products, 2, 3),
+        )
+
+    def about_centre_of_mass(self, mass: float) -> ShapeIntegrals:
+        """Return the integrals of the same shapes less their mean displacements, for a body of ``mass``.
+
+        What the deformation moves the centre of mass by is then no longer in the shapes: R follows it instead.
+        """
+        p = self.momentum
+        products = np.einsum("ki,lj->klij", p, p) / mass
+        squares = np.einsum("klii->kl", products)
+        return ShapeIntegrals(
+            self.mass - squares,
+            np.zeros_like(p),
+            self.angular_momentum,
+            self.cross - np.cross(p[:, None], p[None, :]) / mass,
+            self.first,
+            self.second - (2.0 * squares[:, :, None, None] * np.eye(3) - products - np.swapaxes(products, 2, 3)),
+        )
+
+
+@dataclass(eq=False)
+class ModalBody(Body):
+    """A body with modal coordinates. Made by :meth:`gearmbs.mechanism.Mechanism.modal_body`.
+
+    Attributes
+    ----------
+    modal : ModalInertia
+        Integrals, stiffness and damping of the shapes less their mean displacements.
+    shapes : callable
+        Shapes in the body's frame, see `Shapes`.
+    mean : ndarray, shape (n, 3)
+        Mean displacement by one unit of each mode, m.
+    start, rate : ndarray, shape (n,)
+        Modal coordinates and their rates at the start.
+    """
+
+    modal: ModalInertia = None  # type: ignore[assignment]
+    shapes: Shapes = None  # type: ignore[assignment]
+    mean: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    start: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    rate: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def shape_at(self, marker: Marker) -> tuple[np.ndarray, np.ndarray]:
+        """Return displacements, less the mean, and rotations at a marker by one unit of each mode, each (n, 3).
+
+        Raises
+        ------
+        ModelError
+            If the shapes given have other sizes.
+        """
+        n = self.modal.modes
+        moved, turned = (np.asarray(part, dtype=float) for part in self.shapes(marker.position.copy()))
+        for part, what in ((moved, "displacements"), (turned, "rotations")):
+            if part.shape != (n, 3) or not np.all(np.isfinite(part)):
+                raise ModelError(
+                    f"body '{self.name}': its shapes give {what} of shape {part.shape} at {marker!r}; "
+                    f"they must be {n} finite vectors of 3"
+                )
+        return moved - self.mean, turned
+
+    def centre_of_mass(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return position and velocity of the centre of mass at the start, deformation included, global components."""
+        arm = self.orientation @ (self.com + self.start @ self.mean)
+        push = self.orientation @ (self.rate @ self.mean)
+        return self.position + arm, self.velocity + np.cross(self.angular_velocity, arm) + push
+
+    def __repr__(self) -> str:
+        return f"ModalBody({self.name!r}, mass={self.mass:g} kg, {self.modal.modes} modes, {len(self.markers)} markers)"
+
+
+def make_modal_body(
+    rigid: Body, modes: Sequence[Mode], shapes: Shapes, integrals: ShapeIntegrals | None = None
+) -> ModalBody:
+    """Return a checked modal body with the mass properties and the place of a rigid one.
+
+    Raises
+    ------
+    ModelError
+        If a mode has no positive mass, frequency or stiffness, or the inertia is not that of any body.
+    """
+    label = f"body '{rigid.name}'"
+    if not modes:
+        raise ModelError(f"{label}: a modal body needs modes; add a rigid one with .body(...)")
+    given = ShapeIntegrals.of_modes(modes) if integrals is None else integrals
+    n = len(modes)
+    if given.mass.shape != (n, n):
+        raise ModelError(f"{label}: the integrals are those of {given.mass.shape[0]} shapes, there are {n} modes")
+    stiffness, damping = np.zeros((n, n)), np.zeros((n, n))
+    for k, mode in enumerate(modes):
+        stiffness[k, k] = _stiffness(mode, given.mass[k, k], f"{label}: mode {k + 1}")
+        damping[k, k] = 2.0 * mode.damping_ratio * np.sqrt(stiffness[k, k] * given.mass[k, k])
+    if rigid.mass <= 0.0:
+        raise ModelError(f"{label}: a modal body needs a mass")
+    own = given.about_centre_of_mass(rigid.mass)
+    coupled = np.block([[rigid.inertia, own.angular_momentum.T], [own.angular_momentum, own.mass]])
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(coupled), 1e-300))
+    if np.linalg.eigvalsh(scale[:, None] * coupled * scale)[0] <= 0.0:
+        raise ModelError(
+            f"{label}: its modes carry more momentum than its mass and inertia allow; check modal masses, momenta and "
+            "angular momenta, about the centre of mass and in the units of the shapes"
+        )
+    modal = ModalInertia(own.mass, stiffness, damping, own.angular_momentum, own.cross, own.first, own.second)
+    fields: dict[str, Any] = {name: getattr(rigid, name) for name in Body.__dataclass_fields__}
+    return ModalBody(
+        **fields,
+        modal=modal,
+        shapes=shapes,
+        mean=given.momentum / rigid.mass,
+        start=np.array([m.start for m in modes], dtype=float),
+        rate=np.array([m.rate for m in modes], dtype=float),
+    )
+
+
+def _stiffness(mode: Mode, mass: float, label: str) -> float:
+    """Return the modal stiffness of a mode given by frequency or stiffness."""
+    if (mode.frequency is None) == (mode.stiffness is None):
+        raise ModelError(f"{label}: give either its frequency or its stiffness")
+    if not (np.isfinite(mass) and mass > 0.0):
+        raise ModelError(f"{label}: modal mass = {mass}; it must be positive")
+    if not mode.damping_ratio >= 0.0:
+        raise ModelError(f"{label}: damping_ratio = {mode.damping_ratio}; it must not be negative")
+    stiffness = mode.stiffness if mode.frequency is None else (2.0 * np.pi * mode.frequency) ** 2 * mass
+    if stiffness is None or not (np.isfinite(stiffness) and stiffness >= 0.0):
+        raise ModelError(f"{label}: stiffness = {stiffness}; it must not be negative")
+    return float(stiffness)
