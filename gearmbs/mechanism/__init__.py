@@ -1,6 +1,5 @@
 """What a person builds: bodies, markers, joints, motions, forces."""
 
-<<<<<<< HEAD
 from typing import TYPE_CHECKING
 
 from gearmbs._lazy import late
@@ -13,22 +12,9 @@ if TYPE_CHECKING:
     from gearmbs.mechanism.functions import TimeFunction, constant, expression, harmonic, polynomial, ramp, step
     from gearmbs.mechanism.joints import Joint
     from gearmbs.mechanism.mechanism import Mechanism
+    from gearmbs.mechanism.modal import ModalBody, Mode, ShapeIntegrals
     from gearmbs.mechanism.parts import Body, Marker
     from gearmbs.mechanism.simulate import simulate
-=======
-import gearmbs._announce
-import gearmbs.mechanism.expression  # noqa: F401  (first, so that the function of that name below takes its place)
-from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
-from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
-from gearmbs.mechanism.elements import Compiled, ForceElement, Load, State, Torque
-from gearmbs.mechanism.friction import JointFriction
-from gearmbs.mechanism.functions import TimeFunction, constant, expression, harmonic, polynomial, ramp, step
-from gearmbs.mechanism.joints import Joint
-from gearmbs.mechanism.mechanism import Mechanism
-from gearmbs.mechanism.modal import ModalBody, Mode, ShapeIntegrals
-from gearmbs.mechanism.parts import Body, Marker
-from gearmbs.mechanism.simulate import simulate
->>>>>>> 59212ee (Add modal bodies: a body that deforms by modes, with its inertia coupling and elastic markers)
 
 __all__ = [
     "AssemblyError",
@@ -73,7 +59,10 @@ late(
         "Load": ".elements",
         "Marker": ".parts",
         "Mechanism": ".mechanism",
+        "ModalBody": ".modal",
+        "Mode": ".modal",
         "ModelError": "gearmbs.dae.errors",
+        "ShapeIntegrals": ".modal",
         "SingularModelError": "gearmbs.dae.errors",
         "State": ".elements",
         "TimeFunction": ".functions",

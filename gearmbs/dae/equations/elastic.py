@@ -22,8 +22,8 @@ on: then X_c = e_c. From Hessians in these those in the body's coordinates follo
 from __future__ import annotations
 
 import numpy as np
-from gearmbs._jit import njit
 
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import matrix_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3, dot3

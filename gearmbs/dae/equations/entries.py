@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from gearmbs._jit import njit
 
 NUMBERS, PLACES, COUNT = 0, 1, 2

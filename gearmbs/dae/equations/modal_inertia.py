@@ -16,8 +16,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from gearmbs._jit import njit
 
+from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import dot3
