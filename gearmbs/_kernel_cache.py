@@ -31,7 +31,7 @@ import numba
 import numpy as np
 from numba.core import config, dispatcher, serialize
 
-FORMAT = "2"
+FORMAT = "3"
 """To be raised when the files or what they hold change."""
 
 OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")

@@ -5,9 +5,11 @@ A kernel is an entry if code that is not compiled names it, or if it has a decla
 
 from __future__ import annotations
 
+import contextlib
 import dis
 import gc
 import importlib
+import pkgutil
 import re
 import sys
 from collections.abc import Iterable, Iterator
@@ -33,6 +35,15 @@ def kernel_modules(package: str = "gearmbs") -> list[str]:
         ):
             found.append(".".join((package, *path.relative_to(root).with_suffix("").parts)))
     return found
+
+
+def import_all(package: str = "gearmbs") -> None:
+    """Import all modules of a package, but those that need what is not installed."""
+    root = importlib.import_module(package)
+    for info in pkgutil.walk_packages(root.__path__, f"{package}."):
+        if not info.name.endswith("__main__"):
+            with contextlib.suppress(ImportError):
+                importlib.import_module(info.name)
 
 
 def kernels(modules: Iterable[str]) -> list[Kernel]:

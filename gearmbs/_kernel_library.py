@@ -6,6 +6,7 @@ from its own code and all parts below it, optimised as a whole, and becomes the 
 
 from __future__ import annotations
 
+import sys
 from types import SimpleNamespace
 from typing import Any
 
@@ -95,13 +96,15 @@ class PartLibrary(_Linked):
         library.close(compiled.fndesc.llvm_func_name)
         fndesc = compiled.fndesc
         fndesc.typemap = fndesc.calltypes = None
-        environments = [compiled.environment, *_environments(library._final_module)]
+        environments = {
+            id(e): e for e in (compiled.environment, *_environments(library._final_module)) if e.can_cache()
+        }
         return SimpleNamespace(
             key=object(),
             library=library,
             fndesc=fndesc,
             signature=compiled.signature,
-            environments=[e for e in environments if e is not None and e.can_cache()],
+            environments=list(environments.values()),
             reload_init=list(library._reload_init),
         )
 
@@ -112,7 +115,8 @@ class PartLibrary(_Linked):
         if library.has_dynamic_globals or not library.lasting:
             return None
         code = library._final_module.as_bitcode()
-        return code, part.fndesc, part.signature, part.environments, part.reload_init, tuple(library.parts)
+        environments = [_kept(e) for e in part.environments]
+        return code, part.fndesc, part.signature, environments, part.reload_init, tuple(library.parts)
 
     @staticmethod
     def rebuild(target: Any, package: str, file: str, payload: tuple) -> SimpleNamespace | None:
@@ -136,7 +140,7 @@ class PartLibrary(_Linked):
             library=library,
             fndesc=fndesc,
             signature=signature,
-            environments=environments,
+            environments=[_environment(*e) for e in environments],
             reload_init=reload_init,
         )
 
@@ -173,7 +177,7 @@ class EntryLibrary(_Linked, _Ready):
             return None
         fndesc = compiled.fndesc
         fndesc.typemap = fndesc.calltypes = None
-        environments = [e for e in _environments(library._final_module) if e.can_cache()]
+        environments = [_kept(e) for e in _environments(library._final_module) if e.can_cache()]
         defined = [
             value.name
             for values in (library._final_module.functions, library._final_module.global_variables)
@@ -184,7 +188,7 @@ class EntryLibrary(_Linked, _Ready):
         return (
             code,
             fndesc,
-            compiled.environment,
+            _kept(compiled.environment),
             compiled.signature,
             compiled.reload_init,
             environments,
@@ -206,6 +210,8 @@ class EntryLibrary(_Linked, _Ready):
         library._set_compiled_object(code)
         library._finalize_final_module()
         codegen._engine._defined_symbols.update(defined)
+        environments = [_environment(*e) for e in environments]
+        own = _environment(*own)
         entry = target.get_executable(library, fndesc, own)
         for other in environments:
             codegen.set_env(other.env_name, other)
@@ -237,6 +243,26 @@ def _below(parts: dict[str, PartLibrary], seen: dict[str, PartLibrary] | None = 
             seen[file] = part
             out += [*_below(part.parts, seen), part]
     return out
+
+
+def _kept(env: Any) -> tuple:
+    """Return what an environment is rebuilt from."""
+    return env.globals.get("__name__"), list(env.consts), env.env_name
+
+
+def _environment(module: str, constants: list, name: str) -> Any:
+    """Return an environment; the module it belongs to, often one of numba's, is not imported for its sake.
+
+    Compiled code takes constants from it, for its exceptions; only numba's object mode looks at the module.
+    """
+    found = environment.lookup_environment(name)
+    if found is None:
+        home = sys.modules.get(module)
+        found = environment.Environment({"__name__": module} if home is None else vars(home))
+        found.consts[:] = constants
+        found.env_name = name
+        environment.Environment._memo[name] = found
+    return found
 
 
 def _environments(module: Any) -> list:

@@ -45,9 +45,12 @@ def compile_all(
     RuntimeError
         If a kernel cannot be compiled; with its traceback.
     """
-    from gearmbs._kernel_calls import entries, kernel_modules, kernels
+    from gearmbs._kernel_calls import entries, import_all, kernel_modules, kernels
 
     start = time.perf_counter()
+    if modules is None:
+        # who calls a kernel may stand anywhere
+        import_all()
     found = kernels(kernel_modules() if modules is None else modules)
     compile_entries(entries(found), report, workers)
     return time.perf_counter() - start

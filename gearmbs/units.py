@@ -1,6 +1,7 @@
 """Units at the border: text with a unit, or a float in SI, becomes a float in SI.
 
-Floats and integers pass through as SI values. Text is read by pint, imported only when text arrives.
+Floats and integers pass through as SI values. Text with common units is read here; all other text, and all that is
+wrong with it, is left to pint, whose registry of units takes a quarter of a second to set up.
 """
 
 from __future__ import annotations
@@ -46,6 +47,64 @@ SPELLINGS = (
     (r"\b(?:RPM|[Uu]/min)\b", "rpm"),
 )
 """Usual ways of writing that the parser of units does not know."""
+
+
+COMMON = {
+    "m": (1.0, {"m": 1}),
+    "cm": (1e-2, {"m": 1}),
+    "mm": (1e-3, {"m": 1}),
+    "um": (1e-6, {"m": 1}),
+    "kg": (1.0, {"kg": 1}),
+    "g": (1e-3, {"kg": 1}),
+    "s": (1.0, {"s": 1}),
+    "ms": (1e-3, {"s": 1}),
+    "min": (60.0, {"s": 1}),
+    "rad": (1.0, {"rad": 1}),
+    "deg": (math.pi / 180.0, {"rad": 1}),
+    "rpm": (math.tau / 60.0, {"rad": 1, "s": -1}),
+    "Hz": (1.0, {"s": -1}),
+    "kHz": (1e3, {"s": -1}),
+    "N": (1.0, {"kg": 1, "m": 1, "s": -2}),
+    "kN": (1e3, {"kg": 1, "m": 1, "s": -2}),
+    "J": (1.0, {"kg": 1, "m": 2, "s": -2}),
+    "W": (1.0, {"kg": 1, "m": 2, "s": -3}),
+    "kW": (1e3, {"kg": 1, "m": 2, "s": -3}),
+    "Pa": (1.0, {"kg": 1, "m": -1, "s": -2}),
+    "MPa": (1e6, {"kg": 1, "m": -1, "s": -2}),
+    "GPa": (1e9, {"kg": 1, "m": -1, "s": -2}),
+}
+"""Common units: factor to SI, and powers of m, kg, s and rad."""
+
+NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+FACTOR = re.compile(r"\s*([*/]?)\s*([A-Za-z]+)(?:(?:\^|\*\*)(-?\d+(?:\.\d+)?))?\s*")
+
+
+@functools.lru_cache(maxsize=256)
+def _common(unit: str) -> tuple[float, tuple] | None:
+    """Return factor and powers of a product of common units; None for anything else."""
+    factor, powers, place = 1.0, dict.fromkeys(("m", "kg", "s", "rad"), 0.0), 0
+    while place < len(unit):
+        found = FACTOR.match(unit, place)
+        if found is None or found[2] not in COMMON:
+            return None
+        size, bases = COMMON[found[2]]
+        power = float(found[3] or 1.0) * (-1.0 if found[1] == "/" else 1.0)
+        factor *= size**power
+        for base, exponent in bases.items():
+            powers[base] += power * exponent
+        place = found.end()
+    return (factor, tuple(round(p, 9) for p in powers.values())) if place else None
+
+
+def _quick(text: str, target: str) -> float | None:
+    """Return the value of a number with common units in a target of the very same powers; else None."""
+    number = NUMBER.match(text)
+    if number is None:
+        return None
+    unit, wanted = _common(text[number.end() :]), _common(target)
+    if unit is None or wanted is None or unit[1] != wanted[1]:
+        return None
+    return float(number[0]) * (unit[0] / wanted[0])
 
 
 @functools.cache
@@ -105,12 +164,16 @@ def to_si(value: Any, unit: str, field: str = "value") -> float:
 
 @functools.lru_cache(maxsize=1024)
 def _parse(text: str, target: str, field: str) -> float:
-    import pint
-
-    registry = _registry()
     clean = re.sub(r"(?<=\d)\s*°", " deg", text.strip()).replace("·", "*").replace("µ", "u").replace("μ", "u")
     for pattern, written in SPELLINGS:
         clean = re.sub(pattern, written, clean)
+    quick = _quick(clean, target)
+    if quick is not None:
+        return quick
+
+    import pint
+
+    registry = _registry()
     try:
         quantity = registry.Quantity(clean)
     except Exception as error:

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
 from gearmbs.gears.mesh import Mesh
@@ -281,6 +280,8 @@ def _extremes(
     """Smallest and largest error, searched for around the extreme points of every mesh cycle."""
     if np.ptp(error) < SEARCHED_FROM:
         return None
+    from scipy.optimize import minimize_scalar
+
     ends = []
     for sign, found in ((1.0, float(error.min())), (-1.0, -float(error.max()))):
         for part in range(0, phase.size, points):

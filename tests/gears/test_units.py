@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from gearmbs import units
 from gearmbs.gears import ContactLaw, FlankFriction, GearSpec
 from gearmbs.units import to_si
 
@@ -112,3 +113,35 @@ def test_a_module_of_metres_is_a_forgotten_unit():
         GearSpec(teeth=20, module=3)
     with pytest.raises(ValueError, match="write for example '3 mm'"):
         GearSpec(teeth=20, module="3")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("0.1 mm", "m"),
+        ("1000 rpm", "rad/s"),
+        ("2.9852e5 N/mm^1.3", "N/m^1.3"),
+        ("100 N m", "N*m"),
+        (".5 um", "m"),
+        ("7.85 g/cm^3", "kg/m^3"),
+        ("207 GPa", "Pa"),
+        ("-3 N*m/deg", "N*m/rad"),
+        ("12.8 kHz", "Hz"),
+        ("1.5 kg mm**2", "kg*m^2"),
+        ("20 N/mm/deg", "N/m/rad"),
+    ],
+)
+def test_common_units_agree_with_the_registry(text, unit):
+    """What is read without the registry of units is what the registry says, to rounding."""
+    import pint
+
+    quick = units._quick(text, unit)
+    assert quick == pytest.approx(pint.UnitRegistry().Quantity(text).to(unit).magnitude, rel=4e-16, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [("30 Hz", "rad/s"), ("5", "m"), ("3 km", "m"), ("1 2 mm", "m"), ("95/31 mm", "m"), ("3 mm", "s"), ("nan mm", "m")],
+)
+def test_all_else_is_left_to_the_registry(text, unit):
+    assert units._quick(text, unit) is None
