@@ -84,6 +84,8 @@ class Struct:
 
     def __init_subclass__(cls) -> None:
         kinds = inspect.get_annotations(cls)
+        if not all(isinstance(kind, str) for kind in kinds.values()):
+            raise TypeError(f"{cls.__name__}: annotations are read as text; import annotations from __future__")
         cls.scalar_members = {name: SCALARS[kind] for name, kind in kinds.items() if kind in SCALARS}
         cls.array_members = {name: ARRAYS[kind] for name, kind in kinds.items() if kind not in SCALARS}
         cls.numba_type = StructType(
@@ -98,8 +100,24 @@ class Struct:
         missing = set(self.array_members) - set(members)
         if missing:
             raise TypeError(f"{type(self).__name__} is missing {', '.join(sorted(missing))}")
-        for name, value in members.items():
-            setattr(self, name, value)
+        words: list[int] = []
+        for name in self.array_members:
+            words += self._adopt(name, members[name])
+        # the arrays stand together behind the scalars
+        memory.view(np.int64)[len(memory.view(np.int64)) - len(words) :] = words
+        for name in members.keys() - self.array_members.keys():
+            setattr(self, name, members[name])
+
+    def _adopt(self, name: str, value: np.ndarray) -> tuple[int, ...]:
+        """Take an array for a member; return its address and shape."""
+        kind, dimensions = self.array_members[name]
+        if value.dtype != kind or value.ndim != dimensions or not value.flags.c_contiguous:
+            raise TypeError(
+                f"{name} must be a contiguous array of type {kind} with {dimensions} dimensions, "
+                f"is one of {value.dtype} of shape {value.shape}"
+            )
+        self.__dict__[name] = value
+        return value.__array_interface__["data"][0], *value.shape
 
     def __getattr__(self, name: str) -> Any:
         if name in type(self).scalar_members:
@@ -112,14 +130,7 @@ class Struct:
             return
         if name not in self.array_members:
             raise AttributeError(f"{type(self).__name__} has no member {name!r}")
-        kind, dimensions = self.array_members[name]
-        if value.dtype != kind or value.ndim != dimensions or not value.flags.c_contiguous:
-            raise TypeError(
-                f"{name} must be a contiguous array of type {kind} with {dimensions} dimensions, "
-                f"is one of {value.dtype} of shape {value.shape}"
-            )
-        self.__dict__[name] = value
-        self._record[f"{name}:"] = (value.__array_interface__["data"][0], *value.shape)
+        self._record[f"{name}:"] = self._adopt(name, value)
 
     def __reduce__(self) -> tuple:
         # addresses do not travel

@@ -14,6 +14,8 @@ References
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import float64, int64, types
 
@@ -27,6 +29,7 @@ ROW_SINGLETON_THRESHOLD = 1e-3
 CANCELLED = 1e-14
 SEARCH_LIMIT = 12
 EQUILIBRATION_SWEEPS = 8
+TINY = 1e-300
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -72,9 +75,37 @@ def equilibrate(indptr, indices, vals, row_scale, col_scale):
         col_scale[i] = 2.0 ** np.round(np.log2(col_scale[i]))
 
 
+class Lines(NamedTuple):
+    """Rows or columns of the matrix left to eliminate, each a stretch of a pool, and lists of those of equal length.
+
+    Attributes
+    ----------
+    start, length, room : ndarray of int64
+        Place in the pool, entries and places taken of each line; ``room[-1]`` is the first free place of the pool.
+    head, after, before : ndarray of int64
+        Doubly linked lists of lines with the same number of entries.
+    pool : ndarray of int64
+        Indices of entries across the line.
+    vals : ndarray
+        Their values, or one place for lines that carry the pattern alone.
+    """
+
+    start: np.ndarray
+    length: np.ndarray
+    room: np.ndarray
+    head: np.ndarray
+    after: np.ndarray
+    before: np.ndarray
+    pool: np.ndarray
+    vals: np.ndarray
+
+
+LINES_TYPE = types.NamedTuple([_IVEC] * 7 + [_VEC], Lines)
+
+
 @njit(types.void(int64, int64, _IVEC, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
 def _unlink(item, count, head, after, before):
-    """Take ``item`` out of the list of items with ``count`` entries."""
+    """Take ``item`` out of the list of lines with ``count`` entries."""
     a = after[item]
     b = before[item]
     if b >= 0:
@@ -87,7 +118,7 @@ def _unlink(item, count, head, after, before):
 
 @njit(types.void(int64, int64, _IVEC, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
 def _link(item, count, head, after, before):
-    """Put ``item`` at the front of the list of items with ``count`` entries."""
+    """Put ``item`` at the front of the list of lines with ``count`` entries."""
     a = head[count]
     after[item] = a
     before[item] = -1
@@ -96,75 +127,117 @@ def _link(item, count, head, after, before):
     head[count] = item
 
 
-@njit(
-    types.Tuple((_IVEC, _VEC))(_IVEC, _VEC, _IVEC, _IVEC, _IVEC, int64, int64),
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def _make_room(pool, pool_vals, start, length, room, line, want):
-    """Move ``line`` to the end of the pool with room for ``want`` entries; compact or grow the pool when full.
+@njit(LINES_TYPE(_IVEC, _IVEC, _VEC), cache=True, nogil=True, error_model="numpy")
+def _columns(indptr, indices, scaled):
+    """Return the columns of a CSC matrix with their values, not yet linked."""
+    n = indptr.shape[0] - 1
+    nnz = indices.shape[0]
+    start = indptr[:n].copy()
+    room = np.empty(n + 1, dtype=np.int64)
+    pool = np.empty(3 * nnz + 4 * n, dtype=np.int64)
+    vals = np.empty(3 * nnz + 4 * n)
+    for j in range(n):
+        room[j] = indptr[j + 1] - indptr[j]
+    room[n] = nnz
+    for p in range(nnz):
+        pool[p] = indices[p]
+        vals[p] = scaled[p]
+    head = np.full(n + 1, -1, dtype=np.int64)
+    after = np.empty(n, dtype=np.int64)
+    before = np.empty(n, dtype=np.int64)
+    return Lines(start, room[:n].copy(), room, head, after, before, pool, vals)
 
-    ``room[-1]`` is the first free place of the pool.
+
+@njit(LINES_TYPE(_IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
+def _rows(indptr, indices):
+    """Return the pattern of the rows of a CSC matrix, not yet linked."""
+    n = indptr.shape[0] - 1
+    nnz = indices.shape[0]
+    start = np.empty(n, dtype=np.int64)
+    length = np.zeros(n, dtype=np.int64)
+    room = np.empty(n + 1, dtype=np.int64)
+    pool = np.empty(3 * nnz + 4 * n, dtype=np.int64)
+    for p in range(nnz):
+        length[indices[p]] += 1
+    end = 0
+    for i in range(n):
+        start[i] = end
+        room[i] = length[i]
+        end += length[i]
+        length[i] = 0
+    room[n] = nnz
+    for j in range(n):
+        for p in range(indptr[j], indptr[j + 1]):
+            i = indices[p]
+            pool[start[i] + length[i]] = j
+            length[i] += 1
+    head = np.full(n + 1, -1, dtype=np.int64)
+    after = np.empty(n, dtype=np.int64)
+    before = np.empty(n, dtype=np.int64)
+    return Lines(start, length, room, head, after, before, pool, np.empty(1))
+
+
+@njit(LINES_TYPE(LINES_TYPE, int64, int64), cache=True, nogil=True, error_model="numpy")
+def _make_room(lines, line, want):
+    """Return the lines with ``line`` at the end of the pool with room for ``want`` entries.
+
+    The pool is compacted, and grown if need be, when it is full.
     """
-    lines = start.shape[0]
-    if room[lines] + want > pool.shape[0]:
-        live = 0
-        for m in range(lines):
-            live += length[m]
-        size = max(pool.shape[0], 2 * (live + want) + 4 * lines)
+    start, length, room = lines.start, lines.length, lines.room
+    pool, vals = lines.pool, lines.vals
+    with_values = vals.shape[0] > 1
+    n = start.shape[0]
+    if room[n] + want > pool.shape[0]:
+        size = max(pool.shape[0], 2 * (np.sum(length) + want) + 4 * n)
         fresh = np.empty(size, dtype=np.int64)
-        fresh_vals = np.empty(size if pool_vals.shape[0] > 1 else 1)
+        fresh_vals = np.empty(size if with_values else 1)
         end = 0
-        for m in range(lines):
+        for m in range(n):
             for p in range(length[m]):
                 fresh[end + p] = pool[start[m] + p]
-                if pool_vals.shape[0] > 1:
-                    fresh_vals[end + p] = pool_vals[start[m] + p]
+                if with_values:
+                    fresh_vals[end + p] = vals[start[m] + p]
             start[m] = end
             room[m] = length[m]
             end += length[m]
-        room[lines] = end
+        room[n] = end
         pool = fresh
-        pool_vals = fresh_vals
-    end = room[lines]
+        vals = fresh_vals
+    end = room[n]
     for p in range(length[line]):
         pool[end + p] = pool[start[line] + p]
-        if pool_vals.shape[0] > 1:
-            pool_vals[end + p] = pool_vals[start[line] + p]
+        if with_values:
+            vals[end + p] = vals[start[line] + p]
     start[line] = end
     room[line] = want
-    room[lines] = end + want
-    return pool, pool_vals
+    room[n] = end + want
+    return Lines(start, length, room, lines.head, lines.after, lines.before, pool, vals)
+
+
+@njit(float64(int64, int64, int64, _IVEC, _VEC), cache=True, nogil=True, error_model="numpy")
+def _entry(index, first, length, pool, vals):
+    """Return the magnitude of the entry at ``index`` in a line."""
+    for p in range(first, first + length):
+        if pool[p] == index:
+            return abs(vals[p])
+    return 0.0
 
 
 @njit(
-    types.UniTuple(int64, 2)(
-        int64,
-        float64,
-        float64,
-        _IVEC,
-        _IVEC,
-        _VEC,
-        _VEC,
-        _IVEC,
-        _IVEC,
-        _IVEC,
-        _IVEC,
-        _IVEC,
-        _VEC,
-        _IVEC,
-        _IVEC,
-        _IVEC,
-    ),
+    types.UniTuple(int64, 2)(LINES_TYPE, LINES_TYPE, _VEC, _VEC, float64, float64),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def _best_pivot(
-    n, drop, threshold, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, cvals, rpool, rhead, rafter
-):
-    """Return the row and column of the acceptable entry with the lowest Markowitz cost, or (-1, -1)."""
+def _best_pivot(columns, rows, top, peak, drop, threshold):
+    """Return the row and column of the acceptable entry with the lowest Markowitz cost, or (-1, -1).
+
+    ``top`` holds the largest entry of each column, ``peak`` the largest it ever had; the rest as in `choose_pivots`.
+    """
+    n = top.shape[0]
+    cstart, clen, cpool, cvals = columns.start, columns.length, columns.pool, columns.vals
+    rstart, rlen, rpool = rows.start, rows.length, rows.pool
+    chead, cafter, rhead, rafter = columns.head, columns.after, rows.head, rows.after
     best_row = -1
     best_col = -1
     best_cost = n * n + 1
@@ -191,27 +264,185 @@ def _best_pivot(
                     return best_row, best_col
             j = cafter[j]
         i = rhead[count]
+        limit = min(ROW_SINGLETON_THRESHOLD, threshold) if count == 1 else threshold
         while i >= 0:
             for p in range(rstart[i], rstart[i] + count):
                 j = rpool[p]
                 cost = (clen[j] - 1) * (count - 1)
                 if cost > best_cost or top[j] <= drop * peak[j]:
                     continue
-                for q in range(cstart[j], cstart[j] + clen[j]):
-                    if cpool[q] == i:
-                        ratio = abs(cvals[q]) / top[j]
-                        limit = min(ROW_SINGLETON_THRESHOLD, threshold) if count == 1 else threshold
-                        if ratio >= limit and (cost < best_cost or ratio > best_ratio):
-                            best_cost = cost
-                            best_ratio = ratio
-                            best_row = i
-                            best_col = j
-                        break
+                ratio = _entry(i, cstart[j], clen[j], cpool, cvals) / top[j]
+                if ratio >= limit and (cost < best_cost or ratio > best_ratio):
+                    best_cost = cost
+                    best_ratio = ratio
+                    best_row = i
+                    best_col = j
             looked += 1
             if best_cost <= count * (count - 1) or (looked >= SEARCH_LIMIT and best_row >= 0):
                 return best_row, best_col
             i = rafter[i]
     return best_row, best_col
+
+
+@njit(
+    types.void(LINES_TYPE, LINES_TYPE, int64, int64, _IVEC, _IVEC, _VEC),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+    forceinline=True,
+)
+def _take_out(columns, rows, row, col, below, right, multipliers):
+    """Take the pivot's row and column out of the lists, and its column out of the patterns of the rows.
+
+    Parameters
+    ----------
+    columns, rows : Lines
+    row, col : int
+        The pivot.
+    below, right : ndarray
+        Written: rows below the pivot, columns right of it.
+    multipliers : ndarray
+        Written: entries below the pivot divided by it.
+    """
+    first = columns.start[col]
+    pool, vals, row_pool = columns.pool, columns.vals, rows.pool
+    start, length, head, after, before = rows.start, rows.length, rows.head, rows.after, rows.before
+    last = first + columns.length[col]
+    pivot = 0.0
+    for p in range(first, last):
+        if pool[p] == row:
+            pivot = vals[p]
+    e = 0
+    for p in range(first, last):
+        i = pool[p]
+        if i == row:
+            continue
+        below[e] = i
+        multipliers[e] = vals[p] / pivot
+        e += 1
+        _unlink(i, length[i], head, after, before)
+        end = start[i] + length[i] - 1
+        for q in range(start[i], end + 1):
+            if row_pool[q] == col:
+                row_pool[q] = row_pool[end]
+                break
+        length[i] -= 1
+    _unlink(col, columns.length[col], columns.head, columns.after, columns.before)
+    _unlink(row, length[row], head, after, before)
+    e = 0
+    for q in range(start[row], start[row] + length[row]):
+        if row_pool[q] != col:
+            right[e] = row_pool[q]
+            e += 1
+    columns.length[col] = 0
+    length[row] = 0
+
+
+@njit(
+    types.UniTuple(LINES_TYPE, 2)(LINES_TYPE, LINES_TYPE, int64, _IVEC, _IVEC, _VEC, _IVEC, _VEC, _VEC),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def _eliminate(columns, rows, row, below, right, multipliers, place, top, peak):
+    """Subtract multiples of the pivot's column from the columns right of it.
+
+    Parameters
+    ----------
+    columns, rows : Lines
+    row : int
+        Row of the pivot.
+    below, right : ndarray
+        Rows below the pivot, columns right of it.
+    multipliers : ndarray
+        Entries below the pivot divided by it.
+    place : ndarray of int64, shape (n,)
+        Scratch, -1 everywhere before and after.
+    top, peak : ndarray, shape (n,)
+        Largest entry of each column, now and ever; changed.
+
+    Returns
+    -------
+    columns, rows : Lines
+        With larger pools, perhaps.
+    """
+    start, length, room = columns.start, columns.length, columns.room
+    head, after, before = columns.head, columns.after, columns.before
+    pool, vals = columns.pool, columns.vals
+    row_start, row_length, row_room, row_pool = rows.start, rows.length, rows.room, rows.pool
+    for j in right:
+        _unlink(j, length[j], head, after, before)
+        first = start[j]
+        last = first + length[j] - 1
+        u = 0.0
+        for p in range(first, last + 1):
+            if pool[p] == row:
+                u = vals[p]
+                pool[p] = pool[last]
+                vals[p] = vals[last]
+                break
+        for p in range(first, last):
+            place[pool[p]] = p
+        count = last - first
+        for m in range(below.shape[0]):
+            p = place[below[m]]
+            if p >= 0:
+                vals[p] -= multipliers[m] * u
+            else:
+                count += 1
+        length[j] = last - first
+        if count > room[j]:
+            columns = _make_room(columns, j, 2 * count)
+            pool, vals = columns.pool, columns.vals
+        for m in range(below.shape[0] if count > length[j] else 0):
+            i = below[m]
+            if place[i] >= 0:
+                continue
+            pool[start[j] + length[j]] = i
+            vals[start[j] + length[j]] = -multipliers[m] * u
+            length[j] += 1
+            if row_length[i] + 1 > row_room[i]:
+                rows = _make_room(rows, i, 2 * (row_length[i] + 1))
+                row_pool = rows.pool
+            row_pool[row_start[i] + row_length[i]] = j
+            row_length[i] += 1
+        top[j] = 0.0
+        for p in range(start[j], start[j] + length[j]):
+            place[pool[p]] = -1
+            top[j] = max(top[j], abs(vals[p]))
+        peak[j] = max(peak[j], max(top[j], abs(u)))
+        _link(j, length[j], head, after, before)
+    return columns, rows
+
+
+@njit(types.void(_IVEC, LINES_TYPE), cache=True, nogil=True, error_model="numpy")
+def _link_all(items, lines):
+    """Put ``items`` at the front of the lists they belong to, one after the other."""
+    length, head, after, before = lines.length, lines.head, lines.after, lines.before
+    for i in items:
+        _link(i, length[i], head, after, before)
+
+
+@njit(_IVEC(_IVEC, int64, int64), cache=True, nogil=True, error_model="numpy")
+def _grown(places, want, n):
+    """Return ``places``, made longer if they do not reach to ``want``."""
+    if want <= places.shape[0]:
+        return places
+    return np.concatenate((places, np.empty(places.shape[0] + n, dtype=np.int64)))
+
+
+@njit(types.void(_IVEC, int64), cache=True, nogil=True, error_model="numpy")
+def _append_left_over(lines, rank):
+    """Write behind the first ``rank`` pivot rows (or columns) those that are not among them."""
+    n = lines.shape[0]
+    done = np.zeros(n, dtype=np.bool_)
+    for k in range(rank):
+        done[lines[k]] = True
+    end = rank
+    for m in range(n):
+        if not done[m]:
+            lines[end] = m
+            end += 1
 
 
 @njit(
@@ -249,170 +480,46 @@ def choose_pivots(indptr, indices, scaled, drop, threshold):
     """
     n = indptr.shape[0] - 1
     nnz = indices.shape[0]
-    # columns carry values, rows only the pattern
-    cstart = np.empty(n, dtype=np.int64)
-    clen = np.empty(n, dtype=np.int64)
-    croom = np.empty(n + 1, dtype=np.int64)
-    cpool = np.empty(3 * nnz + 4 * n, dtype=np.int64)
-    cvals = np.empty(3 * nnz + 4 * n)
-    rstart = np.empty(n, dtype=np.int64)
-    rlen = np.zeros(n, dtype=np.int64)
-    rroom = np.empty(n + 1, dtype=np.int64)
-    rpool = np.empty(3 * nnz + 4 * n, dtype=np.int64)
-    none = np.empty(1)
+    columns = _columns(indptr, indices, scaled)
+    rows = _rows(indptr, indices)
     top = np.zeros(n)
-    peak = np.zeros(n)
     for j in range(n):
-        cstart[j] = indptr[j]
-        clen[j] = indptr[j + 1] - indptr[j]
-        croom[j] = clen[j]
         for p in range(indptr[j], indptr[j + 1]):
-            cpool[p] = indices[p]
-            cvals[p] = scaled[p]
-            rlen[indices[p]] += 1
             top[j] = max(top[j], abs(scaled[p]))
-        peak[j] = top[j]
-    largest = max(np.max(peak), 1e-300)
-    croom[n] = nnz
-    end = 0
-    for i in range(n):
-        rstart[i] = end
-        rroom[i] = rlen[i]
-        end += rlen[i]
-        rlen[i] = 0
-    rroom[n] = nnz
-    for j in range(n):
-        for p in range(indptr[j], indptr[j + 1]):
-            i = indices[p]
-            rpool[rstart[i] + rlen[i]] = j
-            rlen[i] += 1
-    chead = np.full(n + 1, -1, dtype=np.int64)
-    cafter = np.empty(n, dtype=np.int64)
-    cbefore = np.empty(n, dtype=np.int64)
-    rhead = np.full(n + 1, -1, dtype=np.int64)
-    rafter = np.empty(n, dtype=np.int64)
-    rbefore = np.empty(n, dtype=np.int64)
+    peak = top.copy()
+    largest = max(np.max(peak), TINY)
     for m in range(n - 1, -1, -1):
-        _link(m, clen[m], chead, cafter, cbefore)
-        _link(m, rlen[m], rhead, rafter, rbefore)
-
+        _link(m, columns.length[m], columns.head, columns.after, columns.before)
+        _link(m, rows.length[m], rows.head, rows.after, rows.before)
     pivot_rows = np.empty(n, dtype=np.int64)
     pivot_cols = np.empty(n, dtype=np.int64)
-    row_done = np.zeros(n, dtype=np.bool_)
-    col_done = np.zeros(n, dtype=np.bool_)
     l_ptr = np.zeros(n + 1, dtype=np.int64)
     u_ptr = np.zeros(n + 1, dtype=np.int64)
     l_rows = np.empty(4 * nnz + n, dtype=np.int64)
     u_cols = np.empty(4 * nnz + n, dtype=np.int64)
     place = np.full(n, -1, dtype=np.int64)
-    factor = np.empty(n)
+    multipliers = np.empty(n)
     rank = 0
     for k in range(n):
-        pi, pj = _best_pivot(
-            n, drop, threshold, cstart, clen, top, peak, rstart, rlen, chead, cafter, cpool, cvals, rpool, rhead, rafter
-        )
-        if pi < 0:
+        row, col = _best_pivot(columns, rows, top, peak, drop, threshold)
+        if row < 0:
             break
         rank += 1
-        pivot_rows[k] = pi
-        pivot_cols[k] = pj
-        row_done[pi] = True
-        col_done[pj] = True
-        nl = clen[pj] - 1
-        nu = rlen[pi] - 1
-        if l_ptr[k] + nl > l_rows.shape[0]:
-            l_rows = np.concatenate((l_rows, np.empty(l_rows.shape[0] + n, dtype=np.int64)))
-        if u_ptr[k] + nu > u_cols.shape[0]:
-            u_cols = np.concatenate((u_cols, np.empty(u_cols.shape[0] + n, dtype=np.int64)))
-        # take the pivot column out of the row patterns, and remember its multipliers
-        pivot = 0.0
-        for p in range(cstart[pj], cstart[pj] + clen[pj]):
-            if cpool[p] == pi:
-                pivot = cvals[p]
-        e = l_ptr[k]
-        for p in range(cstart[pj], cstart[pj] + clen[pj]):
-            i = cpool[p]
-            if i == pi:
-                continue
-            l_rows[e] = i
-            factor[e - l_ptr[k]] = cvals[p] / pivot
-            e += 1
-            _unlink(i, rlen[i], rhead, rafter, rbefore)
-            for q in range(rstart[i], rstart[i] + rlen[i]):
-                if rpool[q] == pj:
-                    rpool[q] = rpool[rstart[i] + rlen[i] - 1]
-                    break
-            rlen[i] -= 1
-        l_ptr[k + 1] = e
-        _unlink(pj, clen[pj], chead, cafter, cbefore)
-        _unlink(pi, rlen[pi], rhead, rafter, rbefore)
-        e = u_ptr[k]
-        for q in range(rstart[pi], rstart[pi] + rlen[pi]):
-            j = rpool[q]
-            if j == pj:
-                continue
-            u_cols[e] = j
-            e += 1
-        u_ptr[k + 1] = e
-        clen[pj] = 0
-        rlen[pi] = 0
-        for e in range(u_ptr[k], u_ptr[k + 1]):
-            j = u_cols[e]
-            _unlink(j, clen[j], chead, cafter, cbefore)
-            u = 0.0
-            for p in range(cstart[j], cstart[j] + clen[j]):
-                if cpool[p] == pi:
-                    u = cvals[p]
-                    last = cstart[j] + clen[j] - 1
-                    cpool[p] = cpool[last]
-                    cvals[p] = cvals[last]
-                    break
-            clen[j] -= 1
-            for p in range(cstart[j], cstart[j] + clen[j]):
-                place[cpool[p]] = p
-            fill = 0
-            for m in range(nl):
-                i = l_rows[l_ptr[k] + m]
-                if place[i] >= 0:
-                    cvals[place[i]] -= factor[m] * u
-                else:
-                    fill += 1
-            for p in range(cstart[j], cstart[j] + clen[j]):
-                place[cpool[p]] = -2 if place[cpool[p]] >= 0 else -1
-            if fill > 0:
-                if clen[j] + fill > croom[j]:
-                    cpool, cvals = _make_room(cpool, cvals, cstart, clen, croom, j, 2 * (clen[j] + fill))
-                for m in range(nl):
-                    i = l_rows[l_ptr[k] + m]
-                    if place[i] == -1:
-                        cpool[cstart[j] + clen[j]] = i
-                        cvals[cstart[j] + clen[j]] = -factor[m] * u
-                        clen[j] += 1
-                        if rlen[i] + 1 > rroom[i]:
-                            rpool, none = _make_room(rpool, none, rstart, rlen, rroom, i, 2 * (rlen[i] + 1))
-                        rpool[rstart[i] + rlen[i]] = j
-                        rlen[i] += 1
-            top[j] = 0.0
-            for p in range(cstart[j], cstart[j] + clen[j]):
-                place[cpool[p]] = -1
-                top[j] = max(top[j], abs(cvals[p]))
-            peak[j] = max(peak[j], max(top[j], abs(u)))
-            _link(j, clen[j], chead, cafter, cbefore)
-        for m in range(nl):
-            i = l_rows[l_ptr[k] + m]
-            _link(i, rlen[i], rhead, rafter, rbefore)
-    for k in range(rank, n):
-        l_ptr[k + 1] = l_ptr[rank]
-        u_ptr[k + 1] = u_ptr[rank]
-    left_r = rank
-    left_c = rank
-    for m in range(n):
-        if not row_done[m]:
-            pivot_rows[left_r] = m
-            left_r += 1
-        if not col_done[m]:
-            pivot_cols[left_c] = m
-            left_c += 1
+        pivot_rows[k] = row
+        pivot_cols[k] = col
+        l_ptr[k + 1] = l_ptr[k] + columns.length[col] - 1
+        u_ptr[k + 1] = u_ptr[k] + rows.length[row] - 1
+        l_rows = _grown(l_rows, l_ptr[k + 1], n)
+        u_cols = _grown(u_cols, u_ptr[k + 1], n)
+        below = l_rows[l_ptr[k] : l_ptr[k + 1]]
+        right = u_cols[u_ptr[k] : u_ptr[k + 1]]
+        _take_out(columns, rows, row, col, below, right, multipliers)
+        columns, rows = _eliminate(columns, rows, row, below, right, multipliers, place, top, peak)
+        _link_all(below, rows)
+    l_ptr[rank:] = l_ptr[rank]
+    u_ptr[rank:] = u_ptr[rank]
+    _append_left_over(pivot_rows, rank)
+    _append_left_over(pivot_cols, rank)
     growth = np.max(peak) / largest
     return (
         rank,

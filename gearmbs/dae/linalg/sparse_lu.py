@@ -101,49 +101,15 @@ def _sort_lines(places, ptr):
 
 
 @njit(
-    types.Tuple((int64, _IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _VEC, _VEC, _VEC))(
-        _IVEC, _IVEC, _VEC, _VEC, float64
-    ),
+    types.Tuple((_IVEC, _UVEC, _UVEC, _VEC))(_IVEC, _IVEC, _VEC, _VEC, _IVEC, _IVEC),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def _plan(indptr, indices, vals, scale, drop):
-    """Return the rank and the fields of an `LUPlan`."""
+def _entries_in_order(indptr, indices, row_scale, col_scale, cols, row_place):
+    """Return the entries of the matrix column by column in pivot order, rows ascending: fields ``a_*`` of `LUPlan`."""
     n = indptr.shape[0] - 1
     nnz = indices.shape[0]
-    row_scale = np.ones(n)
-    col_scale = scale.copy()
-    equilibrate(indptr, indices, vals, row_scale, col_scale)
-    scaled = np.empty(nnz)
-    for j in range(n):
-        for p in range(indptr[j], indptr[j + 1]):
-            scaled[p] = vals[p] * row_scale[indices[p]] * col_scale[j]
-    rank, growth, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(indptr, indices, scaled, drop, THRESHOLDS[0])
-    for threshold in THRESHOLDS[1:]:
-        if growth > GROWTH_ALLOWED:
-            rank, growth, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(
-                indptr, indices, scaled, drop, threshold
-            )
-
-    row_place = np.empty(n, dtype=np.int64)
-    col_place = np.empty(n, dtype=np.int64)
-    row_from = np.empty(n, dtype=np.uint32)
-    col_to = np.empty(n, dtype=np.uint32)
-    row_scale_out = np.empty(n)
-    col_scale_out = np.empty(n)
-    kept = np.zeros(n)
-    for k in range(n):
-        row_place[rows[k]] = k
-        col_place[cols[k]] = k
-        row_from[k] = rows[k]
-        col_to[k] = cols[k]
-        row_scale_out[k] = row_scale[rows[k]]
-        col_scale_out[k] = col_scale[cols[k]]
-        if k < rank:
-            kept[k] = 1.0
-
-    # entries of the matrix, column by column in pivot order, rows ascending
     a_ptr = np.zeros(n + 1, dtype=np.int64)
     a_pos = np.empty(nnz, dtype=np.uint32)
     a_src = np.empty(nnz, dtype=np.uint32)
@@ -165,20 +131,75 @@ def _plan(indptr, indices, vals, scale, drop):
             p = at[a_pos[e]]
             a_src[e] = p
             a_scale[e] = row_scale[indices[p]] * col_scale[j]
+    return a_ptr, a_pos, a_src, a_scale
 
-    # rows of U come out pivot by pivot, so that each column's pivots ascend
-    u_by_col = np.zeros(n + 1, dtype=np.int64)
+
+@njit(types.Tuple((_IVEC, _UVEC))(_IVEC, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
+def _upper_by_columns(u_ptr, u_cols, col_place):
+    """Return U's pattern by columns: it comes out pivot by pivot, so that each column's pivots ascend."""
+    n = u_ptr.shape[0] - 1
+    by_col = np.zeros(n + 1, dtype=np.int64)
     for e in range(u_cols.shape[0]):
-        u_by_col[col_place[u_cols[e]] + 1] += 1
+        by_col[col_place[u_cols[e]] + 1] += 1
+    at = np.empty(n, dtype=np.int64)
     for k in range(n):
-        u_by_col[k + 1] += u_by_col[k]
-        at[k] = u_by_col[k]
-    u_pos = np.empty(u_cols.shape[0], dtype=np.uint32)
+        by_col[k + 1] += by_col[k]
+        at[k] = by_col[k]
+    places = np.empty(u_cols.shape[0], dtype=np.uint32)
     for k in range(n):
         for e in range(u_ptr[k], u_ptr[k + 1]):
             m = col_place[u_cols[e]]
-            u_pos[at[m]] = k
+            places[at[m]] = k
             at[m] += 1
+    return by_col, places
+
+
+@njit(types.Tuple((_VEC, _VEC, _VEC))(_IVEC, _IVEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
+def _scaled(indptr, indices, vals, scale):
+    """Return the scales of rows and columns, and the values with them."""
+    n = indptr.shape[0] - 1
+    row_scale = np.ones(n)
+    col_scale = scale.copy()
+    equilibrate(indptr, indices, vals, row_scale, col_scale)
+    scaled = np.empty(indices.shape[0])
+    for j in range(n):
+        for p in range(indptr[j], indptr[j + 1]):
+            scaled[p] = vals[p] * row_scale[indices[p]] * col_scale[j]
+    return row_scale, col_scale, scaled
+
+
+@njit(
+    types.Tuple((int64, _IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _VEC, _VEC, _VEC))(
+        _IVEC, _IVEC, _VEC, _VEC, float64
+    ),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def _plan(indptr, indices, vals, scale, drop):
+    """Return the rank and the fields of an `LUPlan`, in their order; parameters as in `analyse`."""
+    n = indptr.shape[0] - 1
+    row_scale, col_scale, scaled = _scaled(indptr, indices, vals, scale)
+    rank, growth, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(indptr, indices, scaled, drop, THRESHOLDS[0])
+    for threshold in THRESHOLDS[1:]:
+        if growth > GROWTH_ALLOWED:
+            rank, growth, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(
+                indptr, indices, scaled, drop, threshold
+            )
+    row_place = np.empty(n, dtype=np.int64)
+    col_place = np.empty(n, dtype=np.int64)
+    row_from = np.empty(n, dtype=np.uint32)
+    col_to = np.empty(n, dtype=np.uint32)
+    kept = np.zeros(n)
+    for k in range(n):
+        row_place[rows[k]] = k
+        col_place[cols[k]] = k
+        row_from[k] = rows[k]
+        col_to[k] = cols[k]
+        if k < rank:
+            kept[k] = 1.0
+    a_ptr, a_pos, a_src, a_scale = _entries_in_order(indptr, indices, row_scale, col_scale, cols, row_place)
+    u_by_col, u_pos = _upper_by_columns(u_ptr, u_cols, col_place)
     l_pos = np.empty(l_rows.shape[0], dtype=np.uint32)
     for e in range(l_rows.shape[0]):
         l_pos[e] = row_place[l_rows[e]]
@@ -195,8 +216,8 @@ def _plan(indptr, indices, vals, scale, drop):
         l_pos,
         row_from,
         col_to,
-        row_scale_out,
-        col_scale_out,
+        row_scale[rows],
+        col_scale[cols],
         kept,
     )
 

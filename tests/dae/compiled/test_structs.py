@@ -1,0 +1,83 @@
+"""Structs: the same members in Python and in compiled code, checked when an array is taken."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+from numba import float64, int64, njit
+
+from gearmbs.dae.compiled.structs import IntVector, Matrix, Struct, Vector
+
+
+class Sample(Struct):
+    h: float
+    order: int
+    open: bool
+    y: Vector
+    rows: Matrix
+    marks: IntVector
+
+
+@njit(float64(Sample.numba_type, int64))
+def work(st, row):
+    """Change scalars and arrays of all kinds."""
+    st.h += 0.5
+    st.order = 2 * st.order + 1
+    st.open = not st.open
+    st.marks[0] = st.rows.shape[1]
+    total = 0.0
+    for i in range(st.y.shape[0]):
+        st.y[i] += st.rows[row, i]
+        total += st.y[i]
+    return total
+
+
+def sample() -> Sample:
+    return Sample(y=np.ones(3), rows=np.arange(6.0).reshape(2, 3), marks=np.zeros(2, dtype=np.int64), order=3)
+
+
+def test_compiled_code_and_python_see_the_same_members():
+    st = sample()
+    assert (st.h, st.order, st.open) == (0.0, 3, False)
+    assert work(st, 1) == 3.0 + 3.0 + 4.0 + 5.0
+    assert (st.h, st.order, st.open) == (0.5, 7, True)
+    np.testing.assert_array_equal(st.y, [4.0, 5.0, 6.0])
+    assert st.marks[0] == 3
+    st.h = 2.0
+    work(st, 0)
+    assert st.h == 2.5
+
+
+def test_an_array_replaced_in_python_is_the_one_compiled_code_sees():
+    st = sample()
+    st.y = np.array([10.0, 20.0, 30.0])
+    st.rows = np.zeros((2, 3))
+    assert work(st, 0) == 60.0
+
+
+def test_a_copy_has_memory_of_its_own():
+    st = sample()
+    other = pickle.loads(pickle.dumps(st))
+    work(other, 1)
+    assert other.order == 7
+    assert st.order == 3
+    np.testing.assert_array_equal(st.y, 1.0)
+
+
+@pytest.mark.parametrize(
+    "wrong", [np.ones(3, dtype=np.float32), np.ones((3, 1)), np.ones(6)[::2], np.zeros(3, dtype=np.int64)]
+)
+def test_an_array_of_another_kind_is_refused(wrong):
+    with pytest.raises(TypeError, match="y must be a contiguous array of type f8 with 1 dimensions"):
+        sample().y = wrong
+
+
+def test_unknown_and_missing_members_are_named():
+    with pytest.raises(TypeError, match="missing marks, rows"):
+        Sample(y=np.ones(1))
+    with pytest.raises(AttributeError, match="no member 'size'"):
+        sample().size = 1.0
+    with pytest.raises(AttributeError, match="no member 'size'"):
+        _ = sample().size
