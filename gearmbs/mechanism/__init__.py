@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
+    from gearmbs.dae.equations.force_elements import Diagnostic
     from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
     from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
     from gearmbs.mechanism.elements import Compiled, ForceElement, Load, State, Torque
@@ -20,6 +21,7 @@ __all__ = [
     "AssemblyError",
     "Body",
     "Compiled",
+    "Diagnostic",
     "ForceElement",
     "Joint",
     "JointFriction",
@@ -53,6 +55,7 @@ late(
         "AssemblyError": "gearmbs.dae.errors",
         "Body": ".parts",
         "Compiled": ".elements",
+        "Diagnostic": "gearmbs.dae.equations.force_elements",
         "ForceElement": ".elements",
         "Joint": ".joints",
         "JointFriction": ".friction",

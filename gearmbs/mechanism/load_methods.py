@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import elements as el
 from gearmbs.mechanism.elements import Load
+from gearmbs.mechanism.forces.springs import AxisSpring, Beam, Bushing, Field, LineSpring, MatrixForce, in_si
 from gearmbs.mechanism.geometry import Vector, vector
 from gearmbs.mechanism.parts import Marker
 from gearmbs.mechanism.quantities import expression_text, quantity
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from gearmbs.mechanism.expression_syntax import Units
 
 Expression = str | float | None
+M = TypeVar("M", bound=MatrixForce)
 
 SI_UNITS = {
     "force": "N", "torque": "N*m", "length": "m", "angle": "rad", "time": "s", "stiffness": "N/m", "damping": "N*s/m",
@@ -35,6 +37,7 @@ class LoadMethods:
 
     units: Units
     reads_units: bool
+    add: Callable[[Any], Any]
     _add_load: Callable[[Load], Load]
 
     def _text(self, label: str, value: Expression, dimension: str) -> str:
@@ -47,6 +50,10 @@ class LoadMethods:
         """Return a number in the mechanism's units; ``dimension`` is that of the field's name by default."""
         dimension = dimension or FIELDS.get(field, field)
         return quantity(value, SI_UNITS[dimension], f"{label}: {field}", self.units.factor(dimension))
+
+    def _in_si(self, *values: tuple[float, str]) -> list[float]:
+        """Return numbers in the mechanism's units, each with its dimension, in SI."""
+        return [value * self.units.factor(dimension) for value, dimension in values]
 
     def load(
         self,
@@ -103,20 +110,19 @@ class LoadMethods:
         damping: float = 0.0,
         length: float | None = None,
         preload: float = 0.0,
-    ) -> Load:
+    ) -> LineSpring:
         """Connect two markers by a spring (N/m) and damper (N s/m) along the line between them.
 
         ``length`` is the length at which the force is ``preload`` (default: the initial distance).
         """
         if length is None:
-            length = float(np.linalg.norm(i.global_position() - j.global_position()))
-        a, b = _ref(i), _ref(j)
+            length = float(np.linalg.norm(i.global_position() - j.global_position())) / self.units.length
         label = f"spring-damper '{name}'"
         k, c = self._number(label, "stiffness", stiffness), self._number(label, "damping", damping)
         free, start = self._number(label, "length", length), self._number(label, "preload", preload, "force")
-        text = f"{start!r} - {k!r}*(DM({a},{b}) - {free!r}) - {c!r}*VR({a},{b})"
         made = {"stiffness": k, "damping": c, "length": free, "preload": start}
-        return self._add_load(Load(name, "springdamper", i, j, j, el.LINE, (text,), made))
+        k, c, free, start = self._in_si((k, "stiffness"), (c, "damping"), (free, "length"), (start, "force"))
+        return self.add(LineSpring(name, i, j, k, c, free, start, made))
 
     def torsion_spring(
         self,
@@ -128,16 +134,16 @@ class LoadMethods:
         damping: float = 0.0,
         angle: float = 0.0,
         preload: float = 0.0,
-    ) -> Load:
+    ) -> AxisSpring:
         """Connect two markers by a rotational spring (N m/rad) and damper (N m s/rad) about z of J."""
-        a, b = _ref(i), _ref(j)
         label = f"torsion spring '{name}'"
         k = self._number(label, "stiffness", stiffness, "rotational_stiffness")
         c = self._number(label, "damping", damping, "rotational_damping")
         free, start = self._number(label, "angle", angle), self._number(label, "preload", preload, "torque")
-        text = f"{start!r} - {k!r}*(AZ({a},{b}) - {free!r}) - {c!r}*WZ({a},{b},{b})"
         made = {"stiffness": k, "damping": c, "angle": free, "preload": start}
-        return self._add_load(Load(name, "springdamper", i, j, j, el.AXIS_TORQUE, (text,), made))
+        dimensions = ("rotational_stiffness", "rotational_damping", "angle", "torque")
+        k, c, free, start = self._in_si(*zip((k, c, free, start), dimensions))
+        return self.add(AxisSpring(name, i, j, k, c, free, start, made))
 
     def bushing(
         self,
@@ -149,9 +155,8 @@ class LoadMethods:
         damping: Vector = (0.0, 0.0, 0.0),
         torsional_stiffness: Vector = (0.0, 0.0, 0.0),
         torsional_damping: Vector = (0.0, 0.0, 0.0),
-    ) -> Load:
+    ) -> Bushing:
         """Connect two markers by springs and dampers along and about the three axes of J (small rotations)."""
-        a, b = _ref(i), _ref(j)
         label = f"bushing '{name}'"
         k, c, kt, ct = (
             vector(value, f"{label}: {field}", SI_UNITS[dimension], self.units.factor(dimension)).tolist()
@@ -162,14 +167,29 @@ class LoadMethods:
                 ("torsional_damping", torsional_damping, "rotational_damping"),
             )
         )
-        force = [f"-{k[n]!r}*D{x}({a},{b},{b}) - {c[n]!r}*V{x}({a},{b},{b},{b})" for n, x in enumerate("XYZ")]
-        turn = [f"-{kt[n]!r}*A{x}({a},{b}) - {ct[n]!r}*W{x}({a},{b},{b})" for n, x in enumerate("XYZ")]
-        parts = [e if k[n] or c[n] else None for n, e in enumerate(force)]
-        parts += [e if kt[n] or ct[n] else None for n, e in enumerate(turn)]
-        if not any(parts):
+        if not any((*k, *c, *kt, *ct)):
             raise ModelError(f"bushing '{name}': all stiffnesses and dampings are zero")
         made = {"stiffness": k, "damping": c, "torsional_stiffness": kt, "torsional_damping": ct}
-        return self._add_load(Load(name, "bushing", i, j, j, el.COMPONENTS, tuple(parts), made))
+        return self.matrix_force(Bushing, name, i, j, np.diag([*k, *kt]), np.diag([*c, *ct]), made)
+
+    def matrix_force(
+        self,
+        kind: type[M],
+        name: str,
+        i: Marker,
+        j: Marker,
+        stiffness: np.ndarray,
+        damping: np.ndarray,
+        parameters: Mapping[str, Any],
+        free: npt.ArrayLike = (0.0,) * 6,
+        preload: npt.ArrayLike = (0.0,) * 6,
+    ) -> M:
+        """Add an element of a class derived from MatrixForce, its numbers in the mechanism's units."""
+        k, c = in_si(stiffness, self.units, False), in_si(damping, self.units, True)
+        rest = np.asarray(free, dtype=float) * np.repeat([self.units.factor("length"), 1.0], 3)
+        factors = np.repeat([self.units.factor("force"), self.units.factor("torque")], 3)
+        start = factors * np.asarray(preload, dtype=float)
+        return self.add(kind(name, i, j, k, c, rest, start, parameters))
 
     def field(
         self,
@@ -181,8 +201,7 @@ class LoadMethods:
         damping: npt.ArrayLike | None = None,
         free: npt.ArrayLike = (0.0,) * 6,
         preload: npt.ArrayLike = (0.0,) * 6,
-        kind: str = "field",
-    ) -> Load:
+    ) -> Field:
         """Connect two markers by full matrices: F = preload - K (q - free) - C q'.
 
         Parameters
@@ -193,19 +212,18 @@ class LoadMethods:
             Displacements and rotations of I in J's frame (small rotations about its axes) without load, and the load
             there.
         """
-        label = f"{kind} '{name}'"
+        label = f"field '{name}'"
         k, c = (
             np.zeros((6, 6)) if m is None else _numbers(m, f"{label}: {field}")
             for field, m in (("stiffness", stiffness), ("damping", damping))
         )
         rest, start = _numbers(free, f"{label}: free"), _numbers(preload, f"{label}: preload")
         if k.shape != (6, 6) or c.shape != (6, 6) or rest.shape != (6,) or start.shape != (6,):
-            raise ModelError(f"{kind} '{name}': stiffness and damping are 6x6, free and preload have 6 entries")
-        texts = matrix_texts(_ref(i), _ref(j), k, c, rest, start)
-        if not any(texts):
-            raise ModelError(f"{kind} '{name}': all stiffnesses, dampings and preloads are zero")
+            raise ModelError(f"{label}: stiffness and damping are 6x6, free and preload have 6 entries")
+        if not any(np.any(part) for part in (k, c, start)):
+            raise ModelError(f"{label}: all stiffnesses, dampings and preloads are zero")
         made = {"stiffness": k, "damping": c, "free": rest, "preload": start}
-        return self._add_load(Load(name, kind, i, j, j, el.COMPONENTS, texts, made))
+        return self.matrix_force(Field, name, i, j, k, c, made, rest, start)
 
     def beam(
         self,
@@ -220,7 +238,7 @@ class LoadMethods:
         shear_modulus: float,
         shear_ratios: tuple[float, float] = (0.0, 0.0),
         damping_ratio: float = 0.0,
-    ) -> Load:
+    ) -> Beam:
         """Connect two markers by a massless Timoshenko beam from J to I along x of J.
 
         Parameters
@@ -258,8 +276,7 @@ class LoadMethods:
                 raise ModelError(f"beam '{name}': {field} = {value}; it must be positive")
         k = beam_stiffness(length, area, ixx, iyy, izz, modulus, shear_modulus, shear_ratios)
         free = (length, 0.0, 0.0, 0.0, 0.0, 0.0)
-        load = self.field(name, i, j, stiffness=k, damping=damping_ratio * k, free=free, kind="beam")
-        load.parameters = {
+        made = {
             "length": length,
             "area": area,
             "second_moments": (ixx, iyy, izz),
@@ -268,7 +285,7 @@ class LoadMethods:
             "shear_ratios": shear_ratios,
             "damping_ratio": damping_ratio,
         }
-        return load
+        return self.matrix_force(Beam, name, i, j, k, damping_ratio * k, made, free)
 
 
 def beam_stiffness(
@@ -287,30 +304,6 @@ def beam_stiffness(
     return k
 
 
-def matrix_texts(
-    a: str, c: str, stiffness: np.ndarray, damping: np.ndarray, free: np.ndarray, preload: np.ndarray
-) -> tuple[str | None, ...]:
-    """Return the six components of preload - K (q - free) - C q' as expressions of the markers a and c."""
-    shifts = [f"D{x}({a},{c},{c})" for x in "XYZ"] + [f"A{x}({a},{c})" for x in "XYZ"]
-    rates = [f"V{x}({a},{c},{c},{c})" for x in "XYZ"] + [f"W{x}({a},{c},{c})" for x in "XYZ"]
-    texts: list[str | None] = []
-    for row in range(6):
-        parts = [(float(preload[row]), "")]
-        for k in range(6):
-            shift = shifts[k] if free[k] == 0.0 else f"({shifts[k]} - ({float(free[k])!r}))"
-            parts.append((-float(stiffness[row, k]), shift))
-            parts.append((-float(damping[row, k]), rates[k]))
-        text = weighted_sum(*parts)
-        texts.append(None if text == "0" else text)
-    return tuple(texts)
-
-
-def weighted_sum(*parts: tuple[float, str]) -> str:
-    """Return the terms with a factor other than zero, added up."""
-    shown = [f"({factor!r})" + (f"*{measure}" if measure else "") for factor, measure in parts if factor != 0.0]
-    return " + ".join(shown) if shown else "0"
-
-
 def _numbers(value: npt.ArrayLike, field: str) -> np.ndarray:
     """Return an array without texts: its entries have different units."""
     try:
@@ -319,7 +312,3 @@ def _numbers(value: npt.ArrayLike, field: str) -> np.ndarray:
         raise ModelError(
             f"{field}: {value!r} is not made of numbers; give them in SI, texts have no place here"
         ) from None
-
-
-def _ref(marker: Marker) -> str:
-    return f'"{marker.name}"'

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -15,6 +15,7 @@ from gearmbs.dae.model.system import System
 from gearmbs.mechanism import joints as jt
 from gearmbs.mechanism.elements import ForceElement, Load, State, Torque
 from gearmbs.mechanism.expression_syntax import Units
+from gearmbs.mechanism.forces.function_force import FunctionForce, function_force
 from gearmbs.mechanism.friction import add_friction, friction_of
 from gearmbs.mechanism.function_text import integrated
 from gearmbs.mechanism.functions import TimeFunction, as_function, constant
@@ -398,6 +399,82 @@ class Mechanism(LoadMethods):
             self._check_body(label, marker.body)
         self.elements[element.name] = element
         return element
+
+    def force(
+        self,
+        name: str,
+        kernel: Callable[..., None],
+        *markers: Marker,
+        parameters: Mapping[str, float] | Sequence[float] = (),
+        states: Mapping[str, float] | Sequence[str] = (),
+        algebraic: Mapping[str, float] | Sequence[str] = (),
+        diagnostics: Sequence[Any] = (),
+        derivatives: Callable[..., None] | None = None,
+        steps: Mapping[str, float] | None = None,
+    ) -> FunctionForce:
+        """Add a force given by a function of your own, compiled by numba.
+
+        Parameters
+        ----------
+        kernel : callable
+            ``kernel(t, frames, states, parameters, wrench, rates, diagnostics)``, plain Python that numba compiles, or
+            compiled by ``numba.njit`` without a signature. It reads the first four and writes to the others, which are
+            zero before, and returns nothing; all in SI and global components:
+
+            * ``frames[k]`` of marker k: origin ``[0:3]``, orientation ``[3:12]`` (row-major 3x3, columns are the
+              marker's axes), velocity of the origin ``[12:15]``, angular velocity ``[15:18]``
+            * ``wrench[0]``: force and torque on the body of the first marker at its origin. Of two markers, the second
+              one's body takes the reaction at the same point, of one marker the ground does. More than two: each has
+              a wrench of its own, ``wrench[k]``.
+            * ``rates[k]``: the derivative of a differential state, the value of an algebraic one, differential ones
+              first
+            * ``diagnostics[k]``: what else is to be told
+
+            It must depend on its arguments alone, and smoothly enough for Newton's method.
+        *markers : Marker
+            One, two or more.
+        parameters : mapping or sequence of float
+            In the kernel an array, in the order given.
+        states, algebraic : mapping of str to float
+            Own states with their start: z' = rate, or z = rate. Results know them as ``name.state``.
+        diagnostics : sequence
+            Of names, (name, unit, role) or :class:`gearmbs.mechanism.Diagnostic`. Roles: "stored" (J) and "dissipated"
+            (W) enter the energy balance, "count", "plain".
+        derivatives : callable, optional
+            ``derivatives(t, frames, states, parameters, jac)`` writes the exact derivatives: rows are the wrenches,
+            then the rates; columns the variations [dP, dpi, dv, dw] of each frame (dA = dpi x A), then the states.
+            Default: central differences.
+        steps : mapping, optional
+            Steps of the differences, ``length``, ``angle``, ``speed``, ``angular_speed`` (m, rad, m/s, rad/s), for a
+            force that changes within less than some 10 um or 0.1 mm/s.
+
+        Raises
+        ------
+        ModelError
+            If numba cannot compile the function, or what is given does not fit together.
+
+        Examples
+        --------
+        >>> from gearmbs.mechanism import Mechanism
+        >>> def pull(t, frames, states, parameters, wrench, rates, diagnostics):
+        ...     apart = frames[0, 0:3] - frames[1, 0:3]
+        ...     wrench[0, 0:3] = -parameters[0] * apart / (apart @ apart) ** 1.5
+        >>> m = Mechanism("magnets")
+        >>> ball = m.body("ball", mass=0.1, inertia=(1e-5, 1e-5, 1e-5), position=(0.1, 0, 0))
+        >>> m.force("magnet", pull, ball.marker(), m.ground.marker(), parameters={"strength": 1e-4})
+        FunctionForce('magnet' on 'ball.marker1', 'ground.marker1')
+        """
+        self._check_name(name)
+        if not markers:
+            raise ModelError(f"force '{name}': give the markers it acts on, one or more")
+        for marker in markers:
+            if not isinstance(marker, Marker):
+                raise ModelError(f"force '{name}': {marker!r} is not a marker; make one with body.marker(...)")
+            self._check_body(f"force '{name}'", marker.body)
+        made = function_force(
+            name, kernel, markers, parameters, states, algebraic, diagnostics, derivatives, steps
+        )  # fmt: skip
+        return self.add(made)
 
     def friction(self, name: str, joint: jt.Joint, mu_static: float, mu_dynamic: float, **parameters) -> list[Load]:
         """Add dry friction to a revolute, translational, cylindrical, spherical or universal joint.

@@ -1,4 +1,4 @@
-"""Force elements of a deck as loads of the mechanism, their expressions in the deck's units."""
+"""Force elements of a deck as those of the mechanism, in the deck's units."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 
 from gearmbs.adams.builders.builder import Builder
 from gearmbs.adams.parse import statements as st
+from gearmbs.mechanism.forces.springs import Beam, Bushing, Field, MatrixForce
 from gearmbs.mechanism.friction import INPUTS, KINDS
-from gearmbs.mechanism.load_methods import beam_stiffness, matrix_texts, weighted_sum
+from gearmbs.mechanism.load_methods import beam_stiffness
 from gearmbs.mechanism.parts import Marker
 
 COMPONENTS = ("fx", "fy", "fz", "tx", "ty", "tz")
@@ -63,27 +64,19 @@ def add_spring_damper(b: Builder, s: st.SpringDamper) -> None:
     name = b.model.names["springdamper", s.id]
     i, j = b.markers[s.i or 0], b.markers[s.j or 0]
     if s.type == "TRANSLATIONAL":
-        text = weighted_sum((s.force, ""), (-s.k, f"(DM({s.i},{s.j}) - {s.length!r})"), (-s.c, f"VR({s.i},{s.j})"))
-        load = b.mechanism.line_force(name, i, j, text, kind="springdamper")
-        load.parameters = {"stiffness": s.k, "damping": s.c, "length": s.length, "preload": s.force}
+        b.mechanism.spring_damper(name, i, j, stiffness=s.k, damping=s.c, length=s.length, preload=s.force)
     else:
-        turn = (-s.kt, f"(AZ({s.i},{s.j}) - ({s.angle!r}))")
-        text = weighted_sum((s.torque, ""), turn, (-s.ct, f"WZ({s.i},{s.j},{s.j})"))
-        load = b.mechanism.load(name, i, j, tz=text, rm=j, kind="springdamper")
-        load.parameters = {"stiffness": s.kt, "damping": s.ct, "angle": s.angle, "preload": s.torque}
+        b.mechanism.torsion_spring(name, i, j, stiffness=s.kt, damping=s.ct, angle=s.angle, preload=s.torque)
 
 
 def _matrix_load(
-    b: Builder, name: str, kind: str, s: Any, stiffness: np.ndarray, damping: np.ndarray, free: Sequence[float],
-    preload: Sequence[float], parameters: Mapping[str, Any],
+    b: Builder, kind: type[MatrixForce], name: str, s: Any, stiffness: np.ndarray, damping: np.ndarray,
+    free: Sequence[float], preload: Sequence[float], parameters: Mapping[str, Any],
 ) -> None:  # fmt: skip
-    """Add F = preload - K (q - free) - C q' in J's frame; every product in the deck's units."""
-    texts = matrix_texts(str(s.i), str(s.j), stiffness, damping, np.array(free), np.array(preload))
-    given = {c: t for c, t in zip(COMPONENTS, texts) if t is not None}
-    if given:
+    """Add F = preload - K (q - free) - C q' in J's frame, all in the deck's units; nothing if there is no load."""
+    if any(np.any(part) for part in (stiffness, damping, preload)):
         i, j = b.markers[s.i], b.markers[s.j]
-        load = b.mechanism.load(name, i, j, rm=j, kind=kind, **given)  # type: ignore[arg-type]
-        load.parameters = parameters
+        b.mechanism.matrix_force(kind, name, i, j, stiffness, damping, parameters, free, preload)
 
 
 def add_bushing(b: Builder, s: st.Bushing) -> None:
@@ -94,7 +87,7 @@ def add_bushing(b: Builder, s: st.Bushing) -> None:
     made = {
         "stiffness": s.k, "damping": s.c, "torsional_stiffness": s.kt, "torsional_damping": s.ct, "preload": preload,
     }  # fmt: skip
-    _matrix_load(b, name, "bushing", s, k, c, [0.0] * 6, preload, made)
+    _matrix_load(b, Bushing, name, s, k, c, [0.0] * 6, preload, made)
 
 
 def add_field(b: Builder, s: st.Field) -> None:
@@ -108,7 +101,7 @@ def add_field(b: Builder, s: st.Field) -> None:
     name = b.model.names["field", s.id]
     free, preload = s.length or [0.0] * 6, s.force or [0.0] * 6
     made = {"stiffness": k, "damping": c, "free": free, "preload": preload}
-    _matrix_load(b, name, "field", s, k, c, free, preload, made)
+    _matrix_load(b, Field, name, s, k, c, free, preload, made)
 
 
 def add_beam(b: Builder, s: st.Beam) -> None:
@@ -127,7 +120,7 @@ def add_beam(b: Builder, s: st.Beam) -> None:
         "shear_modulus": s.gmodulus or 0.0, "shear_ratios": (s.asy, s.asz), "damping_ratio": s.cratio or 0.0,
         "damping": c if s.cmatrix is not None else None,
     }  # fmt: skip
-    _matrix_load(b, b.model.names["beam", s.id], "beam", s, k, c, free, [0.0] * 6, made)
+    _matrix_load(b, Beam, b.model.names["beam", s.id], s, k, c, free, [0.0] * 6, made)
 
 
 def add_friction(b: Builder, s: st.Friction) -> None:

@@ -371,7 +371,10 @@ class DeckWriter:
             self.statement(f"SPLINE/{self.splines[_upper(key)]}", arguments, str(key))
 
     def _element(self, name: str, element: Any) -> None:
-        if isinstance(element, Load):
+        if name in self.kept:
+            kind = self.kept[name]
+            self.statement(f"{KEYWORDS[kind]}/{self.elements[kind, name]}", element_arguments(self, element), name)
+        elif isinstance(element, Load):
             self._load(name, element)
         elif isinstance(element, Torque):
             text = self.expression(function_text(element.function, self.units.time, self.units.factor("torque")))
@@ -382,10 +385,6 @@ class DeckWriter:
             raise ModelError(f"element '{name}': {element!r} has no form in an ADAMS deck")
 
     def _load(self, name: str, load: Load) -> None:
-        if name in self.kept:
-            kind = self.kept[name]
-            self.statement(f"{KEYWORDS[kind]}/{self.elements[kind, name]}", element_arguments(self, load), name)
-            return
         keyword = load_statement(load)
         if keyword == "SFORCE":
             text = self.expression(next(e for e in load.expressions if e is not None) or "0")

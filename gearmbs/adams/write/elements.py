@@ -1,6 +1,6 @@
 """Elements that keep their statement in a deck: SPRINGDAMPER, BUSHING, FIELD, BEAM, FRICTION.
 
-A mechanism holds all loads as expressions; what they were made from stands beside them (``Load.parameters``).
+What they were made from, in the mechanism's units, stands beside them (``parameters``).
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import numpy as np
 from gearmbs.adams.write.context import WriterContext
 from gearmbs.adams.write.text import listed, number
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.elements import LINE, Load
+from gearmbs.mechanism.elements import Load
+from gearmbs.mechanism.forces.springs import LineSpring
 from gearmbs.mechanism.friction import INPUTS, JointFriction
 from gearmbs.mechanism.joints import Joint
 
@@ -45,7 +46,8 @@ def kept(mechanism: Mechanism) -> dict[str, str]:
     """Return the loads that keep their statement: name -> kind."""
     found = {}
     for name, load in mechanism.elements.items():
-        if isinstance(load, Load) and load.parameters is not None and load.kind in KEYWORDS and load.rm is load.j:
+        made = getattr(load, "parameters", None) is not None and load.kind in KEYWORDS
+        if made and (not isinstance(load, Load) or load.rm is load.j):
             if load.kind != "friction" or not _used_elsewhere(mechanism, name, load):
                 found[name] = load.kind
     return found
@@ -60,7 +62,7 @@ def hidden(mechanism: Mechanism) -> set[str]:
     return keys
 
 
-def element_arguments(writer: WriterContext, load: Load) -> list[str]:
+def element_arguments(writer: WriterContext, load: Any) -> list[str]:
     """Return the arguments of the statement a load was made from, numbers in the mechanism's units."""
     p = _parameters(load)
     if load.kind == "friction":
@@ -88,8 +90,8 @@ def _used_elsewhere(mechanism: Mechanism, name: str, load: Load) -> bool:
     return any(key in used for key in keys)
 
 
-def _spring(load: Load, p: Mapping[str, Any]) -> list[str]:
-    if load.mode == LINE:
+def _spring(load: Any, p: Mapping[str, Any]) -> list[str]:
+    if isinstance(load, LineSpring):
         words = {"K": "stiffness", "C": "damping", "LENGTH": "length", "FORCE": "preload"}
         return ["TRANSLATIONAL", *(f"{w} = {number(p[key])}" for w, key in words.items())]
     words = {"KT": "stiffness", "CT": "damping", "ANGLE": "angle", "TORQUE": "preload"}

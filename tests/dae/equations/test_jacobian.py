@@ -62,6 +62,13 @@ def build(kind: str) -> Mechanism:
         m.load("joint", i, j, rm=random_marker(two, rng), fx=f"DX({a},{b})**2", fz=f"VY({a},{b},{a})", ty="DIF(lag)")
     elif kind == "bushing":
         m.bushing("joint", i, j, stiffness=(10, 20, 30), damping=(1, 2, 3), torsional_stiffness=(4, 5, 6))
+    elif kind == "spring":
+        m.spring_damper("joint", i, j, stiffness=7.0, damping=1.3, length=0.4, preload=0.9)
+    elif kind == "torsion":
+        m.torsion_spring("joint", i, j, stiffness=7.0, damping=1.3, angle=0.4, preload=0.9)
+    elif kind == "field":
+        matrices = rng.standard_normal((2, 6, 6))
+        m.field("joint", i, j, stiffness=matrices[0], damping=matrices[1], free=range(6), preload=(1, 2, 3, 4, 5, 6))
     elif kind.startswith("reaction"):
         joints = {
             "reaction of a revolute joint": lambda: m.revolute("pin", i, j),
@@ -80,7 +87,17 @@ def build(kind: str) -> Mechanism:
     return m
 
 
-LOADS = ["general constraint", "line force", "axis force", "axis torque", "load", "bushing"]
+LOADS = [
+    "general constraint",
+    "line force",
+    "axis force",
+    "axis torque",
+    "load",
+    "spring",
+    "torsion",
+    "bushing",
+    "field",
+]
 REACTIONS = [f"reaction of a {k}" for k in ("revolute joint", "translational joint", "distance", "screw", "motion")]
 OTHERS = ["screw", "distance", "rotation", "translation", "coupler", "torque", "grounded revolute"]
 KINDS = [*JOINTS, *LOADS, *REACTIONS, *OTHERS]

@@ -1,0 +1,150 @@
+"""Springs, bushings, fields and beams as force elements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gearmbs.mechanism.elements import Compiled, ForceElement
+
+
+@dataclass(eq=False, repr=False)
+class LineSpring(ForceElement):
+    """Spring and damper along the line between two markers, SPRINGDAMPER.
+
+    Attributes
+    ----------
+    stiffness, damping, length, preload : float
+        N/m, N s/m, m, N; the force is ``preload`` at the length.
+    parameters : mapping
+        The same in the mechanism's units, for writing decks.
+    """
+
+    stiffness: float
+    damping: float
+    length: float
+    preload: float
+    parameters: Mapping[str, Any]
+
+    kind = "springdamper"
+    has_torque = False
+
+    def compiled(self) -> Compiled:
+        from gearmbs.mechanism.forces.spring_kernel import line_spring
+
+        return Compiled(line_spring, reals=(self.stiffness, self.damping, self.length, self.preload), scratch=6)
+
+    def __repr__(self) -> str:
+        return (
+            f"LineSpring({self.name!r}, {self.i.name!r} to {self.j.name!r}, {self.stiffness:g} N/m, "
+            f"{self.damping:g} N s/m, {self.preload:g} N at {self.length:g} m)"
+        )
+
+
+@dataclass(eq=False, repr=False)
+class AxisSpring(ForceElement):
+    """Spring and damper about the z axis of J, the rotational SPRINGDAMPER.
+
+    Attributes
+    ----------
+    stiffness, damping, angle, preload : float
+        N m/rad, N m s/rad, rad, N m; the torque is ``preload`` at the angle, which is counted through full turns.
+    parameters : mapping
+        The same in the mechanism's units, for writing decks.
+    """
+
+    stiffness: float
+    damping: float
+    angle: float
+    preload: float
+    parameters: Mapping[str, Any]
+
+    kind = "springdamper"
+    has_force = False
+
+    def compiled(self) -> Compiled:
+        from gearmbs.mechanism.forces.spring_kernel import axis_spring
+
+        reals = (self.stiffness, self.damping, self.angle, self.preload)
+        return Compiled(axis_spring, reals=reals, angles=((2, self.i, self.j),), scratch=9)
+
+    def __repr__(self) -> str:
+        return (
+            f"AxisSpring({self.name!r}, {self.i.name!r} about z of {self.j.name!r}, {self.stiffness:g} N m/rad, "
+            f"{self.damping:g} N m s/rad, {self.preload:g} N m at {self.angle:g} rad)"
+        )
+
+
+@dataclass(eq=False, repr=False)
+class MatrixForce(ForceElement):
+    """F = preload - K (q - free) - C q' in the axes of J.
+
+    Attributes
+    ----------
+    stiffness, damping : ndarray, shape (6, 6)
+    free, preload : ndarray, shape (6,)
+        SI; displacements and rotations of I in J's frame without load, and the load there.
+    parameters : mapping
+        What it was made from, in the mechanism's units, for writing decks.
+    """
+
+    stiffness: np.ndarray
+    damping: np.ndarray
+    free: np.ndarray
+    preload: np.ndarray
+    parameters: Mapping[str, Any]
+
+    kind = "field"
+
+    @property
+    def has_force(self) -> bool:  # type: ignore[override]
+        """Whether F is an unknown."""
+        return self._loaded(slice(0, 3))
+
+    @property
+    def has_torque(self) -> bool:  # type: ignore[override]
+        """Whether N is an unknown."""
+        return self._loaded(slice(3, 6))
+
+    def _loaded(self, rows: slice) -> bool:
+        return any(np.any(part[rows]) for part in (self.stiffness, self.damping, self.preload))
+
+    def compiled(self) -> Compiled:
+        from gearmbs.mechanism.forces.matrix_kernel import WORK, matrix_force
+
+        # an angle without stiffness is not looked at: it may be undetermined, as AX is when z_I stands across
+        used = [axis for axis in range(3) if np.any(self.stiffness[:, 3 + axis])]
+        places = [used.index(axis) if axis in used else -1 for axis in range(3)]
+        reals = np.concatenate([self.stiffness.ravel(), self.damping.ravel(), self.free, self.preload])
+        return Compiled(
+            matrix_force, places, reals, angles=tuple((axis, self.i, self.j) for axis in used), scratch=WORK
+        )
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name!r}, {self.i.name!r} in the axes of {self.j.name!r})"
+
+
+class Field(MatrixForce):
+    """Full matrices between two markers, FIELD."""
+
+
+class Bushing(MatrixForce):
+    """Springs and dampers along and about the axes of J, BUSHING."""
+
+    kind = "bushing"
+
+
+class Beam(MatrixForce):
+    """A massless beam from J to I along x of J, BEAM."""
+
+    kind = "beam"
+
+
+def in_si(matrix: np.ndarray, units: Any, rates: bool) -> np.ndarray:
+    """Return a stiffness or, for ``rates``, damping matrix given in a mechanism's units in SI."""
+    load = np.repeat([units.factor("force"), units.factor("torque")], 3)
+    shift = np.repeat([units.factor("length"), 1.0], 3) / (units.factor("time") if rates else 1.0)
+    return np.asarray(matrix, dtype=float) * load[:, None] / shift
