@@ -110,7 +110,7 @@ def test_magnet_keeps_to_keplers_orbit(formulation, integrator, derivatives):
     np.testing.assert_allclose(told["magnet_energy"], -0.1 / r, rtol=1e-10)
     np.testing.assert_allclose(told["pull"], np.linalg.norm(solution.load("magnet")[0], axis=1), rtol=1e-10)
     balance = solution.energy_balance()
-    assert np.ptp(balance.elastic) > 0.01
+    assert np.ptp(balance.elastic.values) > 0.01
     assert float(np.abs(balance.work_applied).max()) == 0.0
     assert balance.attrs["relative_imbalance"] < 1e-5
     data = solution.to_dataset()
@@ -164,11 +164,14 @@ def test_algebraic_state_solves_its_equation_from_the_start(formulation, integra
     solution = m.simulate(1.0, rate=200, formulation=formulation, integrator=integrator, tol=1e-9)
     assert solution.success, solution.message
     assert solution.load("spring")[0][0, 0] == pytest.approx(-force(x0), rel=1e-10)
+    # index 3 controls positions only; between steps the state is interpolated
     np.testing.assert_allclose(
-        solution.state("spring.load"), [force(x) for x in solution.com_position("block")[:, 0]], atol=1e-5
+        solution.state("spring.load"),
+        [force(x) for x in solution.com_position("block")[:, 0]],
+        atol=5e-3 if formulation == "I3" else 1e-5,
     )
     end = solve_ivp(lambda t, y: [y[1], -force(y[0])], (0, 1), [x0, 0], rtol=1e-10, atol=1e-12).y[0, -1]
-    assert solution.com_position("block")[-1, 0] == pytest.approx(end, abs=5e-6)
+    assert solution.com_position("block")[-1, 0] == pytest.approx(end, abs=2e-5 if formulation == "I3" else 5e-6)
 
 
 def falling() -> Mechanism:
@@ -279,7 +282,7 @@ def test_statics_and_modes():
 
 
 def test_an_own_state_takes_part_in_modes():
-    """Mass on a Maxwell element: s (m c s^2/k ...) = 0: m s^2 (1 + c s/k) + c s = 0."""
+    """Mass on a Maxwell element: m s^2 (1 + c s/k) + c s = 0; one of a pair of conjugate values is listed."""
     m = Mechanism("damper")
     block = m.body("block", 2.0, UNIT)
     m.translational("guide", block, m.ground, axis=(1, 0, 0))
@@ -288,7 +291,7 @@ def test_an_own_state_takes_part_in_modes():
     found = linear_modes(m).eigenvalues
     expected = np.roots([2.0 * 15.0 / 300.0, 2.0, 15.0, 0.0])
     for value in expected[np.abs(expected) > 1e-9]:
-        assert np.abs(found - value).min() < 1e-6 * abs(value)
+        assert min(np.abs(found - value).min(), np.abs(found - np.conj(value)).min()) < 1e-6 * abs(value)
 
 
 def test_decks_refuse_it_by_name():
@@ -308,12 +311,16 @@ def too_far(t, frames, states, parameters, wrench, rates, diagnostics):
     wrench[1, 0] = 1.0
 
 
+def column_too_far(t, frames, states, parameters, jac):
+    jac[0, 24] = 1.0
+
+
 def answers(t, frames, states, parameters, wrench, rates, diagnostics):
     return 3.0
 
 
-def is_text(t, frames, states, parameters, wrench, rates, diagnostics):
-    wrench[0, 0] = {"a": [1, "b"]}["a"][0]
+def uses_objects(t, frames, states, parameters, wrench, rates, diagnostics):
+    wrench[0, 0] = float(Mechanism is not None)
 
 
 def not_finite(t, frames, states, parameters, wrench, rates, diagnostics):
@@ -329,9 +336,9 @@ def rate_not_finite(t, frames, states, parameters, wrench, rates, diagnostics):
     [
         (no_frames, {}, r"kernel has to take the arguments \(t, frames, states, parameters, wrench"),
         (3.0, {}, "kernel = 3.0 is not a function"),
-        (too_far, {}, r"its kernel fails with index 1.*wrench \(1, 6\)"),
+        (too_far, {}, r"its kernel fails with: index 1.*wrench \(1, 6\)"),
         (answers, {}, "its kernel returns 3.0; let it write"),
-        (is_text, {}, "numba cannot compile kernel"),
+        (uses_objects, {}, "numba cannot compile kernel.*hand over what else it needs"),
         (nothing, {"parameters": {"stiffness": np.nan}}, "parameter stiffness = nan; give a finite number"),
         (nothing, {"parameters": ["a"]}, "give numbers, one a parameter"),
         (nothing, {"parameters": [[1.0]]}, r"parameters have the shape \(1, 1\)"),
@@ -341,7 +348,8 @@ def rate_not_finite(t, frames, states, parameters, wrench, rates, diagnostics):
         (nothing, {"states": {"z": 0.0}, "algebraic": {"z": 0.0}}, "state 'z' is given twice"),
         (nothing, {"diagnostics": [("heat", "W", "lost")]}, "'heat' has the role 'lost'; choose one of stored"),
         (nothing, {"diagnostics": [3]}, "diagnostic 3; give a name"),
-        (nothing, {"derivatives": no_frames}, r"derivatives has to take the arguments \(t, frames, states, parameters, j"),
+        (nothing, {"derivatives": no_frames}, r"derivatives has to take the arguments \(t, frames, states, param"),
+        (nothing, {"derivatives": column_too_far}, r"its derivatives fails with: index 24.*jac \(6, 24\)"),
         (nothing, {"steps": {"way": 1.0}}, "steps has no 'way'; there are length, angle"),
         (nothing, {"steps": {"length": 0.0}}, r"steps: length = 0\.0; it must be positive"),
     ],

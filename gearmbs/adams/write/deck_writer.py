@@ -382,7 +382,10 @@ class DeckWriter:
         elif is_gear_contact(element):
             gear_statements(self, name, element)
         else:
-            raise ModelError(f"element '{name}': {element!r} has no form in an ADAMS deck")
+            raise ModelError(
+                f"{element.kind} '{name}': it has a compiled function of its own, which has no form in an ADAMS deck; "
+                "describe it by expressions (Mechanism.load) or take it out of the mechanism first"
+            )
 
     def _load(self, name: str, load: Load) -> None:
         keyword = load_statement(load)

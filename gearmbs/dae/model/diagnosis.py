@@ -74,6 +74,16 @@ def check_finite(system: System, rhs: np.ndarray, loads: np.ndarray, t: float) -
         raise ModelError(f"body '{body}': its forces at t = {t:.6g} s are not finite")
 
 
+def check_states(system: System, rest: np.ndarray, t: float) -> None:
+    """Raise a ModelError that names the state whose equation, with ``rest`` its residual, is not finite."""
+    for name, value in zip(system.state_names, rest):
+        if not np.isfinite(value):
+            raise ModelError(
+                f"state '{name}': its rate at t = {t:.6g} s is not finite; look for a division by zero, or a root or "
+                "logarithm of a negative number"
+            )
+
+
 def body_of(model: Model, coordinate: int) -> str:
     """Return the name of the body a spatial displacement or modal coordinate belongs to."""
     bodies = len(model.names.bodies)

@@ -32,7 +32,7 @@ from gearmbs.dae.equations.rotation import (
 )
 from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, SI1
 from gearmbs.dae.equations.update import inertia_times
-from gearmbs.dae.errors import SingularModelError
+from gearmbs.dae.errors import ModelError, SingularModelError
 from gearmbs.dae.model import diagnosis, evaluator
 from gearmbs.dae.problem import DAEProblem
 
@@ -151,7 +151,7 @@ def accelerations(system: System, place: Configuration, t: float) -> tuple[np.nd
         If a load or a function of time has no finite value.
     """
     base = place.coordinates
-    inner: np.ndarray | None = None
+    inner = _algebraic_start(system, place, t)
     for attempt in range(MAX_LOAD_ITERATIONS if _coupled(system.model) else 1):
         found = system.assembler.at(place, t, inner, system.state_start)
         diagnosis.check_finite(system, found.rhs, found.loads, t)
@@ -169,6 +169,43 @@ def accelerations(system: System, place: Configuration, t: float) -> tuple[np.nd
         if last is not None and np.abs(inner - last).max() <= 1e-13 * (1e-3 + np.abs(inner).max()):
             break
     return solution[:base], solution[base:], found
+
+
+def _algebraic_start(system: System, place: Configuration, t: float) -> np.ndarray | None:
+    """Return F, N and z at a configuration whose algebraic states satisfy their equations, None without such states.
+
+    Newton's method from the given start; the loads follow the states, reactions are left out.
+    """
+    model, algebraic = system.model, np.flatnonzero(~system.model.differential_states)
+    if algebraic.size == 0:
+        return None
+    found = system.assembler.at(place, t, None, system.state_start)
+    y, first, z = found.y, int(found.idata[T.H_F]), int(found.idata[T.H_Z])
+    y[first:] = _inner(y, found.loads, found.idata)
+    codes = euler_references(place.pose)
+    indptr, indices, slots = jacobian.pattern(found.idata, found.rdata, found.work.size)
+    idata, rdata, size = model.pack(I3, slots, codes)
+    out, rest, vals, work = np.zeros(y.size), np.zeros(y.size), np.zeros(indices.size), np.zeros(size)
+    places = np.concatenate([np.arange(first, z), z + algebraic])
+    for _ in range(MAX_STATE_ITERATIONS):
+        residual.residual(t, y, rest, out, idata, rdata, work)
+        diagnosis.check_states(system, out[z:], t)
+        jacobian.jacobian(t, y, rest, 0.0, vals, idata, rdata, work)
+        matrix = csc_array((vals, indices, indptr), shape=(y.size, y.size))
+        try:
+            step = splu(csc_array(matrix[places][:, places])).solve(out[places])
+        except RuntimeError:
+            break
+        if not np.all(np.isfinite(step)):
+            break
+        y[places] -= step
+        if np.abs(step).max() <= 1e-12 * (1.0 + np.abs(y[places]).max()):
+            return y[first:].copy()
+    names = ", ".join(system.state_names[k] for k in algebraic)
+    raise ModelError(
+        f"algebraic states {names}: no values were found at t = {t:.6g} s that satisfy their equations; start them "
+        "nearer to their values"
+    )
 
 
 def _coupled(model: Model) -> bool:
@@ -216,7 +253,7 @@ def make_problem(system: System, formulation: str, rate_scale: float) -> DAEProb
     y[at["F"] : at["mu"]] = found.y[first:]
     (yp if form == SI1 else y)[at["lambda"] : at["lambda"] + len(lam)] = lam
     differential = model.differential_states
-    _settle_states(system, y, yp, slice(at["z"], at["mu"]), idata, rdata, work)
+    _state_rates(system, y, yp, slice(at["z"], at["mu"]), idata, rdata, work)
     _rates(y, yp, acc, system.t0, idata, rdata, work)
     largest = float(np.abs(found.loads[:, :3]).max(initial=0.0))
     scale = unknowns.scales(model.counts, form, model.bodies[1:], model.modal_sizes(), min(system.length, 1.0), largest)
@@ -249,6 +286,7 @@ def _hook_interval(model: Model, at: dict[str, int]):
     """Time in which no Euler angle comes near its singularity, and no counted angle turns by half a turn."""
     rates = slice(at["eps"], at["v_f"])
     counted = bool(np.any(model.terms[:, T.TERM_TYPE] == ANGLE)) or any(tape.n_angles for tape in model.tapes)
+    counted = counted or len(model.angles) > 0
 
     def interval(y: np.ndarray) -> float:
         rate = np.abs(y[rates]).reshape(-1, 3)
@@ -260,16 +298,17 @@ def _hook_interval(model: Model, at: dict[str, int]):
     return interval
 
 
-def _settle_states(system: System, y, yp, z: slice, idata, rdata, work) -> None:
-    """Iterate algebraic states to their definitions; set the rates of the differential ones."""
+def _state_rates(system: System, y, yp, z: slice, idata, rdata, work) -> None:
+    """Settle algebraic states to their definitions, which reactions may enter; set the rates of the others."""
     out = np.zeros(y.size)
     algebraic = ~system.model.differential_states
     for _ in range(MAX_STATE_ITERATIONS if algebraic.any() else 1):
         residual.residual(system.t0, y, yp, out, idata, rdata, work)
+        diagnosis.check_states(system, out[z], system.t0)
         correction = out[z] * algebraic
-        y[z] -= correction
         if np.abs(correction).max(initial=0.0) <= 1e-12 * (1.0 + np.abs(y[z]).max(initial=0.0)):
             break
+        y[z] -= correction
     yp[z] -= out[z] * ~algebraic
 
 

@@ -19,6 +19,9 @@ from gearmbs.mechanism.parts import Marker
 ARGUMENTS = ("t", "frames", "states", "parameters", "wrench", "rates", "diagnostics")
 DERIVATIVE_ARGUMENTS = ("t", "frames", "states", "parameters", "jac")
 
+KEPT_OPTIONS = ("fastmath", "inline", "boundscheck")
+"""Options of ``numba.njit`` with which a function that has been compiled already is compiled again."""
+
 STEP = 1e-6
 """Steps of differences, of the distances between the markers and of speeds; in rad."""
 SMALLEST = {"length": 1e-7, "angle": 1e-6, "speed": 1e-7, "angular_speed": 1e-7}
@@ -110,7 +113,7 @@ def function_force(
                     f"{label}: {title} '{key.removeprefix(f'{name}.')}' is given twice; choose another name"
                 )
     frames = np.array([_frame(marker) for marker in markers])
-    _try(label, kernel, frames, numbers, own, told)
+    _try(label, kernel, derivatives, frames, numbers, own, told)
     return FunctionForce(
         name,
         markers[0],
@@ -166,7 +169,7 @@ def _states(label: str, name: str, given: Any, algebraic: bool) -> list[State]:
 def _diagnostic(label: str, given: Any) -> Diagnostic:
     made = given if isinstance(given, Diagnostic) else None
     if made is None:
-        parts = (given,) if isinstance(given, str) else tuple(given)
+        parts = tuple(given) if isinstance(given, Sequence) and not isinstance(given, str) else (given,)
         if not 1 <= len(parts) <= 3 or not all(isinstance(part, str) for part in parts):
             raise ModelError(f"{label}: diagnostic {given!r}; give a name, or (name, unit, role) as texts")
         made = Diagnostic(*parts)
@@ -186,30 +189,41 @@ def _frame(marker: Marker) -> np.ndarray:
 
 
 def _try(
-    label: str, kernel: Any, frames: np.ndarray, parameters: np.ndarray, states: list[State],
+    label: str, kernel: Any, derivatives: Any, frames: np.ndarray, parameters: np.ndarray, states: list[State],
     diagnostics: tuple[Diagnostic, ...],
 ) -> None:  # fmt: skip
-    """Call a function once as plain Python, where places out of range are found, in copies of the present frames."""
-    python = getattr(kernel, "py_func", kernel)
-    _check_arguments(label, "kernel", python, ARGUMENTS)
-    wrench = np.zeros((len(frames) if len(frames) > 2 else 1, 6))
-    rates = np.zeros(len(states))
+    """Call the functions once as plain Python, where places out of range are found, with copies of the frames."""
     start = np.array([state.start for state in states])
+    wrench, rates, told = (
+        np.zeros((len(frames) if len(frames) > 2 else 1, 6)),
+        np.zeros(len(states)),
+        np.zeros(len(diagnostics)),
+    )
+    given = {"frames": frames, "states": start, "parameters": parameters}
+    results = {"wrench": wrench, "rates": rates, "diagnostics": told}
+    _try_one(label, "kernel", kernel, ARGUMENTS, given, results)
+    if derivatives is not None:
+        jac = np.zeros((wrench.size + rates.size, 12 * len(frames) + start.size))
+        _try_one(label, "derivatives", derivatives, DERIVATIVE_ARGUMENTS, given, {"jac": jac})
+
+
+def _try_one(
+    label: str, what: str, function: Any, expected: tuple[str, ...], given: dict[str, np.ndarray],
+    results: dict[str, np.ndarray],
+) -> None:  # fmt: skip
+    python = getattr(function, "py_func", function)
+    _check_arguments(label, what, python, expected)
     try:
         with np.errstate(all="ignore"):
-            answer = python(0.0, frames.copy(), start, parameters.copy(), wrench, rates, np.zeros(len(diagnostics)))
+            answer = python(0.0, *(part.copy() for part in given.values()), *results.values())
     except (IndexError, ValueError) as error:
-        raise ModelError(
-            f"{label}: its kernel fails with {error}; frames have the shape {frames.shape}, states ({len(states)},), "
-            f"parameters ({parameters.size},), wrench {wrench.shape}, rates ({len(states)},), "
-            f"diagnostics ({len(diagnostics)},)"
-        ) from error
+        shapes = ", ".join(f"{name} {part.shape}" for name, part in {**given, **results}.items())
+        raise ModelError(f"{label}: its {what} fails with: {error}; the shapes are {shapes}") from error
     except ZeroDivisionError:
         return
     if answer is not None:
-        raise ModelError(
-            f"{label}: its kernel returns {answer!r}; let it write to wrench, rates and diagnostics instead"
-        )
+        written = ", ".join(results)
+        raise ModelError(f"{label}: its {what} returns {answer!r}; let it write to {written} and return nothing")
 
 
 def _check_arguments(label: str, what: str, function: Any, expected: tuple[str, ...]) -> None:
@@ -222,10 +236,10 @@ def _check_arguments(label: str, what: str, function: Any, expected: tuple[str, 
 
 
 def _compiled(label: str, what: str, function: Any, signature: Any, expected: tuple[str, ...]) -> Any:
-    """Return a function compiled for a signature."""
-    python = getattr(function, "py_func", None)
-    _check_arguments(label, what, python or function, expected)
-    dispatcher: Any = function if python is not None else njit(error_model="numpy", nogil=True)(function)
+    """Return a function compiled for a signature; a division by zero gives no number and raises nothing."""
+    python = getattr(function, "py_func", function)
+    options = {key: value for key, value in getattr(function, "targetoptions", {}).items() if key in KEPT_OPTIONS}
+    dispatcher: Any = njit(error_model="numpy", nogil=True, **options)(python)
     try:
         dispatcher.compile(signature.args)
         found = dispatcher.overloads[signature.args].signature.return_type
@@ -237,7 +251,7 @@ def _compiled(label: str, what: str, function: Any, signature: Any, expected: tu
             f"({', '.join(expected)}); hand over what else it needs as parameters:\n{text}"
         ) from error
     if found != signature.return_type:
-        raise ModelError(f"{label}: {what} returns {found}; let it write to its last arguments and return nothing")
+        raise ModelError(f"{label}: {what} returns {found}; let it return nothing")
     return dispatcher
 
 
