@@ -11,8 +11,8 @@ from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations import time_functions
 from gearmbs.dae.equations.counted_angles import AXES as COUNTED
-from gearmbs.dae.equations.expressions import ExpressionError, Tape
-from gearmbs.dae.equations.expressions.tape import LEVEL_ACCELERATION, LEVEL_TIME
+from gearmbs.dae.equations.expressions import ExpressionError
+from gearmbs.dae.equations.expressions.opcodes import LEVEL_ACCELERATION, LEVEL_TIME
 from gearmbs.dae.equations.unknowns import I3, Counts, offsets
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.model.builder import TableBuilder
@@ -22,13 +22,13 @@ from gearmbs.dae.model.system import System
 from gearmbs.mechanism import elements as el
 from gearmbs.mechanism import joints as jt
 from gearmbs.mechanism.elements import ForceElement, Load, State
-from gearmbs.mechanism.expression_compiler import compile_expression
 from gearmbs.mechanism.expression_syntax import Scope
 from gearmbs.mechanism.functions import TimeFunction
 from gearmbs.mechanism.modal import ModalBody
 from gearmbs.mechanism.parts import Body, Marker
 
 if TYPE_CHECKING:
+    from gearmbs.dae.equations.expressions import Tape
     from gearmbs.mechanism.mechanism import Mechanism
 
 REACTION_KINDS = {
@@ -211,6 +211,9 @@ class _Compiler:
         return self._scope
 
     def tape(self, text: str, label: str, dimension: str) -> Tape:
+        """Return an expression bound to the unknowns; the compiler of expressions is loaded with the first."""
+        from gearmbs.mechanism.expression_compiler import compile_expression
+
         try:
             tape = compile_expression(text, self.scope(), dimension)
         except ExpressionError as error:

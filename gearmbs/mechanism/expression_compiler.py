@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.dae.equations.expressions.tape import LEVEL_ACCELERATION, ExpressionError, Tape, TapeBuilder
+from gearmbs.dae.equations.expressions.errors import ExpressionError
+from gearmbs.dae.equations.expressions.tape import Tape, TapeBuilder
 from gearmbs.mechanism.expression_functions import Lowering
 from gearmbs.mechanism.expression_library import FUNCTIONS
 from gearmbs.mechanism.expression_syntax import Scope, parse, shown
@@ -36,6 +37,6 @@ def compile_expression(text: str, scope: Scope, dimension: str = "number", accel
     result = lowering.node(parse(text))
     result = builder.binary(op.MUL, builder.constant(scope.units.factor(dimension)), result)
     tape = builder.finish(result, text)
-    if tape.level == LEVEL_ACCELERATION and not accelerations:
+    if tape.level == op.LEVEL_ACCELERATION and not accelerations:
         raise ExpressionError(f"accelerations can only be asked for in a REQUEST, not in {shown(text)}")
     return tape

@@ -8,7 +8,8 @@ from collections.abc import Callable, Mapping
 from typing import NoReturn
 
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.dae.equations.expressions.tape import ExpressionError, TapeBuilder
+from gearmbs.dae.equations.expressions.errors import ExpressionError
+from gearmbs.dae.equations.expressions.tape import TapeBuilder
 from gearmbs.mechanism.expression_syntax import (
     Call,
     Chain,

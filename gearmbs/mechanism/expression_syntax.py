@@ -11,8 +11,8 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from gearmbs.dae.equations.expressions.splines import SplineData
-from gearmbs.dae.equations.expressions.tape import ExpressionError
+from gearmbs.dae.equations.expressions.errors import ExpressionError
+from gearmbs.dae.equations.expressions.spline_data import SplineData
 
 MAX_DEPTH = 100
 """Deepest nesting of brackets, functions and signs."""

@@ -13,14 +13,15 @@ from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution
 from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.equations.counted_angles import AXES as ANGLE_NAMES
 from gearmbs.dae.equations.expressions import eval_gradient
+from gearmbs.dae.equations.expressions.errors import ExpressionError
 from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_R
-from gearmbs.dae.equations.expressions.tape import ExpressionError, Tape
+from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.dae.results.frames import frame_motion
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.compile import starting_angles
 from gearmbs.mechanism.expression_compiler import compile_expression
+from gearmbs.mechanism.expression_series import evaluate_series
 from gearmbs.mechanism.expression_syntax import Scope
-from gearmbs.mechanism.measures import evaluate_series
 
 COLUMNS = {
     "DISPLACEMENT": ("DM", "DX", "DY", "DZ", "", "PSI", "THETA", "PHI"),

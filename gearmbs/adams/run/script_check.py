@@ -10,7 +10,9 @@ from gearmbs.adams.parse.commands import Change, Linear, Script, Simulate, Stop,
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
 from gearmbs.adams.run.session import Session, change, output_times, switch, unsupported
-from gearmbs.dae.equations.expressions.tape import LEVEL_TIME, ExpressionError, Tape
+from gearmbs.dae.equations.expressions.errors import ExpressionError
+from gearmbs.dae.equations.expressions.opcodes import LEVEL_TIME
+from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.mechanism.expression_compiler import compile_expression
 
 SINGLE = ("STATICS", "INITIAL_CONDITIONS", "DISPLACEMENT", "VELOCITY", "ACCELERATION")

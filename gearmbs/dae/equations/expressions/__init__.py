@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
+    from gearmbs.dae.equations.expressions.errors import ExpressionError
     from gearmbs.dae.equations.expressions.evaluate import (
         angle_rates,
         eval_gradient,
@@ -14,8 +15,8 @@ if TYPE_CHECKING:
         eval_value,
         update_angles,
     )
-    from gearmbs.dae.equations.expressions.splines import SplineData
-    from gearmbs.dae.equations.expressions.tape import ExpressionError, Tape, TapeBuilder
+    from gearmbs.dae.equations.expressions.spline_data import SplineData
+    from gearmbs.dae.equations.expressions.tape import Tape, TapeBuilder
 
 __all__ = [
     "ExpressionError",
@@ -34,8 +35,8 @@ __all__ = [
 late(
     __name__,
     {
-        "ExpressionError": ".tape",
-        "SplineData": ".splines",
+        "ExpressionError": ".errors",
+        "SplineData": ".spline_data",
         "Tape": ".tape",
         "TapeBuilder": ".tape",
         "angle_rates": ".evaluate",

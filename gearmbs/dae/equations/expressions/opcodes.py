@@ -95,3 +95,11 @@ MAGNITUDE = 3
 """Axis operand of a vector leaf that asks for the vector's length."""
 GLOBAL = -1
 """Marker operand that stands for the global frame at the ground's origin."""
+
+LEVEL_CONSTANT = 0
+"""What an expression depends on at most; likewise the next."""
+LEVEL_TIME = 1
+LEVEL_POSITION = 2
+LEVEL_VELOCITY = 3
+LEVEL_ALGEBRAIC = 4
+LEVEL_ACCELERATION = 5

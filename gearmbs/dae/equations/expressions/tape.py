@@ -9,32 +9,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gearmbs.dae.equations.expressions import opcodes as op
+from gearmbs.dae.equations.expressions.errors import ExpressionError
 from gearmbs.dae.equations.expressions.evaluate import JACOBIAN_AT
 from gearmbs.dae.equations.expressions.integrals import integral_table, time_value
 from gearmbs.dae.equations.expressions.measures import LEAF_WORK
 from gearmbs.dae.equations.expressions.scalar import binary, unary
-from gearmbs.dae.equations.expressions.splines import SplineData, spline_table
-
-LEVEL_CONSTANT = 0
-LEVEL_TIME = 1
-LEVEL_POSITION = 2
-LEVEL_VELOCITY = 3
-LEVEL_ALGEBRAIC = 4
-LEVEL_ACCELERATION = 5
+from gearmbs.dae.equations.expressions.spline_data import SplineData, spline_table
 
 _LEAF_LEVEL = {
-    op.CONST: LEVEL_CONSTANT,
-    op.TIME: LEVEL_TIME,
-    op.DISPLACEMENT: LEVEL_POSITION,
-    op.COSINE: LEVEL_POSITION,
-    op.EULER_PARAMETER: LEVEL_POSITION,
-    op.VELOCITY: LEVEL_VELOCITY,
-    op.ANGULAR_VELOCITY: LEVEL_VELOCITY,
-    op.RADIAL_VELOCITY: LEVEL_VELOCITY,
-    op.ALGEBRAIC: LEVEL_ALGEBRAIC,
-    op.FORCE: LEVEL_ALGEBRAIC,
-    op.ACCELERATION: LEVEL_ACCELERATION,
-    op.ANGULAR_ACCELERATION: LEVEL_ACCELERATION,
+    op.CONST: op.LEVEL_CONSTANT,
+    op.TIME: op.LEVEL_TIME,
+    op.DISPLACEMENT: op.LEVEL_POSITION,
+    op.COSINE: op.LEVEL_POSITION,
+    op.EULER_PARAMETER: op.LEVEL_POSITION,
+    op.VELOCITY: op.LEVEL_VELOCITY,
+    op.ANGULAR_VELOCITY: op.LEVEL_VELOCITY,
+    op.RADIAL_VELOCITY: op.LEVEL_VELOCITY,
+    op.ALGEBRAIC: op.LEVEL_ALGEBRAIC,
+    op.FORCE: op.LEVEL_ALGEBRAIC,
+    op.ACCELERATION: op.LEVEL_ACCELERATION,
+    op.ANGULAR_ACCELERATION: op.LEVEL_ACCELERATION,
 }
 
 AlgebraicKey = tuple[Hashable, ...]
@@ -42,10 +36,6 @@ AlgebraicKey = tuple[Hashable, ...]
 
 AngleKey = tuple[str, int, int]
 """Name of a counted angle: function and indices of the markers I and J."""
-
-
-class ExpressionError(ValueError):
-    """A function expression that cannot be read or evaluated; says where and what to do."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +103,7 @@ class Tape:
     @property
     def constant(self) -> float | None:
         """The value when the expression is a constant, else None."""
-        if self.level != LEVEL_CONSTANT:
+        if self.level != op.LEVEL_CONSTANT:
             return None
         at = self.ints[op.HEAD_CODE] + op.WIDTH * self.ints[op.HEAD_RESULT]
         return float(self.floats[self.ints[at + 1]])
@@ -275,7 +265,7 @@ class TapeBuilder:
             Span over which the integral is tabulated; later times take longer to evaluate.
         """
         tape = self.finish(a)
-        if tape.level > LEVEL_TIME or tape.integrates:
+        if tape.level > op.LEVEL_TIME or tape.integrates:
             raise ExpressionError("only a function of TIME, itself without an integral, can be integrated")
         if not end > start:
             raise ExpressionError(f"the end {end} of the span must be later than its start {start}")
@@ -317,7 +307,7 @@ class TapeBuilder:
                     row[2] = angle_slot[c[2]]
         levels = [_LEAF_LEVEL[c[0]] for c in used if c[0] <= op.LAST_LEAF]
         if any(c[0] == op.INTEGRAL for c in used):
-            levels.append(LEVEL_TIME)
+            levels.append(op.LEVEL_TIME)
         smooth = {op.CONST, op.TIME, op.DISPLACEMENT, op.COSINE}
         body_at = op.HEAD_SIZE
         algebraic_at = body_at + len(bodies)
@@ -330,7 +320,7 @@ class TapeBuilder:
             bodies=tuple(bodies),
             algebraic=keys,
             n_angles=len(angle_slot),
-            level=max(levels, default=LEVEL_CONSTANT),
+            level=max(levels, default=op.LEVEL_CONSTANT),
             second_order=all(c[0] in smooth for c in used if c[0] <= op.LAST_LEAF),
             text=text,
             integrates=any(c[0] == op.INTEGRAL for c in used),
