@@ -51,8 +51,9 @@ def kernels(modules: Iterable[str]) -> list[Kernel]:
     names = set(modules)
     for name in names:
         importlib.import_module(name)
-    found = (k for k in gc.get_objects() if isinstance(k, Kernel) and k.__module__ in names)
-    return sorted((k for k in found if find(k.__module__, k.__name__) is k), key=address)
+    # by the type, for what a weak proxy stands for may be gone
+    found: list[Kernel] = [k for k in gc.get_objects() if issubclass(type(k), Kernel)]
+    return sorted((k for k in found if k.__module__ in names and k == find(k.__module__, k.__name__)), key=address)
 
 
 def find(module: str, name: str) -> Kernel | None:

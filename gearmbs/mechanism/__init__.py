@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
     from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
     from gearmbs.mechanism.elements import Compiled, ForceElement, Load, State, Torque
-    from gearmbs.mechanism.friction import JointFriction
+    from gearmbs.mechanism.friction_parameters import JointFriction
     from gearmbs.mechanism.functions import TimeFunction, constant, expression, harmonic, polynomial, ramp, step
     from gearmbs.mechanism.joints import Joint
     from gearmbs.mechanism.mechanism import Mechanism
@@ -58,7 +58,7 @@ late(
         "Diagnostic": "gearmbs.dae.equations.force_elements",
         "ForceElement": ".elements",
         "Joint": ".joints",
-        "JointFriction": ".friction",
+        "JointFriction": ".friction_parameters",
         "Load": ".elements",
         "Marker": ".parts",
         "Mechanism": ".mechanism",

@@ -1,4 +1,4 @@
-"""Joint friction in the manner of ADAMS: states and loads in the function language, made from a joint's reaction.
+"""Joint friction in the manner of ADAMS, from a joint's reaction.
 
 The friction on I's body opposes the slip s (m/s, components s_k in the marker J) of the joint's surfaces,
 
@@ -27,106 +27,26 @@ ADAMS Solver manual.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from gearmbs.dae.errors import ModelError
-from gearmbs.mechanism import elements as el
-from gearmbs.mechanism.elements import Load, State
+from gearmbs.mechanism.elements import State
 from gearmbs.mechanism.expression_syntax import Units
+from gearmbs.mechanism.forces.friction_force import FrictionForce
+from gearmbs.mechanism.friction_parameters import INPUTS, KINDS, JointFriction
+from gearmbs.mechanism.friction_text import friction_text
 from gearmbs.mechanism.joints import Joint
-from gearmbs.mechanism.parts import Marker
 from gearmbs.mechanism.quantities import quantity
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.mechanism import Mechanism
 
-INPUTS = ("preload", "reaction_force", "bending_moment", "torsional_moment")
-EFFECTS = ("all", "stiction", "sliding")
-OVERLAPS = {"constant": 0.0, "increasing": 1.0, "decreasing": -1.0}
-KINDS = ("revolute", "translational", "cylindrical", "spherical", "universal")
-TINY = 1e-6
-"""Forces, in the unit of force, and slips, in transition velocities, below which lengths of vectors are rounded off."""
-
-
-@dataclass(frozen=True)
-class JointFriction:
-    """Parameters of a joint's friction, in the mechanism's units (SI unless read from a deck).
-
-    Attributes
-    ----------
-    mu_static, mu_dynamic : float
-        Coefficients of friction.
-    stiction_transition_velocity : float
-        Slip speed below which the joint sticks.
-    max_stiction_deformation : float
-        Deformation in the joint at which sticking gives way; 0: friction is a function of the slip speed alone.
-    effect : {"all", "stiction", "sliding"}
-        Both, no friction beyond the transition, or no increase of the coefficient at rest (without deformation).
-    inputs : sequence of str
-        What presses the surfaces together: preload, reaction_force, bending_moment, torsional_moment.
-    preload_force, preload_torque : float
-        Friction of the unloaded joint.
-    pin_radius, friction_arm, bending_arm : float
-        Revolute and universal: radius of the pin, arm of the axial force, arm that turns the bending moment into a
-        force. Cylindrical: the radius.
-    reaction_arm, overlap : float
-        Translational: arm that turns the torsional moment into a force. Translational and cylindrical: length that
-        turns the bending moment into a force.
-    overlap_change : {"constant", "increasing", "decreasing"}
-        How the overlap changes with the displacement.
-    ball_radius : float
-        Spherical.
-    yoke : {"i", "j"}
-        Universal: the arm with friction.
-    max_force, max_torque : float, optional
-        The most the friction can be: force of translational, torque of the other joints, both of cylindrical ones.
-    """
-
-    mu_static: float
-    mu_dynamic: float
-    stiction_transition_velocity: float = 1e-3
-    max_stiction_deformation: float = 1e-5
-    effect: str = "all"
-    inputs: tuple[str, ...] = INPUTS
-    preload_force: float = 0.0
-    preload_torque: float = 0.0
-    pin_radius: float = 0.0
-    friction_arm: float = 0.0
-    bending_arm: float = 0.0
-    reaction_arm: float = 0.0
-    overlap: float = 0.0
-    overlap_change: str = "constant"
-    ball_radius: float = 0.0
-    yoke: str = "i"
-    max_force: float | None = None
-    max_torque: float | None = None
-
-    def check(self, name: str) -> None:
-        """Raise a ModelError that names a wrong parameter."""
-        label = f"friction '{name}'"
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if isinstance(value, (int, float)) and not (np.isfinite(value) and value >= 0.0):
-                raise ModelError(f"{label}: {f.name} = {value}; it must not be negative")
-        for field, known in (("effect", EFFECTS), ("overlap_change", tuple(OVERLAPS)), ("yoke", ("i", "j"))):
-            if getattr(self, field) not in known:
-                raise ModelError(f"{label}: {field} = {getattr(self, field)!r}; choose one of {', '.join(known)}")
-        for item in self.inputs:
-            if item not in INPUTS:
-                raise ModelError(f"{label}: inputs has {item!r}; choose from {', '.join(INPUTS)}")
-        if not self.stiction_transition_velocity > 0.0:
-            raise ModelError(f"{label}: stiction_transition_velocity must be positive")
-        for field in ("max_force", "max_torque"):
-            if getattr(self, field) == 0.0:
-                raise ModelError(f"{label}: {field} must be positive; leave it out for no limit")
-        if not self.mu_dynamic > 0.0:
-            raise ModelError(f"{label}: mu_dynamic = {self.mu_dynamic}; it must be positive")
-        if self.mu_static < self.mu_dynamic and self.effect != "sliding":
-            raise ModelError(f"{label}: mu_static = {self.mu_static} is less than mu_dynamic = {self.mu_dynamic}")
-
+NEEDED = {
+    "revolute": ("pin_radius",), "universal": ("pin_radius",), "cylindrical": ("pin_radius",),
+    "spherical": ("ball_radius",),
+}  # fmt: skip
+"""Lengths without which there is no friction, by the kind of joint."""
 
 DIMENSIONS = {
     "stiction_transition_velocity": ("speed", "velocity"),
@@ -167,8 +87,8 @@ def friction_of(name: str, mu_static: float, mu_dynamic: float, parameters: dict
     return JointFriction(mu_static, mu_dynamic, **given)
 
 
-def add_friction(mechanism: Mechanism, name: str, joint: Joint, friction: JointFriction) -> list[Load]:
-    """Add a joint's friction to a mechanism: its states, variables and loads; return the loads.
+def add_friction(mechanism: Mechanism, name: str, joint: Joint, friction: JointFriction) -> list[FrictionForce]:
+    """Add a joint's friction to a mechanism, and variables with what it is made of; return the force element.
 
     Raises
     ------
@@ -178,178 +98,14 @@ def add_friction(mechanism: Mechanism, name: str, joint: Joint, friction: JointF
     friction.check(name)
     if joint.kind not in KINDS:
         raise ModelError(f"friction '{name}': joint '{joint.name}' is {joint.kind}; it must be {', '.join(KINDS)}")
-    return _Writer(mechanism, name, joint, friction).add()
+    for field in NEEDED.get(joint.kind, ()):
+        if not getattr(friction, field) > 0.0:
+            raise ModelError(f"friction '{name}': {field} is needed for a {joint.kind} joint")
+    text = friction_text(name, joint, friction, mechanism.units)
+    for key, expression in text.variables.items():
+        mechanism.variable(key, expression)
+    states = tuple(State(key) for key in text.states)
+    return [mechanism.add(FrictionForce(name, joint.i, joint.j, joint, friction, mechanism.units, states, text))]
 
 
-class _Writer:
-    """Writes one joint's friction in the function language."""
-
-    def __init__(self, mechanism: Mechanism, name: str, joint: Joint, friction: JointFriction) -> None:
-        self.mechanism, self.name, self.joint, self.f = mechanism, name, joint, friction
-        self.i, self.j = joint.i, joint.j
-        self.vs = float(friction.stiction_transition_velocity)
-        self.keys: list[str] = []
-        """Names of the variables and states it adds."""
-
-    def add(self) -> list[Load]:
-        return getattr(self, f"_{self.joint.kind}")()
-
-    # --- joints -------------------------------------------------------------------------------------
-
-    def _revolute(self) -> list[Load]:
-        return self._pin(self.j)
-
-    def _universal(self) -> list[Load]:
-        return self._pin(self.i if self.f.yoke == "i" else self.j)
-
-    def _pin(self, frame: Marker) -> list[Load]:
-        """A pin about z of ``frame``: N r = r F_radial + a |F_axial| + (r/b) T_bending."""
-        radius = self._needed("pin_radius")
-        arm = self._lever("bending_moment", "bending_arm")
-        parts = []
-        if "reaction_force" in self.f.inputs:
-            parts.append(f"{radius!r}*{self._length(frame, (2, 3))}")
-            parts.append(f"{float(self.f.friction_arm)!r}*{self._length(frame, (4,))}")
-        if arm:
-            parts.append(f"{radius / arm!r}*{self._length(frame, (6, 7), radius)}")
-        moment = self._variable("moment", " + ".join(parts) or "0")
-        slip = f"{radius!r}*WZ({_ref(self.i)},{_ref(self.j)},{_ref(frame)})"
-        mu = self._coefficients([slip])[0]
-        text = _at_most(self._resisting(mu, moment, self.f.preload_torque), self.f.max_torque)
-        return [self._load(el.AXIS_TORQUE, (text,), frame)]
-
-    def _translational(self) -> list[Load]:
-        parts = self._across()
-        arm = self._lever("torsional_moment", "reaction_arm")
-        if arm:
-            parts.append(f"{self._length(self.j, (8,), arm)}/{arm!r}")
-        normal = self._variable("normal", " + ".join(parts) or "0")
-        a, c = _ref(self.i), _ref(self.j)
-        mu = self._coefficients([f"VZ({a},{c},{c},{c})"])[0]
-        text = _at_most(self._resisting(mu, normal, self.f.preload_force), self.f.max_force)
-        return [self._load(el.AXIS_FORCE, (text,), self.j)]
-
-    def _cylindrical(self) -> list[Load]:
-        """Slip along and about the axis: one surface, so both share the coefficient."""
-        radius = self._needed("pin_radius")
-        normal = self._variable("normal", " + ".join(self._across()) or "0")
-        a, c = _ref(self.i), _ref(self.j)
-        along, about = self._coefficients([f"VZ({a},{c},{c},{c})", f"{radius!r}*WZ({a},{c},{c})"])
-        force = _at_most(self._resisting(along, normal, self.f.preload_force), self.f.max_force)
-        torque = _at_most(self._resisting(about, f"{radius!r}*{normal}", self.f.preload_torque), self.f.max_torque)
-        return [self._load(el.COMPONENTS, (None, None, force, None, None, torque), self.j)]
-
-    def _spherical(self) -> list[Load]:
-        radius = self._needed("ball_radius")
-        used = "reaction_force" in self.f.inputs
-        normal = self._variable("normal", self._length(self.j, (2, 3, 4)) if used else "0")
-        a, c = _ref(self.i), _ref(self.j)
-        mu = self._coefficients([f"{radius!r}*W{x}({a},{c},{c})" for x in "XYZ"])
-        torque = [self._resisting(m, f"{radius!r}*{normal}", self.f.preload_torque) for m in mu]
-        if self.f.max_torque is not None:
-            parts = [self._variable(f"torque{k + 1}", text) for k, text in enumerate(torque)]
-            most = float(self.f.max_torque)
-            size = f"SQRT({' + '.join(f'{p}**2' for p in parts)} + {(TINY * most) ** 2!r})"
-            share = self._variable("share", f"MIN(1, {most!r}/{size})")
-            torque = [f"{p}*{share}" for p in parts]
-        return [self._load(el.COMPONENTS, (None, None, None, *torque), self.j)]
-
-    # --- pieces -------------------------------------------------------------------------------------
-
-    def _needed(self, field: str) -> float:
-        value = float(getattr(self.f, field))
-        if not value > 0.0:
-            raise ModelError(f"friction '{self.name}': {field} is needed for a {self.joint.kind} joint")
-        return value
-
-    def _lever(self, moment: str, field: str) -> float:
-        """Return the lever of a moment, 0 where it does not count."""
-        return float(getattr(self.f, field)) if moment in self.f.inputs else 0.0
-
-    def _across(self) -> list[str]:
-        """Return the force across z of J and what the bending moment over the overlap adds."""
-        parts = [self._length(self.j, (2, 3))] if "reaction_force" in self.f.inputs else []
-        overlap = self._lever("bending_moment", "overlap")
-        if overlap:
-            length = f"{overlap!r}"
-            sign = OVERLAPS[self.f.overlap_change]
-            if sign:
-                a, c = _ref(self.i), _ref(self.j)
-                apart = self.i.global_position() - self.j.global_position()
-                start = float(self.j.global_orientation()[:, 2] @ apart) / self.mechanism.units.length
-                length = f"({overlap!r} + {sign!r}*(DZ({a},{c},{c}) - ({start!r})))"
-            parts.append(f"{self._length(self.j, (6, 7), overlap)}/{length}")
-        return parts
-
-    def _length(self, frame: Marker, components: tuple[int, ...], scale: float = 1.0) -> str:
-        """Return the length of components, as JOINT counts them (2-4 force, 6-8 torque), of the joint's reaction."""
-        squares = [f'JOINT("{self.joint.name}",0,{c},{_ref(frame)})**2' for c in components]
-        return f"SQRT({' + '.join(squares)} + {(TINY * (scale if components[0] > 5 else 1.0)) ** 2!r})"
-
-    def _variable(self, what: str, text: str) -> str:
-        key = f"{self.name}.{what}"
-        self.keys.append(key)
-        self.mechanism.variable(key, text)
-        return f'VARVAL("{key}")'
-
-    def _resisting(self, mu: str, normal: str, preload: float) -> str:
-        kept = float(preload) / self.f.mu_dynamic if "preload" in self.f.inputs else 0.0
-        return f"-{mu}*({normal} + {kept!r})" if kept else f"-{mu}*{normal}"
-
-    def _limit(self, speed: str) -> str:
-        """g(V)."""
-        dynamic = 1e-6 * self.f.mu_static if self.f.effect == "stiction" else self.f.mu_dynamic
-        static = self.f.mu_dynamic if self.f.effect == "sliding" else self.f.mu_static
-        return f"STEP({speed},{self.vs!r},{static!r},{1.5 * self.vs!r},{dynamic!r})"
-
-    def _coefficients(self, slips: list[str]) -> list[str]:
-        """Return mu_k for the components of the slip."""
-        s = [self._variable(f"slip{k + 1}", text) for k, text in enumerate(slips)]
-        if len(s) == 1:
-            speed = f"ABS({s[0]})"
-        else:
-            floor = (TINY * self.vs) ** 2
-            squares = " + ".join(f"{x}**2" for x in s)
-            speed = f"SQRT({squares} + {floor!r})"
-        speed = self._variable("speed", speed)
-        if self.f.effect == "sliding" or self.f.max_stiction_deformation == 0.0:
-            return [self._variable(f"mu{k + 1}", text) for k, text in enumerate(self._by_velocity(s, speed))]
-        return [self._variable(f"mu{k + 1}", text) for k, text in enumerate(self._by_deformation(s, speed))]
-
-    def _by_velocity(self, slips: list[str], speed: str) -> list[str]:
-        static = self.f.mu_dynamic if self.f.effect == "sliding" else self.f.mu_static
-        inside = f"{0.5 * static / self.vs!r}*(3 - ({speed}/{self.vs!r})**2)"
-        outside = f"{self._limit(speed)}/MAX({speed},{0.5 * self.vs!r})"
-        per_slip = self._variable("mu_per_slip", f"IF({speed} - {self.vs!r}: {inside}, {inside}, {outside})")
-        return [f"{s}*{per_slip}" for s in slips]
-
-    def _by_deformation(self, slips: list[str], speed: str) -> list[str]:
-        m = self.mechanism
-        deformation = float(self.f.max_stiction_deformation)
-        stiffness = self.f.mu_static / deformation
-        limit = self._variable("limit", self._limit(speed))
-        tau = deformation / self.vs
-        damping = self._variable("damping", f"{tau!r}*STEP({speed},{self.vs!r},1,{1.5 * self.vs!r},0)")
-        found = []
-        for k, slip in enumerate(slips):
-            key = f"{self.name}.deformation{k + 1}"
-            z = f'DIF("{key}")'
-            rate = self._variable(f"rate{k + 1}", f"{slip} - {stiffness!r}*{speed}*{z}/{limit}")
-            text = rate if m.units.time == 1.0 else f"({rate})/{m.units.time!r}"
-            self.keys.append(key)
-            m.states[key] = State(key, text, 0.0)
-            found.append(f"{stiffness!r}*({z} + {damping}*{rate})")
-        return found
-
-    def _load(self, mode: int, expressions: tuple[str | None, ...], frame: Marker) -> Load:
-        made = {"joint": self.joint, "friction": self.f, "keys": tuple(self.keys)}
-        return self.mechanism._add_load(Load(self.name, "friction", self.i, self.j, frame, mode, expressions, made))
-
-
-def _at_most(text: str, most: float | None) -> str:
-    """Return an expression kept between -most and most."""
-    return text if most is None else f"MAX({-float(most)!r}, MIN({float(most)!r}, {text}))"
-
-
-def _ref(marker: Marker) -> str:
-    return f'"{marker.name}"'
+__all__ = ["INPUTS", "KINDS", "JointFriction", "add_friction", "friction_of"]

@@ -15,6 +15,7 @@ from gearmbs.dae.model.system import System
 from gearmbs.mechanism import joints as jt
 from gearmbs.mechanism.elements import ForceElement, Load, State, Torque
 from gearmbs.mechanism.expression_syntax import Units
+from gearmbs.mechanism.forces.friction_force import FrictionForce
 from gearmbs.mechanism.forces.function_force import FunctionForce, function_force
 from gearmbs.mechanism.friction import add_friction, friction_of
 from gearmbs.mechanism.function_text import integrated
@@ -476,7 +477,9 @@ class Mechanism(LoadMethods):
         )  # fmt: skip
         return self.add(made)
 
-    def friction(self, name: str, joint: jt.Joint, mu_static: float, mu_dynamic: float, **parameters) -> list[Load]:
+    def friction(
+        self, name: str, joint: jt.Joint, mu_static: float, mu_dynamic: float, **parameters
+    ) -> list[FrictionForce]:
         """Add dry friction to a revolute, translational, cylindrical, spherical or universal joint.
 
         It depends on the joint's reaction and its slip speed as in ADAMS.

@@ -277,3 +277,31 @@ def test_errors_name_the_parameter(kind, options, words):
     joint = m.joint(kind, "joint", m.body("b", 1.0, (1, 1, 1)), m.ground)
     with pytest.raises(ModelError, match=words):
         m.friction("friction", joint, 0.3, 0.2, **options)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "translational", "cylindrical", "spherical", "universal"])
+@pytest.mark.parametrize("deformation", [0.0, 0.01])
+def test_the_kernel_agrees_with_the_function_language(kind, deformation):
+    """Decks have the friction as expressions, on which a second body moves exactly as with the kernel."""
+    from gearmbs.adams import parse_deck, write_deck
+
+    def swinging(looked_into: bool) -> Mechanism:
+        m = Mechanism("dry", gravity=(1, 2, -9.81))
+        body = m.body("body", 1.0, (0.1, 0.2, 0.3), position=(0.3, 0, 0), angular_velocity=(0.5, 1, 0.5))
+        i = body.marker((-0.3, 0, 0), axis=(0, 1, 0), name="i")
+        j = m.ground.marker(axis=(1, 0, 0) if kind == "universal" else (0, 1, 0), name="j")
+        lengths = {"pin_radius": 0.05, "friction_arm": 0.02, "bending_arm": 0.2, "ball_radius": 0.03, "overlap": 2.0,
+                   "overlap_change": "decreasing", "reaction_arm": 0.3}  # fmt: skip
+        m.friction("dry", m.joint(kind, "pin", i, j), 0.3, 0.2, preload_force=0.1, preload_torque=0.02,
+                   stiction_transition_velocity=0.05, max_stiction_deformation=deformation, **lengths)  # fmt: skip
+        if looked_into:
+            m.axis_torque("nothing", i, j, '0*VARVAL("dry.speed")')
+        return m
+
+    text = write_deck(swinging(True))
+    assert "FRICTION/" not in text
+    assert ("DIFF/" in text) == (deformation > 0.0)
+    one, two = (m.simulate(0.2, rate=50, tol=1e-9) for m in (swinging(False), parse_deck(text).to_mechanism()))
+    np.testing.assert_allclose(two.com_position("body"), one.com_position("body"), atol=1e-8)
+    for part in range(2):
+        np.testing.assert_allclose(two.load("dry")[part], one.load("dry")[part], atol=2e-7)

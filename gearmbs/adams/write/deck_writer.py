@@ -11,7 +11,7 @@ import numpy as np
 
 from gearmbs.adams.builders.constraints import JOINT_KINDS, JPRIM_KINDS
 from gearmbs.adams.parse.units import TABLES
-from gearmbs.adams.write.elements import KEYWORDS, element_arguments, hidden, kept
+from gearmbs.adams.write.elements import KEYWORDS, as_expressions, element_arguments, hidden, kept, states_of
 from gearmbs.adams.write.gears import gear_statements, is_gear_contact
 from gearmbs.adams.write.output import integrator_statement, request_statements
 from gearmbs.adams.write.text import listed, number, wrapped
@@ -23,6 +23,7 @@ from gearmbs.mechanism.elements import AXIS_FORCE, AXIS_TORQUE, LINE, Load
 from gearmbs.mechanism.elements import COMPONENTS as COMPONENT_MODE
 from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
 from gearmbs.mechanism.expression_syntax import Call, Name, Node, Number, parse, shown, unparse
+from gearmbs.mechanism.forces.friction_force import FrictionForce
 from gearmbs.mechanism.function_text import function_text
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Body, Marker
@@ -108,7 +109,8 @@ class DeckWriter:
         self.kept = kept(mechanism)
         self._hidden = hidden(mechanism)
         self.variables = self._numbered(mechanism.variables)
-        self.states = self._numbered(mechanism.states)
+        self.all_states = states_of(mechanism)
+        self.states = self._numbered(self.all_states)
         self.splines = {_upper(k): n for n, k in enumerate(mechanism.splines, 1)}
         self.arrays = {_upper(k): n for n, k in enumerate(mechanism.arrays, 1)}
         self.plants = {(kind, _upper(k)): n for n, (kind, k) in enumerate(mechanism.plants, 1)}
@@ -243,7 +245,7 @@ class DeckWriter:
         for name in self.mechanism.constraints:
             yield name, "gcon"
         for name, element in self.mechanism.elements.items():
-            yield name, self.kept.get(name) or load_statement(element).lower()
+            yield name, self.kept.get(name) or load_statement(as_expressions(element)).lower()
 
     def _parts(self) -> None:
         for body in (self.mechanism.ground, *self.mechanism.bodies.values()):
@@ -347,7 +349,7 @@ class DeckWriter:
                 continue
             n = self.variables[_upper(key)]
             self.statement(f"VARIABLE/{n}", [f"FUNCTION = {self.expression(text)}"], str(key))
-        for key, state in m.states.items():
+        for key, state in self.all_states.items():
             if _upper(key) in self._hidden:
                 continue
             if state.algebraic:
@@ -374,8 +376,8 @@ class DeckWriter:
         if name in self.kept:
             kind = self.kept[name]
             self.statement(f"{KEYWORDS[kind]}/{self.elements[kind, name]}", element_arguments(self, element), name)
-        elif isinstance(element, Load):
-            self._load(name, element)
+        elif isinstance(element, Load | FrictionForce):
+            self._load(name, as_expressions(element))
         elif isinstance(element, Torque):
             text = self.expression(function_text(element.function, self.units.time, self.units.factor("torque")))
             self._gforce(name, element.i, element.j, element.axis, {"TZ": text})

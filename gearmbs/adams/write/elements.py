@@ -13,7 +13,8 @@ import numpy as np
 from gearmbs.adams.write.context import WriterContext
 from gearmbs.adams.write.text import listed, number
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.elements import Load
+from gearmbs.mechanism.elements import Load, State
+from gearmbs.mechanism.forces.friction_force import FrictionForce
 from gearmbs.mechanism.forces.springs import LineSpring
 from gearmbs.mechanism.friction import INPUTS, JointFriction
 from gearmbs.mechanism.joints import Joint
@@ -47,7 +48,7 @@ def kept(mechanism: Mechanism) -> dict[str, str]:
     found = {}
     for name, load in mechanism.elements.items():
         made = getattr(load, "parameters", None) is not None and load.kind in KEYWORDS
-        if made and (not isinstance(load, Load) or load.rm is load.j):
+        if made and not isinstance(load, Load):
             if load.kind != "friction" or not _used_elsewhere(mechanism, name, load):
                 found[name] = load.kind
     return found
@@ -71,6 +72,22 @@ def element_arguments(writer: WriterContext, load: Any) -> list[str]:
     if load.kind == "springdamper":
         return [*_spring(load, p)[:1], *ends, *_spring(load, p)[1:]]
     return [*ends, *{"bushing": _bushing, "field": _field, "beam": _beam}[load.kind](p)]
+
+
+def as_expressions(element: Any) -> Any:
+    """Return the load by expressions that stands for a friction; other elements as they are."""
+    return element.text.load if isinstance(element, FrictionForce) else element
+
+
+def states_of(mechanism: Mechanism) -> dict[Any, State]:
+    """Return the states that are written: those of the mechanism, and of frictions that are written as expressions."""
+    found: dict[Any, State] = dict(mechanism.states)
+    whole = kept(mechanism)
+    for name, element in mechanism.elements.items():
+        if isinstance(element, FrictionForce) and name not in whole:
+            for state, text in zip(element.states, element.text.states.values()):
+                found[state.name] = State(state.name, text, state.start)
+    return found
 
 
 def _parameters(load: Any) -> Mapping[str, Any]:

@@ -69,6 +69,15 @@ def build(kind: str) -> Mechanism:
     elif kind == "field":
         matrices = rng.standard_normal((2, 6, 6))
         m.field("joint", i, j, stiffness=matrices[0], damping=matrices[1], free=range(6), preload=(1, 2, 3, 4, 5, 6))
+    elif kind.startswith("friction"):
+        name = kind.split()[-1]
+        joint = m.joint(name, "pin", i, j)
+        lengths = {"pin_radius": 0.3, "friction_arm": 0.2, "bending_arm": 0.4, "ball_radius": 0.3}
+        if name in ("translational", "cylindrical"):
+            lengths |= {"reaction_arm": 0.6, "overlap": 30.0, "overlap_change": "increasing"}
+        by = {"max_stiction_deformation": 0.0 if kind.startswith("friction by speed") else 0.05}
+        m.friction("joint", joint, 0.3, 0.2, stiction_transition_velocity=1.1, preload_force=0.4, preload_torque=0.7,
+                   yoke="i", **by, **lengths)  # fmt: skip
     elif kind.startswith("reaction"):
         joints = {
             "reaction of a revolute joint": lambda: m.revolute("pin", i, j),
@@ -99,8 +108,13 @@ LOADS = [
     "field",
 ]
 REACTIONS = [f"reaction of a {k}" for k in ("revolute joint", "translational joint", "distance", "screw", "motion")]
+FRICTIONS = [
+    f"friction{by} {k}"
+    for k in ("revolute", "translational", "cylindrical", "spherical", "universal")
+    for by in ("", " by speed")
+]
 OTHERS = ["screw", "distance", "rotation", "translation", "coupler", "torque", "grounded revolute"]
-KINDS = [*JOINTS, *LOADS, *REACTIONS, *OTHERS]
+KINDS = [*JOINTS, *LOADS, *REACTIONS, *FRICTIONS, *OTHERS]
 
 
 def unassembled_problem(m: Mechanism, formulation: str):
