@@ -76,7 +76,7 @@ def build(kind: str) -> Mechanism:
         if name in ("translational", "cylindrical"):
             lengths |= {"reaction_arm": 0.6, "overlap": 30.0, "overlap_change": "increasing"}
         by = {"max_stiction_deformation": 0.0 if kind.startswith("friction by speed") else 0.05}
-        m.friction("joint", joint, 0.3, 0.2, stiction_transition_velocity=1.1, preload_force=0.4, preload_torque=0.7,
+        m.friction("joint", joint, 0.3, 0.2, stiction_transition_velocity=2.3, preload_force=0.4, preload_torque=0.7,
                    yoke="i", **by, **lengths)  # fmt: skip
     elif kind.startswith("reaction"):
         joints = {
