@@ -53,6 +53,8 @@ def lumped(mechanism: Mechanism, t0: float = 0.0) -> Lumped | None:
     * if its reaction enters an expression;
     * if a general constraint names a marker of one of its bodies: what it exerts is known of the composite only.
 
+    A mechanism with modal bodies stays as it is.
+
     Raises
     ------
     ModelError
@@ -60,7 +62,7 @@ def lumped(mechanism: Mechanism, t0: float = 0.0) -> Lumped | None:
     """
     whole = mechanism.compile(t0)
     whole.initialise()
-    joints = _joints_inside(mechanism, whole)
+    joints = [] if any(whole.model.modes) else _joints_inside(mechanism, whole)
     if not joints:
         return None
     return _Lumping(mechanism, whole, joints).run(t0)

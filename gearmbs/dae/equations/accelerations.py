@@ -221,11 +221,11 @@ def put_modal_body(mode, slot, vals, k, y, at, modal, kin_row, rhs):
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
     """Assemble the saddle-point matrix (by slots) and right-hand side; return the number of entries.
 
-    The kinematics, marker and function tables must be up to date. Without loads (0) the right-hand side lacks the
+    The kinematics, marker and function tables must be up to date. Without loads the right-hand side lacks the
     applied forces: enough for a projection.
 
     ``phi`` receives 3 values a row one after the other: Phi, Phi_q v + Phi_t, Phi_t.
@@ -317,7 +317,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
                     k = put_pair(mode, slot, vals, k, base + r, q + c, room[6 * b + c])
         rhs[base + r] = -gamma
         phi[3 * r], phi[3 * r + 1], phi[3 * r + 2] = value, rate, partial
-    if mode == NUMBERS and with_loads != 0:
+    if mode == NUMBERS and with_loads:
         for f in range(idata[T.H_FORCES]):
             row = tab.force[f]
             wrench = vector_at(tab.scratch, S_WRENCH, 6)

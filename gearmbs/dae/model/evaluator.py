@@ -156,6 +156,27 @@ def unchanged(vals, before, allowed):
     return True
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def project(t, at, phi, plan, factors, pair, idata, tab):
+    """Move y to the nearest position and velocity, in the metric of the masses, that satisfy the constraints.
+
+    Brings the tables up to date with it; returns the largest |Phi| before.
+    """
+    rows = idata[T.H_ROWS]
+    base = pair.shape[1] - rows
+    strayed = 0.0
+    for c in range(base):
+        pair[0, c] = pair[1, c] = 0.0
+    for r in range(rows):
+        strayed = max(strayed, abs(phi[3 * r]))
+        pair[0, base + r] = 0.0 if abs(phi[3 * r]) > FARTHEST else -phi[3 * r]
+        pair[1, base + r] = -phi[3 * r + 1]
+    solve_pair(plan, factors, pair)
+    index1.displace(at, pair[0], pair[1], idata, tab)
+    update_tables(t, at, tab)
+    return strayed
+
+
 @njit(
     int64(int64, int64, _VEC, _MAT, _IVEC, _IVEC, _VEC, _VEC, _VEC, PLAN_TYPE, FACTORS_TYPE, RECORDS_TYPE, float64),
     cache=True,
@@ -188,48 +209,41 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
         for c in range(at.size):
             at[c] = y[k, c]
         phi, loads = records.phi[k], records.loads[k]
-        if idata[T.H_MODE] == NUMBERS:
-            vals[:] = 0.0
         update_tables(t[k], at, tab)
-        if only_assemble:
-            count = index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
-            records.solution[k, :] = rhs
-            if idata[T.H_MODE] == COUNT:
-                vals[0] = count
-            return last
-        if counts_turns:
+        if counts_turns and not only_assemble:
             track(t[k], at, tab, False)
-        if rows > 0:
-            # the nearest position and velocity, in the metric of the masses, that satisfy the constraints; the
-            # factors of the row before serve while the bodies have hardly turned since
-            spin = index1.violations(t[k], at, phi, idata, tab)
-            if k == first or spin * (t[k] - t[k - 1]) > SAME_POSITION:
-                index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(0))
+        projected = rows == 0 or only_assemble
+        passes = 0
+        while True:
+            if not projected:
+                # the factors of the row before serve while the bodies have hardly turned since
+                spin = index1.violations(t[k], at, phi, idata, tab)
+                if k > first and spin * (t[k] - t[k - 1]) <= SAME_POSITION:
+                    records.strayed[k] = project(t[k], at, phi, plan, factors, pair, idata, tab)
+                    projected = True
+            if idata[T.H_MODE] == NUMBERS:
+                vals[:] = 0.0
+            count = index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, projected)
+            if only_assemble:
+                records.solution[k, :] = rhs
+                if idata[T.H_MODE] == COUNT:
+                    vals[0] = count
+                return last
+            if passes == 0 and not unchanged(vals, factored, allowed):
                 if not factor(plan, factors, vals) <= growth:
                     return k
                 factored[:] = vals
-                vals[:] = 0.0
-            pair[:2, :base] = 0.0
-            records.strayed[k] = 0.0
-            for r in range(rows):
-                records.strayed[k] = max(records.strayed[k], abs(phi[3 * r]))
-                pair[0, base + r] = 0.0 if abs(phi[3 * r]) > FARTHEST else -phi[3 * r]
-                pair[1, base + r] = -phi[3 * r + 1]
-            solve_pair(plan, factors, pair)
-            index1.displace(at, pair[0], pair[1], idata, tab)
-            update_tables(t[k], at, tab)
-        index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
-        if not unchanged(vals, factored, allowed):
-            if not factor(plan, factors, vals) <= growth:
-                return k
-            factored[:] = vals
-        solve(plan, factors, rhs, records.solution[k])
-        for _ in range(REACTION_PASSES if has_reactions else 0):
+            if not projected:
+                records.strayed[k] = project(t[k], at, phi, plan, factors, pair, idata, tab)
+                projected = True
+                continue
+            solve(plan, factors, rhs, records.solution[k])
             # loads that depend on reactions change the right-hand side only
+            passes += 1
+            if not has_reactions or passes > REACTION_PASSES:
+                break
             if renew_reactions(at, records.solution[k, base:], idata, tab) <= 1e-12:
                 break
-            index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, np.int64(1))
-            solve(plan, factors, rhs, records.solution[k])
         index1.loads_of_rows(records.solution[k, base:], idata, tab, records.force[k], records.moment[k])
         index1.poses(at, tab.at, tab.code, tab.kin, records.pose[k])
     return last
