@@ -43,6 +43,21 @@ for _kind, _blocks in {
         HESSIAN_BLOCKS[(_kind, *_block)] = True
 
 
+S_FIRST_I = 0
+S_FIRST_J = S_FIRST_I + 9
+"""In the scratch of `hessian`: first derivatives of the arms, or of two factors, three 3-vectors each."""
+S_VECTOR = S_FIRST_J + 9
+"""A global direction, the separation, or an axis turned by a motion."""
+S_AXIS = S_VECTOR + 3
+S_SINE = S_AXIS + 3
+S_COSINE = S_SINE + 3
+"""Gradients of sine and cosine of an angle by the rotations of I."""
+S_FIRST_AXIS = S_COSINE + 3
+"""First derivatives of the axis of J."""
+S_COLUMNS = S_FIRST_AXIS + 9
+"""Derivatives of P_I - P_J by the twelve coordinates, a 3-vector each."""
+
+
 @njit("float64(float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
 def dot3(a, i, b, j):
     return a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2]
@@ -67,7 +82,19 @@ def copy3(a, i, out, k, factor):
     error_model="numpy",
 )
 def separation(kin, frame, bi, bj, i, j, out, k):
-    """Write P_I - P_J (global) to ``out[k:k+3]``."""
+    """Write P_I - P_J (global) to ``out[k:k+3]``.
+
+    Parameters
+    ----------
+    kin, frame : ndarray
+        Kinematics of the bodies and frames of the markers, up to date.
+    bi, bj : int
+        Bodies of the markers.
+    i, j : int
+        Markers.
+    out : ndarray
+    k : int
+    """
     for c in range(3):
         out[k + c] = kin[bi, KIN_R + c] + frame[i, c] - kin[bj, KIN_R + c] - frame[j, c]
 
@@ -92,7 +119,25 @@ def turned_axes(frame, j, f, out, k, k2):
 
 @njit(cache=True, error_model="numpy")
 def gradient(k, term, fval, reference, marker_body, kin, frame, scratch, g, gt):
-    """Return (phi, phi_t); write the spatial gradient to ``g[0:12]`` and that of phi_t to ``gt[0:12]``."""
+    """Return (phi, phi_t); write the spatial gradient of each.
+
+    Parameters
+    ----------
+    k : int
+        Number of the term.
+    term : ndarray of int, shape (terms, TERM_COLUMNS)
+    fval : ndarray, shape (functions, 3)
+        Functions of time with two derivatives.
+    reference : ndarray
+        Expected values of the counted angles.
+    marker_body : ndarray of int
+        Body of each marker.
+    kin, frame : ndarray
+        Kinematics of the bodies and frames of the markers, up to date.
+    scratch : ndarray
+    g, gt : ndarray, 12 entries
+        Receive the gradients of phi and of its partial time derivative: dR, dpi of I's body, then of J's.
+    """
     kind = term[k, T.TERM_TYPE]
     i, j = term[k, T.TERM_I], term[k, T.TERM_J]
     bi, bj = marker_body[i], marker_body[j]
@@ -253,21 +298,53 @@ def second_derivative_dot(axes, d, b, k, m, n):
     error_model="numpy",
 )
 def product_hessian(axes_i, axes_j, a, ka, b, kb, factor, hess, s):
-    """Add ``factor`` times the Hessian of a . b (a fixed in I, b in J) over the angle blocks."""
-    first_derivatives(axes_i, a, ka, s[0:9])
-    first_derivatives(axes_j, b, kb, s[9:18])
+    """Add ``factor`` times the Hessian of a . b over the angle blocks.
+
+    Parameters
+    ----------
+    axes_i, axes_j : ndarray
+        Kinematics of the bodies of I and J.
+    a, b : ndarray
+        Vectors fixed in I and in J, from their entries ``ka`` and ``kb`` on.
+    ka, kb : int
+    factor : float
+    hess : ndarray, shape (12, 12)
+        Is added to.
+    s : ndarray
+        Scratch.
+    """
+    first_i, first_j = s[S_FIRST_I:S_FIRST_J], s[S_FIRST_J:S_VECTOR]
+    first_derivatives(axes_i, a, ka, first_i)
+    first_derivatives(axes_j, b, kb, first_j)
     for m in range(3):
         for n in range(3):
-            hess[3 + m, 3 + n] += factor * second_derivative_dot(axes_i, s[0:9], b, kb, m, n)
-            hess[9 + m, 9 + n] += factor * second_derivative_dot(axes_j, s[9:18], a, ka, m, n)
-            cross_term = factor * dot3(s, 3 * m, s, 9 + 3 * n)
+            hess[3 + m, 3 + n] += factor * second_derivative_dot(axes_i, first_i, b, kb, m, n)
+            hess[9 + m, 9 + n] += factor * second_derivative_dot(axes_j, first_j, a, ka, m, n)
+            cross_term = factor * dot3(first_i, 3 * m, first_j, 3 * n)
             hess[3 + m, 9 + n] += cross_term
             hess[9 + n, 3 + m] += cross_term
 
 
 @njit(cache=True, error_model="numpy")
 def hessian(k, term, fval, marker_body, kin, frame, hess, s):
-    """Write the Hessian of term k over [R_I, theta_I, R_J, theta_J] to ``hess[12, 12]``; ``s`` is scratch."""
+    """Write the Hessian of term k over [R_I, theta_I, R_J, theta_J] to ``hess``.
+
+    Parameters
+    ----------
+    k : int
+        Number of the term.
+    term : ndarray of int, shape (terms, TERM_COLUMNS)
+    fval : ndarray, shape (functions, 3)
+        Functions of time with two derivatives.
+    marker_body : ndarray of int
+        Body of each marker.
+    kin, frame : ndarray
+        Kinematics of the bodies and frames of the markers, up to date.
+    hess : ndarray, shape (12, 12)
+        Receives the result.
+    s : ndarray
+        Scratch, the places ``S_*``.
+    """
     kind = term[k, T.TERM_TYPE]
     i, j = term[k, T.TERM_I], term[k, T.TERM_J]
     bi, bj = marker_body[i], marker_body[j]
@@ -279,77 +356,99 @@ def hessian(k, term, fval, marker_body, kin, frame, hess, s):
         a = T.MK_AXES + 3 * (term[k, T.TERM_AXES] // 3)
         b = T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3)
         product_hessian(ki, kj, frame[i], a, frame[j], b, 1.0, hess, s)
-        return
-    if kind == ROTATION:
-        fun = term[k, T.TERM_FUNCTION]
-        f = fval[fun, 0]
-        turned_axis(frame, j, f, s, 20)
-        product_hessian(ki, kj, frame[i], T.MK_AXES, s[20:23], 0, 1.0, hess, s)
-        return
-    if kind == ANGLE:
-        a = T.MK_AXES
-        sn = dot3(frame[i], a, frame[j], a + 3)
-        cn = dot3(frame[i], a, frame[j], a)
-        rho = cn * cn + sn * sn
-        product_hessian(ki, kj, frame[i], a, frame[j], a + 3, cn / rho, hess, s)
-        product_hessian(ki, kj, frame[i], a, frame[j], a, -sn / rho, hess, s)
-        cross3(frame[i], a, frame[j], a + 3, s, 30)
-        cross3(frame[i], a, frame[j], a, s, 33)
-        for m in range(3):
-            s[m] = dot3(ki, KIN_AXES + 3 * m, s, 30)
-            s[6 + m] = dot3(ki, KIN_AXES + 3 * m, s, 33)
-            s[3 + m] = -dot3(kj, KIN_AXES + 3 * m, s, 30)
-            s[9 + m] = -dot3(kj, KIN_AXES + 3 * m, s, 33)
-        ss, cc, sc = -2.0 * sn * cn / rho**2, 2.0 * sn * cn / rho**2, (sn * sn - cn * cn) / rho**2
-        for m in range(6):
-            row = 3 + m if m < 3 else 6 + m
-            for n in range(6):
-                col = 3 + n if n < 3 else 6 + n
-                hess[row, col] += ss * s[m] * s[n] + cc * s[6 + m] * s[6 + n] + sc * (s[m] * s[6 + n] + s[6 + m] * s[n])
-        return
-    first_derivatives(ki, frame[i], 0, s[0:9])
-    first_derivatives(kj, frame[j], 0, s[9:18])
-    if kind == POINT:
-        s[20] = s[21] = s[22] = 0.0
-        s[20 + term[k, T.TERM_AXES]] = 1.0
-        for m in range(3):
-            for n in range(3):
-                hess[3 + m, 3 + n] = second_derivative_dot(ki, s[0:9], s, 20, m, n)
-                hess[9 + m, 9 + n] = -second_derivative_dot(kj, s[9:18], s, 20, m, n)
-        return
-    separation(kin, frame, bi, bj, i, j, s, 20)
-    if kind == DOT2:
-        b = T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3)
-        copy3(frame[j], b, s, 24, 1.0)
-        first_derivatives(kj, s, 24, s[30:39])
-        for m in range(3):
-            for n in range(3):
-                hess[m, 9 + n] = hess[9 + n, m] = s[30 + 3 * n + m]
-                hess[6 + m, 9 + n] = hess[9 + n, 6 + m] = -s[30 + 3 * n + m]
-                hess[3 + m, 3 + n] = second_derivative_dot(ki, s[0:9], s, 24, m, n)
-                hess[3 + m, 9 + n] = dot3(s, 3 * m, s, 30 + 3 * n)
-                hess[9 + n, 3 + m] = hess[3 + m, 9 + n]
-                hess[9 + m, 9 + n] = (
-                    second_derivative_dot(kj, s[30:39], s, 20, m, n)
-                    - second_derivative_dot(kj, s[9:18], s, 24, m, n)
-                    - dot3(s, 30 + 3 * m, s, 9 + 3 * n)
-                    - dot3(s, 30 + 3 * n, s, 9 + 3 * m)
-                )
-        return
-    length = np.sqrt(dot3(s, 20, s, 20))
-    copy3(s, 20, s, 20, 1.0 / length)
-    # columns of d(P_I - P_J)/dq, one 3-vector each, in s[30:66]
+    elif kind == ROTATION:
+        turned_axis(frame, j, fval[term[k, T.TERM_FUNCTION], 0], s, S_VECTOR)
+        product_hessian(ki, kj, frame[i], T.MK_AXES, s[S_VECTOR:S_AXIS], 0, 1.0, hess, s)
+    elif kind == ANGLE:
+        angle_hessian(ki, kj, frame[i], frame[j], hess, s)
+    else:
+        first_derivatives(ki, frame[i], T.MK_ARM, s[S_FIRST_I:S_FIRST_J])
+        first_derivatives(kj, frame[j], T.MK_ARM, s[S_FIRST_J:S_VECTOR])
+        if kind == POINT:
+            s[S_VECTOR] = s[S_VECTOR + 1] = s[S_VECTOR + 2] = 0.0
+            s[S_VECTOR + term[k, T.TERM_AXES]] = 1.0
+            add_arm_hessians(ki, kj, 1.0, hess, s)
+            return
+        separation(kin, frame, bi, bj, i, j, s, S_VECTOR)
+        if kind == DOT2:
+            offset_hessian(ki, kj, frame[j], T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3), hess, s)
+        else:
+            distance_hessian(ki, kj, hess, s)
+
+
+@njit(cache=True, error_model="numpy")
+def angle_hessian(ki, kj, frame_i, frame_j, hess, s):
+    """Write the Hessian of the angle of x_I about z_J from x_J, atan2(sine, cosine)."""
+    a = T.MK_AXES
+    sn = dot3(frame_i, a, frame_j, a + 3)
+    cn = dot3(frame_i, a, frame_j, a)
+    rho = cn * cn + sn * sn
+    product_hessian(ki, kj, frame_i, a, frame_j, a + 3, cn / rho, hess, s)
+    product_hessian(ki, kj, frame_i, a, frame_j, a, -sn / rho, hess, s)
+    cross3(frame_i, a, frame_j, a + 3, s, S_SINE)
+    cross3(frame_i, a, frame_j, a, s, S_COSINE)
+    by_sine, by_cosine = s[S_FIRST_I : S_FIRST_I + 6], s[S_FIRST_I + 6 : S_FIRST_I + 12]
     for m in range(3):
-        for c in range(3):
-            s[30 + 3 * m + c] = 1.0 if m == c else 0.0
-            s[48 + 3 * m + c] = -1.0 if m == c else 0.0
-            s[39 + 3 * m + c] = s[3 * m + c]
-            s[57 + 3 * m + c] = -s[9 + 3 * m + c]
-    for m in range(12):
-        along = dot3(s, 20, s, 30 + 3 * m)
-        for n in range(12):
-            hess[m, n] = (dot3(s, 30 + 3 * m, s, 30 + 3 * n) - along * dot3(s, 20, s, 30 + 3 * n)) / length
+        by_sine[m] = dot3(ki, KIN_AXES + 3 * m, s, S_SINE)
+        by_cosine[m] = dot3(ki, KIN_AXES + 3 * m, s, S_COSINE)
+        by_sine[3 + m] = -dot3(kj, KIN_AXES + 3 * m, s, S_SINE)
+        by_cosine[3 + m] = -dot3(kj, KIN_AXES + 3 * m, s, S_COSINE)
+    ss, cc, sc = -2.0 * sn * cn / rho**2, 2.0 * sn * cn / rho**2, (sn * sn - cn * cn) / rho**2
+    for m in range(6):
+        row = 3 + m if m < 3 else 6 + m
+        for n in range(6):
+            col = 3 + n if n < 3 else 6 + n
+            mixed = by_sine[m] * by_cosine[n] + by_cosine[m] * by_sine[n]
+            hess[row, col] += ss * by_sine[m] * by_sine[n] + cc * by_cosine[m] * by_cosine[n] + sc * mixed
+
+
+@njit(cache=True, error_model="numpy")
+def add_arm_hessians(ki, kj, factor, hess, s):
+    """Add the second derivatives of the two arms along the vector at ``S_VECTOR`` to the angle blocks."""
     for m in range(3):
         for n in range(3):
-            hess[3 + m, 3 + n] += second_derivative_dot(ki, s[0:9], s, 20, m, n)
-            hess[9 + m, 9 + n] -= second_derivative_dot(kj, s[9:18], s, 20, m, n)
+            at_i = second_derivative_dot(ki, s[S_FIRST_I:S_FIRST_J], s, S_VECTOR, m, n)
+            at_j = second_derivative_dot(kj, s[S_FIRST_J:S_VECTOR], s, S_VECTOR, m, n)
+            hess[3 + m, 3 + n] += factor * at_i
+            hess[9 + m, 9 + n] -= factor * at_j
+
+
+@njit(cache=True, error_model="numpy")
+def offset_hessian(ki, kj, frame_j, axis, hess, s):
+    """Write the Hessian of an axis of J times (P_I - P_J)."""
+    copy3(frame_j, axis, s, S_AXIS, 1.0)
+    first_derivatives(kj, s, S_AXIS, s[S_FIRST_AXIS:S_COLUMNS])
+    turned = S_FIRST_AXIS
+    for m in range(3):
+        for n in range(3):
+            hess[m, 9 + n] = hess[9 + n, m] = s[turned + 3 * n + m]
+            hess[6 + m, 9 + n] = hess[9 + n, 6 + m] = -s[turned + 3 * n + m]
+            hess[3 + m, 3 + n] = second_derivative_dot(ki, s[S_FIRST_I:S_FIRST_J], s, S_AXIS, m, n)
+            hess[3 + m, 9 + n] = dot3(s, S_FIRST_I + 3 * m, s, turned + 3 * n)
+            hess[9 + n, 3 + m] = hess[3 + m, 9 + n]
+            hess[9 + m, 9 + n] = (
+                second_derivative_dot(kj, s[S_FIRST_AXIS:S_COLUMNS], s, S_VECTOR, m, n)
+                - second_derivative_dot(kj, s[S_FIRST_J:S_VECTOR], s, S_AXIS, m, n)
+                - dot3(s, turned + 3 * m, s, S_FIRST_J + 3 * n)
+                - dot3(s, turned + 3 * n, s, S_FIRST_J + 3 * m)
+            )
+
+
+@njit(cache=True, error_model="numpy")
+def distance_hessian(ki, kj, hess, s):
+    """Write the Hessian of |P_I - P_J|, the vector itself at ``S_VECTOR``."""
+    length = np.sqrt(dot3(s, S_VECTOR, s, S_VECTOR))
+    copy3(s, S_VECTOR, s, S_VECTOR, 1.0 / length)
+    for m in range(3):
+        for c in range(3):
+            column = S_COLUMNS + 3 * m + c
+            s[column] = 1.0 if m == c else 0.0
+            s[column + 18] = -s[column]
+            s[column + 9] = s[S_FIRST_I + 3 * m + c]
+            s[column + 27] = -s[S_FIRST_J + 3 * m + c]
+    for m in range(12):
+        along = dot3(s, S_VECTOR, s, S_COLUMNS + 3 * m)
+        for n in range(12):
+            across = along * dot3(s, S_VECTOR, s, S_COLUMNS + 3 * n)
+            hess[m, n] = (dot3(s, S_COLUMNS + 3 * m, s, S_COLUMNS + 3 * n) - across) / length
+    add_arm_hessians(ki, kj, 1.0, hess, s)
