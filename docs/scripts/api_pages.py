@@ -1,4 +1,4 @@
-"""Pages of the API reference, written from what each room exports."""
+"""Pages of the API reference, written from what each package exports."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import gearmbs
 
-ROOMS = {
+PACKAGES = {
     "gearmbs.mechanism": "Mechanism: bodies, markers, joints, motions, forces",
     "gearmbs.gears": "Gears: wheels, pairs, laws, static analyses",
     "gearmbs.contact": "Contact: compiled kernels",
@@ -109,14 +109,14 @@ MORE = {
     },
     "gearmbs.units": {"gearmbs.units": ["to_si"], "gearmbs.compile": ["compile_all"]},
 }
-"""Names worth a page that their room does not export; names that do not exist are an error."""
+"""Names worth a page that their package does not export; names that do not exist are an error."""
 
 
-def entries(room: str) -> list[str]:
-    """Return the full names of the objects of a room that get a page."""
-    module = importlib.import_module(room)
-    names = [f"{room}.{name}" for name in getattr(module, "__all__", ()) if _documented(getattr(module, name))]
-    for home, more in MORE.get(room, {}).items():
+def entries(package: str) -> list[str]:
+    """Return the full names of the objects of a package that get a page."""
+    module = importlib.import_module(package)
+    names = [f"{package}.{name}" for name in getattr(module, "__all__", ()) if _documented(getattr(module, name))]
+    for home, more in MORE.get(package, {}).items():
         source = importlib.import_module(home)
         for name in _own(source) if more is EVERYTHING else source.__all__ if more is EXPORTED else more:
             getattr(source, name)
@@ -125,9 +125,9 @@ def entries(room: str) -> list[str]:
     return names
 
 
-def constants(room: str) -> list[str]:
-    """Return where the exported constants of a room are defined, by their full names there."""
-    return [f"{home}.{name}" for name, home in CONSTANTS.get(room, {}).items()]
+def constants(package: str) -> list[str]:
+    """Return where the exported constants of a package are defined, by their full names there."""
+    return [f"{home}.{name}" for name, home in CONSTANTS.get(package, {}).items()]
 
 
 def _own(module) -> list[str]:
@@ -145,21 +145,21 @@ def _documented(value: object) -> bool:
 
 
 def write(folder: Path) -> None:
-    """Write one page a room; files whose text is the same are left alone."""
+    """Write one page per package; files whose text is the same are left alone."""
     folder.mkdir(exist_ok=True)
-    for room, title in ROOMS.items():
-        about = (importlib.import_module(room).__doc__ or "").strip()
-        lines = [title, "=" * len(title), "", f"Module ``{room}``.", "", about, ""]
+    for package, title in PACKAGES.items():
+        about = (importlib.import_module(package).__doc__ or "").strip()
+        lines = [title, "=" * len(title), "", f"Module ``{package}``.", "", about, ""]
         lines += [".. autosummary::", "   :toctree: objects", "   :nosignatures:", ""]
-        lines += [f"   {name}" for name in entries(room)]
-        if room in CONSTANTS or any(home in DESCRIBED for home in (room, *MORE.get(room, {}))):
+        lines += [f"   {name}" for name in entries(package)]
+        if package in CONSTANTS or any(home in DESCRIBED for home in (package, *MORE.get(package, {}))):
             lines += ["", "Constants", "---------"]
-        for name in constants(room):
+        for name in constants(package):
             lines += ["", f".. autodata:: {name}", "   :no-value:"]
-        for home in (room, *MORE.get(room, {})):
+        for home in (package, *MORE.get(package, {})):
             for name, text in DESCRIBED.get(home, {}).items():
                 lines += ["", f".. py:data:: {home}.{name}", "", f"   {text}"]
-        _write(folder / f"{room.rpartition('.')[2]}.rst", "\n".join(lines) + "\n")
+        _write(folder / f"{package.rpartition('.')[2]}.rst", "\n".join(lines) + "\n")
 
 
 def _write(path: Path, text: str) -> None:

@@ -26,7 +26,7 @@ class Diagnostic:
         here, such as graphics) or "warning".
     message : str
     file : str
-        "" for what stands in no file.
+        "" for what is in no file.
     line : int
         Counted from 1; 0 for the whole file.
     """

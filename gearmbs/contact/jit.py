@@ -1,4 +1,4 @@
-"""The one way this room compiles: cached, without Python's division checks, one version of each kernel."""
+"""The one way kernels of this package are compiled: cached, without Python's division checks, one version each."""
 
 from __future__ import annotations
 

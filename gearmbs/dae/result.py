@@ -38,7 +38,7 @@ class Status(enum.IntEnum):
     USER_ERROR = -8, "A user function raised an exception."
     NEWTON_FAILURE = -9, "The corrector did not converge even with a fresh Jacobian at the smallest step."
     SOLVER_FAILURE = -10, "The external integrator gave up."
-    CONFLICTING_CONSTRAINTS = -11, "A constraint set aside as redundant was violated by the motion."
+    CONFLICTING_CONSTRAINTS = -11, "A constraint removed as redundant was violated by the motion."
 
 
 @dataclass

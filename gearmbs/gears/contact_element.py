@@ -40,12 +40,12 @@ class GearContact(ForceElement):
         return Compiled(contact_force, integers, reals, ((gear_contact, GEAR_CONTACT_SIG),), scratch=scratch)
 
     def check(self) -> None:
-        """Look at where the two wheels stand at the start.
+        """Check the initial distance of the two wheels.
 
         Raises
         ------
         ModelError
-            If they stand in each other: closer than the sum of their base radii.
+            If they overlap: closer than the sum of their base radii.
 
         Warns
         -----

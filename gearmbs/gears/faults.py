@@ -1,4 +1,4 @@
-"""Faults and deviations of teeth: what is wrong, how bad, and what it is called.
+"""Faults and deviations of teeth: kind, severity and label.
 
 Each is a small frozen description with a severity and a label; ``GearPair.faults`` takes any number of them and they
 combine by addition. Lengths are in m or text with a unit, angles in rad or text.

@@ -1,4 +1,4 @@
-"""Contact and friction laws as a person states them; the compiled forms live in ``gearmbs.contact.laws``."""
+"""Contact and friction laws as users define them; the compiled forms are in ``gearmbs.contact.laws``."""
 
 from __future__ import annotations
 

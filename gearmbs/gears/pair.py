@@ -1,4 +1,4 @@
-"""A gear pair as a person states it: wheels and their places, contact, operating point and faults in one object."""
+"""The gear pair as users define it: wheels and their placement, contact, operating point and faults in one object."""
 
 from __future__ import annotations
 
@@ -235,7 +235,7 @@ class GearPair(PairGeometry):
         Raises
         ------
         ModelError
-            If the wheels stand in each other. Wheels out of reach give a warning.
+            If the wheels overlap. Wheels that cannot reach each other give a warning.
         """
         from gearmbs.gears.contact_element import GearContact
 

@@ -75,7 +75,7 @@ def contact_pattern(
     sections : int
         Along the face, up to 300.
     side : {"drive", "coast"}
-        Flank to look at; the coast flanks are loaded when misalignment jams the teeth.
+        Flank to analyse; the coast flanks are loaded when misalignment jams the teeth.
     tooth : int
         Of the driver; numbers wrap around the wheel.
 

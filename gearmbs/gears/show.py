@@ -1,4 +1,4 @@
-"""Tables for people: what a wheel and a pair are, in the units of a drawing."""
+"""Tables of a wheel and a pair in the units of a drawing, for terminals and notebooks."""
 
 from __future__ import annotations
 

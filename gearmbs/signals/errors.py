@@ -1,4 +1,4 @@
-"""Errors of the signals room: what is wrong, where, and what to do about it."""
+"""Errors of the signals package: what is wrong, where, and what to do about it."""
 
 from __future__ import annotations
 

@@ -226,7 +226,7 @@ def _format(path: Path, format: str | None) -> str:
         if suffix in SUFFIXES:
             return SUFFIXES[suffix]
     raise SignalFileError(
-        path, f"its ending {path.suffix!r} tells no format; use one of {', '.join(SUFFIXES)} or pass format=..."
+        path, f"its ending {path.suffix!r} determines no format; use one of {', '.join(SUFFIXES)} or pass format=..."
     )
 
 

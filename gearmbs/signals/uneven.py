@@ -20,7 +20,7 @@ MARGIN = 64
 """Samples interpolated beyond the span where the times reach so far, so that the filter's ends lie outside."""
 
 BLOCK = 4096
-"""Samples that come out of the filter at a time, so that what it looks at stays in the processor's cache."""
+"""Samples that come out of the filter at a time, so that its input stays in the processor's cache."""
 
 
 def even_signal(
@@ -107,7 +107,7 @@ def _fine(
     wanted: tuple[int, int],
     half: int,
 ) -> np.ndarray:
-    """Return the samples at ``factor`` times the rate that a filter of half length ``half`` looks at.
+    """Return the samples at ``factor`` times the rate that a filter of half length ``half`` spans.
 
     ``span`` and ``wanted`` are the first and last sample, at the rate itself, of what is known and of what is to come
     out of the filter. Beyond the span the values are continued by point reflection in its end samples.

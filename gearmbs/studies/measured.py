@@ -14,7 +14,7 @@ from gearmbs.studies.limits import edge
 
 SMOOTH = {"normal_force": "N", "penetration_drive": "m", "penetration_back": "m"}
 COUNTS = {"pairs_drive": "1", "pairs_back": "1"}
-"""What a record tells of the contact, with units; numbers of pairs cannot be interpolated."""
+"""Contact quantities of a record, with units; numbers of tooth pairs cannot be interpolated."""
 
 TURN_BEFORE = 0.02
 """Turns of the faster wheel between the steps that are looked at before the span of a record's filters."""
@@ -68,7 +68,7 @@ def rows_of_record(case: Case, t: np.ndarray) -> np.ndarray:
 
 
 def span_begin(case: Case) -> float:
-    """Return the time from which on the filters of a record look at a signal, s."""
+    """Return the time at which the span of a record's filters begins, s."""
     operation = case.operation
     return operation.run_up + operation.settling - edge(case) - (MARGIN + 1) / case.solver.output_rate
 

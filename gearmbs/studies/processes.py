@@ -73,8 +73,8 @@ def run_jobs(
             at_work[ours] = waiting.pop()
             ours.send(jobs[at_work[ours]])
         while at_work:
-            told = set(wait(list(at_work), timeout=1.0))
-            for ready in [connection for connection in at_work if connection in told]:
+            finished = set(wait(list(at_work), timeout=1.0))
+            for ready in [connection for connection in at_work if connection in finished]:
                 index = at_work[ready]
                 try:
                     kind, value = ready.recv()

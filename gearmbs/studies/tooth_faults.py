@@ -1,4 +1,4 @@
-"""Faults of teeth in a case: texts and tables as a person writes them, and as the gears know them.
+"""Faults of teeth in a case: from the text and tables of a user to the classes of `gearmbs.gears.faults`.
 
 A fault is a name, such as ``"chipped corner"``, or a table ``{"kind": "chipped corner", "height": "2 mm"}``, or an
 object of :mod:`gearmbs.gears.faults`. A case holds it as a table of plain numbers in SI.

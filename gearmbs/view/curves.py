@@ -1,4 +1,4 @@
-"""What a gear engineer looks at over a mesh cycle: transmission error, stiffness, load sharing, contact pattern."""
+"""Curves over a mesh cycle: transmission error, stiffness, load sharing, contact pattern."""
 
 from __future__ import annotations
 

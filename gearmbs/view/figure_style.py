@@ -42,7 +42,7 @@ LOOK: Any = {
 }
 
 LEGEND_LETTERS, LEGEND_HANDLE = 84, 8
-"""Letters that fit side by side under axes of the usual width, and the room a line before each name takes."""
+"""Letters that fit side by side under axes of the usual width, and the space taken by the line before each name."""
 
 UNITS = {
     "m/s^2": "m/s²",

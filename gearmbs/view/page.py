@@ -21,7 +21,7 @@ class Page:
     Parameters
     ----------
     title, note : str
-        Heading and what stands beside it.
+        Heading and the remark beside it.
     scripts : tuple of str
         Names of the scripts of the page.
     data : dict

@@ -15,7 +15,7 @@ EDGE = 0.35
 
 
 class Camera:
-    """A parallel projection that looks at a point from a direction.
+    """A parallel projection towards a point from a direction.
 
     Parameters
     ----------

@@ -218,7 +218,7 @@ def test_moments_press_a_slide(change):
 
 
 def test_friction_in_a_linkage_with_redundant_joints():
-    """The multipliers of rows set aside are no unknowns; the others move up. Friction takes the energy out."""
+    """The multipliers of removed rows are no unknowns; the others move up. Friction takes the energy out."""
     m = Mechanism("four-bar", gravity=(0, -G, 0))
     points = [(0, 0, 0), (0.5, 1, 0), (2, 1.2, 0), (2, 0, 0)]
     bars = []

@@ -169,7 +169,7 @@ def test_missing_file_unknown_ending_and_missing_folder(tmp_path):
     with pytest.raises(SignalFileError, match="No such file"):
         read_signal(tmp_path / "none.csv")
     (tmp_path / "x.xyz").write_text("1\n")
-    with pytest.raises(SignalFileError, match="tells no format"):
+    with pytest.raises(SignalFileError, match="determines no format"):
         read_signal(tmp_path / "x.xyz")
     with pytest.raises(SignalFileError, match="no folder"):
         write_signal(example(), tmp_path / "nowhere" / "x.csv")

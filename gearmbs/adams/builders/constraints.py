@@ -60,7 +60,7 @@ def _hooke(b: Builder, name: str, i: Marker, j: Marker) -> Joint:
 def _rack_and_pinion(b: Builder, s: st.Joint, name: str, i: Marker, j: Marker) -> None:
     """RACKPIN: the pinion (I, about z_I) rolls on the rack's line (J, along z_J).
 
-    The side on which the rack passes the pinion's axis tells the direction; the travel is PD/2 times the angle
+    The side on which the rack passes the pinion's axis determines the direction; the travel is PD/2 times the angle
     counted from the start. A line through the axis itself moves along z_J for a positive turn: ADAMS asks for x_I along
     z_J, and the pitch point then lies towards -y_I.
     """

@@ -199,7 +199,7 @@ class ArgumentReader:
         return text[start:at]
 
     def _argument_follows(self, at: int) -> bool:
-        """Whether a known keyword stands at ``at`` (with its = sign, or alone for a flag)."""
+        """Whether there is a known keyword at ``at`` (with its = sign, or alone for a flag)."""
         while at < len(self.text) and self.text[at] in _SEPARATORS + " ":
             at += 1
         if at >= len(self.text):

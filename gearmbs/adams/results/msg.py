@@ -102,7 +102,7 @@ def _row(time: float, step: float, evaluations: int, steps: int, order: int, cpu
 
 
 def _echo(command: Command) -> str:
-    """Return a command as it stands in its script, or could stand there."""
+    """Return a command as its script has it, or could have it."""
     if command.text or not isinstance(command, Simulate):
         return command.text
     words = [f"simulate/{(command.kind or 'DYNAMICS').lower()}"]

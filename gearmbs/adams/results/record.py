@@ -204,7 +204,7 @@ class RunRecord:
     def to_dataset(self) -> xr.Dataset:
         """Return requests, parts and forces as an :class:`xarray.Dataset` in the deck's units.
 
-        The columns of ``part_2`` (X, Y, ...), ``joint_1`` (FX, FY, ...) and ``request_3`` stand along dimensions with
+        The columns of ``part_2`` (X, Y, ...), ``joint_1`` (FX, FY, ...) and ``request_3`` have dimensions with
         their names; coordinates such as ``part_unit`` hold their units: ``data.part_2.sel(part_column="X")``.
         """
         import xarray as xr

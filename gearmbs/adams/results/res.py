@@ -68,7 +68,7 @@ def _package_version() -> str:
 def results_text(result: RunRecord, now: datetime | None = None) -> str:
     """Return the content of the results file.
 
-    Forces act on the I marker's part and stand in global components, angles in radians.
+    Forces act on the I marker's part, in global components; angles are in radians.
 
     Parameters
     ----------

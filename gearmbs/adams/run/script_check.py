@@ -16,7 +16,7 @@ from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.mechanism.expression_compiler import compile_expression
 
 SINGLE = ("STATICS", "INITIAL_CONDITIONS", "DISPLACEMENT", "VELOCITY", "ACCELERATION")
-"""Analyses that may stand at the present time."""
+"""Analyses that need no span of time."""
 
 
 def check_script(deck: Deck, script: Script, allow_unsupported: bool = False) -> None:

@@ -280,7 +280,7 @@ class DeckWriter:
 
     @staticmethod
     def _center(body: Body) -> Marker | None:
-        """Return a marker that stands in the centre of mass along the body's axes."""
+        """Return a marker at the centre of mass along the body's axes."""
         there = (m for m in body.markers if np.array_equal(m.position, body.com))
         return next((m for m in there if np.array_equal(m.orientation, np.eye(3))), None)
 

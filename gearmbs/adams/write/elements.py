@@ -1,6 +1,6 @@
 """Elements that keep their statement in a deck: SPRINGDAMPER, BUSHING, FIELD, BEAM, FRICTION.
 
-What they were made from, in the mechanism's units, stands beside them (``parameters``).
+What they were made from, in the mechanism's units, is stored with them (``parameters``).
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def _bushing(p: Mapping[str, Any]) -> list[str]:
 
 
 def _field(p: Mapping[str, Any]) -> list[str]:
-    """A FIELD's matrices stand by columns."""
+    """A FIELD's matrices are written by columns."""
     out = [f"KMATRIX = {listed(np.asarray(p['stiffness']).T.ravel())}"]
     if np.any(p["damping"]):
         out.append(f"CMATRIX = {listed(np.asarray(p['damping']).T.ravel())}")

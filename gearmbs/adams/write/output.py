@@ -11,7 +11,7 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
 
 COLUMNS = ("F2", "F3", "F4", "F6", "F7", "F8")
-"""Columns of a request that stand in the .req."""
+"""Columns of a request that the .req file contains."""
 LONGEST = 80
 """Characters of a comment in the .req."""
 NOT_ASKED = ("coupler", "gear")

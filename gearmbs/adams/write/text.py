@@ -1,11 +1,11 @@
-"""Numbers, lists and long arguments as they stand in a deck."""
+"""Numbers, lists and long arguments as they are written in a deck."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 WIDTH = 78
-"""Of a line."""
+"""Characters in a line."""
 
 
 def number(value: float) -> str:

@@ -1,4 +1,4 @@
-"""Initial conditions: position, velocity, then acceleration and multipliers; redundant rows set aside.
+"""Initial conditions: position, velocity, then acceleration and multipliers; redundant rows removed.
 
 Positions and velocities are corrected as little as possible in the norm sum |dR|^2 + L^2 |dpi|^2 with a
 length L of the mechanism, by Newton's method on the constraints with the exact Jacobian.
@@ -43,7 +43,7 @@ DOUBTFUL = 1e-6
 CHUNK = 200
 """Doubtful rows that are looked at together."""
 SELECTIONS = 3
-"""How often other rows are set aside when those set aside at first turn out to be violated."""
+"""How often other rows are removed when those removed at first turn out to be violated."""
 
 
 @dataclass
@@ -55,7 +55,7 @@ class InitialReport:
     degrees_of_freedom : int
         Coordinates less independent constraint rows.
     redundant : list of str
-        Names of the constraint rows set aside because the others imply them.
+        Names of the constraint rows removed because the others imply them.
     position_iterations : int
         Newton iterations of the assembly.
     largest_correction : float
@@ -89,7 +89,7 @@ class InitialReport:
     def __str__(self) -> str:
         lines = [f"degrees of freedom: {self.degrees_of_freedom}"]
         if self.redundant:
-            lines.append("redundant constraints set aside:")
+            lines.append("redundant constraints removed:")
             lines.extend(f"  {name}" for name in self.redundant)
         lines.append(
             f"assembled in {self.position_iterations} iterations, largest correction "

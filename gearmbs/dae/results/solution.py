@@ -30,7 +30,7 @@ PART_SIZE = 512
 """Output times whose records fit the processor's cache."""
 
 CONFLICT_SAMPLES = 50
-"""Outputs at which constraints set aside as redundant are looked at."""
+"""Outputs at which constraints removed as redundant are looked at."""
 
 
 class Solution:
@@ -81,7 +81,7 @@ class Solution:
         parts.append((report.correction() if report is not None else None) or "")
         aside = report.redundant if report is not None else []
         if aside:
-            parts.append(f"Set aside as redundant: {', '.join(aside)}.")
+            parts.append(f"Removed as redundant: {', '.join(aside)}.")
         return " ".join(part for part in parts if part)
 
     def _last_pose(self) -> np.ndarray:
@@ -191,7 +191,7 @@ class Solution:
             yield part
 
     def find_conflict(self, rows: np.ndarray) -> str | None:
-        """Return what is wrong if a row set aside as redundant is violated at one of the output times ``rows``."""
+        """Return what is wrong if a row removed as redundant is violated at one of the output times ``rows``."""
         if not self.system.has_dropped_rows or rows.size == 0:
             return None
         for part in self.parts(rows, size=1):
@@ -263,7 +263,7 @@ class Solution:
             aside = self.system.report.redundant if self.system.report is not None else []
             if any(name.rsplit(": ", 1)[0] == joint for name in aside):
                 raise KeyError(
-                    f"joint {joint!r} was set aside as redundant, so its share of the load is not determined: "
+                    f"joint {joint!r} was removed as redundant, so its share of the load is not determined: "
                     f"{', '.join(known)} carry all of it"
                 )
             raise KeyError(f"joint {joint!r}; the joints are {', '.join(known) or 'none in this mechanism'}")

@@ -35,7 +35,7 @@ class Stream:
     Attributes
     ----------
     conflict : str or None
-        The first violation found of a constraint row set aside as redundant.
+        The first violation found of a constraint row removed as redundant.
     """
 
     def __init__(

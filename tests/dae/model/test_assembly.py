@@ -1,4 +1,4 @@
-"""Which constraint rows are set aside, and assembly from a pose where others are redundant than in the end."""
+"""Which constraint rows are removed, and assembly from a pose where others are redundant than in the end."""
 
 from __future__ import annotations
 

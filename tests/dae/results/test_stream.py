@@ -39,7 +39,7 @@ def test_parts_are_the_whole(integrator):
 
 
 def test_a_conflict_on_the_way_is_found():
-    """Two hinges on one door, the second of which leaves the axis: the motion contradicts the row set aside."""
+    """Two hinges on one door, the second of which leaves the axis: the motion contradicts the removed row."""
     m = Mechanism("door")
     door = m.body("door", 1.0, (0.1, 0.1, 0.1))
     m.revolute("hinge", door, m.ground, at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
