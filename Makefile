@@ -7,7 +7,7 @@ OUT ?= out
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: paper test quick lint types bench docs clean
+.PHONY: paper test quick wheel lint types bench docs clean
 
 paper: $(VENV)/.installed
 	$(BIN)/python -m gearmbs.compile
@@ -15,12 +15,16 @@ paper: $(VENV)/.installed
 
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m gearmbs.compile
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist loadfile --ignore=tests/test_wheel.py
 	$(BIN)/python -m pytest --doctest-modules gearmbs --ignore=gearmbs/cli.py
 
 quick: $(VENV)/.installed-dev
 	$(BIN)/python -m gearmbs.compile
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
+
+# what a user installs, tried away from the checkout
+wheel: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest tests/test_wheel.py
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

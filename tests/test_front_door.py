@@ -1,0 +1,77 @@
+"""``import gearmbs``: what most programs need, under one name, and nothing loaded before it is used."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import subprocess
+import sys
+from types import ModuleType
+
+import pytest
+
+import gearmbs as gm
+
+HEAVY = (
+    "numba",
+    "llvmlite",
+    "numpy",
+    "scipy",
+    "xarray",
+    "pandas",
+    "pydantic",
+    "pint",
+    "matplotlib",
+    "h5py",
+    "typer",
+    "rich",
+)
+
+
+def loaded(code: str) -> set[str]:
+    """Return the packages that some code loads in a fresh process."""
+    code += "; import sys; print(*{name.partition('.')[0] for name in sys.modules})"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    return set(subprocess.check_output([sys.executable, "-c", code], env=environment, text=True, cwd="/").split())
+
+
+@pytest.mark.parametrize(
+    ("code", "without"),
+    [
+        ("import gearmbs; dir(gearmbs)", HEAVY),
+        ("import gearmbs.dae, gearmbs.gears, gearmbs.mechanism, gearmbs.signals, gearmbs.studies, gearmbs.view", HEAVY),
+        ("from gearmbs.units import to_si; to_si('1000 rpm', 'rad/s')", HEAVY),
+        (
+            "from gearmbs.studies import Case, make_case; make_case({})",
+            ("numba", "scipy", "xarray", "pint", "matplotlib"),
+        ),
+        ("from gearmbs.studies import Case, run_case", ("pint", "matplotlib", "h5py", "sksundae", "typer", "rich")),
+        ("from gearmbs.mechanism import Mechanism", ("pandas", "xarray", "pydantic", "pint", "matplotlib", "sksundae")),
+        ("from gearmbs.dae import solve_dae", ("pandas", "xarray", "pydantic", "pint", "matplotlib", "sksundae")),
+        ("import gearmbs.cli", ("numpy", "numba", "scipy", "xarray", "pydantic")),
+    ],
+)
+def test_loads_what_is_used(code, without):
+    assert not loaded(code) & set(without)
+
+
+def test_every_name():
+    """Each name is what its package says it is, listed, and found by `dir`."""
+    assert sorted(gm.__all__) == gm.__all__
+    for name in gm.__all__:
+        value = getattr(gm, name)
+        assert name in dir(gm)
+        assert f"`{name}`" in gm.__doc__, f"{name} is not in the description of the package"
+        home = importlib.import_module(value.__name__ if isinstance(value, ModuleType) else value.__module__)
+        assert home.__name__.startswith("gearmbs.")
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        gm.nothing  # noqa: B018
+
+
+def test_modules_do_not_take_the_place_of_functions():
+    """`gearmbs.signals.envelope` is a function and the module it lives in; importing the module changes nothing."""
+    function = gm.signals.envelope if "signals" in vars(gm) else importlib.import_module("gearmbs.signals").envelope
+    module = importlib.import_module("gearmbs.signals.envelope")
+    assert isinstance(module, ModuleType)
+    assert importlib.import_module("gearmbs.signals").envelope is function
+    assert callable(function)
