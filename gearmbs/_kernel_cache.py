@@ -94,7 +94,8 @@ def _type(kind: Any) -> str:
         return identity(kind.dispatcher)
     fields = getattr(kind, "fields", "") if isinstance(kind, numba.types.BaseNamedTuple) else ""
     inner = [_type(t) for t in kind.types] if isinstance(kind, numba.types.BaseTuple) else ""
-    return f"{kind} {fields} {inner}"
+    # types of one's own come with code that reads and writes their members
+    return f"{kind} {fields} {inner} {_source(type(kind).__module__)}"
 
 
 def _code(code: python.CodeType, doc: str | None, names: list[str]) -> str:

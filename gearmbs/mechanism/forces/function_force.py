@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.core.errors import NumbaError
 
+from gearmbs._jit import njit
 from gearmbs.dae.equations.force_elements import FRAME_COLUMNS, ROLES, Diagnostic
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.elements import Compiled, ForceElement, State
