@@ -11,7 +11,7 @@ from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.equations.expressions.marker_motion import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.model.model import Names
-from gearmbs.dae.results.frames import body_motion, elastic_motion, frame_motion, modal_slice
+from gearmbs.dae.results.frames import body_motion, elastic_motion, frame_motion
 from gearmbs.mechanism.elements import State
 from gearmbs.mechanism.joints import Joint, kinds_with_angle, kinds_with_displacement
 from gearmbs.mechanism.modal import ModalBody
@@ -90,11 +90,11 @@ class Measures:
         if body.is_ground:
             out[:, KIN_R : KIN_R + 3], out[:, KIN_A : KIN_A + 9] = local, marker.orientation.ravel()
             return out
-        host = body_motion(self.solution, body.name)
+        found = self.solution.evaluated
+        number = found.model.names.bodies.index(body.name) + 1
+        host = body_motion(found, number)
         if isinstance(body, ModalBody):
-            number = self.solution.system.body_names.index(body.name) + 1
-            modal = self.solution._records.modal[:, :, modal_slice(self.solution.system.model, number)]
-            host, _ = elastic_motion(host, None, modal, local, *body.shape_at(marker))
+            host, _ = elastic_motion(host, None, found.modal(number), local, *body.shape_at(marker))
             local = np.zeros(3)
         axes = host[:, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
         arm = axes @ local
@@ -147,7 +147,7 @@ class Measures:
         angles[0, : tape.n_angles] = starting_angles(tape, self.mechanism.turns, marker_named)
         bodies = np.array(builder.marker_body, dtype=np.int64)
         frames = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float).reshape(-1, 12)
-        kin, acc = frame_motion(self.solution, builder.build(Names()))
+        kin, acc = frame_motion(self.solution.evaluated, builder.build(Names()))
         out = np.zeros(t.size)
         evaluate_series(
             tape.ints, tape.floats, t, kin, acc, bodies, frames, y, angles, np.zeros(max(1, tape.gradient_size)),

@@ -97,7 +97,7 @@ class RequestEvaluator:
         self._ypr = output is not None and output.ypr
         system = solution.system
         self.marker_body, self.marker_frame = system.model.marker_body.copy(), system.model.marker_frame.copy()
-        self.kin, self.acc = frame_motion(solution)
+        self.kin, self.acc = frame_motion(solution.evaluated)
         index: dict[int, int] = system.marker_index  # type: ignore[attr-defined]
         self.scope: Scope = model.scope(index, list(self.marker_body))
         self._names = {index[id(m)]: m.name for m in markers_of(model.mechanism)}

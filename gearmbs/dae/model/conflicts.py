@@ -18,7 +18,7 @@ from gearmbs.dae.model import initial
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.configuration import Configuration
-    from gearmbs.dae.model.system import System
+    from gearmbs.dae.model.posed import PosedModel
 
 CONFLICT_SHARE = 1e-5
 """Rate of a redundant constraint, of the sum of its terms, from which it is not redundant but in conflict."""
@@ -34,7 +34,7 @@ FARTHEST_COUNTED = 1e-3
 """Violation from which a counted angle is taken to be off by turns nobody counted; its row is then left alone."""
 
 
-def conflict(system: System, place: Configuration, t: float) -> str | None:
+def conflict(system: PosedModel, place: Configuration, t: float) -> str | None:
     """Return which row dropped as redundant contradicts the motion at a configuration, or None.
 
     The rates are compared, which do not depend on counted turns.
@@ -54,7 +54,7 @@ def conflict(system: System, place: Configuration, t: float) -> str | None:
     )
 
 
-def _violated(system: System, place: Configuration, t: float) -> tuple[str, float] | None:
+def _violated(system: PosedModel, place: Configuration, t: float) -> tuple[str, float] | None:
     """Return the name and rate of the redundant row most violated, None when none is."""
     jacobian, rate, names = system.dropped_rates(place, t)
     velocities = place.velocities
@@ -68,7 +68,7 @@ def _violated(system: System, place: Configuration, t: float) -> tuple[str, floa
     return None if share[worst] <= CONFLICT_SHARE else (names[worst], float(abs(rate[worst])))
 
 
-def projected(system: System, place: Configuration, t: float) -> Configuration | None:
+def projected(system: PosedModel, place: Configuration, t: float) -> Configuration | None:
     """Return the configuration put onto the constraints with velocities that keep it there, None where impossible."""
     weights = system.coordinate_weights()
     counted = _counted_rows(system)
@@ -87,7 +87,7 @@ def projected(system: System, place: Configuration, t: float) -> Configuration |
     return None
 
 
-def _counted_rows(system: System) -> np.ndarray:
+def _counted_rows(system: PosedModel) -> np.ndarray:
     """Mark the rows with an angle whose full turns are counted."""
     model = system.model
     kinds = model.terms[:, T.TERM_TYPE]

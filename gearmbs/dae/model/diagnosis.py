@@ -14,7 +14,7 @@ from gearmbs.dae.errors import ModelError
 if TYPE_CHECKING:
     from gearmbs.dae.model.configuration import Configuration
     from gearmbs.dae.model.model import Model
-    from gearmbs.dae.model.system import System
+    from gearmbs.dae.model.posed import PosedModel
 
 LARGEST_LOCK = 600
 """Constraint rows up to which the cause of a failure is sought in a locking position."""
@@ -25,7 +25,7 @@ DENSE_COORDINATES = 600
 INVERSE_ITERATIONS = 3
 
 
-def locking(system: System, at: Configuration, t: float) -> str | None:
+def locking(system: PosedModel, at: Configuration, t: float) -> str | None:
     """Return which constraint rows are about to depend on each other at a position, None when they are not.
 
     At a position where a mechanism locks the constraint Jacobian loses rank; near it, its smallest singular value
@@ -51,7 +51,7 @@ def locking(system: System, at: Configuration, t: float) -> str | None:
     )
 
 
-def check_finite(system: System, rhs: np.ndarray, loads: np.ndarray, t: float) -> None:
+def check_finite(system: PosedModel, rhs: np.ndarray, loads: np.ndarray, t: float) -> None:
     """Raise a ModelError that names the load, constraint or body whose terms of the equations are not finite."""
     names = system.model.names
     bad = ~np.all(np.isfinite(loads[:, :6]), axis=1)

@@ -19,7 +19,7 @@ from gearmbs.dae.errors import AssemblyError, SingularModelError
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.configuration import Configuration
-    from gearmbs.dae.model.system import System
+    from gearmbs.dae.model.posed import PosedModel
 
 POSITION_TOLERANCE = 1e-12
 RANK_TOLERANCE = 1e-9
@@ -192,7 +192,7 @@ def least_correction(jacobian: csc_array, weights: np.ndarray, violation: np.nda
 
 
 def assemble_position(
-    system: System, place: Configuration, t: float
+    system: PosedModel, place: Configuration, t: float
 ) -> tuple[Configuration, np.ndarray, InitialReport]:
     """Move the bodies as little as possible onto the constraints.
 
@@ -232,7 +232,7 @@ def assemble_position(
     return place, kept, report
 
 
-def _note_correction(system: System, report: InitialReport, before: np.ndarray, pose: np.ndarray) -> None:
+def _note_correction(system: PosedModel, report: InitialReport, before: np.ndarray, pose: np.ndarray) -> None:
     report.length = system.length
     if not len(pose):
         return
@@ -247,7 +247,7 @@ def _note_correction(system: System, report: InitialReport, before: np.ndarray, 
 
 
 def _closed(
-    system: System, place: Configuration, t: float, kept: np.ndarray, length: float
+    system: PosedModel, place: Configuration, t: float, kept: np.ndarray, length: float
 ) -> tuple[Configuration, csc_array, np.ndarray, int]:
     """Solve the kept rows for the nearest position; return it with the Jacobian, Phi and the iterations taken."""
     weights = system.coordinate_weights()
@@ -273,7 +273,7 @@ def _closed(
     return place, jacobian, phi, MAX_POSITION_ITERATIONS
 
 
-def _not_finite(system: System, phi: np.ndarray, t: float) -> AssemblyError:
+def _not_finite(system: PosedModel, phi: np.ndarray, t: float) -> AssemblyError:
     """Say which row has no value."""
     name = system.row_names[int(np.argmin(np.isfinite(phi)))]
     return AssemblyError(
@@ -281,7 +281,7 @@ def _not_finite(system: System, phi: np.ndarray, t: float) -> AssemblyError:
     )
 
 
-def _conflict(system: System, dropped: np.ndarray, phi: np.ndarray) -> AssemblyError:
+def _conflict(system: PosedModel, dropped: np.ndarray, phi: np.ndarray) -> AssemblyError:
     """Say which redundant row contradicts the others most."""
     worst = dropped[np.argmax(np.abs(phi[dropped]))]
     return AssemblyError(
@@ -290,7 +290,7 @@ def _conflict(system: System, dropped: np.ndarray, phi: np.ndarray) -> AssemblyE
     )
 
 
-def consistent_velocity(system: System, place: Configuration, t: float) -> Configuration:
+def consistent_velocity(system: PosedModel, place: Configuration, t: float) -> Configuration:
     """Correct the velocities as little as possible so that Phi_q v + Phi_t = 0."""
     weights = system.coordinate_weights()
     jacobian, _, rate = system.constraint_jacobian(place, t)
@@ -299,7 +299,7 @@ def consistent_velocity(system: System, place: Configuration, t: float) -> Confi
     return place.pushed(least_correction(jacobian, weights, rate))
 
 
-def check_inertia(system: System) -> None:
+def check_inertia(system: PosedModel) -> None:
     """Raise if the mass or inertia of a body is not finite."""
     for name, row in zip(system.body_names, system.model.bodies[1:]):
         if not np.all(np.isfinite(row)):

@@ -151,6 +151,14 @@ class Model:
                 rows.append((np.sqrt(inertia / mass) if inertia > 0.0 else 1.0, mass))
         return np.array(rows).reshape(-1, 2)
 
+    def marker_places(self) -> np.ndarray:
+        """Return the origins of the markers from the undeformed bodies' centres of mass, shape (markers, 3), m."""
+        places = self.marker_frame[:, :3].copy()
+        elastic = self.marker_body >= len(self.bodies)
+        shapes = np.array(self.shape_at, dtype=np.int64)[self.marker_body[elastic] - len(self.bodies)]
+        places[elastic] = self.modal[shapes[:, None] + np.arange(3)]
+        return places
+
     def span(self, row: int) -> slice:
         """Return where the terms of a constraint row are."""
         end = self.rows[row + 1, T.ROW_FIRST] if row + 1 < len(self.rows) else len(self.terms)

@@ -14,20 +14,20 @@ import xarray as xr
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.force_elements import DISSIPATED, STORED
-from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W
-from gearmbs.dae.results.frames import frame_motion, modal_slice
+from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W, POSE_A, POSE_V, POSE_W
+from gearmbs.dae.results.evaluated import Evaluated
+from gearmbs.dae.results.frames import frame_motion
 
 if TYPE_CHECKING:
     from gearmbs.dae.equations.modal_inertia import ModalInertia
-    from gearmbs.dae.results.solution import Solution
 
 
-def energy_balance(solution: Solution) -> xr.Dataset:
+def energy_balance(found: Evaluated) -> xr.Dataset:
     """Return the energies and works of a solution over time, from its first output.
 
     Parameters
     ----------
-    solution : Solution
+    found : Evaluated
         Sampled finely enough for its powers to be integrated: several outputs a step of the fastest force.
 
     Returns
@@ -41,13 +41,13 @@ def energy_balance(solution: Solution) -> xr.Dataset:
         Attribute ``relative_imbalance``: the largest imbalance over all the work or, where more is exchanged than
         worked, over the largest change of a stored energy; NaN when there is neither.
     """
-    t = solution.t
-    powers = _powers(solution)
+    t = found.t
+    powers = _powers(found)
     works = {name: _integral(t, p) for name, p in powers.items()}
     stored = {
-        "kinetic": solution.kinetic_energy,
-        "gravity": _gravity(solution),
-        "elastic": sum((v for _, v in _told(solution, STORED)), _strain(solution)),
+        "kinetic": kinetic_energy(found),
+        "gravity": _gravity(found),
+        "elastic": sum((v for _, v in _told(found, STORED)), _strain(found)),
     }
     change = sum(e - e[0] for e in stored.values())
     net = works["work_motion"] + works["work_applied"]
@@ -70,46 +70,46 @@ def _integral(t: np.ndarray, power: np.ndarray) -> np.ndarray:
     return work - work[0]
 
 
-def _powers(solution: Solution) -> dict[str, np.ndarray]:
-    motion = np.einsum("tr,tr->t", solution.multipliers, solution._phi[:, :, 2])
-    applied = np.zeros(solution.t.size)
-    kin, _ = frame_motion(solution)
-    for k, row in enumerate(solution.system.model.forces):
-        if row[T.FORCE_KIND] != T.REACTION and not _accounts(solution, k - row[T.FORCE_PART]):
-            applied += _load_power(solution, kin, k, row)
-    zero = np.zeros(solution.t.size)
+def _powers(found: Evaluated) -> dict[str, np.ndarray]:
+    motion = np.einsum("tr,tr->t", found.records.multipliers, found.records.by_row[:, :, 2])
+    applied = np.zeros(found.t.size)
+    kin, _ = frame_motion(found)
+    for k, row in enumerate(found.model.forces):
+        if row[T.FORCE_KIND] != T.REACTION and not _accounts(found, k - row[T.FORCE_PART]):
+            applied += _load_power(found, kin, k, row)
+    zero = np.zeros(found.t.size)
     powers = {"work_motion": motion, "work_applied": applied, "dissipated_friction": zero}
-    powers["dissipated_damping"] = _modal_damping(solution)
-    for name, power in _told(solution, DISSIPATED):
+    powers["dissipated_damping"] = _modal_damping(found)
+    for name, power in _told(found, DISSIPATED):
         key = f"dissipated_{name.removesuffix('_power')}"
         powers[key] = powers.get(key, zero) + power
     return powers
 
 
-def _accounts(solution: Solution, k: int) -> bool:
+def _accounts(found: Evaluated, k: int) -> bool:
     """Whether a force element tells what it stores and dissipates, so that the work of its wrench is known."""
-    return any(d.role in (STORED, DISSIPATED) for d in solution.system.model.diagnostics[k])
+    return any(d.role in (STORED, DISSIPATED) for d in found.model.diagnostics[k])
 
 
-def _told(solution: Solution, role: str) -> Iterator[tuple[str, np.ndarray]]:
+def _told(found: Evaluated, role: str) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the names and values of all diagnostics of a role."""
-    for k, diagnostics in enumerate(solution.system.model.diagnostics):
+    for k, diagnostics in enumerate(found.model.diagnostics):
         for c, d in enumerate(diagnostics):
             if d.role == role:
-                yield d.name, solution._loads[:, k, 6 + c]
+                yield d.name, found.records.loads[:, k, 6 + c]
 
 
-def _load_power(solution: Solution, kin: np.ndarray, k: int, row: np.ndarray) -> np.ndarray:
+def _load_power(found: Evaluated, kin: np.ndarray, k: int, row: np.ndarray) -> np.ndarray:
     """Power of a force element: F and N on I's body at marker I, the opposite on J's body at the same point.
 
     ``kin`` holds the motion of all frames, see `gearmbs.dae.results.frames`.
     """
-    model = solution.system.model
-    force, torque = solution._loads[:, k, 0:3], solution._loads[:, k, 3:6]
+    model = found.model
+    force, torque = found.records.loads[:, k, 0:3], found.records.loads[:, k, 3:6]
     bi, bj = (int(model.marker_body[row[column]]) for column in (T.FORCE_I, T.FORCE_J))
     local = model.marker_frame[row[T.FORCE_I]][:3]
     point = kin[:, bi, KIN_R : KIN_R + 3] + kin[:, bi, KIN_A : KIN_A + 9].reshape(-1, 3, 3) @ local
-    power = np.zeros(solution.t.size)
+    power = np.zeros(found.t.size)
     for body, sign in ((bi, 1.0), (bj, -1.0)):
         if body:
             place, spin = kin[:, body, KIN_R : KIN_R + 3], kin[:, body, KIN_W : KIN_W + 3]
@@ -118,28 +118,43 @@ def _load_power(solution: Solution, kin: np.ndarray, k: int, row: np.ndarray) ->
     return power
 
 
-def _modal_damping(solution: Solution) -> np.ndarray:
+def _modal_damping(found: Evaluated) -> np.ndarray:
     """Power dissipated by the damping of modal bodies."""
-    return _over_modal_bodies(solution, lambda modal, q_f, v_f: modal.damping_power(v_f))
+    return _over_modal_bodies(found, lambda modal, q_f, v_f: modal.damping_power(v_f))
 
 
-def _strain(solution: Solution) -> np.ndarray:
+def _strain(found: Evaluated) -> np.ndarray:
     """Strain energy of modal bodies."""
-    return _over_modal_bodies(solution, lambda modal, q_f, v_f: modal.strain_energy(q_f))
+    return _over_modal_bodies(found, lambda modal, q_f, v_f: modal.strain_energy(q_f))
 
 
 def _over_modal_bodies(
-    solution: Solution, of_body: Callable[[ModalInertia, np.ndarray, np.ndarray], np.ndarray]
+    found: Evaluated, of_body: Callable[[ModalInertia, np.ndarray, np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    model, total = solution.system.model, np.zeros(solution.t.size)
+    model, total = found.model, np.zeros(found.t.size)
     for b, modal in enumerate(model.modal_inertia):
         if modal is not None:
-            q_f, v_f, _ = solution._records.modal[:, :, modal_slice(model, b)]
+            q_f, v_f, _ = found.modal(b)
             total = total + of_body(modal, q_f, v_f)
     return total
 
 
-def _gravity(solution: Solution) -> np.ndarray:
-    model = solution.system.model
+def kinetic_energy(found: Evaluated) -> np.ndarray:
+    """Return the kinetic energy over time, shape (m,), J."""
+    total = np.zeros(found.t.size)
+    poses = found.records.by_body
+    for b, (row, modal) in enumerate(zip(found.model.bodies[1:], found.model.modal_inertia[1:])):
+        v, w = poses[:, b, POSE_V : POSE_V + 3], poses[:, b, POSE_W : POSE_W + 3]
+        local = np.einsum("tji,tj->ti", poses[:, b, POSE_A : POSE_A + 9].reshape(-1, 3, 3), w)
+        total += 0.5 * row[T.BODY_MASS] * np.sum(v * v, axis=1)
+        total += 0.5 * np.einsum("ti,ij,tj->t", local, row[T.BODY_INERTIA :].reshape(3, 3), local)
+        if modal is not None:
+            q_f, v_f, _ = found.modal(b + 1)
+            total += modal.kinetic_energy(local, q_f, v_f)
+    return total
+
+
+def _gravity(found: Evaluated) -> np.ndarray:
+    model = found.model
     masses = model.bodies[1:, T.BODY_MASS]
-    return -np.einsum("b,tbc,c->t", masses, solution._pose[:, :, 0:3], model.gravity)
+    return -np.einsum("b,tbc,c->t", masses, found.records.by_body[:, :, 0:3], model.gravity)

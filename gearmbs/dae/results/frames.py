@@ -11,20 +11,20 @@ from gearmbs.dae.equations.rotation import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W,
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.model import Model
-    from gearmbs.dae.results.solution import Solution
+    from gearmbs.dae.results.evaluated import Evaluated
 
 KIN_PLACES = KIN_AXES + 9
 ACC_PLACES = 6
 
 
-def frame_motion(solution: Solution, model: Model | None = None) -> tuple[np.ndarray, np.ndarray]:
+def frame_motion(found: Evaluated, model: Model | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return the kinematics (m, frames, 27) and acceleration (m, frames, 6) tables over time, the ground first.
 
     Frames are numbered as in ``Model.marker_body``; columns are those of the compiled tables. ``model`` may have more
     markers than that of the solution.
     """
-    records = solution._records
-    model = solution.system.model if model is None else model
+    records = found.records
+    model = found.model if model is None else model
     poses, accelerations = records.by_body, records.accelerations
     m, bodies = poses.shape[:2]
     frames = 1 + bodies + len(model.frame_body)
@@ -40,25 +40,19 @@ def frame_motion(solution: Solution, model: Model | None = None) -> tuple[np.nda
         n = model.modes[body]
         shapes = model.modal[model.shape_at[k] : model.shape_at[k] + 3 + 6 * n]
         parts = shapes[:3], shapes[3 : 3 + 3 * n].reshape(n, 3), shapes[3 + 3 * n :].reshape(n, 3)
-        modal = records.modal[:, :, modal_slice(model, body)]
         f = 1 + bodies + k
-        kin[:, f], acc[:, f] = elastic_motion(kin[:, body], acc[:, body], modal, *parts)
+        kin[:, f], acc[:, f] = elastic_motion(kin[:, body], acc[:, body], found.modal(body), *parts)
     return kin, acc
 
 
-def modal_slice(model: Model, body: int) -> slice:
-    """Return where a body's modal coordinates are among those of all; the ground is body 0."""
-    first = sum(model.modes[:body])
-    return slice(first, first + model.modes[body])
-
-
-def body_motion(solution: Solution, body: str) -> np.ndarray:
-    """Return the motion of a body's frame at its centre of mass, columns ``KIN_*``, shape (m, 27)."""
-    kin = np.zeros((solution.t.size, KIN_PLACES))
-    kin[:, KIN_R : KIN_R + 3] = solution.com_position(body)
-    kin[:, KIN_V : KIN_V + 3] = solution.com_velocity(body)
-    kin[:, KIN_A : KIN_A + 9] = solution.orientation(body).reshape(-1, 9)
-    kin[:, KIN_W : KIN_W + 3] = solution.angular_velocity(body)
+def body_motion(found: Evaluated, body: int) -> np.ndarray:
+    """Return the motion of a body's frame at its centre of mass, columns ``KIN_*``, shape (m, 27); the first is 1."""
+    pose = found.records.by_body[:, body - 1]
+    kin = np.zeros((found.t.size, KIN_PLACES))
+    kin[:, KIN_R : KIN_R + 3] = pose[:, POSE_R : POSE_R + 3]
+    kin[:, KIN_V : KIN_V + 3] = pose[:, POSE_V : POSE_V + 3]
+    kin[:, KIN_A : KIN_A + 9] = pose[:, POSE_A : POSE_A + 9]
+    kin[:, KIN_W : KIN_W + 3] = pose[:, POSE_W : POSE_W + 3]
     return kin
 
 

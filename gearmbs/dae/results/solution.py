@@ -16,8 +16,9 @@ import numpy as np
 
 from gearmbs._deprecation import former_name
 from gearmbs.dae.model import evaluator as outputs
+from gearmbs.dae.model.configuration import Configuration
 from gearmbs.dae.result import DAEResult, Status
-from gearmbs.dae.results.frames import modal_slice
+from gearmbs.dae.results.evaluated import Evaluated
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -76,7 +77,7 @@ class Solution:
             return self._conflict
         parts = [self.result.message]
         if not self.result.success and self.t.size:
-            parts.append(self.system.locking(self._last_pose(), float(self.t[-1])) or "")
+            parts.append(self.system.locking(self._last_configuration(), float(self.t[-1])) or "")
         report = self.system.report
         parts.append((report.correction() if report is not None else None) or "")
         aside = report.redundant if report is not None else []
@@ -84,11 +85,15 @@ class Solution:
             parts.append(f"Removed as redundant: {', '.join(aside)}.")
         return " ".join(part for part in parts if part)
 
-    def _last_pose(self) -> np.ndarray:
-        """Return the bodies' record at the last output time, without evaluating the others."""
+    def _last_configuration(self) -> Configuration:
+        """Return the configuration at the last output time, without evaluating the others."""
         if "_records" in self.__dict__:
-            return self._pose[-1]
-        return next(self.parts(np.array([self.t.size - 1])))._pose[-1]
+            return self._configuration(-1)
+        return next(self.parts(np.array([self.t.size - 1])))._configuration(-1)
+
+    def _configuration(self, k: int) -> Configuration:
+        """Return the positions and velocities at one output time."""
+        return Configuration.of(self._records.pose[k], self._records.bodies)
 
     @property
     def stats(self):
@@ -134,6 +139,11 @@ class Solution:
             m, len(system.body_names), len(system.row_names), len(system.force_names), diagnostics,
             sum(system.model.modes),
         )  # fmt: skip
+
+    @property
+    def evaluated(self) -> Evaluated:
+        """The output times, the model and all that was evaluated."""
+        return Evaluated(self.t, self.system.model, self._records)
 
     @property
     def _pose(self) -> np.ndarray:
@@ -195,7 +205,7 @@ class Solution:
         if not self.system.has_dropped_rows or rows.size == 0:
             return None
         for part in self.parts(rows, size=1):
-            found = self.system.conflict(part._pose[0], float(part.t[0]))
+            found = self.system.conflict(part._configuration(0), float(part.t[0]))
             if found is not None:
                 return f"at t = {part.t[0]:.6g} s: {found}"
         return None
@@ -298,7 +308,7 @@ class Solution:
         model, number = self.system.model, self._body(body) + 1
         if not model.modes[number]:
             raise KeyError(f"body {body!r} is rigid: it has no modal coordinates")
-        return self._records.modal[:, :, modal_slice(model, number)]
+        return self.evaluated.modal(number)
 
     def _element(self, name: str) -> int:
         try:
@@ -372,25 +382,15 @@ class Solution:
     @cached_property
     def kinetic_energy(self) -> np.ndarray:
         """Kinetic energy, shape (m,), J."""
-        total = np.zeros(self.t.size)
-        model = self.system.model
-        for b, row in enumerate(model.bodies[1:]):
-            v, w = self._pose[:, b, 12:15], self._pose[:, b, 15:18]
-            a = self._pose[:, b, 3:12].reshape(-1, 3, 3)
-            local = np.einsum("tji,tj->ti", a, w)
-            total += 0.5 * row[0] * np.sum(v * v, axis=1)
-            total += 0.5 * np.einsum("ti,ij,tj->t", local, row[1:].reshape(3, 3), local)
-            modal = model.modal_inertia[b + 1]
-            if modal is not None:
-                q_f, v_f, _ = self._records.modal[:, :, modal_slice(model, b + 1)]
-                total += modal.kinetic_energy(local, q_f, v_f)
-        return total
+        from gearmbs.dae.results.energy import kinetic_energy
+
+        return kinetic_energy(self.evaluated)
 
     def energy_balance(self) -> xr.Dataset:
         """Return energies, works, dissipation and their imbalance; see `gearmbs.dae.results.energy.energy_balance`."""
         from gearmbs.dae.results.energy import energy_balance
 
-        return energy_balance(self)
+        return energy_balance(self.evaluated)
 
     def __len__(self) -> int:
         return self.t.size

@@ -1,0 +1,168 @@
+"""The direction of imports: which package may know which, and no circles among modules.
+
+Read from the source of every module: imports at the top, in functions and for type checkers alike, and the names of
+modules in strings.
+"""
+
+import ast
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import gearmbs
+
+ROOT = Path(gearmbs.__file__).parent
+
+SUPPORT = {"_deprecation", "_jit", "_kernel_cache", "_kernel_calls", "_kernel_library", "_lazy", "compile", "units"}
+"""Modules of the top that any package may use: compilation, lazy imports, units."""
+
+MAY_KNOW = {
+    "dae": {"dae.integrators", "dae.linalg", "dae.compiled"},
+    "dae.compiled": {"dae"},
+    "dae.linalg": {"dae.compiled"},
+    "dae.integrators": {"dae", "dae.compiled", "dae.linalg"},
+    "dae.equations": {"dae", "dae.compiled"},
+    "dae.model": {"dae", "dae.compiled", "dae.equations", "dae.linalg"},
+    "dae.results": {"dae", "dae.equations", "dae.model"},
+    "dae.analyses": {"dae", "dae.equations", "dae.model", "dae.results"},
+    "mechanism": {"dae", "dae.equations", "dae.model", "dae.results", "dae.analyses"},
+    "contact": set(),
+    "gears": {"contact", "mechanism", "dae"},
+    "signals": set(),
+    "view": {"contact", "gears", "mechanism", "signals", "dae.results"},
+    "adams": {"dae", "dae.equations", "dae.model", "dae.analyses", "dae.results", "mechanism"},
+    "studies": {"dae", "dae.results", "gears", "mechanism", "signals", "view"},
+    "cli": {"adams", "signals", "studies", "view"},
+}
+"""What a package may import, besides itself and what `SUPPORT` names. ``dae`` alone is what integrators and equations
+share: the problem, results, errors, and the function that solves a user's DAE."""
+
+EXCEPTIONS = {
+    ("contact", "dae.compiled"): "views of flat tables",
+    ("contact", "dae.equations"): "the signature that every force element's kernel has",
+    ("gears", "dae.equations"): "the same door: a pair hands its kernel to the mechanism",
+    ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
+    ("adams", "gears"): "pairs are written as the contact forces of a deck",
+    ("studies", "gearmbs"): "a result says which version made it",
+    ("cli", "gearmbs"): "the version",
+}
+"""Further arrows, and why."""
+
+CIRCLES = {
+    ("_jit", "_kernel_calls", "compile"): "a kernel that is not there is compiled when it is called",
+    ("dae.integrators.driver", "dae.integrators.start"): "a run and its beginning, parted by length; types only",
+    ("mechanism.compile", "mechanism.friction", "mechanism.lumping", "mechanism.measures", "mechanism.mechanism",
+     "mechanism.simulate"): "methods of Mechanism, and the functions that carry them out",
+    ("adams.builders.builder", "adams.builders.constraints", "adams.builders.forces", "adams.builders.initial",
+     "adams.builders.mechanism", "adams.builders.model", "adams.parse.check", "adams.parse.deck"):
+        "a deck builds its mechanism; types only, and one method",
+}  # fmt: skip
+"""Groups of modules that may know each other, and why."""
+
+
+def module_files() -> dict[str, Path]:
+    """Return the file of each module by its name."""
+    found = {}
+    for path in sorted(ROOT.rglob("*.py")):
+        parts = ["gearmbs", *path.relative_to(ROOT).with_suffix("").parts]
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def room(module: str) -> str:
+    """Return the package of a module, of dae the room; of a module of the top its own name."""
+    parts = module.split(".")[1:]
+    if not parts:
+        return "gearmbs"
+    if parts[0] == "dae" and len(parts) > 1 and (ROOT / "dae" / parts[1]).is_dir():
+        return f"dae.{parts[1]}"
+    return parts[0]
+
+
+def _named(node: ast.AST, package: str, modules: dict[str, Path]) -> list[str]:
+    """Return the modules that one node of a syntax tree names."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.ImportFrom):
+        base = node.module or ""
+        if node.level:
+            parts = package.split(".")
+            base = ".".join([*parts[: len(parts) - node.level + 1], *([node.module] if node.module else [])])
+        return [f"{base}.{a.name}" if f"{base}.{a.name}" in modules else base for a in node.names]
+    if isinstance(node, ast.Constant) and isinstance(node.value, str) and "." in node.value:
+        return [node.value] if node.value in modules else []
+    return []
+
+
+@cache
+def arrows() -> dict[str, frozenset[str]]:
+    """Return which modules of the package each module names."""
+    modules = module_files()
+    found = {}
+    for name, path in modules.items():
+        package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+        named = {n for node in ast.walk(ast.parse(path.read_text())) for n in _named(node, package, modules)}
+        found[name] = frozenset(n for n in named if n in modules and n != name)
+    return found
+
+
+@pytest.mark.parametrize("package", sorted(MAY_KNOW))
+def test_packages_know_only_what_they_may(package):
+    allowed = MAY_KNOW[package] | SUPPORT | {package} | {b for a, b in EXCEPTIONS if a == package}
+    wrong = [
+        f"{name} imports {target}"
+        for name, targets in arrows().items()
+        if room(name) == package
+        for target in targets
+        if room(target) not in allowed
+    ]
+    assert not wrong
+
+
+def test_every_package_has_its_place():
+    rooms = {room(name) for name in module_files()} - SUPPORT - {"gearmbs", "__main__"}
+    assert rooms == set(MAY_KNOW)
+
+
+def test_every_exception_is_needed():
+    used = {(room(name), room(target)) for name, targets in arrows().items() for target in targets}
+    assert set(EXCEPTIONS) <= used
+
+
+def test_dae_does_not_know_gears_by_name():
+    """No word of gears in the names, strings and prose of dae."""
+    words = ("gear", "tooth", "teeth", "flank", "involute")
+    wrong = []
+    for path in sorted((ROOT / "dae").rglob("*.py")):
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            rest = line.lower().replace("gearmbs", "")
+            if any(word in rest for word in words):
+                wrong.append(f"{path.relative_to(ROOT)}:{number}: {line.strip()}")
+    assert not wrong
+
+
+def test_no_circles_among_modules():
+    """A package and its own modules apart: a package's list of what it exports names them."""
+    modules = module_files()
+    packages = {name for name, path in modules.items() if path.name == "__init__.py"}
+    graph = {
+        name: {t for t in targets if t not in packages} for name, targets in arrows().items() if name not in packages
+    }
+    allowed = [{f"gearmbs.{name}" for name in group} for group in CIRCLES]
+    circles = [group for group in _components(graph) if len(group) > 1]
+    assert not [group for group in circles if not any(set(group) <= known for known in allowed)]
+
+
+def _components(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Return the strongly connected components of a graph."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    names = sorted(graph)
+    place = {name: k for k, name in enumerate(names)}
+    pairs = [(place[a], place[b]) for a, targets in graph.items() for b in targets if b in place]
+    rows, columns = zip(*pairs)
+    matrix = csr_array(([1] * len(pairs), (rows, columns)), shape=(len(names), len(names)))
+    _, label = connected_components(matrix, connection="strong")
+    return [[name for name, k in zip(names, label) if k == c] for c in range(max(label) + 1)]
