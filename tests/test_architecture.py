@@ -42,6 +42,7 @@ EXCEPTIONS = {
     ("contact", "dae.compiled"): "views of flat tables",
     ("contact", "dae.equations"): "the signature that every force element's kernel has",
     ("gears", "dae.equations"): "the same door: a pair hands its kernel to the mechanism",
+    ("mechanism", "dae.compiled"): "kernels of force elements: views of tables, calls through addresses",
     ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
     ("adams", "gears"): "pairs are written as the contact forces of a deck",
     ("studies", "gearmbs"): "a result says which version made it",

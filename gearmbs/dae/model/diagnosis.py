@@ -74,7 +74,7 @@ def check_finite(system: PosedModel, rhs: np.ndarray, loads: np.ndarray, t: floa
         raise ModelError(f"body '{body}': its forces at t = {t:.6g} s are not finite")
 
 
-def check_states(system: System, rest: np.ndarray, t: float) -> None:
+def check_states(system: PosedModel, rest: np.ndarray, t: float) -> None:
     """Raise a ModelError that names the state whose equation, with ``rest`` its residual, is not finite."""
     for name, value in zip(system.state_names, rest):
         if not np.isfinite(value):
