@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearmbs.gears.fault import COAST_ALIASES
+from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.transmission import StaticMesh, static_lag, warn_of_unseen
 
@@ -109,17 +110,9 @@ def contact_pattern(
     width = (high - low) / sections
     section = low + (np.arange(sections) + 0.5) * width
     flank = rotation * (1 if side == "drive" else -1)
-    gear = geometry.wheels[0]
-    alpha = geometry.working_pressure_angle
-    middle = gear.base_radius * math.tan(alpha)
-    # tooth 0 touches at length of roll s when the driver is at s / r_b - psi - alpha, on the drive flank
-    offset = rotation * (math.tan(alpha) - gear.base_half_angle - alpha)
-    offset -= 2 * math.pi * tooth / gear.teeth
-    reach = 0.5 * gear.base_pitch
-    begin = geometry.first_roll_lengths[0] - middle - reach
-    end = gear.tip_roll_length - middle + reach
-    roll = np.linspace(begin, end, points) / gear.base_radius
-    pitch_angle = 2 * math.pi / gear.teeth
+    offset, first, last = _engagement(geometry, rotation, tooth)
+    roll = np.linspace(first, last, points)
+    pitch_angle = 2 * math.pi / geometry.driver.teeth
     passed = [(rotation * offset + turn) / pitch_angle for turn in (roll[0], roll[-1])]
     warn_of_unseen(pair, passed[0], passed[1], "give the number of another driver tooth to follow, tooth=...")
     pressure = np.zeros((points, sections))
@@ -143,6 +136,19 @@ def contact_pattern(
                 pressure[k] += loads
                 roll_length[k] = np.where(loads > 0, mine[:, ROLL_LENGTH_1], roll_length[k])
     return ContactPattern(roll, section, pressure, roll_length, pressure.sum(axis=1) * width, total)
+
+
+def _engagement(geometry: PairGeometry, rotation: int, tooth: int) -> tuple[float, float, float]:
+    """Driver angle at which a tooth touches at the pitch point; first and last roll angle, half a pitch beyond its path."""
+    gear = geometry.wheels[0]
+    alpha = geometry.working_pressure_angle
+    middle, reach = gear.base_radius * math.tan(alpha), 0.5 * gear.base_pitch
+    # tooth 0 touches at length of roll s when the driver is at s / r_b - psi - alpha, on the drive flank
+    offset = rotation * (math.tan(alpha) - gear.base_half_angle - alpha)
+    offset -= 2 * math.pi * tooth / gear.teeth
+    begin = geometry.first_roll_lengths[0] - middle - reach
+    end = gear.tip_roll_length - middle + reach
+    return offset, begin / gear.base_radius, end / gear.base_radius
 
 
 def _pair_load(pair: Mesh, rows: np.ndarray, ends: np.ndarray, low: float, width: float) -> np.ndarray:

@@ -81,28 +81,7 @@ def make_signal(
     >>> signal.dims, signal.attrs["units"], round(mesh_frequency(signal), 1)
     (('time', 'channel'), 'm/s', 483.3)
     """
-    if isinstance(data, Mapping):
-        channels = [str(key) for key in data] if channels is None else channels
-        columns = [np.asarray(column, dtype=float) for column in data.values()]
-        if not columns:
-            raise SignalError("data: has no channels")
-        if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
-            shapes = ", ".join(f"{key} {np.shape(value)}" for key, value in data.items())
-            raise SignalError(f"data: every channel must be one column of the same length, got {shapes}")
-        values = np.stack(columns, axis=1)
-    else:
-        values = np.asarray(data, dtype=float)
-        if values.ndim == 1:
-            values = values[:, None]
-    if values.ndim != 2 or 0 in values.shape:
-        raise SignalError(f"data: must have shape (samples, channels) and be non-empty, got {values.shape}")
-    bad = ~np.isfinite(values)
-    if bad.any():
-        row, column = (int(i) for i in np.argwhere(bad)[0])
-        raise SignalError(
-            f"data: {int(bad.sum())} samples are not finite, the first at row {row}, channel {column}; "
-            "cut or repair the record first"
-        )
+    values, channels = _columns(data, channels)
     names = [f"ch{i + 1}" for i in range(values.shape[1])] if channels is None else [str(c) for c in channels]
     if len(names) != values.shape[1] or len(set(names)) != len(names):
         raise SignalError(f"channels: need {values.shape[1]} different names, got {names}")
@@ -125,6 +104,35 @@ def make_signal(
         name=name,
         attrs=all_attrs,
     )
+
+
+def _columns(
+    data: ArrayLike | Mapping[str, ArrayLike], channels: Sequence[str] | None
+) -> tuple[np.ndarray, Sequence[str] | None]:
+    """Return the samples by columns, and the channels' names as far as they are known."""
+    if isinstance(data, Mapping):
+        channels = [str(key) for key in data] if channels is None else channels
+        columns = [np.asarray(column, dtype=float) for column in data.values()]
+        if not columns:
+            raise SignalError("data: has no channels")
+        if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
+            shapes = ", ".join(f"{key} {np.shape(value)}" for key, value in data.items())
+            raise SignalError(f"data: every channel must be one column of the same length, got {shapes}")
+        values = np.stack(columns, axis=1)
+    else:
+        values = np.asarray(data, dtype=float)
+        if values.ndim == 1:
+            values = values[:, None]
+    if values.ndim != 2 or 0 in values.shape:
+        raise SignalError(f"data: must have shape (samples, channels) and be non-empty, got {values.shape}")
+    bad = ~np.isfinite(values)
+    if bad.any():
+        row, column = (int(i) for i in np.argwhere(bad)[0])
+        raise SignalError(
+            f"data: {int(bad.sum())} samples are not finite, the first at row {row}, channel {column}; "
+            "cut or repair the record first"
+        )
+    return values, channels
 
 
 def as_signal(signal: xr.DataArray | xr.Dataset, rate: float | None = None) -> xr.DataArray:

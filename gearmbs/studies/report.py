@@ -42,6 +42,11 @@ def paper_report(study: StudyTables) -> str:
     str
         Markdown.
     """
+    sections = (_claims, _contact, _harmonics, _choices, _settings, _integration)
+    return "\n".join(line for section in sections for line in section(study)) + "\n"
+
+
+def _claims(study: StudyTables) -> list[str]:
     records = study.records
     gmf = float(records.frequency.sel(harmonic=1))
     torques = ", ".join(f"{float(t):g}" for t in records.torque.values)
@@ -69,10 +74,12 @@ def paper_report(study: StudyTables) -> str:
         f"* {c.name}: **{'held' if c.held else 'not held'}** (held means: {c.rule}). {c.numbers}."
         for c in study.claims()
     ]
-    parts += [
-        "",
-        "Held says that this model with these settings behaves as the paper reports; the settings matter, see below.",
-        "",
+    held = "Held says that this model with these settings behaves as the paper reports; the settings matter, see below."
+    return [*parts, "", held, ""]
+
+
+def _contact(study: StudyTables) -> list[str]:
+    return [
         "## Contact",
         "",
         "A driving pair carries the torque with its drive flanks. Two-flank contact braces the wheels: the forces of",
@@ -80,14 +87,19 @@ def paper_report(study: StudyTables) -> str:
         "",
         *_contact_table(study),
         "",
-        "## RMS of the GMF harmonics",
-        "",
     ]
-    for component in records.component.values:
+
+
+def _harmonics(study: StudyTables) -> list[str]:
+    parts = ["## RMS of the GMF harmonics", ""]
+    for component in study.records.component.values:
         parts += [f"### {_plain(component)}", "", *_table(study, str(component)), ""]
-    parts += [
-        "Band: zero-phase band-pass about each harmonic. Orders: amplitudes over whole mesh periods. Scaled, m/s^2.",
-        "",
+    how = "Band: zero-phase band-pass about each harmonic. Orders: amplitudes over whole mesh periods. Scaled, m/s^2."
+    return [*parts, how, ""]
+
+
+def _choices(study: StudyTables) -> list[str]:
+    parts = [
         "## What the paper left open, and what was chosen",
         "",
         "| what the paper leaves open | chosen here | why |",
@@ -96,33 +108,33 @@ def paper_report(study: StudyTables) -> str:
     for c in choices(study.cases, study.component):
         chosen = f"**{c.chosen}** (preset: {c.preset})" if c.changed else c.chosen
         parts.append(f"| {c.what} | {chosen} | {c.why} |")
-    parts += [
+    return [
+        *parts,
         "",
         "The claims depend on these choices, most of all on backlash (two-flank contact under misalignment), on the",
         "penetration depth, the speed and the force component. `gearmbs paper` takes each as an option; the",
         "documentation has maps.",
         "",
-        "## Settings",
-        "",
-        "| parameter | value |",
-        "|---|---|",
     ]
+
+
+def _settings(study: StudyTables) -> list[str]:
+    parts = ["## Settings", "", "| parameter | value |", "|---|---|"]
     skip = ("solver_healthy", "solver_misaligned", "solver_distance", "case_", "title", "scaling")
-    for key, value in records.attrs.items():
+    attrs = study.records.attrs
+    for key, value in attrs.items():
         if not key.startswith(skip) and not key.endswith("_units"):
-            parts.append(f"| {key} | {_value(value)} {records.attrs.get(f'{key}_units', '')}".rstrip() + " |")
-    parts += [
-        "",
-        "## Integration",
-        "",
-        "| case | steps | residuals | Jacobians | wall time s |",
-        "|---|---|---|---|---|",
-    ]
+            parts.append(f"| {key} | {_value(value)} {attrs.get(f'{key}_units', '')}".rstrip() + " |")
+    return [*parts, ""]
+
+
+def _integration(study: StudyTables) -> list[str]:
+    parts = ["## Integration", "", "| case | steps | residuals | Jacobians | wall time s |", "|---|---|---|---|---|"]
     for case in study.cases:
         key = f"solver_{case.name.replace(', ', '_').replace(' ', '_')}"
-        numbers = [records.attrs[f"{key}_{item}"] for item in ("steps", "residuals", "jacobians", "wall_time")]
+        numbers = [study.records.attrs[f"{key}_{item}"] for item in ("steps", "residuals", "jacobians", "wall_time")]
         parts.append(f"| {case.name} | " + " | ".join(_value(v) for v in numbers) + " |")
-    return "\n".join(parts) + "\n"
+    return parts
 
 
 def _table(study: StudyTables, component: str) -> list[str]:
