@@ -139,7 +139,7 @@ def contact_pattern(
 
 
 def _engagement(geometry: PairGeometry, rotation: int, tooth: int) -> tuple[float, float, float]:
-    """Driver angle at which a tooth touches at the pitch point; first and last roll angle, half a pitch beyond its path."""
+    """Driver angle at which a tooth touches at the pitch point; roll angles half a pitch before and after its path."""
     gear = geometry.wheels[0]
     alpha = geometry.working_pressure_angle
     middle, reach = gear.base_radius * math.tan(alpha), 0.5 * gear.base_pitch
