@@ -6,6 +6,7 @@ import numpy as np
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.jit import kernel
+from gearmbs.dae.equations.time_functions import smooth_step
 
 LAW_HUNT_CROSSLEY = L.LAW_HUNT_CROSSLEY
 FRICTION_ADAMS = L.FRICTION_ADAMS
@@ -46,9 +47,8 @@ def normal_law(law, k, e, c, d, delta, rate):
         step = 1.0
         step_slope = 0.0
     else:
-        ratio = delta / d
-        step = ratio * ratio * (3.0 - 2.0 * ratio)
-        step_slope = 6.0 * ratio * (1.0 - ratio) / d
+        _, step, step_slope, _ = smooth_step(delta / d, 0)
+        step_slope /= d
     p = elastic + c * step * rate
     if p <= 0.0:
         return 0.0, 0.0, 0.0, energy, elastic
@@ -75,9 +75,9 @@ def friction_law(kind, mu_s, mu_d, v_s, v_d, speed):
             return 0.5 * mu_s * (3.0 - r * r) / v_s, -mu_s / v_s**3
         if speed >= v_d:
             return mu_d / speed, -mu_d / speed**3
-        r = (speed - v_s) / (v_d - v_s)
-        mu = mu_s + (mu_d - mu_s) * r * r * (3.0 - 2.0 * r)
-        slope = (mu_d - mu_s) * 6.0 * r * (1.0 - r) / (v_d - v_s)
+        _, step, step_slope, _ = smooth_step((speed - v_s) / (v_d - v_s), 0)
+        mu = mu_s + (mu_d - mu_s) * step
+        slope = (mu_d - mu_s) * step_slope / (v_d - v_s)
         ratio = mu / speed
         return ratio, (slope - ratio) / (speed * speed)
     y = speed / v_s

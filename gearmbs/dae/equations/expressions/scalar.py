@@ -8,6 +8,7 @@ import numpy as np
 
 from gearmbs._jit import njit
 from gearmbs.dae.equations.expressions import opcodes as op
+from gearmbs.dae.equations.time_functions import smooth_step
 
 
 @njit("UniTuple(float64, 3)(int64, float64, float64)", cache=True, error_model="numpy", nogil=True)
@@ -69,19 +70,9 @@ def unary(code, a, p):
         return (np.floor(a) if a >= 0.0 else np.ceil(a)), 0.0, 0.0
     if code == op.ANINT:
         return (np.floor(a + 0.5) if a >= 0.0 else np.ceil(a - 0.5)), 0.0, 0.0
-    if code == op.STEP01:
-        if a <= 0.0:
-            return 0.0, 0.0, 0.0
-        if a >= 1.0:
-            return 1.0, 0.0, 0.0
-        return a * a * (3.0 - 2.0 * a), 6.0 * a * (1.0 - a), 6.0 - 12.0 * a
-    if code == op.STEP5_01:
-        if a <= 0.0:
-            return 0.0, 0.0, 0.0
-        if a >= 1.0:
-            return 1.0, 0.0, 0.0
-        b = a * (1.0 - a)
-        return a * a * a * (10.0 - 15.0 * a + 6.0 * a * a), 30.0 * b * b, 60.0 * b * (1.0 - 2.0 * a)
+    if code == op.STEP01 or code == op.STEP5_01:
+        _, f, slope, curvature = smooth_step(a, 1 if code == op.STEP5_01 else 0)
+        return f, slope, curvature
     if code == op.HAVERSINE01:
         if a <= 0.0:
             return 0.0, 0.0, 0.0
