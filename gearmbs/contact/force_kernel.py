@@ -6,7 +6,15 @@ from gearmbs._jit import njit
 from gearmbs.contact.kernel import GEAR_CONTACT_SIG
 from gearmbs.dae.compiled.pointers import caller
 from gearmbs.dae.compiled.views import matrix_at, vector_at
-from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P, FRAME_V, FRAME_W
+from gearmbs.dae.equations.force_elements import (
+    DERIVATIVES,
+    FORCE_SIG,
+    FRAME_A,
+    FRAME_COLUMNS,
+    FRAME_P,
+    FRAME_V,
+    FRAME_W,
+)
 
 contact_at = caller(GEAR_CONTACT_SIG)
 
@@ -17,19 +25,19 @@ def contact_force(ints, reals, t, frames, states, inputs, want, work, wrench, ra
 
     Called through it, the large kernel need not be compiled into this one.
     """
-    first, second = frames[0], frames[1]
+    other = FRAME_COLUMNS
     contact_at(ints[0])(
         vector_at(ints, 1, ints.size - 1),
         reals,
-        vector_at(first, FRAME_P, 3),
-        matrix_at(first, FRAME_A, 3, 3),
-        vector_at(first, FRAME_V, 3),
-        vector_at(first, FRAME_W, 3),
-        vector_at(second, FRAME_P, 3),
-        matrix_at(second, FRAME_A, 3, 3),
-        vector_at(second, FRAME_V, 3),
-        vector_at(second, FRAME_W, 3),
-        wrench[0],
+        vector_at(frames, FRAME_P, 3),
+        matrix_at(frames, FRAME_A, 3, 3),
+        vector_at(frames, FRAME_V, 3),
+        vector_at(frames, FRAME_W, 3),
+        vector_at(frames, other + FRAME_P, 3),
+        matrix_at(frames, other + FRAME_A, 3, 3),
+        vector_at(frames, other + FRAME_V, 3),
+        vector_at(frames, other + FRAME_W, 3),
+        vector_at(wrench, 0, 6),
         jac,
         diagnostics,
         want & DERIVATIVES,

@@ -16,7 +16,7 @@ from numba.np.arrayobj import make_array, populate_array
 
 def _view(dimensions: int):
     def typing(array, *places):
-        if not isinstance(array, types.Array) or array.ndim != 1 or array.layout != "C":
+        if not isinstance(array, types.Array) or array.layout != "C":
             return None
         if not all(isinstance(place, types.Integer) for place in places):
             return None
@@ -47,13 +47,13 @@ _VECTOR, _MATRIX = _view(1), _view(2)
 
 @intrinsic
 def vector_at(typingctx, array, first, size):
-    """Return ``array[first : first + size]``."""
+    """Return ``array.ravel()[first : first + size]``."""
     signature = _VECTOR[0](array, first, size)
     return (signature, _VECTOR[1]) if signature is not None else None
 
 
 @intrinsic
 def matrix_at(typingctx, array, first, rows, columns):
-    """Return ``array[first : first + rows * columns].reshape(rows, columns)``."""
+    """Return ``array.ravel()[first : first + rows * columns].reshape(rows, columns)``."""
     signature = _MATRIX[0](array, first, rows, columns)
     return (signature, _MATRIX[1]) if signature is not None else None

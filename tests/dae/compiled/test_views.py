@@ -31,3 +31,11 @@ def test_integers_and_nothing():
         return matrix_at(a, 2, n, 2).shape[0], vector_at(a, 4, 1)[0]
 
     assert last(np.arange(6), 0) == (0, 4)
+
+
+def test_views_of_tables_count_along_the_rows():
+    @njit
+    def part(a):
+        return vector_at(a, 3, 2)[1], matrix_at(a, 4, 2, 2)[1, 0]
+
+    assert part(np.arange(12.0).reshape(4, 3)) == (4.0, 6.0)
