@@ -1,0 +1,43 @@
+"""A run taken step by step, to look into its state in between."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearmbs.dae.integrators import run_state as s
+from gearmbs.dae.integrators import start
+from gearmbs.dae.integrators.driver import Run
+from gearmbs.dae.integrators.options import Options
+from gearmbs.dae.integrators.rounding import rounding_level
+from gearmbs.dae.integrators.step import advance
+from gearmbs.dae.problem import DAEProblem
+
+
+def started(problem: DAEProblem, t_eval: np.ndarray | None = None, t_end: float | None = None, **settings) -> Run:
+    """Return a run that stands at its start, with pivots chosen."""
+    run = Run(problem, t_eval, t_end, Options(**settings))
+    failure = start.begin(run)
+    assert failure is None, failure
+    return run
+
+
+def take_step(run: Run) -> int:
+    """Take one accepted step, with the help of Python where it is needed; return the code of the loop."""
+    while True:
+        code = advance(run.functions, run.state, run.plan, run.factors, 1)
+        if code == s.REPIVOT:
+            assert run.repivot() is None
+        elif code == s.BUFFER_FULL:
+            run.records.drain()
+        else:
+            return code
+
+
+def moved_by_rounding(run: Run, unknowns: np.ndarray) -> float:
+    """Return how far rounding moves some unknowns in the corrector of the last step."""
+    st = run.state
+    weights = st.w_error.copy()
+    st.w_error[:] = unknowns
+    level = rounding_level(st, run.plan, run.factors)
+    st.w_error[:] = weights
+    return float(level)
