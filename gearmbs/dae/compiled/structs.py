@@ -81,6 +81,7 @@ class Struct:
     scalar_members: ClassVar[Mapping[str, str]]
     array_members: ClassVar[Mapping[str, tuple[str, int]]]
     numba_type: ClassVar[StructType]
+    _array_dtypes: ClassVar[Mapping[str, tuple[np.dtype, int]]]
 
     def __init_subclass__(cls) -> None:
         kinds = inspect.get_annotations(cls)
@@ -88,6 +89,9 @@ class Struct:
             raise TypeError(f"{cls.__name__}: annotations are read as text; import annotations from __future__")
         cls.scalar_members = {name: SCALARS[kind] for name, kind in kinds.items() if kind in SCALARS}
         cls.array_members = {name: ARRAYS[kind] for name, kind in kinds.items() if kind not in SCALARS}
+        cls._array_dtypes = {
+            name: (np.dtype(kind), dimensions) for name, (kind, dimensions) in cls.array_members.items()
+        }
         cls.numba_type = StructType(
             cls.__name__,
             tuple(cls.scalar_members.items()),
@@ -110,10 +114,10 @@ class Struct:
 
     def _adopt(self, name: str, value: np.ndarray) -> tuple[int, ...]:
         """Take an array for a member; return its address and shape."""
-        kind, dimensions = self.array_members[name]
+        kind, dimensions = self._array_dtypes[name]
         if value.dtype != kind or value.ndim != dimensions or not value.flags.c_contiguous:
             raise TypeError(
-                f"{name} must be a contiguous array of type {kind} with {dimensions} dimensions, "
+                f"{name} must be a contiguous array of type {kind.str[1:]} with {dimensions} dimensions, "
                 f"is one of {value.dtype} of shape {value.shape}"
             )
         self.__dict__[name] = value

@@ -14,12 +14,11 @@ References
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import float64, int64, types
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.structs import IntVector, Struct, Vector
 
 THRESHOLDS = (0.01, 0.1, 0.5)
 """Fraction of its column's largest entry a pivot must reach; the next is taken where entries grow too much."""
@@ -75,7 +74,7 @@ def equilibrate(indptr, indices, vals, row_scale, col_scale):
         col_scale[i] = 2.0 ** np.round(np.log2(col_scale[i]))
 
 
-class Lines(NamedTuple):
+class Lines(Struct):
     """Rows or columns of the matrix left to eliminate, each a stretch of a pool, and lists of those of equal length.
 
     Attributes
@@ -88,19 +87,30 @@ class Lines(NamedTuple):
         Indices of entries across the line.
     vals : ndarray
         Their values, or one place for lines that carry the pattern alone.
+    full : bool
+        The pool was too small.
     """
 
-    start: np.ndarray
-    length: np.ndarray
-    room: np.ndarray
-    head: np.ndarray
-    after: np.ndarray
-    before: np.ndarray
-    pool: np.ndarray
-    vals: np.ndarray
+    start: IntVector
+    length: IntVector
+    room: IntVector
+    head: IntVector
+    after: IntVector
+    before: IntVector
+    pool: IntVector
+    vals: Vector
+    full: bool
 
 
-LINES_TYPE = types.NamedTuple([_IVEC] * 7 + [_VEC], Lines)
+def new_lines(n: int, size: int, with_values: bool) -> Lines:
+    """Return ``n`` empty lines with a pool of ``size`` places."""
+    whole = {name: np.empty(n, dtype=np.int64) for name in ("start", "length", "after", "before")}
+    counts = {name: np.empty(n + 1, dtype=np.int64) for name in ("room", "head")}
+    pool = np.empty(size, dtype=np.int64)
+    return Lines(**whole, **counts, pool=pool, vals=np.empty(size if with_values else 1))
+
+
+LINES_TYPE = Lines.numba_type
 
 
 @njit(types.void(int64, int64, _IVEC, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
@@ -127,83 +137,73 @@ def _link(item, count, head, after, before):
     head[count] = item
 
 
-@njit(LINES_TYPE(_IVEC, _IVEC, _VEC), cache=True, nogil=True, error_model="numpy")
-def _columns(indptr, indices, scaled):
-    """Return the columns of a CSC matrix with their values, not yet linked."""
+@njit(types.void(LINES_TYPE, _IVEC, _IVEC, _VEC), cache=True, nogil=True, error_model="numpy")
+def _fill_columns(columns, indptr, indices, scaled):
+    """Fill the columns of a CSC matrix with their values, not yet linked."""
     n = indptr.shape[0] - 1
-    nnz = indices.shape[0]
-    start = indptr[:n].copy()
-    room = np.empty(n + 1, dtype=np.int64)
-    pool = np.empty(3 * nnz + 4 * n, dtype=np.int64)
-    vals = np.empty(3 * nnz + 4 * n)
     for j in range(n):
-        room[j] = indptr[j + 1] - indptr[j]
-    room[n] = nnz
-    for p in range(nnz):
-        pool[p] = indices[p]
-        vals[p] = scaled[p]
-    head = np.full(n + 1, -1, dtype=np.int64)
-    after = np.empty(n, dtype=np.int64)
-    before = np.empty(n, dtype=np.int64)
-    return Lines(start, room[:n].copy(), room, head, after, before, pool, vals)
+        columns.start[j] = indptr[j]
+        columns.length[j] = indptr[j + 1] - indptr[j]
+        columns.room[j] = columns.length[j]
+    columns.room[n] = indices.shape[0]
+    for p in range(indices.shape[0]):
+        columns.pool[p] = indices[p]
+        columns.vals[p] = scaled[p]
+    columns.head[:] = -1
+    columns.full = False
 
 
-@njit(LINES_TYPE(_IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
-def _rows(indptr, indices):
-    """Return the pattern of the rows of a CSC matrix, not yet linked."""
+@njit(types.void(LINES_TYPE, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
+def _fill_rows(rows, indptr, indices):
+    """Fill the pattern of the rows of a CSC matrix, not yet linked."""
     n = indptr.shape[0] - 1
-    nnz = indices.shape[0]
-    start = np.empty(n, dtype=np.int64)
-    length = np.zeros(n, dtype=np.int64)
-    room = np.empty(n + 1, dtype=np.int64)
-    pool = np.empty(3 * nnz + 4 * n, dtype=np.int64)
-    for p in range(nnz):
+    start, length = rows.start, rows.length
+    length[:] = 0
+    for p in range(indices.shape[0]):
         length[indices[p]] += 1
     end = 0
     for i in range(n):
         start[i] = end
-        room[i] = length[i]
+        rows.room[i] = length[i]
         end += length[i]
         length[i] = 0
-    room[n] = nnz
+    rows.room[n] = indices.shape[0]
     for j in range(n):
         for p in range(indptr[j], indptr[j + 1]):
             i = indices[p]
-            pool[start[i] + length[i]] = j
+            rows.pool[start[i] + length[i]] = j
             length[i] += 1
-    head = np.full(n + 1, -1, dtype=np.int64)
-    after = np.empty(n, dtype=np.int64)
-    before = np.empty(n, dtype=np.int64)
-    return Lines(start, length, room, head, after, before, pool, np.empty(1))
+    rows.head[:] = -1
+    rows.full = False
 
 
-@njit(LINES_TYPE(LINES_TYPE, int64, int64), cache=True, nogil=True, error_model="numpy")
+@njit(types.boolean(LINES_TYPE, int64, int64), cache=True, nogil=True, error_model="numpy")
 def _make_room(lines, line, want):
-    """Return the lines with ``line`` at the end of the pool with room for ``want`` entries.
+    """Move ``line`` to the end of the pool with room for ``want`` entries; return whether there is room.
 
-    The pool is compacted, and grown if need be, when it is full.
+    A full pool is compacted first.
     """
     start, length, room = lines.start, lines.length, lines.room
     pool, vals = lines.pool, lines.vals
     with_values = vals.shape[0] > 1
     n = start.shape[0]
     if room[n] + want > pool.shape[0]:
-        size = max(pool.shape[0], 2 * (np.sum(length) + want) + 4 * n)
-        fresh = np.empty(size, dtype=np.int64)
-        fresh_vals = np.empty(size if with_values else 1)
+        old = pool.copy()
+        old_vals = vals.copy()
         end = 0
         for m in range(n):
             for p in range(length[m]):
-                fresh[end + p] = pool[start[m] + p]
+                pool[end + p] = old[start[m] + p]
                 if with_values:
-                    fresh_vals[end + p] = vals[start[m] + p]
+                    vals[end + p] = old_vals[start[m] + p]
             start[m] = end
             room[m] = length[m]
             end += length[m]
         room[n] = end
-        pool = fresh
-        vals = fresh_vals
     end = room[n]
+    if end + want > pool.shape[0]:
+        lines.full = True
+        return False
     for p in range(length[line]):
         pool[end + p] = pool[start[line] + p]
         if with_values:
@@ -211,7 +211,7 @@ def _make_room(lines, line, want):
     start[line] = end
     room[line] = want
     room[n] = end + want
-    return Lines(start, length, room, lines.head, lines.after, lines.before, pool, vals)
+    return True
 
 
 @njit(float64(int64, int64, int64, _IVEC, _VEC), cache=True, nogil=True, error_model="numpy")
@@ -339,7 +339,7 @@ def _take_out(columns, rows, row, col, below, right, multipliers):
 
 
 @njit(
-    types.UniTuple(LINES_TYPE, 2)(LINES_TYPE, LINES_TYPE, int64, _IVEC, _IVEC, _VEC, _IVEC, _VEC, _VEC),
+    types.boolean(LINES_TYPE, LINES_TYPE, int64, _IVEC, _IVEC, _VEC, _IVEC, _VEC, _VEC),
     cache=True,
     nogil=True,
     error_model="numpy",
@@ -363,8 +363,8 @@ def _eliminate(columns, rows, row, below, right, multipliers, place, top, peak):
 
     Returns
     -------
-    columns, rows : Lines
-        With larger pools, perhaps.
+    done : bool
+        False where a pool is too small.
     """
     start, length, room = columns.start, columns.length, columns.room
     head, after, before = columns.head, columns.after, columns.before
@@ -392,8 +392,8 @@ def _eliminate(columns, rows, row, below, right, multipliers, place, top, peak):
                 count += 1
         length[j] = last - first
         if count > room[j]:
-            columns = _make_room(columns, j, 2 * count)
-            pool, vals = columns.pool, columns.vals
+            if not _make_room(columns, j, 2 * count):
+                return False
         for m in range(below.shape[0] if count > length[j] else 0):
             i = below[m]
             if place[i] >= 0:
@@ -402,8 +402,8 @@ def _eliminate(columns, rows, row, below, right, multipliers, place, top, peak):
             vals[start[j] + length[j]] = -multipliers[m] * u
             length[j] += 1
             if row_length[i] + 1 > row_room[i]:
-                rows = _make_room(rows, i, 2 * (row_length[i] + 1))
-                row_pool = rows.pool
+                if not _make_room(rows, i, 2 * (row_length[i] + 1)):
+                    return False
             row_pool[row_start[i] + row_length[i]] = j
             row_length[i] += 1
         top[j] = 0.0
@@ -412,7 +412,7 @@ def _eliminate(columns, rows, row, below, right, multipliers, place, top, peak):
             top[j] = max(top[j], abs(vals[p]))
         peak[j] = max(peak[j], max(top[j], abs(u)))
         _link(j, length[j], head, after, before)
-    return columns, rows
+    return True
 
 
 @njit(types.void(_IVEC, LINES_TYPE), cache=True, nogil=True, error_model="numpy")
@@ -446,12 +446,14 @@ def _append_left_over(lines, rank):
 
 
 @njit(
-    types.Tuple((int64, float64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC))(_IVEC, _IVEC, _VEC, float64, float64),
+    types.Tuple((int64, float64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC))(
+        _IVEC, _IVEC, _VEC, float64, float64, LINES_TYPE, LINES_TYPE
+    ),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def choose_pivots(indptr, indices, scaled, drop, threshold):
+def choose_pivots(indptr, indices, scaled, drop, threshold, columns, rows):
     """Eliminate the matrix once with Markowitz's rule and record pivots and fill.
 
     Parameters
@@ -464,11 +466,13 @@ def choose_pivots(indptr, indices, scaled, drop, threshold):
         Columns whose entries have all fallen below this fraction of their largest value are left without a pivot.
     threshold : float
         Fraction of the largest entry left in its column that a pivot must reach.
+    columns, rows : Lines
+        Scratch, of `new_lines`; ``columns`` with values.
 
     Returns
     -------
     rank : int
-        Number of pivots found, less than n when the matrix is singular.
+        Number of pivots found, less than n when the matrix is singular; -1 where a pool was too small.
     growth : float
         Largest entry met on the way, beside the largest of the matrix.
     pivot_rows, pivot_cols : ndarray, shape (n,)
@@ -480,8 +484,8 @@ def choose_pivots(indptr, indices, scaled, drop, threshold):
     """
     n = indptr.shape[0] - 1
     nnz = indices.shape[0]
-    columns = _columns(indptr, indices, scaled)
-    rows = _rows(indptr, indices)
+    _fill_columns(columns, indptr, indices, scaled)
+    _fill_rows(rows, indptr, indices)
     top = np.zeros(n)
     for j in range(n):
         for p in range(indptr[j], indptr[j + 1]):
@@ -514,7 +518,8 @@ def choose_pivots(indptr, indices, scaled, drop, threshold):
         below = l_rows[l_ptr[k] : l_ptr[k + 1]]
         right = u_cols[u_ptr[k] : u_ptr[k + 1]]
         _take_out(columns, rows, row, col, below, right, multipliers)
-        columns, rows = _eliminate(columns, rows, row, below, right, multipliers, place, top, peak)
+        if not _eliminate(columns, rows, row, below, right, multipliers, place, top, peak):
+            return -1, 0.0, pivot_rows, pivot_cols, l_ptr, l_rows, u_ptr, u_cols
         _link_all(below, rows)
     l_ptr[rank:] = l_ptr[rank]
     u_ptr[rank:] = u_ptr[rank]

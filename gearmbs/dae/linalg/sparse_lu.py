@@ -12,7 +12,15 @@ from numba import float64, int64, types, uint32
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.structs import IndexVector, IntVector, Struct, Vector
-from gearmbs.dae.linalg.pivoting import CANCELLED, GROWTH_ALLOWED, THRESHOLDS, choose_pivots, equilibrate
+from gearmbs.dae.linalg.pivoting import (
+    CANCELLED,
+    GROWTH_ALLOWED,
+    LINES_TYPE,
+    THRESHOLDS,
+    choose_pivots,
+    equilibrate,
+    new_lines,
+)
 
 GROWTH_LIMIT = 1e5
 
@@ -170,22 +178,29 @@ def _scaled(indptr, indices, vals, scale):
 
 @njit(
     types.Tuple((int64, _IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _VEC, _VEC, _VEC))(
-        _IVEC, _IVEC, _VEC, _VEC, float64
+        _IVEC, _IVEC, _VEC, _VEC, float64, LINES_TYPE, LINES_TYPE
     ),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def _plan(indptr, indices, vals, scale, drop):
-    """Return the rank and the fields of an `LUPlan`, in their order; parameters as in `analyse`."""
+def _plan(indptr, indices, vals, scale, drop, columns, rows_left):
+    """Return the rank and the fields of an `LUPlan`, in their order; parameters as in `analyse` and `choose_pivots`."""
     n = indptr.shape[0] - 1
     row_scale, col_scale, scaled = _scaled(indptr, indices, vals, scale)
-    rank, growth, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(indptr, indices, scaled, drop, THRESHOLDS[0])
-    for threshold in THRESHOLDS[1:]:
+    growth = np.inf
+    for threshold in THRESHOLDS:
         if growth > GROWTH_ALLOWED:
             rank, growth, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(
-                indptr, indices, scaled, drop, threshold
+                indptr, indices, scaled, drop, threshold, columns, rows_left
             )
+    if rank < 0:
+        rows = np.arange(n)
+        cols = rows
+        l_ptr[:] = 0
+        u_ptr[:] = 0
+        l_rows = rows[:0]
+        u_cols = l_rows
     row_place = np.empty(n, dtype=np.int64)
     col_place = np.empty(n, dtype=np.int64)
     row_from = np.empty(n, dtype=np.uint32)
@@ -250,7 +265,13 @@ def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np
     """
     if not np.isfinite(vals).all():
         raise ValueError("the matrix has entries that are not finite")
-    rank, *plan = _plan(indptr, indices, vals, np.asarray(scale, dtype=float), max(drop, CANCELLED))
+    n = len(indptr) - 1
+    size = 3 * len(indices) + 4 * n
+    rank = -1
+    while rank < 0:
+        lines = new_lines(n, size, True), new_lines(n, size, False)
+        rank, *plan = _plan(indptr, indices, vals, np.asarray(scale, dtype=float), max(drop, CANCELLED), *lines)
+        size *= 2
     if rank < len(indptr) - 1 and drop == 0.0:
         rows, cols = (np.asarray(plan[i], dtype=np.int64)[rank:] for i in (8, 9))
         raise SingularMatrixError(rows, cols)

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearmbs.dae.linalg.pivoting import GROWTH_ALLOWED, THRESHOLDS, choose_pivots, equilibrate
+from gearmbs.dae.linalg.pivoting import GROWTH_ALLOWED, THRESHOLDS, choose_pivots, equilibrate, new_lines
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, SingularMatrixError, analyse, factor, new_factors, solve
 
 
@@ -205,9 +205,30 @@ def test_growing_entries_ask_for_stricter_pivots():
             if rng.random() < 0.8:
                 dense[k, j] = rng.choice([-1, 1]) * (0.011 if rng.random() < 0.6 else 1.0)
     indptr, indices, vals = csc(dense)
-    growth = [choose_pivots(indptr, indices, vals, 1e-14, threshold)[1] for threshold in THRESHOLDS[:2]]
+    n, size = len(indptr) - 1, 8 * len(indices)
+    lines = new_lines(n, size, True), new_lines(n, size, False)
+    growth = [choose_pivots(indptr, indices, vals, 1e-14, threshold, *lines)[1] for threshold in THRESHOLDS[:2]]
     assert growth[0] > GROWTH_ALLOWED > 10.0 * growth[1]
     x = rng.normal(size=n)
     out = solve_once(dense, dense @ x)
     # backward stable: rounding, a growth below 100, and a sum over 2 * 5 + 1 entries
     assert np.abs(dense @ out - dense @ x).max() < 100.0 * 11 * 2.2e-16 * np.abs(dense).max() * np.abs(out).max()
+
+
+def test_fill_that_does_not_fit_is_told_and_given_room():
+    """A scattered matrix fills up; with a small pool lines are moved together, until there is no room at all."""
+    rng = np.random.default_rng(4)
+    n = 60
+    dense = np.where(rng.random((n, n)) < 0.15, rng.normal(size=(n, n)), 0.0) + np.eye(n)
+    indptr, indices, vals = csc(dense)
+
+    def pivots(size):
+        lines = new_lines(n, size, True), new_lines(n, size, False)
+        return choose_pivots(indptr, indices, vals, 1e-14, 0.1, *lines)
+
+    assert pivots(len(indices) + 2)[0] == -1
+    wide = pivots(50 * len(indices))
+    compacted = pivots(4 * len(indices))
+    assert wide[0] == compacted[0] == n
+    np.testing.assert_array_equal(compacted[2], wide[2])
+    np.testing.assert_array_equal(compacted[3], wide[3])
