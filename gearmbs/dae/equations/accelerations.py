@@ -46,7 +46,16 @@ from gearmbs.dae.equations.rotation import (
     euler_rates,
     momentum_from_conjugate,
 )
-from gearmbs.dae.equations.simple_terms import OFFSET, QUADRATIC, RATE, RELATIVE, dot_motion, relative_motion
+from gearmbs.dae.equations.simple_terms import (
+    OFFSET,
+    QUADRATIC,
+    RATE,
+    RELATIVE,
+    dot_motion,
+    put_dot,
+    put_point,
+    relative_motion,
+)
 from gearmbs.dae.equations.update import update_bodies
 
 FORCE_RECORD = 6
@@ -104,53 +113,6 @@ def tape_row_rates(k, t, y, tab, room):
             eps = own_rate(b, 3 + m, y, tab.at, tab.kin)
             gamma -= eps * terms.dot3(kin, KIN_ADOT + 3 * m, grad, 6 * p + 3)
     return value, rate, partial, gamma
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def put_point(mode, slot, vals, k, row, coef, term, at, marker_body, frame):
-    """Hand over the gradient of a POINT term; return the number of the next entry."""
-    c = term[T.TERM_AXES]
-    c1 = c + 1 if c < 2 else 0
-    c2 = c - 1 if c > 0 else 2
-    for side in range(2):
-        marker = term[T.TERM_I + side]
-        if marker_body[marker] == 0:
-            continue
-        sign = coef if side == 0 else -coef
-        if mode == NUMBERS:
-            arm_2, arm_1 = sign * frame[marker, T.MK_ARM + c2], -sign * frame[marker, T.MK_ARM + c1]
-            vals[slot[k]] += sign
-            vals[slot[k + 1]] += sign
-            vals[slot[k + 2]] += arm_2
-            vals[slot[k + 3]] += arm_2
-            vals[slot[k + 4]] += arm_1
-            vals[slot[k + 5]] += arm_1
-            k += 6
-            continue
-        q = at[marker_body[marker], T.AT_V]
-        k = put_pair(mode, slot, vals, k, row, q + c, sign)
-        k = put_pair(mode, slot, vals, k, row, q + 3 + c1, sign * frame[marker, T.MK_ARM + c2])
-        k = put_pair(mode, slot, vals, k, row, q + 3 + c2, -sign * frame[marker, T.MK_ARM + c1])
-    return k
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def put_dot(mode, slot, vals, k, row, coef, term, at, marker_body, cross):
-    """Hand over the gradient of a DOT1 term, given that of its first side; return the number of the next entry."""
-    for side in range(2):
-        body = marker_body[term[T.TERM_I + side]]
-        if body == 0:
-            continue
-        sign = coef if side == 0 else -coef
-        if mode == NUMBERS:
-            for c in range(3):
-                vals[slot[k]] += sign * cross[c]
-                vals[slot[k + 1]] += sign * cross[c]
-                k += 2
-            continue
-        for c in range(3):
-            k = put_pair(mode, slot, vals, k, row, at[body, T.AT_V] + 3 + c, sign * cross[c])
-    return k
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -178,6 +178,21 @@ def bias(f, n, v, y, at, body, partial, d, s):
 
     They are w x (w x s) + 2 w x s' of the point and sum_k v_k b_k' of the rotation, the axis b_k of mode k turning with
     the body and the modes before it. ``s[0:6]`` holds the arm and its elastic rate.
+
+    Parameters
+    ----------
+    f, n, v : int
+        The frame, its number of modes, and where their rates are in y.
+    y
+        Unknowns.
+    at, partial : ndarray
+        Places, and the table of partial derivatives.
+    body : ndarray
+        The body's row of the kinematics table.
+    d : ndarray
+        The frame's partial derivatives.
+    s : ndarray
+        Arm and elastic rate in the first six places, then scratch.
     """
     first = at[f, T.AT_PARTIAL] + PARTIALS * (3 + n)
     cross3(body, KIN_W, s, 0, s, 9)
@@ -417,7 +432,21 @@ def wrench_at(f, point, force, torque, sign, marker_body, kin, frame, s):
 
 @njit(cache=True, error_model="numpy")
 def load_at(f, sign, row, y, marker_body, kin, frame, s):
-    """As `wrench_at` for the F and N that a force element has in y."""
+    """As `wrench_at` for the F and N that a force element has in y.
+
+    Parameters
+    ----------
+    f, sign : int, float
+        The frame that feels the load, and the factor of both.
+    row : ndarray of int
+        Row of the force element.
+    y
+        Unknowns.
+    marker_body, kin, frame : ndarray
+        The markers' frames, tables of kinematics and of markers.
+    s : ndarray
+        Written, 15 places.
+    """
     force, torque = s[9:12], s[12:15]
     for c in range(3):
         force[c] = y[row[T.FORCE_F] + c] if row[T.FORCE_F] >= 0 else 0.0

@@ -120,7 +120,23 @@ def elastic_term_entries(mode, j, coef, lam, mu, factor, rate_rows, row_lam, row
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
-    """Entries of one constraint row, its derivative, and the forces of its multipliers."""
+    """Entries of one constraint row, its derivative, and the forces of its multipliers.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.entries.put`; returned is the number of the next entry.
+    r : int
+        Constraint row.
+    y, yp
+        Unknowns and their derivatives.
+    cj
+        Factor of dG/dy'.
+    idata
+        Header and tables of integers.
+    tab
+        Named views of the tables, up to date with y.
+    """
     rate_rows = has_rate_rows(idata[T.H_FORMULATION])
     lam, mu = idata[T.H_LAMBDA] + r, idata[T.H_MU] + r
     lam_value, mu_value = multipliers_of_row(r, y, yp, idata)
@@ -201,7 +217,25 @@ def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
 
 @njit(cache=True, error_model="numpy")
 def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k):
-    """Entries of a constraint row given by an expression."""
+    """Entries of a constraint row given by an expression.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.entries.put`; returned is the number of the next entry.
+    t
+        S.
+    r : int
+        Constraint row.
+    y, yp
+        Unknowns and their derivatives.
+    cj
+        Factor of dG/dy'.
+    idata
+        Header and tables of integers.
+    tab
+        Named views of the tables, up to date with y.
+    """
     rate_rows = has_rate_rows(idata[T.H_FORMULATION])
     lam, mu = idata[T.H_LAMBDA] + r, idata[T.H_MU] + r
     lam_value, mu_value = multipliers_of_row(r, y, yp, idata)
@@ -248,7 +282,23 @@ def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k):
 
 @njit(cache=True, error_model="numpy")
 def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, tab, slot, vals, k):
-    """Entries of one row from the spatial gradient ``d`` over a list of bodies, then of unknowns."""
+    """Entries of one row from the spatial gradient ``d`` over a list of bodies, then of unknowns.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.entries.put`; returned is the number of the next entry.
+    base : int
+        Row of the entries.
+    d, sign : ndarray, float
+        Derivatives by the variations of the frames, 12 each, then by unknowns, and their factor.
+    bodies, first : int
+        Number of frames, and where among the extra integers they are.
+    unknowns, after : int
+        Number of unknowns, and where they are.
+    tab
+        Named views of the tables, up to date with y.
+    """
     for q in range(bodies):
         b = tab.extra_i[first + q]
         if b == 0:
@@ -272,7 +322,25 @@ def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, tab, slot
 
 @njit(cache=True, error_model="numpy")
 def state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k):
-    """Entries of the equation of one user-defined state."""
+    """Entries of the equation of one user-defined state.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.entries.put`; returned is the number of the next entry.
+    t
+        S.
+    s : int
+        Number of the state.
+    y
+        Unknowns.
+    cj
+        Factor of dG/dy'.
+    idata
+        Header and tables of integers.
+    tab
+        Named views of the tables, up to date with y.
+    """
     z = idata[T.H_Z] + s
     k = put(mode, slot, vals, k, z, z, cj if tab.state[s, T.STATE_KIND] == T.STATE_DIFFERENTIAL else 1.0)
     tape = tab.state[s, T.STATE_TAPE]
@@ -298,7 +366,21 @@ def state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k):
 
 @njit(cache=True, error_model="numpy")
 def load_entries(mode, b, sign, row, y, tab, slot, vals, k):
-    """Entries of one force element's loads on body b in the rows of eq. (5)."""
+    """Entries of one force element's loads on body b in the rows of eq. (5).
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.entries.put`; returned is the number of the next entry.
+    b, sign : int, float
+        The frame that feels the load, 1 for that of I and -1 for that of J.
+    row : ndarray of int
+        Row of the force element.
+    y
+        Unknowns.
+    tab
+        Named views of the tables, up to date with y.
+    """
     if b == 0:
         return k
     at = tab.at[b]
@@ -369,7 +451,25 @@ def load_entries(mode, b, sign, row, y, tab, slot, vals, k):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k):
-    """Entries of the rows F - F(q, q', t) and N - N(q, q', t) of one force element, and of its own states."""
+    """Entries of the rows F - F(q, q', t) and N - N(q, q', t) of one force element, and of its own states.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.entries.put`; returned is the number of the next entry.
+    t
+        S.
+    row : ndarray of int
+        Row of the force element.
+    y, yp
+        Unknowns and their derivatives.
+    cj
+        Factor of dG/dy'.
+    idata
+        Header and tables of integers.
+    tab
+        Named views of the tables, up to date with y.
+    """
     width = row[T.FORCE_WIDTH]
     depends = row[T.FORCE_DEPENDS]
     bodies = tab.extra_i[depends]
@@ -421,6 +521,19 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
     """Evaluate dG/dy + cj dG/dy' into ``vals``, CSC order.
 
     Asked for it in the header, count the entries or write their rows and columns instead.
+
+    Parameters
+    ----------
+    t
+        S.
+    y, yp
+        Unknowns and their derivatives.
+    cj
+        Factor of dG/dy'.
+    vals : ndarray
+        Values in CSC order, or what the header asks for.
+    idata, rdata, work : ndarray
+        The packed tables and the work array.
     """
     tab = T.unpack(idata, rdata, work)
     mode = idata[T.H_MODE]

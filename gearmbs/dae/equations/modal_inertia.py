@@ -146,7 +146,21 @@ def coupling(y, at, modal, k, out, i):
 
 @njit(cache=True, error_model="numpy")
 def inertia_change(y, at, modal, k, w, i, out, j):
-    """Write dJ/dq_k w to ``out[j:j+3]``, body components, w in ``w[i:i+3]``."""
+    """Write dJ/dq_k w to ``out[j:j+3]``, body components, w in ``w[i:i+3]``.
+
+    Parameters
+    ----------
+    y
+        Unknowns.
+    at, modal : ndarray
+        The body's places, the table of all integrals.
+    k : int
+        Mode.
+    w, i : ndarray, int
+        The vector and its place.
+    out, j : ndarray, int
+        Where to write.
+    """
     n, q = at[T.AT_MODES], at[T.AT_QF]
     _, j1, j2, _, _, _, _, _ = integrals(modal, at[T.AT_MODAL], n)
     for r in range(3):

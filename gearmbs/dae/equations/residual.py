@@ -31,6 +31,7 @@ from gearmbs.dae.equations.forces import evaluate_element
 from gearmbs.dae.equations.modal_inertia import modal_residual
 from gearmbs.dae.equations.reactions import reaction_wrench
 from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, KIN_H, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.simple_terms import add_dot_term, add_point_term
 from gearmbs.dae.equations.unknowns import SI1, has_rate_rows, multipliers_of_row
 from gearmbs.dae.equations.update import euler_component, update_tables
 from gearmbs.dae.problem import RESIDUAL_SIG
@@ -63,7 +64,23 @@ def arm_to(b, point_marker, marker_body, kin, frame, out, k):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def add_load(b, sign, row, y, at, marker_body, kin, frame, partial, scratch, out):
-    """Subtract the generalised loads of one force element on body b (eq. (5), H_F^T F and H_N^T N)."""
+    """Subtract the generalised loads of one force element on body b (eq. (5), H_F^T F and H_N^T N).
+
+    Parameters
+    ----------
+    b, sign : int, float
+        The frame that feels the load, 1 for that of I and -1 for that of J.
+    row : ndarray of int
+        Row of the force element.
+    y
+        Unknowns.
+    at, marker_body, kin, frame
+        Tables of places, of the markers' frames, of kinematics and of markers.
+    partial, scratch : ndarray
+        Partial derivatives of elastic frames, and the work array's scratch.
+    out : ndarray
+        G.
+    """
     if b == 0:
         return
     if is_elastic(b, at):
@@ -114,57 +131,6 @@ def add_tape_row(k, t, lam, mu, y, tab, out):
             out[at[T.AT_R] + c] -= mu * along
             out[at[T.AT_THETA] + c] -= mu * about
     return value, rate
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def add_point_term(k, coef, lam, mu, at, term, marker_body, kin, frame, out):
-    """As the general path of `add_constraints` for a POINT term, whose gradient is a unit vector."""
-    c = term[k, T.TERM_AXES]
-    c1 = c + 1 if c < 2 else 0
-    c2 = c - 1 if c > 0 else 2
-    value, rate = 0.0, 0.0
-    for side in range(2):
-        marker = term[k, T.TERM_I + side]
-        b = marker_body[marker]
-        sign = coef if side == 0 else -coef
-        row = kin[b]
-        x1, x2 = frame[marker, T.MK_ARM + c1], frame[marker, T.MK_ARM + c2]
-        value += sign * (row[KIN_R + c] + frame[marker, T.MK_ARM + c])
-        if b == 0:
-            continue
-        rate += sign * (row[KIN_V + c] + row[KIN_W + c1] * x2 - row[KIN_W + c2] * x1)
-        p, th = at[b, T.AT_P], at[b, T.AT_THETA]
-        out[at[b, T.AT_U] + c] += sign * lam
-        out[at[b, T.AT_R] + c] -= sign * mu
-        for m in range(3):
-            a = KIN_AXES + 3 * m
-            angle = sign * (row[a + c1] * x2 - row[a + c2] * x1)
-            out[p + m] += lam * angle
-            out[th + m] -= mu * angle
-    return value, rate
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def add_dot_term(k, coef, lam, mu, at, term, marker_body, kin, frame, s, out):
-    """As the general path of `add_constraints` for a DOT1 term, which has no translations."""
-    i, j = term[k, T.TERM_I], term[k, T.TERM_J]
-    a = T.MK_AXES + 3 * (term[k, T.TERM_AXES] // 3)
-    b = T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3)
-    terms.cross3(frame[i], a, frame[j], b, s, 0)
-    rate = 0.0
-    for side in range(2):
-        body = marker_body[i if side == 0 else j]
-        if body == 0:
-            continue
-        sign = coef if side == 0 else -coef
-        row = kin[body]
-        rate += sign * terms.dot3(s, 0, row, KIN_W)
-        p, th = at[body, T.AT_P], at[body, T.AT_THETA]
-        for m in range(3):
-            angle = sign * terms.dot3(row, KIN_AXES + 3 * m, s, 0)
-            out[p + m] += lam * angle
-            out[th + m] -= mu * angle
-    return coef * terms.dot3(frame[i], a, frame[j], b), rate
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -1,4 +1,5 @@
-"""The two commonest constraint terms, POINT and DOT1, without the general path of `constraint_terms`.
+"""The two commonest constraint terms, POINT and DOT1, without the general path of `constraint_terms`: their motion,
+the forces of their multipliers, and their gradients in the acceleration system.
 
 A POINT term has a unit vector for its translational gradient, a DOT1 term none; centripetal parts follow from
 w x (w x r) = (w . r) w - (w . w) r.
@@ -9,7 +10,8 @@ from __future__ import annotations
 from gearmbs._jit import njit
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3, dot3
-from gearmbs.dae.equations.rotation import KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.entries import NUMBERS, put_pair
+from gearmbs.dae.equations.rotation import KIN_AXES, KIN_R, KIN_V, KIN_W
 
 OFFSET, RATE, QUADRATIC = 0, 3, 6
 RELATIVE = 9
@@ -69,3 +71,129 @@ def dot_motion(k, term, marker_body, kin, frame, s):
     ja, jb = dot3(wj, KIN_W, a, ka), dot3(wj, KIN_W, b, kb)
     ii, ij, jj = dot3(wi, KIN_W, wi, KIN_W), dot3(wi, KIN_W, wj, KIN_W), dot3(wj, KIN_W, wj, KIN_W)
     return phi, rate, ia * ib + ja * jb + 2.0 * (ij * phi - ib * ja) - (ii + jj) * phi
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_point_term(k, coef, lam, mu, at, term, marker_body, kin, frame, out):
+    """As the general path of `add_constraints` for a POINT term, whose gradient is a unit vector.
+
+    Parameters
+    ----------
+    k, coef : int, float
+        The term and its coefficient.
+    lam, mu : float
+        Multipliers of its row.
+    term : ndarray of int
+        Table of terms.
+    at, marker_body, kin, frame
+        Tables of places, of the markers' frames, of kinematics and of markers.
+    out : ndarray
+        G.
+    """
+    c = term[k, T.TERM_AXES]
+    c1 = c + 1 if c < 2 else 0
+    c2 = c - 1 if c > 0 else 2
+    value, rate = 0.0, 0.0
+    for side in range(2):
+        marker = term[k, T.TERM_I + side]
+        b = marker_body[marker]
+        sign = coef if side == 0 else -coef
+        row = kin[b]
+        x1, x2 = frame[marker, T.MK_ARM + c1], frame[marker, T.MK_ARM + c2]
+        value += sign * (row[KIN_R + c] + frame[marker, T.MK_ARM + c])
+        if b == 0:
+            continue
+        rate += sign * (row[KIN_V + c] + row[KIN_W + c1] * x2 - row[KIN_W + c2] * x1)
+        p, th = at[b, T.AT_P], at[b, T.AT_THETA]
+        out[at[b, T.AT_U] + c] += sign * lam
+        out[at[b, T.AT_R] + c] -= sign * mu
+        for m in range(3):
+            a = KIN_AXES + 3 * m
+            angle = sign * (row[a + c1] * x2 - row[a + c2] * x1)
+            out[p + m] += lam * angle
+            out[th + m] -= mu * angle
+    return value, rate
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_dot_term(k, coef, lam, mu, at, term, marker_body, kin, frame, s, out):
+    """As the general path of `add_constraints` for a DOT1 term, which has no translations.
+
+    Parameters
+    ----------
+    k, coef : int, float
+        The term and its coefficient.
+    lam, mu : float
+        Multipliers of its row.
+    term : ndarray of int
+        Table of terms.
+    at, marker_body, kin, frame
+        Tables of places, of the markers' frames, of kinematics and of markers.
+    s, out : ndarray
+        Scratch of 3 places, and G.
+    """
+    i, j = term[k, T.TERM_I], term[k, T.TERM_J]
+    a = T.MK_AXES + 3 * (term[k, T.TERM_AXES] // 3)
+    b = T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3)
+    cross3(frame[i], a, frame[j], b, s, 0)
+    rate = 0.0
+    for side in range(2):
+        body = marker_body[i if side == 0 else j]
+        if body == 0:
+            continue
+        sign = coef if side == 0 else -coef
+        row = kin[body]
+        rate += sign * dot3(s, 0, row, KIN_W)
+        p, th = at[body, T.AT_P], at[body, T.AT_THETA]
+        for m in range(3):
+            angle = sign * dot3(row, KIN_AXES + 3 * m, s, 0)
+            out[p + m] += lam * angle
+            out[th + m] -= mu * angle
+    return coef * dot3(frame[i], a, frame[j], b), rate
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def put_point(mode, slot, vals, k, row, coef, term, at, marker_body, frame):
+    """Hand over the gradient of a POINT term; return the number of the next entry."""
+    c = term[T.TERM_AXES]
+    c1 = c + 1 if c < 2 else 0
+    c2 = c - 1 if c > 0 else 2
+    for side in range(2):
+        marker = term[T.TERM_I + side]
+        if marker_body[marker] == 0:
+            continue
+        sign = coef if side == 0 else -coef
+        if mode == NUMBERS:
+            arm_2, arm_1 = sign * frame[marker, T.MK_ARM + c2], -sign * frame[marker, T.MK_ARM + c1]
+            vals[slot[k]] += sign
+            vals[slot[k + 1]] += sign
+            vals[slot[k + 2]] += arm_2
+            vals[slot[k + 3]] += arm_2
+            vals[slot[k + 4]] += arm_1
+            vals[slot[k + 5]] += arm_1
+            k += 6
+            continue
+        q = at[marker_body[marker], T.AT_V]
+        k = put_pair(mode, slot, vals, k, row, q + c, sign)
+        k = put_pair(mode, slot, vals, k, row, q + 3 + c1, sign * frame[marker, T.MK_ARM + c2])
+        k = put_pair(mode, slot, vals, k, row, q + 3 + c2, -sign * frame[marker, T.MK_ARM + c1])
+    return k
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def put_dot(mode, slot, vals, k, row, coef, term, at, marker_body, cross):
+    """Hand over the gradient of a DOT1 term, given that of its first side; return the number of the next entry."""
+    for side in range(2):
+        body = marker_body[term[T.TERM_I + side]]
+        if body == 0:
+            continue
+        sign = coef if side == 0 else -coef
+        if mode == NUMBERS:
+            for c in range(3):
+                vals[slot[k]] += sign * cross[c]
+                vals[slot[k + 1]] += sign * cross[c]
+                k += 2
+            continue
+        for c in range(3):
+            k = put_pair(mode, slot, vals, k, row, at[body, T.AT_V] + 3 + c, sign * cross[c])
+    return k

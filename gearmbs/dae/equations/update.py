@@ -52,7 +52,21 @@ def update_ground(kin):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def update_bodies(y, at, code, body, modal, kin, partial, scratch):
-    """Fill the kinematics table from the positions and velocities in y."""
+    """Fill the kinematics table from the positions and velocities in y.
+
+    Parameters
+    ----------
+    y
+        Unknowns.
+    at, code, body : ndarray
+        Places of the unknowns, Euler references, masses and inertias.
+    modal, partial : ndarray
+        Integrals and shapes of modal bodies, partial derivatives of their frames.
+    kin : ndarray
+        Kinematics table.
+    scratch : ndarray
+        3 places.
+    """
     update_ground(kin)
     for b in range(1, code.size):
         if at[b, T.AT_MODES] > 0:
