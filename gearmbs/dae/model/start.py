@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from gearmbs.dae.model.posed import PosedModel
 
 MAX_LOAD_ITERATIONS = 200
-"""Of loads that depend on each other, at the start; friction converges like a power of the friction coefficient."""
+"""Passes in which loads that depend on each other may come to agree at the start; friction converges like a power of
+the friction coefficient."""
 MAX_STATE_ITERATIONS = 100
 
 
