@@ -10,7 +10,7 @@ from numba import njit
 
 from benchmarks.gear_pair import call_costs
 from benchmarks.markdown import number, table
-from gearmbs.contact import gear_contact
+from gearmbs.contact import GAP_COLUMNS, gear_contact, layout
 from gearmbs.gears import FlankFriction, GearPair
 from gearmbs.gears.faults import GradedFlanks
 from gearmbs.gears.transmission import StaticMesh
@@ -69,12 +69,12 @@ def measure(pair: GearPair, slices: int | None) -> dict[str, float]:
                 best = min(best, (time.perf_counter() - start) / CALLS)
             totals[want] += best / POSITIONS
         low, high = pair.common_face
-        count = int(gi[2])
+        count = int(gi[layout.SLICES])
         stations = low + (np.arange(count) + 0.5) * (high - low) / count
         rows = mesh.gaps(
             angle, StaticMesh(pair, slices).loaded_angle(angle, 100.0, mesh.touching_angle(angle)), stations
         )
-        pair_slices += np.count_nonzero(rows[:, 4] < 0) / POSITIONS
+        pair_slices += np.count_nonzero(rows[:, GAP_COLUMNS.index("gap")] < 0) / POSITIONS
     return {
         "value_us": totals[0] * 1e6,
         "jacobian_us": totals[1] * 1e6,

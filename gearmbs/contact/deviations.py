@@ -10,123 +10,146 @@ import numpy as np
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.jit import kernel
+from gearmbs.contact.records import integers_of, reals_of
 
-S_X, S_LENGTH, P_DEV = L.S_X, L.S_LENGTH, L.P_DEV
-P_DEV_2 = L.W_LIMIT  # the other wheel's lookup, in the limits' records, free between calls
-SHORTEST = 0.01  # string over base radius where the lookup ends towards the base circle
-N_GAP, N_GRAD, N_HESS = L.N_GAP, L.N_GRAD, L.N_HESS
-P_SOFT, P_SOFT_X, P_SOFT_XX = L.P_SOFT, L.P_SOFT_X, L.P_SOFT_XX
-RB, PSI, WHEEL = L.RB, L.PSI, L.WHEEL
+SHORTEST = 0.01  # length of roll over base radius where the lookup ends towards the base circle
 
 
 @kernel
-def tooth_record(gi, wheel, side, tooth):
-    """Index of a tooth flank among all tooth flanks of the pair; wheel 0 or 1, side +1 or -1, tooth any integer."""
-    z = gi[L.Z1 + wheel]
-    index = (side * tooth) % z
-    if side < 0:
+def tooth_flank(options, wheel, sign, tooth):
+    """Place of a tooth flank among all of the pair; wheel 0 or 1, side +1 or -1, tooth any integer."""
+    z = options.teeth[wheel]
+    index = (sign * tooth) % z
+    if sign < 0:
         index += z
     if wheel == 1:
-        index += 2 * gi[L.Z1]
+        index += 2 * options.teeth[0]
     return index
 
 
 @kernel
-def contact_string(gr, wk, wheel, kind, f1, f2, zeta, o, V, want):
-    """String length of the contact on one wheel, with gradient and Hessian by the pose, into ``wk[V:]``.
-
-    The place is half-way between the surfaces. Flank on flank it is that of parallel axes moved by the tilt to first
-    order; under a corner it is where the corner stands, less half the gap of perfect profiles in the record at
-    ``wk[o:]``. Both agree where the one takes over from the other.
-    """
-    for i in range(1, 43 if want != 0 else 7):
-        wk[V + i] = 0.0
-    a = wk[S_X]
-    rb1 = gr[RB]
-    rb2 = gr[WHEEL + RB]
-    G = V + 1
-    T = V + 7
-    if kind == 0:
-        Rb = rb1 + rb2
-        l = wk[S_LENGTH]
-        alpha = wk[L.S_A0]
-        sign = 1.0 if wheel == 0 else -1.0
-        own = rb1 if wheel == 0 else rb2
-        p, q = wk[S_X + 2], wk[S_X + 3]
-        diff = 0.5 * sign * (rb1 * (f1 + gr[PSI]) - rb2 * (f2 + gr[WHEEL + PSI]) + (rb1 - rb2) * alpha)
-        k1 = Rb / (a * l)
-        turn = 2.0 * zeta * own
-        wk[V] = diff + 0.5 * l + turn * (q / a - p * k1)
-        k1_a = -Rb * (1.0 / (a * a * l) + 1.0 / l**3)
-        slope = 0.5 * sign * (rb1 - rb2)
-        wk[G] = slope * k1 + 0.5 * a / l + turn * (-q / (a * a) - p * k1_a)
-        wk[G + 2] = -turn * k1
-        wk[G + 3] = turn / a
-        wk[G + 4] = 0.5 * sign * rb1
-        wk[G + 5] = -0.5 * sign * rb2
-        if want != 0:
-            k1_aa = Rb * (2.0 / (a**3 * l) + 1.0 / (a * l**3) + 3.0 * a / l**5)
-            wk[T] = slope * k1_a - 0.5 * Rb * Rb / l**3 + turn * (2.0 * q / a**3 - p * k1_aa)
-            wk[T + 2] = -turn * k1_a
-            wk[T + 12] = wk[T + 2]
-            wk[T + 3] = -turn / (a * a)
-            wk[T + 18] = wk[T + 3]
-        return
-    half = 0.5 if kind == wheel + 1 else -0.5
-    wk[V] = half * wk[o + N_GAP]
-    for i in range(6):
-        wk[G + i] = half * wk[o + N_GRAD + i]
-        if want != 0:
-            for j in range(6):
-                wk[T + 6 * i + j] = half * wk[o + N_HESS + 6 * i + j]
-    if kind == wheel + 1:
-        wk[V] += wk[L.C_STRING]
-        return
-    mate = rb1 if wheel == 0 else rb2
-    f = 5 if wheel == 0 else 4
-    r = wk[L.C_R]
-    se, ce = wk[L.C_SIN], wk[L.C_COS]
-    Px = a - r * ce - 2.0 * wk[S_X + 2] * zeta
-    Py = -r * se - 2.0 * wk[S_X + 3] * zeta
-    s2 = Px * Px + Py * Py - mate * mate
-    if s2 < SHORTEST * SHORTEST * mate * mate:
-        wk[V] += SHORTEST * mate - wk[L.C_ROUND]
-        return
-    s = np.sqrt(s2)
-    wk[V] += s - wk[L.C_ROUND]
-    i_s = 1.0 / s
-    for i in range(6):
-        dx = 1.0 if i == 0 else (-2.0 * zeta if i == 2 else (r * se if i == f else 0.0))
-        dy = -2.0 * zeta if i == 3 else (-r * ce if i == f else 0.0)
-        by_i = (Px * dx + Py * dy) * i_s
-        wk[G + i] += by_i
-        if want == 0:
-            continue
-        for j in range(6):
-            ex = 1.0 if j == 0 else (-2.0 * zeta if j == 2 else (r * se if j == f else 0.0))
-            ey = -2.0 * zeta if j == 3 else (-r * ce if j == f else 0.0)
-            value = dx * ex + dy * ey - by_i * (Px * ex + Py * ey) * i_s
-            if i == f and j == f:
-                value += r * (Px * ce + Py * se)
-            wk[T + 6 * i + j] += value * i_s
+def flank_number(options, flank, which):
+    """Number of a tooth flank's shape, tip or compliance (`layout.FLANK_SHAPE` and on), -1 for none."""
+    return integers_of(options)[options.flanks + L.FLANK * flank + which]
 
 
 @kernel
-def cubic(gr, o, n, u):
-    """Value and first two derivatives, per station, of the curve ``gr[o:o+n]`` at ``u`` stations: Catmull-Rom.
+def clear_lookup(lookup):
+    """Set derivatives of a place on the profile to nothing."""
+    for i in range(6):
+        lookup.grad[i] = 0.0
+        for j in range(6):
+            lookup.hess[i, j] = 0.0
+
+
+@kernel
+def roll_of_flanks(side, wheels, lookup, wheel, f1, f2, zeta):
+    """Length of roll where flank bears on flank on one wheel, with gradient and Hessian by the pose.
+
+    The place is half-way between the surfaces: that of parallel axes moved by the tilt to first order.
+
+    Parameters
+    ----------
+    side, wheels : record
+    lookup : record
+        Out.
+    wheel : int
+        0 or 1.
+    f1, f2 : float
+        Angles of the two teeth from the line of centres.
+    zeta : float
+        Place of the section along the mean axis.
+    """
+    clear_lookup(lookup)
+    a, p, q = side.x[L.A], side.x[L.P], side.x[L.Q]
+    rb1, rb2, Rb = side.base_1, side.base_2, side.base_sum
+    l, alpha = side.length, side.alpha_0
+    sign = 1.0 if wheel == 0 else -1.0
+    own = rb1 if wheel == 0 else rb2
+    half_1, half_2 = wheels.wheel_1.half_angle, wheels.wheel_2.half_angle
+    diff = 0.5 * sign * (rb1 * (f1 + half_1) - rb2 * (f2 + half_2) + side.base_difference * alpha)
+    k1 = Rb / (a * l)
+    turn = 2.0 * zeta * own
+    lookup.roll = diff + 0.5 * l + turn * (q / a - p * k1)
+    k1_a = -Rb * (1.0 / (a * a * l) + 1.0 / l**3)
+    slope = 0.5 * sign * side.base_difference
+    grad, hess = lookup.grad, lookup.hess
+    grad[L.A] = slope * k1 + 0.5 * a / l + turn * (-q / (a * a) - p * k1_a)
+    grad[L.P] = -turn * k1
+    grad[L.Q] = turn / a
+    grad[L.F1] = 0.5 * sign * rb1
+    grad[L.F2] = -0.5 * sign * rb2
+    k1_aa = Rb * (2.0 / (a**3 * l) + 1.0 / (a * l**3) + 3.0 * a / l**5)
+    hess[L.A, L.A] = slope * k1_a - 0.5 * Rb * Rb / l**3 + turn * (2.0 * q / a**3 - p * k1_aa)
+    hess[L.A, L.P] = hess[L.P, L.A] = -turn * k1_a
+    hess[L.A, L.Q] = hess[L.Q, L.A] = -turn / (a * a)
+
+
+@kernel
+def roll_under_corner(side, corner, strip, j, lookup, wheel, want):
+    """Length of roll on one wheel where a corner bears in section ``j``, with gradient and Hessian by the pose.
+
+    Half-way between the surfaces: where the corner stands, less half the gap of perfect profiles. Agrees with
+    `roll_of_flanks` where the one takes over from the other.
+    """
+    clear_lookup(lookup)
+    grad, hess = lookup.grad, lookup.hess
+    own_corner = strip.kind[j] == wheel + 1
+    half = 0.5 if own_corner else -0.5
+    lookup.roll = half * strip.gap[j]
+    for i in range(6):
+        grad[i] = half * strip.grad[i, j]
+        if want != 0:
+            for k in range(6):
+                hess[i, k] = half * (strip.hess[i, k, j] if i <= k else strip.hess[k, i, j])
+    if own_corner:
+        lookup.roll += corner.roll[j]
+        return
+    a, zeta = side.x[L.A], strip.zeta[j]
+    mate = side.base_1 if wheel == 0 else side.base_2
+    f = L.F2 if wheel == 0 else L.F1
+    r, se, ce = corner.radius[j], corner.sin[j], corner.cos[j]
+    Px = a - r * ce - 2.0 * side.x[L.P] * zeta
+    Py = -r * se - 2.0 * side.x[L.Q] * zeta
+    s2 = Px * Px + Py * Py - mate * mate
+    if s2 < SHORTEST * SHORTEST * mate * mate:
+        lookup.roll += SHORTEST * mate - corner.rounding[j]
+        return
+    s = np.sqrt(s2)
+    lookup.roll += s - corner.rounding[j]
+    i_s = 1.0 / s
+    for i in range(6):
+        dx = 1.0 if i == L.A else (-2.0 * zeta if i == L.P else (r * se if i == f else 0.0))
+        dy = -2.0 * zeta if i == L.Q else (-r * ce if i == f else 0.0)
+        by_i = (Px * dx + Py * dy) * i_s
+        grad[i] += by_i
+        if want == 0:
+            continue
+        for k in range(6):
+            ex = 1.0 if k == L.A else (-2.0 * zeta if k == L.P else (r * se if k == f else 0.0))
+            ey = -2.0 * zeta if k == L.Q else (-r * ce if k == f else 0.0)
+            value = dx * ex + dy * ey - by_i * (Px * ex + Py * ey) * i_s
+            if i == f and k == f:
+                value += r * (Px * ce + Py * se)
+            hess[i, k] += value * i_s
+
+
+@kernel
+def cubic(reals, o, n, u):
+    """Value and first two derivatives, per place, of the curve ``reals[o:o+n]`` at ``u`` places: Catmull-Rom.
 
     Beyond its ends the curve keeps its end value.
     """
     if u <= 0.0:
-        return gr[o], 0.0, 0.0
+        return reals[o], 0.0, 0.0
     if u >= n - 1.0:
-        return gr[o + n - 1], 0.0, 0.0
+        return reals[o + n - 1], 0.0, 0.0
     k = int(u)
     t = u - k
-    y1 = gr[o + k]
-    y2 = gr[o + k + 1]
-    m1 = 0.0 if k == 0 else 0.5 * (y2 - gr[o + k - 1])
-    m2 = 0.0 if k == n - 2 else 0.5 * (gr[o + k + 2] - y1)
+    y1 = reals[o + k]
+    y2 = reals[o + k + 1]
+    m1 = 0.0 if k == 0 else 0.5 * (y2 - reals[o + k - 1])
+    m2 = 0.0 if k == n - 2 else 0.5 * (reals[o + k + 2] - y1)
     d = y2 - y1
     c2 = 3.0 * d - 2.0 * m1 - m2
     c3 = m1 + m2 - 2.0 * d
@@ -134,24 +157,24 @@ def cubic(gr, o, n, u):
 
 
 @kernel
-def shape_value(gi, gr, wheel, shape, s, z):
-    """A deviation shape at string length ``s`` and face position ``z`` (from -1 to 1): value, slopes, curvatures.
+def shape_value(options, reals, wheel, shape, s, z):
+    """A deviation shape at length of roll ``s`` and face position ``z`` (from -1 to 1): value, slopes, curvatures.
 
     Returns
     -------
     value, by s, by z, by s twice, by s and z : float
-        Linear in z between stations and beyond the ends.
+        Linear in z between its places and beyond the ends.
     """
-    ns = gi[L.SHAPE_S]
-    nz = gi[L.SHAPE_Z]
-    ds = gr[wheel * WHEEL + L.SHAPE_DS]
-    u = (s - gr[wheel * WHEEL + L.SHAPE_S0]) / ds
+    ns = options.profile_places
+    nz = options.face_places
+    ds = wheel.shape_spacing
+    u = (s - wheel.shape_start) / ds
     v = 0.5 * (z + 1.0) * (nz - 1)
     k = min(max(int(v), 0), nz - 2)
     t = v - k
-    o = gi[L.O_SHAPE] + (shape * nz + k) * ns
-    y0, d0, c0 = cubic(gr, o, ns, u)
-    y1, d1, c1 = cubic(gr, o + ns, ns, u)
+    o = options.shapes + (shape * nz + k) * ns
+    y0, d0, c0 = cubic(reals, o, ns, u)
+    y1, d1, c1 = cubic(reals, o + ns, ns, u)
     dz = 0.5 * (nz - 1)
     return (
         y0 + t * (y1 - y0),
@@ -163,123 +186,122 @@ def shape_value(gi, gr, wheel, shape, s, z):
 
 
 @kernel
-def add_deviations(gi, gr, wk, record1, record2, kind, f1, f2, zeta, o, want):
-    """Add both wheels' deviations to the gap in the node record at ``wk[o:]`` and to its derivatives."""
+def add_deviations(options, wheels, scratch, strip, j, want):
+    """Add the deviations of both teeth of the pair at work to the gap in section ``j`` and to its derivatives."""
+    side, pair = scratch.side, scratch.pair
+    flank_1, flank_2 = int(pair.flank_1), int(pair.flank_2)
+    shape_1 = flank_number(options, flank_1, L.FLANK_SHAPE)
+    shape_2 = flank_number(options, flank_2, L.FLANK_SHAPE)
+    reals = reals_of(wheels)
+    kind = int(strip.kind[j])
     # both places on the profiles follow from the gap of perfect ones, so they are found before it changes
     for wheel in range(2):
-        if tooth_shape(gi, record1 if wheel == 0 else record2) >= 0:
-            contact_string(gr, wk, wheel, kind, f1, f2, zeta, o, P_DEV if wheel == 0 else P_DEV_2, want)
-    for wheel in range(2):
-        record = record1 if wheel == 0 else record2
-        wk[o + N_GAP] += gr[gi[L.O_OFFSET] + record]
-        shape = tooth_shape(gi, record)
-        if shape >= 0:
-            add_shape(gi, gr, wk, wheel, shape, zeta, o, P_DEV if wheel == 0 else P_DEV_2, want)
+        lookup = scratch.lookup_1 if wheel == 0 else scratch.lookup_2
+        if (shape_1 if wheel == 0 else shape_2) < 0:
+            continue
+        if kind == L.FLANKS:
+            roll_of_flanks(side, wheels, lookup, wheel, pair.f_1, pair.f_2, strip.zeta[j])
+        else:
+            corner = scratch.corner_1 if kind == L.CORNER_1 else scratch.corner_2
+            roll_under_corner(side, corner, strip, j, lookup, wheel, want)
+    strip.gap[j] += reals[options.offsets + flank_1] + reals[options.offsets + flank_2]
+    if shape_1 >= 0:
+        add_shape(options, reals, wheels.wheel_1, shape_1, 1.0, side.x[L.H], scratch.lookup_1, strip, j, want)
+    if shape_2 >= 0:
+        add_shape(options, reals, wheels.wheel_2, shape_2, -1.0, side.x[L.H], scratch.lookup_2, strip, j, want)
 
 
 @kernel
-def tooth_shape(gi, record):
-    """Number of a tooth flank's deviation shape, -1 for a perfect one."""
-    return gi[gi[L.O_TOOTH] + L.TOOTH * record]
+def add_shape(options, reals, wheel, shape, sign, h, lookup, strip, j, want):
+    """Add a deviation shape at a place on a profile to the gap in section ``j``.
 
-
-@kernel
-def add_shape(gi, gr, wk, wheel, shape, zeta, o, V, want):
-    """Add a deviation shape at the place in ``wk[V:]`` to the gap in the node record at ``wk[o:]``."""
-    sign = 1.0 if wheel == 0 else -1.0
-    scale = 2.0 / gr[wheel * WHEEL + L.FACE]
-    z = (zeta + sign * 0.5 * wk[S_X + 1]) * scale
-    value, by_s, by_z, by_ss, by_sz = shape_value(gi, gr, wheel, shape, wk[V], z)
+    Parameters
+    ----------
+    options : record
+    reals : ndarray
+        All reals of the pair's table.
+    wheel : record
+    shape : int
+        Number of the shape.
+    sign : float
+        +1 on wheel 1, -1 on wheel 2.
+    h : float
+        Axial offset.
+    lookup, strip : record
+    j : int
+        Section.
+    want : int
+        Nonzero to add second derivatives.
+    """
+    scale = 2.0 / wheel.face_width
+    z = (strip.zeta[j] + sign * 0.5 * h) * scale
+    value, by_s, by_z, by_ss, by_sz = shape_value(options, reals, wheel, shape, lookup.roll, z)
     z_h = 0.5 * sign * scale
-    wk[o + N_GAP] += value
-    G = V + 1
+    grad = lookup.grad
+    strip.gap[j] += value
     for i in range(6):
-        wk[o + N_GRAD + i] += by_s * wk[G + i]
-    wk[o + N_GRAD + 1] += by_z * z_h
+        strip.grad[i, j] += by_s * grad[i]
+    strip.grad[L.H, j] += by_z * z_h
     if want == 0:
         return
+    mixed = by_sz * z_h
     for i in range(6):
-        for j in range(6):
-            wk[o + N_HESS + 6 * i + j] += by_ss * wk[G + i] * wk[G + j] + by_s * wk[V + 7 + 6 * i + j]
-        mixed = by_sz * z_h * wk[G + i]
-        wk[o + N_HESS + 6 * i + 1] += mixed
-        wk[o + N_HESS + 6 + i] += mixed
+        for k in range(i, 6):
+            strip.hess[i, k, j] += by_ss * grad[i] * grad[k] + by_s * lookup.hess[i, k]
+        strip.hess[min(i, L.H), max(i, L.H), j] += mixed * grad[i]
+    strip.hess[L.H, L.H, j] += mixed * grad[L.H]
 
 
 @kernel
-def tip_string(gi, gr, wheel, record, zeta):
-    """String length where a tooth's flank ends at a station: its own if broken or chipped there, else the wheel's.
+def tip_roll(options, wheels, wheel, k, flank, zeta):
+    """Length of roll where a tooth's flank ends in a section: its own if broken or chipped there, else the wheel's.
 
-    Stations count from the wheels' axial places in the drawing; axial vibration does not move them.
+    Sections count from the wheels' axial places in the drawing; axial vibration does not move them. ``k`` is 0 for
+    wheel 1 and 1 for wheel 2.
     """
-    whole = gr[wheel * WHEEL + L.S_TIP]
-    if gi[L.O_TOOTH] == 0:
-        return whole
-    tip = gi[gi[L.O_TOOTH] + L.TOOTH * record + 1]
+    tip = flank_number(options, flank, L.FLANK_TIP)
     if tip < 0:
-        return whole
-    nz = gi[L.SHAPE_Z]
-    sign = 1.0 if wheel == 0 else -1.0
-    z = (zeta + sign * 0.5 * gr[L.AXIAL_SHIFT]) * 2.0 / gr[wheel * WHEEL + L.FACE]
+        return wheel.tip_roll
+    nz = options.face_places
+    sign = 1.0 if k == 0 else -1.0
+    z = (zeta + sign * 0.5 * wheels.axial_shift) * 2.0 / wheel.face_width
     v = min(max(0.5 * (z + 1.0) * (nz - 1), 0.0), nz - 1.0)
-    k = min(int(v), nz - 2)
-    o = gi[L.O_TIP] + tip * nz + k
-    return gr[o] + (v - k) * (gr[o + 1] - gr[o])
+    i = min(int(v), nz - 2)
+    o = options.tips + tip * nz + i
+    reals = reals_of(wheels)
+    return reals[o] + (v - i) * (reals[o + 1] - reals[o])
 
 
 @kernel
-def set_corner(gr, wk, wheel, f, string):
-    """Make the tip corner of a tooth the one at work: at the wheel's own tip, or sharp at a shorter ``string``."""
-    base = wheel * WHEEL
-    if string >= gr[base + L.S_TIP]:
-        psi = gr[base + L.PSI_CORNER]
-        wk[L.C_R] = gr[base + L.R_CORNER]
-        wk[L.C_ROUND] = gr[base + L.R_ROUND]
-        wk[L.C_STRING] = gr[base + L.S_TIP]
-    else:
-        rb = gr[base + RB]
-        tan = string / rb
-        psi = gr[base + PSI] - tan + np.arctan(tan)
-        wk[L.C_R] = np.sqrt(rb * rb + string * string)
-        wk[L.C_ROUND] = 0.0
-        wk[L.C_STRING] = string
-    wk[L.C_PSI] = psi
-    wk[L.C_SIN] = np.sin(f + psi)
-    wk[L.C_COS] = np.cos(f + psi)
-
-
-@kernel
-def pair_softness(gi, gr, wk, record1, record2, f1, f2, want):
+def pair_softness(options, wheels, side, pair, lookup):
     """Stiffness factor of a tooth pair from relative compliances along its profiles, with derivatives.
 
     The factor is one over the sum of the pair's own curve and of what each of the two teeth adds to it, looked up
     where parallel flanks would touch.
     """
-    n = gi[L.N_COMPLIANCE]
-    base = gi[L.O_COMPLIANCE]
-    contact_string(gr, wk, 0, 0, f1, f2, 0.0, 0, P_DEV, want)
-    ds = gr[L.COMPLIANCE_DS]
-    u = (wk[P_DEV] - gr[L.COMPLIANCE_S0]) / ds
-    total, slope, curve = cubic(gr, base, n, u)
-    for k in range(2):
-        record = record1 if k == 0 else record2
-        if gi[L.O_TOOTH] != 0:
-            number = gi[gi[L.O_TOOTH] + L.TOOTH * record + 2]
+    n = options.compliance_places
+    reals = reals_of(wheels)
+    base = options.compliances
+    roll_of_flanks(side, wheels, lookup, 0, pair.f_1, pair.f_2, 0.0)
+    ds = wheels.compliance_spacing
+    u = (lookup.roll - wheels.compliance_start) / ds
+    total, slope, curve = cubic(reals, base, n, u)
+    if options.flanks != 0:
+        for k in range(2):
+            flank = int(pair.flank_1 if k == 0 else pair.flank_2)
+            number = flank_number(options, flank, L.FLANK_COMPLIANCE)
             if number >= 0:
-                value, d1, d2 = cubic(gr, base + (1 + number) * n, n, u)
+                value, d1, d2 = cubic(reals, base + (1 + number) * n, n, u)
                 total += value
                 slope += d1
                 curve += d2
     slope /= ds
     curve /= ds * ds
     m = 1.0 / total
-    wk[P_SOFT] = m
+    pair.soft = m
     m1 = -slope * m * m
     m2 = (2.0 * slope * slope * m - curve) * m * m
     for i in range(6):
-        wk[P_SOFT_X + i] = m1 * wk[P_DEV + 1 + i]
-    if want != 0:
-        for i in range(6):
-            for j in range(6):
-                outer = wk[P_DEV + 1 + i] * wk[P_DEV + 1 + j]
-                wk[P_SOFT_XX + 6 * i + j] = m2 * outer + m1 * wk[P_DEV + 7 + 6 * i + j]
+        pair.soft_x[i] = m1 * lookup.grad[i]
+        for j in range(6):
+            pair.soft_xx[i, j] = m2 * lookup.grad[i] * lookup.grad[j] + m1 * lookup.hess[i, j]

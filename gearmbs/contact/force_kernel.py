@@ -24,6 +24,21 @@ def contact_force(ints, reals, t, frames, states, inputs, want, work, wrench, ra
     """Hand the frames of the two wheels to `gear_contact`, whose address stands before its integers.
 
     Called through it, the large kernel need not be compiled into this one.
+
+    Parameters
+    ----------
+    ints, reals : ndarray
+        Address of `gear_contact`, then the pair's tables.
+    t, states, inputs, rates
+        Not used.
+    frames : ndarray
+        Poses and velocities of the two wheels.
+    want : int
+        Flags; derivatives are filled if `DERIVATIVES` is among them.
+    work : ndarray
+        Scratch.
+    wrench, jac, diagnostics : ndarray
+        Out, as of `gear_contact`.
     """
     other = FRAME_COLUMNS
     contact_at(ints[0])(

@@ -6,35 +6,23 @@ from numba import types
 
 from gearmbs._jit import njit
 from gearmbs.contact import layout as L
-from gearmbs.contact.flanks import side_contacts
 from gearmbs.contact.jit import kernel
-from gearmbs.contact.pose import pose_columns, pose_rates, pose_wrench, relative_pose
+from gearmbs.contact.matrices import add_product, add_transposed_product
+from gearmbs.contact.pair import side_contacts
+from gearmbs.contact.pose import pose_columns, pose_rate_slopes, pose_rates, pose_wrench, relative_pose
+from gearmbs.contact.records import options_at, pair_at, scratch_at
 from gearmbs.contact.root import root_contacts
-from gearmbs.contact.sums import mirror
+from gearmbs.contact.sums import clear_sums, mirror
 
 VEC = types.float64[::1]
 MAT = types.float64[:, ::1]
 GEAR_CONTACT_SIG = types.void(
     types.int64[::1], VEC, VEC, MAT, VEC, VEC, VEC, MAT, VEC, VEC, VEC, MAT, VEC, types.int64, VEC
 )
-H_, B_, F_, FX_, FV_, FR_ = L.H_, L.B_, L.F_, L.FX_, L.FV_, L.FR_
-M, V, W, G, MU, XDX, WX, KX, KV, J = (
-    L.W_M,
-    L.W_V,
-    L.W_W,
-    L.W_G,
-    L.W_MU,
-    L.W_XDX,
-    L.W_WX,
-    L.W_KX,
-    L.W_KV,
-    L.W_J,
-)
-W2 = L.S_X  # angular velocity of wheel 2 in M, once the sides are done
 
 
 @kernel
-def relative_twist(R1, v1, w1, R2, v2, w2, wk):
+def relative_twist(R1, v1, w1, R2, v2, w2, motion):
     """Twist of wheel 1 relative to wheel 2 at R1, in the mean frame."""
     dx = R1[0] - R2[0]
     dy = R1[1] - R2[1]
@@ -45,99 +33,112 @@ def relative_twist(R1, v1, w1, R2, v2, w2, wk):
     ox = w1[0] - w2[0]
     oy = w1[1] - w2[1]
     oz = w1[2] - w2[2]
+    frame, twist = motion.frame, motion.twist
     for k in range(3):
-        wk[V + k] = wk[M + k] * vx + wk[M + 3 + k] * vy + wk[M + 6 + k] * vz
-        wk[V + 3 + k] = wk[M + k] * ox + wk[M + 3 + k] * oy + wk[M + 6 + k] * oz
+        twist[k] = frame[0, k] * vx + frame[1, k] * vy + frame[2, k] * vz
+        twist[3 + k] = frame[0, k] * ox + frame[1, k] * oy + frame[2, k] * oz
 
 
 @kernel
-def wrench_slopes(wk):
-    """Derivatives of the wrench W = G^T Q + F by the pose numbers (KX) and the relative twist (KV), (6, 6) each."""
-    # J holds dQ/dx and dQ/dV, row by row, on the way
+def wrench_slopes(motion, sums, n):
+    """Derivatives of the wrench W = G^T Q + F by the pose and by the relative twist.
+
+    Both depend on the pose's rates, which are ``G twist``, through ``D = G^T dQ/d(dx/dt) + dF/d(dx/dt)``. ``n`` is
+    the number of columns worked on side by side, `layout.PADDED`.
+    """
+    G, by_x, by_twist, by_xd = motion.columns, motion.by_x, motion.by_twist, motion.by_xd
+    f_x, f_twist, f_xd, wrench_x = sums.f_x, sums.f_twist, sums.f_xd, motion.wrench_x
     for i in range(6):
-        b = B_ + 6 * i
-        f = FR_ + 6 * i
-        for j in range(6):
-            qx = wk[H_ + 6 * i + j]
-            kx = wk[FX_ + 6 * i + j]
-            qv = 0.0
-            kv = wk[FV_ + 6 * i + j]
-            if j < 4:
-                kx += wk[WX + 4 * i + j]
-                for k in range(6):
-                    qx += wk[b + k] * wk[XDX + 4 * k + j]
-                    kx += wk[f + k] * wk[XDX + 4 * k + j]
-            for k in range(6):
-                qv += wk[b + k] * wk[G + 6 * k + j]
-                kv += wk[f + k] * wk[G + 6 * k + j]
-            wk[J + 12 * i + j] = qx
-            wk[J + 12 * i + 6 + j] = qv
-            wk[KX + 6 * i + j] = kx
-            wk[KV + 6 * i + j] = kv
-    for i in range(6):
-        for j in range(6):
-            kx = wk[KX + 6 * i + j]
-            kv = wk[KV + 6 * i + j]
-            for k in range(6):
-                kx += wk[G + 6 * k + i] * wk[J + 12 * k + j]
-                kv += wk[G + 6 * k + i] * wk[J + 12 * k + 6 + j]
-            wk[KX + 6 * i + j] = kx
-            wk[KV + 6 * i + j] = kv
+        for j in range(n):
+            by_x[i, j] = f_x[i, j] + wrench_x[i, j]
+            by_twist[i, j] = f_twist[i, j]
+            by_xd[i, j] = f_xd[i, j]
+    add_transposed_product(by_xd, G, sums.q_xd, n)
+    add_transposed_product(by_x, G, sums.q_x, n)
+    add_product(by_x, by_xd, motion.xd_x, n)
+    add_product(by_twist, by_xd, G, n)
 
 
 @kernel
-def own_columns(wk):
-    """Derivatives of the wrench by the variations of wheel 1, all in the mean frame: ``J`` (6, 12)."""
-    for i in range(6):
-        for j in range(6):
-            total = 0.0
-            for k in range(6):
-                total += wk[KX + 6 * i + k] * wk[G + 6 * k + j]
-            wk[J + 12 * i + j] = total
-            wk[J + 12 * i + 6 + j] = wk[KV + 6 * i + j]
-    for j in range(6):
-        ux, uy, uz = wk[MU + j], wk[MU + 6 + j], wk[MU + 12 + j]
-        # the relative twist seen from the turning mean frame
-        d0 = uz * wk[V + 1] - uy * wk[V + 2]
-        d1 = ux * wk[V + 2] - uz * wk[V]
-        d2 = uy * wk[V] - ux * wk[V + 1]
-        d3 = uz * wk[V + 4] - uy * wk[V + 5]
-        d4 = ux * wk[V + 5] - uz * wk[V + 3]
-        d5 = uy * wk[V + 3] - ux * wk[V + 4]
-        if j == 0:
-            d1 -= wk[W2 + 2]
-            d2 += wk[W2 + 1]
-        elif j == 1:
-            d0 += wk[W2 + 2]
-            d2 -= wk[W2]
-        elif j == 2:
-            d0 -= wk[W2 + 1]
-            d1 += wk[W2]
-        for i in range(6):
-            r = KV + 6 * i
-            wk[J + 12 * i + j] += (
-                wk[r] * d0 + wk[r + 1] * d1 + wk[r + 2] * d2 + wk[r + 3] * d3 + wk[r + 4] * d4 + wk[r + 5] * d5
-            )
-        for b in range(0, 6, 3):
-            wk[J + 12 * b + j] += uy * wk[W + b + 2] - uz * wk[W + b + 1]
-            wk[J + 12 * b + 12 + j] += uz * wk[W + b] - ux * wk[W + b + 2]
-            wk[J + 12 * b + 24 + j] += ux * wk[W + b + 1] - uy * wk[W + b]
+def turn_effects(turn, v, wrench, twist_turn, jac):
+    """Fill how twist and wrench, constant in space, change in components of the turning mean frame.
+
+    ``twist_turn`` is what that does to the twist, ``jac`` what it does to the wrench.
+    """
+    v0, v1, v2, v3, v4, v5 = v[0], v[1], v[2], v[3], v[4], v[5]
+    f0, f1, f2, m0, m1, m2 = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5]
+    for j in range(turn.shape[1]):
+        ux, uy, uz = turn[0, j], turn[1, j], turn[2, j]
+        twist_turn[0, j] = uz * v1 - uy * v2
+        twist_turn[1, j] = ux * v2 - uz * v0
+        twist_turn[2, j] = uy * v0 - ux * v1
+        twist_turn[3, j] = uz * v4 - uy * v5
+        twist_turn[4, j] = ux * v5 - uz * v3
+        twist_turn[5, j] = uy * v3 - ux * v4
+        jac[0, j] = uy * f2 - uz * f1
+        jac[1, j] = uz * f0 - ux * f2
+        jac[2, j] = ux * f1 - uy * f0
+        jac[3, j] = uy * m2 - uz * m1
+        jac[4, j] = uz * m0 - ux * m2
+        jac[5, j] = ux * m1 - uy * m0
 
 
 @kernel
-def spread(wk, R1, v1, w1, R2, v2, w2, wrench, jac):
-    """Turn ``J`` into global components and complete the columns of wheel 2 from the invariance under motions."""
+def own_columns(motion, w2, n):
+    """Derivatives of the wrench by displacements of wheel 1, in the mean frame: ``motion.jac``.
+
+    ``n`` is the number of columns worked on side by side, `layout.PADDED`.
+    """
+    frame, twist_turn, jac = motion.frame, motion.twist_turn, motion.jac
+    turn_effects(motion.turn, motion.twist, motion.wrench, twist_turn, jac)
+    # the twist is that at the origin of wheel 1, which moves through the velocities of wheel 2's turning
+    s0 = frame[0, 0] * w2[0] + frame[1, 0] * w2[1] + frame[2, 0] * w2[2]
+    s1 = frame[0, 1] * w2[0] + frame[1, 1] * w2[1] + frame[2, 1] * w2[2]
+    s2 = frame[0, 2] * w2[0] + frame[1, 2] * w2[1] + frame[2, 2] * w2[2]
+    twist_turn[1, 0] -= s2
+    twist_turn[2, 0] += s1
+    twist_turn[0, 1] += s2
+    twist_turn[2, 1] -= s0
+    twist_turn[0, 2] -= s1
+    twist_turn[1, 2] += s0
+    add_product(jac, motion.by_x, motion.columns, n)
+    add_product(jac, motion.by_twist, twist_turn, n)
+
+
+@kernel
+def turn_to_global(motion, jac):
+    """Turn the columns of wheel 1 from the mean frame into global components, block by block: ``M J M^T``."""
+    turn_blocks(motion.jac, motion.frame, jac, 0)
+    turn_blocks(motion.by_twist, motion.frame, jac, 6)
+
+
+@kernel
+def turn_blocks(own, m, jac, first):
+    """Turn the four blocks of a 6 x 6 matrix into global components, to the columns of ``jac`` from ``first`` on."""
     for b in range(0, 6, 3):
-        for c in range(0, 12, 3):
-            o = J + 12 * b + c
+        for c in range(0, 6, 3):
             for k in range(3):
-                mx, my, mz = wk[M + 3 * k], wk[M + 3 * k + 1], wk[M + 3 * k + 2]
-                m0 = wk[o] * mx + wk[o + 1] * my + wk[o + 2] * mz
-                m1 = wk[o + 12] * mx + wk[o + 13] * my + wk[o + 14] * mz
-                m2 = wk[o + 24] * mx + wk[o + 25] * my + wk[o + 26] * mz
-                jac[b, c + k] = wk[M] * m0 + wk[M + 1] * m1 + wk[M + 2] * m2
-                jac[b + 1, c + k] = wk[M + 3] * m0 + wk[M + 4] * m1 + wk[M + 5] * m2
-                jac[b + 2, c + k] = wk[M + 6] * m0 + wk[M + 7] * m1 + wk[M + 8] * m2
+                mx, my, mz = m[k, 0], m[k, 1], m[k, 2]
+                m0 = own[b, c] * mx + own[b, c + 1] * my + own[b, c + 2] * mz
+                m1 = own[b + 1, c] * mx + own[b + 1, c + 1] * my + own[b + 1, c + 2] * mz
+                m2 = own[b + 2, c] * mx + own[b + 2, c + 1] * my + own[b + 2, c + 2] * mz
+                jac[b, first + c + k] = m[0, 0] * m0 + m[0, 1] * m1 + m[0, 2] * m2
+                jac[b + 1, first + c + k] = m[1, 0] * m0 + m[1, 1] * m1 + m[1, 2] * m2
+                jac[b + 2, first + c + k] = m[2, 0] * m0 + m[2, 1] * m1 + m[2, 2] * m2
+
+
+@kernel
+def mate_columns(R1, v1, w1, R2, v2, w2, wrench, jac):
+    """Complete the columns of wheel 2 from the invariance of contact under common motions of both wheels.
+
+    Parameters
+    ----------
+    R1, v1, w1, R2, v2, w2 : ndarray, shape (3,)
+        Places, velocities and angular velocities of the wheels.
+    wrench : ndarray, shape (6,)
+    jac : ndarray, shape (6, 24)
+        In: columns of wheel 1; out: those of wheel 2, too.
+    """
     dx, dy, dz = R2[0] - R1[0], R2[1] - R1[1], R2[2] - R1[2]
     ax, ay, az = v1[0] - v2[0], v1[1] - v2[1], v1[2] - v2[2]
     bx, by, bz = w1[0] - w2[0], w1[1] - w2[1], w1[2] - w2[2]
@@ -173,6 +174,56 @@ def spread(wk, R1, v1, w1, R2, v2, w2, wrench, jac):
         jac[b + 1, 17] += fx
 
 
+@kernel
+def both_sides(options, wheels, scratch, want):
+    """Sum up the contacts of both sides of the teeth, the second seen in a mirror."""
+    totals = scratch.totals
+    motion, side, sums = scratch.motion, scratch.side, scratch.sums
+    root = options.root != 0
+    pose_rates(motion)
+    clear_sums(sums, want)
+    for i in range(6):
+        side.x[i], side.xd[i], side.twist[i] = motion.x[i], motion.xd[i], motion.twist[i]
+    side_contacts(options, wheels, scratch, 1, totals, want)
+    if root:
+        root_contacts(options, wheels, scratch, 1, totals, want)
+    for i in range(6):
+        sign = -1.0 if i > 2 else 1.0
+        side.x[i] = sign * motion.x[i]
+        side.xd[i] = sign * motion.xd[i]
+        side.twist[i] = -motion.twist[i] if i % 2 == 1 else motion.twist[i]
+    turned = side_contacts(options, wheels, scratch, -1, totals, want)
+    if root:
+        if not turned:
+            mirror(sums, want)
+        turned = True
+        root_contacts(options, wheels, scratch, -1, totals, want)
+    if turned:
+        mirror(sums, want)
+
+
+@kernel
+def clear_totals(totals):
+    """Set the diagnostics to nothing."""
+    totals.energy = totals.damping_power = totals.friction_power = 0.0
+    totals.depth_drive = totals.depth_coast = 0.0
+    totals.pairs_drive = totals.pairs_coast = 0.0
+    totals.normal_force = 0.0
+
+
+@kernel
+def put_totals(totals, diag):
+    """Write the diagnostics in the order of `layout.TOTALS`."""
+    diag[0] = totals.energy
+    diag[1] = totals.damping_power
+    diag[2] = totals.friction_power
+    diag[3] = totals.depth_drive
+    diag[4] = totals.depth_coast
+    diag[5] = totals.pairs_drive
+    diag[6] = totals.pairs_coast
+    diag[7] = totals.normal_force
+
+
 @njit(GEAR_CONTACT_SIG, cache=True, nogil=True, error_model="numpy")
 def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want_jac, work):
     """Wrench of the contact of two wheels, its derivatives and diagnostics.
@@ -191,8 +242,8 @@ def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want
         Out, when ``want_jac`` is not 0: derivatives by the spatial variations ``[dR, dpi, dv, dw]`` of wheel 1,
         then of wheel 2.
     diag : ndarray, shape (8,)
-        Out: elastic energy J, damping power W, friction power W, largest penetration m on drive and on back
-        flanks, tooth pairs touching on drive and on back flanks, sum of normal forces N.
+        Out: elastic energy J, damping power W, friction power W, largest penetration m on drive and on
+        coast flanks, tooth pairs touching on drive and on coast flanks, sum of normal forces N.
     work : ndarray
         Scratch of at least the length that ``contact_tables`` returned.
 
@@ -203,50 +254,33 @@ def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want
     """
     for i in range(6):
         wrench[i] = 0.0
-    for i in range(8):
-        diag[i] = 0.0
-    if want_jac != 0:
-        for i in range(6):
-            for j in range(24):
-                jac[i, j] = 0.0
-    if not relative_pose(R1, A1, R2, A2, work):
+    scratch = scratch_at(work)
+    motion, sums, totals = scratch.motion, scratch.sums, scratch.totals
+    clear_totals(totals)
+    touching = relative_pose(R1, A1, R2, A2, motion)
+    if touching:
+        relative_twist(R1, v1, w1, R2, v2, w2, motion)
+        both_sides(options_at(gi), pair_at(gr), scratch, want_jac)
+        touching = totals.energy > 0.0
+    put_totals(totals, diag)
+    if not touching:
+        if want_jac != 0:
+            for i in range(6):
+                for j in range(24):
+                    jac[i, j] = 0.0
         return
-    relative_twist(R1, v1, w1, R2, v2, w2, work)
-    pose_rates(work)
-    for i in range(L.SUMS):
-        work[L.W_SUMS + i] = 0.0
-    for i in range(18):
-        work[L.S_X + i] = work[L.W_X + i]
-    side_contacts(gi, gr, work, 1, diag, want_jac)
-    if gi[L.ROOT] != 0:
-        root_contacts(gi, gr, work, 1, diag, want_jac)
+    pose_wrench(motion, sums.q, want_jac)
+    own, frame = motion.wrench, motion.frame
     for i in range(6):
-        sign = -1.0 if i > 2 else 1.0
-        work[L.S_X + i] = sign * work[L.W_X + i]
-        work[L.S_XD + i] = sign * work[L.W_XD + i]
-        work[L.S_V + i] = -work[V + i] if i % 2 == 1 else work[V + i]
-    turned = side_contacts(gi, gr, work, -1, diag, want_jac)
-    if gi[L.ROOT] != 0:
-        if not turned:
-            mirror(work)
-        turned = True
-        root_contacts(gi, gr, work, -1, diag, want_jac)
-    if not diag[0] > 0.0:
-        return
-    if turned:
-        mirror(work)
-    pose_wrench(work, want_jac)
-    for i in range(6):
-        work[W + i] += work[F_ + i]
+        own[i] += sums.f[i]
     for b in range(0, 6, 3):
         for k in range(3):
-            row = M + 3 * k
-            wrench[b + k] = work[row] * work[W + b] + work[row + 1] * work[W + b + 1] + work[row + 2] * work[W + b + 2]
+            wrench[b + k] = frame[k, 0] * own[b] + frame[k, 1] * own[b + 1] + frame[k, 2] * own[b + 2]
     if want_jac == 0:
         return
-    pose_columns(work)
-    for k in range(3):
-        work[W2 + k] = work[M + k] * w2[0] + work[M + 3 + k] * w2[1] + work[M + 6 + k] * w2[2]
-    wrench_slopes(work)
-    own_columns(work)
-    spread(work, R1, v1, w1, R2, v2, w2, wrench, jac)
+    pose_columns(motion)
+    pose_rate_slopes(motion)
+    wrench_slopes(motion, sums, L.PADDED)
+    own_columns(motion, w2, L.PADDED)
+    turn_to_global(motion, jac)
+    mate_columns(R1, v1, w1, R2, v2, w2, wrench, jac)

@@ -5,11 +5,73 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.jit import kernel
-from gearmbs.dae.equations.time_functions import smooth_step
+from gearmbs.contact.jit import inlined, kernel
 
 LAW_HUNT_CROSSLEY = L.LAW_HUNT_CROSSLEY
 FRICTION_ADAMS = L.FRICTION_ADAMS
+MANTISSA = 52  # bits of a double's fraction
+ROOT_HALF = 0x3FE6A09E667F3BCD  # bits of the square root of a half
+BIAS = 1023
+LOG_2, LOG_2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10  # the first has zeros at its end
+ODD = tuple(2.0 / (2 * i + 1) for i in range(11))  # series of the logarithm
+INVERSE = (1.0, 1.0, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, 1 / 5040, 1 / 40320, 1 / 362880, 1 / 3628800, 1 / 39916800)
+LAST_INVERSE = 1 / 479001600
+
+
+@inlined
+def power(x, e):
+    """``x`` to the power ``e`` for a positive normal ``x``, without branches: loops that call it become vectors.
+
+    The logarithm's series runs in ``(m - 1) / (m + 1)`` with the mantissa between the roots of 1/2 and 2, the
+    exponential's within half a binary place. Good to about ten units in the last place for the exponents of contact
+    laws.
+    """
+    bits = np.float64(x).view(np.int64)
+    n = (bits - np.int64(ROOT_HALF)) >> np.int64(MANTISSA)
+    m = np.int64(bits - (n << np.int64(MANTISSA))).view(np.float64)
+    t = (m - 1.0) / (m + 1.0)
+    u = t * t
+    v = u * u
+    even = ODD[0] + v * (ODD[2] + v * (ODD[4] + v * (ODD[6] + v * (ODD[8] + v * ODD[10]))))
+    odd = ODD[1] + v * (ODD[3] + v * (ODD[5] + v * (ODD[7] + v * ODD[9])))
+    y = e * (n * LOG_2 + (t * (even + u * odd) + n * LOG_2_LOW))
+    k = max(np.rint(y / (LOG_2 + LOG_2_LOW)), 1.0 - BIAS)
+    r = (y - k * LOG_2) - k * LOG_2_LOW
+    s = r * r
+    even = INVERSE[0] + s * (INVERSE[2] + s * (INVERSE[4] + s * (INVERSE[6] + s * (INVERSE[8] + s * INVERSE[10]))))
+    odd = INVERSE[1] + s * (INVERSE[3] + s * (INVERSE[5] + s * (INVERSE[7] + s * (INVERSE[9] + s * INVERSE[11]))))
+    scale = np.int64((np.int64(k) + np.int64(BIAS)) << np.int64(MANTISSA)).view(np.float64)
+    return (even + (r * odd + s * s * s * s * s * s * LAST_INVERSE)) * scale
+
+
+@inlined
+def pressure(law, elastic, e, c, d, delta, rate):
+    """Pressure per unit face width and its derivatives at a positive penetration from its elastic part.
+
+    Parameters and results are those of `normal_law`; ``elastic`` is ``k delta^e``. STEP is that of
+    `gearmbs.dae.equations.time_functions.smooth_step`, written without its jumps.
+    """
+    slope = e * elastic / delta
+    energy = elastic * delta / (e + 1.0)
+    if law == LAW_HUNT_CROSSLEY:
+        factor = 1.0 + c * rate
+        p = elastic * factor
+        p_delta = slope * factor
+        p_rate = elastic * c
+    else:
+        ratio = min(delta / d, 1.0)
+        step = ratio * ratio * (3.0 - 2.0 * ratio)
+        p = elastic + c * step * rate
+        p_delta = slope + c * (6.0 * ratio * (1.0 - ratio) / d) * rate
+        p_rate = c * step
+    pushes = p > 0.0
+    return (
+        p if pushes else 0.0,
+        p_delta if pushes else 0.0,
+        p_rate if pushes else 0.0,
+        energy,
+        elastic,
+    )
 
 
 @kernel
@@ -36,23 +98,23 @@ def normal_law(law, k, e, c, d, delta, rate):
     if delta <= 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0
     elastic = k * delta if e == 1.0 else k * delta**e
-    slope = e * elastic / delta
-    energy = elastic * delta / (e + 1.0)
-    if law == LAW_HUNT_CROSSLEY:
-        factor = 1.0 + c * rate
-        if factor <= 0.0:
-            return 0.0, 0.0, 0.0, energy, elastic
-        return elastic * factor, slope * factor, elastic * c, energy, elastic
-    if delta >= d:
-        step = 1.0
-        step_slope = 0.0
-    else:
-        _, step, step_slope, _ = smooth_step(delta / d, 0)
-        step_slope /= d
-    p = elastic + c * step * rate
-    if p <= 0.0:
-        return 0.0, 0.0, 0.0, energy, elastic
-    return p, slope + c * step_slope * rate, c * step, energy, elastic
+    return pressure(law, elastic, e, c, d, delta, rate)
+
+
+@inlined
+def friction_ratio(mu_s, mu_d, v_s, v_d, speed):
+    """ADAMS's friction law; arguments and results are those of `friction_law`."""
+    r = speed / v_s
+    stick = 0.5 * mu_s * (3.0 - r * r) / v_s
+    stick_slope = -mu_s / (v_s * v_s * v_s)
+    moving = max(speed, v_s)
+    u = min((moving - v_s) / (v_d - v_s), 1.0)
+    mu = mu_s + (mu_d - mu_s) * u * u * (3.0 - 2.0 * u)
+    slope = (mu_d - mu_s) * 6.0 * u * (1.0 - u) / (v_d - v_s)
+    ratio = mu / moving
+    ratio_slope = (slope - ratio) / (moving * moving)
+    sticks = speed <= v_s
+    return stick if sticks else ratio, stick_slope if sticks else ratio_slope
 
 
 @kernel
@@ -70,16 +132,7 @@ def friction_law(kind, mu_s, mu_d, v_s, v_d, speed):
         ``(d ratio / d speed) / speed``, finite at rest.
     """
     if kind == FRICTION_ADAMS:
-        if speed <= v_s:
-            r = speed / v_s
-            return 0.5 * mu_s * (3.0 - r * r) / v_s, -mu_s / v_s**3
-        if speed >= v_d:
-            return mu_d / speed, -mu_d / speed**3
-        _, step, step_slope, _ = smooth_step((speed - v_s) / (v_d - v_s), 0)
-        mu = mu_s + (mu_d - mu_s) * step
-        slope = (mu_d - mu_s) * step_slope / (v_d - v_s)
-        ratio = mu / speed
-        return ratio, (slope - ratio) / (speed * speed)
+        return friction_ratio(mu_s, mu_d, v_s, v_d, speed)
     y = speed / v_s
     if y < 1e-2:
         y2 = y * y

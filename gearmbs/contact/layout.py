@@ -1,163 +1,342 @@
-"""Where things stand in the flat tables of a gear pair and in the kernel's scratch array.
+"""What stands where: the tables of a gear pair and the kernel's scratch, described field by field.
 
-The tables are plain arrays (``gi`` int64, ``gr`` float64) so that one compiled kernel serves every pair. The scratch
-array holds everything the kernel computes on the way, at fixed places: no slices are made, nothing is allocated.
+A gear pair comes as two flat tables (``gi`` int64, ``gr`` float64), so that one compiled kernel serves every pair.
+Both begin with a header, described here as a record with named fields; behind it stand the tooth flanks that deviate
+from perfect ones. The scratch array holds what the kernel computes on the way: one record `SCRATCH` and, behind it,
+strips of the face.
+
+A strip is up to `LANES` neighbouring sections of the face, the nodes of up to ``LANES - 1`` slices. Each of its numbers
+is a row with one place (lane) a section, so that loops over the sections run side by side in the processor's vector
+registers. Neighbouring strips share a section.
 """
 
 from __future__ import annotations
 
-# --- gi: integers -------------------------------------------------------------------------------
-Z1 = 0  # teeth of wheel 1
-Z2 = 1
-N_SLICES = 2  # slices along the face; 1: a single plane at mid-face, no end effects
-LAW = 3  # one of LAW_*
-FRICTION = 4  # one of FRICTION_*
-DRIVE = 5  # +1: wheel 1 drives turning positive about its z axis, -1: negative
-LOAD = 6  # one of LOAD_*
-SHAPE_S = 7  # stations of a deviation shape along the profile
-SHAPE_Z = 8  # stations of a deviation shape along the face
-O_TOOTH = 9  # offset in gi of the tooth records (shape, tip, compliance numbers; -1: none), 0: all teeth perfect
-O_OFFSET = 10  # offset in gr of one constant deviation per tooth flank
-O_SHAPE = 11  # offset in gr of the deviation shapes
-O_TIP = 12  # offset in gr of tip strings over the face, for broken and chipped teeth
-O_COMPLIANCE = 13  # offset in gr of relative compliances along the profile, 0: constant stiffness
-N_COMPLIANCE = 14  # stations of a compliance curve
-ROOT = 15  # 1: tips also meet the mate's root
-GI_HEADER = 16
-TOOTH = 3  # integers per tooth record
+import numpy as np
 
-# --- gr: reals; wheel 1 at 0, wheel 2 at WHEEL ----------------------------------------------------
-RB = 0  # base radius, m
-PSI = 1  # half angle of the tooth at the base circle, rad
-S_TIP = 2  # string length where the involute ends at the tip, m
-R_CORNER = 3  # radius of the centre of the tip rounding, m (the tip corner itself when sharp)
-PSI_CORNER = 4  # its half angle, rad
-R_ROUND = 5  # tip rounding radius, m
-R_TIP = 6  # tip circle radius, m
-R_ROOT = 7  # root circle radius, m
-FACE = 8  # face width, m
-S_FORM = 9  # string length where the involute begins, m
-R_FILLET = 10  # radius of the root arc, m
-R_FILLET_CENTRE = 11  # radius of the arc's centre, m
-PSI_FILLET = 12  # half angle of the arc's centre from the tooth's middle, rad
-SHAPE_S0 = 13  # string length of the first profile station, m
-SHAPE_DS = 14  # spacing of the profile stations, m
-WHEEL = 16
-PITCH = 32  # base pitch, m
-LAW_K = 33  # stiffness per unit face width, N/m^(1+e)
-LAW_E = 34
-LAW_C = 35  # damping per unit face width, N s/m^2 (IMPACT), or rate factor (Hunt-Crossley), s/m
-LAW_D = 36  # penetration of full damping, m
-MU_S = 37
-MU_D = 38
-V_S = 39
-V_D = 40
-WIDTH = 41  # common face width the stiffness refers to, m
-EDGE_BLEND = 42  # rounding of the face ends in the overlap, m
-GAP_MARGIN = 43  # most material added to a flank pair by deviations, m
-ZETA_LO = 44  # the slices' range along the mean axis, m
-ZETA_HI = 45
-COMPLIANCE_S0 = 46  # first station of the pair's compliance curve on wheel 1's string, m
-COMPLIANCE_DS = 47
-AXIAL_SHIFT = 48  # nominal axial offset of wheel 2, m
-GR_HEADER = 50
+LANES = 8
+"""Sections worked on side by side; one vector register of AVX-512, two of AVX, four of NEON."""
 
-LAW_IMPACT = 0
-LAW_HUNT_CROSSLEY = 1
+CACHE_LINE = 64
+"""Bytes; every record of the scratch starts on a multiple of it."""
 
-FRICTION_NONE = 0
-FRICTION_ADAMS = 1
-FRICTION_SMOOTH = 2
+REAL, INTEGER = np.float64, np.int64
 
-LOAD_SLICES = 0
-LOAD_ADAMS = 1
 
-# --- pose numbers -----------------------------------------------------------------------------------
-# centre distance, axial offset, tilt (inclination, skew), spin angles
-X_A, X_H, X_P, X_Q, X_F1, X_F2 = range(6)
+def record(*fields: str | tuple, kind: type = REAL) -> np.dtype:
+    """Return a record of 8-byte numbers that stand one after another; its size is whole cache lines.
 
-# --- scratch: node records ----------------------------------------------------------------------------
-N_ALPHA = 0  # operating angle of the contact normal in this section, its sine and cosine
-N_SIN = 1
-N_COS = 2
-N_GAP = 3
-N_GRAD = 4  # 6: d gap / d x at fixed station
-N_HESS = 10  # 36: d2 gap / dx2
-N_DALPHA = 46  # 6: d alpha / d x
-N_PN = 52  # contact point, along the normal and the tangent, from wheel 1's centre
-N_PT = 53
-N_DPN = 54  # 6
-N_DPT = 60  # 6
-N_FORCE = 66  # nodal normal force, N
-N_FX = 67  # 6: its derivative with respect to x
-N_FV = 73  # 6: and to dx/dt
-N_RATE = 79  # d gap / dt
-N_S1 = 80  # string length on wheel 1 at the contact
-N_S2 = 81
-N_KIND = 82  # 0 flank on flank, 1 corner of wheel 1, 2 corner of wheel 2
-N_DRATE = 83  # 6: d (d gap / d t) / d x
-N_ELASTIC = 89  # elastic part of the nodal force, N
-NODE = 90
+    Parameters
+    ----------
+    *fields : str, tuple or dtype
+        Name of a number, or name and shape of an array: ``("grad", 6)``; name and dtype of a record within.
+    kind : type
+        `REAL`, or `INTEGER`.
+    """
+    names, formats, offsets, end = [], [], [], 0
+    for field in fields:
+        name, *shape = (field,) if isinstance(field, str) else field
+        form = shape[0] if shape and isinstance(shape[0], np.dtype) else np.dtype((kind, tuple(shape)))
+        names.append(name)
+        formats.append(form)
+        offsets.append(end)
+        end += form.itemsize
+    size = -(-end // CACHE_LINE) * CACHE_LINE
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
 
-# --- scratch: sums over all contacts, in the mean frame -------------------------------------------------
-W_SUMS = 560
-Q_ = W_SUMS  # 6: generalised normal force
-H_ = Q_ + 6  # 36: dQ/dx
-B_ = H_ + 36  # 36: dQ/d(dx/dt)
-F_ = B_ + 36  # 6: friction wrench on wheel 1
-FX_ = F_ + 6  # 36: its derivative by x
-FV_ = FX_ + 36  # 36: and by the relative twist
-FR_ = FV_ + 36  # 36: and by dx/dt, through the damping in the normal force
-SUMS = 192
 
-# --- scratch: single places -------------------------------------------------------------------------------
-W_X = 0  # 6: pose numbers
-W_XD = 6  # 6: their rates
-W_V = 12  # 6: relative twist of wheel 1 in the mean frame
-W_M = 18  # 9: mean frame, row by row
-W_XDX = 27  # 24: d(dx/dt)/d(a, h, p, q)
-S_X = 51  # the same, as seen on the side of the teeth at work
-S_XD = 57
-S_V = 63
-S_W = 69  # cosine of half the angle between the axes
-S_A0 = 70  # operating angle of parallel axes, its sine and cosine
-S_LENGTH = 73  # length of the line of action, m
-S_ALPHA = 74  # running normal: alpha, sine, cosine
-S_SIN = 75
-S_COS = 76
-C_SIN = 77  # tip corner at work: its polar angle's sine and cosine, radius, rounding, string, half angle
-C_COS = 78
-C_R = 79
-C_ROUND = 80
-C_STRING = 81
-C_PSI = 82
-S_IW = 529  # 1/w, its third and fifth power, 1/(1 + w), and m = 1/(w (1 + w)) with two derivatives by w
-S_IW3 = 530
-S_IW5 = 531
-S_ONE = 532
-S_M = 533
-S_MW = 534
-S_MWW = 535
-S_SLOPE = 536  # d alpha / d zeta at the last solution
-S_CURVE = 537  # lower bound of the corner gap's growth beyond the path of contact, 1/m
-S_OVERHANG = 538  # how far the common face may reach beyond the slices, m
-P_MOVED = 539  # 6: derivative of a pair's elastic energy by the pose as its centroid moves along the face
-P_SOFT = 83  # stiffness factor of the tooth pair at work, and its gradient (6) and Hessian (36)
-P_SOFT_X = 84
-P_SOFT_XX = 90
-P_DEV = 126  # deviation lookup: value, gradient (6), Hessian (36)
-W_SUP = 169  # 30: two support records
-W_LIMIT = 199  # 172: limits of the face, with derivatives
-W_G = 371  # 36
-W_MU = 407  # 18
-W_W = 425  # 6
-W_WX = 431  # 24
-W_KX = 455  # 36
-W_KV = 491  # 36
-W_NODES = W_SUMS + SUMS + 72
-W_J = W_SUMS + SUMS  # 72
+def lanes(*fields: str | tuple) -> np.dtype:
+    """Return a record of rows: each field has a last axis of one place a section of a strip."""
+    return record(*[(*((field,) if isinstance(field, str) else field), LANES) for field in fields])
+
+
+def place(table: np.dtype, name: str) -> int:
+    """Return where a field stands in its flat table, in numbers."""
+    return table.fields[name][1] // 8  # type: ignore[index]
+
+
+# --- the tables of a pair -----------------------------------------------------------------------------
+OPTIONS = record(
+    ("teeth", 2),
+    "slices",  # along the face; 1: a single plane at mid-face, no end effects
+    "law",  # one of LAW_*
+    "friction",  # one of FRICTION_*
+    "drive",  # +1: wheel 1 drives turning positive about its z axis, -1: negative
+    "load",  # one of LOAD_*
+    "root",  # 1: tips also meet the mate's root
+    "profile_places",  # of a deviation shape along the profile
+    "face_places",  # and along the face
+    "compliance_places",  # of a compliance curve
+    "flanks",  # where the records of the tooth flanks begin in gi, 0: all teeth perfect
+    "offsets",  # where in gr: one constant deviation a tooth flank
+    "shapes",  # deviation shapes
+    "tips",  # lengths of roll at the tip over the face, for broken and chipped teeth
+    "compliances",  # relative compliances along the profile, 0: constant stiffness
+    kind=INTEGER,
+)
+FLANK_SHAPE, FLANK_TIP, FLANK_COMPLIANCE, FLANK = range(4)
+"""A tooth flank's numbers of its shape, tip and compliance (-1: none), and how many numbers that makes."""
+
+WHEEL = record(
+    "base_radius",  # m
+    "half_angle",  # of the tooth at the base circle, rad
+    "tip_roll",  # length of roll where the involute ends at the tip, m
+    "corner_radius",  # of the centre of the tip rounding (the tip corner itself when sharp), m
+    "corner_angle",  # its half angle, rad
+    "tip_rounding",  # radius, m
+    "tip_radius",
+    "root_radius",
+    "face_width",
+    "form_roll",  # length of roll where the involute begins, m
+    "fillet_radius",  # of the root arc, m
+    "fillet_centre_radius",
+    "fillet_angle",  # half angle of the arc's centre from the tooth's middle, rad
+    "shape_start",  # length of roll of the first place of a deviation shape, m
+    "shape_spacing",  # of its places, m
+)
+PAIR = record(
+    ("wheel_1", WHEEL),
+    ("wheel_2", WHEEL),
+    "pitch",  # base pitch, m
+    "stiffness",  # per unit face width, N/m^(1+e)
+    "exponent",
+    "damping",  # per unit face width, N s/m^2 (IMPACT), or rate factor (Hunt-Crossley), s/m
+    "damping_depth",  # penetration of full damping, m
+    "static_friction",
+    "dynamic_friction",
+    "static_speed",
+    "dynamic_speed",
+    "width",  # common face width the stiffness refers to, m
+    "end_blend",  # rounding of the face ends in the overlap, m
+    "added_material",  # most material added to a flank pair by deviations, m
+    "face_low",  # the slices' range along the mean axis, m
+    "face_high",
+    "axial_shift",  # nominal axial offset of wheel 2, m
+    "compliance_start",  # first place of the pair's compliance curve on wheel 1's length of roll, m
+    "compliance_spacing",
+)
+SLICES, FRICTION, LAW = place(OPTIONS, "slices"), place(OPTIONS, "friction"), place(OPTIONS, "law")
+
+LAW_IMPACT, LAW_HUNT_CROSSLEY = range(2)
+FRICTION_NONE, FRICTION_ADAMS, FRICTION_SMOOTH = range(3)
+LOAD_SLICES, LOAD_ADAMS = range(2)
+
+# --- results ------------------------------------------------------------------------------------------
+TOTALS = record(
+    "energy",  # elastic, J
+    "damping_power",  # W
+    "friction_power",
+    "depth_drive",  # largest penetration on the drive flanks, m
+    "depth_coast",  # and on the coast flanks
+    "pairs_drive",  # tooth pairs touching
+    "pairs_coast",
+    "normal_force",  # sum over all tooth pairs, N
+)
+DIAGNOSTICS = len(TOTALS.names or ())
+"""How many diagnostics there are."""
+
+# --- kinds of contact and of what bounds the touching part of a slice -----------------------------------------
+FLANKS, CORNER_1, CORNER_2 = range(3)
+"""Flank on flank; tip corner of wheel 1, of wheel 2, on the mate's flank."""
+AT_NODE, AT_FACE_END, AT_TOUCH_END = range(3)
+
+# --- the pose: centre distance, axial offset, tilt (inclination, skew), spin angles -------------------------
+A, H, P, Q, F1, F2 = range(6)
+
+# --- scratch -----------------------------------------------------------------------------------------------
+PADDED = 8
+"""Columns of 6 x 6 matrices: two spare ones make a row one vector, and lines of the cache."""
+
+MOTION = record(
+    ("x", 6),  # pose
+    ("xd", 6),  # its rates
+    ("twist", 6),  # of wheel 1 relative to wheel 2, in the mean frame
+    ("frame", 3, 3),  # mean frame; columns are its axes
+    ("wrench", 6),  # on wheel 1, in the mean frame
+    ("xd_x", 6, PADDED),  # d xd / dx
+    ("wrench_x", 6, PADDED),  # derivative of the wrench by the pose at fixed generalised force
+    ("columns", 6, PADDED),  # d x by the variation of wheel 1 in the mean frame
+    ("turn", 3, PADDED),  # how the mean frame turns with that variation
+    ("twist_turn", 6, PADDED),  # and how the twist changes with it
+    ("by_x", 6, PADDED),  # derivative of the wrench by the pose
+    ("by_twist", 6, PADDED),  # and by the twist
+    ("by_xd", 6, PADDED),  # and by the pose's rates
+    ("jac", 6, PADDED),  # derivative of the wrench by displacements of wheel 1
+)
+LINES = record(("d", 2), ("d_x", 5, 2), ("d_xx", 5, 5, 2))
+"""Offset of a tip line from a root line, with derivatives by (a, p, q, tip angle, root angle)."""
+SIDE = record(
+    ("x", 6),  # pose, rates and twist as seen on the side of the teeth at work
+    ("xd", 6),
+    ("twist", 6),
+    "w",  # cosine of half the angle between the axes
+    "i_w",  # 1 / w, its third and fifth power
+    "i_w3",
+    "i_w5",
+    "i_1w",  # 1 / (1 + w)
+    "m",  # 1 / (w (1 + w)) with two derivatives by w
+    "m_w",
+    "m_ww",
+    "gentle",  # 1: the axes lean so little that the turn of the normal is a short series, else 0
+    "base_1",  # base radii, their sum and difference
+    "base_2",
+    "base_sum",
+    "base_difference",
+    "alpha_0",  # operating angle of parallel axes, its sine and cosine
+    "sin_0",
+    "cos_0",
+    "length",  # of the line of action, m
+    "roll_sum",  # sum of base radius times (spin + half angle), tooth 0 of wheel 1 and the tooth facing it
+    "start_1",  # spin plus half angle of tooth 0 of wheel 1, and of the tooth facing it
+    "start_2",
+    "facing",  # number of the tooth of wheel 2 that faces tooth 0 of wheel 1
+    "first",  # nodes of the face that may touch
+    "last",
+    "low",  # where the slices begin, m; 0 for a single plane
+    "step",  # width of a slice, m
+    "overhang",  # how far the common face may reach beyond the slices, m
+    "curve",  # lower bound of the corner gap's growth beyond the path of contact, 1/m
+    "sign",  # +1 or -1, for the tables that name flanks
+    ("lines", LINES),
+)
+TOOTH_PAIR = record(
+    "f_1",  # angles of the two teeth from the line of centres
+    "f_2",
+    "flank_1",  # their places among all tooth flanks of the pair of wheels
+    "flank_2",
+    "shift",  # length of roll on wheel 1 beyond that of tooth 0
+    "first",  # nodes that may touch
+    "last",
+    "low",  # where the common face ends, in slices from the first of the face
+    "high",
+    "roll",  # length of roll on wheel 1 where the flanks meet, axes taken as parallel
+    "corner_bears",  # 1: the corner of wheel 1 bears in some section
+    "soft",  # stiffness factor, its gradient and Hessian
+    ("soft_x", 6),
+    ("soft_xx", 6, 6),
+    ("moved", 6),  # derivative of the elastic energy by the pose as the centroid moves along the face
+)
+LIMIT = record("value", ("grad", 6), ("hess", 6, 6))
+SUMS = record(
+    ("q", 6),  # generalised normal force
+    ("f", 6),  # friction wrench on wheel 1
+    ("q_x", 6, PADDED),  # derivative of q by the pose
+    ("q_xd", 6, PADDED),  # and by the pose's rates
+    ("f_x", 6, PADDED),
+    ("f_twist", 6, PADDED),
+    ("f_xd", 6, PADDED),  # through the damping in the normal force
+)
+LOOKUP = record("roll", ("grad", 6), ("hess", 6, 6))
+"""Where the contact stands on a profile."""
+CORNER = lanes("roll", "radius", "rounding", "sin", "cos")
+"""The tip corner of a wheel at work: length of roll, radius, rounding, sine and cosine of its polar angle."""
+LOADS = lanes(
+    "kind",  # of contact in the tooth pair at work
+    # of the slice from this node to the next
+    "low",  # the part that touches and lies on both faces, as fractions
+    "high",
+    "depth",  # its largest penetration
+    "clip_low",  # 1: the touch ends there
+    "clip_high",
+    "energy",
+    "power",
+    "k_ll",  # minus derivatives of the forces on the left and right node by the gaps at the left and right node
+    "k_lr",
+    "k_rl",
+    "k_rr",
+    "r_ll",  # and by the rates of the gaps
+    "r_lr",
+    "r_rr",
+    "left_low",  # derivatives of the forces left and right by the bounds
+    "right_low",
+    "left_high",
+    "right_high",
+    "force_left",  # its share on either node
+    "force_right",
+    "elastic_left",
+    "elastic_right",
+    ("x_left", 6),  # their derivatives by the pose; rows ..._left above ..._right: read from one lane before
+    ("x_right", 6),
+    ("v_left", 6),  # and by the pose's rates
+    ("v_right", 6),
+    # of the node
+    "force",
+    "elastic",
+    ("force_x", 6),
+    ("force_xd", 6),
+    # friction
+    "normal",  # contact point along normal and tangent, from the centre of wheel 1
+    "tangent",
+    ("normal_x", 6),
+    ("tangent_x", 6),
+    "slope_A",  # slopes of the support function of wheel 1's profile
+    "slope_B",
+    "slope_F",
+    ("profile", 6),  # unit wrenches of a force along the profile and along the face
+    ("axial", 6),
+    "v_profile",  # sliding velocity
+    "v_axial",
+    "ratio",  # friction coefficient over speed, and the derivative of that by the speed over the speed
+    "ratio_slope",
+    "f_profile",  # friction forces
+    "f_axial",
+    "pp",  # their derivatives by the sliding velocity
+    "pa",
+    "aa",
+    ("profile_x", 6),  # their derivatives by the pose
+    ("axial_x", 6),
+    ("profile_v", 6),  # and by the twist
+    ("axial_v", 6),
+    ("sliding", 6),  # derivative of the wrench by the normal force
+    ("turned", 6, 6),  # derivatives of the wrench by the pose at constant forces
+)
+STRIP = lanes(
+    "zeta",  # place of the section along the mean axis
+    "alpha",  # operating angle of the contact normal, its sine and cosine
+    "sin",
+    "cos",
+    "gap",
+    "rate",  # of the gap
+    "roll_1",  # length of roll at the contact
+    "roll_2",
+    "turn",  # of the normal seen from the wheels' own planes
+    "kind",  # FLANKS, CORNER_1 or CORNER_2
+    "step",  # of Newton's method
+    "good",  # 1: a corner bears on its mate's involute, 0: on its continuation
+    ("grad", 6),  # d gap / dx
+    ("rate_x", 6),  # d rate / dx
+    ("alpha_x", 6),
+    ("hess", 6, 6),  # d2 gap / dx2, upper triangle
+)
+VALUE_ROWS = place(STRIP, "rate_x") // LANES
+"""Rows of a strip that stand before the derivatives of second order."""
+
+SCRATCH = record(
+    ("motion", MOTION),
+    ("side", SIDE),
+    ("pair", TOOTH_PAIR),
+    ("sums", SUMS),
+    ("totals", TOTALS),
+    ("low", LIMIT),  # limits of the common face
+    ("high", LIMIT),
+    ("end_1", LIMIT),  # end faces of the two wheels
+    ("end_2", LIMIT),
+    ("lookup_1", LOOKUP),
+    ("lookup_2", LOOKUP),
+    ("corner_1", CORNER),
+    ("corner_2", CORNER),
+    ("loads", LOADS),
+    ("middle", STRIP),  # mid-face
+    ("corners", STRIP),  # sections in which a corner bears
+)
+
+
+def strip_count(n_slices: int) -> int:
+    """Return the number of strips that so many slices need."""
+    return max(1, -(-n_slices // (LANES - 1)))
 
 
 def work_size(n_slices: int) -> int:
     """Length of the scratch array the kernel needs for so many slices."""
-    return W_NODES + (2 * NODE + 1) * (n_slices + 1)
+    strips = 2 * strip_count(n_slices)
+    return (CACHE_LINE + SCRATCH.itemsize + strips * STRIP.itemsize) // 8

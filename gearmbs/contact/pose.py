@@ -10,15 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.contact import layout as L
 from gearmbs.contact.jit import kernel
-
-X, XD, V, M = L.W_X, L.W_XD, L.W_V, L.W_M
-XDX, WX, W, G, MU, Q = L.W_XDX, L.W_WX, L.W_W, L.W_G, L.W_MU, L.Q_
 
 
 @kernel
-def relative_pose(R1, A1, R2, A2, wk):
+def relative_pose(R1, A1, R2, A2, motion):
     """Fill pose numbers and mean frame (columns are its axes); False when they are undefined."""
     zx = A1[0, 2] + A2[0, 2]
     zy = A1[1, 2] + A2[1, 2]
@@ -45,25 +41,18 @@ def relative_pose(R1, A1, R2, A2, wk):
     fx = zy * ez - zz * ey
     fy = zz * ex - zx * ez
     fz = zx * ey - zy * ex
-    wk[M + 0] = ex
-    wk[M + 3] = ey
-    wk[M + 6] = ez
-    wk[M + 1] = fx
-    wk[M + 4] = fy
-    wk[M + 7] = fz
-    wk[M + 2] = zx
-    wk[M + 5] = zy
-    wk[M + 8] = zz
+    frame = motion.frame
+    frame[0, 0], frame[1, 0], frame[2, 0] = ex, ey, ez
+    frame[0, 1], frame[1, 1], frame[2, 1] = fx, fy, fz
+    frame[0, 2], frame[1, 2], frame[2, 2] = zx, zy, zz
     ux = 0.5 * (A1[0, 2] - A2[0, 2])
     uy = 0.5 * (A1[1, 2] - A2[1, 2])
     uz = 0.5 * (A1[2, 2] - A2[2, 2])
     p = ux * ex + uy * ey + uz * ez
     q = ux * fx + uy * fy + uz * fz
     w = np.sqrt(1.0 - p * p - q * q)
-    wk[X + 0] = a
-    wk[X + 1] = h
-    wk[X + 2] = p
-    wk[X + 3] = q
+    x = motion.x
+    x[0], x[1], x[2], x[3] = a, h, p, q
     for k in range(2):
         A = A1 if k == 0 else A2
         sign = 1.0 if k == 0 else -1.0
@@ -71,16 +60,40 @@ def relative_pose(R1, A1, R2, A2, wk):
         vy = A[0, 0] * fx + A[1, 0] * fy + A[2, 0] * fz
         vz = A[0, 0] * zx + A[1, 0] * zy + A[2, 0] * zz
         back = (p * vx + q * vy) / (1.0 + w) + sign * vz
-        wk[X + 4 + k] = np.arctan2(sign * (vy - q * back), sign * (vx - p * back))
+        x[4 + k] = np.arctan2(sign * (vy - q * back), sign * (vx - p * back))
     return True
 
 
 @kernel
-def pose_rates(wk):
-    """Fill the rates of the pose under the relative twist of wheel 1, and their derivatives by a, h, p, q."""
-    a, h, p, q = wk[X], wk[X + 1], wk[X + 2], wk[X + 3]
+def pose_rates(motion):
+    """Fill the rates of the pose under the relative twist of wheel 1."""
+    x = motion.x
+    a, h, p, q = x[0], x[1], x[2], x[3]
     w = np.sqrt(1.0 - p * p - q * q)
-    ry, ox, oy, oz = wk[V + 1], wk[V + 3], wk[V + 4], wk[V + 5]
+    twist, xd = motion.twist, motion.xd
+    ox, oy, oz = twist[3], twist[4], twist[5]
+    i2w = 0.5 / w
+    mx = 0.5 * oy - oz * q * i2w
+    my = -0.5 * ox + oz * p * i2w
+    mz = -(twist[1] + h * my) / a
+    lam = p * my - q * mx
+    i1w = 1.0 / (1.0 + w)
+    xd[0] = -twist[0] - h * mx
+    xd[1] = -twist[2] + a * mx
+    xd[2] = w * mx + q * mz
+    xd[3] = w * my - p * mz
+    xd[4] = p * ox + q * oy + w * oz + lam * (1.0 + 2.0 * w) * i1w - mz
+    xd[5] = -lam * i1w - mz
+
+
+@kernel
+def pose_rate_slopes(motion):
+    """Fill the derivatives of the rates of the pose by a, h, p, q."""
+    x = motion.x
+    a, h, p, q = x[0], x[1], x[2], x[3]
+    w = np.sqrt(1.0 - p * p - q * q)
+    twist, xd_x = motion.twist, motion.xd_x
+    ry, ox, oy, oz = twist[1], twist[3], twist[4], twist[5]
     i2w = 0.5 / w
     wp = -p / w
     wq = -q / w
@@ -102,44 +115,44 @@ def pose_rates(wk):
     i1w = 1.0 / (1.0 + w)
     g1 = (1.0 + 2.0 * w) * i1w
     g1_w = i1w * i1w
-    wk[XD + 0] = -wk[V] - h * mx
-    wk[XD + 1] = -wk[V + 2] + a * mx
-    wk[XD + 2] = w * mx + q * mz
-    wk[XD + 3] = w * my - p * mz
-    wk[XD + 4] = p * ox + q * oy + w * oz + lam * g1 - mz
-    wk[XD + 5] = -lam * i1w - mz
-    wk[XDX + 0] = 0.0
-    wk[XDX + 1] = -mx
-    wk[XDX + 2] = -h * mx_p
-    wk[XDX + 3] = -h * mx_q
-    wk[XDX + 4] = mx
-    wk[XDX + 5] = 0.0
-    wk[XDX + 6] = a * mx_p
-    wk[XDX + 7] = a * mx_q
-    wk[XDX + 8] = q * mz_a
-    wk[XDX + 9] = q * mz_h
-    wk[XDX + 10] = wp * mx + w * mx_p + q * mz_p
-    wk[XDX + 11] = wq * mx + w * mx_q + mz + q * mz_q
-    wk[XDX + 12] = -p * mz_a
-    wk[XDX + 13] = -p * mz_h
-    wk[XDX + 14] = wp * my + w * my_p - mz - p * mz_p
-    wk[XDX + 15] = wq * my + w * my_q - p * mz_q
-    wk[XDX + 16] = -mz_a
-    wk[XDX + 17] = -mz_h
-    wk[XDX + 18] = ox + wp * oz + lam_p * g1 + lam * g1_w * wp - mz_p
-    wk[XDX + 19] = oy + wq * oz + lam_q * g1 + lam * g1_w * wq - mz_q
-    wk[XDX + 20] = -mz_a
-    wk[XDX + 21] = -mz_h
-    wk[XDX + 22] = -lam_p * i1w + lam * g1_w * wp - mz_p
-    wk[XDX + 23] = -lam_q * i1w + lam * g1_w * wq - mz_q
+    for i in range(6):
+        xd_x[i, 4] = xd_x[i, 5] = 0.0
+    xd_x[0, 0] = 0.0
+    xd_x[0, 1] = -mx
+    xd_x[0, 2] = -h * mx_p
+    xd_x[0, 3] = -h * mx_q
+    xd_x[1, 0] = mx
+    xd_x[1, 1] = 0.0
+    xd_x[1, 2] = a * mx_p
+    xd_x[1, 3] = a * mx_q
+    xd_x[2, 0] = q * mz_a
+    xd_x[2, 1] = q * mz_h
+    xd_x[2, 2] = wp * mx + w * mx_p + q * mz_p
+    xd_x[2, 3] = wq * mx + w * mx_q + mz + q * mz_q
+    xd_x[3, 0] = -p * mz_a
+    xd_x[3, 1] = -p * mz_h
+    xd_x[3, 2] = wp * my + w * my_p - mz - p * mz_p
+    xd_x[3, 3] = wq * my + w * my_q - p * mz_q
+    xd_x[4, 0] = -mz_a
+    xd_x[4, 1] = -mz_h
+    xd_x[4, 2] = ox + wp * oz + lam_p * g1 + lam * g1_w * wp - mz_p
+    xd_x[4, 3] = oy + wq * oz + lam_q * g1 + lam * g1_w * wq - mz_q
+    xd_x[5, 0] = -mz_a
+    xd_x[5, 1] = -mz_h
+    xd_x[5, 2] = -lam_p * i1w + lam * g1_w * wp - mz_p
+    xd_x[5, 3] = -lam_q * i1w + lam * g1_w * wq - mz_q
 
 
 @kernel
-def pose_wrench(wk, want):
+def pose_wrench(motion, generalised, want):
     """Fill the wrench on wheel 1 in M that does the work of the generalised force, and its derivatives."""
-    a, h, p, q = wk[X], wk[X + 1], wk[X + 2], wk[X + 3]
+    x = motion.x
+    a, h, p, q = x[0], x[1], x[2], x[3]
     w = np.sqrt(1.0 - p * p - q * q)
-    Qa, Qh, Qp, Qq, Q1, Q2 = wk[Q], wk[Q + 1], wk[Q + 2], wk[Q + 3], wk[Q + 4], wk[Q + 5]
+    Qa, Qh, Qp, Qq, Q1, Q2 = (
+        generalised[0], generalised[1], generalised[2], generalised[3], generalised[4], generalised[5],
+    )  # fmt: skip
+    wrench, wrench_x = motion.wrench, motion.wrench_x
     i1w = 1.0 / (1.0 + w)
     Mz = q * Qp - p * Qq - Q1 - Q2
     Lam = (Q1 * (1.0 + 2.0 * w) - Q2) * i1w
@@ -147,14 +160,16 @@ def pose_wrench(wk, want):
     Cy = w * Qq + p * Lam - h * Mz / a
     i2w = 0.5 / w
     mixed = p * Cy - q * Cx
-    wk[W + 0] = -Qa
-    wk[W + 1] = -Mz / a
-    wk[W + 2] = -Qh
-    wk[W + 3] = -0.5 * Cy + p * Q1
-    wk[W + 4] = 0.5 * Cx + q * Q1
-    wk[W + 5] = mixed * i2w + w * Q1
+    wrench[0] = -Qa
+    wrench[1] = -Mz / a
+    wrench[2] = -Qh
+    wrench[3] = -0.5 * Cy + p * Q1
+    wrench[4] = 0.5 * Cx + q * Q1
+    wrench[5] = mixed * i2w + w * Q1
     if want == 0:
         return
+    for i in range(6):
+        wrench_x[i, 4] = wrench_x[i, 5] = 0.0
     wx = (0.0, 0.0, -p / w, -q / w)
     Mx = (0.0, 0.0, -Qq, Qp)
     for k in range(4):
@@ -175,21 +190,23 @@ def pose_wrench(wk, want):
         else:
             Cxk -= Lam
             qk = 1.0
-        wk[WX + 0 + k] = 0.0
-        wk[WX + 4 + k] = -Mx[k] / a + (Mz / (a * a) if k == 0 else 0.0)
-        wk[WX + 8 + k] = 0.0
-        wk[WX + 12 + k] = -0.5 * Cyk + pk * Q1
-        wk[WX + 16 + k] = 0.5 * Cxk + qk * Q1
-        wk[WX + 20 + k] = (p * Cyk - q * Cxk + pk * Cy - qk * Cx) * i2w - mixed * i2w / w * wx[k] + wx[k] * Q1
+        wrench_x[0, k] = 0.0
+        wrench_x[1, k] = -Mx[k] / a + (Mz / (a * a) if k == 0 else 0.0)
+        wrench_x[2, k] = 0.0
+        wrench_x[3, k] = -0.5 * Cyk + pk * Q1
+        wrench_x[4, k] = 0.5 * Cxk + qk * Q1
+        wrench_x[5, k] = (p * Cyk - q * Cxk + pk * Cy - qk * Cx) * i2w - mixed * i2w / w * wx[k] + wx[k] * Q1
 
 
 @kernel
-def pose_columns(wk):
+def pose_columns(motion):
     """Fill the derivative of the pose by the variation of wheel 1 in M (6, 6), and the turn of M (3, 6)."""
-    a, h, p, q = wk[X], wk[X + 1], wk[X + 2], wk[X + 3]
+    x = motion.x
+    a, h, p, q = x[0], x[1], x[2], x[3]
     w = np.sqrt(1.0 - p * p - q * q)
     i1w = 1.0 / (1.0 + w)
     g1 = (1.0 + 2.0 * w) * i1w
+    columns, turn = motion.columns, motion.turn
     for k in range(6):
         mx = 0.0
         my = 0.0
@@ -202,15 +219,15 @@ def pose_columns(wk):
             my = 0.5 * p / w
         mz = -((1.0 if k == 1 else 0.0) + h * my) / a
         lam = p * my - q * mx
-        wk[G + 0 + k] = -(1.0 if k == 0 else 0.0) - h * mx
-        wk[G + 6 + k] = -(1.0 if k == 2 else 0.0) + a * mx
-        wk[G + 12 + k] = w * mx + q * mz
-        wk[G + 18 + k] = w * my - p * mz
-        wk[G + 24 + k] = lam * g1 - mz
-        wk[G + 30 + k] = -lam * i1w - mz
-        wk[MU + 0 + k] = -my
-        wk[MU + 6 + k] = mx
-        wk[MU + 12 + k] = mz
-    wk[G + 27] += p
-    wk[G + 28] += q
-    wk[G + 29] += w
+        columns[0, k] = -(1.0 if k == 0 else 0.0) - h * mx
+        columns[1, k] = -(1.0 if k == 2 else 0.0) + a * mx
+        columns[2, k] = w * mx + q * mz
+        columns[3, k] = w * my - p * mz
+        columns[4, k] = lam * g1 - mz
+        columns[5, k] = -lam * i1w - mz
+        turn[0, k] = -my
+        turn[1, k] = mx
+        turn[2, k] = mz
+    columns[4, 3] += p
+    columns[4, 4] += q
+    columns[4, 5] += w

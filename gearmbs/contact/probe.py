@@ -2,35 +2,38 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from gearmbs.contact import layout as L
-from gearmbs.contact.deviations import add_deviations, pair_softness, set_corner, tip_string, tooth_record
-from gearmbs.contact.face import LIMIT, face_limit
-from gearmbs.contact.flanks import corner_section, flank_pitch, open_side, set_normal
+from gearmbs.contact.corners import corner_gaps, set_corner
+from gearmbs.contact.deviations import add_deviations, pair_softness, tip_roll
+from gearmbs.contact.face import limit_value, roll_difference
 from gearmbs.contact.jit import kernel
-from gearmbs.contact.node import contact_point, flank_normal, section_gap
+from gearmbs.contact.pair import set_pair
+from gearmbs.contact.points import contact_points
 from gearmbs.contact.pose import relative_pose
+from gearmbs.contact.records import options_at, pair_at, scratch_at
+from gearmbs.contact.search import facing_teeth, open_side, teeth_in_reach
+from gearmbs.contact.sections import flank_normals, flank_sections
 
-COLUMNS = (
+COLUMNS: tuple[str, ...] = (
     "side",
     "tooth_1",
     "tooth_2",
-    "station",
+    "section",
     "gap",
     "kind",
-    "string_1",
-    "string_2",
+    "roll_1",
+    "roll_2",
     "normal",
     "tangent",
     "alpha",
     "stiffness",
 )
+SIDE, TOOTH_1, TOOTH_2, SECTION, GAP, KIND, ROLL_1, ROLL_2, NORMAL, TANGENT, ALPHA, STIFFNESS = range(len(COLUMNS))
 
 
 @kernel
-def pair_gaps(gi, gr, R1, A1, R2, A2, stations, rows, work):
-    """Gap of every tooth pair within one pitch of the path of contact, both sides, at stations along the face.
+def pair_gaps(gi, gr, R1, A1, R2, A2, sections, rows, work):
+    """Gap of every tooth pair within one pitch of the path of contact, both sides, in sections across the face.
 
     Parameters
     ----------
@@ -38,11 +41,11 @@ def pair_gaps(gi, gr, R1, A1, R2, A2, stations, rows, work):
         As for ``gear_contact``.
     R1, A1, R2, A2 : ndarray
         Poses of the wheels.
-    stations : ndarray
+    sections : ndarray
         Positions along the mean axis from mid-way between the wheels, m; if empty, the ends of the common face.
     rows : ndarray, shape (n, 12)
-        Out, columns as in ``COLUMNS``: side (+1, -1), tooth numbers, station, gap m, kind (0 flank on flank, 1 or 2
-        the wheel whose corner bears), string lengths on both wheels m, contact point from the centre of wheel 1 along
+        Out, columns as in ``COLUMNS``: side (+1, -1), tooth numbers, section, gap m, kind (0 flank on flank, 1 or 2
+        the wheel whose corner bears), lengths of roll on both wheels m, contact point from the centre of wheel 1 along
         normal and tangent m, operating angle of the normal rad (mirrored for side -1), stiffness factor
         of the pair.
 
@@ -51,72 +54,103 @@ def pair_gaps(gi, gr, R1, A1, R2, A2, stations, rows, work):
     int
         Number of rows filled.
     """
-    if not relative_pose(R1, A1, R2, A2, work):
+    scratch = scratch_at(work)
+    options, wheels, side = options_at(gi), pair_at(gr), scratch.side
+    if not relative_pose(R1, A1, R2, A2, scratch.motion):
         return 0
-    rb1 = gr[L.RB]
-    rb2 = gr[L.WHEEL + L.RB]
-    pitch = gr[L.PITCH]
-    o = L.W_NODES
     count = 0
-    teeth = gi[L.O_TOOTH] != 0
-    for side in (1, -1):
+    for sign in (1, -1):
         for i in range(6):
-            work[L.S_X + i] = -work[L.W_X + i] if side == -1 and i > 2 else work[L.W_X + i]
-        if not open_side(gr, work):
+            side.x[i] = -scratch.motion.x[i] if sign == -1 and i > 2 else scratch.motion.x[i]
+        if not open_side(wheels, side):
             return 0
-        length = work[L.S_LENGTH]
-        alpha0 = work[L.S_A0]
-        tip1 = gr[L.S_TIP]
-        tip2 = gr[L.WHEEL + L.S_TIP]
-        base1 = rb1 * (work[L.S_X + 4] + gr[L.PSI])
-        n = int(flank_pitch(gr, work))
-        first = int(np.ceil((length - tip2 - base1 - rb1 * alpha0) / pitch)) - 1
-        last = int(np.floor((tip1 - base1 - rb1 * alpha0) / pitch)) + 1
-        for i in range(first, last + 1):
-            f1 = work[L.S_X + 4] + i * 2.0 * np.pi / gi[L.Z1]
-            f2 = work[L.S_X + 5] + (n - i) * 2.0 * np.pi / gi[L.Z2]
-            record1 = tooth_record(gi, 0, side, i) if teeth else 0
-            record2 = tooth_record(gi, 1, side, n - i) if teeth else 0
-            soft = 1.0
-            if gi[L.O_COMPLIANCE] != 0:
-                pair_softness(gi, gr, work, record1, record2, f1, f2, 0)
-                soft = work[L.P_SOFT]
-            ends = stations.size == 0
-            if ends:
-                face_limit(-1.0, gr, work, f1, f2, L.W_LIMIT, 0)
-                face_limit(1.0, gr, work, f1, f2, L.W_LIMIT + LIMIT, 0)
-            for j in range(2 if ends else stations.size):
-                if count >= rows.shape[0]:
-                    return count
-                zeta = work[L.W_LIMIT + j * LIMIT] if ends else stations[j]
-                set_normal(work, alpha0, work[L.S_A0 + 1], work[L.S_A0 + 2])
-                flank_normal(work, base1 + i * pitch + rb2 * (f2 + gr[L.WHEEL + L.PSI]), rb1 + rb2, zeta)
-                section_gap(gr, work, 0, f1, f2, zeta, o, 0)
-                tip1 = tip_string(gi, gr, 0, record1, zeta)
-                tip2 = tip_string(gi, gr, 1, record2, zeta)
-                kind = 0
-                if work[o + L.N_S1] - tip1 > work[o + L.N_S2] - tip2:
-                    if work[o + L.N_S1] > tip1:
-                        kind = 1
-                elif work[o + L.N_S2] > tip2:
-                    kind = 2
-                if kind != 0:
-                    set_corner(gr, work, kind - 1, f1 if kind == 1 else f2, tip1 if kind == 1 else tip2)
-                    corner_section(gr, work, kind, f1, f2, zeta, False, o, 0)
-                if teeth:
-                    add_deviations(gi, gr, work, record1, record2, kind, f1, f2, zeta, o, 0)
-                contact_point(gr, work, kind, f1, zeta, o, 0)
-                rows[count, 0] = side
-                rows[count, 1] = (side * i) % gi[L.Z1]
-                rows[count, 2] = (side * (n - i)) % gi[L.Z2]
-                rows[count, 3] = zeta
-                rows[count, 4] = work[o + L.N_GAP]
-                rows[count, 5] = kind
-                rows[count, 6] = work[o + L.N_S1]
-                rows[count, 7] = work[o + L.N_S2]
-                rows[count, 8] = work[o + L.N_PN]
-                rows[count, 9] = work[o + L.N_PT]
-                rows[count, 10] = work[o + L.N_ALPHA]
-                rows[count, 11] = soft
-                count += 1
+        facing_teeth(options, wheels, side)
+        first, last = teeth_in_reach(wheels, side, 0.0, 0.0)
+        for i in range(first - 1, last + 2):
+            set_pair(options, scratch, sign, i)
+            count = pair_rows(options, wheels, scratch, sign, i, sections, rows, count)
     return count
+
+
+@kernel
+def pair_rows(options, wheels, scratch, sign, i, sections, rows, count):
+    """Fill the rows of one tooth pair.
+
+    Parameters
+    ----------
+    options, wheels, scratch : record
+        Tables and scratch; the pair at work is set.
+    sign, i : int
+        Side, and tooth of wheel 1.
+    sections, rows
+        As for `pair_gaps`.
+    count : int
+        Rows filled before.
+
+    Returns
+    -------
+    int
+        Rows filled.
+    """
+    side, pair = scratch.side, scratch.pair
+    strip, loads = scratch.middle, scratch.loads
+    if options.compliances != 0:
+        pair_softness(options, wheels, side, pair, scratch.lookup_1)
+    sig = roll_difference(side, wheels, pair.f_1, pair.f_2)
+    mate = int(side.facing) - i
+    ends = sections.size == 0
+    for j in range(2 if ends else sections.size):
+        if count >= rows.shape[0]:
+            return count
+        zeta = limit_value(side, wheels, -1.0 if j == 0 else 1.0, sig) if ends else sections[j]
+        section_of_pair(options, wheels, scratch, zeta)
+        contact_points(
+            side, scratch.corner_1, strip, loads, 1, pair.f_1 + wheels.wheel_1.half_angle, strip.kind[0] == 1.0, 0
+        )
+        rows[count, SIDE] = sign
+        rows[count, TOOTH_1] = (sign * i) % options.teeth[0]
+        rows[count, TOOTH_2] = (sign * mate) % options.teeth[1]
+        rows[count, SECTION] = zeta
+        rows[count, GAP] = strip.gap[0]
+        rows[count, KIND] = strip.kind[0]
+        rows[count, ROLL_1] = strip.roll_1[0]
+        rows[count, ROLL_2] = strip.roll_2[0]
+        rows[count, NORMAL] = loads.normal[0]
+        rows[count, TANGENT] = loads.tangent[0]
+        rows[count, ALPHA] = strip.alpha[0]
+        rows[count, STIFFNESS] = pair.soft
+        count += 1
+    return count
+
+
+@kernel
+def section_of_pair(options, wheels, scratch, zeta):
+    """Fill the first section of ``scratch.middle`` with the gap of the pair at work, its deviations included."""
+    side, pair = scratch.side, scratch.pair
+    strip = scratch.middle
+    teeth = options.flanks != 0
+    strip.zeta[0] = zeta
+    strip.alpha[0], strip.sin[0], strip.cos[0] = side.alpha_0, side.sin_0, side.cos_0
+    flank_normals(side, strip, 1)
+    flank_sections(side, strip, 1, 0)
+    strip.roll_1[0] += pair.shift
+    strip.roll_2[0] -= pair.shift
+    tip_1, tip_2 = wheels.wheel_1.tip_roll, wheels.wheel_2.tip_roll
+    if teeth:
+        tip_1 = tip_roll(options, wheels, wheels.wheel_1, 0, int(pair.flank_1), zeta)
+        tip_2 = tip_roll(options, wheels, wheels.wheel_2, 1, int(pair.flank_2), zeta)
+    over_1, over_2 = strip.roll_1[0] - tip_1, strip.roll_2[0] - tip_2
+    kind = L.FLANKS
+    if over_1 > over_2:
+        if over_1 > 0.0:
+            kind = L.CORNER_1
+    elif over_2 > 0.0:
+        kind = L.CORNER_2
+    if kind == L.CORNER_1:
+        set_corner(wheels.wheel_1, scratch.corner_1, 0, pair.f_1, tip_1)
+        corner_gaps(side, wheels, scratch.corner_1, strip, 1, kind, pair.f_2, strip, 0)
+    elif kind == L.CORNER_2:
+        set_corner(wheels.wheel_2, scratch.corner_2, 0, pair.f_2, tip_2)
+        corner_gaps(side, wheels, scratch.corner_2, strip, 1, kind, pair.f_1, strip, 0)
+    if teeth:
+        add_deviations(options, wheels, scratch, strip, 0, 0)

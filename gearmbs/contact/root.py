@@ -13,143 +13,195 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.cells import plane_force
-from gearmbs.contact.deviations import set_corner
-from gearmbs.contact.face import LIMIT, face_limit
-from gearmbs.contact.flanks import TWO_PI, clear_node, face_forces, flank_pitch, gap_rate, open_side, station
+from gearmbs.contact.corners import copy_corner, set_corner
 from gearmbs.contact.jit import kernel
-from gearmbs.contact.lines import corner_on_plane, distance_gap, line_distance, line_offset
-from gearmbs.contact.sums import add_normal
+from gearmbs.contact.lines import clear_slopes, corner_on_plane, distance_gap, line_distance, line_offset
+from gearmbs.contact.loads import strip_forces
+from gearmbs.contact.pair import count_pair, set_limits
+from gearmbs.contact.pair_strips import strip_count
+from gearmbs.contact.records import strip_at
+from gearmbs.contact.search import facing_teeth, open_side
+from gearmbs.contact.sections import gap_rates
+from gearmbs.contact.slices import law_of, plane_force
+from gearmbs.contact.sums import add_normal, total_force
 
-S_X = L.S_X
-WHEEL, NODE, N_GAP, N_GRAD, N_HESS = L.WHEEL, L.NODE, L.N_GAP, L.N_GRAD, L.N_HESS
-NODES, LO, HI = L.W_NODES, L.W_LIMIT, L.W_LIMIT + LIMIT
 FAR = 1.0  # a gap, m, for parts that do not face each other
 ON_CIRCLE, ON_ARC, ON_FLANK, UNDER_ARC = range(4)
-BEFORE = L.W_J  # 42: generalised force and its derivatives before a part that is taken away
+NEIGHBOURS = 2  # tips on either side of the line of centres that are looked at
 
 
 @kernel
-def over_arc(gr, wk, mate, f_root, zeta):
+def over_arc(side, corner, mate, f_root, zeta):
     """Whether the corner at work stands over the root arc of its mate's tooth in a section."""
-    r = wk[L.C_R]
-    psi = gr[mate + L.PSI_FILLET]
+    r = corner.radius[0]
+    psi = mate.fillet_angle
     sc, cc = np.sin(f_root + psi), np.cos(f_root + psi)
-    rc = gr[mate + L.R_FILLET_CENTRE]
-    dx, dy = line_offset(wk, -r * wk[L.C_COS] - rc * cc, -r * wk[L.C_SIN] - rc * sc, zeta)
+    rc = mate.fillet_centre_radius
+    dx, dy = line_offset(side, -r * corner.cos[0] - rc * cc, -r * corner.sin[0] - rc * sc, zeta)
     if dx * sc - dy * cc < 0.0:
         return False
-    end = f_root + psi - np.arcsin(gr[mate + L.R_FILLET] / rc)
+    end = f_root + psi - np.arcsin(mate.fillet_radius / rc)
     return dx * np.cos(end) + dy * np.sin(end) < 0.0
 
 
 @kernel
-def root_gap(gr, wk, part, tip, f_tip, f_root, zeta, o, want):
-    """Gap of one part of a tip's contact with the mate's root in a section; far where the part is not in play.
+def root_gap(side, own, mate, corner, part, tip, f_tip, f_root, strip, j, want):
+    """Gap of one part of a tip's contact with the mate's root in section ``j``; far where the part is not in play.
 
-    The tip is that of wheel ``2 - tip``.
+    Parameters
+    ----------
+    side : record
+    own, mate : record
+        Tables of the wheel whose tip it is, and of the other.
+    corner : record
+        The tip's corner, in its first lane.
+    part : int
+        `ON_CIRCLE` or one of those after it.
+    tip : int
+        1 for a tip of wheel 1, 0 for one of wheel 2.
+    f_tip, f_root : float
+        Angles of the tip's tooth and of the mate's tooth beside the root, from the line of centres.
+    strip : record
+    j : int
+        Section.
+    want : int
+        Nonzero to fill second derivatives.
     """
-    own = WHEEL * (1 - tip)
-    mate = WHEEL * tip
-    r = wk[L.C_R]
-    se, ce = wk[L.C_SIN], wk[L.C_COS]
-    wk[o + N_GAP] = FAR
+    zeta, r = strip.zeta[j], corner.radius[0]
+    se, ce = corner.sin[0], corner.cos[0]
+    strip.gap[j] = FAR
+    clear_slopes(strip, j)
     if part == ON_CIRCLE:
-        dx, dy = line_offset(wk, 0.0, 0.0, zeta)
+        dx, dy = line_offset(side, 0.0, 0.0, zeta)
         off = f_tip - np.arctan2(dy, dx)
-        psi = gr[own + L.PSI_CORNER]
+        psi = own.corner_angle
         if abs(off) <= psi:
-            line_distance(wk, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, zeta)
-            distance_gap(wk, tip, 1.0, gr[own + L.R_TIP] + gr[mate + L.R_ROOT], o, want)
+            line_distance(side, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, zeta)
+            distance_gap(side, strip, j, tip, 1.0, own.tip_radius + mate.root_radius, want)
             return
         nearer = f_tip - psi if off > 0.0 else f_tip + psi
         se, ce = np.sin(nearer), np.cos(nearer)
-    elif not over_arc(gr, wk, mate, f_root, zeta):
+    elif not over_arc(side, corner, mate, f_root, zeta):
         return
     if part == ON_ARC:
-        eta = f_root + gr[mate + L.PSI_FILLET]
-        rs, rc = gr[mate + L.R_FILLET_CENTRE] * np.sin(eta), gr[mate + L.R_FILLET_CENTRE] * np.cos(eta)
-        line_distance(wk, -r * ce - rc, -r * se - rs, r * se, -r * ce, rs, -rc, zeta)
-        distance_gap(wk, tip, -1.0, gr[mate + L.R_FILLET] - wk[L.C_ROUND], o, want)
+        eta = f_root + mate.fillet_angle
+        rs, rc = mate.fillet_centre_radius * np.sin(eta), mate.fillet_centre_radius * np.cos(eta)
+        line_distance(side, -r * ce - rc, -r * se - rs, r * se, -r * ce, rs, -rc, zeta)
+        distance_gap(side, strip, j, tip, -1.0, mate.fillet_radius - corner.rounding[0], want)
     elif part == ON_FLANK:
-        rf, rc = gr[mate + L.R_FILLET], gr[mate + L.R_FILLET_CENTRE]
-        end = f_root + gr[mate + L.PSI_FILLET] - np.arcsin(rf / rc)
-        corner_on_plane(wk, tip, end, np.sqrt(rc * rc - rf * rf), 0.0, zeta, o, want)
+        rf, rc = mate.fillet_radius, mate.fillet_centre_radius
+        end = f_root + mate.fillet_angle - np.arcsin(rf / rc)
+        corner_on_plane(side, corner, strip, j, tip == 1, end, np.sqrt(rc * rc - rf * rf), 0.0, want)
     else:
-        line_distance(wk, -r * ce, -r * se, r * se, -r * ce, 0.0, 0.0, zeta)
-        distance_gap(wk, tip, 1.0, gr[mate + L.R_ROOT] + wk[L.C_ROUND], o, want)
+        line_distance(side, -r * ce, -r * se, r * se, -r * ce, 0.0, 0.0, zeta)
+        distance_gap(side, strip, j, tip, 1.0, mate.root_radius + corner.rounding[0], want)
 
 
 @kernel
-def root_part(gi, gr, wk, part, tip, f_tip, f_root, diag, want):
-    """Add one part of a tip's contact with the mate's root, or take it away; returns its largest penetration."""
-    slices = gi[L.N_SLICES]
-    step = 0.0 if slices == 1 else (gr[L.ZETA_HI] - gr[L.ZETA_LO]) / slices
-    own = NODES + (slices + 1) * NODE
-    sel = NODES + 2 * (slices + 1) * NODE
-    nodes = slices + 1 if slices > 1 else 1
+def root_sections(options, wheels, scratch, part, tip, f_tip, f_root, want):
+    """Fill the sections of one part of a tip's contact with the mate's root; returns whether any gap is negative.
+
+    Parameters
+    ----------
+    options, wheels, scratch : record
+        Tables of the pair of wheels, and scratch.
+    part, tip : int
+    f_tip, f_root : float
+        As in `root_gap`.
+    want : int
+        Nonzero to fill derivatives.
+    """
+    side = scratch.side
+    own = wheels.wheel_1 if tip == 1 else wheels.wheel_2
+    mate = wheels.wheel_2 if tip == 1 else wheels.wheel_1
+    corner = scratch.corner_1 if tip == 1 else scratch.corner_2
+    slices = options.slices
+    count = strip_count(slices)
     touching = False
-    for j in range(nodes):
-        o = own + j * NODE
-        root_gap(gr, wk, part, tip, f_tip, f_root, station(gi, gr, j, step), o, want)
-        if wk[o + N_GAP] >= FAR:
-            for i in range(o + N_GRAD, o + N_HESS + 36):
-                wk[i] = 0.0
-        gap_rate(wk, o, want)
-        clear_node(wk, o, want)
-        wk[sel + j] = o
-        touching = touching or wk[o + N_GAP] < 0.0
-    if not touching:
-        return 0.0
-    away = part == ON_FLANK or part == UNDER_ARC
-    energy = diag[0]
-    power = diag[1]
-    if away:
-        for i in range(42):
-            wk[BEFORE + i] = wk[L.Q_ + i]
-    if slices == 1:
-        depth = plane_force(gi, gr, wk, own, 1.0, diag, want)
-    else:
-        f1 = f_root if tip == 0 else f_tip
-        f2 = f_tip if tip == 0 else f_root
-        face_limit(-1.0, gr, wk, f1, f2, LO, want)
-        face_limit(1.0, gr, wk, f1, f2, HI, want)
-        depth = face_forces(gi, gr, wk, sel, 0, slices, step, 1.0, diag, want)
-    if away:
-        diag[0] = 2.0 * energy - diag[0]
-        diag[1] = 2.0 * power - diag[1]
-        for i in range(42):
-            wk[L.Q_ + i] = 2.0 * wk[BEFORE + i] - wk[L.Q_ + i]
-    for j in range(nodes):
-        o = own + j * NODE
-        if away:
-            wk[o + L.N_FORCE] = -wk[o + L.N_FORCE]
-            for i in range(12):
-                wk[o + L.N_FX + i] = -wk[o + L.N_FX + i]
-        diag[7] += wk[o + L.N_FORCE]
-        add_normal(wk, o, want)
-    return 0.0 if away else depth
+    for k in range(count):
+        strip = strip_at(scratch, count + k)
+        node = k * (L.LANES - 1)
+        n = 1 if slices == 1 else L.LANES
+        for j in range(n):
+            strip.zeta[j] = 0.0 if slices == 1 else wheels.face_low + min(node + j, slices) * side.step
+            strip.kind[j] = 0.0
+            root_gap(side, own, mate, corner, part, tip, f_tip, f_root, strip, j, want)
+            touching = touching or strip.gap[j] < 0.0
+            for i in range(6):
+                strip.alpha_x[i, j] = 0.0
+        gap_rates(side, strip, n, want)
+    return touching
 
 
 @kernel
-def root_contacts(gi, gr, wk, side, diag, want):
+def root_part(options, wheels, scratch, part, tip, f_tip, f_root, totals, want):
+    """Add one part of a tip's contact with the mate's root, or take it away; returns its largest penetration.
+
+    Parameters
+    ----------
+    options, wheels, scratch, part, tip, f_tip, f_root
+        As in `root_sections`.
+    totals : record
+        Diagnostics.
+    want : int
+        Nonzero to add derivatives.
+    """
+    side = scratch.side
+    if not root_sections(options, wheels, scratch, part, tip, f_tip, f_root, want):
+        return 0.0
+    slices, loads, sums, pair = options.slices, scratch.loads, scratch.sums, scratch.pair
+    share = -1.0 if part == ON_FLANK or part == UNDER_ARC else 1.0
+    law = law_of(options, wheels, 1.0)
+    depth = 0.0
+    if slices == 1:
+        strip = strip_at(scratch, 1)
+        depth = plane_force(law, share * wheels.width, strip, loads, totals, want)
+        totals.normal_force += loads.force[0]
+        add_normal(sums, strip, loads, 1, want)
+        return depth if share > 0.0 else 0.0
+    pair.f_1 = f_tip if tip == 1 else f_root
+    pair.f_2 = f_root if tip == 1 else f_tip
+    pair.soft = 1.0
+    for i in range(6):
+        pair.soft_x[i] = 0.0
+    set_limits(wheels, side, pair)
+    count = strip_count(slices)
+    for k in range(count):
+        strip = strip_at(scratch, count + k)
+        node = k * (L.LANES - 1)
+        high = float(min(slices - node, L.LANES - 1))
+        deepest = strip_forces(options, wheels, scratch, law, strip, float(node), 0.0, high, share, totals, want)
+        if deepest > 0.0:
+            depth = max(depth, deepest)
+            totals.normal_force += total_force(loads, L.LANES)
+            add_normal(sums, strip, loads, L.LANES, want)
+    return depth if share > 0.0 else 0.0
+
+
+@kernel
+def root_contacts(options, wheels, scratch, sign, totals, want):
     """Add the contacts of all tips near the line of centres with the mate's root, on one side of the teeth."""
-    if not open_side(gr, wk):
+    side = scratch.side
+    if not open_side(wheels, side):
         return
-    n = flank_pitch(gr, wk)
+    facing_teeth(options, wheels, side)
+    side.step = (wheels.face_high - wheels.face_low) / options.slices
     for tip in range(2):
-        pitch_tip = TWO_PI / gi[L.Z1 + 1 - tip]
-        pitch_root = TWO_PI / gi[L.Z1 + tip]
-        middle = -np.floor(wk[S_X + 5 - tip] / pitch_tip + 0.5)
-        for k in range(-2, 3):
-            f_tip = wk[S_X + 5 - tip] + (middle + k) * pitch_tip
-            f_root = wk[S_X + 4 + tip] + (n - middle - k) * pitch_root
-            set_corner(gr, wk, 1 - tip, f_tip, gr[WHEEL * (1 - tip) + L.S_TIP])
+        own = wheels.wheel_1 if tip == 1 else wheels.wheel_2
+        corner = scratch.corner_1 if tip == 1 else scratch.corner_2
+        place_tip, place_root = (L.F1, L.F2) if tip == 1 else (L.F2, L.F1)
+        pitch_tip = 2.0 * np.pi / options.teeth[1 - tip]
+        pitch_root = 2.0 * np.pi / options.teeth[tip]
+        middle = -np.floor(side.x[place_tip] / pitch_tip + 0.5)
+        for k in range(-NEIGHBOURS, NEIGHBOURS + 1):
+            f_tip = side.x[place_tip] + (middle + k) * pitch_tip
+            f_root = side.x[place_root] + (side.facing - middle - k) * pitch_root
+            set_corner(own, corner, 0, f_tip, own.tip_roll)
+            for j in range(1, L.LANES):
+                copy_corner(corner, 0, j)
             depth = 0.0
             # the circle knows no sides and counts on that of the drive
-            for part in range(ON_CIRCLE if side == gi[L.DRIVE] else ON_ARC, UNDER_ARC + 1):
-                depth = max(depth, root_part(gi, gr, wk, part, tip, f_tip, f_root, diag, want))
+            for part in range(ON_CIRCLE if sign == options.drive else ON_ARC, UNDER_ARC + 1):
+                depth = max(depth, root_part(options, wheels, scratch, part, tip, f_tip, f_root, totals, want))
             if depth > 0.0:
-                place = 3 if side == gi[L.DRIVE] else 4
-                diag[place] = max(diag[place], depth)
-                diag[place + 2] += 1.0
+                count_pair(options, sign, depth, totals)

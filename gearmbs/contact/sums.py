@@ -5,110 +5,216 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.jit import kernel
-from gearmbs.contact.laws import friction_law
-
-N_GRAD, N_HESS, N_FORCE, N_FX, N_FV = L.N_GRAD, L.N_HESS, L.N_FORCE, L.N_FX, L.N_FV
-N_SIN, N_COS, N_PN, N_PT, N_DPN, N_DPT, N_DALPHA = L.N_SIN, L.N_COS, L.N_PN, L.N_PT, L.N_DPN, L.N_DPT, L.N_DALPHA
-Q_, H_, B_, F_, FX_, FV_, FR_ = L.Q_, L.H_, L.B_, L.F_, L.FX_, L.FV_, L.FR_
-S_V = L.S_V
-FRICTION, MU_S, MU_D, V_S, V_D = L.FRICTION, L.MU_S, L.MU_D, L.V_S, L.V_D
+from gearmbs.contact.jit import inlined, kernel, summing
+from gearmbs.contact.laws import friction_law, friction_ratio
+from gearmbs.contact.matrices import add_curvatures, add_outer, add_stack, add_two_outers
 
 
 @kernel
-def add_normal(wk, o, want):
-    """Add a node's normal force: Q grows by f dg/dx."""
-    f = wk[o + N_FORCE]
+def clear_sums(sums, want):
+    """Set all sums to nothing."""
     for i in range(6):
-        g = wk[o + N_GRAD + i]
-        wk[Q_ + i] += f * g
+        sums.q[i] = sums.f[i] = 0.0
         if want != 0:
-            row = 6 * i
             for j in range(6):
-                wk[H_ + row + j] += g * wk[o + N_FX + j] + f * wk[o + N_HESS + row + j]
-                wk[B_ + row + j] += g * wk[o + N_FV + j]
+                sums.q_x[i, j] = sums.q_xd[i, j] = 0.0
+                sums.f_x[i, j] = sums.f_twist[i, j] = sums.f_xd[i, j] = 0.0
 
 
-@kernel
-def add_friction(gi, gr, wk, o, zp, diag, want):
-    """Add a node's friction on wheel 1 at the contact point ``(N_PN, N_PT)``, ``zp`` along the mean axis.
+@summing
+def total_force(loads, n):
+    """Sum of the nodal forces."""
+    total = 0.0
+    for j in range(n):
+        total += loads.force[j]
+    return total
 
-    The sliding velocity is that of wheel 1 against wheel 2 at the point, without its part along the normal; it has
-    a component along the profile and one along the face.
-    """
-    f = wk[o + N_FORCE]
-    sa, ca = wk[o + N_SIN], wk[o + N_COS]
-    pn, pt = wk[o + N_PN], wk[o + N_PT]
-    # unit wrenches of a force along the profile tangent and along the face
-    t = (ca, -sa, 0.0, zp * sa, zp * ca, -pn)
-    z = (0.0, 0.0, 1.0, pn * ca - pt * sa, -pn * sa - pt * ca, 0.0)
-    vt = 0.0
-    vz = 0.0
+
+@summing
+def add_normal(sums, strip, loads, n, want):
+    """Add the nodes' normal forces: Q grows by f dg/dx."""
+    force, grad = loads.force, strip.grad
     for i in range(6):
-        vt += t[i] * wk[S_V + i]
-        vz += z[i] * wk[S_V + i]
-    ratio, ratio_slope = friction_law(gi[FRICTION], gr[MU_S], gr[MU_D], gr[V_S], gr[V_D], np.sqrt(vt * vt + vz * vz))
-    ft = -ratio * vt * f
-    fz = -ratio * vz * f
-    diag[2] -= ft * vt + fz * vz
-    for i in range(6):
-        wk[F_ + i] += ft * t[i] + fz * z[i]
+        value = 0.0
+        for j in range(n):
+            value += force[j] * grad[i, j]
+        sums.q[i] += value
     if want == 0:
         return
-    tt = -f * (ratio + ratio_slope * vt * vt)
-    tz = -f * ratio_slope * vt * vz
-    zz = -f * (ratio + ratio_slope * vz * vz)
-    for j in range(6):
-        da = wk[o + N_DALPHA + j]
-        dn = wk[o + N_DPN + j]
-        dt = wk[o + N_DPT + j]
-        dz = 0.5 if j == 1 else 0.0
-        # how the unit wrenches turn with the pose
-        t0 = -sa * da
-        t1 = -ca * da
-        t3 = dz * sa + zp * ca * da
-        t4 = dz * ca - zp * sa * da
-        un = dn - pt * da
-        ut = dt + pn * da
-        z3 = un * ca - ut * sa
-        z4 = -un * sa - ut * ca
-        dvt = t0 * wk[S_V] + t1 * wk[S_V + 1] + t3 * wk[S_V + 3] + t4 * wk[S_V + 4] - dn * wk[S_V + 5]
-        dvz = z3 * wk[S_V + 3] + z4 * wk[S_V + 4]
-        df = wk[o + N_FX + j]
-        dft = -ratio * vt * df + tt * dvt + tz * dvz
-        dfz = -ratio * vz * df + tz * dvt + zz * dvz
-        c = FX_ + j
-        wk[c] += dft * t[0] + ft * t0
-        wk[c + 6] += dft * t[1] + ft * t1
-        wk[c + 12] += dfz
-        wk[c + 18] += dft * t[3] + ft * t3 + dfz * z[3] + fz * z3
-        wk[c + 24] += dft * t[4] + ft * t4 + dfz * z[4] + fz * z4
-        wk[c + 30] += dft * t[5] - ft * dn
-        dft = tt * t[j] + tz * z[j]
-        dfz = tz * t[j] + zz * z[j]
-        c = FV_ + j
-        for i in range(6):
-            wk[c + 6 * i] += dft * t[i] + dfz * z[i]
-        df = -ratio * wk[o + N_FV + j]
-        c = FR_ + j
-        for i in range(6):
-            wk[c + 6 * i] += df * (vt * t[i] + vz * z[i])
+    add_outer(sums.q_x, grad, loads.force_x, n)
+    add_curvatures(sums.q_x, force, strip.hess, n)
+    add_outer(sums.q_xd, grad, loads.force_xd, n)
 
 
 @kernel
-def mirror(wk):
+def friction_directions(side, strip, loads, n):
+    """Fill unit wrenches of friction forces along the profile and the face, and the sliding velocity along them.
+
+    The sliding velocity is that of wheel 1 against wheel 2 at the point, without its part along the normal.
+    """
+    twist = side.twist
+    v0, v1, v2, v3, v4, v5 = twist[0], twist[1], twist[2], twist[3], twist[4], twist[5]
+    half_h = 0.5 * side.x[L.H]
+    profile, axial = loads.profile, loads.axial
+    for j in range(n):
+        sa, ca = strip.sin[j], strip.cos[j]
+        pn, pt = loads.normal[j], loads.tangent[j]
+        zp = strip.zeta[j] + half_h
+        t3, t4 = zp * sa, zp * ca
+        z3, z4 = pn * ca - pt * sa, -pn * sa - pt * ca
+        profile[0, j], profile[1, j], profile[2, j] = ca, -sa, 0.0
+        profile[3, j], profile[4, j], profile[5, j] = t3, t4, -pn
+        axial[0, j], axial[1, j], axial[2, j] = 0.0, 0.0, 1.0
+        axial[3, j], axial[4, j], axial[5, j] = z3, z4, 0.0
+        loads.v_profile[j] = ca * v0 - sa * v1 + t3 * v3 + t4 * v4 - pn * v5
+        loads.v_axial[j] = v2 + z3 * v3 + z4 * v4
+
+
+@kernel
+def friction_ratios(wheels, kind, loads, n):
+    """Fill the friction coefficient over the sliding speed, and the derivative of that ratio."""
+    mu_s, mu_d, v_s, v_d = wheels.static_friction, wheels.dynamic_friction, wheels.static_speed, wheels.dynamic_speed
+    if kind != L.FRICTION_ADAMS:
+        for j in range(n):
+            vt, vz = loads.v_profile[j], loads.v_axial[j]
+            loads.ratio[j], loads.ratio_slope[j] = friction_law(kind, mu_s, mu_d, v_s, v_d, np.sqrt(vt * vt + vz * vz))
+        return
+    for j in range(n):
+        vt, vz = loads.v_profile[j], loads.v_axial[j]
+        loads.ratio[j], loads.ratio_slope[j] = friction_ratio(mu_s, mu_d, v_s, v_d, np.sqrt(vt * vt + vz * vz))
+
+
+@summing
+def friction_forces(sums, loads, n, totals):
+    """Fill the friction forces, and add their wrench and their power."""
+    power = 0.0
+    for j in range(n):
+        vt, vz, scale = loads.v_profile[j], loads.v_axial[j], -loads.ratio[j] * loads.force[j]
+        loads.f_profile[j] = scale * vt
+        loads.f_axial[j] = scale * vz
+        power += scale * (vt * vt + vz * vz)
+    totals.friction_power -= power
+    for i in range(6):
+        value = 0.0
+        for j in range(n):
+            value += loads.f_profile[j] * loads.profile[i, j] + loads.f_axial[j] * loads.axial[i, j]
+        sums.f[i] += value
+
+
+@inlined
+def friction_slope(strip, loads, j, k, spin, dz, half_h):
+    """Fill derivatives of the friction forces of section ``j`` by pose number ``k`` and by that number of the twist.
+
+    Parameters
+    ----------
+    strip, loads : record
+    j, k : int
+    spin : tuple of float
+        Twist, without the velocity along the axis.
+    dz : float
+        Derivative of the contact point's place along the axis.
+    half_h : float
+        Half the axial offset.
+    """
+    v0, v1, v3, v4, v5 = spin
+    sa, ca = strip.sin[j], strip.cos[j]
+    pn, pt, zp = loads.normal[j], loads.tangent[j], strip.zeta[j] + half_h
+    vt, vz, ratio = loads.v_profile[j], loads.v_axial[j], loads.ratio[j]
+    tt, tz, zz = loads.pp[j], loads.pa[j], loads.aa[j]
+    da, dn, dt = strip.alpha_x[k, j], loads.normal_x[k, j], loads.tangent_x[k, j]
+    # how the unit wrenches turn with the pose
+    t3 = dz * sa + zp * ca * da
+    t4 = dz * ca - zp * sa * da
+    un = dn - pt * da
+    ut = dt + pn * da
+    z3 = un * ca - ut * sa
+    z4 = -un * sa - ut * ca
+    dvt = t3 * v3 + t4 * v4 - dn * v5 - da * (sa * v0 + ca * v1)
+    dvz = z3 * v3 + z4 * v4
+    df = loads.force_x[k, j]
+    loads.profile_x[k, j] = -ratio * vt * df + tt * dvt + tz * dvz
+    loads.axial_x[k, j] = -ratio * vz * df + tz * dvt + zz * dvz
+    t, z = loads.profile[k, j], loads.axial[k, j]
+    loads.profile_v[k, j] = tt * t + tz * z
+    loads.axial_v[k, j] = tz * t + zz * z
+    loads.sliding[k, j] = -ratio * (vt * t + vz * z)
+    ft, fz = loads.f_profile[j], loads.f_axial[j]
+    loads.turned[0, k, j] = -ft * sa * da
+    loads.turned[1, k, j] = -ft * ca * da
+    loads.turned[2, k, j] = 0.0
+    loads.turned[3, k, j] = ft * t3 + fz * z3
+    loads.turned[4, k, j] = ft * t4 + fz * z4
+    loads.turned[5, k, j] = -ft * dn
+
+
+@kernel
+def friction_slopes(side, strip, loads, n):
+    """Fill derivatives of the friction forces by the pose and the twist, row by row."""
+    half_h = 0.5 * side.x[L.H]
+    spin = (side.twist[0], side.twist[1], side.twist[3], side.twist[4], side.twist[5])
+    for j in range(n):
+        vt, vz, force = loads.v_profile[j], loads.v_axial[j], loads.force[j]
+        straight, curve = -force * loads.ratio[j], -force * loads.ratio_slope[j]
+        loads.pp[j] = straight + curve * vt * vt
+        loads.pa[j] = curve * vt * vz
+        loads.aa[j] = straight + curve * vz * vz
+    for j in range(n):
+        friction_slope(strip, loads, j, 0, spin, 0.0, half_h)
+        friction_slope(strip, loads, j, 1, spin, 0.5, half_h)
+        friction_slope(strip, loads, j, 2, spin, 0.0, half_h)
+        friction_slope(strip, loads, j, 3, spin, 0.0, half_h)
+        friction_slope(strip, loads, j, 4, spin, 0.0, half_h)
+        friction_slope(strip, loads, j, 5, spin, 0.0, half_h)
+
+
+@kernel
+def add_friction(wheels, kind, side, sums, strip, loads, n, totals, want):
+    """Add the nodes' friction on wheel 1 at their contact points.
+
+    It has a component along the profile and one along the face.
+
+    Parameters
+    ----------
+    wheels : record
+        The pair's table.
+    kind : int
+        Friction law.
+    side, sums, strip, loads : record
+    n : int
+        Sections.
+    totals : record
+        Diagnostics.
+    want : int
+        Nonzero to add derivatives.
+    """
+    friction_directions(side, strip, loads, n)
+    friction_ratios(wheels, kind, loads, n)
+    friction_forces(sums, loads, n, totals)
+    if want == 0:
+        return
+    friction_slopes(side, strip, loads, n)
+    profile, axial = loads.profile, loads.axial
+    add_two_outers(sums.f_x, profile, loads.profile_x, axial, loads.axial_x, n)
+    add_stack(sums.f_x, loads.turned, n)
+    add_two_outers(sums.f_twist, profile, loads.profile_v, axial, loads.axial_v, n)
+    add_outer(sums.f_xd, loads.sliding, loads.force_xd, n)
+
+
+@kernel
+def mirror(sums, want):
     """Reflect all sums in the plane of the axes: the other flanks are the same problem seen in a mirror."""
     for i in range(6):
         si = -1.0 if i > 2 else 1.0
         fi = -1.0 if i % 2 == 1 else 1.0
-        wk[Q_ + i] *= si
-        wk[F_ + i] *= fi
+        sums.q[i] *= si
+        sums.f[i] *= fi
+        if want == 0:
+            continue
         for j in range(6):
             sj = -1.0 if j > 2 else 1.0
             fj = -1.0 if j % 2 == 1 else 1.0
-            k = 6 * i + j
-            wk[H_ + k] *= si * sj
-            wk[B_ + k] *= si * sj
-            wk[FX_ + k] *= fi * sj
-            wk[FV_ + k] *= fi * fj
-            wk[FR_ + k] *= fi * sj
+            sums.q_x[i, j] *= si * sj
+            sums.q_xd[i, j] *= si * sj
+            sums.f_x[i, j] *= fi * sj
+            sums.f_twist[i, j] *= fi * fj
+            sums.f_xd[i, j] *= fi * sj

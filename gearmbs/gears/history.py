@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 
 from gearmbs._jit import njit
-from gearmbs.contact import gear_contact
+from gearmbs.contact import gear_contact, layout
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.tables import pack
 
@@ -115,9 +115,18 @@ def contact_history(
         raise ValueError(f"driver and driven have {[len(a) for a in args]} instants; give as many of each")
     gi, gr, size = pack(pair)
     wrench = np.zeros((n, 6))
-    diag = np.zeros((n, 8))
+    diag = np.zeros((n, layout.DIAGNOSTICS))
     run: Any = _run
     run(gi, gr, *args, wrench, diag, np.zeros(size))
-    energy, damping, friction, drive, coast = diag[:, :5].T
-    drive_pairs, coast_pairs = diag[:, 5:7].T.astype(int)
-    return ContactHistory(wrench, energy, damping, friction, drive, coast, drive_pairs, coast_pairs, diag[:, 7])
+    told = dict(zip(layout.TOTALS.names or (), diag.T))
+    return ContactHistory(
+        wrench,
+        told["energy"],
+        told["damping_power"],
+        told["friction_power"],
+        told["depth_drive"],
+        told["depth_coast"],
+        told["pairs_drive"].astype(int),
+        told["pairs_coast"].astype(int),
+        told["normal_force"],
+    )

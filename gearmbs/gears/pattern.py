@@ -7,13 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gearmbs.contact import GAP_COLUMNS
 from gearmbs.gears.fault import COAST_ALIASES
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.transmission import StaticMesh, static_lag, warn_of_unseen
 
-SIDE, SECTION, GAP, ROLL_LENGTH_1, SOFT = 0, 3, 4, 6, 11
-TEETH = slice(1, 3)
+SIDE, SECTION, GAP, ROLL_LENGTH_1, SOFT = (
+    GAP_COLUMNS.index(name) for name in ("side", "section", "gap", "roll_1", "stiffness")
+)
+TEETH = [GAP_COLUMNS.index(name) for name in ("tooth_1", "tooth_2")]
 FINE = 8
 MAX_SECTIONS = 300
 

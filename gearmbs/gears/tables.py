@@ -18,23 +18,24 @@ LAWS = {
     "hertz": L.LAW_IMPACT,
 }
 FRICTIONS = {"none": L.FRICTION_NONE, "adams": L.FRICTION_ADAMS, "smooth": L.FRICTION_SMOOTH}
-EDGE_BLEND = 1e-6
+END_BLEND = 1e-6
+"""Length over which the ends of two faces are blended where they tie, m."""
 
 
-def _pack_wheel(gear: GearSpec, gr: np.ndarray, base: int) -> None:
-    gr[base + L.RB] = gear.base_radius
-    gr[base + L.PSI] = gear.base_half_angle
-    gr[base + L.S_TIP] = gear.tip_roll_length
-    gr[base + L.R_CORNER] = gear.corner_radius
-    gr[base + L.PSI_CORNER] = gear.corner_half_angle
-    gr[base + L.R_ROUND] = gear.tip_rounding
-    gr[base + L.R_TIP] = gear.tip_radius
-    gr[base + L.R_ROOT] = gear.root_radius
-    gr[base + L.FACE] = gear.face_width
-    gr[base + L.S_FORM] = gear.form_roll_length
-    gr[base + L.R_FILLET] = gear.fillet_radius
-    gr[base + L.R_FILLET_CENTRE] = gear.fillet_centre_radius
-    gr[base + L.PSI_FILLET] = gear.fillet_half_angle
+def _pack_wheel(gear: GearSpec, table: np.void) -> None:
+    table["base_radius"] = gear.base_radius
+    table["half_angle"] = gear.base_half_angle
+    table["tip_roll"] = gear.tip_roll_length
+    table["corner_radius"] = gear.corner_radius
+    table["corner_angle"] = gear.corner_half_angle
+    table["tip_rounding"] = gear.tip_rounding
+    table["tip_radius"] = gear.tip_radius
+    table["root_radius"] = gear.root_radius
+    table["face_width"] = gear.face_width
+    table["form_roll"] = gear.form_roll_length
+    table["fillet_radius"] = gear.fillet_radius
+    table["fillet_centre_radius"] = gear.fillet_centre_radius
+    table["fillet_angle"] = gear.fillet_half_angle
 
 
 def pack(pair: Mesh, slices: int | None = None) -> tuple[np.ndarray, np.ndarray, int]:
@@ -48,43 +49,42 @@ def pack(pair: Mesh, slices: int | None = None) -> tuple[np.ndarray, np.ndarray,
     """
     geometry, model, point = pair.geometry, pair.contact_model, pair.operating_point
     slices = model.face_slices(geometry, pair.faults) if slices is None else slices
-    gi = np.zeros(L.GI_HEADER, dtype=np.int64)
-    gr = np.zeros(L.GR_HEADER)
+    options, table = np.zeros(1, L.OPTIONS), np.zeros(1, L.PAIR)
+    integers, reals = options[0], table[0]
     first, second = geometry.wheels
-    gi[L.Z1] = first.teeth
-    gi[L.Z2] = second.teeth
-    gi[L.N_SLICES] = slices
-    gi[L.LAW] = LAWS[model.law.kind]
-    gi[L.FRICTION] = FRICTIONS[model.friction.kind]
-    gi[L.DRIVE] = point.rotation
-    gi[L.LOAD] = L.LOAD_ADAMS if model.load == "adams" else L.LOAD_SLICES
-    gi[L.ROOT] = int(model.tips_may_bottom(geometry))
-    _pack_wheel(first, gr, 0)
-    _pack_wheel(second, gr, L.WHEEL)
-    gr[L.PITCH] = first.base_pitch
-    width = geometry.common_face_width
-    _pack_laws(model, width, gr)
-    gr[L.WIDTH] = width
-    gr[L.EDGE_BLEND] = EDGE_BLEND
-    low, high = geometry.common_face
-    gr[L.ZETA_LO] = low
-    gr[L.ZETA_HI] = high
-    gr[L.AXIAL_SHIFT] = geometry.axial_shift
+    integers["teeth"] = first.teeth, second.teeth
+    integers["slices"] = slices
+    integers["law"] = LAWS[model.law.kind]
+    integers["friction"] = FRICTIONS[model.friction.kind]
+    integers["drive"] = point.rotation
+    integers["load"] = L.LOAD_ADAMS if model.load == "adams" else L.LOAD_SLICES
+    integers["root"] = int(model.tips_may_bottom(geometry))
+    _pack_wheel(first, reals["wheel_1"])
+    _pack_wheel(second, reals["wheel_2"])
+    reals["pitch"] = first.base_pitch
+    reals["width"] = geometry.common_face_width
+    _pack_laws(model, geometry.common_face_width, reals)
+    reals["end_blend"] = END_BLEND
+    reals["face_low"], reals["face_high"] = geometry.common_face
+    reals["axial_shift"] = geometry.axial_shift
+    more_integers, more_reals = np.zeros(0, dtype=np.int64), np.zeros(0)
     if pair.faults or model.stiffness_curve != "constant":
-        gi, gr = _pack_teeth(pair, gi, gr)
+        more_integers, more_reals = _pack_teeth(pair, integers, reals)
+    gi = np.concatenate([options.view(np.int64), more_integers])
+    gr = np.concatenate([table.view(np.float64), more_reals])
     return gi, gr, L.work_size(slices)
 
 
-def _pack_laws(model: ContactModel, width: float, gr: np.ndarray) -> None:
+def _pack_laws(model: ContactModel, width: float, reals: np.void) -> None:
     law, friction = model.law, model.friction
-    gr[L.LAW_K] = law.stiffness / width
-    gr[L.LAW_E] = law.exponent
-    gr[L.LAW_C] = law.damping if law.kind == "hunt-crossley" else law.damping / width
-    gr[L.LAW_D] = law.depth
-    gr[L.MU_S] = friction.static
-    gr[L.MU_D] = friction.dynamic
-    gr[L.V_S] = friction.static_speed
-    gr[L.V_D] = friction.dynamic_speed
+    reals["stiffness"] = law.stiffness / width
+    reals["exponent"] = law.exponent
+    reals["damping"] = law.damping if law.kind == "hunt-crossley" else law.damping / width
+    reals["damping_depth"] = law.depth
+    reals["static_friction"] = friction.static
+    reals["dynamic_friction"] = friction.dynamic
+    reals["static_speed"] = friction.static_speed
+    reals["dynamic_speed"] = friction.dynamic_speed
 
 
 def tooth_deviations(pair: Mesh) -> tuple[ToothDeviations, ToothDeviations]:
@@ -108,11 +108,12 @@ def _numbered(rows: np.ndarray, plain: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return np.where((rows == plain).all(axis=1), -1, number), distinct
 
 
-def _pack_teeth(pair: Mesh, gi: np.ndarray, gr: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _pack_teeth(pair: Mesh, integers: np.void, reals: np.void) -> tuple[np.ndarray, np.ndarray]:
+    """Complete the headers for deviating teeth; return what stands behind them."""
     both = tooth_deviations(pair)
     nz = both[0].section.size
     records = [c.offset.size for c in both]
-    tooth = np.full((sum(records), L.TOOTH), -1, dtype=np.int64)
+    tooth = np.full((sum(records), L.FLANK), -1, dtype=np.int64)
     base_curve = np.ones(COMPLIANCE_POINTS)
     if pair.contact_model.stiffness_curve == "potential-energy":
         stiffness = pair_stiffness(pair.geometry, compliance_roll_lengths(pair.geometry))
@@ -136,31 +137,26 @@ def _pack_teeth(pair: Mesh, gi: np.ndarray, gr: np.ndarray) -> tuple[np.ndarray,
             parts[name].append(distinct.ravel())
         removed = deviations.offset[:, :, None, None] + deviations.shape
         added += max(0.0, -float(removed.min()))
-        gr[k * L.WHEEL + L.SHAPE_DS] = deviations.roll_length[1] - deviations.roll_length[0]
+        reals[f"wheel_{k + 1}"]["shape_spacing"] = deviations.roll_length[1] - deviations.roll_length[0]
         start += records[k]
-    gr[L.GAP_MARGIN] = added
-    softened = pair.contact_model.stiffness_curve != "constant" or (tooth[:, 2] >= 0).any()
+    reals["added_material"] = added
+    softened = pair.contact_model.stiffness_curve != "constant" or (tooth[:, L.FLANK_COMPLIANCE] >= 0).any()
     if softened:
         at = compliance_roll_lengths(pair.geometry)
-        gr[L.COMPLIANCE_S0] = at[0]
-        gr[L.COMPLIANCE_DS] = at[1] - at[0]
+        reals["compliance_start"] = at[0]
+        reals["compliance_spacing"] = at[1] - at[0]
         parts["compliance"].insert(0, base_curve)
-    blocks = [gr]
-    end = gr.size
-    for name, slot in (
-        ("offset", L.O_OFFSET),
-        ("shape", L.O_SHAPE),
-        ("tip", L.O_TIP),
-        ("compliance", L.O_COMPLIANCE),
-    ):
+    blocks = []
+    end = L.PAIR.itemsize // np.dtype(np.float64).itemsize
+    for name, field in (("offset", "offsets"), ("shape", "shapes"), ("tip", "tips"), ("compliance", "compliances")):
         if name == "compliance" and not softened:
             continue
-        gi[slot] = end
+        integers[field] = end
         block = np.concatenate(parts[name])
         blocks.append(block)
         end += block.size
-    gi[L.SHAPE_S] = PROFILE_POINTS
-    gi[L.SHAPE_Z] = nz
-    gi[L.N_COMPLIANCE] = COMPLIANCE_POINTS
-    gi[L.O_TOOTH] = gi.size
-    return np.concatenate([gi, tooth.ravel()]), np.concatenate(blocks)
+    integers["profile_places"] = PROFILE_POINTS
+    integers["face_places"] = nz
+    integers["compliance_places"] = COMPLIANCE_POINTS
+    integers["flanks"] = L.OPTIONS.itemsize // np.dtype(np.int64).itemsize
+    return tooth.ravel(), np.concatenate(blocks)

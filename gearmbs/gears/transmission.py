@@ -13,6 +13,8 @@ from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.tables import pack
 
+SIDE, TOOTH_1, TOOTH_2, GAP = (GAP_COLUMNS.index(name) for name in ("side", "tooth_1", "tooth_2", "gap"))
+NORMAL_FORCE, PAIRS_DRIVE = layout.place(layout.TOTALS, "normal_force"), layout.place(layout.TOTALS, "pairs_drive")
 MAX_ROWS = 4000
 NEWTON_STEPS = 100
 PHASE_STEPS = 50
@@ -111,7 +113,7 @@ class StaticMesh:
         """Rows of ``gearmbs.contact.pair_gaps`` (by default at the ends of the common face, mid-face for one slice)."""
         place = self.geometry.frames(driver_angle, driven_angle)
         if sections is None:
-            sections = np.zeros(1 if self.gi[layout.N_SLICES] == 1 else 0)
+            sections = np.zeros(1 if self.gi[layout.SLICES] == 1 else 0)
         count = pair_gaps(
             self.gi, self.gr, place.origin_1, place.axes_1, place.origin_2, place.axes_2, sections, self.rows, self.work
         )
@@ -132,7 +134,7 @@ class StaticMesh:
         angle = self.ideal_angle(driver_angle)
         for _ in range(PHASE_STEPS):
             rows = self.gaps(driver_angle, angle)
-            gap = rows[rows[:, 0] == side, 4].min()
+            gap = rows[rows[:, SIDE] == side, GAP].min()
             angle += side * gap / rb
             if abs(gap) < TOUCH_TOLERANCE:
                 break
@@ -200,7 +202,7 @@ def kinematic_transmission_error(
     def touching(angle: float) -> tuple[float, float]:
         driven = mesh.touching_angle(angle)
         rows = mesh.gaps(angle, driven)
-        on_drive = rows[(rows[:, 0] == side) & (rows[:, 4] < TOUCHING)]
+        on_drive = rows[(rows[:, SIDE] == side) & (rows[:, GAP] < TOUCHING)]
         return side * (driven - mesh.ideal_angle(angle)) * rb, np.unique(on_drive[:, 1]).size
 
     error, pairs = _over_phases(mesh, phase, touching)
@@ -252,7 +254,7 @@ def loaded_transmission_error(
         driven = mesh.loaded_angle(angle, load, ideal + lag)
         lag = driven - ideal
         _, slope = mesh.torque(angle, driven)
-        return side * lag * rb, mesh.diag[7], mesh.diag[5], -slope / rb**2
+        return side * lag * rb, mesh.diag[NORMAL_FORCE], mesh.diag[PAIRS_DRIVE], -slope / rb**2
 
     error, forces, pairs, stiffness = _over_phases(mesh, phase, loaded)
     return TransmissionError(phase, error, load, forces, pairs, stiffness, cycles)
@@ -332,6 +334,6 @@ def _passing(pair: Mesh, begin: float, end: float) -> tuple[set[int], set[int]]:
     # the tooth of the driven wheel that tooth 0 of the driver meets
     angle = side * centre * 2 * math.pi / gear.teeth
     rows = mesh.gaps(angle, mesh.ideal_angle(angle))
-    met = int(rows[(rows[:, 0] == side) & (rows[:, 1] == 0)][0, 2])
+    met = int(rows[(rows[:, SIDE] == side) & (rows[:, TOOTH_1] == 0)][0, TOOTH_2])
     turns = range(math.ceil(begin - centre - last), math.floor(end - centre - first) + 1)
     return {-side * m % gear.teeth for m in turns}, {(met + side * m) % mate.teeth for m in turns}

@@ -105,7 +105,7 @@ class ContactProbe:
         zero = np.zeros(len(rows))
         normal = np.column_stack([sine, cosine, zero])
         tangent = np.column_stack([np.abs(cosine), -side * sine, zero])
-        along = rows[:, COLUMN["station"]] + 0.5 * float((place.origin_2 - place.origin_1) @ mean[:, 2])
+        along = rows[:, COLUMN["section"]] + 0.5 * float((place.origin_2 - place.origin_1) @ mean[:, 2])
         local = rows[:, [COLUMN["normal"]]] * normal + rows[:, [COLUMN["tangent"]]] * tangent
         local[:, 2] = along
         point = place.origin_1 + local @ mean.T
@@ -121,7 +121,7 @@ class ContactProbe:
             side=side.astype(int),
             tooth_1=rows[:, COLUMN["tooth_1"]].astype(int),
             tooth_2=rows[:, COLUMN["tooth_2"]].astype(int),
-            section=rows[:, COLUMN["station"]],
+            section=rows[:, COLUMN["section"]],
             depth=depth,
             kind=rows[:, COLUMN["kind"]].astype(int),
             point=point,
@@ -150,7 +150,7 @@ class ContactProbe:
         count = self.sections.size
         if count == 1 or len(rows) == 0:
             return np.full(len(rows), self.width)
-        ends = self._rows(place, np.zeros(0))[:, COLUMN["station"]].reshape(-1, 1, 2)
+        ends = self._rows(place, np.zeros(0))[:, COLUMN["section"]].reshape(-1, 1, 2)
         low, high = self.sections - 0.5 * self.width, self.sections + 0.5 * self.width
         low = np.where(np.arange(count) == 0, -np.inf, low)
         high = np.where(np.arange(count) == count - 1, np.inf, high)
@@ -158,7 +158,8 @@ class ContactProbe:
 
     def _pressure(self, depth: np.ndarray, rate: np.ndarray, factor: np.ndarray) -> np.ndarray:
         law = int(self.gi[layout.LAW])
-        numbers = [float(self.gr[k]) for k in (layout.LAW_K, layout.LAW_E, layout.LAW_C, layout.LAW_D)]
+        table = self.gr[: layout.PAIR.itemsize // self.gr.itemsize].view(layout.PAIR)[0]
+        numbers = [float(table[name]) for name in ("stiffness", "exponent", "damping", "damping_depth")]
         values = [
             normal_law(law, numbers[0] * f, *numbers[1:], float(d), float(r))[0] for d, r, f in zip(depth, rate, factor)
         ]

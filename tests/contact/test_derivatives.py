@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from gearmbs.contact import layout
 from gearmbs.contact import support as sup
 from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
 from gearmbs.gears.faults import (
@@ -97,37 +96,32 @@ def corner_support(alpha, p, q, eta, r=0.0475, rt=0.0003):
 
 
 def kernel_support(function, y):
-    """Value, gradient and Hessian by (alpha, p, q, spin) from the kernel's record in the frame of the normal."""
+    """Value, gradient and Hessian by (alpha, p, q, spin) from the kernel's, which are in the frame of the normal."""
     alpha, p, q, spin = y
     sa, ca = np.sin(alpha), np.cos(alpha)
     a, b = p * sa + q * ca, p * ca - q * sa
     w = np.sqrt(1 - p * p - q * q)
     kap = np.sqrt(1 - b * b)
-    wk = np.zeros(layout.work_size(1))
     one = 1 / (1 + w)
     m = one / w
-    wk[[layout.S_IW, layout.S_IW3, layout.S_IW5, layout.S_ONE]] = 1 / w, w**-3, w**-5, one
-    wk[[layout.S_M, layout.S_MW]] = m, -(1 + 2 * w) * m**2
-    wk[layout.S_MWW] = 2 * m * m * ((1 + 2 * w) ** 2 * m - 1)
-    wk[[layout.S_SIN, layout.S_COS]] = sa, ca
-    o = layout.W_SUP
+    m_w, m_ww = -(1 + 2 * w) * m**2, 2 * m * m * ((1 + 2 * w) ** 2 * m - 1)
+    tilt = sup.Tilt(p, q, w, 1 / w, w**-3, w**-5, one, m, m_w, m_ww, 0.0)
     if function is involute_support:
-        s = 0.04 * (spin + 0.3 + alpha + sup.tilt_turn(a, b, w))
-        sup.involute_support(a, b, w, kap, s, 0.04, wk, o, 1)
+        args = (a, b, kap, 0.04 * (spin + 0.3 + alpha + sup.normal_turn(a, b, tilt)), 0.04, tilt)
+        first, second = sup.involute_slopes(*args), sup.involute_curvatures(*args)
     else:
-        wk[[layout.C_SIN, layout.C_COS, layout.C_R, layout.C_ROUND]] = np.sin(spin), np.cos(spin), 0.0475, 0.0003
-        sup.corner_support(a, b, w, kap, wk, o, 1)
-    r = wk[o : o + 15]
+        args = (a, b, kap, np.sin(alpha + spin), np.cos(alpha + spin), 0.0475, 0.0003, tilt)
+        first, second = sup.corner_slopes(*args), sup.corner_curvatures(*args)
     turn = np.array([[sa, ca], [ca, -sa]])
-    grad = np.array([r[sup.HA_], *(turn @ r[[sup.H_A, sup.H_B]]), r[sup.H_F]])
+    grad = np.array([first.alpha, *(turn @ [first.A, first.B]), first.F])
     hess = np.zeros((4, 4))
-    hess[0, 0] = r[sup.HAA_]
-    hess[0, 1:3] = turn @ r[[sup.HA_A, sup.HA_B]]
-    hess[0, 3] = r[sup.HA_F]
-    hess[1:3, 1:3] = turn @ [[r[sup.H_AA], r[sup.H_AB]], [r[sup.H_AB], r[sup.H_BB]]] @ turn.T
-    hess[1:3, 3] = turn @ r[[sup.H_AF, sup.H_BF]]
-    hess[3, 3] = r[sup.H_FF]
-    return r[sup.H], grad, np.triu(hess)
+    hess[0, 0] = second.alpha_alpha
+    hess[0, 1:3] = turn @ [second.alpha_A, second.alpha_B]
+    hess[0, 3] = second.alpha_F
+    hess[1:3, 1:3] = turn @ [[second.AA, second.AB], [second.AB, second.BB]] @ turn.T
+    hess[1:3, 3] = turn @ [second.AF, second.BF]
+    hess[3, 3] = second.FF
+    return first.h, grad, np.triu(hess)
 
 
 @pytest.mark.parametrize("function", [involute_support, corner_support])

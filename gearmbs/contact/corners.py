@@ -1,0 +1,106 @@
+"""Tip corners at work: those of one tooth pair in the sections of a strip, and their gaps to the mate's flank."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearmbs.contact import layout as L
+from gearmbs.contact.corner_sections import corner_normals, corner_sections, corner_starts
+from gearmbs.contact.jit import kernel
+from gearmbs.contact.lines import corner_on_plane
+from gearmbs.contact.sections import NEAR_BASE, normal_turns
+
+
+@kernel
+def set_corner(wheel, corner, j, f, roll):
+    """Make a tip corner the one at work in section ``j``: at the wheel's own tip, or sharp at a shorter ``roll``."""
+    if roll >= wheel.tip_roll:
+        psi = wheel.corner_angle
+        corner.radius[j] = wheel.corner_radius
+        corner.rounding[j] = wheel.tip_rounding
+        corner.roll[j] = wheel.tip_roll
+    else:
+        rb = wheel.base_radius
+        tan = roll / rb
+        psi = wheel.half_angle - tan + np.arctan(tan)
+        corner.radius[j] = np.sqrt(rb * rb + roll * roll)
+        corner.rounding[j] = 0.0
+        corner.roll[j] = roll
+    corner.sin[j] = np.sin(f + psi)
+    corner.cos[j] = np.cos(f + psi)
+
+
+@kernel
+def copy_corner(corner, source, target):
+    """Repeat the corner at work in one section in another."""
+    corner.radius[target] = corner.radius[source]
+    corner.rounding[target] = corner.rounding[source]
+    corner.roll[target] = corner.roll[source]
+    corner.sin[target] = corner.sin[source]
+    corner.cos[target] = corner.cos[source]
+
+
+@kernel
+def corner_gaps(side, wheels, corner, strip, n, kind, f_mate, normal, want):
+    """Fill the gaps of the corners at work on the mate's flank.
+
+    Close to its base circle and inside it the mate's flank goes on as its tangent plane.
+
+    Parameters
+    ----------
+    side, wheels, corner : record
+        ``wheels`` is the pair's table.
+    strip : record
+        Out; its sections are placed.
+    n : int
+        Sections.
+    kind : int
+        The wheel whose corner bears, 1 or 2.
+    f_mate : float
+        Angle of the mate's tooth from the line of centres.
+    normal : record
+        Strip whose first section has a solved normal.
+    want : int
+        Nonzero to fill second derivatives.
+    """
+    rb = side.base_2 if kind == 1 else side.base_1
+    start = f_mate + (wheels.wheel_2.half_angle if kind == 1 else wheels.wheel_1.half_angle)
+    corner_starts(side, corner, strip, n, rb, normal)
+    corner_normals(side, corner, strip, n, rb * start, rb)
+    corner_sections(side, corner, strip, n, kind, start, want)
+    mended = False
+    for j in range(n):
+        if strip.good[j] == 0.0:
+            mended = True
+            corner_near_base(side, corner, strip, j, kind, start, rb, want)
+    if mended:
+        normal_turns(side, strip, n)
+
+
+@kernel
+def corner_near_base(side, corner, strip, j, kind, start, rb, want):
+    """Gap of a corner on the plane that continues the mate's involute towards its base circle, in section ``j``.
+
+    Parameters
+    ----------
+    side, corner, strip : record
+    j : int
+        Section.
+    kind : int
+        The wheel whose corner bears, 1 or 2.
+    start, rb : float
+        Angle of the mate's involute where it begins, from the line of centres, and its base radius.
+    want : int
+        Nonzero to fill second derivatives.
+    """
+    turned = start - NEAR_BASE
+    corner_on_plane(side, corner, strip, j, kind == 1, turned, rb, NEAR_BASE * rb, want)
+    strip.kind[j] = float(kind)
+    strip.alpha[j] = -turned
+    strip.sin[j] = -np.sin(turned)
+    strip.cos[j] = np.cos(turned)
+    strip.roll_1[j] = corner.roll[j] if kind == 1 else 0.0
+    strip.roll_2[j] = corner.roll[j] if kind == 2 else 0.0
+    for i in range(6):
+        strip.alpha_x[i, j] = 0.0
+    strip.alpha_x[L.F2 if kind == 1 else L.F1, j] = -1.0

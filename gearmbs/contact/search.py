@@ -1,0 +1,213 @@
+"""Which teeth and which part of the face may touch, on one side of the teeth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearmbs.contact import layout as L
+from gearmbs.contact.jit import kernel
+from gearmbs.contact.records import strip_at
+from gearmbs.contact.sections import flank_normals, flank_sections, gap_rates, set_sections
+from gearmbs.contact.support import GENTLE
+
+CORNER_SLACK = 0.45  # share of the corner gap's parabola taken as its lower bound
+STEEPEST = 3.0  # how much steeper the corner gap may grow than that bound
+UNBOUNDED = 1e9  # curvature of a corner gap, 1/m, where the tip reaches beyond the line of action
+
+
+@kernel
+def open_side(wheels, side):
+    """Fill what a side's pose implies; False when the base circles meet.
+
+    The only place where base radii are added and subtracted; an internal wheel would turn the signs.
+    """
+    a, p, q = side.x[L.A], side.x[L.P], side.x[L.Q]
+    rb1, rb2 = wheels.wheel_1.base_radius, wheels.wheel_2.base_radius
+    Rb = rb1 + rb2
+    if a <= Rb * 1.0001:
+        return False
+    length = np.sqrt(a * a - Rb * Rb)
+    lean = p * p + q * q
+    w = np.sqrt(1.0 - lean)
+    i_w = 1.0 / w
+    one = 1.0 / (1.0 + w)
+    m = i_w * one
+    side.w = w
+    side.i_w = i_w
+    side.i_w3 = i_w * i_w * i_w
+    side.i_w5 = i_w * i_w * i_w * i_w * i_w
+    side.i_1w = one
+    side.m = m
+    side.m_w = -(1.0 + 2.0 * w) * m * m
+    side.m_ww = 2.0 * m * m * ((1.0 + 2.0 * w) * (1.0 + 2.0 * w) * m - 1.0)
+    side.gentle = 1.0 if 0.5 * lean * m < GENTLE else 0.0
+    side.base_1, side.base_2, side.base_sum, side.base_difference = rb1, rb2, Rb, rb1 - rb2
+    side.length = length
+    side.alpha_0 = np.arctan2(length, Rb)
+    side.sin_0 = length / a
+    side.cos_0 = Rb / a
+    return True
+
+
+@kernel
+def facing_teeth(options, wheels, side):
+    """Find the tooth of wheel 2 facing tooth 0 of wheel 1: the sum of their turns is what the gap depends on."""
+    pitch = wheels.pitch
+    half_1, half_2 = wheels.wheel_1.half_angle, wheels.wheel_2.half_angle
+    base_1 = side.base_1 * (side.x[L.F1] + half_1)
+    base_2 = side.base_2 * (side.x[L.F2] + half_2)
+    n = np.floor((side.length - side.base_sum * side.alpha_0 - base_1 - base_2) / pitch + 0.5)
+    side.facing = n
+    side.roll_sum = base_1 + base_2 + n * pitch
+    side.start_1 = side.x[L.F1] + half_1
+    side.start_2 = side.x[L.F2] + n * (2.0 * np.pi / options.teeth[1]) + half_2
+
+
+@kernel
+def middle_section(options, wheels, side, strip, want):
+    """Fill the gap of flank on flank at mid-face; ``want`` as for `flank_sections`."""
+    single = options.slices == 1
+    strip.zeta[0] = 0.0 if single else 0.5 * (wheels.face_low + wheels.face_high)
+    strip.alpha[0], strip.sin[0], strip.cos[0] = side.alpha_0, side.sin_0, side.cos_0
+    strip.step[0] = 0.0
+    if side.x[L.P] != 0.0 or side.x[L.Q] != 0.0:
+        flank_normals(side, strip, 1)
+    flank_sections(side, strip, 1, want)
+
+
+@kernel
+def reach_of_face(options, wheels, side, middle):
+    """Fill the nodes ``side.first`` to ``side.last`` that may touch; False if none can.
+
+    The gap over the face is convex: its tangent in the middle bounds the touching part.
+    """
+    x, slices = side.x, options.slices
+    p, q = x[L.P], x[L.Q]
+    low, high = wheels.face_low, wheels.face_high
+    deepest = wheels.added_material - middle.gap[0]
+    slope = 2.0 * (p * middle.sin[0] + q * middle.cos[0]) / side.w
+    side.low = low
+    side.step = (high - low) / slices
+    # where a leaning or shifted wheel's end face goes beyond the slices, gaps are extrapolated
+    shift = 0.5 * abs(x[L.H] - wheels.axial_shift)
+    side.overhang = abs(p) * x[L.A] + abs(q) * max(side.base_1, side.base_2) + shift + wheels.end_blend
+    reach = 0.5 * (high - low) + side.overhang
+    if deepest + abs(slope) * reach <= 0.0:
+        return False
+    first, last = 0, slices
+    if deepest - abs(slope) * reach < 0.0:
+        edge = int(np.floor((middle.zeta[0] - deepest / slope - low) / side.step))
+        if slope > 0.0:
+            first = min(max(0, edge), slices - 1)
+        else:
+            last = max(min(slices, edge + 1), 1)
+    side.first, side.last = float(first), float(last)
+    return True
+
+
+@kernel
+def strips_between(first, last):
+    """Return how many strips cover the nodes ``first`` to ``last``."""
+    return max(1, -(-int(last - first) // (L.LANES - 1)))
+
+
+@kernel
+def beyond_end(side, end_gap, next_gap):
+    """Lower bound of the flanks' gap from an end node outwards."""
+    return end_gap - max(0.0, next_gap - end_gap) * side.overhang / side.step
+
+
+@kernel
+def flank_strips(scratch, slices, want):
+    """Fill the strips of the face with flank-on-flank sections; return the least gap, end faces included.
+
+    Where the slices begin or end, the face may reach beyond them: there the gap is bounded by its slope.
+    """
+    side, middle = scratch.side, scratch.middle
+    first, last = side.first, side.last
+    count = strips_between(first, last)
+    least = np.inf
+    for k in range(count):
+        strip = strip_at(scratch, k)
+        node = first + k * (L.LANES - 1)
+        nodes = min(last - node + 1.0, float(L.LANES))
+        set_sections(strip, L.LANES, side, node, nodes, middle)
+        flank_normals(side, strip, L.LANES)
+        flank_sections(side, strip, L.LANES, want)
+        gap_rates(side, strip, L.LANES, want)
+        for j in range(int(nodes)):
+            least = min(least, strip.gap[j])
+        if k == 0 and first == 0.0:
+            least = min(least, beyond_end(side, strip.gap[0], strip.gap[1]))
+        end = int(nodes) - 1
+        if k == count - 1 and last == slices:
+            least = min(least, beyond_end(side, strip.gap[end], strip.gap[end - 1]))
+    return least
+
+
+@kernel
+def teeth_in_reach(wheels, side, depth, wander):
+    """First and last tooth of wheel 1 that may bear, counted from tooth 0.
+
+    A corner may bear beyond the path of contact as far as the parabola of its gap stays below ``depth``; ``wander`` is
+    how far the contact moves along the profile over the face.
+    """
+    tip_1, tip_2, length = wheels.wheel_1.tip_roll, wheels.wheel_2.tip_roll, side.length
+    rb1, rb2, pitch = side.base_1, side.base_2, wheels.pitch
+    curve = CORNER_SLACK * min(
+        length * tip_1 / (2.0 * (length - tip_1) * rb1 * rb1) if length > tip_1 else UNBOUNDED,
+        length * tip_2 / (2.0 * (length - tip_2) * rb2 * rb2) if length > tip_2 else UNBOUNDED,
+    )
+    side.curve = curve
+    beyond = min(pitch, np.sqrt(max(depth, 0.0) / curve) + wander)
+    at = rb1 * side.start_1 + rb1 * side.alpha_0
+    first = np.ceil((length - tip_2 - beyond - at) / pitch)
+    last = np.floor((tip_1 + beyond - at) / pitch)
+    return int(first), int(last)
+
+
+@kernel
+def path_excess(wheels, side, strip, j, shift):
+    """Return how much the gap of a pair in section ``j`` grows at least for standing beyond the path of contact."""
+    over_1 = strip.roll_1[j] + shift - wheels.wheel_1.tip_roll
+    over_2 = strip.roll_2[j] - shift - wheels.wheel_2.tip_roll
+    x = max(max(over_1, over_2), 0.0)
+    return side.curve * x * x
+
+
+@kernel
+def pair_reach(wheels, scratch, slices):
+    """Fill the nodes of a tooth pair that may touch, and one more on either side; False if none can.
+
+    The gap is at least that of the flanks plus a parabola.
+    """
+    side, pair = scratch.side, scratch.pair
+    margin, shift = wheels.added_material, pair.shift
+    low, high = int(side.first), int(side.last)
+    first, last = high + 1, low - 1
+    count = strips_between(low, high)
+    for k in range(count):
+        strip = strip_at(scratch, k)
+        start = low + k * (L.LANES - 1)
+        nodes = min(high - start + 1, L.LANES)
+        for j in range(nodes):
+            if strip.gap[j] + path_excess(wheels, side, strip, j, shift) < margin:
+                first = min(first, start + j)
+                last = max(last, start + j)
+        if k == 0 and low == 0 and end_in_reach(wheels, side, strip, 0, 1, shift):
+            first = 0
+            last = max(last, 0)
+        if k == count - 1 and high == slices and end_in_reach(wheels, side, strip, nodes - 1, nodes - 2, shift):
+            first = min(first, slices)
+            last = slices
+    pair.first, pair.last = float(max(first - 1, low)), float(min(last + 1, high))
+    return pair.last >= pair.first
+
+
+@kernel
+def end_in_reach(wheels, side, strip, end, inward, shift):
+    """Whether a pair may touch where the face goes on beyond its end node; ``inward`` is the section next to it."""
+    grown = path_excess(wheels, side, strip, inward, shift) - path_excess(wheels, side, strip, end, shift)
+    share = STEEPEST * side.overhang / side.step
+    bound = beyond_end(side, strip.gap[end], strip.gap[inward]) - max(0.0, grown) * share
+    return bound < wheels.added_material

@@ -1,0 +1,364 @@
+"""Pressure along the face: from gaps at the nodes of the slices to nodal forces, with their derivatives.
+
+Between two nodes gap and gap rate are linear. The part of a slice that touches, and that lies on both faces, is
+integrated by Gauss's three-point rule, so that the ends of a wedge move through the slices without a jump. A wedge that
+ends inside its only slice is then good to 0.05 % (two points: 0.3 %).
+
+The slices of a strip are integrated side by side: lane i holds the slice from node i to node i + 1. The last lane has
+no slice. It stays empty, which lets the loops read one place on in a row: what they find there is multiplied by zero.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from gearmbs.contact import layout as L
+from gearmbs.contact.jit import inlined, kernel, summing
+from gearmbs.contact.laws import normal_law, power, pressure
+from gearmbs.contact.records import before
+
+POINTS = (0.1127016653792583, 0.5, 0.8872983346207417)
+WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+
+
+class Law(NamedTuple):
+    """The normal law of a tooth pair, per unit face width."""
+
+    kind: int
+    k: float
+    e: float
+    c: float
+    d: float
+
+
+class Cut(NamedTuple):
+    """Which slices of a strip count, and where the face ends, in slices from its first node."""
+
+    low: float
+    high: float
+    lowest: float  # slices before this one are left out
+    highest: float  # from this one on, too
+    begin: float  # the face's first slice
+    end: float  # and its last
+
+
+@inlined
+def law_of(options, wheels, soft):
+    """Normal law of a tooth pair whose stiffness is a multiple of the nominal one."""
+    kind = options.law
+    c = wheels.damping
+    return Law(
+        kind, soft * wheels.stiffness, wheels.exponent, soft * c if kind == L.LAW_IMPACT else c, wheels.damping_depth
+    )
+
+
+@kernel
+def plane_force(law, width, strip, loads, totals, want):
+    """Force of a pair described by a single section: the pressure there times the common face width.
+
+    Returns the penetration.
+    """
+    delta, rate = -strip.gap[0], -strip.rate[0]
+    p, p_d, p_r, energy, elastic = normal_law(law.kind, law.k, law.e, law.c, law.d, delta, rate)
+    loads.force[0] = width * p
+    loads.elastic[0] = width * elastic
+    totals.energy += width * energy
+    totals.damping_power += width * (p - elastic) * rate
+    if want != 0:
+        for i in range(6):
+            g = strip.grad[i, 0]
+            loads.force_x[i, 0] = -width * (p_d * g + p_r * strip.rate_x[i, 0])
+            loads.force_xd[i, 0] = -width * p_r * g
+    return delta
+
+
+@kernel
+def touching_parts(strip, loads, n, cut):
+    """Bounds of the part of each slice that touches and lies on both faces, as fractions, and its largest depth.
+
+    ``depth`` is 0 for slices that do not count.
+    """
+    low, high, lowest, highest, begin, end = cut
+    gap = strip.gap
+    for i in range(n):
+        j = float(i)
+        ua, ub = low - j, high - j
+        first, last = j == begin, j == end
+        counts = (j >= lowest) and (j < highest) and (ua < 1.0 or last) and (ub > 0.0 or first)
+        ua = ua if (ua > 0.0 or first) else 0.0
+        ub = ub if (ub < 1.0 or last) else 1.0
+        d0, d1 = -gap[i], -gap[i + 1]
+        slope = d1 - d0
+        da, db = d0 + slope * ua, d0 + slope * ub
+        counts = counts and (ub > ua) and (da > 0.0 or db > 0.0)
+        loads.low[i] = (-d0 / slope if da < 0.0 else ua) if counts else 0.0
+        loads.high[i] = (-d0 / slope if db < 0.0 else ub) if counts else 0.0
+        loads.depth[i] = max(da, db) if counts else 0.0
+        loads.clip_low[i] = 1.0 if counts and da < 0.0 else 0.0
+        loads.clip_high[i] = 1.0 if counts and db < 0.0 else 0.0
+
+
+@kernel
+def slice_forces(law, strip, loads, n, width, want):
+    """Integrate the pressure over the parts of the slices that `touching_parts` found.
+
+    Fills the nodal forces of each slice, its energy and its damping power, and, if wanted, the derivatives of the
+    forces by the gaps and rates of its nodes and by its bounds. Both passes evaluate the law, which costs less than to
+    keep all it says.
+
+    Parameters
+    ----------
+    law : Law
+    strip, loads : record
+    n : int
+        Sections of the strip.
+    width : float
+        Width of a slice, m.
+    want : int
+        Nonzero to fill derivatives.
+    """
+    slice_values(law, strip, loads, n, width)
+    if want != 0:
+        slice_curvatures(law, strip, loads, n, width)
+        clipped_slopes(strip, loads, n)
+
+
+@inlined
+def at_point(law, d0, slope, r0, rs, counts, low, span, t):
+    """Pressure at the fraction ``t`` of the touching part of a slice.
+
+    Parameters
+    ----------
+    law : Law
+    d0, slope, r0, rs : float
+        Penetration and its rate at the left node, and their growth towards the right one.
+    counts : bool
+        Whether the slice touches.
+    low, span, t : float
+        Where the touching part begins, its length, and the point in it, as fractions.
+
+    Returns
+    -------
+    u, p, p_depth, p_rate, energy, elastic, power : float
+        Place in the slice, pressure with its derivatives, densities of elastic energy, elastic pressure, damping power.
+    """
+    u = low + span * t
+    depth = d0 + slope * u
+    inside = counts and depth > 0.0
+    delta = depth if inside else 1.0
+    rate = r0 + rs * u if inside else 0.0
+    p, p_d, p_r, w, e = pressure(law.kind, law.k * power(delta, law.e), law.e, law.c, law.d, delta, rate)
+    on = 1.0 if inside else 0.0
+    return u, on * p, on * p_d, on * p_r, on * w, on * e, on * (p - e) * rate
+
+
+@kernel
+def slice_values(law, strip, loads, n, width):
+    """Fill forces, energy and damping power of the slices; see `slice_forces`."""
+    gap, gap_rate = strip.gap, strip.rate
+    kind, k, e, c, d = law
+    copy = Law(kind, k, e, c, d)
+    w0, w1, w2 = WEIGHTS[0] * width, WEIGHTS[1] * width, WEIGHTS[2] * width
+    t0, t1, t2 = POINTS
+    for i in range(n):
+        counts = loads.depth[i] > 0.0
+        d0, r0 = -gap[i], -gap_rate[i]
+        slope, rs = -gap[i + 1] - d0, -gap_rate[i + 1] - r0
+        low = loads.low[i]
+        span = loads.high[i] - low
+        u0, p0, _, _, a0, e0, b0 = at_point(copy, d0, slope, r0, rs, counts, low, span, t0)
+        u1, p1, _, _, a1, e1, b1 = at_point(copy, d0, slope, r0, rs, counts, low, span, t1)
+        u2, p2, _, _, a2, e2, b2 = at_point(copy, d0, slope, r0, rs, counts, low, span, t2)
+        m0, m1, m2 = w0 * span, w1 * span, w2 * span
+        loads.force_left[i] = m0 * (1.0 - u0) * p0 + m1 * (1.0 - u1) * p1 + m2 * (1.0 - u2) * p2
+        loads.force_right[i] = m0 * u0 * p0 + m1 * u1 * p1 + m2 * u2 * p2
+        loads.elastic_left[i] = m0 * (1.0 - u0) * e0 + m1 * (1.0 - u1) * e1 + m2 * (1.0 - u2) * e2
+        loads.elastic_right[i] = m0 * u0 * e0 + m1 * u1 * e1 + m2 * u2 * e2
+        loads.energy[i] = m0 * a0 + m1 * a1 + m2 * a2
+        loads.power[i] = m0 * b0 + m1 * b1 + m2 * b2
+
+
+@inlined
+def bound_slopes(u, t, span, share, p, grown):
+    """Derivatives of the left and right force by the lower and upper bound, from one point of the touching part.
+
+    ``grown`` is the derivative of the pressure by the place in the slice.
+    """
+    v = 1.0 - u
+    left = span * (v * grown - p) * share
+    right = span * (u * grown + p) * share
+    on_left, on_right = share * v * p, share * u * p
+    return (1.0 - t) * left - on_left, (1.0 - t) * right - on_right, t * left + on_left, t * right + on_right
+
+
+@kernel
+def slice_curvatures(law, strip, loads, n, width):
+    """Fill derivatives of the forces of the slices by gaps, rates and bounds; see `slice_forces`."""
+    gap, gap_rate = strip.gap, strip.rate
+    kind, k, e, c, d = law
+    copy = Law(kind, k, e, c, d)
+    w0, w1, w2 = WEIGHTS[0] * width, WEIGHTS[1] * width, WEIGHTS[2] * width
+    t0, t1, t2 = POINTS
+    for i in range(n):
+        counts = loads.depth[i] > 0.0
+        d0, r0 = -gap[i], -gap_rate[i]
+        slope, rs = -gap[i + 1] - d0, -gap_rate[i + 1] - r0
+        low = loads.low[i]
+        span = loads.high[i] - low
+        u0, p0, d_0, r_0, _, _, _ = at_point(copy, d0, slope, r0, rs, counts, low, span, t0)
+        u1, p1, d_1, r_1, _, _, _ = at_point(copy, d0, slope, r0, rs, counts, low, span, t1)
+        u2, p2, d_2, r_2, _, _, _ = at_point(copy, d0, slope, r0, rs, counts, low, span, t2)
+        m0, m1, m2 = w0 * span, w1 * span, w2 * span
+        v0, v1, v2 = 1.0 - u0, 1.0 - u1, 1.0 - u2
+        ll0, ll1, ll2 = m0 * v0 * v0, m1 * v1 * v1, m2 * v2 * v2
+        lr0, lr1, lr2 = m0 * v0 * u0, m1 * v1 * u1, m2 * v2 * u2
+        rr0, rr1, rr2 = m0 * u0 * u0, m1 * u1 * u1, m2 * u2 * u2
+        loads.k_ll[i] = ll0 * d_0 + ll1 * d_1 + ll2 * d_2
+        loads.k_lr[i] = lr0 * d_0 + lr1 * d_1 + lr2 * d_2
+        loads.k_rr[i] = rr0 * d_0 + rr1 * d_1 + rr2 * d_2
+        loads.r_ll[i] = ll0 * r_0 + ll1 * r_1 + ll2 * r_2
+        loads.r_lr[i] = lr0 * r_0 + lr1 * r_1 + lr2 * r_2
+        loads.r_rr[i] = rr0 * r_0 + rr1 * r_1 + rr2 * r_2
+        slope = slope if counts else 0.0
+        rs = rs if counts else 0.0
+        a0, b0, c0, e0 = bound_slopes(u0, t0, span, w0, p0, d_0 * slope + r_0 * rs)
+        a1, b1, c1, e1 = bound_slopes(u1, t1, span, w1, p1, d_1 * slope + r_1 * rs)
+        a2, b2, c2, e2 = bound_slopes(u2, t2, span, w2, p2, d_2 * slope + r_2 * rs)
+        loads.left_low[i] = a0 + a1 + a2
+        loads.right_low[i] = b0 + b1 + b2
+        loads.left_high[i] = c0 + c1 + c2
+        loads.right_high[i] = e0 + e1 + e2
+
+
+@kernel
+def clipped_slopes(strip, loads, n):
+    """Add to the derivatives by the gaps that a bound where the touch ends moves with them."""
+    gap = strip.gap
+    for i in range(n):
+        d0, d1 = -gap[i], -gap[i + 1]
+        slope = d1 - d0
+        at_low = loads.clip_low[i] != 0.0
+        at_high = loads.clip_high[i] != 0.0
+        left = loads.left_low[i] if at_low else loads.left_high[i]
+        right = loads.right_low[i] if at_low else loads.right_high[i]
+        i_s2 = 1.0 / (slope * slope)
+        c0 = -d1 * i_s2 if (at_low or at_high) else 0.0
+        c1 = d0 * i_s2 if (at_low or at_high) else 0.0
+        k01 = loads.k_lr[i]
+        loads.k_ll[i] += left * c0
+        loads.k_lr[i] = k01 + left * c1
+        loads.k_rl[i] = k01 + right * c0
+        loads.k_rr[i] += right * c1
+
+
+@summing
+def node_forces(loads, n, totals):
+    """Gather the forces of the slices at the nodes, and energy and damping power; return the largest penetration."""
+    energy = power_ = 0.0
+    for i in range(n):
+        energy += loads.energy[i]
+        power_ += loads.power[i]
+    totals.energy += energy
+    totals.damping_power += power_
+    # the place before the first of a row is the last lane of the row above, which is empty
+    right, elastic = before(loads.force_right), before(loads.elastic_right)
+    for i in range(n):
+        loads.force[i] = loads.force_left[i] + right[i]
+        loads.elastic[i] = loads.elastic_left[i] + elastic[i]
+    depth = 0.0
+    for i in range(n):
+        depth = max(depth, loads.depth[i])
+    return depth
+
+
+@inlined
+def slice_slope(strip, loads, i, k):
+    """Fill the derivatives of one slice's forces by one pose number and its rate."""
+    g0, g1 = strip.grad[k, i], strip.grad[k, i + 1]
+    h0, h1 = strip.rate_x[k, i], strip.rate_x[k, i + 1]
+    r_ll, r_lr, r_rr = loads.r_ll[i], loads.r_lr[i], loads.r_rr[i]
+    loads.v_left[k, i] = -(r_ll * g0 + r_lr * g1)
+    loads.v_right[k, i] = -(r_lr * g0 + r_rr * g1)
+    loads.x_left[k, i] = -(loads.k_ll[i] * g0 + loads.k_lr[i] * g1 + r_ll * h0 + r_lr * h1)
+    loads.x_right[k, i] = -(loads.k_rl[i] * g0 + loads.k_rr[i] * g1 + r_lr * h0 + r_rr * h1)
+
+
+@kernel
+def slice_slopes(strip, loads, n):
+    """Fill the derivatives of each slice's forces by the pose and its rates."""
+    for i in range(n):
+        slice_slope(strip, loads, i, 0)
+        slice_slope(strip, loads, i, 1)
+        slice_slope(strip, loads, i, 2)
+        slice_slope(strip, loads, i, 3)
+        slice_slope(strip, loads, i, 4)
+        slice_slope(strip, loads, i, 5)
+
+
+@inlined
+def node_slope(loads, right, v_right, i, k):
+    """Gather the derivatives of the slices' forces by one pose number and its rate at one node."""
+    loads.force_x[k, i] = loads.x_left[k, i] + right[k, i]
+    loads.force_xd[k, i] = loads.v_left[k, i] + v_right[k, i]
+
+
+@kernel
+def node_slopes(loads, n):
+    """Gather the derivatives of the slices' forces at the nodes."""
+    right, v_right = before(loads.x_right), before(loads.v_right)
+    for i in range(n):
+        node_slope(loads, right, v_right, i, 0)
+        node_slope(loads, right, v_right, i, 1)
+        node_slope(loads, right, v_right, i, 2)
+        node_slope(loads, right, v_right, i, 3)
+        node_slope(loads, right, v_right, i, 4)
+        node_slope(loads, right, v_right, i, 5)
+
+
+@kernel
+def moving_end(loads, i, low, limit, width):
+    """Add how the forces of slice ``i`` change as the end of the face that bounds it moves."""
+    by_left = loads.left_low[i] if low else loads.left_high[i]
+    by_right = loads.right_low[i] if low else loads.right_high[i]
+    for k in range(6):
+        moved = limit.grad[k] / width
+        loads.x_left[k, i] += by_left * moved
+        loads.x_right[k, i] += by_right * moved
+
+
+@kernel
+def end_force(law, strip, i, width, u, sign, limit, pair, sums, want):
+    """Add the force from cutting the elastic layer at an end of the face: its energy density times the limit's motion.
+
+    Parameters
+    ----------
+    law : Law
+    strip : record
+    i, width : int, float
+        Slice of the strip that the face ends in, and the width of a slice, m.
+    u : float
+        Where in it, as a fraction.
+    sign : float
+        -1 at the lower end, +1 at the higher.
+    limit, pair, sums : record
+    want : int
+        Nonzero to add derivatives.
+    """
+    d0 = -strip.gap[i]
+    slope = -strip.gap[i + 1] - d0
+    delta = d0 + slope * u
+    if delta <= 0.0:
+        return
+    _, _, _, energy, elastic = normal_law(L.LAW_IMPACT, law.k, law.e, 0.0, 1.0, delta, 0.0)
+    grad, hess = limit.grad, limit.hess
+    for m in range(6):
+        sums.q[m] -= sign * energy * grad[m]
+    if want == 0:
+        return
+    softened = energy / pair.soft
+    for j in range(6):
+        dd = slope / width * grad[j] - (1.0 - u) * strip.grad[j, i] - u * strip.grad[j, i + 1]
+        for m in range(6):
+            moved = elastic * dd * grad[m] + energy * hess[m, j]
+            moved += softened * (grad[m] * pair.soft_x[j] + grad[j] * pair.soft_x[m])
+            sums.q_x[m, j] -= sign * moved
