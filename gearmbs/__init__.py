@@ -8,7 +8,7 @@
     report = gm.analyse(gm.read_signal("gearbox.csv", rate=12800.0), teeth=29)
 
 Studies
-    `Case`, `CaseError`, `load_case`, `make_case`, `run_case`, `run_cases`, `run_paper`, `gear_rig`
+    `Case`, `CaseError`, `load_case`, `make_case`, `run_case`, `run_cases`, `run_paper`, `record_signal`, `gear_rig`
 Gears
     `GearPair`, `GearSpec`, `Material`, `ContactLaw`, `FlankFriction`, `faults`
 Mechanisms
@@ -20,7 +20,7 @@ Signals
 ADAMS decks
     `read_deck`, `run_deck`, `write_deck`
 Views
-    `gear_scene`, `mechanism_scene`, `solution_scene`, `mesh_animation`
+    `gear_scene`, `mechanism_scene`, `solution_scene`, `mesh_animation`, `average_plot`
 Units
     `to_si`
 
@@ -53,12 +53,13 @@ if TYPE_CHECKING:
         gear_rig,
         load_case,
         make_case,
+        record_signal,
         run_case,
         run_cases,
         run_paper,
     )
     from gearmbs.units import to_si
-    from gearmbs.view import gear_scene, mechanism_scene, mesh_animation, solution_scene
+    from gearmbs.view import average_plot, gear_scene, mechanism_scene, mesh_animation, solution_scene
 
 __version__ = "0.1.0"
 
@@ -77,6 +78,7 @@ __all__ = [
     "Solution",
     "Status",
     "analyse",
+    "average_plot",
     "compare",
     "envelope_spectrum",
     "faults",
@@ -90,6 +92,7 @@ __all__ = [
     "mesh_animation",
     "read_deck",
     "read_signal",
+    "record_signal",
     "run_case",
     "run_cases",
     "run_deck",
@@ -121,6 +124,7 @@ late(
         "Solution": ".dae.results.solution",
         "Status": ".dae",
         "analyse": ".signals",
+        "average_plot": ".view",
         "compare": ".signals",
         "envelope_spectrum": ".signals",
         "faults": ".gears",
@@ -134,6 +138,7 @@ late(
         "mesh_animation": ".view",
         "read_deck": ".adams",
         "read_signal": ".signals",
+        "record_signal": ".studies",
         "run_case": ".studies",
         "run_cases": ".studies",
         "run_deck": ".adams",

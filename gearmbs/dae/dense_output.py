@@ -93,11 +93,6 @@ class DenseOutput:
         self.t_min = float(self._t[self._steps[0] - 1]) if len(self._steps) else float(self._t[0])
         self.t_max = float(self._ends[-1]) if len(self._steps) else float(self._t[0])
 
-    @property
-    def n_steps(self) -> int:
-        """Number of polynomial pieces."""
-        return len(self._steps)
-
     def evaluate(self, t: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return y and y' at ``t``.
 

@@ -117,10 +117,6 @@ def test_the_backlash_that_jams_found_from_gaps(plane, second_order):
     assert missing[1] / missing[0] == pytest.approx(4, rel=0.06)
 
 
-def wheels_on_axes(pair, slices, driver_angle, depth):
-    return Contact(pair, slices), Contact(pair, slices).state(driver_angle, depth, 100.0)
-
-
 @pytest.mark.parametrize("changes", [{}, {"misalignment": "1 deg"}, {"centre_distance_error": "3 mm"}])
 def test_one_pitch_later_is_the_same(changes):
     contact = Contact(GearPair.paper(**changes))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import MISSING, Field, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from gearmbs.adams.parse.source import CONTINUED, RawStatement
@@ -76,11 +76,6 @@ def arg(
 def specs_of(cls: type) -> dict[str, Spec]:
     """Return field name -> Spec of a statement class."""
     return {f.name: f.metadata["spec"] for f in fields(cls) if "spec" in f.metadata}
-
-
-def default_of(f: Field[Any]) -> Any:
-    """Return a field's default value."""
-    return None if f.default is MISSING else f.default
 
 
 class Grammar:

@@ -27,8 +27,6 @@ ANGLE = 4
 ROTATION = 5
 """x_I times y_J turned by f(t): zero when I is turned by f(t) about z_J."""
 
-R_BLOCK_I, T_BLOCK_I, R_BLOCK_J, T_BLOCK_J = 0, 1, 2, 3
-
 HESSIAN_BLOCKS = np.zeros((6, 4, 4), dtype=np.bool_)
 """Which 3x3 blocks of a term's Hessian over [R_I, theta_I, R_J, theta_J] can differ from zero."""
 for _kind, _blocks in {

@@ -99,7 +99,6 @@ class RunState(Struct):
     # where the run stands
     t: float  # end of the last accepted step
     h: float  # size wanted of the next step
-    h_used: float  # of the last accepted step
     order: int
     newest: int  # row of the window with the newest point, or with the end of the open step
     n_past: int  # points accepted and not forgotten, at most HISTORY

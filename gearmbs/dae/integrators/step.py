@@ -280,7 +280,6 @@ def accept(st):
     count_noise(st)
     st.n_past = min(st.n_past + 1, bdf.HISTORY)
     st.t = st.t_new
-    st.h_used = st.step
     if st.rate > RATE_WORTH_RENEWING:
         st.matrix_wanted = True
 

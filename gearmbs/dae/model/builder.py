@@ -128,11 +128,6 @@ class TableBuilder:
         self.rows.append((len(self.terms), -1, tape))
         return len(self.rows) - 1
 
-    def add_state(self, kind: int, tape: int) -> int:
-        """Add a user-defined state z with z' = f or z = f."""
-        self.states.append((kind, tape))
-        return len(self.states) - 1
-
     def ground_marker(self) -> int:
         """Return a marker at the origin of the ground."""
         if self._ground_marker is None:
