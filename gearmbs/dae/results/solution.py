@@ -161,10 +161,6 @@ class Solution:
     def _loads(self) -> np.ndarray:
         return self._records.loads
 
-    @property
-    def _phi(self) -> np.ndarray:
-        return self._records.by_row
-
     def parts(self, rows: np.ndarray | None = None, *, size: int = PART_SIZE) -> Iterator[Solution]:
         """Yield the solution piece by piece, for what is wanted of a long one to be collected in little memory.
 
