@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gearmbs._jit import njit
-from gearmbs.dae.integrators.bdf import HISTORY, divided_difference_norm, step_for_error
+from gearmbs.dae.integrators.bdf import HISTORY, divided_difference_norm, local_error, step_for_error
 from gearmbs.dae.integrators.history import rows_from, times_from
 
 TARGET = 0.2
@@ -16,8 +16,14 @@ FAIL_SHRINK = (0.1, 0.8)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def difference_norm(st, k):
+    """Return the norm of the difference of order k + 1, over the newest k + 2 points."""
+    return divided_difference_norm(times_from(st, 0), k + 2, rows_from(st, 0), st.w_error, st.value)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def step_at_order(st, k, h, nodes):
-    """Return the step size at order k from ``nodes[0]``, from the difference over the newest k + 2 points.
+    """Return the step size at order k from ``nodes[0]``.
 
     Parameters
     ----------
@@ -28,19 +34,22 @@ def step_at_order(st, k, h, nodes):
     nodes : ndarray
         Times of the past points of the step, newest first.
     """
-    difference = divided_difference_norm(times_from(st, 0), k + 2, rows_from(st, 0), st.w_error, st.value)
-    return step_for_error(h, nodes, k, difference, TARGET)
+    return step_for_error(h, nodes, k, difference_norm(st, k), TARGET)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def step_below(st, k, h, nodes):
-    """Return the step size at which the two orders below k agree: the smaller of theirs.
+def allows(st, k, h, nodes):
+    """Return whether order k takes a step of size ``h`` from ``nodes[0]``; parameters are those of `step_at_order`."""
+    return local_error(h, nodes, k, difference_norm(st, k)) <= TARGET
 
-    One difference may be small by chance, where its derivative passes through zero; two rarely are. Parameters are
-    those of `step_at_order`.
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def lower_allow(st, k, h, nodes):
+    """Return whether the two orders below k take a step of size ``h``; parameters are those of `step_at_order`.
+
+    One difference may be small by chance, where its derivative passes through zero; two rarely are.
     """
-    below = step_at_order(st, k - 1, h, nodes)
-    return min(below, step_at_order(st, k - 2, h, nodes)) if k > 2 else below
+    return k > 1 and allows(st, k - 1, h, nodes) and (k == 2 or allows(st, k - 2, h, nodes))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -62,14 +71,13 @@ def after_success(st):
     nodes = times_from(st, 0)
     best = k
     h_best = step_at_order(st, k, h, nodes)
-    if k > 1 and h_best <= step_below(st, k, h, nodes):
+    if lower_allow(st, k, h_best, nodes):
         best = k - 1
         h_best = step_at_order(st, k - 1, h, nodes)
     if best == k and k < st.max_order and n_past >= k + 3 and unchanged and st.caution == 0:
-        h_high = step_at_order(st, k + 1, h, nodes)
-        if h_high > RAISE_GAIN * h_best:
+        if allows(st, k + 1, RAISE_GAIN * h_best, nodes):
             best = k + 1
-            h_best = h_high
+            h_best = step_at_order(st, k + 1, h, nodes)
     ratio = h_best / h
     if best != k:
         st.order = best
@@ -113,7 +121,7 @@ def after_error_failure(st, error, fails):
         best = k
         h_best = step_at_order(st, k, h, nodes)
         lowest = max(1, k - 1) if fails == 1 else 1
-        while best > lowest and h_best <= step_below(st, best, h, nodes):
+        while best > lowest and lower_allow(st, best, h_best, nodes):
             best -= 1
             h_best = step_at_order(st, best, h, nodes)
         factor = h_best / h
