@@ -94,9 +94,7 @@ def begin(run: Run) -> Failure | None:
         return failure
     st.h = max(st.h, h)
     failure = _check(run, h) if run.options.check_start else _repair(run, h)
-    if failure is None:
-        failure = choose_first_pivots(run, st.h)
-    return failure if failure is not None else _lengthen(run)
+    return failure if failure is not None else _settle_first_step(run)
 
 
 def choose_first_pivots(run: Run, h: float) -> Failure | None:
@@ -162,27 +160,21 @@ def _check(run: Run, h: float) -> Failure | None:
     return None
 
 
-def _lengthen(run: Run) -> Failure | None:
-    """Take a longer first step, if one of implicit Euler stays close enough to its prediction.
+def _settle_first_step(run: Run) -> Failure | None:
+    """Choose the pivots of the first step, and a longer one, if implicit Euler stays close to its prediction over that.
 
     Very short steps are no safer: rounding is divided by them, twice in equations of index three.
     """
     st = run.state
     least = st.h
-    span = st.t_end - st.t
-    h = min(FIRST_TRIED * span, st.h_max)
-    if run.steps_given[0]:
-        return None
+    h = 0.0 if run.steps_given[0] else min(FIRST_TRIED * (st.t_end - st.t), st.h_max)
     for _ in range(TRIALS):
         if h <= least:
             break
-        if choose_first_pivots(run, h) is None:
-            error = _euler_error(run, h)
-            if error <= FIRST_ERROR:
-                st.h = h
-                return None
-        else:
-            error = np.inf
+        error = _euler_error(run, h) if choose_first_pivots(run, h) is None else np.inf
+        if error <= FIRST_ERROR:
+            st.h = h
+            return None
         h *= max(0.5 * np.sqrt(FIRST_ERROR / error), least / h) if np.isfinite(error) else 1e-4
     return choose_first_pivots(run, least)
 
