@@ -62,6 +62,8 @@ class DAEProblem:
         call it after each step.
     restart_rates : callable, optional
         ``restart_rates(t, y, yp, idata, rdata)`` returns y' consistent with y after ``hook`` has rewritten y.
+    jacobian_residuals : int
+        Calls of ``residual`` that one of ``jacobian`` takes, if that takes differences.
     advice : mapping of Status to str
         What to try after a failure, in the words of whoever states the problem; default: in those of `solve_dae`.
     """
@@ -87,4 +89,5 @@ class DAEProblem:
     n_events: int = 0
     hook_interval: Callable[[np.ndarray], float] | None = None
     restart_rates: Callable | None = None
+    jacobian_residuals: int = 0
     advice: Mapping[Any, str] = field(default_factory=dict)

@@ -275,6 +275,7 @@ def as_problem(
         names=list(names),
         events=compiled_events,
         n_events=len(events),
+        jacobian_residuals=1 + int(idata[differences.N_COLOURS]) if jac is None else 0,
     )
     if not problem.error_mask.any():
         raise ValueError("error_mask leaves no unknown under error control")

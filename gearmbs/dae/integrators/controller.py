@@ -38,18 +38,26 @@ def step_at_order(st, k, h, nodes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def allows(st, k, h, nodes):
-    """Return whether order k takes a step of size ``h`` from ``nodes[0]``; parameters are those of `step_at_order`."""
-    return local_error(h, nodes, k, difference_norm(st, k)) <= TARGET
+def step_reaching(st, k, wanted, h, nodes):
+    """Return the step size at order k, or zero without a search where it is less than ``wanted``.
+
+    The other parameters are those of `step_at_order`, whose search goes by powers and takes far longer than one error.
+    """
+    difference = difference_norm(st, k)
+    if local_error(wanted, nodes, k, difference) > TARGET:
+        return 0.0
+    return step_for_error(h, nodes, k, difference, TARGET)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def lower_allow(st, k, h, nodes):
-    """Return whether the two orders below k take a step of size ``h``; parameters are those of `step_at_order`.
+def step_below(st, k, h, nodes):
+    """Return the step size at which the two orders below k agree: the smaller of theirs.
 
-    One difference may be small by chance, where its derivative passes through zero; two rarely are.
+    One difference may be small by chance, where its derivative passes through zero; two rarely are. Parameters are
+    those of `step_at_order`.
     """
-    return k > 1 and allows(st, k - 1, h, nodes) and (k == 2 or allows(st, k - 2, h, nodes))
+    below = step_at_order(st, k - 1, h, nodes)
+    return min(below, step_at_order(st, k - 2, h, nodes)) if k > 2 else below
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -71,13 +79,17 @@ def after_success(st):
     nodes = times_from(st, 0)
     best = k
     h_best = step_at_order(st, k, h, nodes)
-    if lower_allow(st, k, h_best, nodes):
-        best = k - 1
-        h_best = step_at_order(st, k - 1, h, nodes)
+    if k > 1:
+        h_low = step_reaching(st, k - 1, h_best, h, nodes)
+        # see `step_below`
+        if h_low >= h_best and (k == 2 or step_reaching(st, k - 2, h_best, h, nodes) >= h_best):
+            best = k - 1
+            h_best = h_low
     if best == k and k < st.max_order and n_past >= k + 3 and unchanged and st.caution == 0:
-        if allows(st, k + 1, RAISE_GAIN * h_best, nodes):
+        h_high = step_reaching(st, k + 1, RAISE_GAIN * h_best, h, nodes)
+        if h_high > RAISE_GAIN * h_best:
             best = k + 1
-            h_best = step_at_order(st, k + 1, h, nodes)
+            h_best = h_high
     ratio = h_best / h
     if best != k:
         st.order = best
@@ -121,7 +133,7 @@ def after_error_failure(st, error, fails):
         best = k
         h_best = step_at_order(st, k, h, nodes)
         lowest = max(1, k - 1) if fails == 1 else 1
-        while best > lowest and lower_allow(st, best, h_best, nodes):
+        while best > lowest and h_best <= step_below(st, best, h, nodes):
             best -= 1
             h_best = step_at_order(st, best, h, nodes)
         factor = h_best / h

@@ -20,6 +20,10 @@ CONSUMED_BYTES = 500_000
 
 MOST_RECORDS = 8192
 EVENT_BUFFER = 64
+RATE_ALLOWED = 0.12
+RATE_ALLOWED_IF_DEAR = 0.2
+DEAR = 12
+"""Residuals from which on a matrix is dear, and worth its price only at slower rates of the corrector."""
 
 
 def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_end: float, keep: bool) -> RunState:
@@ -65,6 +69,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.h_max = np.inf if options.max_step is None else options.max_step
     st.rtol = options.rtol
     st.newton_tolerance = NEWTON_TOLERANCE
+    st.rate_allowed = RATE_ALLOWED_IF_DEAR if problem.jacobian_residuals >= DEAR else RATE_ALLOWED
     st.max_order = options.highest_order if options.max_order is None else options.max_order
     st.max_iterations = MAX_ITERATIONS if options.max_iterations is None else options.max_iterations
     st.max_steps = options.max_steps or 0

@@ -30,7 +30,6 @@ from gearmbs.dae.problem import HISTORY_CHANGED
 EPS = 2.220446049250313e-16
 ROUNDED_STEP = 16.0 * EPS
 """Smallest step in units of the time, whose last digit is as much as is left of smaller ones."""
-RATE_WORTH_RENEWING = 0.12
 MAX_FAILS = 16
 NEWTON_SHRINK = 0.25
 RESTART_SHRINK = 0.1
@@ -280,7 +279,7 @@ def accept(st):
     count_noise(st)
     st.n_past = min(st.n_past + 1, bdf.HISTORY)
     st.t = st.t_new
-    if st.rate > RATE_WORTH_RENEWING:
+    if st.rate > st.rate_allowed:
         st.matrix_wanted = True
 
 
