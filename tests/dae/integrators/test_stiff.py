@@ -37,7 +37,8 @@ def test_digits_grow_with_the_tolerance(name, method):
         assert result.success, result.message
         errors.append(problem.error(result.y[-1]))
     errors = np.array(errors)
-    # a digit a decade: the same multiple of every tolerance. Van der Pol's jump turns an error of the time into one of the value: 60 tolerances at 1e-4
+    # a digit a decade: the same multiple of every tolerance; van der Pol's jump turns an error of the time into one of
+    # the value, 60 tolerances at 1e-4
     assert (errors < 60.0 * TOLERANCES + FLOOR.get(name, 0.0)).all()
 
 
