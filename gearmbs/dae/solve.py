@@ -60,9 +60,8 @@ def solve_dae(
 ) -> DAEResult:
     """Solve an implicit system G(t, y, y') = 0 of index one or two, or three with an ``error_mask``.
 
-    Mechanical systems with constraints on positions only (index three) fail with the default error control, since the
-    error of their velocities does not shrink with the step: put the positions alone under control, or better, write
-    the stabilised index-2 form, with the constraints on velocities too and a second set of multipliers.
+    Mechanical systems of index three fail with the default error control, since the error of their velocities does not
+    shrink with the step: put positions alone under control, or better, write the stabilised index-2 form.
 
     Parameters
     ----------
@@ -95,7 +94,7 @@ def solve_dae(
     Returns
     -------
     DAEResult
-        ``y`` has one row for each time. Numerical failures do not raise: see ``status`` and ``message``.
+        One row of ``y`` for each time. Numerical failures do not raise: see ``status`` and ``message``.
 
     Raises
     ------
@@ -104,13 +103,12 @@ def solve_dae(
 
     Examples
     --------
-    >>> import numpy as np
     >>> from gearmbs.dae import solve_dae
     >>> def decay(t, y, yp, out):
     ...     out[0] = yp[0] + y[0]
     >>> result = solve_dae(decay, (0.0, 1.0), [1.0], rtol=1e-8, t_eval=[1.0])
-    >>> bool(abs(result.y[-1, 0] - np.exp(-1.0)) < 1e-6)
-    True
+    >>> round(float(result.y[-1, 0]), 6)
+    0.367879
     """
     of_equations = {name: more.pop(name) for name in OF_EQUATIONS if name in more}
     chosen = Options.gather(method, options, more, "beside what is said of the equations ")
