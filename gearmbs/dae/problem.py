@@ -21,6 +21,8 @@ IVEC = types.int64[::1]
 
 RESIDUAL_SIG = types.void(F8, VEC, VEC, VEC, IVEC, VEC, VEC)
 JACOBIAN_SIG = types.void(F8, VEC, VEC, F8, VEC, IVEC, VEC, VEC)
+"""jacobian(t, y, yp, cj, vals, idata, rdata, work): write dG/dy + cj dG/dy' at (t, y, y') to ``vals``, in the order of
+the CSC pattern; the tables and the scratch array are those of the `DAEProblem`."""
 KEPT, HISTORY_CHANGED, MATRIX_OUTDATED = range(3)
 """What a hook tells the integrator."""
 HOOK_SIG = types.int64(F8, MAT, I8, IVEC, VEC, VEC)

@@ -64,6 +64,25 @@ FORCE_RECORD = 6
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def apply_load(b, sign, row, wrench, at, marker_body, kin, frame, partial, scratch, rhs):
+    """Add one side of a force element's load to the right-hand side; nothing on the ground.
+
+    Parameters
+    ----------
+    b : int
+        Body or elastic frame that the load acts on.
+    sign : float
+        1 for I's body, -1 for J's.
+    row : ndarray of int, shape (FORCE_COLUMNS,)
+        The element's row of the force table; both sides act at the origin of its marker I.
+    wrench : ndarray, shape (6,)
+        F, N and N, N m; global components.
+    at, marker_body, kin, frame, partial
+        Tables of places, of the markers' bodies, of kinematics, of markers, and of elastic frames' derivatives.
+    scratch : ndarray
+        The shared scratch, of which the places from ``S_VECTOR`` on are used.
+    rhs : ndarray
+        Generalised forces of the acceleration system, added to.
+    """
     if b == 0:
         return
     if is_elastic(b, at):
@@ -187,11 +206,26 @@ def put_modal_body(mode, slot, vals, k, y, at, modal, kin_row, rhs):
 def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
     """Assemble the saddle-point matrix (by slots) and right-hand side; return the number of entries.
 
-    The kinematics, marker and function tables must be up to date. Without loads the right-hand side lacks the
-    applied forces: enough for a projection.
+    The kinematics, marker and function tables must be up to date.
 
-    ``phi`` receives 3 values a row one after the other: Phi, Phi_q v + Phi_t, Phi_t.
-    ``loads[f]`` receives F, N and the diagnostics of force element f; it need not be cleared.
+    Parameters
+    ----------
+    t : float
+        Time, s.
+    y : ndarray, shape (unknowns,)
+    slot, vals
+        As in `gearmbs.dae.equations.entries.put`, with the mode from the header of ``idata``; numbers are added up.
+    rhs : ndarray, shape (coordinates + rows,)
+        Written: generalised forces, then -gamma of each row.
+    phi : ndarray, shape (3 rows,)
+        Written: Phi, Phi_q v + Phi_t and Phi_t of each row in turn.
+    loads : ndarray, shape (elements, FORCE_RECORD + diagnostics)
+        Written if the loads are wanted: F, N and diagnostics of each force element; need not be cleared.
+    idata : ndarray of int
+        Integer tables, for their header.
+    tab : Tables
+    with_loads : bool
+        Whether the right-hand side includes the applied forces, which a projection does not need.
     """
     mode = idata[T.H_MODE]
     bodies, rows = idata[T.H_BODIES], idata[T.H_ROWS]

@@ -122,7 +122,27 @@ def slot_of(tab, depends, body):
 
 @njit(cache=True, error_model="numpy")
 def add_component(row, k, ex, ey, ez, first, t, y, tab, wrench, jac, want_jac):
-    """Add tape k times the unit vector e to ``wrench[first:first+3]`` and e times its gradient to ``jac``; return f."""
+    """Add tape k times the unit vector e to ``wrench[first:first+3]`` and e times its gradient to ``jac``; return f.
+
+    Parameters
+    ----------
+    row : ndarray of int, shape (FORCE_COLUMNS,)
+        The element's row of the force table.
+    k : int
+        Tape, whose value is f in N or N m.
+    ex, ey, ez : float
+        e, global components.
+    first : int
+        0 for a force, 3 for a torque.
+    t, y : float, ndarray
+        Time, s, and the unknowns.
+    tab : Tables
+    wrench : ndarray, shape (6,)
+        F and N.
+    jac : ndarray, shape (6, FORCE_WIDTH)
+        Derivatives, columns as in `load`; left alone if ``want_jac`` is zero.
+    want_jac : int
+    """
     if want_jac == 0:
         f = value(k, t, y, tab)
     else:
@@ -165,7 +185,22 @@ def turn_columns(jac, first, q, fx, fy, fz):
 
 @njit(cache=True, error_model="numpy")
 def add_projector_columns(jac, q, factor, ex, ey, ez, frame, marker):
-    """Add ``factor`` (1 - e e^T) dP to the force rows, P the origin of a marker on the body of block q."""
+    """Add ``factor`` (1 - e e^T) dP to the force rows, P the origin of a marker on the body of block q.
+
+    Parameters
+    ----------
+    jac : ndarray, shape (6, FORCE_WIDTH)
+        Derivatives of F and N, 12 columns a block.
+    q : int
+        Place of the body in the dependency list.
+    factor : float
+        Force over length, N/m.
+    ex, ey, ez : float
+        Unit vector e, global components.
+    frame : ndarray, shape (markers, MK_COLUMNS)
+        Table of markers, up to date.
+    marker : int
+    """
     sx, sy, sz = frame[marker, 0], frame[marker, 1], frame[marker, 2]
     for r in range(3):
         er = ex if r == 0 else (ey if r == 1 else ez)
@@ -184,7 +219,22 @@ def add_projector_columns(jac, q, factor, ex, ey, ez, frame, marker):
 
 @njit(cache=True, error_model="numpy")
 def line_direction_columns(row, f, ex, ey, ez, length, tab, jac):
-    """Add f d(e) for e = (P_I - P_J)/|P_I - P_J|: f/length times the projector normal to e."""
+    """Add f d(e) for e = (P_I - P_J)/|P_I - P_J|: f/length times the projector normal to e.
+
+    Parameters
+    ----------
+    row : ndarray of int, shape (FORCE_COLUMNS,)
+        The element's row of the force table.
+    f : float
+        Force along e, N.
+    ex, ey, ez : float
+        e, global components.
+    length : float
+        |P_I - P_J|, m, not zero.
+    tab : Tables
+    jac : ndarray, shape (6, FORCE_WIDTH)
+        Derivatives, columns as in `load`.
+    """
     for side in range(2):
         marker = row[T.FORCE_I + side]
         body = tab.marker_body[marker]

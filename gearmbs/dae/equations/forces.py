@@ -39,7 +39,25 @@ def marker_pose(m, marker_body, kin, frame, out, k):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def fill_inputs(row, y, extra_i, extra_r, angle, fval, sees, out, k):
-    """Write the unknowns, functions of time and references of angles that an element asks for to ``out[k:]``."""
+    """Write the inputs that an element declares to ``out[k:]``; return the place after the last.
+
+    Parameters
+    ----------
+    row : ndarray of int, shape (FORCE_COLUMNS,)
+        The element's row of the force table.
+    y : ndarray, shape (unknowns,)
+        Its further unknowns come first.
+    extra_i, extra_r : ndarray of int, ndarray
+        Tables of extra integers and reals.
+    angle : ndarray of int, shape (angles, ANGLE_COLUMNS)
+        Counted angles, whose references come last.
+    fval : ndarray, shape (functions, FUNCTION_VALUES)
+        Functions of time, whose values come second.
+    sees : int
+        Place in ``extra_i`` of the number of functions, behind the list of markers.
+    out, k : ndarray, int
+        Where to write, and the first place.
+    """
     at = row[T.FORCE_DEPENDS]
     at += 1 + extra_i[at]
     for q in range(at + 1 + row[T.FORCE_STATES], at + 1 + extra_i[at]):

@@ -23,7 +23,23 @@ from gearmbs.dae.equations import layout as T
 @njit("void(float64[:, ::1], int64, int64, float64, float64[:, ::1], int64, int64, float64[::1], int64)",
       cache=True, error_model="numpy")  # fmt: skip
 def add_cross_columns(jac, qi, qj, factor, frame, i, a, b, bk):
-    """Add ``factor`` d(a x b) to the moment rows: a is an axis of marker i on I's body, b is fixed in J's body."""
+    """Add ``factor`` d(a x b) to the moment rows: a is an axis of marker i on I's body, b is fixed in J's body.
+
+    Parameters
+    ----------
+    jac : ndarray, shape (6, FORCE_WIDTH)
+        Derivatives of F and N, 12 columns a body of the dependency list.
+    qi, qj : int
+        Places of I's and J's body in that list, -1 of a body without one.
+    factor : float
+        Moment, N m.
+    frame : ndarray, shape (markers, MK_COLUMNS)
+        Table of markers, up to date.
+    i, a : int
+        Marker I, and the place of the axis in its row of ``frame``.
+    b, bk : ndarray, int
+        Global components of b, from ``b[bk]`` on.
+    """
     ax, ay, az = frame[i, a], frame[i, a + 1], frame[i, a + 2]
     bx, by, bz = b[bk], b[bk + 1], b[bk + 2]
     dot = ax * bx + ay * by + az * bz
@@ -48,7 +64,22 @@ def add_direction_columns(jac, q, factor, e, k):
 
 @njit(cache=True, error_model="numpy")
 def add_distance_columns(jac, qi, qj, factor, i, j, tab, s):
-    """Add ``factor`` d(e), e the direction from J to I."""
+    """Add ``factor`` d(e) to the force rows, e the direction from J to I.
+
+    Parameters
+    ----------
+    jac : ndarray, shape (6, FORCE_WIDTH)
+        Derivatives of F and N, 12 columns a body of the dependency list.
+    qi, qj : int
+        Places of I's and J's body in that list, -1 of a body without one.
+    factor : float
+        Minus the row's multiplier times the term's coefficient, N.
+    i, j : int
+        Markers.
+    tab : Tables
+    s : ndarray
+        Scratch, 3 places.
+    """
     terms.separation(tab.kin, tab.frame, tab.marker_body[i], tab.marker_body[j], i, j, s, 0)
     length = terms.dot3(s, 0, s, 0) ** 0.5
     for side in range(2):
@@ -62,7 +93,23 @@ def add_distance_columns(jac, qi, qj, factor, i, j, tab, s):
 
 @njit(cache=True, error_model="numpy")
 def add_angle_columns(jac, qi, qj, factor, i, j, frame, s):
-    """Add ``factor`` d(m), m = (c x_I x y_J - s x_I x x_J)/(c^2 + s^2) the moment of a counted angle."""
+    """Add ``factor`` d(m), m = (c x_I x y_J - s x_I x x_J)/(c^2 + s^2) the moment of a counted angle.
+
+    Parameters
+    ----------
+    jac : ndarray, shape (6, FORCE_WIDTH)
+        Derivatives of F and N, 12 columns a body of the dependency list.
+    qi, qj : int
+        Places of I's and J's body in that list, -1 of a body without one.
+    factor : float
+        Minus the row's multiplier times the term's coefficient, N m.
+    i, j : int
+        Markers.
+    frame : ndarray, shape (markers, MK_COLUMNS)
+        Table of markers, up to date.
+    s : ndarray
+        Scratch, 9 places.
+    """
     x, y = T.MK_AXES, T.MK_AXES + 3
     sine = terms.dot3(frame[i], x, frame[j], y)
     cosine = terms.dot3(frame[i], x, frame[j], x)

@@ -154,7 +154,21 @@ def add_dot_term(k, coef, lam, mu, at, term, marker_body, kin, frame, s, out):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def put_point(mode, slot, vals, k, row, coef, term, at, marker_body, frame):
-    """Hand over the gradient of a POINT term; return the number of the next entry."""
+    """Hand over the gradient of a POINT term; return the number of the next entry.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As in `gearmbs.dae.equations.entries.put`.
+    row : int
+        Row of the matrix: number of coordinates + number of the constraint row.
+    coef : float
+        Coefficient of the term.
+    term : ndarray of int, shape (TERM_COLUMNS,)
+        The term's row of the table of terms.
+    at, marker_body, frame
+        Tables of places, of the markers' bodies and of markers.
+    """
     c = term[T.TERM_AXES]
     c1 = c + 1 if c < 2 else 0
     c2 = c - 1 if c > 0 else 2
@@ -182,7 +196,23 @@ def put_point(mode, slot, vals, k, row, coef, term, at, marker_body, frame):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def put_dot(mode, slot, vals, k, row, coef, term, at, marker_body, cross):
-    """Hand over the gradient of a DOT1 term, given that of its first side; return the number of the next entry."""
+    """Hand over the gradient of a DOT1 term, given that of its first side; return the number of the next entry.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As in `gearmbs.dae.equations.entries.put`.
+    row : int
+        Row of the matrix: number of coordinates + number of the constraint row.
+    coef : float
+        Coefficient of the term.
+    term : ndarray of int, shape (TERM_COLUMNS,)
+        The term's row of the table of terms.
+    at, marker_body
+        Tables of places and of the markers' bodies.
+    cross : ndarray
+        Gradient of phi with respect to the rotation of I's body, in the first three places, as `dot_motion` writes it.
+    """
     for side in range(2):
         body = marker_body[term[T.TERM_I + side]]
         if body == 0:

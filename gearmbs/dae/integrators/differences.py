@@ -227,7 +227,18 @@ def _difference_colour(residual, t, y, yp, cj, vals, idata, rdata, work, c, wide
 def difference_matrix(residual, t, y, yp, cj, vals, idata, rdata, work):
     """Write dG/dy + cj dG/dy' by forward differences, one residual for each colour and one for the base.
 
-    ``idata``, ``rdata`` and ``work`` are laid out by `pack_tables`; ``residual`` gets them as they are.
+    Columns with entries that rounding may hide cost their colour a second residual.
+
+    Parameters
+    ----------
+    residual : function
+        Of RESIDUAL_SIG.
+    t, y, yp, cj : float, ndarray, ndarray, float
+        Time, y, y' and the factor of dG/dy'.
+    vals : ndarray, shape (nnz,)
+        Written, in CSC order.
+    idata, rdata, work : ndarray
+        Tables laid out by `pack_tables`, handed to ``residual`` as they are; G is left in the first block of ``work``.
     """
     n = idata[N]
     base = work[0:n]
@@ -437,7 +448,19 @@ def _append_event(before: Callable, function: Callable, takes_p: bool, place: in
     cache=True,
 )
 def find_differential(residual, t, y, yp, differential, idata, rdata, work):
-    """Mark the unknowns whose derivative changes the residual at one point."""
+    """Mark the unknowns whose derivative changes the residual at one point.
+
+    Parameters
+    ----------
+    residual : function
+        Of RESIDUAL_SIG.
+    t, y, yp : float, ndarray, ndarray
+        The point.
+    differential : ndarray of bool, shape (n,)
+        Written.
+    idata, rdata, work : ndarray
+        Tables of the problem, handed to ``residual`` as they are.
+    """
     n = y.shape[0]
     base = np.empty(n)
     moved = np.empty(n)

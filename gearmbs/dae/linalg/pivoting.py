@@ -462,10 +462,9 @@ def choose_pivots(indptr, indices, scaled, drop, threshold, columns, rows):
         CSC pattern; entries that happen to be zero stay in the pattern.
     scaled : ndarray
         Values after `equilibrate`.
-    drop : float
-        Columns whose entries have all fallen below this fraction of their largest value are left without a pivot.
-    threshold : float
-        Fraction of the largest entry left in its column that a pivot must reach.
+    drop, threshold : float
+        Fraction of its largest value below which a column has cancelled and is left without a pivot; fraction of the
+        largest entry left in its column that a pivot must reach.
     columns, rows : Lines
         Scratch, of `new_lines`; ``columns`` with values.
 
@@ -477,10 +476,8 @@ def choose_pivots(indptr, indices, scaled, drop, threshold, columns, rows):
         Largest entry met on the way, beside the largest of the matrix.
     pivot_rows, pivot_cols : ndarray, shape (n,)
         Original row and column of each pivot; in a singular case the places from ``rank`` on hold what was left over.
-    l_ptr, l_rows : ndarray
-        Original rows below each pivot in its column.
-    u_ptr, u_cols : ndarray
-        Original columns right of each pivot in its row.
+    l_ptr, l_rows, u_ptr, u_cols : ndarray
+        Original rows below each pivot in its column, and original columns right of each pivot in its row.
     """
     n = indptr.shape[0] - 1
     nnz = indices.shape[0]

@@ -161,6 +161,21 @@ def project(t, at, phi, plan, factors, pair, idata, tab):
     """Move y to the nearest position and velocity, in the metric of the masses, that satisfy the constraints.
 
     Brings the tables up to date with it; returns the largest |Phi| before.
+
+    Parameters
+    ----------
+    t : float
+        Time, s.
+    at : ndarray, shape (unknowns,)
+        y, changed in place; conjugate momenta are left alone.
+    phi : ndarray, shape (3 rows,)
+        Violations at y, as `saddle` writes them.
+    plan, factors : LUPlan, LUFactors
+        The factored saddle-point matrix.
+    pair : ndarray, shape (4, coordinates + rows)
+        Scratch of `solve_pair`; left in its first two rows: displacements and changes of velocity, then multipliers.
+    idata, tab : ndarray of int, Tables
+        Integer tables, for their header, and the views of all.
     """
     rows = idata[T.H_ROWS]
     base = pair.shape[1] - rows
@@ -186,11 +201,28 @@ def project(t, at, phi, plan, factors, pair, idata, tab):
 def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, factors, records, growth):
     """Evaluate output rows from ``first``; return the row where new pivots are needed, or ``last``.
 
-    Each row of y is first projected onto the constraints, from which the integrator and its interpolant stray by the
-    tolerance; y itself is not changed.
+    Each row of y is first projected onto the constraints, from which the integrator and its interpolant drift within
+    the tolerance; y itself is not changed.
 
-    Asked for it in the header of ``idata``, only count the entries of the matrix or write their places to ``vals``;
-    with ``last`` less than ``first``, assemble row ``first`` without solving. ``growth`` is what the factors may grow.
+    Parameters
+    ----------
+    first, last : int
+        Rows ``first`` to ``last - 1``; if ``last`` is less than ``first``, row ``first`` is assembled but not solved.
+    t : ndarray, shape (m,)
+        Output times, s.
+    y : ndarray, shape (m, unknowns)
+    slots : ndarray of int
+        Place of each entry of the matrix among its values.
+    idata, rdata, work : ndarray
+        Tables of the model. In the modes COUNT and PLACES of the header the entries are only counted or located.
+    vals : ndarray, shape (nnz,)
+        Values of the matrix in CSC order; in the mode COUNT the number of entries, in PLACES their rows and columns.
+    plan, factors : LUPlan, LUFactors
+        Of the saddle-point matrix; the factors are overwritten.
+    records : Records
+        Written.
+    growth : float
+        Largest growth from `factor` with which the pivots are kept.
     """
     rows = records.force.shape[1]
     size = records.solution.shape[1]

@@ -101,6 +101,19 @@ def _take_pose(pose, tab):
 def _move_member(m, members, tab, solution, pose, acceleration, wrench, s):
     """Write the pose and accelerations of a member, and the wrench about the global origin that moves it.
 
+    Parameters
+    ----------
+    m : int
+        Member.
+    members : Members
+    tab : Tables
+        Of the integrated model, kinematics up to date.
+    solution : ndarray
+        Accelerations a, alpha of each group first, m/s^2 and rad/s^2.
+    pose, acceleration : ndarray
+        Rows of the members' records, written: 18 and 6 places a member.
+    wrench : ndarray, shape (members, 6)
+        Row m is written: mass times (a - g) and the moment, N and N m, global components.
     s : ndarray
         Scratch, 24 places: acceleration of the group in s[0:6], arm in s[6:9].
     """
@@ -147,7 +160,25 @@ def _move_member(m, members, tab, solution, pose, acceleration, wrench, s):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _deduct(m, factor, force, f_at, moment, m_at, point, wrench, s):
-    """Take a load on a member away from the wrench that moves it: a force at a point, and a moment."""
+    """Subtract a load on a member, a force at a point and a moment, from the wrench that moves it.
+
+    Parameters
+    ----------
+    m : int
+        Member; nothing is done for -1, the ground.
+    factor : float
+        Of the load.
+    force, f_at : ndarray, int
+        Force, N, global components, from ``force[f_at]`` on.
+    moment, m_at : ndarray, int
+        Moment about the point, N m, likewise.
+    point : ndarray, shape (3,)
+        Where the force acts, m, global.
+    wrench : ndarray, shape (members, 6)
+        Force, and moment about the global origin, of each member; row m is changed.
+    s : ndarray
+        Scratch, 3 places.
+    """
     if m < 0:
         return
     terms.cross3(point, 0, force, f_at, s, 0)
@@ -212,7 +243,25 @@ def _deduct_rows(multipliers, members, tab, wrench, s):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _internal_reactions(members, tab, wrench, multipliers, phi, force, moment, s):
-    """Write what the fixed joints transmit, from the outermost members inwards."""
+    """Write what the fixed joints transmit, from the outermost members inwards.
+
+    Parameters
+    ----------
+    members : Members
+    tab : Tables
+        Of the integrated model, markers up to date.
+    wrench : ndarray, shape (members, 6)
+        Force, and moment about the global origin, that moves each member, less the loads of force elements and of
+        other constraints; what a joint transmits is added to its parent's.
+    multipliers : ndarray, shape (rows,)
+        Those of fixed joints are written.
+    phi : ndarray, shape (3 rows,)
+        Set to zero in the rows of fixed joints.
+    force, moment : ndarray, shape (rows, 3)
+        Reactions on I's body at marker I, N and N m, global components.
+    s : ndarray
+        Scratch, 12 places.
+    """
     for e in range(members.edge.shape[0]):
         edge = members.edge[e]
         child, parent = edge[EDGE_CHILD], edge[EDGE_PARENT]

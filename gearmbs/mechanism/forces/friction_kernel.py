@@ -1,4 +1,4 @@
-"""Kernel of joint friction, whose law stands in `gearmbs.mechanism.friction`.
+"""Kernel of joint friction, whose law is given in `gearmbs.mechanism.friction`.
 
 Every quantity is carried with its derivatives by all that the element depends on: 12 variations of the frames of I and
 J each, the deformations, the six components of the joint's reaction. Quantities are rows of the scratch, the value
@@ -115,7 +115,21 @@ def length_of(rows, out, first, last, tiny):
 
 @njit(cache=True, error_model="numpy")
 def component(rows, out, frames, f, axis, x, y, z):
-    """Write the component of a vector along an axis of frame f, with its derivative by the frame's rotation only."""
+    """Write the component of a vector along an axis of frame f, with its derivative by the frame's rotation only.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (ROWS, 1 + dependencies)
+        The quantities: value, then derivatives.
+    out : int
+        Row to write.
+    frames : ndarray, shape (2, 18)
+        Frames of I and J, as in `gearmbs.dae.equations.force_elements`.
+    f, axis : int
+        Frame and its axis: 0, 1, 2 for x, y, z.
+    x, y, z : float
+        The vector, global components.
+    """
     clear(rows, out, 0.0)
     ex, ey, ez = frames[f, FRAME_A + axis], frames[f, FRAME_A + 3 + axis], frames[f, FRAME_A + 6 + axis]
     rows[out, 0] = ex * x + ey * y + ez * z
@@ -286,7 +300,11 @@ def resisting(ints, reals, slips, rows):
 
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
 def joint_friction(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
-    """Write the friction of a joint; inputs are the reaction F and N on I's body at marker I, if it has a say."""
+    """Write the friction of a joint.
+
+    Arguments as in `gearmbs.dae.equations.force_elements`; the inputs are the reaction F and N on I's body at
+    marker I if the friction depends on it, else none.
+    """
     kind, f = ints[KIND], ints[FRAME]
     columns = 1 + 24 + states.size + inputs.size
     rows = matrix_at(work, 0, ROWS, columns)

@@ -1,8 +1,8 @@
-"""Kernels of force elements given by a function of one's own, whose address stands in front of the integers.
+"""Kernels of force elements given by a user's function, whose address comes first among the integers.
 
 The function has the signature `FUNCTION_SIG`; see :meth:`gearmbs.mechanism.Mechanism.force`. Without a second one for
-the derivatives these are differences: each spatial variation of each frame and each state is moved by a small step to
-either side. Both kernels are compiled once, with the package; only the function is compiled for the one who wrote it.
+the derivatives these are central differences, with a small step in each spatial variation of each frame and in each
+state. Both kernels are compiled once, with the package; only the user's function is compiled when it is given.
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ SMALLEST_STATE_STEP = 1e-9
 
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
 def with_derivatives(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
-    """Call a function, and the one for its derivatives."""
+    """Call the user's function and, if derivatives are wanted, the function that gives them.
+
+    Arguments as in `gearmbs.dae.equations.force_elements`; ``ints`` holds the addresses of both.
+    """
     parameters = vector_at(reals, STEPS, reals.size - STEPS)
     function_at(ints[0])(t, frames, states, parameters, wrench, rates, diagnostics)
     if want & DERIVATIVES:
@@ -61,7 +64,11 @@ def vary(frames, out, k, c, h):
 
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
 def by_differences(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
-    """Call a function, around the point as well if derivatives are wanted: central differences."""
+    """Call the user's function and, if derivatives are wanted, find them by central differences.
+
+    Arguments as in `gearmbs.dae.equations.force_elements`; ``ints`` holds the address of the function, ``reals``
+    begins with the steps.
+    """
     parameters = vector_at(reals, STEPS, reals.size - STEPS)
     function_at(ints[0])(t, frames, states, parameters, wrench, rates, diagnostics)
     if not want & DERIVATIVES:

@@ -90,7 +90,11 @@ def measure_slopes(ints, frames, work):
 
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
 def matrix_force(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
-    """Write F and N; ``ints`` holds the places of the references of AX, AY and AZ among the inputs, or -1."""
+    """Write F and N of a bushing, field or beam.
+
+    Arguments as in `gearmbs.dae.equations.force_elements`; ``ints`` holds the places of the references
+    of AX, AY and AZ among the inputs, or -1.
+    """
     measure(ints, frames, inputs, reals, work)
     for r in range(6):
         load = reals[PRELOAD + r]

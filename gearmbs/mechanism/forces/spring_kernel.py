@@ -27,7 +27,10 @@ PRELOAD = 3
 
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
 def line_spring(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
-    """Write the force along the line from J to I; nothing where the markers coincide."""
+    """Write the force along the line from J to I; nothing where the markers coincide.
+
+    Arguments as in `gearmbs.dae.equations.force_elements`; there are no inputs.
+    """
     k, c, preload = reals[STIFFNESS], reals[DAMPING], reals[PRELOAD]
     dx, dy, dz = (
         frames[0, FRAME_P] - frames[1, FRAME_P],
@@ -61,7 +64,11 @@ def line_spring(ints, reals, t, frames, states, inputs, want, work, wrench, rate
 
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
 def axis_spring(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
-    """Write the torque about the z axis of J; the only input is the reference of the counted angle AZ."""
+    """Write the torque about the z axis of J.
+
+    Arguments as in `gearmbs.dae.equations.force_elements`; the only input is
+    the reference of the counted angle AZ.
+    """
     k, c, preload = reals[STIFFNESS], reals[DAMPING], reals[PRELOAD]
     z, w = work[0:3], work[3:6]
     speed = 0.0
