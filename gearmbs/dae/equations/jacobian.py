@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.views import matrix_at, vector_at
+from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
@@ -535,6 +535,7 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
     idata, rdata, work : ndarray
         The packed tables and the work array.
     """
+    y, yp, vals, idata = uncounted(y), uncounted(yp), uncounted(vals), uncounted(idata)
     tab = T.unpack(idata, rdata, work)
     mode = idata[T.H_MODE]
     update_tables(t, y, tab)

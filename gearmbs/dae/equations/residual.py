@@ -22,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.views import matrix_at, vector_at
+from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
@@ -216,6 +216,7 @@ def add_own_states(row, y, yp, idata, state, scratch, out):
 @njit(RESIDUAL_SIG, cache=True, error_model="numpy")
 def residual(t, y, yp, out, idata, rdata, work):
     """Evaluate G(t, y, y') of eq. (8) into ``out``."""
+    y, yp, out, idata = uncounted(y), uncounted(yp), uncounted(out), uncounted(idata)
     tab = T.unpack(idata, rdata, work)
     update_tables(t, y, tab)
     for b in range(1, idata[T.H_BODIES]):
