@@ -10,6 +10,7 @@ from numba import float64, int64, types
 from scipy.sparse import csc_array
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
 from gearmbs.dae.equations import accelerations as index1
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.entries import COUNT, NUMBERS, PLACES, compressed
@@ -192,6 +193,84 @@ def project(t, at, phi, plan, factors, pair, idata, tab):
     return strayed
 
 
+@njit(cache=True, error_model="numpy", nogil=True)
+def _evaluate(
+    first, last, t, y, slots, idata, rdata, work, vals, plan, factors, records, growth, rhs, pair, at, factored, allowed
+):  # fmt: skip
+    """Do what `evaluate_rows` promises, in arrays that its caller keeps alive.
+
+    Parameters
+    ----------
+    first, last, t, y, slots, idata, rdata, work, vals, plan, factors, records, growth
+        As of `evaluate_rows`.
+    rhs, pair, at : ndarray, shapes (n,), (4, n) and (unknowns,)
+        Right-hand side, pairs of right-hand sides and solutions, the unknowns of one row.
+    factored, allowed : ndarray, shape (nnz,)
+        The matrix that was factored last, and by how much its entries may differ from another's.
+    """
+    rows = records.force.shape[1]
+    size = records.solution.shape[1]
+    base = size - rows
+    idata, slots, vals, t = uncounted(idata), uncounted(slots), uncounted(vals), uncounted(t)
+    rhs, at, factored, allowed = uncounted(rhs), uncounted(at), uncounted(factored), uncounted(allowed)
+    pair = matrix_at(pair, 0, 4, size)
+    elements, columns = records.loads.shape[1], records.loads.shape[2]
+    tab = T.unpack(idata, rdata, work)
+    only_assemble = last < first or idata[T.H_MODE] != NUMBERS
+    if not only_assemble:
+        for p in range(plan.a_src.size):
+            allowed[plan.a_src[p]] = ROUNDED / plan.a_scale[p]
+    # a call that is handed all tables costs a tenth of a microsecond
+    counts_turns, has_reactions = turns_are_counted(tab), index1.has_reactions(tab)
+    for k in range(first, first + 1 if only_assemble else last):
+        for c in range(at.size):
+            at[c] = y[k, c]
+        phi = vector_at(records.phi, 3 * rows * k, 3 * rows)
+        loads = matrix_at(records.loads, elements * columns * k, elements, columns)
+        solution = vector_at(records.solution, size * k, size)
+        update_tables(t[k], at, tab)
+        if counts_turns and not only_assemble:
+            track(t[k], at, tab, False)
+        projected = rows == 0 or only_assemble
+        passes = 0
+        while True:
+            if not projected:
+                # the factors of the row before serve while the bodies have hardly turned since
+                spin = index1.violations(t[k], at, phi, idata, tab)
+                if k > first and spin * (t[k] - t[k - 1]) <= SAME_POSITION:
+                    records.strayed[k] = project(t[k], at, phi, plan, factors, pair, idata, tab)
+                    projected = True
+            if idata[T.H_MODE] == NUMBERS:
+                vals[:] = 0.0
+            count = index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, projected)
+            if only_assemble:
+                solution[:] = rhs
+                if idata[T.H_MODE] == COUNT:
+                    vals[0] = count
+                return last
+            if passes == 0 and not unchanged(vals, factored, allowed):
+                if not factor(plan, factors, vals) <= growth:
+                    return k
+                factored[:] = vals
+            if not projected:
+                records.strayed[k] = project(t[k], at, phi, plan, factors, pair, idata, tab)
+                projected = True
+                continue
+            solve(plan, factors, rhs, solution)
+            # loads that depend on reactions change the right-hand side only
+            passes += 1
+            if not has_reactions or passes > REACTION_PASSES:
+                break
+            if renew_reactions(at, vector_at(solution, base, rows), idata, tab) <= 1e-12:
+                break
+        force = matrix_at(records.force, 3 * rows * k, rows, 3)
+        moment = matrix_at(records.moment, 3 * rows * k, rows, 3)
+        index1.loads_of_rows(vector_at(solution, base, rows), idata, tab, force, moment)
+        pose = vector_at(records.pose, records.pose.shape[1] * k, records.pose.shape[1])
+        index1.poses(at, tab.at, tab.code, tab.kin, pose)
+    return last
+
+
 @njit(
     int64(int64, int64, _VEC, _MAT, _IVEC, _IVEC, _VEC, _VEC, _VEC, PLAN_TYPE, FACTORS_TYPE, RECORDS_TYPE, float64),
     cache=True,
@@ -224,61 +303,13 @@ def evaluate_rows(first, last, t, y, slots, idata, rdata, work, vals, plan, fact
     growth : float
         Largest growth from `factor` with which the pivots are kept.
     """
-    rows = records.force.shape[1]
     size = records.solution.shape[1]
-    base = size - rows
-    tab = T.unpack(idata, rdata, work)
-    rhs, pair = np.zeros(size), np.zeros((4, size))
-    at = np.zeros(y.shape[1])
-    only_assemble = last < first or idata[T.H_MODE] != NUMBERS
+    rhs, pair, at = np.zeros(size), np.zeros((4, size)), np.zeros(y.shape[1])
     factored, allowed = np.full(vals.size, np.inf), np.zeros(vals.size)
-    if not only_assemble:
-        for p in range(plan.a_src.size):
-            allowed[plan.a_src[p]] = ROUNDED / plan.a_scale[p]
-    # a call that is handed all tables costs a tenth of a microsecond
-    counts_turns, has_reactions = turns_are_counted(tab), index1.has_reactions(tab)
-    for k in range(first, first + 1 if only_assemble else last):
-        for c in range(at.size):
-            at[c] = y[k, c]
-        phi, loads = records.phi[k], records.loads[k]
-        update_tables(t[k], at, tab)
-        if counts_turns and not only_assemble:
-            track(t[k], at, tab, False)
-        projected = rows == 0 or only_assemble
-        passes = 0
-        while True:
-            if not projected:
-                # the factors of the row before serve while the bodies have hardly turned since
-                spin = index1.violations(t[k], at, phi, idata, tab)
-                if k > first and spin * (t[k] - t[k - 1]) <= SAME_POSITION:
-                    records.strayed[k] = project(t[k], at, phi, plan, factors, pair, idata, tab)
-                    projected = True
-            if idata[T.H_MODE] == NUMBERS:
-                vals[:] = 0.0
-            count = index1.saddle(t[k], at, slots, vals, rhs, phi, loads, idata, tab, projected)
-            if only_assemble:
-                records.solution[k, :] = rhs
-                if idata[T.H_MODE] == COUNT:
-                    vals[0] = count
-                return last
-            if passes == 0 and not unchanged(vals, factored, allowed):
-                if not factor(plan, factors, vals) <= growth:
-                    return k
-                factored[:] = vals
-            if not projected:
-                records.strayed[k] = project(t[k], at, phi, plan, factors, pair, idata, tab)
-                projected = True
-                continue
-            solve(plan, factors, rhs, records.solution[k])
-            # loads that depend on reactions change the right-hand side only
-            passes += 1
-            if not has_reactions or passes > REACTION_PASSES:
-                break
-            if renew_reactions(at, records.solution[k, base:], idata, tab) <= 1e-12:
-                break
-        index1.loads_of_rows(records.solution[k, base:], idata, tab, records.force[k], records.moment[k])
-        index1.poses(at, tab.at, tab.code, tab.kin, records.pose[k])
-    return last
+    return _evaluate(
+        first, last, t, y, slots, idata, rdata, work, vals, plan, factors, records, growth, rhs, pair, at, factored,
+        allowed,
+    )  # fmt: skip
 
 
 @cache
