@@ -1,9 +1,10 @@
 """Compiled kernels on disk, under a digest of all that they are made of.
 
 A digest covers the byte code of the function and of every function it calls, the values of the globals they name, the
-declared types and options, and the versions of Python, numba and LLVM and the processor. So an edit never finds stale
-code, a comment or docstring costs nothing, and nothing on disk is ever changed or deleted: processes, checkouts and
-users may share a folder. Looking costs no file work before the first kernel is called.
+declared types and options, the versions of Python, numba and LLVM, the processor, and the source of the modules that
+compile and keep kernels. So an edit never finds stale code, a comment or docstring of a kernel costs nothing, and
+nothing on disk is ever changed or deleted but a file that cannot be read: processes, checkouts and users may share a
+folder. Looking costs no file work before the first kernel is called.
 
 The folder is ``$NUMBA_CACHE_DIR`` if that is set; else ``__pycache__/kernels`` of the package that the kernel belongs
 to; or, where that cannot be written, ``gearmbs`` in the user's cache folder. Where nothing can be written, kernels
@@ -24,7 +25,7 @@ import uuid
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import llvmlite
 import numba
@@ -33,6 +34,9 @@ from numba.core import config, dispatcher, serialize
 
 FORMAT = "3"
 """To be raised when the files or what they hold change."""
+
+MAKERS = ("_jit", "_kernel_library", "_kernel_cache")
+"""Modules of this package that make what is kept; an edit of theirs makes all of it anew."""
 
 OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
 """Settings of numba's that change its machine code."""
@@ -44,11 +48,13 @@ _parts: dict[str, Any] = {}
 
 
 @functools.cache
-def _setting() -> str:
+def setting() -> str:
     """Return what all kernels of a process depend on."""
     magic = numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
     options = [(name, getattr(config, name, None)) for name in OPTIONS]
-    return repr((FORMAT, numba.__version__, llvmlite.__version__, platform.python_version(), magic, options))
+    made_by = [hashlib.sha256(Path(__file__).with_name(f"{name}.py").read_bytes()).hexdigest() for name in MAKERS]
+    versions = (numba.__version__, llvmlite.__version__, platform.python_version())
+    return repr((FORMAT, versions, magic, options, made_by))
 
 
 _identities: dict[Any, str] = {}
@@ -59,7 +65,11 @@ def identity(function: Any) -> str:
     known = _identities.get(function)
     if known is None:
         _identities[function] = "recursion"
-        known = _identities[function] = hashlib.sha256(_described(function).encode()).hexdigest()
+        try:
+            known = _identities[function] = hashlib.sha256(_described(function).encode()).hexdigest()
+        except BaseException:
+            del _identities[function]
+            raise
     return known
 
 
@@ -164,7 +174,7 @@ def _source(module: str) -> str:
 def file_name(kernel: Any, kind: str, args: tuple) -> str:
     """Return the name of the file of an entry or part."""
     told = [_type(t) for t in args]
-    text = repr((_setting(), identity(kernel), kind, told))
+    text = repr((setting(), identity(kernel), kind, told))
     digest = hashlib.sha256(text.encode()).hexdigest()[:24]
     return f"{kernel.__module__.partition('.')[2] or kernel.__module__}.{kernel.__name__}-{digest}.{kind}"
 
@@ -237,8 +247,13 @@ def load(kernel: Any, kind: str, args: tuple, rebuild: Callable) -> Any:
 def _load(file: str, package: str, kind: str, rebuild: Callable) -> Any:
     if kind == "part" and file in _parts:
         return _parts[file]
-    payload = _read(file, package)
-    made = None if payload is None else rebuild(numba.core.registry.cpu_target.target_context, package, file, payload)
+    try:
+        payload = _read(file, package)
+        target = numba.core.registry.cpu_target.target_context
+        made = None if payload is None else rebuild(target, package, file, payload)
+    except Exception:
+        # what cannot be rebuilt, for whatever reason, is compiled again and its file replaced
+        made = None
     if kind == "part" and made is not None:
         _parts[file] = made
     return made
@@ -282,18 +297,31 @@ def compiling(kernel: Any, kind: str, args: tuple) -> Iterator[Slot]:
 @contextlib.contextmanager
 def _lock(path: Path) -> Iterator[None]:
     try:
-        import fcntl
-
-        path.parent.mkdir(parents=True, exist_ok=True)
-        stream = open(path, "w")
-        fcntl.flock(stream, fcntl.LOCK_EX)
+        stream = _locked(path)
     except (ImportError, OSError):
         # two processes may then compile the same; both results are right
-        yield
-        return
+        stream = None
     try:
         yield
     finally:
-        with contextlib.suppress(OSError):
-            path.unlink()
-        stream.close()
+        if stream is not None:
+            # removed while it is held: who waits for it will see that it is gone
+            with contextlib.suppress(OSError):
+                path.unlink()
+            stream.close()
+
+
+def _locked(path: Path) -> IO:
+    """Return a file, held by this process alone, that stands at a path."""
+    import fcntl
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    while True:
+        with contextlib.ExitStack() as unless_held:
+            stream = unless_held.enter_context(open(path, "w"))
+            fcntl.flock(stream, fcntl.LOCK_EX)
+            # its last holder may have removed it meanwhile; what is locked then is a file that nobody else finds
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(stream.fileno()), path.stat()):
+                    unless_held.pop_all()
+                    return stream

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import os
+import pickle
+import shutil
 import subprocess
 import sys
 import textwrap
+import threading
+import time
+import zlib
 from pathlib import Path
 
 import pytest
+
+from gearmbs import _kernel_cache
 
 CALLEES = """
     from typing import NamedTuple
@@ -211,12 +218,63 @@ def test_folders_that_cannot_be_written(package, tmp_path):
 
 
 def test_damaged_files(package):
-    """A file that was cut short is compiled anew."""
+    """A file that was cut short, or holds what nothing can be rebuilt from, is compiled anew."""
     package.call()
+    strange = pickle.dumps(("what", "is", "this"))
     for path in (package.folder / "__pycache__" / "kernels").iterdir():
-        path.write_bytes(path.read_bytes()[:-7])
+        if path.suffix == ".part":
+            path.write_bytes(path.read_bytes()[:-7])
+        else:
+            path.write_bytes(zlib.crc32(strange).to_bytes(4, "little") + strange)
     assert package.call() == [7.0, ["caller", "scaled"]]
     assert package.call() == [7.0, []]
+
+
+def test_what_makes_the_files_is_in_their_names(tmp_path, monkeypatch):
+    for name in _kernel_cache.MAKERS:
+        shutil.copy(Path(_kernel_cache.__file__).with_name(f"{name}.py"), tmp_path)
+    known = _kernel_cache.setting()
+    monkeypatch.setattr(_kernel_cache, "__file__", str(tmp_path / "_kernel_cache.py"))
+    assert _kernel_cache.setting.__wrapped__() == known
+    with (tmp_path / "_jit.py").open("a") as stream:
+        stream.write("CHANGED = True\n")
+    assert _kernel_cache.setting.__wrapped__() != known
+
+
+def test_interrupted_description(monkeypatch):
+    """A digest that could not be finished is not taken for a recursion afterwards."""
+
+    def function():
+        return 1.0
+
+    def interrupted(function):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(_kernel_cache, "_described", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            _kernel_cache.identity(function)
+    assert len(_kernel_cache.identity(function)) == 64
+
+
+def test_lock_after_it_was_removed(tmp_path):
+    """Who waited for a lock holds the file that the next one will find, not the one that its last holder removed."""
+    pytest.importorskip("fcntl")
+    path = tmp_path / "kernel.lock"
+    seen = []
+
+    def second():
+        with _kernel_cache._lock(path):
+            seen.append(path.exists())
+
+    thread = threading.Thread(target=second)
+    with _kernel_cache._lock(path):
+        thread.start()
+        time.sleep(0.2)
+        assert seen == []
+    thread.join(timeout=30)
+    assert seen == [True]
+    assert not path.exists()
 
 
 def test_numba_calls_kernels(package):
