@@ -8,12 +8,14 @@ meets missing kernels does the same for those that it has imported.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import subprocess
 import sys
 import time
 import traceback
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from threading import Condition, Thread
 from typing import TYPE_CHECKING
 
@@ -22,6 +24,12 @@ if TYPE_CHECKING:
 
 HELPER = "GEARMBS_COMPILING"
 """Set in the environment of helper processes, which start none themselves."""
+
+INTRODUCE = "introduce"
+"""What a helper process is asked first; see `_introduction`."""
+
+SILENT = 5.0
+"""Seconds of compiling in a program before it tells how far it is, and between two such lines."""
 
 Report = Callable[[str], None]
 
@@ -43,7 +51,8 @@ def compile_all(
     Raises
     ------
     RuntimeError
-        If a kernel cannot be compiled; with its traceback.
+        If a kernel cannot be compiled, with its traceback; if helper processes do not start, or import another
+        checkout; or if kernels are missing and none of their folders can be written.
     """
     from gearmbs._kernel_calls import entries, import_all, kernel_modules, kernels
 
@@ -56,8 +65,21 @@ def compile_all(
     return time.perf_counter() - start
 
 
+_said: set[str] = set()
+_failures: list[str] = []
+
+
+def _say_once(line: str) -> None:
+    if line not in _said:
+        _said.add(line)
+        print(f"gearmbs: {line}", file=sys.stderr, flush=True)
+
+
 def compile_missing(kernel: Kernel) -> bool:
     """Compile what a program lacks that has imported a kernel and found it missing; tell so on standard error.
+
+    The announcement is printed once per process, and how far it is when it takes longer. Where helper processes fail,
+    this is told once, and they are not started again.
 
     Returns
     -------
@@ -68,25 +90,30 @@ def compile_missing(kernel: Kernel) -> bool:
     from gearmbs._kernel_calls import entries, kernels
 
     package = kernel.__module__.partition(".")[0]
-    if HELPER in os.environ or package != __package__ or not cache.writable(package):
+    if _failures or HELPER in os.environ or package != __package__ or not cache.writable(package):
         return False
     loaded = [name for name in list(sys.modules) if name.partition(".")[0] == package]
     wanted = entries(kernels(loaded), loaded)
     start = time.perf_counter()
-    told = [0.0]
+    told = 0.0
 
     def report(line: str) -> None:
+        nonlocal told
         now = time.perf_counter() - start
-        if now - told[0] > 10.0:
-            told[0] = now
+        if now - told > SILENT:
+            told = now
             print(f"gearmbs: {line.partition(' ')[0]} kernels after {now:.0f} s", file=sys.stderr, flush=True)
 
-    print("gearmbs: compiling the numerical kernels that are needed, once", file=sys.stderr, flush=True)
+    _say_once("compiling the numerical kernels that are needed, once")
     try:
         compile_entries([*{kernel, *wanted}], report)
-    except (RuntimeError, OSError):
+    except (RuntimeError, OSError) as error:
+        _failures.append(str(error))
+        reason = str(error).strip().rpartition("\n")[2]
+        _say_once(f"helper processes failed ({reason}); kernels are compiled one by one, when they are called")
         return False
-    print(f"gearmbs: compiled in {time.perf_counter() - start:.0f} s", file=sys.stderr, flush=True)
+    if told:
+        print(f"gearmbs: compiled in {time.perf_counter() - start:.0f} s", file=sys.stderr, flush=True)
     return True
 
 
@@ -95,6 +122,7 @@ def compile_entries(wanted: list[Kernel], report: Report | None = None, workers:
     tasks = _Tasks(wanted, report)
     if not tasks.waiting:
         return
+    _check_folders({kernel.__module__.partition(".")[0] for kernel in wanted})
     count = min(workers or _cores(), len(tasks.waiting))
     threads = [Thread(target=tasks.work, daemon=True) for _ in range(count)]
     for thread in threads:
@@ -103,6 +131,20 @@ def compile_entries(wanted: list[Kernel], report: Report | None = None, workers:
         thread.join()
     if tasks.errors:
         raise RuntimeError(tasks.errors[0])
+    if tasks.waiting:
+        raise RuntimeError(f"kernels wait for each other: {', '.join(sorted(tasks.waiting))}")
+
+
+def _check_folders(packages: set[str]) -> None:
+    from gearmbs import _kernel_cache as cache
+
+    for package in sorted(packages):
+        if not cache.writable(package):
+            places = ", ".join(str(folder) for folder in cache.folders(package))
+            raise RuntimeError(
+                f"kernels cannot be kept, for none of their folders can be written: {places}; "
+                "set NUMBA_CACHE_DIR to one that can"
+            )
 
 
 def _cores() -> int:
@@ -143,22 +185,26 @@ class _Tasks:
 
     def work(self) -> None:
         """Feed one helper process until nothing is left."""
-        command = [sys.executable, "-m", "gearmbs.compile", "--helper"]
-        environment = {**os.environ, HELPER: "1"}
-        pipe = subprocess.PIPE
-        with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=environment) as helper:
-            assert helper.stdin is not None
-            assert helper.stdout is not None
-            while (task := self._next()) is not None:
-                start = time.perf_counter()
-                try:
-                    helper.stdin.write(task + "\n")
-                    helper.stdin.flush()
-                    answer = helper.stdout.readline().strip()
-                except OSError as error:
-                    answer = str(error)
-                self._done(task, answer, time.perf_counter() - start)
-            helper.stdin.close()
+        try:
+            with _started() as helper:
+                assert helper.stdin is not None
+                assert helper.stdout is not None
+                print(INTRODUCE, file=helper.stdin, flush=True)
+                _check_helper(helper.stdout.readline())
+                while (task := self._next()) is not None:
+                    start = time.perf_counter()
+                    try:
+                        helper.stdin.write(task + "\n")
+                        helper.stdin.flush()
+                        answer = helper.stdout.readline().strip()
+                    except OSError as error:
+                        answer = str(error)
+                    self._done(task, answer, time.perf_counter() - start)
+        except Exception as error:
+            # in a thread, where nobody would see it
+            with self.lock:
+                self.errors.append(f"a helper process failed: {error}")
+                self.lock.notify_all()
 
     def _next(self) -> str | None:
         with self.lock:
@@ -187,6 +233,48 @@ class _Tasks:
             self.lock.notify_all()
 
 
+def _started() -> subprocess.Popen:
+    """Start a helper process that imports and keeps what this process would, wherever it was started."""
+    from numba.core import config
+
+    root = str(Path(__file__).resolve().parent.parent)
+    paths = [os.path.abspath(path) for path in sys.path if path]
+    if root not in map(os.path.realpath, paths):
+        # this package was found in the current folder
+        paths.insert(0, root)
+    environment = {**os.environ, HELPER: "1", "PYTHONPATH": os.pathsep.join(paths)}
+    if config.CACHE_DIR:
+        environment["NUMBA_CACHE_DIR"] = os.path.abspath(config.CACHE_DIR)
+    if environment.get("XDG_CACHE_HOME"):
+        environment["XDG_CACHE_HOME"] = os.path.abspath(environment["XDG_CACHE_HOME"])
+    # without -P the folder it runs in would come first
+    command = [sys.executable or "", "-P", "-m", "gearmbs.compile", "--helper"]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=environment, cwd=os.path.abspath(os.sep))
+
+
+def _introduction() -> list[str]:
+    """Return what a helper process must have in common with who started it: the code, and the compiler's setting."""
+    from gearmbs import _kernel_cache as cache
+
+    return [os.path.realpath(__file__), cache.setting()]
+
+
+def _check_helper(line: str) -> None:
+    """Raise RuntimeError unless the first line of a helper process is that of one of this kind."""
+    if not line:
+        raise RuntimeError("it ended at its start")
+    own = _introduction()
+    try:
+        theirs = json.loads(line)
+    except ValueError:
+        raise RuntimeError("it is of another version") from None
+    if theirs[0] != own[0]:
+        raise RuntimeError(f"it imports another gearmbs, {theirs[0]} instead of {own[0]}")
+    if theirs != own:
+        raise RuntimeError("its numba has another setting")
+
+
 def _help() -> None:
     """Compile what is asked for on standard input, line by line."""
     import gc
@@ -198,6 +286,9 @@ def _help() -> None:
     answers, sys.stdout = sys.stdout, sys.stderr
     for line in sys.stdin:
         kind, _, address = line.strip().partition(" ")
+        if kind == INTRODUCE:
+            print(json.dumps(_introduction()), file=answers, flush=True)
+            continue
         try:
             kernel = find(*address.split(":"))
             if kernel is None:
@@ -222,7 +313,10 @@ def main(arguments: list[str] | None = None) -> None:
     if given.helper:
         _help()
         return
-    seconds = compile_all(None if given.quiet else print, workers=given.workers)
+    try:
+        seconds = compile_all(None if given.quiet else print, workers=given.workers)
+    except RuntimeError as error:
+        sys.exit(str(error))
     print(f"kernels ready after {seconds:.1f} s")
 
 

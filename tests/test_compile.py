@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 
 import gearmbs
 from gearmbs import _kernel_cache, _kernel_calls
+from gearmbs import compile as compiling
 from gearmbs.compile import compile_entries
 
 ROOT = Path(gearmbs.__file__).parent
@@ -27,7 +29,7 @@ def found():
 def test_every_module_that_compiles_is_known():
     known = set(_kernel_calls.kernel_modules())
     for path in ROOT.rglob("*.py"):
-        if re.search(r"^\s*@(?:njit|kernel)\b", path.read_text("utf-8"), re.M):
+        if re.search(r"^\s*@(?:njit|kernel|inlined|summing)\b", path.read_text("utf-8"), re.M):
             assert ".".join(("gearmbs", *path.relative_to(ROOT).with_suffix("").parts)) in known
 
 
@@ -64,13 +66,22 @@ def test_a_mechanism_does_not_need_the_contact(found):
 
 
 def run(folder: Path, *command: str) -> subprocess.CompletedProcess:
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": str(folder)}
-    done = subprocess.run([sys.executable, *command], env=environment, capture_output=True, text=True, timeout=300)
+    """Run Python in a folder that has a package of the same name, with the folder for kernels by a relative path."""
+    decoy = folder / "gearmbs"
+    decoy.mkdir(exist_ok=True)
+    (decoy / "__init__.py").write_text("raise ImportError('the wrong package')")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": "kept"}
+    environment.pop("PYTHONPATH", None)
+    done = subprocess.run(
+        [sys.executable, *command], env=environment, cwd=folder, capture_output=True, text=True, timeout=300
+    )
     assert done.returncode == 0, done.stderr
     return done
 
 
-PROGRAM = """
+PROGRAM = f"""
+import sys
+sys.path[:0] = {[path for path in sys.path if path]}
 from gearmbs.dae.equations.rotation import rotation_matrix
 import numpy as np
 a = np.zeros((3, 3))
@@ -79,9 +90,13 @@ print(rotation_matrix.ready() is rotation_matrix)
 
 
 def test_a_program_says_that_it_compiles(tmp_path):
-    """Missing: helpers compile what the program has imported, and it tells so; there: not a word."""
+    """Missing: helpers compile what the program has imported, and it tells so; there: not a word.
+
+    The helpers import what the program imports, though nothing in their surroundings tells them where it is.
+    """
     first = run(tmp_path, "-c", PROGRAM)
     assert "compiling the numerical kernels" in first.stderr
+    assert "failed" not in first.stderr
     assert first.stdout == "True\n"
     kept = {path.name.partition("-")[0] for path in tmp_path.rglob("*.entry")}
     assert "dae.equations.rotation.rotation_matrix" in kept
@@ -98,3 +113,58 @@ def test_failing_helpers(monkeypatch):
     monkeypatch.setattr(_kernel_calls, "address", lambda kernel: f"{kernel.__module__}:not_there")
     with pytest.raises(RuntimeError, match=r"not_there could not be compiled[\s\S]*LookupError"):
         compile_entries([kernel], workers=1)
+
+
+@pytest.fixture
+def missing(monkeypatch):
+    """Return a kernel that seems to be missing, in a process that has said nothing yet."""
+    monkeypatch.setattr(_kernel_cache, "stored", lambda *rest: False)
+    monkeypatch.setattr(compiling, "_said", set())
+    monkeypatch.setattr(compiling, "_failures", [])
+    monkeypatch.delenv(compiling.HELPER, raising=False)
+    return _kernel_calls.find("gearmbs.dae.equations.rotation", "rotation_matrix")
+
+
+def test_announced_once(missing, monkeypatch, capsys):
+    """A program may lack kernels again and again, as it imports more."""
+    monkeypatch.setattr(compiling, "compile_entries", lambda wanted, report: report("1/1 part 0.1 s"))
+    assert compiling.compile_missing(missing)
+    assert compiling.compile_missing(missing)
+    assert capsys.readouterr().err == "gearmbs: compiling the numerical kernels that are needed, once\n"
+
+
+def test_helpers_that_fail_are_not_started_again(missing, monkeypatch, capsys):
+    started = []
+    monkeypatch.setattr(sys, "executable", "/does/not/exist")
+    monkeypatch.setattr(compiling, "_check_folders", lambda packages: started.append(packages))
+    assert not compiling.compile_missing(missing)
+    assert not compiling.compile_missing(missing)
+    assert len(started) == 1
+    assert capsys.readouterr().err.count("helper processes failed (a helper process failed: [Errno 2]") == 1
+
+
+def test_helpers_of_another_checkout_are_refused():
+    own = compiling._introduction()
+    compiling._check_helper(json.dumps(own))
+    for line, reason in (
+        ("", "ended"),
+        ("Traceback", "another version"),
+        (json.dumps(["/other/gearmbs/compile.py", own[1]]), "/other/gearmbs/compile.py instead of"),
+        (json.dumps([own[0], "other"]), "another setting"),
+    ):
+        with pytest.raises(RuntimeError, match=reason):
+            compiling._check_helper(line)
+
+
+def test_kernels_that_nobody_compiled(missing, monkeypatch):
+    monkeypatch.setattr(compiling._Tasks, "work", lambda self: None)
+    with pytest.raises(RuntimeError, match="wait for each other"):
+        compile_entries([missing])
+
+
+def test_kernels_that_cannot_be_kept(missing, monkeypatch):
+    """The command does not claim that kernels are ready that the next process has to compile again."""
+    monkeypatch.setattr(_kernel_cache, "writable", lambda package: False)
+    monkeypatch.setattr(compiling, "compile_all", lambda *rest, **options: compile_entries([missing]))
+    with pytest.raises(SystemExit, match=re.escape(str(_kernel_cache.folders("gearmbs")[-1]))):
+        compiling.main(["--quiet"])
