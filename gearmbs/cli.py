@@ -206,7 +206,8 @@ def run(
     case_file: Annotated[Path, typer.Argument(help="Case in TOML.")],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="NetCDF file; default: beside the case.")] = None,
     lump: Annotated[
-        bool, typer.Option("--lump", help="Integrate bodies fixed to each other as one, as [solver] lump = true does.")
+        bool,
+        typer.Option("--lump", help="Integrate gear and shaft as one body, as [solver] lump = true does."),
     ] = False,
 ) -> None:
     """Simulate one case file and write its record as NetCDF."""

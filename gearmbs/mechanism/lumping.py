@@ -16,6 +16,7 @@ import numpy as np
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.mechanism.joints import Joint, Row
+from gearmbs.mechanism.modal import ModalBody
 from gearmbs.mechanism.parts import Body, Marker
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def lumped(mechanism: Mechanism, t0: float = 0.0) -> Lumped | None:
     * if its reaction enters an expression;
     * if a general constraint names a marker of one of its bodies: what it exerts is known of the composite only.
 
-    A mechanism with modal bodies stays as it is.
+    A mechanism with modal bodies stays as it is. `why_not_lumped` gives the reason for None.
 
     Raises
     ------
@@ -66,6 +67,18 @@ def lumped(mechanism: Mechanism, t0: float = 0.0) -> Lumped | None:
     if not joints:
         return None
     return _Lumping(mechanism, whole, joints).run(t0)
+
+
+def why_not_lumped(mechanism: Mechanism) -> str:
+    """Return a remark for the message of a run on why `lumped` found nothing to integrate as one."""
+    modal = [f"'{name}'" for name, body in mechanism.bodies.items() if isinstance(body, ModalBody)]
+    if modal:
+        why = f"the mechanism has bodies that deform: {', '.join(modal)}"
+    elif not any(joint.kind == "fixed" for joint in mechanism.joints.values()):
+        why = "there is no fixed joint"
+    else:
+        why = "the fixed joints share loads, enter expressions or constraints, or leave nothing that moves"
+    return f"lump: no bodies are integrated as one, since {why}."
 
 
 def _joints_inside(mechanism: Mechanism, whole: System) -> list[Joint]:

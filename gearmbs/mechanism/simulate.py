@@ -14,7 +14,7 @@ from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.results.stream import Stream
-from gearmbs.mechanism.lumping import lumped
+from gearmbs.mechanism.lumping import lumped, why_not_lumped
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
 
@@ -92,7 +92,9 @@ def simulate(
         `gearmbs.dae.results.stream.Stream`. The solution returned then holds nothing but the last step.
     lump : bool
         Integrate bodies that fixed joints connect, or fix to the ground, as one. Results are about all bodies and
-        joints as without it; reactions inside are recovered exactly. See `gearmbs.mechanism.lumping.lumped`.
+        joints as without it; reactions inside are recovered exactly. Where that is not possible, as with any body that
+        deforms, all bodies are integrated, and the solution's ``message`` says why. See
+        `gearmbs.mechanism.lumping.lumped`.
     **options
         Handed to the integrator.
 
@@ -146,7 +148,8 @@ def simulate(
             result = solve_wstiff(
                 problem, times, t_end=last, tol=tol, method=name, progress=report, consumer=stream, **options
             )
-    solution = Solution(system, problem, result, members)
+    remark = why_not_lumped(mechanism) if lump and one is None else ""
+    solution = Solution(system, problem, result, members, remark)
     if stream is None or consumer is None:
         return solution
     if name == "IDA":

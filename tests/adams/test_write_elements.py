@@ -7,7 +7,7 @@ import pytest
 
 from gearmbs.adams import parse_deck, read_deck, run_deck, write_deck
 from gearmbs.dae.errors import ModelError
-from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism import Mechanism, Mode
 from gearmbs.mechanism.expression_syntax import Units
 
 from .test_run import model
@@ -180,3 +180,10 @@ def test_results_need_not_be_asked_for():
         write_deck(m, integrator="IDA")
     with pytest.raises(ModelError, match="holds 1 to 6 expressions, got 7"):
         write_deck(m, requests={"many": ["TIME"] * 7})
+
+
+def test_a_body_that_deforms_is_refused_by_name():
+    m = Mechanism("flexible")
+    m.modal_body("rod", 1.0, (1, 1, 1), [Mode(frequency=10.0)], lambda p: (np.zeros((1, 3)), np.zeros((1, 3))))
+    with pytest.raises(ModelError, match=r"body 'rod': it deforms by modes.*Mechanism\.body"):
+        write_deck(m)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism import Mechanism, Mode
 from gearmbs.mechanism.lumping import lumped
 
 TIGHT = {"tol": 1e-10, "rate": 50.0}
@@ -146,6 +146,7 @@ def test_shared_loads_stay_with_the_joints_that_carry_them():
     m.spherical("ball", a, m.ground, at=(-0.5, 0.0, 0.0))
     assert lumped(m) is None
     lump = m.simulate(0.3, lump=True, **TIGHT)
+    assert "lump: no bodies are integrated as one, since the fixed joints share loads" in lump.message
     agree(lump, m.simulate(0.3, **TIGHT), 1e-12)
 
 
@@ -192,6 +193,30 @@ def test_a_mechanism_at_rest_and_one_without_fixed_joints_run_as_they_are():
     bob = m.body("bob", 1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
     m.spherical("ball", bob, block, at=(0.5, 0.0, 0.0))
     agree(m.simulate(0.3, lump=True, **TIGHT), m.simulate(0.3, **TIGHT), 1e-7)
+
+
+def test_a_body_that_deforms_keeps_all_apart_and_the_message_says_so():
+    def flexible() -> Mechanism:
+        m = Mechanism("flexible", gravity=(0.0, 0.0, -9.81))
+        mode = Mode(frequency=5.0, mass=0.2, momentum=(0.0, 0.0, 0.3))
+        rod = m.modal_body("rod", 1.0, (0.01, 0.1, 0.1), [mode], lambda p: ([[0, 0, p[0] ** 2]], [[0, -2 * p[0], 0]]))
+        stand = m.body("stand", 1.0, (0.1, 0.1, 0.1))
+        m.fixed("foot", stand, m.ground)
+        m.fixed("clamp", rod, stand)
+        return m
+
+    assert lumped(flexible()) is None
+    lump, full = flexible().simulate(0.2, lump=True, **TIGHT), flexible().simulate(0.2, **TIGHT)
+    remark = "lump: no bodies are integrated as one, since the mechanism has bodies that deform: 'rod'."
+    assert lump.message == f"{full.message} {remark}"
+    agree(lump, full, 1e-12)
+
+
+def test_without_fixed_joints_the_message_says_so():
+    m = Mechanism("free")
+    m.body("plate", 1.0, (1.0, 2.0, 3.0))
+    assert m.simulate(0.1, lump=True).message.endswith("since there is no fixed joint.")
+    assert "lump" not in m.simulate(0.1).message
 
 
 def test_parts_of_a_lumped_run_are_its_whole():

@@ -26,6 +26,7 @@ from gearmbs.mechanism.expression_syntax import Call, Name, Node, Number, parse,
 from gearmbs.mechanism.forces.friction_force import FrictionForce
 from gearmbs.mechanism.function_text import function_text
 from gearmbs.mechanism.joints import Joint
+from gearmbs.mechanism.modal import ModalBody
 from gearmbs.mechanism.parts import Body, Marker
 
 STATEMENT_OF = {v: k for k, v in JOINT_KINDS.items()}
@@ -259,6 +260,11 @@ class DeckWriter:
                 self.statement(f"MARKER/{self.markers[id(marker)]}", arguments, marker.name)
 
     def _part(self, body: Body, n: int) -> None:
+        if isinstance(body, ModalBody):
+            raise ModelError(
+                f"body '{body.name}': it deforms by modes, which decks written here cannot hold; put a rigid body "
+                "in its place (Mechanism.body) first"
+            )
         units = self.units
         own = self._center(body)
         cm = self.centers[id(body)] = self.markers[id(own)] if own is not None else self._next_marker

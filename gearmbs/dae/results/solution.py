@@ -48,13 +48,23 @@ class Solution:
     members : Members or None
         Where bodies fixed to each other were integrated as one: what they are made of. ``problem`` and ``result`` are
         about the composites then, everything else about all bodies.
+    remark : str
+        What ``message`` says besides, for instance of an option without effect.
     """
 
-    def __init__(self, system: System, problem: DAEProblem, result: DAEResult, members: Members | None = None) -> None:
+    def __init__(
+        self,
+        system: System,
+        problem: DAEProblem,
+        result: DAEResult,
+        members: Members | None = None,
+        remark: str = "",
+    ) -> None:
         self.system = system
         self.problem = problem
         self.result = result
         self.members = members
+        self.remark = remark
         self.t = result.t
         self._shared: tuple[outputs.Evaluator, outputs.Records] | None = None
         samples = np.linspace(0, self.t.size - 1, min(self.t.size, CONFLICT_SAMPLES))
@@ -72,7 +82,7 @@ class Solution:
 
     @property
     def message(self) -> str:
-        """What happened, when, which unknown, what to try; what the assembly moved; which constraints are redundant."""
+        """What happened, when, which unknown, what to try; what the assembly moved; redundant constraints; remarks."""
         if self._conflict is not None:
             return self._conflict
         parts = [self.result.message]
@@ -83,6 +93,7 @@ class Solution:
         aside = report.redundant if report is not None else []
         if aside:
             parts.append(f"Removed as redundant: {', '.join(aside)}.")
+        parts.append(self.remark)
         return " ".join(part for part in parts if part)
 
     def _last_configuration(self) -> Configuration:
