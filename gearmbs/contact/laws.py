@@ -1,4 +1,4 @@
-"""Force laws of the contact: normal pressure against penetration and its rate, friction against sliding speed."""
+"""Force laws of the contact: normal pressure by penetration and its rate, eq. (10) and (11); friction by speed."""
 
 from __future__ import annotations
 

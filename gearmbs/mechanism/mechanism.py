@@ -38,7 +38,7 @@ class ContactPair(Protocol):
 
 
 class Mechanism(LoadMethods):
-    """A system of rigid bodies, joints, motions and forces.
+    """A system of bodies, rigid or with modes of deformation, joints, motions and forces.
 
     Every part has a name. Joints take two bodies with a point and an axis in global components at the
     initial position, or two markers::

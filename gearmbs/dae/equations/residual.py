@@ -1,5 +1,7 @@
 """The residual G(t, y, y') of eq. (5)-(9), for the formulations I3, SI2 and SI1.
 
+They are Lagrange's equations with multipliers, eq. (4) of the paper, in first-order form with momenta.
+
 With y = [u, p, eps, R, theta, lambda, F, N, z, mu] the rows are, in the same order as the unknowns,
 
     M u' - m g + Phi_R^T lambda - H_F^T F                     (5), first
