@@ -26,8 +26,6 @@ MAX_ORDER = 6
 HISTORY = MAX_ORDER + 2
 MAX_STEP_RATIO = 8.0
 STEP_SEARCH_SWEEPS = 3
-LEAST_ERROR = tuple(MAX_STEP_RATIO ** -(k + 1.0) for k in range(MAX_ORDER + 1))
-"""Part of the target below which the step may grow by the whole ratio, by order."""
 
 _VEC = float64[::1]
 
@@ -140,16 +138,10 @@ def local_error(h, nodes, k, difference):
         Norm of the divided difference of order k + 1, y^(k+1)/(k+1)!.
     """
     t = nodes[0] + h
-    # product of the distances, and gamma times it, without a division
     product = 1.0
-    slope = 0.0
-    for j in range(k):
-        d = t - nodes[j]
-        slope = slope * d + product
-        product *= d
-    last = t - nodes[k]
-    # r/(1 + r) with r = 1/(gamma last)
-    return product / (slope * last + product) * (product * last) * difference
+    for j in range(k + 1):
+        product *= t - nodes[j]
+    return error_constant(t, nodes, k) * product * difference
 
 
 @njit(float64(float64, _VEC, int64, float64, float64), cache=True, nogil=True, error_model="numpy")
@@ -162,7 +154,7 @@ def step_for_error(h, nodes, k, difference, target):
     trial = h
     for _ in range(STEP_SEARCH_SWEEPS):
         e = local_error(trial, nodes, k, difference)
-        if e <= target * LEAST_ERROR[k]:
+        if e <= target * MAX_STEP_RATIO ** -(k + 1.0):
             trial *= MAX_STEP_RATIO
         else:
             power = k + 1.0
