@@ -93,8 +93,10 @@ def choose_end(st):
     """
     times = times_from(st, 1)
     t_old = times[0]
-    if st.error_fails + st.newton_fails + st.nan_fails > MAX_FAILS:
-        return s.FAIL_TOO_MANY_REJECTIONS
+    other_fails = st.error_fails + st.newton_fails
+    if other_fails + st.nan_fails > MAX_FAILS:
+        # a step down to rounding may take more attempts than are allowed
+        return s.FAIL_NOT_FINITE if st.nan_fails > other_fails else s.FAIL_TOO_MANY_REJECTIONS
     st.h = min(st.h, st.h_max)
     h_min = max(st.h_min, ROUNDED_STEP * abs(t_old))
     stop = st.t_end

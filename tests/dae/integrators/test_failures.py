@@ -152,6 +152,18 @@ def test_nan_from_a_user_function(compiled):
     assert "division by zero" in result.message
 
 
+@pytest.mark.parametrize("last", [1e-6, 0.01, 1.0])
+def test_nan_from_a_time_on_is_named_whatever_the_time(last):
+    @njit
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - 1.0 / last + (0.0 if t <= last else np.nan)
+
+    result = solve_dae(residual, (0.0, 3.0 * last), [1.0], names=["level"])
+    assert result.status is Status.NOT_FINITE
+    assert result.t_last == pytest.approx(last, rel=1e-3)
+    assert "equation 0" in result.message
+
+
 def test_nan_at_the_start():
     def residual(t, y, yp, out):
         out[:] = np.nan

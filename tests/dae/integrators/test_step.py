@@ -78,7 +78,17 @@ def test_a_step_below_its_limit_is_a_failure_named_by_what_failed():
     assert step.choose_end(st) == run_state.FAIL_NEWTON
     st.nan_fails = 1
     assert step.choose_end(st) == run_state.FAIL_NOT_FINITE
-    st.nan_fails = 20
+    st.newton_fails = 20
+    assert step.choose_end(st) == run_state.FAIL_TOO_MANY_REJECTIONS
+
+
+def test_a_step_refused_too_often_is_named_by_what_failed_most():
+    st = opened(warm())
+    st.nan_fails = step.MAX_FAILS
+    assert step.choose_end(st) == RUNNING
+    st.newton_fails = 1
+    assert step.choose_end(st) == run_state.FAIL_NOT_FINITE
+    st.nan_fails, st.newton_fails = 1, step.MAX_FAILS
     assert step.choose_end(st) == run_state.FAIL_TOO_MANY_REJECTIONS
 
 
