@@ -82,7 +82,7 @@ def after_success(st):
     if k > 1:
         h_low = step_reaching(st, k - 1, h_best, h, nodes)
         # see `step_below`
-        if h_low >= h_best and (k == 2 or step_reaching(st, k - 2, h_best, h, nodes) >= h_best):
+        if h_low >= h_best and (k == 2 or st.kinks or step_reaching(st, k - 2, h_best, h, nodes) >= h_best):
             best = k - 1
             h_best = h_low
     if best == k and k < st.max_order and n_past >= k + 3 and unchanged and st.caution == 0:

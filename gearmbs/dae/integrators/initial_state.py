@@ -75,6 +75,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.max_steps = options.max_steps or 0
     st.n_events = n_events
     st.fixed_leading = options.method == "GSTIFF"
+    st.kinks = problem.kinks
     st.interpolate = options.interpolate
     st.has_hook = problem.hook is not None
     st.keep_rows = keep

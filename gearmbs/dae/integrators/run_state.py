@@ -92,6 +92,7 @@ class RunState(Struct):
     max_steps: int  # 0: no limit
     n_events: int
     fixed_leading: bool  # GSTIFF
+    kinks: bool  # the problem's
     interpolate: bool  # outputs by interpolation, or by steps that land on them
     has_hook: bool
     keep_rows: bool  # whether y of every step is recorded
