@@ -10,7 +10,17 @@ if TYPE_CHECKING:
     from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
     from gearmbs.mechanism.elements import Compiled, ForceElement, Load, State, Torque
     from gearmbs.mechanism.friction_parameters import JointFriction
-    from gearmbs.mechanism.functions import TimeFunction, constant, expression, harmonic, polynomial, ramp, step
+    from gearmbs.mechanism.functions import (
+        TimeFunction,
+        constant,
+        curve,
+        curve_integral,
+        expression,
+        harmonic,
+        polynomial,
+        ramp,
+        step,
+    )
     from gearmbs.mechanism.joints import Joint
     from gearmbs.mechanism.mechanism import Mechanism
     from gearmbs.mechanism.modal import ModalBody, Mode, ShapeIntegrals
@@ -37,6 +47,8 @@ __all__ = [
     "TimeFunction",
     "Torque",
     "constant",
+    "curve",
+    "curve_integral",
     "expression",
     "harmonic",
     "kinematic",
@@ -71,6 +83,8 @@ late(
         "TimeFunction": ".functions",
         "Torque": ".elements",
         "constant": ".functions",
+        "curve": ".functions",
+        "curve_integral": ".functions",
         "expression": ".functions",
         "harmonic": ".functions",
         "kinematic": ".analyses",

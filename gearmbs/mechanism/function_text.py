@@ -44,7 +44,29 @@ def function_text(function: TimeFunction, time: float, value: float) -> str:
         return f"POLY(TIME, 0, {', '.join(repr(c) for c in coefficients)})"
     if function.kind in (tf.STEP_INTEGRAL, tf.STEP5_INTEGRAL):
         return _step_integral(function, time, value)
+    if function.kind == tf.PIECEWISE:
+        return _pieces(function, time, value)
     raise ModelError(f"function {function.text}: it has no form in ADAMS's function language")
+
+
+def _pieces(function: TimeFunction, time: float, value: float) -> str:
+    """Nested IFs about the middle one of the times between pieces, so that few of them enclose each polynomial."""
+    p = function.parameters
+    count = int(p[0])
+    borders, table = p[1:count], p[count:]
+
+    def text(low: int, high: int) -> str:
+        if low == high:
+            origin, *coefficients = table[tf.PIECE_SIZE * low : tf.PIECE_SIZE * (low + 1)]
+            while len(coefficients) > 1 and coefficients[-1] == 0.0:
+                coefficients.pop()
+            scaled = ", ".join(repr(c * time**k / value) for k, c in enumerate(coefficients))
+            return f"POLY(TIME, {origin / time!r}, {scaled})"
+        middle = (low + high) // 2
+        after = text(middle + 1, high)
+        return f"IF(TIME - ({borders[middle] / time!r}): {text(low, middle)}, {after}, {after})"
+
+    return text(0, count - 1)
 
 
 def _step_integral(function: TimeFunction, time: float, value: float) -> str:

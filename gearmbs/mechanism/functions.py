@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,8 @@ RATES = ("angular speed", "speed", "rad/s^2", "acceleration", "dimensionless")
 class TimeFunction:
     """A function of time in one of the closed forms of :mod:`gearmbs.dae.equations.time_functions`.
 
-    Make one with :func:`constant`, :func:`step`, :func:`ramp`, :func:`harmonic` or :func:`polynomial`.
+    Make one with :func:`constant`, :func:`step`, :func:`ramp`, :func:`harmonic`, :func:`polynomial`, :func:`curve` or
+    :func:`curve_integral`.
     """
 
     kind: int
@@ -93,6 +95,86 @@ def polynomial(coefficients: list[float]) -> TimeFunction:
         raise ModelError("polynomial: give at least one coefficient")
     text = " + ".join(f"{c:g} t^{k}" for k, c in enumerate(coefficients))
     return TimeFunction(tf.POLYNOMIAL, (len(coefficients) - 1, *map(float, coefficients)), text)
+
+
+def curve(times: Sequence[float], values: Sequence[float]) -> TimeFunction:
+    """Return the smooth curve through points: a monotone cubic, constant before the first and after the last of them.
+
+    The slope is continuous and zero at both ends, so two points make a STEP. Between neighbouring points the curve
+    stays between their values [1]_.
+
+    Parameters
+    ----------
+    times : sequence of float, shape (n,)
+        Increasing, s or texts with units.
+    values : sequence of float, shape (n,)
+        SI or texts with units.
+
+    Raises
+    ------
+    ModelError
+        For fewer than two points, times that do not increase, or values that are not finite.
+
+    References
+    ----------
+    .. [1] Fritsch, F. N., Butland, J.: A method for constructing local monotone piecewise cubic interpolants. SIAM J.
+       Sci. Stat. Comput. 5 (1984) 300-304.
+    """
+    t, pieces = _curve_pieces(times, values)
+    return _piecewise(t, pieces, f"curve of {t.size} points from {t[0]:g} to {t[-1]:g} s")
+
+
+def curve_integral(times: Sequence[float], values: Sequence[float], start: float = 0.0) -> TimeFunction:
+    """Return the angle or displacement whose rate is the `curve` through points, in closed form.
+
+    Parameters
+    ----------
+    times, values
+        As of :func:`curve`; the values are rates.
+    start : float or str
+        Value at the first of the times.
+    """
+    t, rate = _curve_pieces(times, values)
+    pieces = np.zeros((t.size + 1, 5))
+    pieces[:, 1:] = rate[:, :4] / np.arange(1, 5)
+    pieces[0, 0] = pieces[1, 0] = any_quantity(start, "curve_integral: start")
+    gain = np.diff(t) * np.polynomial.polynomial.polyval(np.diff(t), (rate[1:-1, :4] / np.arange(1, 5)).T, tensor=False)
+    pieces[2:, 0] = pieces[1, 0] + np.cumsum(gain)
+    return _piecewise(t, pieces, f"integral of the curve of {t.size} points from {t[0]:g} to {t[-1]:g} s")
+
+
+def _curve_pieces(times: Sequence[float], values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points' times and the coefficients of all pieces, those before and after them included, (n + 1, 5)."""
+    t = np.array([quantity(time, "time", "curve: times") for time in times], dtype=float)
+    f = np.array([any_quantity(value, "curve: values") for value in values], dtype=float)
+    if t.size != f.size or t.size < 2:
+        raise ModelError(f"curve: {t.size} times and {f.size} values; give two points or more, a value for each time")
+    if not (np.all(np.isfinite(t)) and np.all(np.isfinite(f))):
+        raise ModelError("curve: times and values must be finite")
+    width = np.diff(t)
+    if not np.all(width > 0.0):
+        late = int(np.argmin(width > 0.0))
+        raise ModelError(f"curve: its times must increase; {t[late + 1]:g} s follows {t[late]:g} s")
+    secant = np.diff(f) / width
+    slope = np.zeros(t.size)
+    left, right = secant[:-1], secant[1:]
+    same = left * right > 0.0
+    a, b = 2.0 * width[1:] + width[:-1], width[1:] + 2.0 * width[:-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope[1:-1] = np.where(same, (a + b) / (a / left + b / right), 0.0)
+    pieces = np.zeros((t.size + 1, 5))
+    pieces[0, 0] = f[0]
+    pieces[1:, 0] = f
+    pieces[1:-1, 1] = slope[:-1]
+    pieces[1:-1, 2] = (3.0 * secant - 2.0 * slope[:-1] - slope[1:]) / width
+    pieces[1:-1, 3] = (slope[:-1] + slope[1:] - 2.0 * secant) / width**2
+    return t, pieces
+
+
+def _piecewise(t: np.ndarray, pieces: np.ndarray, text: str) -> TimeFunction:
+    origins = np.concatenate([t[:1], t])
+    table = np.column_stack([origins, pieces]).ravel()
+    return TimeFunction(tf.PIECEWISE, (float(t.size + 1), *map(float, t), *map(float, table)), text)
 
 
 def expression(text: str) -> TimeFunction:

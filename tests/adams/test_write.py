@@ -14,7 +14,7 @@ from gearmbs.adams.run.runner import run_deck
 from gearmbs.adams.write.deck_writer import write_deck
 from gearmbs.adams.write.text import wrapped
 from gearmbs.dae.errors import ModelError
-from gearmbs.mechanism import Mechanism, harmonic, polynomial, ramp, step
+from gearmbs.mechanism import Mechanism, curve, curve_integral, harmonic, polynomial, ramp, step
 from gearmbs.mechanism.expression_syntax import Units
 
 from .decks import PENDULUM
@@ -78,7 +78,8 @@ def test_every_joint_is_written_and_read(kind):
 
 @pytest.mark.parametrize(
     "function", [2.5, step(0.1, 1.0, 0.4, 3.0), step(0.1, 1.0, 0.4, 3.0, quintic=True), harmonic(2.0, 5.0, 0.3, 1.0),
-                 polynomial([1.0, -2.0, 3.0]), ramp(4.0, 0.3, 0.5), ramp(4.0, 0.3, 0.5, quintic=True)],
+                 polynomial([1.0, -2.0, 3.0]), ramp(4.0, 0.3, 0.5), ramp(4.0, 0.3, 0.5, quintic=True),
+                 curve([0.1, 0.3, 0.4], [1.0, 3.0, -2.0]), curve_integral([0.1, 0.3, 0.4], [1.0, 3.0, -2.0], 0.5)],
 )  # fmt: skip
 def test_functions_of_time_are_written_as_expressions(function):
     from gearmbs.mechanism.expression_compiler import compile_expression

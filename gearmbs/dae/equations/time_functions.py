@@ -1,6 +1,8 @@
 """Functions of time for motions and torques, with their first two derivatives.
 
-The kinds are closed forms; ``TAPE`` evaluates a parsed expression of time.
+The kinds are closed forms; ``TAPE`` evaluates a parsed expression of time. The parameters of ``PIECEWISE`` are the
+number n of pieces, the n - 1 times between them, and of each piece the time it counts from and the coefficients c0 to
+c4 of its polynomial.
 """
 
 from __future__ import annotations
@@ -17,6 +19,9 @@ POLYNOMIAL = 4
 TAPE = 5
 STEP5 = 6
 STEP5_INTEGRAL = 7
+PIECEWISE = 8
+
+PIECE_SIZE = 6
 
 
 @njit("UniTuple(float64, 4)(float64, int64)", cache=True, error_model="numpy")
@@ -55,6 +60,23 @@ def evaluate(kind, par, k, t):
         amplitude, omega, phase, offset = par[k], par[k + 1], par[k + 2], par[k + 3]
         s, c = np.sin(omega * t + phase), np.cos(omega * t + phase)
         return offset + amplitude * s, amplitude * omega * c, -amplitude * omega * omega * s
+    if kind == PIECEWISE:
+        pieces = int(par[k])
+        low, high = 0, pieces - 1
+        while low < high:
+            middle = (low + high) // 2
+            if t < par[k + 1 + middle]:
+                high = middle
+            else:
+                low = middle + 1
+        k += pieces + PIECE_SIZE * low
+        x = t - par[k]
+        c0, c1, c2, c3, c4 = par[k + 1], par[k + 2], par[k + 3], par[k + 4], par[k + 5]
+        return (
+            c0 + x * (c1 + x * (c2 + x * (c3 + x * c4))),
+            c1 + x * (2.0 * c2 + x * (3.0 * c3 + x * 4.0 * c4)),
+            2.0 * c2 + x * (6.0 * c3 + x * 12.0 * c4),
+        )
     degree = int(par[k])
     f, f1, f2 = 0.0, 0.0, 0.0
     for j in range(degree, -1, -1):
