@@ -39,6 +39,7 @@ class Status(enum.IntEnum):
     NEWTON_FAILURE = -9, "The corrector did not converge even with a fresh Jacobian at the smallest step."
     SOLVER_FAILURE = -10, "The external integrator gave up."
     CONFLICTING_CONSTRAINTS = -11, "A constraint removed as redundant was violated by the motion."
+    STALLED = -12, "The steps have become so small that the run would never end."
 
 
 @dataclass

@@ -35,6 +35,10 @@ ADVICE = {
         "Something jumps there: smooth the force or motion (STEP), give its time in breakpoints, or loosen tol."
     ),
     Status.TOO_MANY_STEPS: "Raise max_steps or loosen tol.",
+    Status.STALLED: (
+        "The motion may have no continuation there, as where friction jams a joint; look at the forces just before, or "
+        "end the run before."
+    ),
     Status.SOLVER_FAILURE: ("Loosen tol, let motions and torques start more smoothly, or take the WSTIFF integrator."),
 }
 """What the modeller of a mechanism can try against a failing integration."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from gearmbs.dae import Status
 from gearmbs.mechanism import Mechanism, ModelError, static_equilibrium
 
 G = 9.81
@@ -194,9 +195,8 @@ def test_universal_joint_brakes_one_of_its_arms(yoke):
     )
 
 
-@pytest.mark.parametrize("change", ["constant", "increasing", "decreasing"])
-def test_moments_press_a_slide(change):
-    """Push of 30 N at 0.2 m above the rail, weight 0.1 m beside it: N = m g + T_bend/overlap + T_turn/arm."""
+def pushed_slide(change: str) -> Mechanism:
+    """Return a slide pushed with 30 N at 0.2 m above its rail, with its weight 0.1 m beside it."""
     m = Mechanism("slide", gravity=(0, 0, -G))
     body = m.body("slide", 2.0, (0.1, 0.1, 0.1), position=(0, 0.1, 0))
     rail = m.joint(
@@ -207,7 +207,14 @@ def test_moments_press_a_slide(change):
     )
     m.friction("friction", rail, 0.3, 0.1, reaction_arm=0.25, overlap=0.5, overlap_change=change, **SLIDING)
     m.load("push", body.marker((0, -0.1, 0.2), name="push"), m.ground.marker(name="base"), fx="30")
-    solution = m.simulate(0.4, rate=500, tol=1e-8)
+    return m
+
+
+@pytest.mark.parametrize("change", ["constant", "increasing", "decreasing"])
+def test_moments_press_a_slide(change):
+    """N = m g + T_bend/overlap + T_turn/arm, until the slide jams where the overlap has gone."""
+    solution = pushed_slide(change).simulate(0.25, rate=500, tol=1e-8)
+    assert solution.success, solution.message
     x = solution.com_position("slide")[:, 0]
     overlap = 0.5 + {"constant": 0.0, "increasing": 1.0, "decreasing": -1.0}[change] * x
     # bending: about y 30 * 0.2 and, since the push and friction act 0.1 m from the centre, about z m a 0.1
@@ -215,6 +222,16 @@ def test_moments_press_a_slide(change):
     bending = np.hypot(30 * 0.2, 2.0 * a * 0.1)
     normal = 2 * G + bending / overlap + 2 * G * 0.1 / 0.25
     np.testing.assert_allclose(2.0 * a[5:], (30 - 0.1 * normal)[5:], rtol=1e-5)
+
+
+@pytest.mark.parametrize("tol", [1e-7, 1e-8])
+def test_a_slide_that_jams_ends_the_run(tol):
+    """Friction's part 0.1 * 0.1 m |a|/overlap reaches m |a| where the overlap is 0.01 m: no motion goes beyond."""
+    solution = pushed_slide("decreasing").simulate(0.4, rate=500, tol=tol)
+    assert solution.status in (Status.STALLED, Status.TOO_MANY_REJECTIONS)
+    assert "u_x(slide)" in solution.message
+    assert 0.27 < solution.t[-1] < 0.28
+    assert 0.48 < solution.com_position("slide")[-1, 0] < 0.49
 
 
 def test_friction_in_a_linkage_with_redundant_joints():

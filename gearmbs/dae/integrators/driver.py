@@ -20,6 +20,7 @@ from gearmbs.dae.integrators.initial_state import initial_state
 from gearmbs.dae.integrators.options import Options, output_times
 from gearmbs.dae.integrators.records import Records
 from gearmbs.dae.integrators.rounding import rounding_level
+from gearmbs.dae.integrators.stall import StallWatch
 from gearmbs.dae.integrators.step import advance
 from gearmbs.dae.linalg.sparse_lu import (
     GROWTH_LIMIT,
@@ -80,6 +81,7 @@ class Run:
         self.state = initial_state(problem, options, outputs, end, every_step or options.dense_output)
         self.records = Records(problem, self.state, options, every_step)
         start.choose_steps(self)
+        self.stall = StallWatch(self.state.steps, self.state.t)
         self.indptr = np.asarray(problem.indptr, dtype=np.int64)
         self.indices = np.asarray(problem.indices, dtype=np.int64)
         self.scale = np.asarray(problem.scale, dtype=float)
@@ -185,6 +187,11 @@ class Run:
                 return ending
             if interrupt.raised:
                 return Status.INTERRUPTED, self._interrupted_message()
+            needed = self.stall.steps_needed(self.state.steps, self.state.t, self.state.t_end)
+            if needed:
+                return Status.STALLED, messages.stalled(
+                    self.problem, self.state.t, self.stall.progress, needed, self.state.worst_error
+                )
             if code == s.RUNNING:
                 self._report()
                 elapsed = time.perf_counter() - tic

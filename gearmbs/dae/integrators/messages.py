@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gearmbs.dae.integrators.stall import WINDOW
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import Status
 
@@ -24,6 +25,10 @@ ADVICE = {
         "unknown."
     ),
     Status.TOO_MANY_STEPS: "Raise max_steps or loosen the tolerance.",
+    Status.STALLED: (
+        "The equations may have no solution beyond this time, or jump there; look at the unknown named, or end the run "
+        "before."
+    ),
     Status.SOLVER_FAILURE: (
         "Try a looser tolerance, a smaller maximum step, a smoother start, or the WSTIFF integrator."
     ),
@@ -153,6 +158,15 @@ def too_many_steps(problem: DAEProblem, t: float, steps: int) -> str:
     return (
         f"{Status.TOO_MANY_STEPS.sentence} {steps} steps took the run to t = {t:.9g}. "
         f"{advice(problem, Status.TOO_MANY_STEPS)}"
+    )
+
+
+def stalled(problem: DAEProblem, t: float, progress: float, needed: float, worst: int) -> str:
+    """Explain a run that goes on without getting anywhere."""
+    return (
+        f"{Status.STALLED.sentence} Near t = {t:.9g} {WINDOW} steps went {progress:.3g}, mostly because of "
+        f"{unknown_name(problem, worst)}; at that rate the end is {needed:.1g} steps away. "
+        f"{advice(problem, Status.STALLED)}"
     )
 
 
