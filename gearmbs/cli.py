@@ -7,6 +7,7 @@ import gc
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -37,9 +38,11 @@ def fail(message: str) -> None:
 
 @contextmanager
 def guarded() -> Iterator[None]:
-    """Turn the library's errors into messages and Ctrl-C into exit status 130."""
+    """Turn the library's errors into messages, its warnings into notes, and Ctrl-C into exit status 130."""
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.showwarning = lambda message, *_: typer.secho(f"gearmbs: note: {message}", err=True)
+            yield
     except typer.Exit:
         raise
     except KeyboardInterrupt:
@@ -169,7 +172,7 @@ def paper(
         if torque is not None:
             data.setdefault("operation", {})["torque"] = torque
         base = make_case(data, "options")
-        low = base.operation.torque
+        low = base.operation.top_torque
         tilt = to_si(angle, "angle", "--angle")
         check_record(base.changed(operation={"torque": 2.0 * low}, fault={"misalignment": tilt}), "options")
 
@@ -232,14 +235,23 @@ def run(
             except SimulationFailed as failure:
                 keep_partial(failure, target.with_name(f"{target.stem}.partial.nc"))
         write_dataset(target, data)
-        levels = data["gmf_rms"].sel(way="band")
-        typer.echo(f"{'component':<18}" + "".join(f"{h:>4} x GMF" for h in levels.harmonic.values) + "   RMS, m/s^2")
-        for component in levels.component.values:
-            row = levels.sel(component=component).values
-            typer.echo(f"{component!s:<18}" + "".join(f"{v:10.4g}" for v in row))
+        typer.echo(_level_table(data))
         for remark in remarks(case):
             typer.echo(f"note: {remark}", err=True)
         typer.echo(f"wrote {target}")
+
+
+def _level_table(data: Any) -> str:
+    """Return the levels of the mesh harmonics of a record as a table; of a run-up the highest, and where."""
+    if "gmf_rms" in data:
+        levels = data["gmf_rms"].sel(way="band")
+        lines = [f"{'component':<18}" + "".join(f"{h:>4} x GMF" for h in levels.harmonic.values) + "   RMS, m/s^2"]
+        for component in levels.component.values:
+            row = levels.sel(component=component).values
+            lines.append(f"{component!s:<18}" + "".join(f"{v:10.4g}" for v in row))
+        return "\n".join(lines)
+    speed = data["speed"] * 30.0 / 3.141592653589793
+    return f"driver from {float(speed[0]):.4g} to {float(speed[-1]):.4g} rpm, at most {float(speed.max()):.4g} rpm"
 
 
 @app.command()

@@ -72,6 +72,22 @@ class Fault:
             value = getattr(self, key)
             require(value is None or math.isfinite(value), f"{name}.{key} is {value}; give a finite number")
 
+    def check_teeth(self, count: int) -> None:
+        """Refuse teeth that a wheel of so many teeth does not have; negative numbers count from its last.
+
+        Raises
+        ------
+        ValueError
+            Naming the field, the tooth and those that there are.
+        """
+        for name in ("tooth", "teeth"):
+            numbers = getattr(self, name, ())
+            for tooth in (numbers,) if isinstance(numbers, int) else () if isinstance(numbers, str) else numbers:
+                require(
+                    -count <= tooth < count,
+                    f"{type(self).__name__}.{name} is {tooth}; the {self.wheel} wheel has teeth 0 to {count - 1}",
+                )
+
     @property
     def severity(self) -> float:
         """Size of the fault, by its own main parameter."""

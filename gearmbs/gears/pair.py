@@ -97,6 +97,8 @@ class GearPair(PairGeometry):
         for fault in self.faults:
             require(isinstance(fault, Fault), f"GearPair.faults holds {fault!r}; give faults of gearmbs.gears.faults")
         super().__post_init__()
+        for fault in self.faults:
+            fault.check_teeth(self.wheels[fault.wheel == "driven"].teeth)
         if not self.root_contact:
             self._check_clearance(0.0)
 

@@ -51,7 +51,8 @@ def record_signal(record: xr.Dataset, component: str | None = None) -> xr.DataAr
     Returns
     -------
     DataArray
-        Dimensions (time, channel), m/s^2, with sampling rate, speed and teeth.
+        Dimensions (time, channel), m/s^2, with sampling rate, speed and teeth. Of a run-up the coordinates ``speed``
+        (rad/s) and ``angle`` (rad) over time, and no single speed.
 
     Raises
     ------
@@ -65,16 +66,18 @@ def record_signal(record: xr.Dataset, component: str | None = None) -> xr.DataAr
     if component is not None and component not in names:
         raise SignalError(f"component: there is no {component!r}; choose one of {', '.join(names)}")
     kept = names if component is None else [component]
-    return make_signal(
+    turning = [name for name in ("speed", "angle") if name in record.coords and record[name].dims == ("signal_time",)]
+    signal = make_signal(
         record["acceleration"].sel(component=kept).transpose("signal_time", "component").values,
         float(attributes["solver_signal_rate"]),
         units="m/s^2",
         channels=kept,
         t0=float(record.signal_time.values[0]),
-        speed=float(attributes["operation_speed"]),
+        speed=None if turning else float(attributes["operation_speed"]),
         teeth=tuple(int(z) for z in attributes["gears_teeth"]),
         attrs={"source": str(attributes.get("case", "simulation"))},
     )
+    return signal.assign_coords({name: ("time", record[name].values, record[name].attrs) for name in turning})
 
 
 def read_any(path: str | Path, component: str | None = None, **settings: Any) -> xr.DataArray:

@@ -19,42 +19,58 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from gearmbs.studies import quantities as q
+from gearmbs.studies.section import CaseError, CaseWarning, Section, measures_of
 from gearmbs.units import to_si
 
 if TYPE_CHECKING:
     from gearmbs.gears import GearPair
 
+__all__ = ["Case", "CaseError", "CaseWarning", "load_case", "make_case"]
+
 LEAST_TOLERANCE = 1e-12
 LARGEST_TOLERANCE = {"WSTIFF": 5e-6, "GSTIFF": 5e-6, "IDA": 1e-6}
 """Limits of ``solver.tolerance``; see `Solver`."""
 
+SIGNAL_RATE, OUTPUT_RATE = 12800.0, 51200.0
+"""Least sampling rates, Hz, where a case gives none: natural frequencies do not fall with the speed."""
+
+KEPT_HARMONICS, ANALYSER = 5, 2.56
+"""Mesh harmonics that a default rate holds, and the ratio of rate to highest frequency that analysers use."""
 
 WHEELS = ("driver", "driven")
 
 
-class CaseError(ValueError):
-    """A case that cannot be simulated; the message names the field, the value and the remedy."""
+def _both(value: Any) -> Any:
+    """Return one value for both wheels as two."""
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        if len(value) != 2:
+            raise ValueError(f"{len(value)} values; give one for both wheels, or those of driver and driven")
+        return tuple(value)
+    return (value, value)
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+def _upper(value: Any) -> Any:
+    return value.upper() if isinstance(value, str) else value
 
 
-class Gears(_Section):
+class Gears(Section):
     """The wheels: the paper's table, or numbers of one's own.
 
-    Attributes are those of :class:`gearmbs.gears.GearSpec` and its material; ``teeth`` holds driver and driven. All
-    but module and pressure angle may be given once for both wheels or as a list of two. ``tip_radius`` and
-    ``root_radius`` take the place of ``addendum`` and ``dedendum``.
+    Attributes are those of :class:`gearmbs.gears.GearSpec` and its material; all but module and pressure angle may be
+    given once for both wheels or as a list of two, driver and driven. ``tip_radius`` and ``root_radius`` take the place
+    of ``addendum`` and ``dedendum``.
     """
 
-    teeth: tuple[int, int] = (29, 29)
+    section: ClassVar[str] = "gears"
+
+    teeth: Annotated[tuple[int, int], BeforeValidator(_both)] = (29, 29)
     module: q.Module = 95e-3 / 31
     pressure_angle: q.PressureAngle = Field(default=0.3490658503988659)
     face_width: q.FaceWidth = 0.020
@@ -63,7 +79,7 @@ class Gears(_Section):
     tip_radius: q.WheelRadius = None
     root_radius: q.WheelRadius = None
     fillet_radius: q.ToothLength = None
-    profile_shift: tuple[float, float] = (0.0, 0.0)
+    profile_shift: Annotated[tuple[float, float], BeforeValidator(_both)] = (0.0, 0.0)
     bore_radius: q.BoreRadius = 0.0
     tip_rounding: q.TipRounding = 0.0
     density: q.WheelDensity = 7850.0
@@ -100,22 +116,59 @@ class Gears(_Section):
         return abs(radius - 0.5 * self.module * self.teeth[wheel])
 
 
-class Shafts(_Section):
+class Shafts(Section):
     """Both shafts: solid steel cylinders centred on their wheels."""
+
+    section: ClassVar[str] = "shafts"
 
     radius: q.ShaftRadius = 0.015
     length: q.ShaftLength = 0.200
     density: q.Density = 7850.0
 
 
-class Operation(_Section):
-    """Speed of the driver, load torque on the driven wheel, run-up and recording."""
+class Operation(Section):
+    """Speed of the driver, load torque on the driven wheel, run-up and recording.
+
+    ``speed`` and ``torque`` are numbers, or curves for run-ups and coast-downs: lists of points (time, value), the time
+    from the beginning of the record, ``[["0 s", "0 rpm"], ["2 s", "3000 rpm"]]``. Between the points runs a monotone
+    cubic, see `gearmbs.mechanism.curve`; before the first the first value is held, which ``run_up`` leads to from rest,
+    and after the last the last. ``duration`` is up to the end of the curves unless it is given.
+    """
+
+    section: ClassVar[str] = "operation"
 
     speed: q.AngularSpeed = 104.71975511965977
     torque: q.TorqueValue = 100.0
     run_up: q.RunUp = 0.05
     settling: q.Settling = 0.05
     duration: q.Duration = 1.0
+
+    @model_validator(mode="after")
+    def _span(self) -> Operation:
+        ends = [points[-1][0] for points in (self.speed_curve, self.torque_curve) if points]
+        if ends and "duration" not in self.model_fields_set:
+            self.__dict__["duration"] = max(ends)
+        return self
+
+    @property
+    def speed_curve(self) -> q.Points | None:
+        """Points (s, rad/s) of a speed that changes, s from the beginning of the record."""
+        return self.speed if isinstance(self.speed, tuple) else None
+
+    @property
+    def torque_curve(self) -> q.Points | None:
+        """Points (s, N m) of a torque that changes."""
+        return self.torque if isinstance(self.torque, tuple) else None
+
+    @property
+    def top_speed(self) -> float:
+        """Highest speed, rad/s."""
+        return self.speed if isinstance(self.speed, float) else max(value for _, value in self.speed)
+
+    @property
+    def top_torque(self) -> float:
+        """Largest torque, N m."""
+        return self.torque if isinstance(self.torque, float) else max(value for _, value in self.torque)
 
 
 def _fault_tables(value: Any) -> tuple[dict[str, Any], ...]:
@@ -127,12 +180,14 @@ def _fault_tables(value: Any) -> tuple[dict[str, Any], ...]:
 ToothFaults = Annotated[tuple[dict[str, Any], ...], BeforeValidator(_fault_tables)]
 
 
-class FaultSettings(_Section):
+class FaultSettings(Section):
     """Deviations of the pair: axes, distance, backlash; and ``teeth``, faults of teeth by name or as tables.
 
     In a case file a fault of a tooth is a table ``[[fault.teeth]]`` with ``kind = "broken tooth"`` and the parameters
     of that class of :mod:`gearmbs.gears.faults`.
     """
+
+    section: ClassVar[str] = "fault"
 
     misalignment: q.Misalignment = 0.0
     plane: Literal["skew", "inclination"] = "skew"
@@ -143,8 +198,10 @@ class FaultSettings(_Section):
     teeth: ToothFaults = ()
 
 
-class Contact(_Section):
+class Contact(Section):
     """IMPACT law of the paper's eq. (10)-(11): stiffness in N/m^e by text, e.g. "2.9852e5 N/mm^1.3"."""
+
+    section: ClassVar[str] = "contact"
 
     stiffness: float | str = "2.9852e5 N/mm^1.3"
     exponent: float = Field(default=1.3, ge=1.0)
@@ -164,8 +221,10 @@ class Contact(_Section):
         return f"N/m^{self.exponent!r}"
 
 
-class FrictionSettings(_Section):
+class FrictionSettings(Section):
     """ADAMS's velocity friction law between the flanks."""
+
+    section: ClassVar[str] = "friction"
 
     enabled: bool = True
     static: float = Field(default=0.1, ge=0)
@@ -174,7 +233,7 @@ class FrictionSettings(_Section):
     dynamic_speed: q.SlidingSpeed = 1.0
 
 
-class Solver(_Section):
+class Solver(Section):
     """Integrator, formulation, accuracy and output.
 
     ``tolerance`` is the local error allowed a step, for lengths of the order of the mechanism. Measured on the paper's
@@ -182,15 +241,20 @@ class Solver(_Section):
     5e-6, but 16 % at 1e-5 and by a factor of 3 at 3e-5, since steps then skip contacts of tens of micrometres; with IDA
     by 1 % at 1e-7 and 12 % at 1e-6. Below 1e-12 runs only become longer: 1e-11 and 1e-13 differ by two millionths.
 
+    ``signal_rate`` is the sampling rate of the acceleration and its evaluation, ``output_rate`` that of forces and
+    contact, a multiple of it. Where they are not given they follow the mesh frequency; see `Case.signal_rate`.
+
     ``lump`` integrates each gear and its shaft, which are fixed to each other, as one body; the record is about all
     bodies as without it.
     """
 
-    integrator: Literal["WSTIFF", "GSTIFF", "IDA"] = "WSTIFF"
-    formulation: Literal["SI2", "SI1", "I3"] = "SI2"
+    section: ClassVar[str] = "solver"
+
+    integrator: Annotated[Literal["WSTIFF", "GSTIFF", "IDA"], BeforeValidator(_upper)] = "WSTIFF"
+    formulation: Annotated[Literal["SI2", "SI1", "I3"], BeforeValidator(_upper)] = "SI2"
     tolerance: float | None = None
-    output_rate: q.Frequency = 51200.0
-    signal_rate: q.Frequency = 12800.0
+    output_rate: q.SamplingRate = None
+    signal_rate: q.SamplingRate = None
     lump: bool = False
 
     @property
@@ -213,6 +277,8 @@ class Solver(_Section):
 
     @model_validator(mode="after")
     def _rates(self) -> Solver:
+        if self.signal_rate is None or self.output_rate is None:
+            return self
         if self.signal_rate > self.output_rate:
             raise ValueError(
                 f"signal_rate {self.signal_rate:g} Hz is above output_rate {self.output_rate:g} Hz; raise output_rate"
@@ -226,7 +292,7 @@ class Solver(_Section):
         return self
 
 
-class Case(_Section):
+class Case(Section):
     """One simulated measurement of a gear pair on two shafts.
 
     Attributes
@@ -252,8 +318,47 @@ class Case(_Section):
     friction: FrictionSettings = Field(default_factory=FrictionSettings)
     solver: Solver = Field(default_factory=Solver)
 
+    @classmethod
+    def label(cls, data: Any) -> str:
+        """Return how messages name the case made of ``data``."""
+        name = data.get("name") if isinstance(data, dict) else None
+        return f"case '{name}'" if isinstance(name, str) else "case"
+
+    @model_validator(mode="after")
+    def _possible(self) -> Case:
+        """Refuse wheels that do not mesh and faults that do not fit, before anything is run."""
+        g, f, c = self.gears, self.fault, self.contact
+        for name, length in (("fault.backlash", f.backlash), ("contact.depth", c.depth)):
+            if length > g.module:
+                raise ValueError(
+                    f"{name} is {length * 1e3:.6g} mm, more than the module of {g.module * 1e3:.6g} mm; give less (a "
+                    "plain number is in m)"
+                )
+        sound = self._pair(())
+        if f.teeth:
+            from gearmbs.studies.tooth_faults import check_each_fault
+
+            try:
+                check_each_fault(sound, f.teeth)
+            except ValueError as error:
+                raise ValueError(f"fault.teeth{error}") from None
+        if sound.misalignment == 0.0 and sound.jams:
+            overlap = -sound.normal_backlash
+            raise ValueError(
+                f"fault.centre_distance_error = {1e3 * f.centre_distance_error:g} mm with fault.backlash = "
+                f"{1e3 * f.backlash:g} mm: negative backlash, the teeth overlap by {1e3 * overlap:.4g} mm on both "
+                f"flanks; give at least {1e3 * (f.backlash + overlap):.4g} mm of backlash"
+            )
+        return self
+
     def pair(self) -> GearPair:
-        """Return the gear pair of the case.
+        """Return the gear pair of the case."""
+        from gearmbs.studies.tooth_faults import tooth_fault
+
+        return self._pair(tuple(tooth_fault(table) for table in self.fault.teeth))
+
+    def _pair(self, faults: tuple) -> GearPair:
+        """Return the gear pair of the case with these faults of teeth.
 
         Raises
         ------
@@ -261,14 +366,8 @@ class Case(_Section):
             If the wheels are impossible or do not mesh.
         """
         from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, Material
-        from gearmbs.studies.tooth_faults import tooth_fault
 
         g, f, c, r = self.gears, self.fault, self.contact, self.friction
-        if f.backlash > g.module:
-            raise ValueError(
-                f"fault.backlash is {f.backlash * 1e3:.6g} mm, more than the module of {g.module * 1e3:.6g} mm; give "
-                "less (a plain number is in m)"
-            )
         wheels = []
         for k, name in enumerate(WHEELS):
             material = Material(*(g.of_wheel(key, k) for key in ("youngs_modulus", "poisson_ratio", "density")))
@@ -300,15 +399,52 @@ class Case(_Section):
             backlash=f.backlash,
             contact=law,
             friction=friction,
-            torque=self.operation.torque,
+            torque=self.operation.top_torque,
             slices=c.slices,
-            faults=tuple(tooth_fault(table) for table in f.teeth),
+            faults=faults,
         )
 
     @property
     def mesh_frequency(self) -> float:
-        """Gear mesh frequency at the operating speed, Hz."""
-        return self.gears.teeth[0] * self.operation.speed / 6.283185307179586
+        """Gear mesh frequency at the operating speed, the highest if it changes, Hz."""
+        return self.gears.teeth[0] * self.operation.top_speed / 6.283185307179586
+
+    @property
+    def angle_turned(self) -> float:
+        """Angle that the driver turns during the record, rad."""
+        operation = self.operation
+        if operation.speed_curve is None:
+            return operation.top_speed * operation.duration
+        from gearmbs.studies.drive import drive_angle
+
+        start = operation.run_up + operation.settling
+        angle = drive_angle(operation.speed, operation.run_up, start)
+        return angle(start + operation.duration) - angle(start)
+
+    @property
+    def signal_rate(self) -> float:
+        """Sampling rate of the acceleration, Hz.
+
+        Where it is not given: 12.8 kHz, doubled until five mesh harmonics lie below rate / 2.56, the usable band of
+        an analyser. With ``output_rate`` given, the least whole part of that which is as high.
+        """
+        if self.solver.signal_rate is not None:
+            return self.solver.signal_rate
+        rate = SIGNAL_RATE
+        while KEPT_HARMONICS * self.mesh_frequency > rate / ANALYSER:
+            rate *= 2.0
+        given = self.solver.output_rate
+        return rate if given is None else given / max(1, int(given // rate))
+
+    @property
+    def output_rate(self) -> float:
+        """Sampling rate of forces and contact, Hz: given, or the signal's rate doubled until it is 51.2 kHz or more."""
+        if self.solver.output_rate is not None:
+            return self.solver.output_rate
+        rate = 2.0 * self.signal_rate
+        while rate < OUTPUT_RATE:
+            rate *= 2.0
+        return rate
 
     def changed(self, **sections: Any) -> Case:
         """Return a copy with fields of its sections changed.
@@ -318,20 +454,26 @@ class Case(_Section):
         >>> Case().changed(fault={"misalignment": "1 deg"}).fault.plane
         'skew'
         """
-        data = self.model_dump()
+        data = self.settings()
         for key, value in sections.items():
             data[key] = {**data[key], **value} if isinstance(value, dict) and key in data else value
         return make_case(data)
 
+    def settings(self) -> dict[str, Any]:
+        """Return all settings as nested dictionaries, quantities as the user wrote them, else in SI."""
+        data = self.model_dump()
+        for name in type(self).model_fields:
+            section = getattr(self, name)
+            if isinstance(section, Section):
+                # a duration that follows from a curve goes with it
+                kept = {k: v for k, v in data[name].items() if k != "duration" or k in section.model_fields_set}
+                data[name] = {**kept, **section.written}
+        return data
+
 
 def units_of_fields(section: BaseModel) -> dict[str, str]:
     """Return the SI units of those fields of a section of a case that are quantities."""
-    units = {
-        name: item.unit
-        for name, field in type(section).model_fields.items()
-        for item in field.metadata
-        if isinstance(item, q.Measure)
-    }
+    units = {name: measure.unit for name, measure in measures_of(type(section)).items()}
     if isinstance(section, Contact):
         units |= {"stiffness": section.stiffness_unit, "damping": "N s/m"}
     return units
@@ -345,28 +487,7 @@ def make_case(data: dict[str, Any], source: str = "case") -> Case:
     CaseError
         Naming every wrong field with its value.
     """
-    try:
-        case = Case.model_validate(data)
-        pair = case.pair()
-    except ValidationError as error:
-        raise CaseError(_explain(error, source)) from error
-    except ValueError as error:
-        raise CaseError(f"{source}: {error}") from error
-    if pair.faults:
-        from gearmbs.studies.tooth_faults import check_each_fault
-
-        try:
-            check_each_fault(pair)
-        except ValueError as error:
-            raise CaseError(f"{source}: fault.teeth{error}") from error
-    if pair.misalignment == 0.0 and pair.jams:
-        fault, overlap = case.fault, -pair.normal_backlash
-        raise CaseError(
-            f"{source}: fault.centre_distance_error = {1e3 * fault.centre_distance_error:g} mm with fault.backlash = "
-            f"{1e3 * fault.backlash:g} mm: negative backlash, the teeth overlap by {1e3 * overlap:.4g} mm on both "
-            f"flanks; give at least {1e3 * (fault.backlash + overlap):.4g} mm of backlash"
-        )
-    return case
+    return Case.checked(data, source)
 
 
 def load_case(path: str | Path) -> Case:
@@ -386,25 +507,3 @@ def load_case(path: str | Path) -> Case:
         raise CaseError(f"{path}: not a valid TOML file ({error})") from error
     data.setdefault("name", path.stem)
     return make_case(data, str(path))
-
-
-def _explain(error: ValidationError, source: str) -> str:
-    lines = []
-    for item in error.errors():
-        field = ".".join(str(part) for part in item["loc"])
-        message = item["msg"].removeprefix("Value error, ")
-        if item["type"] == "extra_forbidden":
-            section = item["loc"][0] if len(item["loc"]) > 1 else None
-            model: Any = Case.model_fields[section].annotation if section in Case.model_fields else Case
-            message = f"unknown key; known ones are {', '.join(model.model_fields)}"
-            lines.append(f"{source}: {field}: {message}")
-        elif message.startswith("["):
-            # one of several, named by its place
-            lines.append(f"{source}: {field}{message}")
-        else:
-            # what is wrong with a section as a whole begins with the name of the field
-            whole = isinstance(item["input"], (dict, BaseModel))
-            lines.append(
-                f"{source}: {field}.{message}" if whole else f"{source}: {field} = {item['input']!r}: {message}"
-            )
-    return "\n".join(lines)

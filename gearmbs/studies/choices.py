@@ -88,7 +88,7 @@ def _values(cases: list[Case], component: str) -> dict[str, str]:
             f"{r.static:.4g} below {r.static_speed:.4g} m/s, {r.dynamic:.4g} above {r.dynamic_speed:.4g} m/s of sliding"
         )
     return {
-        "speed": f"{o.speed * 30 / np.pi:.6g} rpm: GMF {case.mesh_frequency:.2f} Hz",
+        "speed": f"{o.top_speed * 30 / np.pi:.6g} rpm: GMF {case.mesh_frequency:.2f} Hz",
         "penetration d of full damping": f"{1e3 * c.depth:.4g} mm",
         "stiffness K": f"{c.stiffness}, exponent {c.exponent:g}",
         "damping C": str(c.damping),
@@ -100,7 +100,7 @@ def _values(cases: list[Case], component: str) -> dict[str, str]:
         "centre distance": f"{1e3 * shifts[0]:+.4g} mm" if shifts else "nominal",
         "friction": friction,
         "start": f"over {o.run_up:.4g} s, settling {o.settling:.4g} s",
-        "record": f"{o.duration:.4g} s at {case.solver.signal_rate:.6g} Hz",
+        "record": f"{o.duration:.4g} s at {case.signal_rate:.6g} Hz",
         "which force": component.replace("_", " "),
         "mean": "removed",
         "scaling": "one factor from the healthy signal at low load, kept for the other five",

@@ -22,18 +22,21 @@ EDGE = 0.01
 DEEPEST = 0.25
 """Static penetration of one tooth pair, in modules, beyond which teeth would have to pass through each other."""
 
+LEAST_TURNS = 4.0
+"""Revolutions that a record of changing speed must hold."""
+
 SLIPPED = 0.5
 """Transmission error, in base pitches, beyond which teeth have passed each other."""
 
 
 def edge(case: Case) -> float:
     """Return what must be simulated beyond both ends of the record, s: half the length of the anti-alias filter."""
-    solver = case.solver
-    ratio = round(solver.output_rate / solver.signal_rate)
+    rate = case.output_rate
+    ratio = round(rate / case.signal_rate)
     if ratio == 1:
         return EDGE
-    taps = decimation_taps(ratio, solver.output_rate).size
-    return max(EDGE, math.ceil(0.5 * taps + 1) / solver.output_rate)
+    taps = decimation_taps(ratio, rate).size
+    return max(EDGE, math.ceil(0.5 * taps + 1) / rate)
 
 
 def check_record(case: Case, source: str = "") -> None:
@@ -52,24 +55,39 @@ def check_record(case: Case, source: str = "") -> None:
         filters, if it begins too early, or if the contact is too soft to carry the load.
     """
     source = source or f"case '{case.name}'"
-    operation, solver, gmf = case.operation, case.solver, case.mesh_frequency
-    turns = f"operation.speed = {operation.speed:.6g} rad/s ({operation.speed * 30.0 / math.pi:.6g} rpm)"
+    operation, gmf, rate = case.operation, case.mesh_frequency, case.signal_rate
+    turns = f"operation.speed = {operation.top_speed:.6g} rad/s ({operation.top_speed * 30.0 / math.pi:.6g} rpm)"
     top = (HARMONICS + HALF_WIDTH + TRANSITION) * gmf
-    if top >= 0.5 * solver.signal_rate:
-        times = math.floor(2.0 * top / solver.signal_rate) + 1
+    if top >= 0.5 * rate:
+        times = math.floor(2.0 * top / rate) + 1
         raise CaseError(
-            f"{source}: solver.signal_rate = {solver.signal_rate:g} Hz: {turns} with {case.gears.teeth[0]} teeth puts "
+            f"{source}: solver.signal_rate = {rate:g} Hz: {turns} with {case.gears.teeth[0]} teeth puts "
             f"the band of mesh harmonic {HARMONICS} up to {top:.6g} Hz, above half that rate; give signal_rate = "
-            f"{times * solver.signal_rate:g} and output_rate = {times * solver.output_rate:g}, or a lower speed (a "
-            "plain number is in rad/s; write '1000 rpm')"
+            f"{times * rate:g} and output_rate = {times * case.output_rate:g}, leave both out so that they follow the "
+            "mesh frequency, or give a lower speed (a plain number is in rad/s; write '1000 rpm')"
         )
+    if operation.speed_curve is None:
+        _check_length(case, source)
+    else:
+        _check_curve(case, source)
+    ahead = edge(case)
+    if operation.run_up + operation.settling < ahead:
+        raise CaseError(
+            f"{source}: operation.settling = {operation.settling:g} s: run_up and settling are "
+            f"{operation.run_up + operation.settling:g} s together, but the anti-alias filter at signal_rate = "
+            f"{rate:g} Hz needs {ahead:.3g} s before the record; give a longer settling"
+        )
+    check_stiffness(case, source)
+
+
+def _check_length(case: Case, source: str) -> None:
+    """Refuse a record at constant speed that is too short for its filters."""
+    operation, gmf, rate = case.operation, case.mesh_frequency, case.signal_rate
     taps = max(
-        bandpass_taps(
-            solver.signal_rate, (k - HALF_WIDTH) * gmf, (k + HALF_WIDTH) * gmf, TRANSITION * gmf, ATTENUATION_DB
-        ).size
+        bandpass_taps(rate, (k - HALF_WIDTH) * gmf, (k + HALF_WIDTH) * gmf, TRANSITION * gmf, ATTENUATION_DB).size
         for k in range(1, HARMONICS + 1)
     )
-    need = max((taps + 1) / solver.signal_rate + 1.0 / gmf, MIN_PERIODS / gmf + 1.0 / solver.signal_rate)
+    need = max((taps + 1) / rate + 1.0 / gmf, MIN_PERIODS / gmf + 1.0 / rate)
     if operation.duration < need:
         least = math.ceil(1e4 * need) / 1e4
         raise CaseError(
@@ -77,14 +95,17 @@ def check_record(case: Case, source: str = "") -> None:
             f"{gmf:.6g} Hz needs a record of at least {least:g} s, that is {math.ceil(need * gmf)} mesh periods; give "
             "a longer duration"
         )
-    ahead = edge(case)
-    if operation.run_up + operation.settling < ahead:
+
+
+def _check_curve(case: Case, source: str) -> None:
+    """Refuse a run-up in which the driver turns less than the window that its orders are tracked with."""
+    turned = case.angle_turned / math.tau
+    if turned < LEAST_TURNS:
         raise CaseError(
-            f"{source}: operation.settling = {operation.settling:g} s: run_up and settling are "
-            f"{operation.run_up + operation.settling:g} s together, but the anti-alias filter at signal_rate = "
-            f"{solver.signal_rate:g} Hz needs {ahead:.3g} s before the record; give a longer settling"
+            f"{source}: operation.speed: the driver makes {turned:.3g} revolutions in the record of "
+            f"{case.operation.duration:g} s, orders are tracked over {LEAST_TURNS:g} and more; give a longer curve or "
+            "higher speeds"
         )
-    check_stiffness(case, source)
 
 
 def check_stiffness(case: Case, source: str) -> None:
@@ -100,7 +121,7 @@ def check_stiffness(case: Case, source: str) -> None:
     if depth > DEEPEST * case.gears.module:
         raise CaseError(
             f"{source}: contact.stiffness = {case.contact.stiffness!r}: at operation.torque = "
-            f"{case.operation.torque:g} N m a tooth pair would be pressed in by {depth * 1e3:.4g} mm, a module is "
+            f"{case.operation.top_torque:g} N m a tooth pair would be pressed in by {depth * 1e3:.4g} mm, a module is "
             f"{case.gears.module * 1e3:.4g} mm; give a stiffer contact (the paper's is '2.9852e5 N/mm^1.3') or less "
             "torque"
         )

@@ -62,7 +62,7 @@ def rows_of_record(case: Case, t: np.ndarray) -> np.ndarray:
     """
     first = int(np.searchsorted(t, span_begin(case)))
     teeth = case.gears.teeth
-    turn = 2.0 * np.pi / (case.operation.speed * max(1.0, teeth[0] / teeth[1]))
+    turn = 2.0 * np.pi / (case.operation.top_speed * max(1.0, teeth[0] / teeth[1]))
     interval = np.floor(t[: first + 1] / (TURN_BEFORE * turn))
     return np.concatenate([np.flatnonzero(np.diff(interval) > 0.0), np.arange(first, t.size)])
 
@@ -70,7 +70,7 @@ def rows_of_record(case: Case, t: np.ndarray) -> np.ndarray:
 def span_begin(case: Case) -> float:
     """Return the time at which the span of a record's filters begins, s."""
     operation = case.operation
-    return operation.run_up + operation.settling - edge(case) - (MARGIN + 1) / case.solver.output_rate
+    return operation.run_up + operation.settling - edge(case) - (MARGIN + 1) / case.output_rate
 
 
 class Recorder:

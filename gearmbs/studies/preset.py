@@ -12,6 +12,8 @@ LOAD_NAMES = ("low", "high")
 DEFAULT_COMPONENT = "line_of_action"
 MISALIGNMENT = np.deg2rad(1.0)
 DISTANCE = 3e-3
+RATES = {"signal_rate": 12800.0, "output_rate": 51200.0}
+"""Sampling rates, Hz: that of the paper's measurements, and four times as much for forces and contact."""
 
 
 def paper_cases(
@@ -25,6 +27,8 @@ def paper_cases(
         If one of them is impossible.
     """
     data = (base or Case()).model_dump()
+    if data["solver"]["signal_rate"] is None and data["solver"]["output_rate"] is None:
+        data["solver"] |= RATES
     faults = {
         "healthy": {"misalignment": 0.0, "centre_distance_error": 0.0},
         "misaligned": {"misalignment": misalignment, "centre_distance_error": 0.0},

@@ -34,6 +34,8 @@ class Measure:
         Unit of the limits and of messages; default the SI unit.
     each : bool
         Whether driver and driven may have values of their own, as a list of two.
+    curve : bool
+        Whether the value may be a curve, as a list of points (time, value); zero is possible there.
     """
 
     dimension: str
@@ -41,6 +43,7 @@ class Measure:
     high: float | None = None
     shown: str = ""
     each: bool = False
+    curve: bool = False
 
     @property
     def unit(self) -> str:
@@ -64,7 +67,37 @@ class Measure:
             if len(value) != 2:
                 raise ValueError(f"{len(value)} values; give one for both wheels, or those of driver and driven")
             return tuple(self._one(item) for item in value)
+        if self.curve and isinstance(value, Sequence) and not isinstance(value, str):
+            return self._points(value)
         return self._one(value)
+
+    def _points(self, value: Sequence) -> tuple[tuple[float, float], ...]:
+        """Return the points of a curve in s and SI."""
+        points: list[tuple[float, float]] = []
+        for place, point in enumerate(value, 1):
+            if isinstance(point, str) or not isinstance(point, Sequence) or len(point) != 2:
+                raise ValueError(
+                    f"a curve is a list of points [time, value] such as [['0 s', '0 {self.shown or self.unit}'], "
+                    f"['2 s', ...]]; point {place} is {point!r}"
+                )
+            try:
+                time = to_si(point[0], "time", "value")
+                zero = to_si(point[1], self.dimension, "value") == 0.0
+            except (TypeError, ValueError) as error:
+                raise ValueError(f"point {place}: {str(error).removeprefix('value: ')}") from None
+            if (
+                not math.isfinite(time)
+                or time < (points[-1][0] if points else 0.0)
+                or (points and time == points[-1][0])
+            ):
+                raise ValueError(f"point {place} is at {time:g} s; give times from 0 on that increase")
+            try:
+                points.append((time, 0.0 if zero else self._one(point[1])))
+            except ValueError as error:
+                raise ValueError(f"point {place}: {error}") from None
+        if len(points) < 2 or not any(number for _, number in points):
+            raise ValueError("a curve needs two points at least, and one that is not zero")
+        return tuple(points)
 
     def _one(self, value: Any) -> float:
         try:
@@ -109,10 +142,11 @@ Density = Annotated[float, Measure("density", 10, 30000)]
 WheelDensity = Annotated[float | tuple[float, float], Measure("density", 10, 30000, each=True)]
 Modulus = Annotated[float | tuple[float, float], Measure("pressure", 0.001, 2000, "GPa", each=True)]
 PoissonRatio = Annotated[float | tuple[float, float], Measure("dimensionless", 0, 0.499, each=True)]
-AngularSpeed = Annotated[float, Measure("angular speed", 0.01, 1e6, "rpm")]
-TorqueValue = Annotated[float, Measure("torque", 1e-6, 1e8)]
+Points = tuple[tuple[float, float], ...]
+AngularSpeed = Annotated[float | Points, Measure("angular speed", 0.01, 1e6, "rpm", curve=True)]
+TorqueValue = Annotated[float | Points, Measure("torque", 1e-6, 1e8, curve=True)]
 RunUp = Annotated[float, Measure("time", 1e-5, 1000)]
 Settling = Annotated[float, Measure("time", 0, 1000)]
 Duration = Annotated[float, Measure("time", 1e-5, 10000)]
-Frequency = Annotated[float, Measure("frequency", 1, 1e7)]
+SamplingRate = Annotated[float | None, Measure("frequency", 1, 1e7)]
 SlidingSpeed = Annotated[float, Measure("speed", 1e-6, 1000)]

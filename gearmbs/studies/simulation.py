@@ -28,6 +28,7 @@ from gearmbs.signals import (
 from gearmbs.signals.monotone_cubic import monotone_cubic
 from gearmbs.studies import rig
 from gearmbs.studies.case import Case, units_of_fields
+from gearmbs.studies.drive import drive_angle
 from gearmbs.studies.limits import check_record, edge, remarks, slip
 from gearmbs.studies.measured import COUNTS, SMOOTH, Measured, Recorder, measure, rows_of_record
 
@@ -92,16 +93,16 @@ def simulate_case(
     operation, solver = case.operation, case.solver
     t_end = operation.run_up + operation.settling + operation.duration + edge(case)
     # up to a whole sample
-    t_end = np.ceil(t_end * solver.output_rate - 1e-6) / solver.output_rate
+    t_end = np.ceil(t_end * case.output_rate - 1e-6) / case.output_rate
     return simulate(
         mechanism,
         t_end,
-        rate=None if every_step else solver.output_rate,
+        rate=None if every_step else case.output_rate,
         every_step=every_step,
         integrator=solver.integrator,
         formulation=solver.formulation,
         tol=solver.used_tolerance,
-        rate_scale=operation.speed * case.gears.teeth[0],
+        rate_scale=operation.top_speed * case.gears.teeth[0],
         lump=solver.lump,
         progress=progress,
         advice=ADVICE,
@@ -115,7 +116,9 @@ def case_mechanism(case: Case):
     return rig.gear_rig(
         case.pair(),
         speed=operation.speed,
+        torque=operation.torque,
         run_up=operation.run_up,
+        start=operation.run_up + operation.settling,
         shaft_radius=shafts.radius,
         shaft_length=shafts.length,
         shaft_density=shafts.density,
@@ -201,7 +204,7 @@ def record(case: Case, solution: Solution) -> xr.Dataset:
         If teeth slipped past each other.
     """
     known = measure(case, solution, rows_of_record(case, solution.t))
-    return _evaluated(case, solution, known, even=_is_even(solution.t, case.solver.output_rate))
+    return _evaluated(case, solution, known, even=_is_even(solution.t, case.output_rate))
 
 
 def _evaluated(case: Case, solution: Solution, known: Measured, *, even: bool) -> xr.Dataset:
@@ -210,11 +213,11 @@ def _evaluated(case: Case, solution: Solution, known: Measured, *, even: bool) -
     if slipped is not None:
         raise SimulationFailed(f"case '{case.name}': {slipped}", solution, case)
     pair = case.pair()
-    operation, solver = case.operation, case.solver
+    operation = case.operation
     start = operation.run_up + operation.settling
     stop = start + operation.duration
-    rate, ahead = solver.output_rate, edge(case)
-    labels: dict[str, Any] = {"units": "N", "speed": operation.speed, "teeth": case.gears.teeth}
+    rate, ahead = case.output_rate, edge(case)
+    labels: dict[str, Any] = {"units": "N", "speed": operation.top_speed, "teeth": case.gears.teeth}
     names = [f"{k}{axis}" for k in (1, 2) for axis in "xyz"]
     if even:
         keep = known.t >= start - ahead - 0.5 / rate
@@ -227,10 +230,9 @@ def _evaluated(case: Case, solution: Solution, known: Measured, *, even: bool) -
     signal = forces.isel(channel=slice(3, 6)).assign_coords(channel=["x", "y", "z"])
     components = force_components(signal, pressure_angle=pair.working_pressure_angle, sense=pair.rotation)
     acceleration = force_to_acceleration(components, pair.wheels[1].mass)
-    if solver.signal_rate < solver.output_rate:
-        acceleration = decimate(acceleration, solver.signal_rate)
+    if case.signal_rate < rate:
+        acceleration = decimate(acceleration, case.signal_rate)
     acceleration = trim(acceleration, start, stop)
-    levels = gmf_rms(acceleration)
     inside = (t >= start - 0.5 / rate) & (t < stop - 0.5 / rate)
     t = t[inside]
     between = {name: np.interp(t, known.t, known.contact[name]) for name in SMOOTH}
@@ -246,11 +248,34 @@ def _evaluated(case: Case, solution: Solution, known: Measured, *, even: bool) -
     dataset["acceleration"].attrs.update(
         units="m/s^2", long_name="force on the driven gear over its mass (Newton's second law)"
     )
-    ways = xr.concat([levels["band"], levels["orders"]], dim="way").assign_coords(way=["band", "orders"])
-    dataset["gmf_rms"] = ways.drop_vars(["channel_units", "units"], errors="ignore").rename(channel="component")
-    dataset["gmf_rms"].attrs = {"units": "m/s^2", "long_name": "RMS of the gear mesh frequency harmonics"}
+    if operation.speed_curve is None:
+        dataset["gmf_rms"] = _mesh_levels(acceleration)
+    else:
+        dataset = dataset.assign_coords(_turning(case, dataset["signal_time"].values))
     dataset.attrs = attributes_of(case, solution)
     return dataset
+
+
+def _mesh_levels(acceleration: xr.DataArray) -> xr.DataArray:
+    """Return the RMS of the mesh harmonics by both ways."""
+    levels = gmf_rms(acceleration)
+    ways = xr.concat([levels["band"], levels["orders"]], dim="way").assign_coords(way=["band", "orders"])
+    found = ways.drop_vars(["channel_units", "units"], errors="ignore").rename(channel="component")
+    found.attrs = {"units": "m/s^2", "long_name": "RMS of the gear mesh frequency harmonics"}
+    return found
+
+
+def _turning(case: Case, t: np.ndarray) -> dict[str, Any]:
+    """Return speed and angle of the driver over the times of a signal, as prescribed."""
+    operation = case.operation
+    start = operation.run_up + operation.settling
+    function = drive_angle(operation.speed, operation.run_up, start)
+    begin = function(start)
+    angle, speed, _ = np.array([function.derivatives(at) for at in t]).T
+    return {
+        "speed": ("signal_time", speed, {"units": "rad/s", "long_name": "speed of the driver"}),
+        "angle": ("signal_time", angle - begin, {"units": "rad", "long_name": "angle of the driver"}),
+    }
 
 
 def _is_even(t: np.ndarray, rate: float) -> bool:
@@ -272,6 +297,9 @@ def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any
         units = units_of_fields(settings)
         for key, value in settings.model_dump().items():
             name = f"{section}_{key}"
+            if name in ("operation_speed", "operation_torque") and isinstance(value, tuple):
+                out[f"{name}_curve"] = json.dumps(value)
+                value = max(number for _, number in value)
             if value is None:
                 out[name] = "default"
             elif name == "fault_teeth":
@@ -283,6 +311,8 @@ def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any
                 if key in units and not isinstance(value, str):
                     out[f"{name}_units"] = units[key]
     out["solver_tolerance"] = case.solver.used_tolerance
+    for name, rate in (("signal_rate", case.signal_rate), ("output_rate", case.output_rate)):
+        out[f"solver_{name}"], out[f"solver_{name}_units"] = rate, "Hz"
     pair = case.pair()
     out["contact_ratio"] = pair.contact_ratio
     out["face_slices"] = pair.face_slices

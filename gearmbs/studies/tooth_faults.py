@@ -6,7 +6,8 @@ object of :mod:`gearmbs.gears.faults`. A case holds it as a table of plain numbe
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import difflib
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from gearmbs.gears.tables import tooth_deviations
 
 if TYPE_CHECKING:
     from gearmbs.gears.pair import GearPair
+    from gearmbs.gears.tooth_deviations import ToothDeviations
 
 
 def kinds() -> dict[str, type[faults.Fault]]:
@@ -44,12 +46,16 @@ def tooth_fault(value: Any) -> faults.Fault:
     wanted = _plain(table["kind"])
     kind = next((k for label, k in kinds().items() if wanted in (_plain(label), _plain(k.__name__))), None)
     if kind is None:
-        raise ValueError(f"kind {table['kind']!r} is unknown; known ones are {', '.join(kinds())}")
+        near = difflib.get_close_matches(table["kind"].lower(), kinds(), n=1, cutoff=0.5)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise ValueError(f"kind {table['kind']!r} is unknown; known ones are {', '.join(kinds())}{hint}")
     settings: dict[str, Any] = {str(key): item for key, item in table.items() if key != "kind"}
     known = [field.name for field in fields(kind)]
     for key in settings:
         if key not in known:
-            raise ValueError(f"{kind.label}: unknown key {key!r}; known ones are {', '.join(known)}")
+            near = difflib.get_close_matches(key, known, n=1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            raise ValueError(f"{kind.label}: unknown key {key!r}; known ones are {', '.join(known)}{hint}")
     return kind(**settings)
 
 
@@ -70,19 +76,31 @@ def fault_tables(value: Any) -> tuple[dict[str, Any], ...]:
     return tuple(fault_table(_placed(one, place)) for place, one in enumerate(several))
 
 
-def check_each_fault(pair: GearPair) -> None:
-    """Apply every fault of a pair by itself, to find those that do not fit their wheel before anything is run.
+def check_each_fault(pair: GearPair, tables: Sequence[Mapping[str, Any]]) -> None:
+    """Apply every fault to a sound pair by itself, to find those that do not fit their wheel before anything is run.
 
     Raises
     ------
     ValueError
         Naming the fault by its place, ``[0].lost``, with its value and what would do.
     """
-    for place, fault in enumerate(pair.faults):
+    for place, table in enumerate(tables):
+        fault = tooth_fault(table)
         try:
-            tooth_deviations(pair.with_changes(faults=(fault,)))
+            _check_size(tooth_deviations(pair.with_changes(faults=(fault,))), pair)
         except ValueError as error:
-            raise ValueError(_at(place, fault, error)) from error
+            raise ValueError(_at(place, fault, error)) from None
+
+
+def _check_size(deviations: tuple[ToothDeviations, ToothDeviations], pair: GearPair) -> None:
+    """Refuse flanks that are displaced by more than a tooth is thick."""
+    for gear, deviation in zip(pair.wheels, deviations, strict=True):
+        most = max(float(abs(part).max(initial=0.0)) for part in (deviation.offset, deviation.shape))
+        if most > gear.tooth_thickness:
+            raise ValueError(
+                f"a flank would be displaced by {1e3 * most:.4g} mm, more than a tooth is thick "
+                f"({1e3 * gear.tooth_thickness:.4g} mm); give less (a plain number is in m)"
+            )
 
 
 def _placed(value: Any, place: int) -> faults.Fault:

@@ -1,12 +1,14 @@
 """Case files: units as text, unknown keys, impossible values."""
 
 import json
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gearmbs.studies import Case, CaseError, load_case, make_case, paper_cases
+from gearmbs.studies.case import CaseWarning, Gears, Operation
 
 FILE = """
 name = "tilted"
@@ -62,7 +64,7 @@ def test_name_defaults_to_the_file(tmp_path):
         ("[gears]\nface_width = 0.0", r"face_width"),
         ("[gears]\nteeth = [3, 29]", r"teeth"),
         ("[contact]\ndepth = '0 mm'", r"contact.depth"),
-        ("[solver]\nsignal_rate = 1e6", r"signal_rate"),
+        ("[solver]\nsignal_rate = 1e6\noutput_rate = 51200.0", r"signal_rate"),
         ("[engine]\npower = 1", r"engine: unknown key; known ones are name"),
         ("[operation\n", r"not a valid TOML file"),
     ],
@@ -138,3 +140,110 @@ def test_wrong_faults_of_teeth(fault, words):
 def test_faults_that_do_not_fit_are_named_by_their_place(fault, words):
     with pytest.raises(CaseError, match=words):
         make_case({"fault": {"teeth": ["eccentricity", fault]}})
+
+
+WRONG = [
+    ({"bogus": 1}, "case: bogus: unknown key; known ones are name, gears"),
+    ({"operation": {"speed": "10 N m"}}, "case: operation.speed = '10 N m': '10 N m' is in"),
+    ({"gears": {"modul": "3 mm"}}, r"gears.modul: unknown key; .*; did you mean module\?"),
+    ({"speed": "1000 rpm"}, r"speed: unknown key; .*; did you mean operation.speed\?"),
+    ({"operation": "1000 rpm"}, "operation = '1000 rpm': give its keys, speed, torque"),
+    ({"gears": {"teeth": [20, 21, 22]}}, "gears.teeth = .*3 values; give one for both wheels"),
+    ({"contact": {"depth": 0.01}}, r"contact.depth is 10 mm, more than the module .*\(a plain number is in m\)"),
+    ({"fault": {"teeth": {"kind": "broken tooth", "lost": 1.5}}}, r"fault.teeth\[0\].lost is 1.5; give a share"),
+    ({"fault": {"teeth": {"kind": "root crack", "depth": "50 mm"}}}, r"fault.teeth\[0\]: crack depth is 50.0000 mm"),
+    (
+        {"fault": {"teeth": {"kind": "broken tooth", "tooth": 99}}},
+        r"\[0\].tooth is 99; the driver wheel has teeth 0 to 28",
+    ),
+    (
+        {"fault": {"teeth": {"kind": "wear", "teeth": [3, 77]}}},
+        r"\[0\].teeth is 77; the driver wheel has teeth 0 to 28",
+    ),
+    ({"fault": {"teeth": {"kind": "pitting", "depth": "30 mm"}}}, "displaced by 30 mm, more than a tooth is thick"),
+    ({"fault": {"teeth": "root cracks"}}, r"did you mean root crack\?"),
+    ({"fault": {"teeth": {"kind": "wear", "deptt": 1}}}, r"did you mean depth\?"),
+    (
+        {"operation": {"speed": [["0 s", "0 rpm"], ["0 s", "5 rpm"]]}},
+        "speed = .*point 2 is at 0 s; give times from 0 on",
+    ),
+    ({"operation": {"speed": [["0 s", "0 rpm"], ["1 s", "5 mm"]]}}, "speed = .*point 2: '5 mm' is in mm"),
+    ({"operation": {"speed": [["0 s", "0 rpm"]]}}, "a curve needs two points at least"),
+    ({"operation": {"speed": ["0 rpm", "5 rpm"]}}, r"a curve is a list of points \[time, value\]"),
+]
+
+
+@pytest.mark.parametrize(("data", "words"), WRONG)
+def test_every_way_in_has_one_error_of_one_line(tmp_path, data, words):
+    """Constructor, dictionary, change of a case and pydantic's own methods; a file in the same words."""
+    ways = (
+        lambda: Case(**data),
+        lambda: make_case(data),
+        lambda: Case.model_validate(data),
+        lambda: Case.model_validate_json(json.dumps(data)),
+        lambda: Case().changed(**data),
+    )
+    for way in ways:
+        with pytest.raises(CaseError, match=words) as caught:
+            way()
+        assert len(str(caught.value).splitlines()) == 1
+        assert "pydantic" not in str(caught.value)
+
+
+def test_sections_raise_the_same_error():
+    with pytest.raises(CaseError, match=r"case: gears.teeth = \[3\]: 1 values") as caught:
+        Gears(teeth=[3])
+    assert len(str(caught.value).splitlines()) == 1
+    with pytest.raises(CaseError, match="give its fields by name"):
+        Operation(3)
+
+
+def test_one_count_of_teeth_is_for_both_wheels(tmp_path):
+    path = tmp_path / "twenty.toml"
+    path.write_text("[gears]\nteeth = 20\nprofile_shift = 0.2\n[solver]\nintegrator = 'gstiff'\n")
+    case = load_case(path)
+    assert case.gears.teeth == (20, 20)
+    assert case.gears.profile_shift == (0.2, 0.2)
+    assert case.solver.integrator == "GSTIFF"
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ({"operation": {"speed": 1000}}, "which is 9549.3 rpm; write '1000 rpm' if that is meant, '1000 rad/s' if not"),
+        ({"shafts": {"radius": 1.0}}, "shafts.radius = 1.0 is a plain number and so in m, which is 1000 mm"),
+    ],
+)
+def test_plain_numbers_that_look_like_another_unit_are_remarked(data, words):
+    with pytest.warns(CaseWarning, match=words):
+        Case(**data)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Case(operation={"speed": "1000 rad/s"}, shafts={"radius": "1 m"})
+        Case(operation={"speed": 104.71975511965977})
+
+
+def test_quantities_are_kept_as_the_user_wrote_them():
+    case = Case(operation={"speed": "1500 rpm", "torque": 80.0}, gears={"face_width": ["22 mm", "20 mm"]})
+    assert case.operation.written == {"speed": "1500 rpm"}
+    assert case.gears.written == {"face_width": ["22 mm", "20 mm"]}
+    changed = case.changed(operation={"torque": "90 N m"})
+    assert changed.operation.written == {"speed": "1500 rpm", "torque": "90 N m"}
+    assert changed == make_case(json.loads(changed.model_dump_json()))
+
+
+def test_speed_and_torque_as_curves(tmp_path):
+    path = tmp_path / "up.toml"
+    path.write_text(
+        '[operation]\nspeed = [["0 s", "0 rpm"], ["2 s", "3000 rpm"]]\ntorque = [[0.0, "50 N m"], [1.5, 100.0]]\n'
+    )
+    case = load_case(path)
+    assert case.operation.speed_curve == ((0.0, 0.0), (2.0, pytest.approx(100 * np.pi)))
+    assert case.operation.torque_curve == ((0.0, 50.0), (1.5, 100.0))
+    assert case.operation.duration == 2.0
+    assert case.mesh_frequency == pytest.approx(29 * 50.0)
+    # a STEP covers half the way of its end speed
+    assert case.angle_turned == pytest.approx(100 * np.pi, rel=1e-12)
+    assert case.pair().torque == 100.0
+    assert make_case(json.loads(case.model_dump_json())) == case
+    assert case.changed(operation={"speed": [[0, 0], [3, "3000 rpm"]]}).operation.duration == 3.0

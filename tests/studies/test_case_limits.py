@@ -30,7 +30,10 @@ from gearmbs.studies.limits import check_record, edge, remarks, slip
         ({"solver": {"tolerance": 1e-2}}, r"tolerance = 0.01: steps would skip contacts; give 1e-12 to 5e-06"),
         ({"solver": {"tolerance": 1e-16}}, r"tolerance = 1e-16: rounding errors would be larger; give 1e-12"),
         ({"solver": {"tolerance": 2e-6, "integrator": "IDA"}}, r"give 1e-12 to 1e-06 with IDA"),
-        ({"solver": {"signal_rate": 12345.0}}, r"not a whole multiple of signal_rate 12345 Hz; .*output_rate = 61725"),
+        (
+            {"solver": {"signal_rate": 12345.0, "output_rate": 51200.0}},
+            r"not a whole multiple of signal_rate 12345 Hz; .*output_rate = 61725",
+        ),
     ],
 )
 def test_values_out_of_range(data, words):
@@ -66,7 +69,7 @@ def test_material_and_sizes_of_each_wheel(tmp_path):
     [
         # (3 + 1/4 + 1/4) 29 n of 1000 rad/s is 16154 Hz, half of 38400 Hz is the first multiple of 6400 Hz above it
         (
-            {"operation": {"speed": 1000.0}},
+            {"operation": {"speed": "1000 rad/s"}, "solver": {"signal_rate": 12800.0}},
             r"signal_rate = 12800 Hz: .*9549.3 rpm.* up to 16154.2 Hz.*signal_rate = 38400",
         ),
         ({"operation": {"duration": "0.05 s"}}, r"operation.duration = 0.05 s: .*483.333 Hz needs .* at least 0.05"),
@@ -96,9 +99,9 @@ def test_the_shortest_record_that_is_accepted_is_long_enough():
     for seconds, fits in ((need + 0.0005, True), (need - 0.001, False)):
         changed = case.changed(operation={"duration": seconds})
         assert fits == (_refusal(changed) is None)
-    count = round((need + 0.0005) * case.solver.signal_rate)
-    t = np.arange(count) / case.solver.signal_rate
-    signal = make_signal(np.cos(2 * np.pi * case.mesh_frequency * t), case.solver.signal_rate, units="m/s^2")
+    count = round((need + 0.0005) * case.signal_rate)
+    t = np.arange(count) / case.signal_rate
+    signal = make_signal(np.cos(2 * np.pi * case.mesh_frequency * t), case.signal_rate, units="m/s^2")
     assert gmf_rms(signal, case.mesh_frequency)["band"].shape == (3, 1)
     slow = Case(solver={"signal_rate": 1600.0, "output_rate": 51200.0})
     # Kaiser's 100 dB over a tenth of the new rate: half the filter is 0.5 (100 - 7.95)/(2.285 2 pi 0.1 f) = 20 ms
@@ -159,7 +162,8 @@ def test_wrong_settings_are_found_without_compiling():
         "import sys\n"
         "from gearmbs.studies.case import CaseError, make_case\n"
         "from gearmbs.studies.limits import check_record\n"
-        "for data in ({'operation': {'spead': 1}}, {'fault': {'backlash': '-1 mm'}}, {'operation': {'speed': 1000}}):\n"
+        "high = {'operation': {'speed': '9549 rpm'}, 'solver': {'signal_rate': '12.8 kHz'}}\n"
+        "for data in ({'operation': {'spead': 1}}, {'fault': {'backlash': '-1 mm'}}, high):\n"
         "    try:\n"
         "        check_record(make_case(data))\n"
         "    except CaseError:\n"
@@ -168,3 +172,31 @@ def test_wrong_settings_are_found_without_compiling():
         "raise SystemExit('numba' in sys.modules)\n"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_random_plausible_pairs_are_not_refused_for_their_rates():
+    """Pairs of 15 to 70 teeth at 100 to 6000 rpm: the rates follow the mesh frequency, also where it is high."""
+    random = np.random.default_rng(60)
+    refused: list[str] = []
+    for _ in range(60):
+        teeth, speed = random.integers(15, 71, 2).tolist(), random.uniform(100.0, 6000.0)
+        data = {
+            "gears": {"teeth": teeth, "module": "3 mm", "profile_shift": [0.3, 0.0]},
+            "operation": {
+                "speed": f"{speed} rpm",
+                "torque": "50 N m",
+                "duration": max(0.5, 600.0 / (teeth[0] * speed)),
+            },
+        }
+        try:
+            case = make_case(data)
+        except CaseError as error:
+            refused.append(str(error))
+            continue
+        check_record(case)
+        assert 5.0 * case.mesh_frequency <= case.signal_rate / 2.56 + 1e-9
+        assert case.signal_rate >= 12800.0
+        assert case.output_rate % case.signal_rate == 0.0
+    # wheels that cannot be, whatever their speed
+    assert len(refused) <= 3
+    assert all("rate" not in text for text in refused)

@@ -28,7 +28,7 @@ def test_record_signal_keeps_what_is_known(records):
     signal = record_signal(records["healthy"])
     assert signal["channel"].values.tolist() == records["healthy"].component.values.tolist()
     assert signal.attrs["teeth"] == (29, 29)
-    assert signal.attrs["sampling_rate"] == 12800.0
+    assert signal.attrs["sampling_rate"] == records["healthy"].attrs["solver_signal_rate"] == 25600.0
     assert signal.attrs["units"] == "m/s^2"
     with pytest.raises(SignalError, match="there is no 'up'"):
         record_signal(records["healthy"], "up")

@@ -184,7 +184,7 @@ def test_floor_between_the_lines_at_the_study_settings(fault):
     spectrum = np.abs(
         np.fft.rfft((force - force.mean(axis=0)) * blackmanharris(len(force), sym=False)[:, None], axis=0)
     )
-    frequency = np.fft.rfftfreq(len(force), 1.0 / case.solver.output_rate)
+    frequency = np.fft.rfftfreq(len(force), 1.0 / case.output_rate)
     apart = np.abs(frequency - np.round(frequency / case.mesh_frequency) * case.mesh_frequency)
     width = 6.0 * frequency[1]
     between = spectrum[(apart > width) & (frequency > width) & (frequency < 6400.0)].max(axis=0)

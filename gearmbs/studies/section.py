@@ -1,0 +1,187 @@
+"""Sections of a case: validated, frozen, with one error of one line a fault, and the units that the user wrote."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import warnings
+from numbers import Real
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+
+from gearmbs.studies.quantities import Measure
+
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
+
+ROUND = 10.0
+"""Plain speeds that are whole multiples of so many rad/s, and as many at least, look like rpm."""
+
+HALF_METRE = 0.5
+"""Plain lengths from here on, m, look like millimetres."""
+
+
+class CaseError(ValueError):
+    """A case that cannot be simulated; the message names the field, the value and the remedy."""
+
+
+class CaseWarning(UserWarning):
+    """A value of a case that is possible but looks like a slip, such as a plain number meant in rpm."""
+
+
+class _OneError(ModelMetaclass):
+    """Let a section raise a CaseError wherever it is built."""
+
+    def __call__(cls: Any, *args: Any, **data: Any) -> Any:
+        if args:
+            raise CaseError(f"{cls.label(data)}: give its fields by name, not by place")
+        try:
+            return super().__call__(**data)
+        except ValidationError as error:
+            raise CaseError(explained(error, cls, cls.label(data))) from None
+
+
+class Section(BaseModel, metaclass=_OneError):
+    """What all sections of a case share."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    section: ClassVar[str] = ""
+
+    @classmethod
+    def label(cls, data: Any) -> str:
+        """Return how messages name what is built from ``data``."""
+        return "case"
+
+    @classmethod
+    def checked(cls, data: Any, source: str) -> Any:
+        """Return the section made of ``data``, which comes from ``source``.
+
+        Raises
+        ------
+        CaseError
+            Naming every wrong field with its value, each in a line.
+        """
+        try:
+            return cls.__pydantic_validator__.validate_python(data)
+        except ValidationError as error:
+            raise CaseError(explained(error, cls, source)) from None
+
+    @classmethod
+    def model_validate(cls, obj: Any, **options: Any) -> Any:
+        """Return the section made of a mapping, as pydantic does but with the package's own error."""
+        try:
+            return super().model_validate(obj, **options)
+        except ValidationError as error:
+            raise CaseError(explained(error, cls, cls.label(obj))) from None
+
+    @classmethod
+    def model_validate_json(cls, json_data: Any, **options: Any) -> Any:
+        """Return the section made of JSON, as pydantic does but with the package's own error."""
+        try:
+            return super().model_validate_json(json_data, **options)
+        except ValidationError as error:
+            raise CaseError(explained(error, cls, cls.label({}))) from None
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _remember(cls, data: Any, handler: Any) -> Any:
+        """Keep what the user wrote of quantities, and remark plain numbers that look like another unit."""
+        made = handler(data)
+        if isinstance(data, dict):
+            measures = measures_of(cls)
+            made.__dict__["given"] = {k: v for k, v in data.items() if k in measures and _has_text(v)}
+            for name, measure in measures.items():
+                if name in data:
+                    _remark(f"{cls.section}.{name}", data[name], measure)
+        return made
+
+    @property
+    def written(self) -> dict[str, Any]:
+        """The quantities that the user wrote with units, as written."""
+        return self.__dict__.get("given", {})
+
+
+def measures_of(kind: type[BaseModel]) -> dict[str, Measure]:
+    """Return what the fields of a section measure, by name."""
+    return {
+        name: item for name, field in kind.model_fields.items() for item in field.metadata if isinstance(item, Measure)
+    }
+
+
+def _has_text(value: Any) -> bool:
+    if isinstance(value, (list, tuple)):
+        return any(_has_text(item) for item in value)
+    return isinstance(value, str)
+
+
+def _remark(field: str, value: Any, measure: Measure) -> None:
+    """Warn of a plain number in SI that looks as if it were meant in the unit people use."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return
+    number, meant = float(value), ""
+    if measure.dimension == "angular speed" and number >= ROUND and math.fmod(number, ROUND) == 0.0:
+        meant, is_now = "rpm", f"rad/s, which is {number * 30.0 / math.pi:.6g} rpm"
+    elif measure.dimension == "length" and abs(number) >= HALF_METRE:
+        meant, is_now = "mm", f"m, which is {number * 1e3:.6g} mm"
+    if meant:
+        warnings.warn(
+            f"{field} = {value!r} is a plain number and so in {is_now}; write '{value} {meant}' if that is meant, "
+            f"'{value} {measure.unit}' if not",
+            CaseWarning,
+            stacklevel=6,
+        )
+
+
+def explained(error: ValidationError, kind: Any, source: str) -> str:
+    """Return what is wrong, each fault in a line of its own that begins with ``source``."""
+    return "\n".join(_line(item, kind, source) for item in error.errors(include_url=False))
+
+
+def _line(item: Any, kind: Any, source: str) -> str:
+    loc = item["loc"]
+    parts = [str(part) for part in loc if not str(part).startswith(("function-", "tuple[", "float", "constrained"))]
+    field = ".".join([*([kind.section] if kind.section else []), *parts])
+    message = item["msg"].removeprefix("Value error, ")
+    if item["type"] == "extra_forbidden":
+        return f"{source}: {field}: {_unknown(loc, kind)}"
+    if item["type"] in ("model_type", "model_attributes_type", "dataclass_type"):
+        return f"{source}: {field} = {item['input']!r}: give its keys, {', '.join(_owner(loc, kind).model_fields)}"
+    if message.startswith("["):
+        # one of several, named by its place
+        return f"{source}: {field}{message}"
+    # what is wrong with a section as a whole begins with the name of the field
+    if isinstance(item["input"], (dict, BaseModel)):
+        return f"{source}: {field}.{message}" if field else f"{source}: {message}"
+    return f"{source}: {field} = {item['input']!r}: {message}"
+
+
+def _owner(loc: tuple, kind: Any) -> Any:
+    """Return the section that holds what is at a place."""
+    for part in loc:
+        inner = getattr(kind.model_fields.get(part), "annotation", None)
+        if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
+            break
+        kind = inner
+    return kind
+
+
+def _unknown(loc: tuple, kind: Any) -> str:
+    """Return what is known in place of an unknown key, with the nearest of them all."""
+    key, owner = str(loc[-1]), _owner(loc[:-1], kind)
+    known = list(owner.model_fields)
+    text = f"unknown key; known ones are {', '.join(known)}"
+    near = difflib.get_close_matches(key, known, n=1)
+    if not near:
+        sections = {
+            name: field.annotation.model_fields
+            for name, field in kind.model_fields.items()
+            if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)
+        }
+        places = {f"{name}.{inner}": inner for name, fields in sections.items() for inner in fields}
+        close = difflib.get_close_matches(key, places.values(), n=1)
+        near = [place for place, inner in places.items() if close and inner == close[0]]
+    return f"{text}; did you mean {' or '.join(near)}?" if near else text

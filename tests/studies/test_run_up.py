@@ -1,0 +1,96 @@
+"""Run-ups and coast-downs: speed and torque as curves, and what the record of one holds."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from gearmbs import cli
+from gearmbs.mechanism import curve
+from gearmbs.signals import angular_resample, order_spectrum
+from gearmbs.studies import Case, CaseError, make_case, record_signal, run_case
+from gearmbs.studies.limits import check_record
+
+UP = [["0 s", "0 rpm"], ["0.6 s", "1800 rpm"]]
+
+
+@pytest.fixture(scope="module")
+def run_up():
+    case = Case(name="up", operation={"speed": UP, "torque": "100 N m"}, friction={"enabled": False})
+    return case, run_case(case)
+
+
+def test_the_record_begins_at_rest_and_follows_the_curve(run_up):
+    case, record = run_up
+    t = record.signal_time.values - 0.1
+    speed = curve([0.0, 0.6], [0.0, 60.0 * np.pi])
+    np.testing.assert_allclose(record["speed"].values, [speed(at) for at in t], rtol=1e-9, atol=1e-6)
+    # the STEP covers half of what its end speed would
+    assert float(record["angle"][-1]) == pytest.approx(0.5 * 0.6 * 60.0 * np.pi, rel=1e-3)
+    assert record.attrs["operation_speed"] == pytest.approx(60.0 * np.pi)
+    assert "gmf_rms" not in record
+    assert case.operation.duration == 0.6
+
+
+def test_the_mesh_carries_the_load_and_accelerates_the_driven_side(run_up):
+    """Mean normal force times base radius is torque plus inertia times the driven side's acceleration."""
+    case, record = run_up
+    pair = case.pair()
+    shaft = case.shafts
+    mass = shaft.density * np.pi * shaft.radius**2 * shaft.length
+    inertia = pair.wheels[1].inertia[2] + 0.5 * mass * shaft.radius**2
+    speed = curve([0.0, 0.6], [0.0, 60.0 * np.pi])
+    force, t = record["normal_force"].values, record.time.values - 0.1
+    for middle in (0.2, 0.3, 0.45):
+        near = np.abs(t - middle) < 0.05
+        wanted = 100.0 + inertia * np.mean([speed.derivatives(at)[1] for at in t[near]])
+        assert force[near].mean() * pair.wheels[1].base_radius == pytest.approx(wanted, rel=2e-3)
+
+
+def test_order_lines_stay_where_they_are(run_up):
+    """The mesh lines of the faster half, piece by piece, lie at multiples of the teeth to a hundredth."""
+    _, record = run_up
+    signal = record_signal(record, "line_of_action")
+    assert "speed" not in signal.attrs
+    turning = signal["speed"].values > 60.0
+    part = signal.isel(time=turning)
+    angular = angular_resample(part, part["angle"].reset_coords(drop=True))
+    per_rev = int(angular.attrs["samples_per_rev"])
+    pieces = range(0, angular.sizes["angle"] - 4 * per_rev, 2 * per_rev)
+    assert len(pieces) >= 3
+    for start in pieces:
+        lines = order_spectrum(angular.isel(angle=slice(start, start + 4 * per_rev)))[:, 0]
+        near = lines.sel(order=slice(20.0, 38.0))
+        assert float(near.order[int(np.argmax(near.values))]) == pytest.approx(29.0, rel=0.01)
+
+
+def test_a_coast_down_and_a_torque_that_changes():
+    case = Case(
+        operation={
+            "speed": [[0, "1200 rpm"], ["0.3 s", "600 rpm"]],
+            "torque": [[0, "100 N m"], ["0.3 s", "20 N m"]],
+            "run_up": "30 ms",
+            "settling": "20 ms",
+        }
+    )
+    record = run_case(case)
+    force = record["normal_force"].values
+    radius = case.pair().wheels[1].base_radius
+    assert float(record["speed"][0]) == pytest.approx(40.0 * np.pi, rel=1e-4)
+    assert float(record["speed"][-1]) == pytest.approx(20.0 * np.pi, rel=1e-3)
+    count = force.size // 10
+    assert force[:count].mean() * radius == pytest.approx(100.0, rel=0.05)
+    assert force[-count:].mean() * radius == pytest.approx(20.0, rel=0.1)
+
+
+def test_a_run_up_of_hardly_a_turn_is_refused():
+    case = make_case({"operation": {"speed": [[0, 0.0], ["50 ms", "500 rpm"]]}})
+    with pytest.raises(CaseError, match=r"operation.speed: the driver makes 0.208 revolutions .* give a longer curve"):
+        check_record(case)
+
+
+def test_from_a_file_on_the_command_line(tmp_path):
+    path = tmp_path / "up.toml"
+    path.write_text('[operation]\nspeed = [["0 s", "0 rpm"], ["0.4 s", "1800 rpm"]]\nrun_up = "30 ms"\n')
+    result = CliRunner().invoke(cli.app, ["run", str(path)])
+    assert result.exit_code == 0, result.output
+    assert "to 1800 rpm" in result.output
