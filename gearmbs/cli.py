@@ -85,22 +85,22 @@ def stage_bar(name: str) -> Iterator[Callable[[float, str], None]]:
 def keep_partial(failure: SimulationFailed, path: Path) -> NoReturn:
     """Write what a run has computed before it stopped, and end: with status 130 if the user interrupted it."""
     from gearmbs.studies.simulation import SimulationInterrupted
-    from gearmbs.studies.store import write_dataset
+    from gearmbs.studies.store import KeptElsewhere, keep_dataset
 
     partial = failure.partial()
     if partial is None:
         raise failure
-    write_dataset(path, partial)
+    try:
+        path = keep_dataset(path, partial)
+    except KeptElsewhere as error:
+        path = error.path
+    except OSError as error:
+        raise RuntimeError(f"{failure}\n{error}") from failure
     if isinstance(failure, SimulationInterrupted):
         end = float(partial.time[-1])
         typer.secho(f"gearmbs: interrupted at t = {end:.6g} s; what was computed until then is in {path}", err=True)
         raise typer.Exit(130) from None
     raise RuntimeError(f"{failure}\nWhat was computed until then is in {path}") from failure
-
-
-def file_stem(name: str) -> str:
-    """Return the name of a case as part of a file's name."""
-    return name.replace(", ", "_").replace("/", "_")
 
 
 def _interrupt(*_args) -> None:
@@ -179,11 +179,17 @@ def paper(
         from gearmbs.studies.paper import run_paper
         from gearmbs.studies.preset import paper_cases
         from gearmbs.studies.simulation import SimulationFailed
-        from gearmbs.studies.store import write_dataset
+        from gearmbs.studies.store import check_place, file_stem, keep, record_size, stored_record
 
         settings: dict[str, Any] = {"torques": (low, 2.0 * low), "misalignment": tilt}
-        names = [case.name for case in paper_cases(base=base, **settings)]
+        cases = paper_cases(base=base, **settings)
+        names = [case.name for case in cases]
         single = out / "cases"
+        finished = [case.name for case in cases if stored_record(single, case) is not None]
+        # each record by itself, and all of them in one file
+        check_place(out, record_size(base) * (2 * len(cases) - len(finished)), "the study")
+        if finished:
+            typer.echo(f"taking up {len(finished)} finished of {len(cases)} cases from {single}", err=True)
         with case_bars(names) as move:
             try:
                 study = run_paper(
@@ -191,13 +197,13 @@ def paper(
                     component=component,
                     workers=workers,
                     progress=move,
-                    done=lambda case, record: write_dataset(single / f"{file_stem(case.name)}.nc", record),
+                    folder=single,
                     **settings,
                 )
             except SimulationFailed as failure:
                 name = file_stem(failure.case.name) if failure.case is not None else "failed"
                 keep_partial(failure, single / f"{name}.partial.nc")
-        paths = study.save(out)
+        paths = keep(study.save, out)
         for claim in study.claims():
             mark = "held    " if claim.held else "NOT HELD"
             typer.echo(f"{mark}  {claim.name}\n          {claim.numbers}")
@@ -224,9 +230,10 @@ def run(
         check_record(case, str(case_file))
 
         from gearmbs.studies.simulation import SimulationFailed, run_case
-        from gearmbs.studies.store import write_dataset
+        from gearmbs.studies.store import check_place, keep_dataset, record_size
 
         target = out or case_file.with_suffix(".nc")
+        check_place(target.parent, record_size(case), "its record")
         operation = case.operation
         span = operation.run_up + operation.settling + operation.duration
         with case_bars([case.name]) as move:
@@ -234,10 +241,12 @@ def run(
                 data = run_case(case, lambda t: move(case.name, min(t / span, 1.0)))
             except SimulationFailed as failure:
                 keep_partial(failure, target.with_name(f"{target.stem}.partial.nc"))
-        write_dataset(target, data)
+        keep_dataset(target, data)
         typer.echo(_level_table(data))
         for remark in remarks(case):
             typer.echo(f"note: {remark}", err=True)
+        speed, cycle = data.attrs["solver_real_time_factor"], 1e3 * data.attrs["solver_time_per_mesh_cycle"]
+        typer.echo(f"solver: {speed:.3g} times real time, {cycle:.3g} ms a mesh cycle", err=True)
         typer.echo(f"wrote {target}")
 
 

@@ -17,6 +17,7 @@ from gearmbs.dae.results.stream import Stream
 from gearmbs.mechanism.lumping import lumped, why_not_lumped
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
+from gearmbs.progress import time_bar
 
 INTEGRATORS = ("WSTIFF", "GSTIFF", "IDA")
 ADVICE = {
@@ -56,7 +57,7 @@ def simulate(
     formulation: str = "SI2",
     tol: float = 1e-6,
     rate_scale: float = 1.0,
-    progress: bool | Callable[[float], None] = False,
+    progress: bool | Callable[[float], None] | None = None,
     advice: Mapping[Status, str] | None = None,
     consumer: Callable[[Solution], None] | None = None,
     lump: bool = False,
@@ -86,8 +87,9 @@ def simulate(
     rate_scale : float
         Velocities are allowed an error this many times larger (1/s) than positions: the angular frequency of the
         motion one is interested in; 1 is ADAMS's practice.
-    progress : bool or callable
-        True shows a bar; a callable is given the time reached.
+    progress : bool or callable, optional
+        A bar, see `gearmbs.progress`: by default after two seconds where somebody watches, with True at once, with
+        False never; a callable is given the time reached.
     advice : mapping, optional
         What messages of failures recommend, by status, where it should be something else than for a mechanism.
     consumer : callable, optional
@@ -140,7 +142,7 @@ def simulate(
     first, last = float(t_eval[0]), float(t_eval[-1])
     times = None if every_step else t_eval
     stream = None if consumer is None else Stream(system, problem, last, consumer, members)
-    with _reporter(progress, first, last) as report:
+    with time_bar(progress, mechanism.name, first, last) as report:
         if name == "IDA":
             result = solve_ida(problem, times, t_end=last, tol=tol, progress=report, **options)
         else:
@@ -198,27 +200,3 @@ SETTINGS = (
     "consumer",
     "lump",
 )
-
-
-class _reporter:
-    """Context that turns ``progress`` into a callable of time, with a bar when asked for."""
-
-    def __init__(self, progress: bool | Callable[[float], None], start: float, end: float) -> None:
-        self.progress, self.start, self.end = progress, start, end
-        self.bar: Any = None
-
-    def __enter__(self) -> Callable[[float], None] | None:
-        if callable(self.progress):
-            return self.progress
-        if not self.progress:
-            return None
-        from rich.progress import Progress
-
-        self.bar = Progress()
-        self.bar.start()
-        task = self.bar.add_task("simulating", total=self.end - self.start)
-        return lambda t: self.bar.update(task, completed=t - self.start)
-
-    def __exit__(self, *exc) -> None:
-        if self.bar is not None:
-            self.bar.stop()

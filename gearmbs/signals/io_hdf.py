@@ -42,7 +42,8 @@ def write_netcdf(record: Record, path: Path) -> None:
     times = record.t0 + np.arange(record.values.shape[0]) / float(record.rate or 1.0)
     dataset = xr.Dataset(variables, coords={"time": ("time", times, {"units": "s", "axis": "T"})}, attrs=attrs)
     # "units: s" is a plain number of seconds here, not a date.
-    dataset.to_netcdf(path, engine="h5netcdf")
+    # in memory first: the format's library ends the program where the disk is full
+    Path(path).write_bytes(dataset.to_netcdf(engine="h5netcdf"))
 
 
 def read_hdf(path: Path, channels: Sequence[str] | None) -> Record:

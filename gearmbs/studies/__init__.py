@@ -6,7 +6,7 @@ from gearmbs._lazy import late
 
 if TYPE_CHECKING:
     from gearmbs.signals.simulated import record_signal
-    from gearmbs.studies.case import Case, CaseError, load_case, make_case
+    from gearmbs.studies.case import Case, CaseError, CaseWarning, load_case, make_case
     from gearmbs.studies.claims import Claim
     from gearmbs.studies.paper import PaperStudy, run_paper
     from gearmbs.studies.parallel import run_cases
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Case",
     "CaseError",
+    "CaseWarning",
     "Claim",
     "PaperStudy",
     "SimulationFailed",
@@ -37,6 +38,7 @@ late(
     {
         "Case": ".case",
         "CaseError": ".case",
+        "CaseWarning": ".case",
         "Claim": ".claims",
         "PaperStudy": ".paper",
         "SimulationFailed": ".simulation",

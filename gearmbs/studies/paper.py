@@ -21,6 +21,9 @@ from gearmbs.studies.store import write_dataset, write_text
 TARGET_RMS = 1.0
 """RMS, m/s^2, to which the healthy signal at low load is scaled; the paper's own value is not published."""
 
+COSTS = ("mesh_cycles", "real_time_factor", "time_per_mesh_cycle")
+"""What a record says of its cost beside the solver's statistics."""
+
 
 @dataclass(frozen=True)
 class PaperStudy:
@@ -89,8 +92,9 @@ def run_paper(
     misalignment: float = MISALIGNMENT,
     component: str = DEFAULT_COMPONENT,
     workers: int | None = None,
-    progress: Callable[[str, float], None] | None = None,
+    progress: bool | Callable[[str, float], None] | None = None,
     done: Callable[[Case, xr.Dataset], None] | None = None,
+    folder: str | Path | None = None,
 ) -> PaperStudy:
     """Simulate the six cases of the paper and evaluate them.
 
@@ -104,7 +108,7 @@ def run_paper(
         Angle of the misaligned case, rad.
     component : str
         Force component of the figures: one of ``line_of_action``, ``line_of_centres``, ``tangential``, ``resultant``.
-    workers, progress, done
+    workers, progress, done, folder
         See :func:`gearmbs.studies.run_cases`.
 
     Examples
@@ -115,7 +119,7 @@ def run_paper(
     if component not in COMPONENTS:
         raise CaseError(f"component: {component!r} is unknown; choose one of {', '.join(COMPONENTS)}")
     cases = paper_cases(base=base, torques=torques, misalignment=misalignment)
-    records = run_cases(cases, workers=workers, progress=progress, done=done)
+    records = run_cases(cases, workers=workers, progress=progress, done=done, folder=folder)
     return PaperStudy(combine(cases, records, component), component, cases)
 
 
@@ -140,7 +144,7 @@ def combine(cases: list[Case], records: list[xr.Dataset], component: str) -> xr.
     together = together.assign_coords(
         torque=("load", [row[0].attrs["operation_torque"] for row in rows], {"units": "N m"})
     )
-    statistics = {f"solver_{name}" for name in SolverStats().as_dict()}
+    statistics = {f"solver_{name}" for name in (*SolverStats().as_dict(), *COSTS, "time_per_mesh_cycle_units")}
     together.attrs = {
         k: v for k, v in records[0].attrs.items() if k not in statistics and k not in ("case", "case_json")
     }
@@ -161,6 +165,6 @@ def combine(cases: list[Case], records: list[xr.Dataset], component: str) -> xr.
     for case, record in zip(cases, records):
         key = case.name.replace(", ", "_").replace(" ", "_")
         together.attrs[f"case_{key}"] = record.attrs["case_json"]
-        for item in ("steps", "residuals", "jacobians", "wall_time"):
+        for item in ("steps", "residuals", "jacobians", "wall_time", *COSTS):
             together.attrs[f"solver_{key}_{item}"] = record.attrs[f"solver_{item}"]
     return together

@@ -5,18 +5,27 @@ from __future__ import annotations
 import os
 import threading
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from pathlib import Path
+from typing import Any, Literal
 
 import xarray as xr
 
-from gearmbs.studies.case import Case
+from gearmbs.progress import bars
+from gearmbs.studies.case import Case, CaseError
 from gearmbs.studies.limits import check_record
 from gearmbs.studies.processes import run_jobs
-from gearmbs.studies.simulation import run_case
+from gearmbs.studies.simulation import SimulationFailed, SimulationInterrupted, run_case
+from gearmbs.studies.store import check_place, file_stem, keep_dataset, record_size, stored_record
 
 REPORT_SECONDS = 0.2
 """Shortest time between two reports of a process."""
+
+
+class StorageWarning(UserWarning):
+    """A record could not be written where it was wanted; the message says where it is."""
 
 
 class Cancelled(RuntimeError):
@@ -32,9 +41,11 @@ def run_cases(
     cases: Sequence[Case],
     *,
     workers: int | None = None,
-    progress: Callable[[str, float], None] | None = None,
+    progress: bool | Callable[[str, float], None] | None = None,
     done: Callable[[Case, xr.Dataset], None] | None = None,
-) -> list[xr.Dataset]:
+    folder: str | Path | None = None,
+    errors: Literal["raise", "keep"] = "raise",
+) -> list[Any]:
     """Run cases in parallel and return their records in order.
 
     Parameters
@@ -43,10 +54,20 @@ def run_cases(
         With different names.
     workers : int, optional
         Default: the cores available.
-    progress : callable, optional
-        ``progress(name, fraction)`` from time to time.
+    progress : bool or callable, optional
+        Bars, see `gearmbs.progress`; a callable is told ``progress(name, fraction)`` from time to time.
     done : callable, optional
         ``done(case, record)`` as soon as a case is finished, so that nothing computed is lost if a later one fails.
+    folder : path, optional
+        Records are written there as they come, ``<name>.nc``, and taken up again: what an interrupted call has
+        finished is not computed twice. A record counts if every setting of its case and the version are the same.
+    errors : {"raise", "keep"}
+        What becomes of a case that fails: "raise" stops the others, "keep" puts the error in the place of its record.
+
+    Returns
+    -------
+    list of Dataset
+        With ``errors="keep"`` the `SimulationFailed` or `CaseError` of cases that failed, in their places.
 
     Raises
     ------
@@ -54,17 +75,57 @@ def run_cases(
         If two cases share a name, or the record of one could not be evaluated; nothing is simulated then.
     SimulationFailed
         If a case fails; the others are stopped. What was computed of it is in its ``partial()``.
+    OSError
+        If the folder cannot be written or has not the room; nothing is simulated then.
     """
+    if errors not in ("raise", "keep"):
+        raise ValueError(f"errors: {errors!r} is unknown; choose raise or keep")
     names = [case.name for case in cases]
     if len(set(names)) != len(names):
         raise ValueError(f"cases: the names {names} are not all different; name each case")
+    found: dict[str, Any] = {}
     for case in cases:
-        check_record(case)
-    workers = max(1, min(workers or available_cores(), len(cases)))
-    compiled = all(case.solver.integrator != "IDA" for case in cases)
-    if workers == 1 or compiled:
-        return _in_threads(cases, workers, progress, done)
-    return _in_processes(cases, workers, progress, done)
+        try:
+            check_record(case)
+        except CaseError as error:
+            if errors == "raise":
+                raise
+            found[case.name] = error
+    if folder is not None:
+        found |= _taken_up([case for case in cases if case.name not in found], folder)
+        done = _storing(Path(folder), done)
+    left = [case for case in cases if case.name not in found]
+    with bars(progress, names) as move:
+        for name in found if move is not None else ():
+            move(name, 1.0)
+        workers = max(1, min(workers or available_cores(), len(left)))
+        compiled = all(case.solver.integrator != "IDA" for case in left)
+        run = _in_threads if workers == 1 or compiled else _in_processes
+        found |= zip((case.name for case in left), run(left, workers, move, done, errors == "keep"), strict=True)
+    return [found[name] for name in names]
+
+
+def _taken_up(cases: Sequence[Case], folder: str | Path) -> dict[str, xr.Dataset]:
+    """Return the records that a folder holds already, and see that there is room for the others."""
+    found = {case.name: record for case in cases if (record := stored_record(folder, case)) is not None}
+    needed = sum(record_size(case) for case in cases if case.name not in found)
+    check_place(folder, needed, f"the study of {len(cases) - len(found)} records")
+    return found
+
+
+def _storing(folder: Path, done: Callable | None) -> Callable[[Case, xr.Dataset], None]:
+    """Return what is done with a finished case: its record is written, elsewhere if need be, and handed on."""
+
+    def store(case: Case, record: xr.Dataset) -> None:
+        try:
+            keep_dataset(folder / f"{file_stem(case.name)}.nc", record)
+        except OSError as error:
+            # the record is in memory all the same, and other cases are not to blame
+            warnings.warn(str(error), StorageWarning, stacklevel=2)
+        if done is not None:
+            done(case, record)
+
+    return store
 
 
 def _span(case: Case) -> float:
@@ -77,7 +138,7 @@ def _cost(case: Case) -> float:
     return _span(case) * (9.0 + case.pair().face_slices)
 
 
-def _in_threads(cases, workers, progress, done) -> list[xr.Dataset]:
+def _in_threads(cases, workers, progress, done, keep) -> list[Any]:
     stop = threading.Event()
 
     def one(case: Case) -> xr.Dataset:
@@ -89,7 +150,7 @@ def _in_threads(cases, workers, progress, done) -> list[xr.Dataset]:
 
         return run_case(case, report)
 
-    records: dict[str, xr.Dataset] = {}
+    records: dict[str, Any] = {}
     # side by side the longest first, or the last one would keep the others waiting
     order = cases if workers == 1 else sorted(cases, key=_cost, reverse=True)
     with ThreadPoolExecutor(workers) as pool:
@@ -100,7 +161,12 @@ def _in_threads(cases, workers, progress, done) -> list[xr.Dataset]:
                 finished, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
                 for future in finished:
                     case = futures[future]
-                    records[case.name] = future.result()
+                    try:
+                        records[case.name] = future.result()
+                    except SimulationFailed as failure:
+                        if not keep or isinstance(failure, SimulationInterrupted):
+                            raise
+                        records[case.name] = failure
                     _finished(case, records[case.name], progress, done)
         except BaseException:
             stop.set()
@@ -109,9 +175,9 @@ def _in_threads(cases, workers, progress, done) -> list[xr.Dataset]:
     return [records[case.name] for case in cases]
 
 
-def _in_processes(cases, workers, progress, done) -> list[xr.Dataset]:
+def _in_processes(cases, workers, progress, done, keep) -> list[Any]:
     return run_jobs(
-        _run_reporting,
+        _run_keeping if keep else _run_reporting,
         cases,
         workers,
         progress=None if progress is None else lambda case, fraction: progress(case.name, fraction),
@@ -133,8 +199,16 @@ def _run_reporting(case: Case, report: Callable[[float], None]) -> xr.Dataset:
     return run_case(case, progress)
 
 
-def _finished(case: Case, record: xr.Dataset, progress, done) -> None:
+def _run_keeping(case: Case, report: Callable[[float], None]) -> Any:
+    """Run a case and return its record, or the failure."""
+    try:
+        return _run_reporting(case, report)
+    except SimulationFailed as failure:
+        return failure
+
+
+def _finished(case: Case, record: Any, progress, done) -> None:
     if progress is not None:
         progress(case.name, 1.0)
-    if done is not None:
+    if done is not None and not isinstance(record, SimulationFailed):
         done(case, record)

@@ -129,11 +129,19 @@ def _settings(study: StudyTables) -> list[str]:
 
 
 def _integration(study: StudyTables) -> list[str]:
-    parts = ["## Integration", "", "| case | steps | residuals | Jacobians | wall time s |", "|---|---|---|---|---|"]
+    parts = [
+        "## Integration",
+        "",
+        "| case | steps | residuals | Jacobians | wall time s | times real time | ms a mesh cycle |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for case in study.cases:
         key = f"solver_{case.name.replace(', ', '_').replace(' ', '_')}"
         numbers = [study.records.attrs[f"{key}_{item}"] for item in ("steps", "residuals", "jacobians", "wall_time")]
-        parts.append(f"| {case.name} | " + " | ".join(_value(v) for v in numbers) + " |")
+        speed = study.records.attrs[f"{key}_real_time_factor"]
+        cycle = 1e3 * study.records.attrs[f"{key}_time_per_mesh_cycle"]
+        row = " | ".join(_value(v) for v in numbers)
+        parts.append(f"| {case.name} | {row} | {speed:.3g} | {cycle:.3g} |")
     return parts
 
 

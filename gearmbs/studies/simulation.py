@@ -79,7 +79,7 @@ class SimulationInterrupted(SimulationFailed):
 
 
 def simulate_case(
-    case: Case, progress: bool | Callable[[float], None] = False, *, every_step: bool = False, **options
+    case: Case, progress: bool | Callable[[float], None] | None = None, *, every_step: bool = False, **options
 ) -> Solution:
     """Integrate the mechanism of a case from rest to the end of its record.
 
@@ -125,7 +125,7 @@ def case_mechanism(case: Case):
     )
 
 
-def run_case(case: Case, progress: bool | Callable[[float], None] = False) -> xr.Dataset:
+def run_case(case: Case, progress: bool | Callable[[float], None] | None = None) -> xr.Dataset:
     """Simulate a case and return its record: a pure function of the case.
 
     Returns
@@ -326,4 +326,22 @@ def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any
     out["python_version"] = platform.python_version()
     if solution is not None:
         out.update({f"solver_{key}": value for key, value in solution.stats.as_dict().items()})
+        out.update(cost(case, solution))
     return out
+
+
+def cost(case: Case, solution: Solution) -> dict[str, Any]:
+    """Return what a run cost: seconds simulated in a second of the solver, and its time for each cycle of the mesh.
+
+    The first falls with the speed of the wheels, the second hardly does.
+    """
+    operation = case.operation
+    end, spent = float(solution.t[-1]), solution.stats.wall_time
+    angle = drive_angle(operation.speed, operation.run_up, operation.run_up + operation.settling)
+    cycles = case.gears.teeth[0] * (angle(end) - angle(0.0)) / (2.0 * np.pi)
+    return {
+        "solver_mesh_cycles": cycles,
+        "solver_real_time_factor": end / spent if spent > 0.0 else 0.0,
+        "solver_time_per_mesh_cycle": spent / cycles if cycles > 0.0 else 0.0,
+        "solver_time_per_mesh_cycle_units": "s",
+    }

@@ -1,23 +1,171 @@
-"""Results of studies as files that appear under their final name only when they are whole."""
+"""Results of studies as files that appear under their final name only when they are whole, and are found again.
+
+A dataset becomes a file in memory first: the library that writes the format ends the whole program where a disk is
+full. Where a file cannot be written, the record is kept elsewhere, and the message says where.
+"""
 
 from __future__ import annotations
 
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import xarray as xr
 
+import gearmbs
+from gearmbs.studies.case import Case
 from gearmbs.view.files import whole_file
 from gearmbs.view.files import write_whole as write_text
 
-__all__ = ["whole_file", "write_dataset", "write_text"]
+__all__ = [
+    "KeptElsewhere",
+    "check_place",
+    "file_stem",
+    "keep",
+    "keep_dataset",
+    "record_size",
+    "stored_record",
+    "whole_file",
+    "write_dataset",
+    "write_text",
+]
+
+T = TypeVar("T")
+
+BYTES, COLUMNS, PACKED = 8, 13, 0.6
+"""Of a number, numbers an output time holds, and what compression leaves of them at best."""
 
 
-def write_dataset(path: str | Path, dataset: xr.Dataset) -> None:
-    """Write a dataset as compressed NetCDF, as a whole."""
+class KeptElsewhere(OSError):
+    """A file could not be written where it was wanted; its content is in another place.
+
+    Attributes
+    ----------
+    path : Path
+        Where it is.
+    """
+
+    def __init__(self, message: str, path: Path) -> None:
+        super().__init__(message)
+        self.path = path
+
+
+def write_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
+    """Write a dataset as compressed NetCDF, as a whole, and return its path.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written or the disk is full; nothing is left behind.
+    """
     encoding = {
         name: {"zlib": True, "complevel": 1, "shuffle": True}
         for name, variable in dataset.data_vars.items()
         if variable.dtype.kind == "f" and variable.size > 1000
     }
+    content = dataset.to_netcdf(engine="h5netcdf", encoding=encoding)
     with whole_file(path) as part:
-        dataset.to_netcdf(part, engine="h5netcdf", encoding=encoding)
+        part.write_bytes(content)
+    return Path(path)
+
+
+def keep_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
+    """Write a dataset, and if that is impossible somewhere else where it is possible; see `keep`."""
+    return keep(lambda place: write_dataset(place, dataset), path)
+
+
+def keep(save: Callable[[Path], T], path: str | Path) -> T:
+    """Return ``save(path)``; if that is impossible save somewhere else where it is possible.
+
+    Raises
+    ------
+    KeptElsewhere
+        If it had to be saved elsewhere: in the working folder or the one for temporary files.
+    OSError
+        If it cannot be saved anywhere.
+    """
+    path = Path(path)
+    try:
+        return save(path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        for folder in (Path("."), Path(tempfile.gettempdir())):
+            other = folder.absolute() / f"gearmbs-kept-{os.getpid()}" / path.name
+            try:
+                save(other)
+            except OSError:
+                shutil.rmtree(other.parent, ignore_errors=True)
+                continue
+            raise KeptElsewhere(f"{path}: cannot be written ({reason}); it is in {other} instead", other) from error
+        raise OSError(error.errno, f"{path}: cannot be written ({reason}), nor anywhere else; it is lost") from error
+
+
+def check_place(target: str | Path, needed: float, what: str = "the result") -> None:
+    """Refuse a folder or file that cannot be written, or whose disk has not the room, before anything is computed.
+
+    Parameters
+    ----------
+    target : path
+        Folder or file to come; folders are not made yet.
+    needed : float
+        Bytes that will be written at least.
+    what : str
+        Named in the message.
+
+    Raises
+    ------
+    OSError
+        Naming the folder, why it will not do, and what would.
+    """
+    folder = Path(target).absolute()
+    if folder.is_file():
+        folder = folder.parent
+    while not folder.exists():
+        folder = folder.parent
+    if not folder.is_dir():
+        raise NotADirectoryError(f"{target}: {folder} is a file; write elsewhere (--out)")
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OSError(
+            f"{target}: {folder} cannot be written ({error.strerror or error}); write elsewhere (--out)"
+        ) from None
+    free = shutil.disk_usage(folder).free
+    if free < needed:
+        raise OSError(
+            f"{target}: {_size(free)} are free in {folder}, {what} takes about {_size(needed)}; make room or write "
+            "elsewhere (--out)"
+        )
+
+
+def _size(count: float) -> str:
+    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"
+
+
+def record_size(case: Case) -> float:
+    """Return about how many bytes the record of a case takes as a file, rather less than more."""
+    samples = COLUMNS * case.output_rate + 5.0 * case.signal_rate
+    return PACKED * BYTES * samples * case.operation.duration + 2e4
+
+
+def file_stem(name: str) -> str:
+    """Return the name of a case as part of a file's name."""
+    return name.replace(", ", "_").replace("/", "_")
+
+
+def stored_record(folder: str | Path, case: Case) -> xr.Dataset | None:
+    """Return the record of exactly this case from a folder, None if there is none made by this version."""
+    path = Path(folder) / f"{file_stem(case.name)}.nc"
+    if not path.is_file():
+        return None
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as found:
+            known = found.attrs.get("case_json"), found.attrs.get("gearmbs_version")
+            return found.load() if known == (case.model_dump_json(), gearmbs.__version__) else None
+    except (OSError, ValueError, KeyError):
+        # damaged, or not one of ours: the case is computed again
+        return None

@@ -28,6 +28,10 @@ def test_the_record_begins_at_rest_and_follows_the_curve(run_up):
     assert float(record["angle"][-1]) == pytest.approx(0.5 * 0.6 * 60.0 * np.pi, rel=1e-3)
     assert record.attrs["operation_speed"] == pytest.approx(60.0 * np.pi)
     assert "gmf_rms" not in record
+    # the run-up to zero and the settling turn nothing
+    assert record.attrs["solver_mesh_cycles"] == pytest.approx(29 * case.angle_turned / (2 * np.pi), rel=0.04)
+    share = record.attrs["solver_wall_time"] / record.attrs["solver_mesh_cycles"]
+    assert record.attrs["solver_time_per_mesh_cycle"] == pytest.approx(share)
     assert case.operation.duration == 0.6
 
 

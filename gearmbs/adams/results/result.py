@@ -45,5 +45,6 @@ class AdamsResult(RunRecord):
             path.write_text(text, encoding="utf-8", newline="\n")
         if self.segments:
             files.append(prefix.with_name(prefix.name + ".nc"))
-            self.to_dataset().to_netcdf(files[-1], engine="h5netcdf")
+            # in memory first: the format's library ends the program where the disk is full
+            files[-1].write_bytes(self.to_dataset().to_netcdf(engine="h5netcdf"))
         return files

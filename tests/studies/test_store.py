@@ -1,0 +1,188 @@
+"""Records as files: whole or not at all, kept elsewhere where a disk is full, found again by an interrupted study."""
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from gearmbs import cli
+from gearmbs.studies import Case, CaseError, SimulationFailed, run_case, run_cases, simulation, store
+from gearmbs.studies.parallel import StorageWarning
+from gearmbs.studies.store import KeptElsewhere, check_place, keep_dataset, record_size, stored_record, write_dataset
+
+SHORT = {"run_up": 0.02, "settling": 0.0, "duration": 0.07}
+
+
+def small():
+    return xr.Dataset({"a": ("x", np.arange(2000.0))})
+
+
+@pytest.fixture
+def full_disk(tmp_path, monkeypatch):
+    """A folder in which every file is too much; files elsewhere are written as always."""
+    folder = tmp_path / "full"
+    write = Path.write_bytes
+
+    def refuse(path, content):
+        if folder in path.absolute().parents:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return write(path, content)
+
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+    monkeypatch.chdir(tmp_path)
+    return folder
+
+
+def test_a_record_is_kept_elsewhere_when_the_disk_is_full(full_disk, tmp_path):
+    with pytest.raises(
+        KeptElsewhere, match=r"r\.nc: cannot be written \(No space left on device\); it is in"
+    ) as caught:
+        keep_dataset(full_disk / "r.nc", small())
+    assert caught.value.path.parent.parent == tmp_path
+    with xr.open_dataset(caught.value.path, engine="h5netcdf") as found:
+        assert found.equals(small())
+    assert list(full_disk.iterdir()) == []
+
+
+def test_nothing_is_left_where_nothing_can_be_written(tmp_path, monkeypatch):
+    def refuse(path, content):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(store.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    with pytest.raises(OSError, match="nor anywhere else; it is lost"):
+        keep_dataset(tmp_path / "r.nc", small())
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of file sizes are POSIX")
+def test_a_file_that_cannot_grow_does_not_end_the_program(tmp_path):
+    """The format's own library ends the process when a write fails; the system refuses files above 4 kB here."""
+    code = (
+        "import resource, signal, sys, numpy as np, xarray as xr\n"
+        "from gearmbs.studies.store import write_dataset\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
+        "noise = np.random.default_rng(1).normal(size=20000)\n"
+        "try:\n"
+        "    write_dataset(sys.argv[1], xr.Dataset({'a': ('x', noise)}))\n"
+        "except OSError as error:\n"
+        "    raise SystemExit(f'refused: {error.strerror}')\n"
+    )
+    path = tmp_path / "r.nc"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    ended = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, env=environment)
+    assert ended.returncode == 1
+    assert "refused: File too large" in ended.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_places_are_looked_at_before_the_work(tmp_path, monkeypatch):
+    check_place(tmp_path / "new" / "deep", 1e3)
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "file").touch()
+    with pytest.raises(NotADirectoryError, match="is a file; write elsewhere"):
+        check_place(tmp_path / "file" / "in it", 1e3)
+    with pytest.raises(OSError, match=r"are free in .*, two records takes about 1000000000.0 GB; make room"):
+        check_place(tmp_path, 1e18, "two records")
+    monkeypatch.setattr(store.tempfile, "TemporaryFile", lambda dir: open("/proc/version", "x"))
+    with pytest.raises(OSError, match=r"cannot be written .*; write elsewhere"):
+        check_place(tmp_path, 1e3)
+
+
+def test_the_size_of_a_record_is_foreseen(tmp_path):
+    case = Case(operation=SHORT)
+    size = write_dataset(tmp_path / "r.nc", run_case(case)).stat().st_size
+    assert 0.6 * size < record_size(case) < 1.3 * size
+
+
+def test_finished_cases_are_taken_up(tmp_path, monkeypatch):
+    """Of three cases two are stored; one call later only the third is computed, and a changed case again."""
+    cases = [Case(name=f"z = {z}", gears={"teeth": (z, 29)}, operation=SHORT) for z in (25, 27, 31)]
+    first = run_cases(cases[:2], folder=tmp_path)
+    computed = []
+    whole = simulation.run_case
+
+    def watched(case, progress=None):
+        computed.append(case.name)
+        return whole(case, progress)
+
+    monkeypatch.setattr("gearmbs.studies.parallel.run_case", watched)
+    again = run_cases(cases, folder=tmp_path)
+    assert computed == ["z = 31"]
+    for one, other in zip(first, again, strict=False):
+        np.testing.assert_array_equal(one.gmf_rms, other.gmf_rms)
+        assert one.attrs["case_json"] == other.attrs["case_json"]
+    changed = cases[0].changed(operation={"torque": "90 N m"})
+    assert stored_record(tmp_path, cases[0]) is not None
+    assert stored_record(tmp_path, changed) is None
+    (tmp_path / "z = 25.nc").write_bytes(b"damaged")
+    assert stored_record(tmp_path, cases[0]) is None
+
+
+def test_errors_can_be_kept(tmp_path, monkeypatch):
+    """The case whose record is too short, the one that fails, and the sound one, each in its place."""
+    monkeypatch.setattr(
+        "gearmbs.studies.simulation.slip", lambda case, *a: "the wheels slipped" if case.name == "slips" else None
+    )
+    cases = [
+        Case(name="short", operation={**SHORT, "duration": 0.01}),
+        Case(name="slips", operation=SHORT),
+        Case(name="sound", operation=SHORT),
+    ]
+    short, slips, sound = run_cases(cases, errors="keep", folder=tmp_path)
+    assert isinstance(short, CaseError)
+    assert "operation.duration" in str(short)
+    assert isinstance(slips, SimulationFailed)
+    assert slips.partial().time.size > 100
+    assert sound.gmf_rms.size
+    assert [path.name for path in tmp_path.iterdir()] == ["sound.nc"]
+    with pytest.raises(CaseError):
+        run_cases(cases)
+    with pytest.raises(ValueError, match="choose raise or keep"):
+        run_cases(cases, errors="forget")
+
+
+def test_a_full_disk_stops_no_case(full_disk):
+    cases = [Case(name="one", operation=SHORT), Case(name="two", operation=SHORT)]
+    with pytest.warns(StorageWarning, match="No space left") as told:
+        records = run_cases(cases, folder=full_disk)
+    assert len(told) == 2
+    assert all(record.gmf_rms.size for record in records)
+
+
+def test_the_paper_goes_on_where_it_stopped(tmp_path, monkeypatch):
+    """Three cases are there from before; three are computed, and a full disk at the end costs nothing."""
+    words = ["paper", "--out", str(tmp_path / "out"), "--duration", "80 ms", "--workers", "1"]
+    with monkeypatch.context() as patch:
+        patch.setattr(simulation, "slip", lambda case, *a: "slipped" if case.operation.torque > 150.0 else None)
+        result = CliRunner().invoke(cli.app, words)
+    assert result.exit_code == 1
+    assert len(list((tmp_path / "out" / "cases").glob("*load.nc"))) == 3
+    with monkeypatch.context() as patch:
+        patch.chdir(tmp_path)
+        patch.setattr("gearmbs.studies.paper.write_dataset", _refuse_in(tmp_path / "out"))
+        result = CliRunner().invoke(cli.app, words)
+    assert "taking up 3 finished of 6 cases" in result.output
+    assert result.exit_code == 1
+    assert "cannot be written (No space left on device); it is in" in result.output.replace("\n", " ")
+    assert len(list(tmp_path.glob("gearmbs-kept-*/out/*"))) == 7
+    result = CliRunner().invoke(cli.app, words)
+    assert result.exit_code == 0
+    assert "taking up 6 finished of 6 cases" in result.output
+
+
+def _refuse_in(folder):
+    def refuse(path, dataset):
+        if Path(path).parent == folder:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return write_dataset(path, dataset)
+
+    return refuse
