@@ -16,7 +16,7 @@ def notebook(monkeypatch):
     """A notebook's shell that keeps what is displayed."""
     shown = []
 
-    def display(page, display_id=None):
+    def display(page, **_):
         shown.append(page)
         return SimpleNamespace(update=shown.append)
 
