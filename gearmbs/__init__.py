@@ -11,6 +11,8 @@ Studies
     `Case`, `CaseError`, `load_case`, `make_case`, `run_case`, `run_cases`, `run_paper`, `record_signal`, `gear_rig`
 Gears
     `GearPair`, `GearSpec`, `Material`, `ContactLaw`, `FlankFriction`, `faults`
+Flexible bodies
+    `Shaft`, `ShaftSection`, `Rotor`, `reduce_model`
 Mechanisms
     `Mechanism`, `JointFriction`, `simulate`, `static_equilibrium`, `linear_modes`, `Solution`
 Differential-algebraic equations
@@ -24,8 +26,8 @@ Views
 Units
     `to_si`
 
-The subpackages hold the rest: `gearmbs.studies`, `gearmbs.gears`, `gearmbs.mechanism`, `gearmbs.dae`,
-`gearmbs.signals`, `gearmbs.adams`, `gearmbs.view`.
+The subpackages hold the rest: `gearmbs.studies`, `gearmbs.gears`, `gearmbs.flexible`, `gearmbs.mechanism`,
+`gearmbs.dae`, `gearmbs.signals`, `gearmbs.adams`, `gearmbs.view`.
 """
 
 from typing import TYPE_CHECKING
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from gearmbs.adams import read_deck, run_deck, write_deck
     from gearmbs.dae import DAEProblem, DAEResult, Status, solve_dae
     from gearmbs.dae.results.solution import Solution
+    from gearmbs.flexible import Rotor, Shaft, ShaftSection, reduce_model
     from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, Material, faults
     from gearmbs.mechanism import JointFriction, Mechanism, linear_modes, simulate, static_equilibrium
     from gearmbs.signals import (
@@ -75,6 +78,9 @@ __all__ = [
     "JointFriction",
     "Material",
     "Mechanism",
+    "Rotor",
+    "Shaft",
+    "ShaftSection",
     "Solution",
     "Status",
     "analyse",
@@ -93,6 +99,7 @@ __all__ = [
     "read_deck",
     "read_signal",
     "record_signal",
+    "reduce_model",
     "run_case",
     "run_cases",
     "run_deck",
@@ -121,6 +128,9 @@ late(
         "JointFriction": ".mechanism",
         "Material": ".gears",
         "Mechanism": ".mechanism",
+        "Rotor": ".flexible",
+        "Shaft": ".flexible",
+        "ShaftSection": ".flexible",
         "Solution": ".dae.results.solution",
         "Status": ".dae",
         "analyse": ".signals",
@@ -139,6 +149,7 @@ late(
         "read_deck": ".adams",
         "read_signal": ".signals",
         "record_signal": ".studies",
+        "reduce_model": ".flexible",
         "run_case": ".studies",
         "run_cases": ".studies",
         "run_deck": ".adams",

@@ -30,10 +30,11 @@ MAY_KNOW = {
     "mechanism": {"dae", "dae.equations", "dae.model", "dae.results", "dae.analyses"},
     "contact": set(),
     "gears": {"contact", "mechanism", "dae"},
+    "flexible": {"mechanism"},
     "signals": set(),
     "view": {"contact", "gears", "mechanism", "signals", "dae.results"},
     "adams": {"dae", "dae.equations", "dae.model", "dae.analyses", "dae.results", "mechanism"},
-    "studies": {"dae", "dae.results", "gears", "mechanism", "signals", "view"},
+    "studies": {"dae", "dae.results", "flexible", "gears", "mechanism", "signals", "view"},
     "cli": {"adams", "signals", "studies", "view"},
 }
 """What a package may import, besides itself and what `SUPPORT` names. ``dae`` alone is what integrators and equations
@@ -43,6 +44,7 @@ EXCEPTIONS = {
     ("contact", "dae.compiled"): "views of flat tables",
     ("contact", "dae.equations"): "the signature that every force element's kernel has",
     ("gears", "dae.equations"): "the same door: a pair hands its kernel to the mechanism",
+    ("flexible", "dae"): "the error of models, of which its own is one",
     ("mechanism", "dae.compiled"): "kernels of force elements: views of tables, calls through addresses",
     ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
     ("adams", "gears"): "pairs are written as the contact forces of a deck",

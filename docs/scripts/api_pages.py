@@ -13,6 +13,7 @@ import gearmbs
 PACKAGES = {
     "gearmbs.mechanism": "Mechanism: bodies, markers, joints, motions, forces",
     "gearmbs.gears": "Gears: wheels, pairs, laws, static analyses",
+    "gearmbs.flexible": "Flexible bodies: shafts, finite elements, reduction",
     "gearmbs.contact": "Contact: compiled kernels",
     "gearmbs.dae": "DAE: equations, formulations, integrators, solutions",
     "gearmbs.signals": "Signals: files, features, comparison, sensors",

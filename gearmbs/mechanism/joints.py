@@ -130,6 +130,7 @@ JOINTS: dict[str, JointKind] = {
     "fixed": JointKind(lambda i, j: [*at_point(i, j), *same_orientation(i, j)], adams=("JOINT", "FIXED")),
     "revolute": JointKind(lambda i, j: [*at_point(i, j), *parallel_z(i, j)], angle=True, adams=("JOINT", "REVOLUTE")),
     "spherical": JointKind(at_point, adams=("JOINT", "SPHERICAL")),
+    "self_aligning": JointKind(at_point, angle=True),
     "cylindrical": JointKind(
         lambda i, j: [*in_line(i, j), *parallel_z(i, j)],
         angle=True,

@@ -317,7 +317,7 @@ class Mechanism(LoadMethods):
         rate : float
             Angular velocity at time 0 for accelerations, rad/s.
         """
-        self._check_joint(name, joint, ("revolute", "cylindrical"))
+        self._check_joint(name, joint, ("revolute", "cylindrical", "self_aligning"))
         given = self._prescribed(name, function, level, start, rate, jt.coordinate_term(joint, 1.0), "rad")
         moved = _displacement(name, function, given, "rad")
         row = jt.Row("angle", (jt.Term(terms.ROTATION, joint.i, joint.j),), None, moved)

@@ -18,6 +18,10 @@ Shapes = Callable[[np.ndarray], tuple[npt.ArrayLike, npt.ArrayLike]]
 """From a point of the body's frame, m, to displacements and rotations there by one unit of each mode, each (n, 3)."""
 
 
+COUPLING = ("full", "partial", "constant")
+"""How much of the coupling between deformation and motion of the frame is kept, see `ShapeIntegrals.coupled`."""
+
+
 @dataclass(frozen=True)
 class Mode:
     """One mode of a body.
@@ -87,8 +91,16 @@ class ShapeIntegrals:
         )
 
     @classmethod
-    def of_points(cls, masses: npt.ArrayLike, positions: npt.ArrayLike, displacements: npt.ArrayLike) -> ShapeIntegrals:
-        """Return all integrals of a body made of mass points.
+    def of_points(
+        cls,
+        masses: npt.ArrayLike,
+        positions: npt.ArrayLike,
+        displacements: npt.ArrayLike,
+        *,
+        inertias: npt.ArrayLike | None = None,
+        rotations: npt.ArrayLike | None = None,
+    ) -> ShapeIntegrals:
+        """Return all integrals of a body made of mass points, or of small rigid bodies if they have inertias.
 
         Parameters
         ----------
@@ -98,6 +110,10 @@ class ShapeIntegrals:
             From the centre of mass, m.
         displacements : array_like, shape (n, p, 3)
             By one unit of each mode, m.
+        inertias : array_like, shape (p, 3, 3), optional
+            About the points, kg m^2.
+        rotations : array_like, shape (n, p, 3), optional
+            By one unit of each mode, rad; needed with ``inertias``.
         """
         m, s = np.asarray(masses, dtype=float), np.asarray(positions, dtype=float)
         phi = np.asarray(displacements, dtype=float)
@@ -106,13 +122,73 @@ class ShapeIntegrals:
         mixed = np.einsum("p,pi,kpj->kij", m, s, phi)
         products = np.einsum("p,kpi,lpj->klij", m, phi, phi)
         mass = np.einsum("klii->kl", products)
-        return cls(
+        moment = products - np.swapaxes(products, 2, 3)
+        points = cls(
             mass,
             np.einsum("p,kpi->ki", m, phi),
             np.einsum("p,kpi->ki", m, np.cross(s, phi)),
-            np.einsum("p,klpi->kli", m, np.cross(phi[:, None], phi[None, :])),
+            np.stack([moment[..., 1, 2], moment[..., 2, 0], moment[..., 0, 1]], axis=-1),
             2.0 * along[:, None, None] * one - mixed - np.swapaxes(mixed, 1, 2),
             2.0 * mass[:, :, None, None] * one - products - np.swapaxes(products, 2, 3),
+        )
+        return points if inertias is None else points + cls._of_turning(inertias, rotations)
+
+    @classmethod
+    def _of_turning(cls, inertias: npt.ArrayLike, rotations: npt.ArrayLike | None) -> ShapeIntegrals:
+        """Return what the inertias of points add, whose rotations are successive as those of markers are.
+
+        To second order the rotations make B = 1 + theta~ + 1/2 sum_kl q_k q_l psi_min~ psi_max~ (~: cross product
+        matrix, min: the mode that comes first), the inertia B J B^T, and the angular velocity
+        sum_k (psi_k + sum_(l<k) q_l psi_l x psi_k) v_k.
+        """
+        if rotations is None:
+            raise ModelError("ShapeIntegrals.of_points: inertias need the rotations of their points; give rotations=")
+        j, psi = np.asarray(inertias, dtype=float), np.asarray(rotations, dtype=float)
+        n = psi.shape[0]
+        tilde = np.zeros((*psi.shape, 3))
+        tilde[..., 0, 1], tilde[..., 0, 2], tilde[..., 1, 2] = -psi[..., 2], psi[..., 1], -psi[..., 0]
+        tilde -= np.swapaxes(tilde, -1, -2)
+        spun = np.einsum("pij,kpj->kpi", j, psi)
+        first = np.einsum("kpia,paj->kij", tilde, j, optimize=True)
+        cross, second = np.zeros((n, n, 3)), np.zeros((n, n, 3, 3))
+        for l in range(n):
+            tilde_j = np.einsum("pia,paj->pij", tilde[l], j)
+            for k in range(n):
+                relative = np.einsum("pij,pj->i", j, np.cross(psi[l], psi[k]))
+                cross[l, k] = np.cross(psi[l], spun[k]).sum(axis=0) - (0.0 if l < k else 1.0) * relative
+                if k < l:
+                    continue
+                quadratic = -np.einsum("pia,paj->ij", tilde_j, tilde[k])
+                ordered = np.einsum("pia,pab,pbj->ij", tilde[l], tilde[k], j, optimize=True)
+                total = quadratic + ordered
+                second[l, k] = second[k, l] = total + total.T
+        mass = np.einsum("kpi,lpi->kl", psi, spun)
+        return cls(mass, np.zeros((n, 3)), spun.sum(axis=1), cross, first + np.swapaxes(first, 1, 2), second)
+
+    def __add__(self, other: ShapeIntegrals) -> ShapeIntegrals:
+        """Return the integrals of two sets of points with the same modes together."""
+        return ShapeIntegrals(*(getattr(self, key) + getattr(other, key) for key in self.__dataclass_fields__))
+
+    def coupled(self, level: str) -> ShapeIntegrals:
+        """Return the integrals that a level of coupling keeps.
+
+        Parameters
+        ----------
+        level : {"full", "partial", "constant"}
+            All; without those of second order in the modal coordinates (``cross`` and ``second``); without the change
+            of the inertia as well. A shaft that turns fast needs ``"full"``: its gyroscopic moments are of second
+            order.
+
+        Raises
+        ------
+        ModelError
+            For another level.
+        """
+        if level not in COUPLING:
+            raise ModelError(f"coupling = {level!r}; choose one of {', '.join(COUPLING)}")
+        dropped = {"full": (), "partial": ("cross", "second"), "constant": ("cross", "second", "first")}[level]
+        return ShapeIntegrals(
+            *(np.zeros_like(getattr(self, k)) if k in dropped else getattr(self, k) for k in self.__dataclass_fields__)
         )
 
     def about_centre_of_mass(self, mass: float) -> ShapeIntegrals:

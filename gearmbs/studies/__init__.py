@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from gearmbs.signals.simulated import record_signal
     from gearmbs.studies.case import Case, CaseError, CaseWarning, load_case, make_case
     from gearmbs.studies.claims import Claim
+    from gearmbs.studies.flexible_rig import flexible_rig
     from gearmbs.studies.paper import PaperStudy, run_paper
     from gearmbs.studies.parallel import run_cases
     from gearmbs.studies.preset import paper_cases
@@ -22,6 +23,7 @@ __all__ = [
     "PaperStudy",
     "SimulationFailed",
     "SimulationInterrupted",
+    "flexible_rig",
     "gear_rig",
     "load_case",
     "make_case",
@@ -43,6 +45,7 @@ late(
         "PaperStudy": ".paper",
         "SimulationFailed": ".simulation",
         "SimulationInterrupted": ".simulation",
+        "flexible_rig": ".flexible_rig",
         "gear_rig": ".rig",
         "load_case": ".case",
         "make_case": ".case",

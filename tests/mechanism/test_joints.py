@@ -59,6 +59,7 @@ DEFINITIONS: dict[str, Callable[[Frame, Frame, float], list[float]]] = {
     "fixed": lambda i, j, t: [*point(i, j), *no_turn(i, j)],
     "revolute": lambda i, j, t: [*point(i, j), *parallel(i, j)],
     "spherical": lambda i, j, t: point(i, j),
+    "self_aligning": lambda i, j, t: point(i, j),
     "cylindrical": lambda i, j, t: [*offset(i, j)[:2], *parallel(i, j)],
     "translational": lambda i, j, t: [*offset(i, j)[:2], *no_turn(i, j)],
     "universal": lambda i, j, t: [*point(i, j), *crossed(i, j)],

@@ -38,7 +38,7 @@ class ModalInertia:
     c0 : ndarray, shape (n, 3)
         sum s x phi_k dm.
     c1 : ndarray, shape (n, n, 3)
-        sum phi_k x phi_l dm.
+        sum phi_k x phi_l dm, with what the turning of the parts' own inertia adds; antisymmetric without that.
     j1 : ndarray, shape (n, 3, 3)
         First derivatives of the inertia by the modal coordinates.
     j2 : ndarray, shape (n, n, 3, 3)
@@ -242,12 +242,12 @@ def modal_acceleration_terms(y, at, modal, kin_row, mass_out, coupling_out, rhs_
     coupling_out : ndarray, shape (n, 3)
         H_k in global components, between angular and modal accelerations.
     rhs_modes : ndarray, shape (n,)
-        1/2 w . dJ/dq_k w + 2 w . sum_l C1_kl v_l - (K q + D v)_k.
+        1/2 w . dJ/dq_k w + w . sum_l (C1_kl - C1_lk) v_l - (K q + D v)_k.
     rhs_rotation : ndarray, shape (3,)
-        -sum_k v_k dJ/dq_k w, global components; the sum over C1_lk v_l v_k vanishes.
+        -sum_k v_k (dJ/dq_k w + sum_l C1_kl v_l), global components.
     """
     n, vf, qf = at[T.AT_MODES], at[T.AT_VF], at[T.AT_QF]
-    _, _, _, _, _, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
+    _, _, _, _, c1, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
     s = np.empty(12)
     to_body(kin_row, kin_row, KIN_W, s, 0)
     for c in range(3):
@@ -255,11 +255,11 @@ def modal_acceleration_terms(y, at, modal, kin_row, mass_out, coupling_out, rhs_
     for k in range(n):
         inertia_change(y, at, modal, k, s, 0, s, 3)
         gyroscopic(y, at, modal, k, s, 6)
-        total = 0.5 * dot3(s, 0, s, 3) + 2.0 * dot3(s, 0, s, 6)
+        total = 0.5 * dot3(s, 0, s, 3) + dot3(s, 0, s, 6)
         for c in range(3):
-            s[9 + c] -= y[vf + k] * s[3 + c]
+            s[9 + c] -= y[vf + k] * (s[3 + c] + s[6 + c])
         for l in range(n):
-            total -= stiffness[k, l] * y[qf + l] + damping[k, l] * y[vf + l]
+            total -= stiffness[k, l] * y[qf + l] + (damping[k, l] + dot3(s, 0, c1[n * l + k], 0)) * y[vf + l]
             mass_out[k, l] = mass[k, l]
         rhs_modes[k] = total
         coupling(y, at, modal, k, s, 3)
@@ -318,9 +318,8 @@ def modal_body_entries(mode, cj, y, at, modal, kin_row, slot, vals, k):
             for r in range(3):
                 for c in range(3):
                     centrifugal += 0.5 * s[r] * j2[n * i + l, 3 * r + c] * s[c]
-            mixed = dot3(s, 0, c1[n * i + l], 0)
             k = put(mode, slot, vals, k, pf + i, qf + l, stiffness[i, l] - centrifugal)
-            k = put(mode, slot, vals, k, pf + i, vf + l, damping[i, l] - mixed)
-            k = put(mode, slot, vals, k, vf + i, qf + l, mixed)
+            k = put(mode, slot, vals, k, pf + i, vf + l, damping[i, l] - dot3(s, 0, c1[n * i + l], 0))
+            k = put(mode, slot, vals, k, vf + i, qf + l, -dot3(s, 0, c1[n * l + i], 0))
             k = put(mode, slot, vals, k, vf + i, vf + l, -mass[i, l])
     return k

@@ -1,0 +1,180 @@
+"""A finite-element model of a body: nodes, degrees of freedom, stiffness and mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+
+from gearmbs.flexible.beam import Slices
+from gearmbs.flexible.errors import FlexibleError
+
+
+@dataclass(frozen=True, eq=False)
+class MassProperties:
+    """Mass, centre of mass, and inertia about it.
+
+    Attributes
+    ----------
+    mass : float
+        kg.
+    com : ndarray, shape (3,)
+        m, in the frame of the nodes.
+    inertia : ndarray, shape (3, 3)
+        kg m^2.
+    """
+
+    mass: float
+    com: np.ndarray
+    inertia: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class FiniteElementModel:
+    """Stiffness and mass of a body with its nodes.
+
+    Parameters
+    ----------
+    ids : ndarray of int, shape (N,)
+        Numbers of the nodes in their source.
+    positions : ndarray, shape (N, 3)
+        m.
+    dofs : ndarray of int, shape (d, 2)
+        Row of the node, and direction 0 to 5 (ux, uy, uz, rx, ry, rz), of each degree of freedom.
+    stiffness, mass : sparse matrix, shape (d, d)
+        N/m and kg, with their rotational counterparts; symmetric.
+    name : str
+    seats : dict of str to int
+        Nodes with a name, by their row.
+    slices : Slices, optional
+        What the mass matrix was made from, of beams.
+    faces : ndarray of int, shape (f, 3 or 4), optional
+        Rows of the corners of surface facets, for views.
+
+    Raises
+    ------
+    FlexibleError
+        If sizes do not fit each other, or a matrix is not symmetric or not finite.
+    """
+
+    ids: np.ndarray
+    positions: np.ndarray
+    dofs: np.ndarray
+    stiffness: sp.csc_array
+    mass: sp.csc_array
+    name: str = "body"
+    seats: dict[str, int] = field(default_factory=dict)
+    slices: Slices | None = None
+    faces: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        d = len(self.dofs)
+        for label in ("stiffness", "mass"):
+            matrix = sp.csc_array(getattr(self, label))
+            if matrix.shape != (d, d):
+                raise FlexibleError(f"{self.name}: {label} has shape {matrix.shape}; there are {d} degrees of freedom")
+            if not np.all(np.isfinite(matrix.data)):
+                raise FlexibleError(f"{self.name}: {label} has entries that are not finite")
+            size = np.abs(matrix.data).max(initial=0.0)
+            wrong = abs(matrix - matrix.T)
+            if wrong.data.max(initial=0.0) > 1e-6 * max(size, 1e-300):
+                raise FlexibleError(
+                    f"{self.name}: {label} is not symmetric; if the file holds one triangle, read it with symmetry"
+                )
+            object.__setattr__(self, label, sp.csc_array(0.5 * (matrix + matrix.T)))
+        if self.positions.shape != (len(self.ids), 3):
+            raise FlexibleError(f"{self.name}: positions have shape {self.positions.shape} for {len(self.ids)} nodes")
+        if d and (self.dofs[:, 0].max() >= len(self.ids) or self.dofs[:, 1].max() > 5 or self.dofs.min() < 0):
+            raise FlexibleError(f"{self.name}: degrees of freedom name nodes or directions that do not exist")
+
+    @property
+    def has_rotations(self) -> bool:
+        """Whether nodes have rotations."""
+        return bool(np.any(self.dofs[:, 1] > 2))
+
+    def dof_rows(self, node: int) -> np.ndarray:
+        """Return the degree of freedom in each of the six directions of a node, -1 where there is none."""
+        found = np.full(6, -1)
+        for row in np.flatnonzero(self.dofs[:, 0] == node):
+            found[self.dofs[row, 1]] = row
+        return found
+
+    def row_of(self, node_id: int) -> int:
+        """Return the row of a node by its number.
+
+        Raises
+        ------
+        FlexibleError
+            If there is no such node.
+        """
+        found = np.flatnonzero(self.ids == node_id)
+        if found.size == 0:
+            near = self.ids[np.argsort(np.abs(self.ids - node_id))[:3]]
+            raise FlexibleError(f"{self.name}: there is no node {node_id}; the nearest numbers are {near.tolist()}")
+        return int(found[0])
+
+    def nearest(self, point: np.ndarray) -> int:
+        """Return the row of the node nearest to a point."""
+        return int(np.argmin(np.linalg.norm(self.positions - np.asarray(point, dtype=float), axis=1)))
+
+    def rigid_motion(self, about: np.ndarray | None = None) -> np.ndarray:
+        """Return displacements of the degrees of freedom by unit translations and rotations, shape (d, 6)."""
+        arm = self.positions - (np.zeros(3) if about is None else about)
+        out = np.zeros((len(self.dofs), 6))
+        node, direction = self.dofs[:, 0], self.dofs[:, 1]
+        for c in range(3):
+            turned = np.cross(np.eye(3)[c], arm)
+            shift = direction < 3
+            out[shift, c] = direction[shift] == c
+            out[shift, 3 + c] = turned[node[shift], direction[shift]]
+            out[~shift, 3 + c] = direction[~shift] == 3 + c
+        return out
+
+    def mass_properties(self) -> MassProperties:
+        """Return mass, centre of mass and inertia from the mass matrix and rigid motions.
+
+        Raises
+        ------
+        FlexibleError
+            If the mass differs by direction, as where degrees of freedom were removed, or is not positive.
+        """
+        rigid = self.rigid_motion()
+        m = rigid.T @ (self.mass @ rigid)
+        masses = np.diag(m)[:3]
+        mass = float(masses.mean())
+        if not mass > 0.0:
+            raise FlexibleError(f"{self.name}: its mass is {mass} kg; check the mass matrix and its density")
+        if np.ptp(masses) > 1e-6 * mass:
+            raise FlexibleError(
+                f"{self.name}: its mass is {masses} kg in x, y and z; degrees of freedom are missing, "
+                "export the matrices without supports"
+            )
+        # m s x: the block between translations and rotations
+        first = m[:3, 3:]
+        com = np.array([first[1, 2] - first[2, 1], first[2, 0] - first[0, 2], first[0, 1] - first[1, 0]]) / (2 * mass)
+        inertia = m[3:, 3:] - mass * (com @ com * np.eye(3) - np.outer(com, com))
+        return MassProperties(mass, com, 0.5 * (inertia + inertia.T))
+
+    def field(self, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return displacements and rotations of the nodes for vectors of the degrees of freedom.
+
+        Parameters
+        ----------
+        vectors : ndarray, shape (d, n)
+
+        Returns
+        -------
+        moved, turned : ndarray, shape (n, N, 3)
+        """
+        n = vectors.shape[1]
+        both = np.zeros((len(self.ids), 6, n))
+        both[self.dofs[:, 0], self.dofs[:, 1]] = vectors
+        both = np.moveaxis(both, 2, 0)
+        return both[:, :, :3].copy(), both[:, :, 3:].copy()
+
+    def __repr__(self) -> str:
+        return (
+            f"FiniteElementModel({self.name!r}, {len(self.ids)} nodes, {len(self.dofs)} degrees of freedom, "
+            f"{len(self.seats)} seats)"
+        )

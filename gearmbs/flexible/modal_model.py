@@ -1,0 +1,266 @@
+"""A body reduced to modes: what a mechanism needs of it, and how it is added to one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gearmbs.flexible.damping import Damping, damping_ratios
+from gearmbs.flexible.errors import FlexibleError
+from gearmbs.flexible.fe_model import MassProperties
+from gearmbs.mechanism import Mechanism, ModalBody, Mode, ShapeIntegrals
+
+REACH = 1e-4
+"""How far a marker may be from a node, as a share of the body's size."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seat:
+    """A named place of a modal body.
+
+    Attributes
+    ----------
+    position : ndarray, shape (3,)
+        m, in the frame of the nodes.
+    moved, turned : ndarray, shape (n, 3)
+        Displacement and rotation by one unit of each mode.
+    turns : bool
+        Whether its rotation is known.
+    """
+
+    position: np.ndarray
+    moved: np.ndarray
+    turned: np.ndarray
+    turns: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class ModalModel:
+    """A free body with orthonormal modes: modal masses are 1, stiffnesses the squared circular frequencies.
+
+    Attributes
+    ----------
+    name : str
+    properties : MassProperties
+    frequencies : ndarray, shape (n,)
+        Of the free body, Hz.
+    integrals : ShapeIntegrals
+        About the centre of mass.
+    ids, positions : ndarray, shapes (N,), (N, 3)
+        Numbers and positions (m) of the nodes.
+    moved, turned : ndarray, shape (n, N, 3)
+        Displacements, and rotations if nodes have them, by one unit of each mode.
+    seats : dict of str to Seat
+    faces : ndarray, optional
+        Corners of the surface, rows of nodes.
+    line : bool
+        Whether the nodes are those of a beam along z, between which shapes are interpolated.
+    """
+
+    name: str
+    properties: MassProperties
+    frequencies: np.ndarray
+    integrals: ShapeIntegrals
+    ids: np.ndarray
+    positions: np.ndarray
+    moved: np.ndarray
+    turned: np.ndarray | None
+    seats: dict[str, Seat] = field(default_factory=dict)
+    faces: np.ndarray | None = None
+    line: bool = False
+
+    @property
+    def modes(self) -> int:
+        """Number of modes."""
+        return self.frequencies.size
+
+    @property
+    def size(self) -> float:
+        """Largest extent, m."""
+        return float(np.ptp(self.positions, axis=0).max())
+
+    def place(self, seat: str | int) -> np.ndarray:
+        """Return the position of a seat by its name, or of a node by its number, m.
+
+        Raises
+        ------
+        FlexibleError
+            If there is none.
+        """
+        if isinstance(seat, str):
+            if seat not in self.seats:
+                raise FlexibleError(f"{self.name}: there is no seat '{seat}'; seats: {', '.join(self.seats) or 'none'}")
+            return self.seats[seat].position.copy()
+        found = np.flatnonzero(self.ids == seat)
+        if found.size == 0:
+            raise FlexibleError(
+                f"{self.name}: there is no node {seat}; numbers go from {self.ids.min()} to {self.ids.max()}"
+            )
+        return self.positions[found[0]].copy()
+
+    def shapes(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return displacements and rotations at a point by one unit of each mode, each (n, 3).
+
+        A seat there comes first; then the nodes: of a beam the section there, else the nearest, with its own rotation
+        or that of its neighbours.
+
+        Raises
+        ------
+        FlexibleError
+            If no node is near.
+        """
+        point = np.asarray(point, dtype=float)
+        for seat in self.seats.values():
+            if seat.turns and np.linalg.norm(seat.position - point) <= REACH * self.size:
+                return seat.moved, seat.turned
+        if self.line:
+            return self._on_line(point)
+        distance = np.linalg.norm(self.positions - point, axis=1)
+        k = int(np.argmin(distance))
+        if distance[k] > REACH * self.size:
+            raise FlexibleError(
+                f"{self.name}: there is no node at {np.array2string(point, precision=6)} m; the nearest, "
+                f"{self.ids[k]}, is {distance[k]:.4g} m away. Put the marker on a node, place(number), or "
+                f"reduce with an interface there"
+            )
+        if self.turned is not None:
+            return self.moved[:, k], self.turned[:, k]
+        return self.moved[:, k], self._fitted(k, distance)
+
+    def _fitted(self, k: int, distance: np.ndarray) -> np.ndarray:
+        """Return the rotation of the nearest neighbours of a node by least squares."""
+        near = np.argsort(np.linalg.norm(self.positions - self.positions[k], axis=1))[: min(9, len(self.ids))]
+        arm = self.positions[near] - self.positions[k]
+        if np.linalg.matrix_rank(arm, tol=1e-6 * max(self.size, 1e-300)) < 2:
+            return np.zeros((self.modes, 3))
+        moved = self.moved[:, near] - self.moved[:, k : k + 1]
+        rows = np.zeros((arm.shape[0], 3, 3))
+        for c in range(3):
+            rows[:, :, c] = np.cross(np.eye(3)[c], arm)
+        solved, *_ = np.linalg.lstsq(rows.reshape(-1, 3), moved.reshape(self.modes, -1).T, rcond=None)
+        return solved.T
+
+    def _on_line(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the motion of the section of a beam at a point that turns with it."""
+        z = self.positions[:, 2]
+        if not z[0] - REACH * self.size <= point[2] <= z[-1] + REACH * self.size:
+            raise FlexibleError(
+                f"{self.name}: z = {point[2]:.6g} m is off the shaft, which reaches from {z[0]:.6g} to {z[-1]:.6g} m"
+            )
+        k = int(np.clip(np.searchsorted(z, point[2]) - 1, 0, z.size - 2))
+        length = z[k + 1] - z[k]
+        x = np.clip((point[2] - z[k]) / length, 0.0, 1.0)
+        a, b = self.moved[:, k], self.moved[:, k + 1]
+        assert self.turned is not None
+        ta, tb = self.turned[:, k], self.turned[:, k + 1]
+        moved, turned = (1 - x) * a + x * b, (1 - x) * ta + x * tb
+        h = [1 - 3 * x**2 + 2 * x**3, x - 2 * x**2 + x**3, 3 * x**2 - 2 * x**3, x**3 - x**2]
+        g = [6 * x * (x - 1), 1 - 4 * x + 3 * x**2, -6 * x * (x - 1), 3 * x**2 - 2 * x]
+        moved, turned = moved.copy(), turned.copy()
+        for plane, axis, sign in ((0, 1, 1.0), (1, 0, -1.0)):
+            ends = (a[:, plane], sign * length * ta[:, axis], b[:, plane], sign * length * tb[:, axis])
+            moved[:, plane] = sum(w * e for w, e in zip(h, ends))
+            # slopes with shear differ from rotations: keep the nodes' rotations, the field's change between
+            turned[:, axis] = sign / length * sum(w * e for w, e in zip(g, ends))
+        offset = np.array([point[0], point[1], 0.0])
+        return moved + np.cross(turned, offset), turned
+
+    def selected(self, chosen: npt.ArrayLike) -> ModalModel:
+        """Return the body with some of its modes, counted from 0."""
+        k = np.asarray(chosen, dtype=int)
+        i = self.integrals
+        integrals = ShapeIntegrals(
+            i.mass[np.ix_(k, k)], i.momentum[k], i.angular_momentum[k], i.cross[np.ix_(k, k)], i.first[k],
+            i.second[np.ix_(k, k)],
+        )  # fmt: skip
+        seats = {key: Seat(s.position, s.moved[k], s.turned[k], s.turns) for key, s in self.seats.items()}
+        turned = None if self.turned is None else self.turned[k]
+        return replace(
+            self, frequencies=self.frequencies[k], integrals=integrals, moved=self.moved[k], turned=turned, seats=seats
+        )
+
+    def participation(self) -> np.ndarray:
+        """Return the share of each mode in the static compliance of the seats, shape (n,).
+
+        The largest share that the mode has of the displacement of any seat under a force there, in its own direction.
+        """
+        stiffness = (2 * np.pi * self.frequencies) ** 2
+        shares = [np.zeros(self.modes)]
+        for seat in self.seats.values():
+            flexibility = seat.moved**2 / stiffness[:, None]
+            total = flexibility.sum(axis=0)
+            shares.append((flexibility[:, total > 0] / total[total > 0]).max(axis=1, initial=0.0))
+        return np.max(shares, axis=0)
+
+    def by_participation(self, least: float = 1e-4) -> ModalModel:
+        """Return the body without the modes whose `participation` is below ``least``."""
+        return self.selected(np.flatnonzero(self.participation() >= least))
+
+    def add_to(
+        self,
+        mechanism: Mechanism,
+        name: str | None = None,
+        *,
+        damping: Damping = 0.01,
+        coupling: str = "full",
+        start: Sequence[float] | None = None,
+        **where: Any,
+    ) -> ModalBody:
+        """Add the body to a mechanism.
+
+        Parameters
+        ----------
+        mechanism : Mechanism
+        name : str, optional
+            Of the body; default: that of the model.
+        damping : float, sequence, "adams" or bands
+            See :func:`~gearmbs.flexible.damping_ratios`.
+        coupling : {"full", "partial", "constant", "rigid"}
+            See :meth:`gearmbs.mechanism.ShapeIntegrals.coupled`; ``"rigid"`` adds the undeformed body without modes.
+        start : sequence of float, optional
+            Modal coordinates at the start.
+        **where
+            ``position``, ``orientation`` of the frame of the nodes, ``velocity``, ``angular_velocity``: as of
+            :meth:`gearmbs.mechanism.Mechanism.body`.
+
+        Returns
+        -------
+        ModalBody
+            Its markers are placed by ``body.marker(model.place("seat"))``. With ``coupling="rigid"`` a
+            :class:`~gearmbs.mechanism.Body`.
+        """
+        p = self.properties
+        label = name or self.name
+        if coupling == "rigid":
+            return mechanism.body(label, p.mass, p.inertia, com=p.com, **where)  # type: ignore[return-value]
+        ratios = damping_ratios(self.frequencies, damping)
+        values = np.zeros(self.modes) if start is None else np.asarray(start, dtype=float)
+        if values.shape != (self.modes,):
+            raise FlexibleError(f"{label}: start has {values.size} values for {self.modes} modes")
+        mass = np.diag(self.integrals.mass)
+        modes = [
+            Mode(frequency=float(f), mass=float(m), damping_ratio=float(z), start=float(q))
+            for f, m, z, q in zip(self.frequencies, mass, ratios, values)
+        ]
+        return mechanism.modal_body(
+            label, p.mass, p.inertia, modes, self.shapes, integrals=self.integrals.coupled(coupling), com=p.com, **where
+        )
+
+    def displaced(self, coordinates: np.ndarray, factor: float = 1.0) -> np.ndarray:
+        """Return the nodes moved by modal coordinates of shape (n,), ``factor`` times as far, shape (N, 3), m."""
+        return self.positions + factor * np.einsum("n,npi->pi", np.asarray(coordinates, dtype=float), self.moved)
+
+    def strain_energies(self, coordinates: np.ndarray) -> np.ndarray:
+        """Return the strain energy in each mode, J, for coordinates of shape (..., n)."""
+        return 0.5 * (2 * np.pi * self.frequencies) ** 2 * np.asarray(coordinates, dtype=float) ** 2
+
+    def __repr__(self) -> str:
+        first = ", ".join(f"{f:.4g}" for f in self.frequencies[:6])
+        return (
+            f"ModalModel({self.name!r}, {self.properties.mass:.6g} kg, {len(self.ids)} nodes, {self.modes} modes: "
+            f"{first}{' ...' if self.modes > 6 else ''} Hz, seats: {', '.join(self.seats) or 'none'})"
+        )

@@ -1,0 +1,296 @@
+"""Reduction of a finite-element model to a few shapes of a free body.
+
+Craig-Bampton: static shapes of the interfaces and modes with the interfaces held (R. Craig, M. Bampton, AIAA J. 6
+(1968) 1313). Free interface: modes of the free body and static shapes of unit loads at the interfaces with inertia
+relief. In both cases rigid motions are taken out, since the frame carries them, and the shapes are made orthonormal: M
+= 1, K diagonal. Interfaces held are a means; the result is a free body, whichever joints it gets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from gearmbs.flexible.errors import FlexibleError
+from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
+from gearmbs.flexible.integrals import shape_integrals
+from gearmbs.flexible.interfaces import Interface, Resolved, resolve
+from gearmbs.flexible.modal_model import ModalModel, Seat
+from gearmbs.mechanism.quantities import quantity
+from gearmbs.units import Quantity
+
+DENSE = 900
+"""Below so many degrees of freedom matrices are treated as dense."""
+
+PAIR = 1e-7
+"""Relative distance below which squared frequencies count as a pair."""
+
+METHODS = ("craig-bampton", "free")
+
+GROUNDED = 1e-6
+"""Largest share of stiffness, against its diagonal, that rigid motions may meet."""
+
+
+def reduce_model(
+    model: FiniteElementModel,
+    interfaces: Iterable[str | Interface] | None = None,
+    *,
+    modes: int | None = None,
+    max_frequency: Quantity = None,
+    internal: int | None = None,
+    method: str = "craig-bampton",
+    name: str | None = None,
+) -> ModalModel:
+    """Return a modal body made of a finite-element model.
+
+    Parameters
+    ----------
+    model : FiniteElementModel
+        Free: without supports.
+    interfaces : iterable of str or Interface, optional
+        Where the body is joined and loaded; default: its seats.
+    modes : int, optional
+        How many shapes are kept, the slowest; default: all of the reduction below ``max_frequency``. Of a shaft one
+        less where the last would be one half of a bending pair, for the shaft would get an axis of preference.
+    max_frequency : float or str, optional
+        Shapes above are left out, Hz.
+    internal : int, optional
+        How many modes with held interfaces (or of the free body) the reduction starts from; default: ``modes``, or 20.
+    method : {"craig-bampton", "free"}
+    name : str, optional
+        Default: that of the model.
+
+    Raises
+    ------
+    FlexibleError
+        If the model is held somewhere, is not a body's, or has fewer shapes than asked for.
+    """
+    if method not in METHODS:
+        raise FlexibleError(f"method = {method!r}; choose one of {', '.join(METHODS)}")
+    if modes is not None and modes < 1:
+        raise FlexibleError(f"modes = {modes}; a modal body needs one at least")
+    limit = None if max_frequency is None else quantity(max_frequency, "frequency", "max_frequency")
+    parts = resolve(model, list(model.seats) if interfaces is None else interfaces)
+    properties = model.mass_properties()
+    _check_free(model)
+    k = sp.csc_array(parts.expand.T @ model.stiffness @ parts.expand)
+    m = sp.csc_array(parts.expand.T @ model.mass @ parts.expand)
+    count = internal if internal is not None else modes if modes is not None else 20
+    rigid = _rigid_of(model, parts)
+    if method == "free":
+        basis = np.hstack([free_modes(k, m, rigid, count)[1], _attachment(k, m, rigid, parts.constraints)])
+    else:
+        held_values, held = held_modes(k, m, parts.constraints, count + 1)
+        held = held[:, : _whole(held_values, count) or count]
+        basis = np.hstack([constraint_modes(k, parts.constraints), held])
+    values, shapes = orthonormal(k, m, basis, rigid)
+    if model.slices is not None:
+        shapes = _in_planes(model, parts, values, shapes)
+    keep = np.arange(values.size)
+    if limit is not None:
+        keep = keep[np.sqrt(values) <= 2 * np.pi * limit]
+    if modes is not None:
+        if keep.size < modes and limit is None:
+            raise FlexibleError(
+                f"{model.name}: modes = {modes}, but the reduction has {keep.size}; ask for more internal modes"
+            )
+        keep = keep[: _whole(values, modes) if model.slices is not None else modes]
+    if keep.size == 0:
+        raise FlexibleError(
+            f"{model.name}: no mode is below max_frequency = {limit} Hz; "
+            f"the first has {np.sqrt(values[0]) / 2 / np.pi:.6g} Hz"
+        )
+    return as_modal_model(
+        model, parts, properties, np.sqrt(values[keep]) / (2 * np.pi), shapes[:, keep], name or model.name
+    )
+
+
+def _whole(values: np.ndarray, count: int) -> int:
+    """Return how many values, ``count`` at most, can be kept without parting a pair of equal ones."""
+    if 0 < count < values.size and values[count] - values[count - 1] < PAIR * values[count]:
+        return count - 1
+    return min(count, values.size)
+
+
+def _in_planes(model: FiniteElementModel, parts: Resolved, values: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+    """Turn pairs of equal modes of a shaft so that one bends in the plane xz and the other in yz."""
+    lateral = np.asarray(parts.expand @ shapes)[model.dofs[:, 1] == 0]
+    out = shapes.copy()
+    k = 0
+    while k < values.size - 1:
+        if values[k + 1] - values[k] < PAIR * values[k + 1]:
+            _, _, turn = np.linalg.svd(lateral[:, k : k + 2], full_matrices=False)
+            out[:, k : k + 2] = shapes[:, k : k + 2] @ turn.T
+            k += 1
+        k += 1
+    return out
+
+
+def as_modal_model(
+    model: FiniteElementModel, parts: Resolved, properties: MassProperties, frequencies: np.ndarray,
+    shapes: np.ndarray, name: str,
+) -> ModalModel:  # fmt: skip
+    """Return the modal body of orthonormal shapes of the degrees of freedom that the interfaces leave."""
+    full = parts.expand @ shapes
+    # signs by the largest entry, so that equal models give equal shapes
+    sign = np.sign(full[np.argmax(np.abs(full) > 0.999 * np.abs(full).max(axis=0), axis=0), np.arange(full.shape[1])])
+    full, shapes = full * sign, shapes * sign
+    moved, turned = model.field(full)
+    held = parts.constraints @ shapes
+    seats = {}
+    for key, (position, rows) in parts.places.items():
+        six = np.zeros((6, shapes.shape[1]))
+        six[rows >= 0] = held[rows[rows >= 0]]
+        seats[key] = Seat(position, six[:3].T.copy(), six[3:].T.copy(), bool(np.all(rows[3:] >= 0)))
+    return ModalModel(
+        name=name,
+        properties=properties,
+        frequencies=frequencies,
+        integrals=shape_integrals(model, full, properties),
+        ids=model.ids,
+        positions=model.positions,
+        moved=moved,
+        turned=turned if model.has_rotations else None,
+        seats=seats,
+        faces=model.faces,
+        line=model.slices is not None,
+    )
+
+
+def _check_free(model: FiniteElementModel) -> None:
+    """Refuse a model whose rigid motions meet stiffness."""
+    about = model.positions.mean(axis=0)
+    rigid = model.rigid_motion(about)
+    energy = np.abs(np.einsum("dc,dc->c", rigid, model.stiffness @ rigid))
+    diagonal = np.abs(model.stiffness.diagonal())
+    scale = np.maximum((rigid**2 * diagonal[:, None]).sum(axis=0), 1e-300)
+    worst = int(np.argmax(energy / scale))
+    if energy[worst] > GROUNDED * scale[worst]:
+        motion = ("x", "y", "z", "rotation about x", "rotation about y", "rotation about z")[worst]
+        raise FlexibleError(
+            f"{model.name}: rigid motion in {motion} meets stiffness ({energy[worst]:.3g} of {scale[worst]:.3g}); a "
+            "body in a floating frame must be free: export the matrices without supports, or check node table and units"
+        )
+
+
+def _rigid_of(model: FiniteElementModel, parts: Resolved) -> np.ndarray:
+    """Return rigid motions in the degrees of freedom that the interfaces leave."""
+    gram = sp.csc_matrix(parts.expand.T @ parts.expand)
+    return spl.splu(gram).solve(np.asarray(parts.expand.T @ model.rigid_motion()))
+
+
+def held_modes(
+    k: sp.csc_array, m: sp.csc_array, constraints: sp.csr_array, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return squared circular frequencies and shapes with the constraints held at zero.
+
+    Parameters
+    ----------
+    k, m : sparse matrix, shape (r, r)
+    constraints : sparse matrix, shape (b, r)
+    count : int
+        How many, the slowest.
+    """
+    r, b = k.shape[0], constraints.shape[0]
+    if r - b < 1 or count < 1:
+        return np.zeros(0), np.zeros((r, 0))
+    if b == 0:
+        raise FlexibleError("a Craig-Bampton reduction needs interfaces; name them, or use method='free'")
+    count = min(count, r - b)
+    if r <= DENSE or count > (r - b) // 2:
+        z = scipy.linalg.null_space(constraints.toarray()) if b else np.eye(r)
+        values, vectors = scipy.linalg.eigh(z.T @ k @ z, z.T @ m @ z, subset_by_index=[0, count - 1])
+        return np.maximum(values, 0.0), z @ vectors
+    # the factor of the saddle matrix applies K^-1 on the space of motions that the constraints allow
+    solve = _saddle(k, constraints)
+    inverse = spl.LinearOperator((r, r), matvec=lambda x: solve(x)[:r], dtype=float)
+    start = np.random.default_rng(0).standard_normal(r)
+    values, vectors = spl.eigsh(k, count, m, sigma=0.0, OPinv=inverse, v0=inverse @ (m @ start))
+    order = np.argsort(values)
+    return np.maximum(values[order], 0.0), vectors[:, order]
+
+
+def constraint_modes(k: sp.csc_array, constraints: sp.csr_array) -> np.ndarray:
+    """Return the static shapes in which one interface coordinate is 1 and the others are 0, shape (r, b)."""
+    r, b = k.shape[0], constraints.shape[0]
+    if b == 0:
+        return np.zeros((r, 0))
+    solve = _saddle(k, constraints)
+    right = np.zeros((r + b, b))
+    right[r:] = np.eye(b)
+    return np.column_stack([solve(right[:, c], full=True)[:r] for c in range(b)])
+
+
+def _saddle(k: sp.csc_array, constraints: sp.csr_array):
+    """Return a function that solves [[K, s C'], [s C, 0]] for right-hand sides of K's rows or of all rows."""
+    r, b = k.shape[0], constraints.shape[0]
+    scale = float(np.abs(k.diagonal()).mean()) or 1.0
+    matrix = sp.block_array([[k, scale * constraints.T], [scale * constraints, None]], format="csc")
+    try:
+        factor = spl.splu(sp.csc_matrix(matrix))
+    except RuntimeError:
+        raise FlexibleError(
+            "the stiffness with held interfaces is singular: the interfaces leave the body a rigid motion or an "
+            "unconnected part; add an interface, or use method='free'"
+        ) from None
+
+    def solve(x: np.ndarray, full: bool = False) -> np.ndarray:
+        right = np.concatenate([x[:r], scale * x[r:]]) if full else np.concatenate([x, np.zeros(b)])
+        return factor.solve(right)
+
+    return solve
+
+
+def free_modes(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return squared circular frequencies and shapes of the free body, without its rigid motions."""
+    r = k.shape[0]
+    wanted = min(count + rigid.shape[1], r)
+    if r <= DENSE or wanted > r // 2:
+        values, vectors = scipy.linalg.eigh(k.toarray(), m.toarray(), subset_by_index=[0, wanted - 1])
+    else:
+        shift = -1e-4 * np.abs(k.diagonal()).mean() / max(np.abs(m.diagonal()).mean(), 1e-300)
+        start = np.random.default_rng(0).standard_normal(r)
+        values, vectors = spl.eigsh(sp.csc_matrix(k), wanted, sp.csc_matrix(m), sigma=shift, v0=start)
+    order = np.argsort(values)[rigid.shape[1] :]
+    return np.maximum(values[order], 0.0), vectors[:, order]
+
+
+def _attachment(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, constraints: sp.csr_array) -> np.ndarray:
+    """Return static shapes of unit loads at the interfaces, balanced by the inertia of the rigid body."""
+    b = constraints.shape[0]
+    if b == 0:
+        return np.zeros((k.shape[0], 0))
+    inertial = m @ rigid
+    loads = constraints.T.toarray()
+    balanced = loads - inertial @ np.linalg.solve(rigid.T @ inertial, rigid.T @ loads)
+    # any solution of the singular system will do: rigid motions are taken out afterwards
+    solve = _saddle(k, sp.csr_array(inertial.T / np.abs(inertial).max()))
+    return np.column_stack([solve(balanced[:, c])[: k.shape[0]] for c in range(b)])
+
+
+def orthonormal(
+    k: sp.csc_array, m: sp.csc_array, basis: np.ndarray, rigid: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return squared circular frequencies and shapes of a basis, without rigid motions, orthonormal in the mass.
+
+    Parameters
+    ----------
+    k, m : sparse matrix, shape (r, r)
+    basis : ndarray, shape (r, n)
+    rigid : ndarray, shape (r, 6)
+    """
+    inertial = m @ rigid
+    basis = basis - rigid @ np.linalg.solve(rigid.T @ inertial, inertial.T @ basis)
+    size = np.sqrt(np.maximum(np.einsum("rn,rn->n", basis, m @ basis), 0.0))
+    basis = basis[:, size > 1e-12 * size.max()] / size[size > 1e-12 * size.max()]
+    # the basis contains combinations without deformation: drop what has no length
+    weight, turn = np.linalg.eigh(basis.T @ (m @ basis))
+    good = weight > 1e-10 * weight[-1]
+    basis = basis @ (turn[:, good] / np.sqrt(weight[good]))
+    values, vectors = scipy.linalg.eigh(basis.T @ (k @ basis))
+    shapes = basis @ vectors
+    return np.maximum(values, 0.0), shapes

@@ -1,0 +1,279 @@
+"""Rotors: a shaft on linear supports, seen from a frame at rest.
+
+    M q'' + (C + W G) q' + K q = f,    W the spin about z
+
+with all degrees of freedom of the finite elements. Whirl, critical speeds, Campbell diagram and unbalance response
+follow from it (Friswell, Penny, Garvey, Lees, *Dynamics of Rotating Machines*, chapters 5 and 6). It is the check of
+the modal body of the same shaft, which turns with its frame and needs no G.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.linalg
+
+from gearmbs.flexible.beam import DOFS
+from gearmbs.flexible.errors import FlexibleError
+from gearmbs.flexible.shaft import Shaft
+from gearmbs.mechanism.quantities import quantities, quantity
+from gearmbs.units import Quantity
+
+DIRECTIONS = {"lateral": (0, 1, 3, 4), "torsional": (5,), "axial": (2,), "all": (0, 1, 2, 3, 4, 5)}
+"""Degrees of freedom of each kind of vibration; those of round shafts do not know each other."""
+
+
+@dataclass(frozen=True)
+class Support:
+    """A linear bearing at a seat of a shaft.
+
+    Parameters
+    ----------
+    seat : str
+    stiffness : float, str or array_like
+        Radial, N/m: one number, (kx, ky), or a 2x2 matrix.
+    damping : float, str or array_like
+        N s/m, likewise.
+    axial, torsional : float or str
+        Stiffness along the axis, N/m, and about it, N m.
+    rotational : float or str
+        Stiffness against tilting, N m.
+    """
+
+    seat: str
+    stiffness: Quantity = 0.0
+    damping: Quantity = 0.0
+    axial: Quantity = 0.0
+    torsional: Quantity = 0.0
+    rotational: Quantity = 0.0
+
+    def matrices(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return stiffness and damping of the six degrees of freedom of the node."""
+        label = f"support at '{self.seat}'"
+        k, c = np.zeros((6, 6)), np.zeros((6, 6))
+        for matrix, value, unit, what in (
+            (k, self.stiffness, "N/m", "stiffness"), (c, self.damping, "N*s/m", "damping")
+        ):  # fmt: skip
+            part = np.asarray(quantities(value, unit, f"{label}: {what}") if not isinstance(value, str)
+                              else quantity(value, unit, f"{label}: {what}"))  # fmt: skip
+            if part.shape not in ((), (2,), (2, 2)):
+                raise FlexibleError(f"{label}: {what} has shape {part.shape}; give one number, two, or a 2x2 matrix")
+            matrix[:2, :2] = part if part.ndim == 2 else np.diag(np.broadcast_to(part, 2))
+        k[2, 2] = quantity(self.axial, "N/m", f"{label}: axial")
+        k[3, 3] = k[4, 4] = quantity(self.rotational, "N*m", f"{label}: rotational")
+        k[5, 5] = quantity(self.torsional, "N*m", f"{label}: torsional")
+        return k, c
+
+
+@dataclass(frozen=True, eq=False)
+class WhirlModes:
+    """Modes of a rotor at one speed, by rising frequency.
+
+    Attributes
+    ----------
+    speed : float
+        rad/s.
+    frequencies : ndarray, shape (n,)
+        Damped natural frequencies, rad/s.
+    damping_ratios : ndarray, shape (n,)
+    directions : list of str
+        "forward", "backward" or "planar" whirl of the station that moves most.
+    shapes : ndarray, shape (n, stations, 6)
+        Complex displacements and rotations of the stations.
+    """
+
+    speed: float
+    frequencies: np.ndarray
+    damping_ratios: np.ndarray
+    directions: list[str]
+    shapes: np.ndarray
+
+    def __repr__(self) -> str:
+        rows = "\n".join(
+            f"{k + 1:3d} {w / (2 * np.pi):14.4f} Hz {w * 30 / np.pi:14.2f} rpm  {z:9.5f}  {d}"
+            for k, (w, z, d) in enumerate(zip(self.frequencies, self.damping_ratios, self.directions))
+        )
+        return f"modes at {self.speed * 30 / np.pi:.6g} rpm: frequency, damping ratio, whirl\n{rows}"
+
+
+@dataclass(frozen=True, eq=False)
+class Campbell:
+    """Natural frequencies of a rotor over its speed.
+
+    Attributes
+    ----------
+    speeds : ndarray, shape (s,)
+        rad/s.
+    frequencies, damping_ratios : ndarray, shape (s, n)
+        rad/s; by rising frequency at each speed.
+    directions : ndarray of str, shape (s, n)
+    """
+
+    speeds: np.ndarray
+    frequencies: np.ndarray
+    damping_ratios: np.ndarray
+    directions: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class UnbalanceResponse:
+    """Steady whirl under unbalance.
+
+    Attributes
+    ----------
+    speeds : ndarray, shape (s,)
+        rad/s.
+    positions : ndarray, shape (stations,)
+        Along the shaft, m.
+    displacements : ndarray, shape (s, stations, 6)
+        Complex amplitudes of exp(i speed t): the real part is the motion.
+    """
+
+    speeds: np.ndarray
+    positions: np.ndarray
+    displacements: np.ndarray
+
+    def major_axis(self, at: float) -> np.ndarray:
+        """Return the largest radial displacement of the station nearest to ``at`` over the speeds, m."""
+        k = int(np.argmin(np.abs(self.positions - at)))
+        x, y = self.displacements[:, k, 0], self.displacements[:, k, 1]
+        return 0.5 * (np.abs(x - 1j * y) + np.abs(x + 1j * y))
+
+
+@dataclass(frozen=True, eq=False)
+class Rotor:
+    """A shaft on supports.
+
+    Parameters
+    ----------
+    shaft : Shaft
+    supports : sequence of Support
+
+    Examples
+    --------
+    A steel shaft between stiff bearings; its first whirl splits as it turns:
+
+    >>> from gearmbs.flexible import Rotor, Shaft, ShaftSection, Support
+    >>> shaft = Shaft([ShaftSection(1.0, 0.1)], seats={"A": 0.0, "B": 1.0})
+    >>> rotor = Rotor(shaft, [Support("A", 1e12), Support("B", 1e12)])
+    >>> slow, fast = rotor.modes("10000 rpm", count=2).frequencies
+    >>> bool(fast > rotor.modes(0.0, count=1).frequencies[0] > slow)
+    True
+    """
+
+    shaft: Shaft
+    supports: Sequence[Support] = ()
+    kind: str = "lateral"
+    _matrices: tuple = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.kind not in DIRECTIONS:
+            raise FlexibleError(f"Rotor.kind is {self.kind!r}; choose one of {', '.join(DIRECTIONS)}")
+        model = self.shaft.model()
+        k, m = model.stiffness.toarray(), model.mass.toarray()
+        assert model.slices is not None
+        g, c = model.slices.gyroscopic_matrix(), np.zeros_like(k)
+        for support in self.supports:
+            if support.seat not in model.seats:
+                known = ", ".join(model.seats) or "none"
+                raise FlexibleError(f"support at '{support.seat}': the shaft has no such seat; seats: {known}")
+            at = slice(DOFS * model.seats[support.seat], DOFS * (model.seats[support.seat] + 1))
+            stiffness, damping = support.matrices()
+            k[at, at] += stiffness
+            c[at, at] += damping
+        rows = np.flatnonzero(np.isin(model.dofs[:, 1], DIRECTIONS[self.kind]))
+        picked = tuple(matrix[np.ix_(rows, rows)] for matrix in (m, c, g, k))
+        object.__setattr__(self, "_matrices", (*picked, rows, model.positions[:, 2]))
+
+    @property
+    def stations(self) -> np.ndarray:
+        """Positions of the stations, m."""
+        return self._matrices[5]
+
+    def modes(self, speed: Quantity = 0.0, count: int = 12) -> WhirlModes:
+        """Return the slowest modes at a speed; motions without a frequency are left out.
+
+        Parameters
+        ----------
+        speed : float or str
+            rad/s or text, ``"3000 rpm"``.
+        count : int
+        """
+        speed = quantity(speed, "angular speed", "speed")
+        m, c, g, k, _, _ = self._matrices
+        n = m.shape[0]
+        damping = c + speed * g
+        a = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(m, k), -np.linalg.solve(m, damping)]])
+        values, vectors = scipy.linalg.eig(a)
+        floor = 1e-6 * np.sqrt(np.abs(k).max() / np.abs(m).max())
+        chosen = np.flatnonzero(values.imag > max(floor, 1e-3))
+        chosen = chosen[np.argsort(values[chosen].imag)][:count]
+        values = values[chosen]
+        shapes = self._at_stations(vectors[:n, chosen].T)
+        return WhirlModes(speed, values.imag.copy(), -values.real / np.abs(values), [_whirl(s) for s in shapes], shapes)
+
+    def campbell(self, speeds: Sequence[Quantity], count: int = 8) -> Campbell:
+        """Return natural frequencies over speeds, rad/s or text."""
+        found = [self.modes(speed, count) for speed in speeds]
+        least = min(f.frequencies.size for f in found)
+        return Campbell(
+            np.array([f.speed for f in found]),
+            np.array([f.frequencies[:least] for f in found]),
+            np.array([f.damping_ratios[:least] for f in found]),
+            np.array([f.directions[:least] for f in found]),
+        )
+
+    def critical_speeds(self, count: int = 6, order: float = 1.0) -> np.ndarray:
+        """Return the speeds at which a natural frequency is ``order`` times the speed, rad/s, without damping.
+
+        With q exp(i order W t) they are eigenvalues: K q = W^2 (order^2 M - i order G) q.
+        """
+        m, _, g, k, _, _ = self._matrices
+        values = scipy.linalg.eigvals(np.linalg.solve(k, order**2 * m - 1j * order * g))
+        real = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values)) & (values.real > 0.0)]
+        both = np.sort(1.0 / np.sqrt(real[real > 1e-12 * real.max()]))
+        return both[:count]
+
+    def unbalance_response(self, speeds: Sequence[Quantity], unbalance: Mapping[float, complex]) -> UnbalanceResponse:
+        """Return the steady response to unbalanced masses.
+
+        Parameters
+        ----------
+        speeds : sequence of float or str
+            rad/s or text.
+        unbalance : mapping of float to complex
+            Mass times eccentricity, kg m, by position along the shaft, m; a complex number has its angle at time 0.
+        """
+        values = np.array([quantity(s, "angular speed", "speeds") for s in speeds])
+        m, c, g, k, rows, z = self._matrices
+        load = np.zeros(DOFS * z.size, dtype=complex)
+        for at, size in unbalance.items():
+            if not -1e-9 <= at <= self.shaft.length * (1 + 1e-9):
+                raise FlexibleError(f"unbalance at {at} m: the shaft reaches from 0 to {self.shaft.length:g} m")
+            node = int(np.argmin(np.abs(z - at)))
+            load[DOFS * node] += size
+            load[DOFS * node + 1] += -1j * size
+        load = load[rows]
+        found = [np.linalg.solve(k + 1j * w * (c + w * g) - w**2 * m, w**2 * load) for w in values]
+        return UnbalanceResponse(values, z, self._at_stations(np.array(found)))
+
+    def _at_stations(self, vectors: np.ndarray) -> np.ndarray:
+        """Return vectors of the degrees of freedom in use by station and direction."""
+        rows, z = self._matrices[4], self._matrices[5]
+        out = np.zeros((len(vectors), DOFS * z.size), dtype=complex)
+        out[:, rows] = vectors
+        return out.reshape(len(vectors), z.size, DOFS)
+
+
+def _whirl(shape: np.ndarray) -> str:
+    """Return the sense in which the station that moves most goes round."""
+    radial = np.abs(shape[:, 0]) ** 2 + np.abs(shape[:, 1]) ** 2
+    x, y = shape[int(np.argmax(radial)), :2]
+    size = abs(x) ** 2 + abs(y) ** 2
+    # q exp(i w t): x = cos, y = sin needs y = -i x
+    turn = (np.conj(x) * y).imag
+    if size == 0.0 or abs(turn) < 1e-6 * size:
+        return "planar"
+    return "forward" if turn < 0 else "backward"

@@ -1,0 +1,254 @@
+"""Shafts by sections and diameters, with discs and seats, and their finite elements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.flexible.beam import DOFS, GAUSS_W, GAUSS_X, BeamSection, Slices, element_stiffness, section_shapes
+from gearmbs.flexible.errors import FlexibleError
+from gearmbs.flexible.fe_model import FiniteElementModel
+from gearmbs.flexible.material import STEEL, ElasticMaterial
+from gearmbs.mechanism.quantities import quantity
+from gearmbs.units import Quantity
+
+if TYPE_CHECKING:
+    from gearmbs.flexible.modal_model import ModalModel
+
+ELEMENTS = 24
+"""Least number of elements of a shaft unless told otherwise."""
+
+
+@dataclass(frozen=True)
+class ShaftSection:
+    """A length of shaft, a cylinder or a cone.
+
+    Parameters
+    ----------
+    length, outer : float or str
+        Length and outer diameter, m.
+    inner : float or str
+        Diameter of the bore, m.
+    outer_end, inner_end : float or str, optional
+        Diameters at the end of a cone, m; default: as at its beginning.
+    material : ElasticMaterial, optional
+        Default: that of the shaft.
+    """
+
+    length: Quantity
+    outer: Quantity
+    inner: Quantity = 0.0
+    outer_end: Quantity = None
+    inner_end: Quantity = None
+    material: ElasticMaterial | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("length", "outer", "inner", "outer_end", "inner_end"):
+            given = getattr(self, name)
+            if given is None:
+                given = getattr(self, name.removesuffix("_end"))
+            object.__setattr__(self, name, quantity(given, "length", f"ShaftSection.{name}"))
+        if not (np.isfinite(self.length) and self.length > 0.0):
+            raise FlexibleError(f"ShaftSection.length is {self.length} m; it must be positive")
+        for outer, inner in ((self.outer, self.inner), (self.outer_end, self.inner_end)):
+            if not 0.0 <= inner < outer:
+                raise FlexibleError(f"ShaftSection: bore {inner} m in {outer} m; give diameters 0 <= inner < outer")
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A rigid disc on a shaft: a wheel, a coupling half, a rotor.
+
+    Give ``outer`` and ``width``, or ``mass``, ``polar`` and ``diametral``.
+
+    Parameters
+    ----------
+    at : float or str
+        Position along the shaft, m.
+    outer, width, inner : float or str, optional
+        Diameters and width of a plain disc, m; ``inner`` is the shaft's diameter.
+    mass, polar, diametral : float or str, optional
+        kg, and moments of inertia about the axis and about a diameter through the disc's centre, kg m^2.
+    material : ElasticMaterial, optional
+    name : str
+    """
+
+    at: Quantity
+    outer: Quantity = None
+    width: Quantity = None
+    inner: Quantity = 0.0
+    mass: Quantity = None
+    polar: Quantity = None
+    diametral: Quantity = None
+    material: ElasticMaterial | None = None
+    name: str = "disc"
+
+    def __post_init__(self) -> None:
+        label = f"Disc '{self.name}'"
+        units = {"at": "length", "outer": "length", "width": "length", "inner": "length", "mass": "mass",
+                 "polar": "inertia", "diametral": "inertia"}  # fmt: skip
+        for name, unit in units.items():
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, quantity(getattr(self, name), unit, f"{label}: {name}"))
+        by_size = self.outer is not None and self.width is not None
+        by_mass = None not in (self.mass, self.polar, self.diametral)
+        if by_size == by_mass:
+            raise FlexibleError(f"{label}: give outer and width, or mass, polar and diametral")
+        numbers = (self.outer, self.width) if by_size else (self.mass, self.polar, self.diametral)
+        if not all(np.isfinite(value) and value >= 0.0 for value in numbers) or (by_size and self.inner >= self.outer):
+            raise FlexibleError(f"{label}: sizes {numbers} must not be negative, nor the bore wider than the disc")
+
+    def properties(self, material: ElasticMaterial) -> tuple[float, float, float]:
+        """Return mass, polar and diametral moment of inertia."""
+        if self.mass is not None:
+            return self.mass, self.polar, self.diametral
+        m = (self.material or material).density * np.pi / 4 * (self.outer**2 - self.inner**2) * self.width
+        round_part = self.outer**2 + self.inner**2
+        return m, m * round_part / 8, m * (3 * round_part + 4 * self.width**2) / 48
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """A shaft along z, from z = 0 on, of sections, with discs on it and named seats.
+
+    Parameters
+    ----------
+    sections : sequence of ShaftSection
+        In their order along z.
+    discs : sequence of Disc
+        Wheels that belong to the body. A wheel that is a body of its own is joined to a seat instead.
+    seats : dict of str to float or str
+        Names of places along the shaft where bearings, wheels and couplings are; m.
+    material : ElasticMaterial
+    elements : int
+        Least number of finite elements; sections, discs and seats begin new ones anyway.
+    shear : float, optional
+        Shear coefficient of all sections in place of Cowper's.
+    name : str
+
+    Raises
+    ------
+    FlexibleError
+        For places off the shaft and impossible sizes.
+
+    Examples
+    --------
+    >>> from gearmbs.flexible import Shaft, ShaftSection
+    >>> shaft = Shaft([ShaftSection("200 mm", "30 mm")], seats={"left": 0, "wheel": "100 mm", "right": "200 mm"})
+    >>> print(f"{shaft.length:g} m, {shaft.model().mass_properties().mass:.4f} kg")
+    0.2 m, 1.1098 kg
+    """
+
+    sections: Sequence[ShaftSection]
+    discs: Sequence[Disc] = ()
+    seats: dict[str, Quantity] = field(default_factory=dict)
+    material: ElasticMaterial = STEEL
+    elements: int = ELEMENTS
+    shear: float | None = None
+    name: str = "shaft"
+
+    def __post_init__(self) -> None:
+        label = f"shaft '{self.name}'"
+        if not self.sections:
+            raise FlexibleError(f"{label}: it has no sections")
+        object.__setattr__(self, "sections", tuple(self.sections))
+        object.__setattr__(self, "discs", tuple(self.discs))
+        seats = {key: quantity(at, "length", f"{label}: seat '{key}'") for key, at in self.seats.items()}
+        object.__setattr__(self, "seats", seats)
+        places = {
+            **{f"seat '{key}'": at for key, at in seats.items()},
+            **{f"disc '{d.name}'": d.at for d in self.discs},
+        }
+        for what, at in places.items():
+            if not -1e-9 * self.length <= at <= self.length * (1 + 1e-9):
+                raise FlexibleError(f"{label}: {what} is at {at} m; the shaft reaches from 0 to {self.length:g} m")
+        if self.elements < 1:
+            raise FlexibleError(f"{label}: elements = {self.elements}; it needs one at least")
+
+    @property
+    def length(self) -> float:
+        """Length, m."""
+        return float(sum(s.length for s in self.sections))
+
+    def stations(self) -> np.ndarray:
+        """Return where the nodes are, m: at changes of section, at discs and seats, and between them."""
+        ends = np.concatenate([[0.0], np.cumsum([s.length for s in self.sections])])
+        fixed = np.concatenate([ends, list(self.seats.values()), [d.at for d in self.discs]])
+        fixed = np.unique(np.round(np.clip(fixed, 0.0, self.length) / self.length, 9)) * self.length
+        step = self.length / self.elements * (1 + 1e-9)
+        parts = [np.linspace(a, b, max(1, int(np.ceil((b - a) / step))) + 1)[:-1] for a, b in pairwise(fixed)]
+        return np.concatenate([*parts, [self.length]])
+
+    def element_section(self, a: float, b: float) -> BeamSection:
+        """Return the section of the element between two stations; a cone has the one at its middle."""
+        start, mid = 0.0, 0.5 * (a + b)
+        for s in self.sections:
+            if mid < start + s.length or s is self.sections[-1]:
+                x = (mid - start) / s.length
+                outer = s.outer + x * (s.outer_end - s.outer)
+                inner = s.inner + x * (s.inner_end - s.inner)
+                return BeamSection.ring(s.material or self.material, outer, inner, self.shear)
+            start += s.length
+        raise AssertionError
+
+    def model(self) -> FiniteElementModel:
+        """Return the finite-element model: consistent Timoshenko elements with axial motion and torsion."""
+        z = self.stations()
+        size = DOFS * z.size
+        stiffness = np.zeros((size, size))
+        rows: list[tuple[Any, ...]] = []
+        for k, (a, b) in enumerate(pairwise(z)):
+            section, length = self.element_section(a, b), b - a
+            places = slice(DOFS * k, DOFS * (k + 2))
+            stiffness[places, places] += element_stiffness(length, section)
+            moved, turned = section_shapes(GAUSS_X, length, section)
+            for g, (x, w) in enumerate(zip(GAUSS_X, GAUSS_W)):
+                inertia = w * length * np.diag(section.inertia)
+                rows.append((w * length * section.mass, a + x * length, inertia, places, moved[g], turned[g]))
+        one = np.eye(DOFS)
+        for disc in self.discs:
+            mass, polar, diametral = disc.properties(self.material)
+            k = int(np.argmin(np.abs(z - disc.at)))
+            places = slice(DOFS * k, DOFS * (k + 1))
+            rows.append((mass, z[k], np.diag([diametral, diametral, polar]), places, one[:3], one[3:]))
+        slices = _slices(rows, size)
+        positions = np.column_stack([np.zeros((z.size, 2)), z])
+        dofs = np.column_stack([np.repeat(np.arange(z.size), DOFS), np.tile(np.arange(DOFS), z.size)])
+        seats = {key: int(np.argmin(np.abs(z - at))) for key, at in self.seats.items()}
+        return FiniteElementModel(
+            np.arange(1, z.size + 1), positions, dofs, stiffness, slices.mass_matrix(), self.name, seats, slices
+        )
+
+    def modal_model(
+        self, modes: int | None = None, *, max_frequency: Quantity = None, seats: Sequence[str] | None = None
+    ) -> ModalModel:
+        """Return the shaft as a modal body: Craig-Bampton with its seats as interface, orthonormalised.
+
+        Parameters
+        ----------
+        modes : int, optional
+            How many modes are kept, the slowest; default: all that the reduction has up to ``max_frequency``.
+        max_frequency : float or str, optional
+            Modes above are left out, Hz.
+        seats : sequence of str, optional
+            Which seats are interfaces; default: all.
+        """
+        from gearmbs.flexible.reduction import reduce_model
+
+        return reduce_model(
+            self.model(), self.seats if seats is None else seats, modes=modes, max_frequency=max_frequency
+        )
+
+
+def _slices(rows: list[tuple[Any, ...]], size: int) -> Slices:
+    """Return slices from (mass, z, inertia, places, moved, turned)."""
+    count = len(rows)
+    moved, turned = np.zeros((count, 3, size)), np.zeros((count, 3, size))
+    for k, row in enumerate(rows):
+        moved[k, :, row[3]], turned[k, :, row[3]] = row[4], row[5]
+    position = np.column_stack([np.zeros((count, 2)), [row[1] for row in rows]])
+    return Slices(np.array([row[0] for row in rows]), position, np.array([row[2] for row in rows]), moved, turned)

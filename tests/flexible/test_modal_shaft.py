@@ -1,0 +1,174 @@
+"""Shafts reduced to modal bodies: the integrals against the rotor at rest, reduction errors, the DAE."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from gearmbs.flexible import (
+    Disc,
+    ElasticMaterial,
+    FlexibleError,
+    Rotor,
+    Shaft,
+    ShaftSection,
+    Support,
+    damping_ratios,
+    reduce_model,
+)
+from gearmbs.mechanism import Mechanism, ModelError, ShapeIntegrals, linear_modes
+
+MATERIAL = ElasticMaterial(2.11e11, 2.11 / (2 * 0.812) - 1, 7810, shear_modulus=8.12e10)
+
+
+def shaft(elements: int = 12) -> Shaft:
+    """Friswell's example 5.9.1."""
+    discs = [Disc(0.5, outer=0.28, width=0.07, inner=0.05), Disc(1.0, outer=0.35, width=0.07, inner=0.05)]
+    return Shaft([ShaftSection(1.5, 0.05)], discs, {"A": 0.0, "B": 1.5}, MATERIAL, elements)
+
+
+def test_reduction_is_that_of_a_free_body():
+    model = shaft().model()
+    reduced = reduce_model(model, modes=10, internal=40)
+    n = reduced.modes
+    exact = np.sqrt(np.maximum(scipy.linalg.eigh(model.stiffness.toarray(), model.mass.toarray())[0], 0))[6 : 6 + n]
+    np.testing.assert_allclose(reduced.frequencies, exact / (2 * np.pi), rtol=3e-5)
+    assert np.all(reduced.frequencies > exact / (2 * np.pi) * (1 - 1e-9))
+    i = reduced.integrals
+    np.testing.assert_allclose(i.mass, np.eye(n), atol=1e-9)
+    np.testing.assert_allclose(i.momentum, 0, atol=1e-9)
+    np.testing.assert_allclose(i.angular_momentum, 0, atol=1e-9)
+
+
+def test_bending_pairs_stay_whole():
+    """A shaft that is the same in all directions must not get an axis of preference from the choice of modes."""
+    for count in range(4, 12):
+        frequencies = shaft().modal_model(count).frequencies
+        assert frequencies.size in (count, count - 1)
+        lateral = [f for f in frequencies if np.sum(np.abs(frequencies / f - 1) < 1e-7) == 2]
+        assert frequencies.size - len(lateral) <= 3
+
+
+@pytest.mark.parametrize("speed", [0.0, 4000 * np.pi / 30])
+def test_integrals_of_the_turning_frame_give_the_whirl_seen_from_rest(speed):
+    """In a frame that turns with the shaft w -+ speed, by Coriolis and centrifugal terms of the integrals only."""
+    rotor = Rotor(shaft(), [Support("A", 1e6), Support("B", 1e6)])
+    expected = rotor.modes(speed, 5).frequencies
+    model = reduce_model(shaft().model(), internal=60)
+    p, i = model.properties, model.integrals
+    own = i.about_centre_of_mass(p.mass)
+    n, z = model.modes, np.array([0, 0, 1.0])
+    # coordinates: translation of the centre of mass, small rotation of the frame, modal coordinates; lagrangian to 2nd
+    # order
+    mass = scipy.linalg.block_diag(p.mass * np.eye(3), p.inertia, own.mass)
+    mass[3:6, 6:], mass[6:, 3:6] = own.angular_momentum.T, own.angular_momentum
+    gyro, spring = np.zeros_like(mass), np.zeros_like(mass)
+    skew = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 0.0]])
+    gyro[:3, :3] = 2 * speed * p.mass * skew
+    spring[:3, :3] = speed**2 * p.mass * skew @ skew
+    jd, jz = p.inertia[0, 0], p.inertia[2, 2]
+    # a body that spins about z with a small tilt, in axes that turn with it
+    gyro[3:5, 3:5] = speed * (2 * jd - jz) * skew[:2, :2]
+    spring[3:5, 3:5] = speed**2 * (jz - jd) * np.eye(2)
+    c1z = own.cross @ z
+    gyro[6:, 6:] = speed * (c1z.T - c1z)
+    spring[6:, 6:] = np.diag((2 * np.pi * model.frequencies) ** 2) - 0.5 * speed**2 * own.second[:, :, 2, 2]
+    # tilt and deformation are coupled by b_k = J1_k z: W a' . b q - W^2 (a x z) . b q in the Lagrangian
+    b = own.first @ z
+    gyro[3:6, 6:], gyro[6:, 3:6] = speed * b.T, -speed * b
+    spring[3:6, 6:] = speed**2 * np.cross(z, b).T
+    spring[6:, 3:6] = spring[3:6, 6:].T
+    assert np.abs(own.angular_momentum).max() < 1e-9
+    for seat in ("A", "B"):
+        place = model.seats[seat]
+        arm = place.position - p.com
+        motion = np.hstack([np.eye(3), np.column_stack([np.cross(e, arm) for e in np.eye(3)]), place.moved.T])
+        spring += 1e6 * motion[:2].T @ motion[:2]
+    a = np.block([[np.zeros_like(mass), np.eye(6 + n)], [-np.linalg.solve(mass, spring), -np.linalg.solve(mass, gyro)]])
+    seen = np.abs(np.linalg.eigvals(a).imag)
+    for w in expected:
+        assert min(np.abs(seen - abs(w - speed)).min(), np.abs(seen - (w + speed)).min()) < 2e-4 * w
+
+
+@pytest.mark.parametrize(
+    ("damping", "expected"),
+    [
+        (0.02, [0.02, 0.02, 0.02, 0.02]),
+        ([0.1, 0.2, 0.3, 0.4], [0.1, 0.2, 0.3, 0.4]),
+        ("adams", [0.01, 0.1, 0.1, 1.0]),
+        ([(200.0, 0.01), (900.0, 0.05)], [0.01, 0.01, 0.05, 0.05]),
+    ],
+)
+def test_damping_by_number_mode_and_band(damping, expected):
+    np.testing.assert_allclose(damping_ratios(np.array([50.0, 150.0, 500.0, 2000.0]), damping), expected)
+
+
+@pytest.mark.parametrize("damping", ["weak", [0.1, 0.2], -0.1, [(900.0, 0.1), (200.0, 0.2)], np.nan])
+def test_wrong_damping_is_refused(damping):
+    with pytest.raises(FlexibleError, match="damping"):
+        damping_ratios(np.array([50.0, 150.0, 500.0]), damping)
+
+
+def test_markers_between_the_stations_and_off_the_axis_follow_the_section():
+    """Cantilever held at the left end, loaded at the right: the line w = F (3 l z^2 - z^3) / 6 E I at any point."""
+    slim = Shaft([ShaftSection(1.0, 0.01)], seats={"A": 0.0, "B": 1.0}, elements=10)
+    model = reduce_model(slim.model(), internal=6)
+    m = Mechanism("cantilever")
+    body = model.add_to(m, damping=0.0)
+    m.fixed("clamp", body.marker(model.place("A")), m.ground.marker())
+    tip, z = body.marker(model.place("B"), name="tip"), 0.437
+    m.load("push", tip, m.ground.marker((0, 0, 1.0)), rm=m.ground.marker(), fx=1.0)
+    on, off = body.marker((0, 0, z), name="on"), body.marker((0.1, 0, z), name="off")
+    from gearmbs.mechanism import static_equilibrium
+
+    found = static_equilibrium(m).solution
+    ei = 2.1e11 * np.pi / 64 * 0.01**4
+    line = (3 * z**2 - z**3) / (6 * ei)
+    np.testing.assert_allclose(found.marker_position(tip)[0, 0], 1 / (3 * ei), rtol=2e-4)
+    np.testing.assert_allclose(found.marker_position(on)[0, 0], line, rtol=5e-4)
+    slope = (6 * z - 3 * z**2) / (6 * ei)
+    np.testing.assert_allclose((found.marker_position(off) - found.marker_position(on))[0, 2], -0.1 * slope, rtol=2e-2)
+    with pytest.raises(FlexibleError, match="off the shaft"):
+        model.shapes(np.array([0, 0, 1.2]))
+
+
+def test_modes_of_the_mechanism_are_those_of_the_rotor():
+    """At rest, on springs: linear modes of the modal body against all degrees of freedom."""
+    rotor = Rotor(shaft(), [Support("A", 1e6), Support("B", 1e6)])
+    model = reduce_model(shaft().model(), internal=30)
+    m = Mechanism("rotor")
+    body = model.add_to(m, damping=0.0)
+    for seat in ("A", "B"):
+        place = model.place(seat)
+        m.bushing(seat, body.marker(place), m.ground.marker(place), stiffness=(1e6, 1e6, 0.0 if seat == "B" else 1e6))
+    found = linear_modes(m)
+    moving = 2 * np.pi * found.frequencies[np.array(found.kinds) == "oscillating"]
+    for w in rotor.modes(0.0, 6).frequencies[::2]:
+        assert np.sum(np.abs(moving / w - 1) < 1e-4) == 2
+
+
+def test_coupling_levels_and_integrals():
+    i = shaft().modal_model(6).integrals
+    assert np.any(i.coupled("full").second)
+    assert not np.any(i.coupled("partial").second)
+    assert not np.any(i.coupled("constant").first)
+    with pytest.raises(ModelError, match="choose one of full, partial, constant"):
+        i.coupled("some")
+    with pytest.raises(ModelError, match="need the rotations"):
+        ShapeIntegrals.of_points([1.0], [[0, 0, 0]], [[[0, 0, 1.0]]], inertias=[np.eye(3)])
+
+
+def test_modes_are_selected_by_what_they_give_to_the_seats():
+    model = reduce_model(shaft().model(), internal=20)
+    share = model.participation()
+    assert np.all((share >= 0) & (share <= 1))
+    kept = model.by_participation(1e-3)
+    assert 4 < kept.modes < model.modes
+    flexible = [(m.seats["A"].moved[:, 0] ** 2 / (2 * np.pi * m.frequencies) ** 2).sum() for m in (model, kept)]
+    np.testing.assert_allclose(flexible[1], flexible[0], rtol=0.02)
+    energy = kept.strain_energies(np.eye(kept.modes)[0])
+    np.testing.assert_allclose(energy[0], 0.5 * (2 * np.pi * kept.frequencies[0]) ** 2)
+    assert (
+        np.ptp(kept.displaced(np.eye(kept.modes)[0], 0.1)[:, 0])
+        + np.ptp(kept.displaced(np.eye(kept.modes)[0], 0.1)[:, 1])
+        > 0
+    )

@@ -1,0 +1,152 @@
+"""Shafts by sections: published and closed-form frequencies, critical speeds, whirl, unbalance."""
+
+import numpy as np
+import pytest
+
+from gearmbs.flexible import Disc, ElasticMaterial, Rotor, Shaft, ShaftSection, Support, shear_coefficient
+
+RPM = np.pi / 30
+PINNED = 1e15
+
+
+def friswell(kind: str = "lateral", elements: int = 48) -> Rotor:
+    """Friswell, Penny, Garvey, Lees, Dynamics of Rotating Machines, example 5.9.1."""
+    material = ElasticMaterial(2.11e11, 2.11 / (2 * 0.812) - 1, 7810, shear_modulus=8.12e10)
+    discs = [Disc(0.5, outer=0.28, width=0.07, inner=0.05), Disc(1.0, outer=0.35, width=0.07, inner=0.05)]
+    shaft = Shaft([ShaftSection(1.5, 0.05)], discs, {"A": 0.0, "B": 1.5}, material, elements)
+    return Rotor(shaft, [Support("A", 1e6), Support("B", 1e6)], kind)
+
+
+def plain(elements: int) -> Rotor:
+    """A round bar between pins: 1 m long, 0.1 m thick."""
+    shaft = Shaft([ShaftSection(1.0, 0.1)], (), {"A": 0.0, "B": 1.0}, ElasticMaterial(2.11e11, 0.3, 7810), elements)
+    return Rotor(shaft, [Support("A", PINNED), Support("B", PINNED)])
+
+
+def test_example_of_friswell_at_rest_and_at_4000_rpm():
+    """Rows of ROSS 2.3.0 with 48 elements; the book prints 86.66, 274.31, 716.78 and 85.39, 87.80, 251.78, 294.71."""
+    rest = friswell().modes(0.0, 6).frequencies
+    np.testing.assert_allclose(rest[::2], [86.658, 274.307, 716.565], rtol=1e-5)
+    np.testing.assert_allclose(rest[1::2], rest[::2], rtol=1e-8)
+    turning = friswell().modes("4000 rpm", 5)
+    np.testing.assert_allclose(turning.frequencies, [85.389, 87.796, 251.781, 294.706, 600.082], rtol=1e-5)
+    assert turning.directions == ["backward", "forward", "backward", "forward", "backward"]
+    np.testing.assert_allclose(turning.damping_ratios, 0.0, atol=1e-9)
+    np.testing.assert_allclose(friswell("torsional").modes(0.0, 1).frequencies, [650.407], rtol=1e-5)
+    # with the book's six elements its printed numbers come out to their last digit
+    coarse = friswell(elements=6)
+    np.testing.assert_allclose(coarse.modes(0.0, 6).frequencies[::2], [86.66, 274.31, 716.78], atol=0.005)
+    printed = [85.39, 87.80, 251.78, 294.71, 600.18]
+    np.testing.assert_allclose(coarse.modes("4000 rpm", 5).frequencies, printed, atol=0.005)
+
+
+def test_critical_speeds_of_friswell_are_where_whirl_meets_the_speed():
+    rotor = friswell()
+    found = rotor.critical_speeds(5)
+    np.testing.assert_allclose(found / RPM, [825.13, 829.87, 2487.7, 2756.0, 5378.9], rtol=1e-5)
+    for speed in found:
+        assert np.abs(rotor.modes(speed, 6).frequencies / speed - 1).min() < 1e-7
+    response = rotor.unbalance_response(found[1] * np.array([0.9, 0.999, 1.1]), {0.5: 1e-4})
+    peak = response.major_axis(0.5)
+    assert peak[1] > 50 * max(peak[0], peak[2])
+
+
+def test_timoshenko_beam_between_pins_converges_to_the_closed_form():
+    """Timoshenko's bar with kappa of Cowper: 201.694, 780.091, 1669.414, 2792.946 Hz."""
+    exact = np.array([201.694, 780.091, 1669.414, 2792.946])
+    assert shear_coefficient(0.3) == pytest.approx(0.88636, abs=5e-6)
+    rows = {
+        8: [201.720, 781.565, 1683.5, 2857.2],
+        16: [201.700, 780.43, 1672.7, 2807.9],
+        32: [201.695, 780.17, 1670.2, 2796.6],
+    }
+    errors = []
+    for elements, expected in rows.items():
+        found = plain(elements).modes(0.0, 8).frequencies[::2] / (2 * np.pi)
+        np.testing.assert_allclose(found, expected, rtol=4e-5)
+        errors.append(found / exact - 1)
+    assert np.all(np.array(errors) > 0)
+    np.testing.assert_array_less(3.5, errors[0][1:] / errors[1][1:])
+
+
+def test_whirl_of_a_bar_splits_at_10000_rpm():
+    pair = plain(32).modes("10000 rpm", 2)
+    np.testing.assert_allclose(pair.frequencies / (2 * np.pi), [200.710, 202.683], rtol=1e-5)
+    assert pair.directions == ["backward", "forward"]
+
+
+def test_jeffcott_rotor_and_its_unbalance():
+    """A heavy disc at mid-span of a light shaft: k = 48 E I / l^3, and the closed response to an unbalance."""
+    light = ElasticMaterial(2.1e11, 0.3, 1e-3, shear_modulus=1e20)
+    disc = Disc(0.5, mass=10.0, polar=0.0, diametral=0.0)
+    shaft = Shaft([ShaftSection(1.0, 0.02)], [disc], {"A": 0.0, "mid": 0.5, "B": 1.0}, light, 8)
+    bearings = [Support("A", PINNED), Support("B", PINNED)]
+    k = 48 * 2.1e11 * np.pi / 64 * 0.02**4
+    assert k == pytest.approx(79168, abs=1)
+    omega = np.sqrt(k / 10.0)
+    np.testing.assert_allclose(Rotor(shaft, bearings).critical_speeds(1) / RPM, [849.66], rtol=1e-5)
+    c = 2 * 0.05 * 10.0 * omega
+    rotor = Rotor(shaft, [*bearings, Support("mid", damping=c)])
+    speeds = omega * np.array([0.3, 1.0, 2.0])
+    r = speeds / omega
+    expected = 1e-3 * r**2 / np.abs(1 - r**2 + 2j * 0.05 * r)
+    np.testing.assert_allclose(rotor.unbalance_response(speeds, {0.5: 1e-2}).major_axis(0.5), expected, rtol=1e-5)
+    np.testing.assert_allclose(rotor.modes(0.0, 1).damping_ratios, [0.05], rtol=1e-5)
+
+
+def test_unequal_bearings_give_planar_modes_at_rest_and_backward_orbits_between_them():
+    shaft = friswell().shaft
+    rotor = Rotor(shaft, [Support("A", (1e6, 2e6)), Support("B", (1e6, 2e6))])
+    rest = rotor.modes(0.0, 2)
+    assert rest.directions == ["planar", "planar"]
+    assert rest.frequencies[1] > 1.01 * rest.frequencies[0]
+    between = rest.frequencies.mean()
+    shape = rotor.unbalance_response([between], {0.5: 1e-4}).displacements[0, 16, :2]
+    assert (np.conj(shape[0]) * shape[1]).imag > 0
+
+
+def test_campbell_table():
+    table = friswell().campbell([0.0, "2000 rpm", "4000 rpm"], 4)
+    assert table.frequencies.shape == (3, 4)
+    np.testing.assert_allclose(table.frequencies[2], [85.389, 87.796, 251.781, 294.706], rtol=1e-5)
+    assert list(table.directions[2]) == ["backward", "forward"] * 2
+
+
+def test_masses_of_sections_cones_and_discs():
+    tube = Shaft(
+        [ShaftSection("0.3 m", "60 mm", "20 mm"), ShaftSection(0.2, 0.06, 0.02, outer_end=0.03, inner_end=0.02)],
+        [Disc(0.1, outer=0.2, width=0.02, inner=0.06)],
+        elements=100,
+    )
+    found = tube.model().mass_properties()
+    rho = 7850.0
+    cylinder = rho * np.pi / 4 * (0.06**2 - 0.02**2) * 0.3
+    cone = rho * np.pi / 12 * (0.06**2 + 0.06 * 0.03 + 0.03**2) * 0.2 - rho * np.pi / 4 * 0.02**2 * 0.2
+    disc = rho * np.pi / 4 * (0.2**2 - 0.06**2) * 0.02
+    np.testing.assert_allclose(found.mass, cylinder + cone + disc, rtol=1e-4)
+    one = Shaft([ShaftSection(1.0, 0.1)]).model().mass_properties()
+    m = rho * np.pi / 4 * 0.01
+    across = m * (1 / 12 + 0.05**2 / 4)
+    np.testing.assert_allclose(one.inertia, np.diag([across, across, m * 0.05**2 / 2]), atol=1e-12)
+    np.testing.assert_allclose(one.com, [0, 0, 0.5], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ShaftSection(0.0, 0.1), "length is 0.0 m"),
+        (lambda: ShaftSection(1.0, 0.1, 0.2), "bore 0.2 m in 0.1 m"),
+        (lambda: ShaftSection("3 kg", 0.1), "ShaftSection.length"),
+        (lambda: Shaft([]), "no sections"),
+        (lambda: Shaft([ShaftSection(1.0, 0.1)], seats={"A": 1.2}), "seat 'A' is at 1.2 m"),
+        (lambda: Disc(0.1, outer=0.2), "give outer and width"),
+        (lambda: ElasticMaterial(poisson_ratio=0.5), "poisson_ratio is 0.5"),
+        (lambda: Rotor(Shaft([ShaftSection(1.0, 0.1)]), [Support("A", 1e6)]), "no such seat"),
+        (lambda: Rotor(Shaft([ShaftSection(1.0, 0.1)]), kind="radial"), "choose one of lateral"),
+        (lambda: friswell().unbalance_response([1.0], {2.0: 1e-3}), "unbalance at 2.0 m"),
+        (lambda: Support("A", np.ones(3)).matrices(), "give one number, two"),
+    ],
+)
+def test_wrong_settings_are_named(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
