@@ -1,0 +1,76 @@
+"""Rolling bearings: geometry, catalogue, Hertz contact of every element, defects, statics, ratings and life."""
+
+from typing import TYPE_CHECKING
+
+from gearmbs._lazy import late
+
+if TYPE_CHECKING:
+    from gearmbs.bearings.defects import (
+        DEFECTS,
+        Defect,
+        Line,
+        Misalignment,
+        OffSize,
+        Pit,
+        Spall,
+        UnevenSpacing,
+        Waviness,
+    )
+    from gearmbs.bearings.element import RollingBearing
+    from gearmbs.bearings.errors import BearingError
+    from gearmbs.bearings.geometry import Bearing
+    from gearmbs.bearings.hertz import PointContact, groove_contact
+    from gearmbs.bearings.profiles import spall_depth
+    from gearmbs.bearings.ratings import equivalent_load, mean_load, rating_life
+    from gearmbs.bearings.statics import BearingState, BearingStatics, stiffness_matrix
+
+__all__ = [
+    "DEFECTS",
+    "Bearing",
+    "BearingError",
+    "BearingState",
+    "BearingStatics",
+    "Defect",
+    "Line",
+    "Misalignment",
+    "OffSize",
+    "Pit",
+    "PointContact",
+    "RollingBearing",
+    "Spall",
+    "UnevenSpacing",
+    "Waviness",
+    "equivalent_load",
+    "groove_contact",
+    "mean_load",
+    "rating_life",
+    "spall_depth",
+    "stiffness_matrix",
+]
+
+late(
+    __name__,
+    {
+        "DEFECTS": ".defects",
+        "Bearing": ".geometry",
+        "BearingError": ".errors",
+        "BearingState": ".statics",
+        "BearingStatics": ".statics",
+        "Defect": ".defects",
+        "Line": ".defects",
+        "Misalignment": ".defects",
+        "OffSize": ".defects",
+        "Pit": ".defects",
+        "PointContact": ".hertz",
+        "RollingBearing": ".element",
+        "Spall": ".defects",
+        "UnevenSpacing": ".defects",
+        "Waviness": ".defects",
+        "equivalent_load": ".ratings",
+        "groove_contact": ".hertz",
+        "mean_load": ".ratings",
+        "rating_life": ".ratings",
+        "spall_depth": ".profiles",
+        "stiffness_matrix": ".statics",
+    },
+)

@@ -1,0 +1,129 @@
+"""Bearings by designation, and those of public recordings.
+
+Boundary dimensions of the common series follow from the designation. Number and size of the elements are standardised
+nowhere; those below are the ones found in the bearings named, and agree with the ratings that makers print. Of any
+other bearing the catalogue gives the boundary dimensions and asks for the elements.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING, Any
+
+from gearmbs.bearings.errors import BearingError
+
+if TYPE_CHECKING:
+    from gearmbs.bearings.geometry import Bearing
+
+INCH = 25.4e-3
+
+OUTSIDE = {
+    "60": {8: 22, 9: 24, 10: 26, 12: 28, 15: 32, 17: 35, 20: 42, 25: 47, 30: 55, 35: 62, 40: 68, 45: 75, 50: 80,
+           55: 90, 60: 95, 65: 100, 70: 110, 75: 115, 80: 125},
+    "62": {8: 24, 9: 26, 10: 30, 12: 32, 15: 35, 17: 40, 20: 47, 25: 52, 30: 62, 35: 72, 40: 80, 45: 85, 50: 90,
+           55: 100, 60: 110, 65: 120, 70: 125, 75: 130, 80: 140},
+    "63": {10: 35, 12: 37, 15: 42, 17: 47, 20: 52, 25: 62, 30: 72, 35: 80, 40: 90, 45: 100, 50: 110, 55: 120, 60: 130,
+           65: 140, 70: 150, 75: 160, 80: 170},
+}  # fmt: skip
+"""Outside diameters by bore, mm, of dimension series 10, 02 and 03."""
+WIDTH = {
+    "60": {8: 7, 9: 7, 10: 8, 12: 8, 15: 9, 17: 10, 20: 12, 25: 12, 30: 13, 35: 14, 40: 15, 45: 16, 50: 16, 55: 18,
+           60: 18, 65: 18, 70: 20, 75: 20, 80: 22},
+    "62": {8: 8, 9: 8, 10: 9, 12: 10, 15: 11, 17: 12, 20: 14, 25: 15, 30: 16, 35: 17, 40: 18, 45: 19, 50: 20, 55: 21,
+           60: 22, 65: 23, 70: 24, 75: 25, 80: 26},
+    "63": {10: 11, 12: 12, 15: 13, 17: 14, 20: 15, 25: 17, 30: 19, 35: 21, 40: 23, 45: 25, 50: 27, 55: 29, 60: 31,
+           65: 33, 70: 35, 75: 37, 80: 39},
+}  # fmt: skip
+"""Widths by bore, mm."""
+
+ELEMENTS = {
+    "6203": (8, 6.746, 28.5),
+    "6204": (8, 7.938, 33.5),
+    "6205": (9, 7.94, 39.04),
+    "6206": (9, 9.525, 46.0),
+    "6207": (9, 11.112, 53.5),
+    "6208": (9, 11.906, 60.0),
+    "6308": (8, 15.081, 65.0),
+    "6309": (8, 17.462, 72.5),
+    "6310": (8, 19.05, 80.0),
+    "6010": (14, 8.73, 65.0),
+}
+"""Number of balls, their diameter and pitch diameter, mm."""
+
+RECORDINGS: dict[str, dict[str, Any]] = {
+    "CWRU drive end": {"designation": "6205-2RS", "elements": 9, "element_diameter": 0.3126 * INCH,
+                       "pitch_diameter": 1.537 * INCH},
+    "CWRU fan end": {"designation": "6203-2RS", "elements": 8, "element_diameter": 0.2656 * INCH,
+                     "pitch_diameter": 1.122 * INCH},
+    "MFPT": {"designation": "NICE", "elements": 8, "element_diameter": 0.235 * INCH, "pitch_diameter": 1.245 * INCH},
+    "PHM09": {"designation": "MB ER-10K", "elements": 8, "element_diameter": 0.3125 * INCH,
+              "pitch_diameter": 1.319 * INCH},
+    "SpectraQuest": {"designation": "ER-16K", "elements": 9, "element_diameter": 0.3125 * INCH,
+                     "pitch_diameter": 1.516 * INCH},
+    "IMS": {"designation": "ZA-2115", "elements": 16, "element_diameter": 0.331 * INCH, "pitch_diameter": 2.815 * INCH,
+            "contact_angle": math.radians(15.17), "kind": "angular contact"},
+    "XJTU": {"designation": "UER204", "elements": 8, "element_diameter": 7.92e-3, "pitch_diameter": 34.55e-3},
+}  # fmt: skip
+"""Bearings of public recordings. Those of IMS are spherical and double-row: their kinematics hold, their contact does not."""
+
+ALIASES = {
+    "NICE": "MFPT", "ER10K": "PHM09", "MBER10K": "PHM09", "ER16K": "SpectraQuest", "ZA2115": "IMS", "UER204": "XJTU",
+    "LDKUER204": "XJTU", "CWRUDRIVEEND": "CWRU drive end", "CWRUFANEND": "CWRU fan end", "MFPT": "MFPT",
+    "PHM09": "PHM09", "IMS": "IMS", "XJTU": "XJTU", "SPECTRAQUEST": "SpectraQuest", "REXNORDZA2115": "IMS",
+}  # fmt: skip
+CLEARANCE = re.compile(r"[/\s-]?C([2-5])\b")
+"""Class of radial clearance in a designation."""
+NUMBER = re.compile(r"^(6[0-4]|16|618|619)?(\d{2,3})$")
+SMALL_BORES = {0: 10, 1: 12, 2: 15, 3: 17}
+
+
+def known() -> list[str]:
+    """Return the designations that are known with their elements, and the names of recordings."""
+    return [*ELEMENTS, *RECORDINGS]
+
+
+def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
+    """Return the bearing of a designation; see `gearmbs.bearings.Bearing.from_designation`."""
+    from gearmbs.bearings.geometry import Bearing
+
+    if not isinstance(designation, str) or not designation.strip():
+        raise BearingError(f"designation is {designation!r}; give a text such as '6205'")
+    plain = re.sub(r"[^A-Z0-9]", "", designation.upper())
+    if plain in ALIASES:
+        return Bearing(**{**RECORDINGS[ALIASES[plain]], **changes})
+    digits = re.match(r"^\s*(?:SKF|FAG|NSK|NTN|INA|KOYO)?\s*(\d{4,5})", designation.upper())
+    series = digits[1] if digits else ""
+    if series in ELEMENTS:
+        z, d, pitch = ELEMENTS[series]
+        found = {"elements": z, "element_diameter": 1e-3 * d, "pitch_diameter": 1e-3 * pitch}
+        return Bearing(**{**found, **_boundary(series), "designation": designation.strip(), **changes})
+    boundary = _boundary(series)
+    if boundary:
+        if {"elements", "element_diameter"} <= changes.keys():
+            middle = 0.5 * (boundary["bore"] + boundary["outside_diameter"])
+            own = {"pitch_diameter": middle, **boundary, "designation": designation.strip()}
+            return Bearing(**{**own, **changes})
+        sizes = ", ".join(f"{key.replace('_', ' ')} {1e3 * value:g} mm" for key, value in boundary.items())
+        raise BearingError(
+            f"designation {designation!r}: {sizes}, but how many balls it has, and of which diameter, differs between "
+            "makers; count them and give elements= and element_diameter= (and pitch_diameter= if it is not the mean)"
+        )
+    if {"elements", "element_diameter", "pitch_diameter"} <= changes.keys():
+        return Bearing(**{"designation": designation.strip(), **changes})
+    raise BearingError(
+        f"designation {designation!r} is not in the catalogue ({', '.join(known())}); give elements=, element_diameter= "
+        "and pitch_diameter=, and contact_angle= if it is not 0"
+    )
+
+
+def _boundary(series: str) -> dict[str, float]:
+    """Return bore, outside diameter and width of a deep groove bearing by its digits, empty if unknown."""
+    if len(series) != 4 or series[:2] not in OUTSIDE:
+        return {}
+    code = int(series[2:])
+    bore = SMALL_BORES.get(code, 5 * code)
+    if bore not in OUTSIDE[series[:2]]:
+        return {}
+    outside, width = OUTSIDE[series[:2]][bore], WIDTH[series[:2]][bore]
+    return {"bore": 1e-3 * bore, "outside_diameter": 1e-3 * outside, "width": 1e-3 * width}

@@ -1,0 +1,274 @@
+"""A rolling bearing: the numbers a drawing or a catalogue gives, checked, and what follows from them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
+
+from gearmbs.bearings.errors import BearingError, require
+from gearmbs.bearings.hertz import (
+    BALL_EXPONENT,
+    ROLLER_EXPONENT,
+    PointContact,
+    groove_contact,
+    in_series,
+    line_contact,
+)
+from gearmbs.units import Quantity, to_si
+
+BALLS = ("deep groove", "angular contact", "four point")
+ROLLERS = ("cylindrical roller", "tapered roller")
+KINDS = (*BALLS, *ROLLERS)
+
+UNITS = {
+    "element_diameter": "length", "pitch_diameter": "length", "contact_angle": "angle", "clearance": "length",
+    "roller_length": "length", "bore": "length", "outside_diameter": "length", "width": "length",
+    "dynamic_rating": "force", "static_rating": "force", "youngs_modulus": "Pa", "density": "density",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bearing:
+    """A rolling bearing.
+
+    Parameters
+    ----------
+    kind : {"deep groove", "angular contact", "four point", "cylindrical roller", "tapered roller"}
+    elements : int
+        Rolling elements in one row, Z.
+    element_diameter, pitch_diameter : float or str
+        d and D, m. Of tapered rollers the mean diameter.
+    contact_angle : float or str
+        Nominal contact angle a, rad; of four-point bearings the angle of each of the two lines of contact.
+    inner_curvature, outer_curvature : float
+        Groove radius by ball diameter, f_i and f_o.
+    clearance : float or str
+        Diametral (catalogue) radial internal clearance, m; negative is interference. Each ring has half of it.
+    roller_length : float or str, optional
+        Effective length of rollers, m; needed for rollers.
+    bore, outside_diameter, width : float or str, optional
+        Boundary dimensions, m.
+    dynamic_rating, static_rating : float or str, optional
+        C and C_0 from a catalogue, N; default: by the formulas of ISO 281 and ISO 76, see `gearmbs.bearings.ratings`.
+    youngs_modulus, poisson_ratio, density
+        Of elements and rings, Pa and kg/m^3.
+    designation : str
+
+    Raises
+    ------
+    BearingError
+        When the numbers do not make a bearing; the message names the field, its value and a remedy.
+
+    Examples
+    --------
+    >>> bearing = Bearing(elements=9, element_diameter="7.94 mm", pitch_diameter="39.04 mm")
+    >>> round(bearing.bpfo, 4), round(bearing.bpfi, 4), round(bearing.bsf, 4), round(bearing.ftf, 4)
+    (3.5848, 5.4152, 2.3567, 0.3983)
+    """
+
+    elements: int
+    element_diameter: Quantity
+    pitch_diameter: Quantity
+    contact_angle: Quantity = 0.0
+    kind: str = "deep groove"
+    inner_curvature: float = 0.515
+    outer_curvature: float = 0.525
+    clearance: Quantity = 0.0
+    roller_length: Quantity = None
+    bore: Quantity = None
+    outside_diameter: Quantity = None
+    width: Quantity = None
+    dynamic_rating: Quantity = None
+    static_rating: Quantity = None
+    youngs_modulus: Quantity = 2.07e11
+    poisson_ratio: float = 0.3
+    density: Quantity = 7800.0
+    designation: str = ""
+
+    def __post_init__(self) -> None:
+        for name, unit in UNITS.items():
+            value = getattr(self, name)
+            if value is not None:
+                try:
+                    object.__setattr__(self, name, to_si(value, unit, f"Bearing.{name}"))
+                except (TypeError, ValueError) as error:
+                    raise BearingError(str(error)) from None
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, float) and not math.isfinite(value):
+                raise BearingError(f"Bearing.{item.name} is {value}; give a finite number")
+        self._check()
+
+    def _check(self) -> None:
+        z, d, pitch = self.elements, self.element_diameter, self.pitch_diameter
+        require(self.kind in KINDS, f"Bearing.kind is {self.kind!r}; choose {', '.join(KINDS)}")
+        whole = isinstance(z, int) and not isinstance(z, bool) and z >= 3
+        require(whole, f"Bearing.elements is {z!r}; give a whole number from 3 up")
+        require(0.0 < d < 1.0, f"Bearing.element_diameter is {d:g} m; give a length such as '7.94 mm'")
+        require(
+            d < pitch < 10.0,
+            f"Bearing.pitch_diameter is {pitch:g} m, the elements measure {d:g} m; give the diameter of their centres",
+        )
+        room = pitch * math.sin(math.pi / z)
+        require(
+            d < room,
+            f"Bearing.elements is {z}: that many of {1e3 * d:.4g} mm do not fit on a pitch diameter of "
+            f"{1e3 * pitch:.4g} mm, where {math.floor(math.pi / math.asin(d / pitch))} do",
+        )
+        angle = self.contact_angle
+        require(0.0 <= angle < 0.5 * math.pi, f"Bearing.contact_angle is {angle:g} rad; give 0 up to 90 deg")
+        for name in ("inner_curvature", "outer_curvature"):
+            value = getattr(self, name)
+            require(0.5 < value < 1.0, f"Bearing.{name} is {value!r}; a groove is wider than its ball: give 0.505 to 0.6")
+        require(abs(self.clearance) < 0.2 * d, f"Bearing.clearance is {self.clearance:g} m; give it in '... um'")
+        require(0.0 <= self.poisson_ratio < 0.5, f"Bearing.poisson_ratio is {self.poisson_ratio}; give 0 up to 0.5")
+        for name in ("roller_length", "bore", "outside_diameter", "width", "dynamic_rating", "static_rating",
+                     "youngs_modulus", "density"):  # fmt: skip
+            value = getattr(self, name)
+            require(value is None or value > 0.0, f"Bearing.{name} is {value}; it must be positive")
+        if self.rollers:
+            require(
+                self.roller_length is not None,
+                f"Bearing.roller_length is missing; a {self.kind} bearing needs the effective length of its rollers",
+            )
+        if self.kind in ("angular contact", "four point", "tapered roller"):
+            require(angle > 0.0, f"Bearing.contact_angle is 0; a bearing of kind '{self.kind}' needs one, such as '25 deg'")
+        if self.kind == "cylindrical roller":
+            require(angle == 0.0, f"Bearing.contact_angle is {angle:g} rad; of cylindrical rollers it is 0")
+
+    @classmethod
+    def from_designation(cls, designation: str, **changes: Any) -> Bearing:
+        """Return a bearing by its designation, such as "6205" or "NU206"; see `gearmbs.bearings.catalogue`.
+
+        Parameters
+        ----------
+        designation : str
+            Suffixes for seals, cages and clearance classes are understood: "6205-2RS/C3".
+        **changes
+            Fields that differ, or that the catalogue does not know.
+
+        Raises
+        ------
+        BearingError
+            If the designation is unknown or its elements are not certain; the message asks for what is missing.
+        """
+        from gearmbs.bearings.catalogue import look_up
+
+        return look_up(designation, changes)
+
+    def changed(self, **changes: Any) -> Bearing:
+        """Return the bearing with other values of some fields."""
+        known = {item.name for item in fields(self)}
+        for name in changes:
+            require(name in known, f"Bearing has no field {name!r}; it has {', '.join(sorted(known))}")
+        return replace(self, **changes)
+
+    @property
+    def rollers(self) -> bool:
+        """Whether the elements are rollers."""
+        return self.kind in ROLLERS
+
+    @property
+    def ratio(self) -> float:
+        """gamma = d cos(a)/D."""
+        return self.element_diameter * math.cos(self.contact_angle) / self.pitch_diameter
+
+    @property
+    def ftf(self) -> float:
+        """Cage turns per turn of the inner ring, outer ring at rest: (1 - gamma)/2."""
+        return 0.5 * (1.0 - self.ratio)
+
+    @property
+    def bpfo(self) -> float:
+        """Elements that pass a point of the outer ring per turn of the inner ring: Z (1 - gamma)/2."""
+        return self.elements * self.ftf
+
+    @property
+    def bpfi(self) -> float:
+        """Elements that pass a point of the inner ring per turn: Z (1 + gamma)/2."""
+        return self.elements - self.bpfo
+
+    @property
+    def bsf(self) -> float:
+        """Turns of an element about its own axis per turn of the inner ring: D/(2 d) (1 - gamma^2)."""
+        return 0.5 * self.pitch_diameter / self.element_diameter * (1.0 - self.ratio**2)
+
+    @property
+    def multiples(self) -> dict[str, float]:
+        """The four kinematic frequencies by turns of the inner ring, by name; see `ftf` and the others."""
+        return {"FTF": self.ftf, "BSF": self.bsf, "BPFO": self.bpfo, "BPFI": self.bpfi}
+
+    def frequencies(self, speed: Quantity) -> dict[str, float]:
+        """Return the kinematic frequencies in Hz at a speed of the inner ring, rad/s or text such as "1000 rpm"."""
+        turns = to_si(speed, "angular speed", "speed") / math.tau
+        return {name: value * turns for name, value in self.multiples.items()}
+
+    @property
+    def exponent(self) -> float:
+        """n of Q = K delta^n."""
+        return ROLLER_EXPONENT if self.rollers else BALL_EXPONENT
+
+    @cached_property
+    def inner_contact(self) -> PointContact:
+        """Contact of a ball with the inner ring."""
+        return self._groove(self.inner_curvature, self.ratio / (1.0 - self.ratio))
+
+    @cached_property
+    def outer_contact(self) -> PointContact:
+        """Contact of a ball with the outer ring."""
+        return self._groove(self.outer_curvature, -self.ratio / (1.0 + self.ratio))
+
+    def _groove(self, curvature: float, slope: float) -> PointContact:
+        require(not self.rollers, f"a {self.kind} bearing has no point contacts")
+        return groove_contact(self.element_diameter, curvature, slope, self.youngs_modulus, self.poisson_ratio)
+
+    @cached_property
+    def contact_stiffness(self) -> tuple[float, float]:
+        """K of one contact with the inner and with the outer ring, N/m^n."""
+        if self.rollers:
+            one = line_contact(self.roller_length)
+            return one, one
+        return self.inner_contact.stiffness, self.outer_contact.stiffness
+
+    @property
+    def stiffness(self) -> float:
+        """K of both contacts of an element in series, N/m^n."""
+        return in_series(*self.contact_stiffness, self.exponent)
+
+    @property
+    def groove_distance(self) -> float:
+        """A_0 = (f_i + f_o - 1) d, distance of the groove centres when a ball just touches both."""
+        return (self.inner_curvature + self.outer_curvature - 1.0) * self.element_diameter
+
+    @property
+    def element_mass(self) -> float:
+        """Mass of one element, kg."""
+        d = self.element_diameter
+        volume = math.pi * d**3 / 6.0 if not self.rollers else 0.25 * math.pi * d**2 * self.roller_length
+        return float(self.density * volume)
+
+    @property
+    def rating(self) -> float:
+        """Basic dynamic load rating C, N: the catalogue's, or by ISO 281."""
+        from gearmbs.bearings.ratings import dynamic_rating
+
+        return self.dynamic_rating if self.dynamic_rating is not None else dynamic_rating(self)
+
+    @property
+    def rating_at_rest(self) -> float:
+        """Basic static load rating C_0, N: the catalogue's, or by ISO 76."""
+        from gearmbs.bearings.ratings import static_rating
+
+        return self.static_rating if self.static_rating is not None else static_rating(self)
+
+    def _repr_html_(self) -> str:
+        rows = {
+            "kind": self.kind, "elements": f"{self.elements}", "d": f"{1e3 * self.element_diameter:.4g} mm",
+            "D": f"{1e3 * self.pitch_diameter:.4g} mm", "contact angle": f"{math.degrees(self.contact_angle):.4g} deg",
+            **{name: f"{value:.4f}" for name, value in self.multiples.items()},
+            "C": f"{1e-3 * self.rating:.3g} kN", "C0": f"{1e-3 * self.rating_at_rest:.3g} kN",
+        }  # fmt: skip
+        cells = "".join(f"<tr><th>{key}</th><td>{value}</td></tr>" for key, value in rows.items())
+        return f"<table><caption>{self.designation or 'bearing'}</caption>{cells}</table>"

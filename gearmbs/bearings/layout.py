@@ -1,0 +1,116 @@
+"""Places of a bearing's integers, reals and scratch, shared by the tables and the kernels."""
+
+from __future__ import annotations
+
+BALL, ROLLER = 0, 1
+"""Kinds of contact: point contact along the line of the groove centres, line contact with a fixed normal."""
+
+ELEMENTS = 0
+"""Integers: number of rolling elements."""
+PATHS = 1
+"""Contact paths an element: one of a ball, two with four points, the slices of a roller."""
+KIND = 2
+SPINS = 3
+"""Number of elements whose spin is a state."""
+OUTER_NODES = 4
+"""Nodes of a profile of the outer ring, of the inner ring, of an element; 0: no profile."""
+INNER_NODES = 5
+SPIN_NODES = 6
+CENTRIFUGAL = 7
+"""Whether the elements' own centrifugal load counts."""
+AT_PATHS = 8
+"""Places of the tables among the reals."""
+AT_ELEMENTS = 9
+AT_OUTER = 10
+AT_INNER = 11
+AT_SPIN = 12
+INTEGERS = 13
+"""Behind: for each path its row of the outer and of the inner profiles or -1; for each element its spin or -1."""
+
+STIFFNESS = 0
+"""Reals: K of the two contacts in series, N/m^n."""
+EXPONENT = 1
+DAMPING = 2
+"""chi, s/m."""
+CAGE = 3
+"""d psi' / d Omega."""
+SPIN = 4
+"""d beta' / d Omega."""
+DISTANCE = 5
+"""A_0 of balls, 0 of rollers."""
+SMOOTH = 6
+"""Half width of the smooth transition of contact, m; 0: none."""
+ROLLING = 7
+"""mu d_m / 2 of the load torque, m."""
+VISCOUS = 8
+"""c_0 of the speed torque, N m (s/rad)^(2/3)."""
+SLOW = 9
+"""Speed below which the friction torque falls to zero, rad/s."""
+INNER_AXIS = 10
+"""Axis of the inner ring in the axes of I, three reals."""
+OUTER_TILT = 13
+"""Components of the outer ring's axis along x_J and y_J."""
+MASS_RADIUS = 15
+"""m d_m / 2, kg m."""
+INNER_STIFFNESS = 16
+OUTER_STIFFNESS = 17
+INNER_REACH = 18
+"""Distance of the ball's centre from the groove centre of the inner ring without load, of the outer ring."""
+OUTER_REACH = 19
+REALS = 20
+
+PATH_RADIAL = 0
+"""Reals of a path: radial and axial distance of the groove centres, rings centred; of a roller the normal."""
+PATH_AXIAL = 1
+PATH_RADIUS = 2
+"""Where the inner ring is touched: radius, and distance from the ring's middle along the axis."""
+PATH_HEIGHT = 3
+PATH_SHARE = 4
+"""Share of the stiffness."""
+PATH_GAP = 5
+"""Clearance and profile of a roller along the normal."""
+PATH_COLUMNS = 6
+
+ELEMENT_COSINE = 0
+"""Reals of an element: cosine and sine of its place in the cage, how much it is larger than the others."""
+ELEMENT_SINE = 1
+ELEMENT_OVERSIZE = 2
+ELEMENT_PLACE = 3
+ELEMENT_COLUMNS = 4
+
+D0, A0, PSI, THETA, BETA = 0, 3, 5, 6, 7
+"""Local coordinates q: displacement, tilt of the axis, cage angle, angle of the inner ring, spins."""
+
+# scratch
+S_Q = 0
+"""d, a, v, w of I seen from J in its axes, three each."""
+S_A = 3
+S_V = 6
+S_W = 9
+S_TURN = 12
+"""Gradient of the angle of the inner ring by a rotation of I, and the angle, the rate."""
+S_THETA = 15
+S_THETA_RATE = 16
+S_SPIN = 17
+"""w_J . z_J"""
+S_TILT = 18
+"""q_3, q_4 and their rates."""
+S_SUMS = 22
+"""Sums over the elements: normal forces, energy, damping power, largest force, number loaded, largest deflection."""
+SUMS = 6
+S_LAW = 28
+"""Of one contact: Q, n, derivatives of Q and of its direction by X, Y, h and the centrifugal load."""
+LAW = 11
+S_LOCAL = 40
+"""From here: generalised forces, then what the derivatives need; see `scratch`."""
+
+VARIATIONS = 13
+"""Local variations: d, rotation, v, w of I seen from J, and w_J . z_J."""
+
+
+def scratch(spins: int) -> int:
+    """Return the length of the scratch of a bearing with so many spins."""
+    n = BETA + spins
+    # generalised forces, their derivatives, vectors of one contact, its profiles; then the variations of q and q',
+    # of the forces, of F and N locally and turned, and the angle's derivatives
+    return S_LOCAL + n * (12 + 2 * n) + 8 + (3 * n + 12) * (VARIATIONS + 1 + spins) + 32

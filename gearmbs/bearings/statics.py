@@ -1,0 +1,269 @@
+"""A bearing at rest: what it carries at a displacement, where a load puts it, and its stiffness there.
+
+The rings' displacement has five components, x, y, z of the inner ring's middle and its tilts about x and y, in the axes
+of the outer ring; loads are those that act on the inner ring from outside, with moments about its middle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gearmbs.bearings import layout as B
+from gearmbs.bearings.errors import BearingError, require
+from gearmbs.bearings.geometry import Bearing
+from gearmbs.bearings.settings import BearingSettings
+from gearmbs.bearings.tables import BearingTables, pack
+from gearmbs.units import Quantity, to_si
+
+AXES = ("x", "y", "z", "tilt x", "tilt y")
+ITERATIONS = 200
+HALVINGS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class BearingState:
+    """A loaded bearing.
+
+    Attributes
+    ----------
+    displacement : ndarray, shape (5,)
+        x, y, z (m) and tilts about x and y (rad) of the inner ring.
+    load : ndarray, shape (5,)
+        Forces (N) and moments (N m) on the inner ring that hold it there.
+    stiffness : ndarray, shape (5, 5)
+        d load/d displacement.
+    element_loads : ndarray, shape (Z,)
+        Normal force of each element on the inner ring, N.
+    element_angles : ndarray, shape (Z,)
+        Where each element is, rad from x.
+    contact_angles : ndarray, shape (Z,)
+        Angle of each normal force against the radial plane, rad; NaN without force.
+    """
+
+    displacement: np.ndarray
+    load: np.ndarray
+    stiffness: np.ndarray
+    element_loads: np.ndarray
+    element_angles: np.ndarray
+    contact_angles: np.ndarray
+
+    @property
+    def loaded(self) -> int:
+        """Number of loaded elements."""
+        return int(np.sum(self.element_loads > 0.0))
+
+    @property
+    def largest(self) -> float:
+        """Force of the most loaded element, N."""
+        return float(self.element_loads.max())
+
+    def to_dataset(self):
+        """Return all of it as a labelled `xarray.Dataset`."""
+        import xarray as xr
+
+        return xr.Dataset(
+            {
+                "displacement": ("axis", self.displacement),
+                "load": ("axis", self.load),
+                "stiffness": (("axis", "by"), self.stiffness),
+                "element_load": ("element", self.element_loads, {"units": "N"}),
+                "element_angle": ("element", self.element_angles, {"units": "rad"}),
+                "contact_angle": ("element", self.contact_angles, {"units": "rad"}),
+            },
+            {"axis": list(AXES), "by": list(AXES)},
+        )
+
+
+class BearingStatics:
+    """A bearing between two rings at rest or at a constant speed.
+
+    Parameters
+    ----------
+    bearing : Bearing
+    speed : float or str
+        Of the inner ring, rad/s; it counts with centrifugal load only.
+    **settings
+        As of `gearmbs.bearings.RollingBearing`, such as ``preload``, ``centrifugal``, ``defects`` or ``stiffness``.
+
+    Examples
+    --------
+    >>> statics = BearingStatics(Bearing.from_designation("6205"))
+    >>> state = statics.under([1000.0, 0.0, 0.0])
+    >>> round(1e6 * state.displacement[0], 2), state.loaded
+    (13.75, 5)
+    """
+
+    def __init__(self, bearing: Bearing, *, speed: Quantity = 0.0, **settings: Any) -> None:
+        try:
+            self.settings = BearingSettings(bearing=bearing, **settings)
+            self.speed = to_si(speed, "angular speed", "speed")
+        except TypeError as error:
+            raise BearingError(f"BearingStatics: {error}") from None
+        self.bearing = bearing
+        self.tables = pack(self.settings)
+
+    def at(self, displacement: Sequence[float], cage_angle: float | None = None) -> BearingState:
+        """Return the bearing at a displacement of three or five components, m and rad."""
+        place = self._five(displacement, "displacement")
+        load, stiffness = self._load(place, cage_angle)
+        return self._state(place, load, stiffness, cage_angle)
+
+    def under(
+        self, load: Sequence[float], *, cage_angle: float | None = None, start: Sequence[float] | None = None
+    ) -> BearingState:
+        """Return the bearing under a load.
+
+        Parameters
+        ----------
+        load : sequence of 3 or 5 floats
+            Forces on the inner ring, N; with five also moments, N m. With three the tilt stays as in ``start``, and
+            the moments are what that takes.
+        cage_angle : float, optional
+            Of element 0, rad.
+        start : sequence of float, optional
+            Displacement to begin with.
+
+        Raises
+        ------
+        BearingError
+            If the bearing cannot carry the load.
+        """
+        wanted = np.asarray(load, dtype=float)
+        require(wanted.shape in ((3,), (5,)) and bool(np.all(np.isfinite(wanted))), f"load is {load!r}; give 3 or 5 numbers")
+        place = self._first(wanted) if start is None else self._five(start, "start")
+        place = self._newton(place, wanted, cage_angle)
+        found, stiffness = self._load(place, cage_angle)
+        return self._state(place, found, stiffness, cage_angle)
+
+    def curve(self, loads: Iterable[Sequence[float]], *, cage_angle: float | None = None) -> list[BearingState]:
+        """Return the bearing under loads that follow each other, each beginning where the last one ended."""
+        found: list[BearingState] = []
+        for load in loads:
+            start = found[-1].displacement if found else None
+            found.append(self.under(load, cage_angle=cage_angle, start=start))
+        return found
+
+    # --- the iteration -----------------------------------------------------------------------------
+
+    def _newton(self, place: np.ndarray, wanted: np.ndarray, cage_angle: float | None) -> np.ndarray:
+        n = wanted.size
+        size = np.array([1.0, 1.0, 1.0, 0.5 * self.bearing.pitch_diameter, 0.5 * self.bearing.pitch_diameter])[:n]
+        scale = max(float(np.abs(wanted / size).max()), 1e-9)
+        load, stiffness = self._load(place, cage_angle)
+        miss = (wanted - load[:n]) / size
+        for _ in range(ITERATIONS):
+            if float(np.abs(miss).max()) <= 1e-11 * scale:
+                return place
+            matrix = stiffness[:n, :n] / np.outer(size, size)
+            step = np.linalg.lstsq(matrix, miss, rcond=1e-13)[0] / size
+            step *= min(1.0, 0.02 * self.bearing.element_diameter / max(float(np.abs(step * size).max()), 1e-300))
+            part, before = 1.0, float(miss @ miss)
+            for _ in range(HALVINGS):
+                there = place.copy()
+                there[:n] += part * step
+                load, stiffness = self._load(there, cage_angle)
+                miss = (wanted - load[:n]) / size
+                if float(miss @ miss) < before:
+                    break
+                part *= 0.5
+            else:
+                if np.sqrt(before) <= 1e-8 * scale:
+                    return place
+                break
+            place = there
+        raise BearingError(
+            f"no equilibrium under {wanted.tolist()} N found: the bearing does not carry it in this direction (an axial "
+            "load needs a contact angle or ball grooves, and the right sense)"
+        )
+
+    def _first(self, wanted: np.ndarray) -> np.ndarray:
+        """Return a displacement in the direction of the load that closes the clearance."""
+        settings, bearing = self.settings, self.bearing
+        stiffness = settings.stiffness or bearing.stiffness
+        place = np.zeros(5)
+        radial, axial = float(np.hypot(*wanted[:2])), float(wanted[2])
+        approach = (5.0 * (radial + abs(axial)) / bearing.elements / stiffness) ** (1.0 / bearing.exponent)
+        if radial > 0.0:
+            gap = max(0.5 * bearing.clearance, 0.0)
+            place[:2] = wanted[:2] / radial * (gap + approach)
+        if axial:
+            free = 0.0
+            if not bearing.rollers and bearing.clearance > 0.0:
+                radial_distance = bearing.groove_distance * np.cos(bearing.contact_angle) - 0.5 * bearing.clearance
+                free = np.sqrt(max(bearing.groove_distance**2 - radial_distance**2, 0.0))
+            place[2] = np.sign(axial) * (free + approach)
+        return place
+
+    def _five(self, values: Sequence[float], field: str) -> np.ndarray:
+        given = np.asarray(values, dtype=float)
+        good = given.shape in ((3,), (5,)) and bool(np.all(np.isfinite(given)))
+        require(good, f"{field} is {values!r}; give 3 or 5 numbers")
+        return np.concatenate([given, np.zeros(5 - given.size)])
+
+    def _load(
+        self, place: np.ndarray, cage_angle: float | None, tables: BearingTables | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the load on the inner ring and its derivatives by the displacement."""
+        from gearmbs.bearings.kernel import bearing_force
+        from gearmbs.dae.equations.force_elements import DERIVATIVES
+
+        tables = self.tables if tables is None else tables
+        frames = _frames(place, self.speed)
+        states = np.zeros(1 + len(tables.spinning))
+        states[0] = self.settings.cage_angle if cage_angle is None else cage_angle
+        wrench, rates = np.zeros((1, 6)), np.zeros(states.size)
+        jac = np.zeros((6 + states.size, 24 + states.size))
+        work = np.zeros(B.scratch(len(tables.spinning)))
+        bearing_force(
+            tables.integers, tables.reals, 0.0, frames, states, np.zeros(0), DERIVATIVES, work, wrench, rates, jac,
+            np.zeros(7),
+        )  # fmt: skip
+        return -wrench[0, :5], -jac[:5, :5]
+
+    def _state(
+        self, place: np.ndarray, load: np.ndarray, stiffness: np.ndarray, cage_angle: float | None
+    ) -> BearingState:
+        tables, z = self.tables, self.bearing.elements
+        start = self.settings.cage_angle if cage_angle is None else cage_angle
+        at = int(tables.integers[B.AT_ELEMENTS])
+        angles = start + tables.reals[at + B.ELEMENT_PLACE : at + B.ELEMENT_COLUMNS * z : B.ELEMENT_COLUMNS]
+        loads, contact = np.zeros(z), np.full(z, np.nan)
+        paths = int(tables.integers[B.PATHS])
+        spins = B.INTEGERS + 2 * paths
+        for j in range(z):
+            # a bearing of one element
+            integers = tables.integers.copy()
+            integers[B.ELEMENTS], integers[B.AT_ELEMENTS] = 1, at + B.ELEMENT_COLUMNS * j
+            integers[spins] = tables.integers[spins + j]
+            one = BearingTables(integers, tables.reals, tables.spinning)
+            force, _ = self._load(place, cage_angle, one)
+            radial = force[0] * np.cos(angles[j]) + force[1] * np.sin(angles[j])
+            loads[j] = np.hypot(radial, force[2])
+            if loads[j] > 0.0:
+                contact[j] = np.arctan2(force[2], radial)
+        return BearingState(place, load, stiffness, loads, angles, contact)
+
+
+def _frames(place: np.ndarray, speed: float) -> np.ndarray:
+    """Return the frames of a displaced inner ring and of the outer ring."""
+    frames = np.zeros((2, 18))
+    frames[:, 3:12] = np.eye(3).ravel()
+    frames[0, :3] = place[:3]
+    angle = float(np.hypot(place[3], place[4]))
+    if angle > 0.0:
+        x, y = place[3] / angle, place[4] / angle
+        c, s = np.cos(angle), np.sin(angle)
+        frames[0, 3:12] = [
+            c + x * x * (1 - c), x * y * (1 - c), y * s, x * y * (1 - c), c + y * y * (1 - c), -x * s, -y * s, x * s, c,
+        ]  # fmt: skip
+    frames[0, 15:18] = speed * frames[0, [5, 8, 11]]
+    return frames
+
+
+def stiffness_matrix(bearing: Bearing, load: Sequence[float], **settings: Any) -> np.ndarray:
+    """Return the stiffness of a bearing under a load, shape (5, 5), N/m, N/rad and N m/rad; see `BearingStatics`."""
+    return BearingStatics(bearing, **settings).under(load).stiffness

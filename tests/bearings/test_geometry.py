@@ -1,0 +1,125 @@
+"""Kinematic multiples, Hertz constants, ratings, life and the catalogue against published numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearmbs.bearings import Bearing, BearingError, equivalent_load, groove_contact, mean_load, rating_life
+from gearmbs.bearings.hertz import line_contact
+
+MULTIPLES = {
+    "CWRU drive end": (0.3983, 3.5848, 5.4152, 2.3567),
+    "CWRU fan end": (0.3816, 3.0531, 4.9469, 1.9938),
+    "MFPT": (0.4056, 3.2450, 4.7550, 2.5546),
+    "ER-10K": (0.3815, 3.0523, 4.9477, 1.9919),
+    "ER16K": (0.3969, 3.5724, 5.4276, 2.3225),
+    "ZA-2115": (0.4433, 7.0921, 8.9079, 4.1975),
+    "UER204": (0.3854, 3.0831, 4.9169, 2.0666),
+    "6204": (0.3815, 3.0522, 4.9478, 1.9916),
+    "6206": (0.3965, 3.5682, 5.4318, 2.3112),
+    "6010": (0.4328, 6.0598, 7.9402, 3.6556),
+}
+
+
+@pytest.mark.parametrize("name", MULTIPLES)
+def test_multiples(name):
+    bearing = Bearing.from_designation(name)
+    ftf, bpfo, bpfi, bsf = MULTIPLES[name]
+    assert (bearing.ftf, bearing.bpfo, bearing.bpfi, bearing.bsf) == pytest.approx((ftf, bpfo, bpfi, bsf), abs=6e-5)
+    assert bearing.bpfo + bearing.bpfi == pytest.approx(bearing.elements)
+    assert bearing.bpfo == pytest.approx(bearing.elements * bearing.ftf)
+
+
+@pytest.mark.parametrize(
+    ("name", "inner", "outer", "series"),
+    [("6204", 2.802e10, 2.511e10, 9.369e9), ("6205", 2.818e10, 2.501e10, 9.375e9), ("6206", 3.085e10, 2.741e10, 1.027e10)],
+)
+def test_hertz_constants(name, inner, outer, series):
+    bearing = Bearing.from_designation(name)
+    assert (*bearing.contact_stiffness, bearing.stiffness) == pytest.approx((inner, outer, series), rel=1e-3)
+
+
+def test_ball_on_ball_of_equal_curvatures_is_the_sphere():
+    """A groove as flat as a plane: Hertz's closed form of a sphere on a plane, K = 4/3 E* sqrt(R)."""
+    contact = groove_contact(0.01, 1e4, 0.0, 2.07e11, 0.3)
+    modulus = 2.07e11 / 2.0 / (1.0 - 0.09)
+    assert contact.stiffness == pytest.approx(4.0 / 3.0 * modulus * np.sqrt(0.005), rel=3e-5)
+    assert contact.ellipticity == pytest.approx(1.0, abs=1e-3)
+    radius = (3.0 * 0.005 / (4.0 * modulus)) ** (1.0 / 3.0)
+    assert contact.semi_axes == pytest.approx((radius, radius), rel=1e-3)
+    assert contact.pressure(contact.force_at(2e9)) == pytest.approx(2e9)
+
+
+def test_palmgrens_line():
+    """delta = 3.84e-5 Q^0.9/L^0.8, mm and N."""
+    force, length = 1234.0, 12.0
+    delta = 3.84e-5 * force**0.9 / length**0.8
+    assert line_contact(1e-3 * length) * (1e-3 * delta) ** (10.0 / 9.0) == pytest.approx(force)
+
+
+@pytest.mark.parametrize(
+    ("name", "dynamic", "static"),
+    [
+        ("6204", 12.7e3, 6.55e3), ("6205", 14.0e3, 7.8e3), ("6206", 19.5e3, 11.2e3), ("6207", 25.5e3, 15.3e3),
+        ("6208", 29.1e3, 17.9e3), ("6308", 40.5e3, 24.0e3), ("6309", 53.0e3, 31.5e3), ("6310", 61.8e3, 38.0e3),
+    ],
+)  # fmt: skip
+def test_ratings_are_those_in_catalogues(name, dynamic, static):
+    bearing = Bearing.from_designation(name)
+    assert bearing.rating == pytest.approx(dynamic, rel=0.02)
+    assert bearing.rating_at_rest == pytest.approx(static, rel=0.02)
+
+
+def test_life():
+    bearing = Bearing.from_designation("6205", dynamic_rating=14e3)
+    assert rating_life(bearing, 1400.0) == pytest.approx(1e9)
+    assert rating_life(bearing, 1400.0, reliability=0.99) == pytest.approx(0.25e9)
+    assert equivalent_load(bearing, 1000.0) == 1000.0
+    # f_0 F_a/C_0 = 1000/(9 7.94^2) = 1.762: Y between 1.45 and 1.31
+    assert equivalent_load(bearing, 500.0, 1000.0) == pytest.approx(0.56 * 500 + 1000 * (1.45 - 0.14 * 0.3824 / 0.69), rel=1e-3)
+    halves = mean_load(bearing, np.array([1000.0, 2000.0]))
+    assert halves == pytest.approx(((1e9 + 8e9) / 2) ** (1 / 3))
+    slow = mean_load(bearing, np.array([1000.0, 2000.0]), speed=np.array([3.0, 1.0]))
+    assert slow == pytest.approx(((3e9 + 8e9) / 4) ** (1 / 3))
+    rollers = Bearing(kind="cylindrical roller", elements=13, element_diameter=7.5e-3, pitch_diameter=46.5e-3,
+                      roller_length=9.5e-3)  # fmt: skip
+    assert rating_life(rollers, rollers.rating / 2) == pytest.approx(1e6 * 2 ** (10 / 3))
+    with pytest.raises(BearingError, match="no axial load"):
+        equivalent_load(rollers, 100.0, 50.0)
+
+
+@pytest.mark.parametrize("text", ["6205", "6205-2RS", "6205-2Z/C3", "SKF 6205", "6205 C4"])
+def test_suffixes(text):
+    bearing = Bearing.from_designation(text)
+    assert bearing.elements == 9
+    assert (bearing.bore, bearing.outside_diameter, bearing.width) == pytest.approx((0.025, 0.052, 0.015))
+
+
+def test_an_uncertain_bearing_asks():
+    with pytest.raises(BearingError, match=r"bore 25 mm, outside diameter 62 mm, width 17 mm, but how many balls"):
+        Bearing.from_designation("6305")
+    own = Bearing.from_designation("6305", elements=7, element_diameter="11.5 mm")
+    assert own.pitch_diameter == pytest.approx(0.0435)
+    with pytest.raises(BearingError, match="is not in the catalogue"):
+        Bearing.from_designation("NU2206")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"elements": 2}, "Bearing.elements is 2; give a whole number"),
+        ({"elements": 40}, "do not fit"),
+        ({"element_diameter": "8 kg"}, "Bearing.element_diameter"),
+        ({"pitch_diameter": 1e-3}, "give the diameter of their centres"),
+        ({"kind": "magic"}, "choose deep groove"),
+        ({"kind": "angular contact"}, "needs one, such as '25 deg'"),
+        ({"kind": "tapered roller"}, "effective length"),
+        ({"inner_curvature": 0.4}, "wider than its ball"),
+        ({"clearance": "9 mm"}, "give it in"),
+        ({"density": float("nan")}, "density"),
+    ],
+)
+def test_refuses(changes, message):
+    with pytest.raises(BearingError, match=message):
+        Bearing.from_designation("6205").changed(**changes)
