@@ -13,6 +13,8 @@ Gears
     `GearPair`, `GearSpec`, `Material`, `ContactLaw`, `FlankFriction`, `faults`
 Flexible bodies
     `Shaft`, `ShaftSection`, `Rotor`, `reduce_model`
+Rolling bearings
+    `Bearing`, `RollingBearing`
 Mechanisms
     `Mechanism`, `JointFriction`, `simulate`, `static_equilibrium`, `linear_modes`, `Solution`
 Differential-algebraic equations
@@ -26,8 +28,8 @@ Views
 Units
     `to_si`
 
-The subpackages hold the rest: `gearmbs.studies`, `gearmbs.gears`, `gearmbs.flexible`, `gearmbs.mechanism`,
-`gearmbs.dae`, `gearmbs.signals`, `gearmbs.adams`, `gearmbs.view`.
+The subpackages hold the rest: `gearmbs.studies`, `gearmbs.gears`, `gearmbs.flexible`, `gearmbs.bearings`,
+`gearmbs.mechanism`, `gearmbs.dae`, `gearmbs.signals`, `gearmbs.adams`, `gearmbs.view`.
 """
 
 from typing import TYPE_CHECKING
@@ -36,6 +38,7 @@ from gearmbs._lazy import late
 
 if TYPE_CHECKING:
     from gearmbs.adams import read_deck, run_deck, write_deck
+    from gearmbs.bearings import Bearing, RollingBearing
     from gearmbs.dae import DAEProblem, DAEResult, Status, solve_dae
     from gearmbs.dae.results.solution import Solution
     from gearmbs.flexible import Rotor, Shaft, ShaftSection, reduce_model
@@ -67,6 +70,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "Bearing",
     "Case",
     "CaseError",
     "ContactLaw",
@@ -78,6 +82,7 @@ __all__ = [
     "JointFriction",
     "Material",
     "Mechanism",
+    "RollingBearing",
     "Rotor",
     "Shaft",
     "ShaftSection",
@@ -117,6 +122,7 @@ __all__ = [
 late(
     __name__,
     {
+        "Bearing": ".bearings",
         "Case": ".studies",
         "CaseError": ".studies",
         "ContactLaw": ".gears",
@@ -128,6 +134,7 @@ late(
         "JointFriction": ".mechanism",
         "Material": ".gears",
         "Mechanism": ".mechanism",
+        "RollingBearing": ".bearings",
         "Rotor": ".flexible",
         "Shaft": ".flexible",
         "ShaftSection": ".flexible",

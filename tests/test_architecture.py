@@ -30,11 +30,12 @@ MAY_KNOW = {
     "mechanism": {"dae", "dae.equations", "dae.model", "dae.results", "dae.analyses"},
     "contact": set(),
     "gears": {"contact", "mechanism", "dae"},
+    "bearings": {"mechanism", "dae"},
     "flexible": {"mechanism"},
     "signals": set(),
     "view": {"contact", "gears", "mechanism", "signals", "dae.results"},
     "adams": {"dae", "dae.equations", "dae.model", "dae.analyses", "dae.results", "mechanism"},
-    "studies": {"dae", "dae.results", "flexible", "gears", "mechanism", "signals", "view"},
+    "studies": {"bearings", "dae", "dae.results", "flexible", "gears", "mechanism", "signals", "view"},
     "cli": {"adams", "signals", "studies", "view"},
 }
 """What a package may import, besides itself and what `SUPPORT` names. ``dae`` alone is what integrators and equations
@@ -45,6 +46,8 @@ EXCEPTIONS = {
     ("contact", "dae.equations"): "the signature that every force element's kernel has",
     ("gears", "dae.equations"): "the same door: a pair hands its kernel to the mechanism",
     ("flexible", "dae"): "the error of models, of which its own is one",
+    ("bearings", "dae.equations"): "the same door: a bearing hands its kernel to the mechanism",
+    ("bearings", "dae.compiled"): "its kernels: views of flat tables",
     ("mechanism", "dae.compiled"): "kernels of force elements: views of tables, calls through addresses",
     ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
     ("adams", "gears"): "pairs are written as the contact forces of a deck",
@@ -56,6 +59,8 @@ EXCEPTIONS = {
 CIRCLES = {
     ("_jit", "_kernel_calls", "compile"): "a kernel that is not there is compiled when it is called",
     ("dae.integrators.driver", "dae.integrators.start"): "a run and its beginning, parted by length; types only",
+    ("bearings.catalogue", "bearings.geometry", "bearings.ratings"):
+        "a bearing is found by its designation and tells its ratings; methods, and types only",
     ("mechanism.compile", "mechanism.friction", "mechanism.lumping", "mechanism.measures", "mechanism.mechanism",
      "mechanism.simulate"): "methods of Mechanism, and the functions that carry them out",
     ("adams.builders.builder", "adams.builders.constraints", "adams.builders.forces", "adams.builders.initial",

@@ -14,6 +14,7 @@ PACKAGES = {
     "gearmbs.mechanism": "Mechanism: bodies, markers, joints, motions, forces",
     "gearmbs.gears": "Gears: wheels, pairs, laws, static analyses",
     "gearmbs.flexible": "Flexible bodies: shafts, finite elements, reduction",
+    "gearmbs.bearings": "Bearings: rolling bearings, defects, statics, ratings",
     "gearmbs.contact": "Contact: compiled kernels",
     "gearmbs.dae": "DAE: equations, formulations, integrators, solutions",
     "gearmbs.signals": "Signals: files, features, comparison, sensors",
@@ -36,6 +37,7 @@ CONSTANTS = {
         "FORMATS": "gearmbs.signals.io",
         "INDICATORS": "gearmbs.signals.indicators",
     },
+    "gearmbs.bearings": {"DEFECTS": "gearmbs.bearings.defects"},
     "gearmbs.view": {"COLOURS": "gearmbs.view.figure_style"},
 }
 """Exported values that are no functions or classes, with the module that defines and describes them."""
@@ -61,6 +63,11 @@ MORE = {
         "gearmbs.gears.pattern": EVERYTHING,
         "gearmbs.gears.stiffness": EVERYTHING,
         "gearmbs.gears.iso1328": EVERYTHING,
+    },
+    "gearmbs.bearings": {
+        "gearmbs.bearings.catalogue": EVERYTHING,
+        "gearmbs.bearings.ratings": EVERYTHING,
+        "gearmbs.bearings.hertz": EVERYTHING,
     },
     "gearmbs.contact": {
         "gearmbs.contact.laws": ["normal_law", "friction_law"],

@@ -65,16 +65,13 @@ RECORDINGS: dict[str, dict[str, Any]] = {
             "contact_angle": math.radians(15.17), "kind": "angular contact"},
     "XJTU": {"designation": "UER204", "elements": 8, "element_diameter": 7.92e-3, "pitch_diameter": 34.55e-3},
 }  # fmt: skip
-"""Bearings of public recordings. Those of IMS are spherical and double-row: their kinematics hold, their contact does not."""
+"""Bearings of public recordings. That of IMS has two rows: its kinematics hold, its contact does not."""
 
 ALIASES = {
     "NICE": "MFPT", "ER10K": "PHM09", "MBER10K": "PHM09", "ER16K": "SpectraQuest", "ZA2115": "IMS", "UER204": "XJTU",
     "LDKUER204": "XJTU", "CWRUDRIVEEND": "CWRU drive end", "CWRUFANEND": "CWRU fan end", "MFPT": "MFPT",
     "PHM09": "PHM09", "IMS": "IMS", "XJTU": "XJTU", "SPECTRAQUEST": "SpectraQuest", "REXNORDZA2115": "IMS",
 }  # fmt: skip
-CLEARANCE = re.compile(r"[/\s-]?C([2-5])\b")
-"""Class of radial clearance in a designation."""
-NUMBER = re.compile(r"^(6[0-4]|16|618|619)?(\d{2,3})$")
 SMALL_BORES = {0: 10, 1: 12, 2: 15, 3: 17}
 
 
@@ -112,8 +109,8 @@ def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
     if {"elements", "element_diameter", "pitch_diameter"} <= changes.keys():
         return Bearing(**{"designation": designation.strip(), **changes})
     raise BearingError(
-        f"designation {designation!r} is not in the catalogue ({', '.join(known())}); give elements=, element_diameter= "
-        "and pitch_diameter=, and contact_angle= if it is not 0"
+        f"designation {designation!r} is not in the catalogue ({', '.join(known())}); give elements=, element_diameter="
+        " and pitch_diameter=, and contact_angle= if it is not 0"
     )
 
 

@@ -6,6 +6,7 @@ draw from their own seed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -40,11 +41,11 @@ class Defect:
                         object.__setattr__(self, item.name, to_si(value, self.units[item.name], place))
                     except (TypeError, ValueError) as error:
                         raise BearingError(str(error)) from None
-                    require(np.isfinite(getattr(self, item.name)), f"{place} is {value}; give a finite number")
+                    require(math.isfinite(getattr(self, item.name)), f"{place} is {value}; give a finite number")
             elif item.name == "part":
                 require(value in PARTS, f"{place} is {value!r}; choose {', '.join(PARTS)}")
             elif item.name in ("element", "seed"):
-                good = isinstance(value, (int, np.integer)) and not isinstance(value, bool) and value >= 0
+                good = isinstance(value, int) and not isinstance(value, bool) and value >= 0
                 require(good, f"{place} is {value!r}; give a whole number from 0 up")
 
     @property
@@ -72,7 +73,7 @@ class SurfaceDefect(Defect):
         if self.part == ELEMENT:
             require(
                 self.element < bearing.elements,
-                f"{type(self).__name__}.element is {self.element}; the bearing has elements 0 to {bearing.elements - 1}",
+                f"{type(self).__name__}.element is {self.element}; the bearing has 0 to {bearing.elements - 1}",
             )
 
     def finest(self, bearing: Bearing) -> float:
@@ -107,7 +108,7 @@ class Spall(SurfaceDefect):
     depth : float or str
         Of the bottom, m.
     angle : float or str
-        Of its middle: about z from the x axis of the ring's marker, or of the element from where the inner ring touches.
+        Of its middle: about z from the x axis of the ring's marker, of an element from where the inner ring touches.
     edge : float or str, optional
         Width over which edges are rounded, m; default a tenth of the width, at most 0.1 mm.
     roughness : float or str

@@ -34,7 +34,7 @@ class RollingBearing(ForceElement):
     cage_angle : float or str
         Angle of element 0 at the start, from x of J, rad.
     preload : float or str
-        Axial force with the rings at zero displacement, N, for bearings with a contact angle. The rings are ground to it.
+        Axial force with the rings at zero displacement, N, for bearings with a contact angle.
     sense : {1, -1}
         Direction along z in which the inner ring of an angular contact or tapered bearing presses into the outer one.
     centrifugal : bool
@@ -44,7 +44,7 @@ class RollingBearing(ForceElement):
     rolling_friction : float
         mu of the friction torque mu (D/2) sum Q.
     viscous_friction : float
-        f_0 nu^(2/3) of Palmgren's speed torque, with the viscosity nu in mm^2/s: 1e-7 f_0 (nu n)^(2/3) D^3, N mm, 1/min.
+        f_0 nu^(2/3) of Palmgren's speed torque 1e-7 f_0 (nu n)^(2/3) D^3 (N mm, 1/min, nu in mm^2/s).
     slow_speed : float or str
         Speed below which the friction torque falls to zero, rad/s.
     slices : int

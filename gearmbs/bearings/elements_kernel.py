@@ -88,9 +88,10 @@ def one_path(ints, reals, states, want, work, j, path, c, s, load):
     lift = u_r + height * phi
     axial = work[2] - radius * phi
     profile = vector_at(work, B.S_LOCAL + (B.BETA + ints[B.SPINS]) * (12 + 2 * (B.BETA + ints[B.SPINS])), 8)
-    h = missing(ints, reals, states, want, work, j, path, profile) - reals[
-        ints[B.AT_ELEMENTS] + B.ELEMENT_COLUMNS * j + B.ELEMENT_OVERSIZE
-    ]
+    h = (
+        missing(ints, reals, states, want, work, j, path, profile)
+        - reals[ints[B.AT_ELEMENTS] + B.ELEMENT_COLUMNS * j + B.ELEMENT_OVERSIZE]
+    )
     law = vector_at(work, B.S_LAW, B.LAW)
     energy = 0.0
     if ints[B.KIND] == B.BALL:
@@ -148,7 +149,15 @@ def one_path(ints, reals, states, want, work, j, path, c, s, load):
 
 @njit(cache=True, error_model="numpy")
 def missing(ints, reals, states, want, work, j, path, out):
-    """Return the missing material at an element's path; write the slopes and curvatures of the three profiles."""
+    """Return the missing material at an element's path; write the slopes and curvatures of the three profiles.
+
+    Parameters
+    ----------
+    ints, reals, states, want, work, j, path
+        As in `one_path`.
+    out : ndarray, shape (6,)
+        Slopes of the outer ring's, the inner ring's and the element's profile, then their curvatures.
+    """
     for k in range(6):
         out[k] = 0.0
     total = 0.0

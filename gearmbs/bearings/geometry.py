@@ -121,7 +121,9 @@ class Bearing:
         require(0.0 <= angle < 0.5 * math.pi, f"Bearing.contact_angle is {angle:g} rad; give 0 up to 90 deg")
         for name in ("inner_curvature", "outer_curvature"):
             value = getattr(self, name)
-            require(0.5 < value < 1.0, f"Bearing.{name} is {value!r}; a groove is wider than its ball: give 0.505 to 0.6")
+            require(
+                0.5 < value < 1.0, f"Bearing.{name} is {value!r}; a groove is wider than its ball: give 0.505 to 0.6"
+            )
         require(abs(self.clearance) < 0.2 * d, f"Bearing.clearance is {self.clearance:g} m; give it in '... um'")
         require(0.0 <= self.poisson_ratio < 0.5, f"Bearing.poisson_ratio is {self.poisson_ratio}; give 0 up to 0.5")
         for name in ("roller_length", "bore", "outside_diameter", "width", "dynamic_rating", "static_rating",
@@ -134,7 +136,9 @@ class Bearing:
                 f"Bearing.roller_length is missing; a {self.kind} bearing needs the effective length of its rollers",
             )
         if self.kind in ("angular contact", "four point", "tapered roller"):
-            require(angle > 0.0, f"Bearing.contact_angle is 0; a bearing of kind '{self.kind}' needs one, such as '25 deg'")
+            require(
+                angle > 0.0, f"Bearing.contact_angle is 0; a bearing of kind '{self.kind}' needs one, such as '25 deg'"
+            )
         if self.kind == "cylindrical roller":
             require(angle == 0.0, f"Bearing.contact_angle is {angle:g} rad; of cylindrical rollers it is 0")
 

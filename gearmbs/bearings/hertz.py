@@ -5,8 +5,8 @@ g = d cos(a)/D and the upper sign for the inner ring,
 
     sum rho = (4 - 1/f + 2 s)/d,    F(rho) = (1/f + 2 s)/(4 - 1/f + 2 s),    s = g/(1 - g) or -g/(1 + g).
 
-The ellipticity k = a/b solves F(rho) = ((k^2 + 1) E - 2 K)/((k^2 - 1) E) with the complete elliptic integrals K and E of
-m = 1 - 1/k^2; then delta* = (2 K/pi) (pi/(2 k^2 E))^(1/3) and
+The ellipticity k = a/b solves F(rho) = ((k^2 + 1) E - 2 K)/((k^2 - 1) E) with the complete elliptic integrals K and E
+of m = 1 - 1/k^2; then delta* = (2 K/pi) (pi/(2 k^2 E))^(1/3) and
 
     Q = K_c delta^(3/2),    K_c = E_y 2^(3/2)/(3 (1 - nu^2)) (sum rho)^(-1/2) delta*^(-3/2).
 

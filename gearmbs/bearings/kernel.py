@@ -288,7 +288,11 @@ def spread(ints, reals, frames, work, wrench, jac):
             turned[12] = e0 * local[b, 12] + e1 * local[b + 1, 12] + e2 * local[b + 2, 12]
             for c in range(3):
                 c1, c2 = (c + 1) % 3, (c + 2) % 3
-                z, z1, z2 = frames[1, FRAME_A + 3 * c + 2], frames[1, FRAME_A + 3 * c1 + 2], frames[1, FRAME_A + 3 * c2 + 2]
+                z, z1, z2 = (
+                    frames[1, FRAME_A + 3 * c + 2],
+                    frames[1, FRAME_A + 3 * c1 + 2],
+                    frames[1, FRAME_A + 3 * c2 + 2],
+                )
                 w1, w2 = frames[1, FRAME_W + c1], frames[1, FRAME_W + c2]
                 by_d, by_v, by_w = turned[c], turned[6 + c], turned[9 + c]
                 jac[r, c] = by_d - (turned[6 + c1] * w2 - turned[6 + c2] * w1)

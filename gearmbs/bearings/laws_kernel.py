@@ -5,8 +5,8 @@ radial and axial, and the material h that is missing. Balls without inertia lie 
 
     delta = L - A_0 - h,    L = |(X, Y)|,    n = (X, Y)/L,    Q = K s(delta)^n,
 
-rollers have a fixed normal: delta = n . (X, Y) - gap - h. What is told of the contact, at ``S_LAW`` of the scratch: Q, n,
-dQ by X, Y, h and the centrifugal load F, and d(alpha) by the same, the turn of n in its plane.
+rollers have a fixed normal: delta = n . (X, Y) - gap - h. What is told of the contact, at ``S_LAW`` of the scratch: Q,
+n, dQ by X, Y, h and the centrifugal load F, and d(alpha) by the same, the turn of n in its plane.
 """
 
 from __future__ import annotations
@@ -144,7 +144,13 @@ def contact_block(stiffness, ex, ey, length, delta):
     """Return force and stiffness (xx, xy, yy) of a contact along e, and its slope."""
     force, slope = hertz_force(stiffness, 1.5, delta)
     across = force / length
-    return force, slope * ex * ex + across * ey * ey, (slope - across) * ex * ey, slope * ey * ey + across * ex * ex, slope
+    return (
+        force,
+        slope * ex * ex + across * ey * ey,
+        (slope - across) * ex * ey,
+        slope * ey * ey + across * ex * ex,
+        slope,
+    )
 
 
 @njit(cache=True, error_model="numpy")

@@ -78,8 +78,8 @@ ELEMENT_OVERSIZE = 2
 ELEMENT_PLACE = 3
 ELEMENT_COLUMNS = 4
 
-D0, A0, PSI, THETA, BETA = 0, 3, 5, 6, 7
-"""Local coordinates q: displacement, tilt of the axis, cage angle, angle of the inner ring, spins."""
+PSI, THETA, BETA = 5, 6, 7
+"""Local coordinates q: displacement (0 to 2), tilt of the axis (3, 4), cage angle, angle of the inner ring, spins."""
 
 # scratch
 S_Q = 0

@@ -8,10 +8,11 @@ Ball bearings, with g = d cos(a)/D, lengths in mm and f the groove radii by the 
 
 roller bearings C = 1.1 f_c (L cos(a))^(7/9) Z^(3/4) d^(29/27) with
 
-    f_c = 207.9 lambda g^(2/9) (1 - g)^(29/27)/(1 + g)^(1/4) (1 + u^(9/2))^(-2/9),  u = 1.04 ((1 - g)/(1 + g))^(143/108).
+    f_c = 207.9 lambda g^(2/9) (1 - g)^(29/27)/(1 + g)^(1/4) (1 + u^(9/2))^(-2/9),
+    u = 1.04 ((1 - g)/(1 + g))^(143/108).
 
-The standard fixes f_i = f_o = 0.52 and the reduction factors lambda, whatever the grooves are. Static: of balls the load
-at which the most loaded one, 5 F/(Z cos a), presses its groove with 4200 MPa; of rollers 44 (1 - g) Z L d cos(a).
+The standard fixes f_i = f_o = 0.52 and the reduction factors lambda, whatever the grooves are. Static: of balls the
+load at which the most loaded one, 5 F/(Z cos a), presses its groove with 4200 MPa; of rollers 44 (1 - g) Z L d cos(a).
 
 References
 ----------
@@ -101,7 +102,7 @@ def load_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, 
         degrees, table = math.degrees(bearing.contact_angle), np.array(ANGULAR)
         require(
             20.0 <= degrees <= 45.0,
-            f"Bearing.contact_angle is {degrees:.4g} deg; the standard's factors begin at 20 and end at 45: give X and Y",
+            f"Bearing.contact_angle is {degrees:.4g} deg; the standard's factors are for 20 to 45 deg",
         )
         e, x, y = (float(np.interp(degrees, table[:, 0], table[:, k])) for k in (1, 2, 3))
     return (1.0, 0.0) if axial <= e * radial else (x, y)

@@ -6,11 +6,12 @@ of the outer ring; loads are those that act on the inner ring from outside, with
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from gearmbs.bearings import layout as B
 from gearmbs.bearings.errors import BearingError, require
@@ -106,14 +107,14 @@ class BearingStatics:
         self.bearing = bearing
         self.tables = pack(self.settings)
 
-    def at(self, displacement: Sequence[float], cage_angle: float | None = None) -> BearingState:
+    def at(self, displacement: npt.ArrayLike, cage_angle: float | None = None) -> BearingState:
         """Return the bearing at a displacement of three or five components, m and rad."""
         place = self._five(displacement, "displacement")
         load, stiffness = self._load(place, cage_angle)
         return self._state(place, load, stiffness, cage_angle)
 
     def under(
-        self, load: Sequence[float], *, cage_angle: float | None = None, start: Sequence[float] | None = None
+        self, load: npt.ArrayLike, *, cage_angle: float | None = None, start: npt.ArrayLike | None = None
     ) -> BearingState:
         """Return the bearing under a load.
 
@@ -133,13 +134,15 @@ class BearingStatics:
             If the bearing cannot carry the load.
         """
         wanted = np.asarray(load, dtype=float)
-        require(wanted.shape in ((3,), (5,)) and bool(np.all(np.isfinite(wanted))), f"load is {load!r}; give 3 or 5 numbers")
+        require(
+            wanted.shape in ((3,), (5,)) and bool(np.all(np.isfinite(wanted))), f"load is {load!r}; give 3 or 5 numbers"
+        )
         place = self._first(wanted) if start is None else self._five(start, "start")
         place = self._newton(place, wanted, cage_angle)
         found, stiffness = self._load(place, cage_angle)
         return self._state(place, found, stiffness, cage_angle)
 
-    def curve(self, loads: Iterable[Sequence[float]], *, cage_angle: float | None = None) -> list[BearingState]:
+    def curve(self, loads: Iterable[npt.ArrayLike], *, cage_angle: float | None = None) -> list[BearingState]:
         """Return the bearing under loads that follow each other, each beginning where the last one ended."""
         found: list[BearingState] = []
         for load in loads:
@@ -176,8 +179,8 @@ class BearingStatics:
                 break
             place = there
         raise BearingError(
-            f"no equilibrium under {wanted.tolist()} N found: the bearing does not carry it in this direction (an axial "
-            "load needs a contact angle or ball grooves, and the right sense)"
+            f"no equilibrium under {wanted.tolist()} N found: the bearing does not carry it in this direction (an "
+            "axial load needs a contact angle or ball grooves, and the right sense)"
         )
 
     def _first(self, wanted: np.ndarray) -> np.ndarray:
@@ -198,7 +201,7 @@ class BearingStatics:
             place[2] = np.sign(axial) * (free + approach)
         return place
 
-    def _five(self, values: Sequence[float], field: str) -> np.ndarray:
+    def _five(self, values: npt.ArrayLike, field: str) -> np.ndarray:
         given = np.asarray(values, dtype=float)
         good = given.shape in ((3,), (5,)) and bool(np.all(np.isfinite(given)))
         require(good, f"{field} is {values!r}; give 3 or 5 numbers")
@@ -264,6 +267,6 @@ def _frames(place: np.ndarray, speed: float) -> np.ndarray:
     return frames
 
 
-def stiffness_matrix(bearing: Bearing, load: Sequence[float], **settings: Any) -> np.ndarray:
+def stiffness_matrix(bearing: Bearing, load: npt.ArrayLike, **settings: Any) -> np.ndarray:
     """Return the stiffness of a bearing under a load, shape (5, 5), N/m, N/rad and N m/rad; see `BearingStatics`."""
     return BearingStatics(bearing, **settings).under(load).stiffness

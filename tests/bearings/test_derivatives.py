@@ -48,12 +48,18 @@ def test_jacobian_against_differences(name):
     probe = Probe(bearing, **settings)
     rng = np.random.default_rng(5)
     checked = 0
-    for _ in range(6):
+    for _ in range(8):
         probe.shaken(rng, 2e-5, 3e-4, 3000.0 if "centrifugal" in name else 300.0)
         value, exact, told = probe()
         if told[3] <= 1.0:
             continue
-        near = probe.differences(steps=(5e-10, 5e-9, 1e-4, 1e-3), state_step=1e-5)
+        # the balls' equilibrium is iterated, to a rounding error of its own
+        h = 4e-9 if "centrifugal" in name else 5e-10
+        near = probe.differences(steps=(h, 10.0 * h, 1e-4, 1e-3), state_step=1e-5)
+        wider = probe.differences(steps=(2 * h, 20.0 * h, 1e-4, 1e-3), state_step=1e-5)
+        if abs(near[:6] - wider[:6]).max() > 1e-6 * abs(near[:6]).max():
+            # an element is about to touch, where the law has no second derivative
+            continue
         checked += 1
         for rows in (slice(0, 3), slice(3, 6)):
             for block in range(9):

@@ -33,7 +33,11 @@ def test_multiples(name):
 
 @pytest.mark.parametrize(
     ("name", "inner", "outer", "series"),
-    [("6204", 2.802e10, 2.511e10, 9.369e9), ("6205", 2.818e10, 2.501e10, 9.375e9), ("6206", 3.085e10, 2.741e10, 1.027e10)],
+    [
+        ("6204", 2.802e10, 2.511e10, 9.369e9),
+        ("6205", 2.818e10, 2.501e10, 9.375e9),
+        ("6206", 3.085e10, 2.741e10, 1.027e10),
+    ],
 )
 def test_hertz_constants(name, inner, outer, series):
     bearing = Bearing.from_designation(name)
@@ -45,6 +49,8 @@ def test_ball_on_ball_of_equal_curvatures_is_the_sphere():
     contact = groove_contact(0.01, 1e4, 0.0, 2.07e11, 0.3)
     modulus = 2.07e11 / 2.0 / (1.0 - 0.09)
     assert contact.stiffness == pytest.approx(4.0 / 3.0 * modulus * np.sqrt(0.005), rel=3e-5)
+    assert contact.curvature_sum == pytest.approx((4.0 - 1e-4) / 0.01)
+    assert contact.curvature_difference == pytest.approx(1e-4 / (4.0 - 1e-4))
     assert contact.ellipticity == pytest.approx(1.0, abs=1e-3)
     radius = (3.0 * 0.005 / (4.0 * modulus)) ** (1.0 / 3.0)
     assert contact.semi_axes == pytest.approx((radius, radius), rel=1e-3)
@@ -77,7 +83,9 @@ def test_life():
     assert rating_life(bearing, 1400.0, reliability=0.99) == pytest.approx(0.25e9)
     assert equivalent_load(bearing, 1000.0) == 1000.0
     # f_0 F_a/C_0 = 1000/(9 7.94^2) = 1.762: Y between 1.45 and 1.31
-    assert equivalent_load(bearing, 500.0, 1000.0) == pytest.approx(0.56 * 500 + 1000 * (1.45 - 0.14 * 0.3824 / 0.69), rel=1e-3)
+    assert equivalent_load(bearing, 500.0, 1000.0) == pytest.approx(
+        0.56 * 500 + 1000 * (1.45 - 0.14 * 0.3824 / 0.69), rel=1e-3
+    )
     halves = mean_load(bearing, np.array([1000.0, 2000.0]))
     assert halves == pytest.approx(((1e9 + 8e9) / 2) ** (1 / 3))
     slow = mean_load(bearing, np.array([1000.0, 2000.0]), speed=np.array([3.0, 1.0]))
