@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.dae.equations.expressions.errors import ExpressionError
+from gearmbs.dae.equations.expressions.errors import NotEvaluatedError
 from gearmbs.dae.equations.expressions.tape import Tape, TapeBuilder
 from gearmbs.mechanism.expression_functions import Lowering
 from gearmbs.mechanism.expression_library import FUNCTIONS
@@ -38,5 +38,5 @@ def compile_expression(text: str, scope: Scope, dimension: str = "number", accel
     result = builder.binary(op.MUL, builder.constant(scope.units.factor(dimension)), result)
     tape = builder.finish(result, text)
     if tape.level == op.LEVEL_ACCELERATION and not accelerations:
-        raise ExpressionError(f"accelerations can only be asked for in a REQUEST, not in {shown(text)}")
+        raise NotEvaluatedError(f"accelerations can only be asked for in a REQUEST, not in {shown(text)}")
     return tape

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import NoReturn
 
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.dae.equations.expressions.errors import ExpressionError
+from gearmbs.dae.equations.expressions.errors import ExpressionError, NotEvaluatedError
 from gearmbs.dae.equations.expressions.tape import TapeBuilder
 from gearmbs.mechanism.expression_syntax import (
     Call,
@@ -40,7 +40,7 @@ ELEMENT_FORCES = {
 EULER_SEQUENCES = ("123", "231", "312", "132", "213", "321", "121", "131", "212", "232", "313", "323")
 """Body-fixed sequences of ORIENT's systems 1 to 12."""
 UNSUPPORTED = frozenset(
-    "NFORCE CONTACT CVCV PTCV CURVE INTERP INVPSD DELAY USER SENVAL MODE INCANG FXFREQ FXMODE "
+    "NFORCE CONTACT CVCV PTCV CURVE INTERP INVPSD DELAY USER SENVAL MODE FXFREQ FXMODE "
     "UVX UVY UVZ DXYZ VXYZ WXYZ FXYZ TXYZ TRANS ARYSUM RANDOM".split()
 )
 """Functions of ADAMS that exist but are not evaluated here."""
@@ -132,7 +132,8 @@ class Lowering:
             self.count(node, low, high)
             return self.guarded(node.at, lambda: function(self, node))
         if name in UNSUPPORTED:
-            self.fail(f"the function {name} is not supported", node.at)
+            message = f"the function {name} is not supported at column {node.at + 1} of {shown(self.text)}"
+            raise NotEvaluatedError(message)
         known = [*UNARY, *BINARY, *ELEMENT_FORCES, *self.functions]
         near = difflib.get_close_matches(name, known, 1)
         self.fail(f"unknown function {name}" + (f"; did you mean {near[0]}?" if near else ""), node.at)

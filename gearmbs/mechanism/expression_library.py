@@ -70,6 +70,25 @@ def _axis_angle(axis: int, low: Lowering, call: Call) -> int:
     return b.wound(angle, ("AXAYAZ"[2 * axis : 2 * axis + 2], i, j))
 
 
+def _included_angle(low: Lowering, call: Call) -> int:
+    """INCANG(i, j, k): the angle at marker j between the lines to i and to k, 0 to pi."""
+    b = low.builder
+    i, j, k = (low.marker(call, n) for n in range(3))
+    if i == j or k == j:
+        low.fail("INCANG needs a vertex apart from the two other markers", call.at)
+
+    def line(end: int) -> list[int]:
+        return [b.vector(op.DISPLACEMENT, end, j, -1, op.GLOBAL, axis) for axis in range(3)]
+
+    def product(x: int, y: int) -> int:
+        return b.binary(op.MUL, x, y)
+
+    u, v = line(i), line(k)
+    dot = b.binary(op.ADD, b.binary(op.ADD, product(u[0], v[0]), product(u[1], v[1])), product(u[2], v[2]))
+    cross = [b.binary(op.SUB, product(u[a], v[c]), product(u[c], v[a])) for a, c in ((1, 2), (2, 0), (0, 1))]
+    return b.binary(op.ATAN2, b.binary(op.HYPOT, b.binary(op.HYPOT, cross[0], cross[1]), cross[2]), dot)
+
+
 def _orient(low: Lowering, call: Call) -> int:
     system = low.literal(call, 0, 1, 27)
     i, j = low.marker(call, 2), low.marker(call, 3)
@@ -298,6 +317,7 @@ def _table() -> dict[str, Function]:
     functions |= {
         "VR": (_radial_velocity, 1, 3),
         "ORIENT": (_orient, 3, 4),
+        "INCANG": (_included_angle, 3, 3),
         "IMPACT": (_impact, 7, 7),
         "BISTOP": (_bistop, 8, 8),
         "IF": (_if, 4, 4),

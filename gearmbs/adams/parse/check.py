@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
@@ -33,7 +33,7 @@ REQUIRED: dict[type, tuple[str, ...]] = {
     st.Friction: ("joint", "mu_static", "mu_dynamic"),
 }
 MEASURES = frozenset(
-    """DX DY DZ DM AX AY AZ PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
+    """DX DY DZ DM AX AY AZ INCANG PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
     WDTX WDTY WDTZ WDTM""".split()
 )
 """Functions of the places and motions of markers."""
@@ -102,13 +102,8 @@ def check(deck: Deck) -> list[Diagnostic]:
             if name in statement.given:
                 message = f"{statement.label()}: {name.upper()} is not supported"
                 deck.diagnostics.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.given[name]))
-        idle = [name for name in WITHOUT_EFFECT.get(cls, ()) if name in statement.given]
-        if idle:
-            names = ", ".join(specs_of(cls)[name].keyword for name in idle)
-            why = WHY.get(cls, "the program's own settings are tight enough")
-            message = f"{statement.label()}: {names} without effect: {why}"
-            deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, statement.given[idle[0]]))
         _check_markers(deck, statement, fail)
+    _remark_idle(deck)
     for part in deck.of(st.Part).values():
         _check_part(deck, part, fail)
     for marker in deck.of(st.Marker).values():
@@ -122,6 +117,36 @@ def check(deck: Deck) -> list[Diagnostic]:
 
 
 Fail = Callable[..., None]
+
+SHOWN_LABELS = 4
+
+
+def _remark_idle(deck: Deck) -> None:
+    """Remark on arguments without effect, once for all statements of a kind that have the same ones."""
+    found: dict[tuple[type, tuple[str, ...]], list[st.Statement]] = {}
+    for statement in deck:
+        idle = tuple(name for name in WITHOUT_EFFECT.get(type(statement), ()) if name in statement.given)
+        if idle:
+            found.setdefault((type(statement), idle), []).append(statement)
+    for (cls, idle), group in found.items():
+        names = ", ".join(specs_of(cls)[name].keyword for name in idle)
+        why = WHY.get(cls, "the program's own settings are tight enough")
+        message = f"{_labels(group)}: {names} without effect: {why}"
+        deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, group[0].given[idle[0]]))
+    bent = [b for b in deck.of(st.Beam).values() if b.formulation != "LINEAR"]
+    if bent:
+        message = (
+            f"{_labels(bent)}: FORMULATION = {bent[0].formulation} is computed as LINEAR: true while deflections stay "
+            "small against the length"
+        )
+        deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, bent[0].given["formulation"]))
+
+
+def _labels(group: Sequence[st.Statement]) -> str:
+    """Return the names of statements, the first few of many."""
+    shown = ", ".join(s.label() for s in group[:SHOWN_LABELS])
+    more = len(group) - SHOWN_LABELS
+    return f"{shown} and {more} more" if more > 0 else shown
 
 
 def _choices(cls: type) -> str:

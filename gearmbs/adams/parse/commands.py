@@ -10,15 +10,27 @@ from pathlib import Path
 
 from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.grammar import CHOICE, FLAG, ID, INT, REAL, TEXT, ArgumentReader, Grammar, StatementError, arg
+from gearmbs.adams.parse.grammar import (
+    CHOICE,
+    FLAG,
+    ID,
+    IDS,
+    INT,
+    REAL,
+    TEXT,
+    ArgumentReader,
+    Grammar,
+    StatementError,
+    arg,
+)
 from gearmbs.adams.parse.reader import GRAMMARS, read_statement, resolve_statement, unknown_statement
 from gearmbs.adams.parse.source import CONTINUED, RawStatement, read_file, statements
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
 SIMULATIONS = "DYNAMICS KINEMATICS STATICS TRANSIENT INITIAL_CONDITIONS ACCELERATION DISPLACEMENT VELOCITY"
 ELEMENTS = (
-    "ACCGRAV BEAM BUSHING COUPLER DIFF FIELD FRICTION GCON GEAR GFORCE JOINT JPRIM MOTION SFORCE SPRINGDAMPER VFORCE "
-    "VTORQUE"
+    "ACCGRAV BEAM BUSHING CONTACT COUPLER DIFF FIELD FRICTION GCON GEAR GFORCE JOINT JPRIM MOTION SENSOR SFORCE "
+    "SPRINGDAMPER VFORCE VTORQUE"
 )
 DEEPEST = 10
 """Command files that may call each other."""
@@ -48,10 +60,11 @@ class Simulate(Command):
 
 @dataclass(frozen=True)
 class Switch(Command):
-    """ACTIVATE or DEACTIVATE of an element."""
+    """ACTIVATE or DEACTIVATE of an element, or of all of a kind whose ids lie in a range."""
 
     element: str | None = arg("element", CHOICE, choices=ELEMENTS)
     id: int | None = arg("ID", ID)
+    range: tuple[int, ...] = arg("RANGE", IDS, (), count=2)
     on: bool = True
 
 
@@ -62,6 +75,7 @@ class FileCommand(Command):
     model: str | None = arg("MODEL", TEXT)
     output_prefix: str | None = arg("OUTPUT_PREFIX", TEXT)
     command: str | None = arg("COMMAND", TEXT)
+    users: bool = arg("USERS", FLAG, False)
 
 
 @dataclass(frozen=True)
@@ -174,6 +188,9 @@ def parse_script(text: str, file: str = "<script>", depth: int = 0) -> Script:
         if command is not None:
             script.commands.append(command)
             if isinstance(command, FileCommand):
+                if command.users:
+                    message = "FILE: USERS has no effect here: there are no compiled subroutines to load"
+                    script.diagnostics.append(Diagnostic(IGNORED, message, script.file, command.line))
                 script.model = command.model or script.model
                 script.prefix = command.output_prefix or script.prefix
                 if command.command is not None:
@@ -277,8 +294,15 @@ def _check(command: Command) -> None:
     StatementError
     """
     if isinstance(command, Switch):
-        if command.element is None or (command.id is None and command.element not in st.WITHOUT_ID):
-            raise StatementError("give an element and its id, for instance DEACTIVATE/JOINT, ID=3")
+        if command.element is None or (
+            command.id is None and not command.range and command.element not in st.WITHOUT_ID
+        ):
+            message = "give an element and its id or a range of ids, for instance DEACTIVATE/JOINT, ID=3"
+            raise StatementError(message)
+        if command.id is not None and command.range:
+            raise StatementError("give ID or RANGE, not both")
+        if command.range and command.range[0] > command.range[1]:
+            raise StatementError(f"RANGE = {command.range[0]}, {command.range[1]}; the first must not be larger")
     if not isinstance(command, Simulate):
         return
     if command.kind is None:

@@ -116,6 +116,7 @@ class Beam(Statement):
     gmodulus: float | None = arg("GMODULUS", REAL)
     cratio: float | None = arg("CRATIO", REAL)
     cmatrix: Vector | None = arg("CMATRIX", REALS, count=21)
+    formulation: str = arg("FORMULATION", WORD, "LINEAR", choices="LINEAR STRING NONLINEAR")
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,7 @@ class Friction(Statement):
     overlap: float = arg("INITIAL_OVERLAP", REAL, 1000.0, dimension="length")
     overlap_delta: str = arg("OVERLAP_DELTA", WORD, "CONSTANT", choices="CONSTANT INCREASING DECREASING")
     yoke: str = arg("YOKE", WORD, "I_YOKE", choices="I_YOKE J_YOKE")
-    inactive: str | None = arg("INACTIVE", WORD, choices="STATIC")
+    inactive: str | None = arg("INACTIVE", WORD, choices="STATIC", aliases="INACTIVE_DURING")
     formulation: str | None = arg("FORMULATION", WORD, choices="ORIGINAL LUGRE")
     max_force: float | None = arg("MAX_FRICTION_FORCE", REAL, dimension="force")
     max_torque: float | None = arg("MAX_FRICTION_TORQUE", REAL, dimension="torque")

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from gearmbs.adams.builders.mechanism import build_model
 from gearmbs.adams.builders.model import AdamsModel, markers_of
-from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
+from gearmbs.adams.errors import ERROR, WARNING, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Change, Linear, Script, Simulate, Stop, Switch
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
 from gearmbs.adams.run.session import Session, change, output_times, switch, unsupported
-from gearmbs.dae.equations.expressions.errors import ExpressionError
+from gearmbs.dae.equations.expressions.errors import ExpressionError, NotEvaluatedError
 from gearmbs.dae.equations.expressions.opcodes import LEVEL_TIME
 from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.mechanism.expression_compiler import compile_expression
+from gearmbs.mechanism.expression_syntax import Call, Number, parse, walk
 
 SINGLE = ("STATICS", "INITIAL_CONDITIONS", "DISPLACEMENT", "VELOCITY", "ACCELERATION")
 """Analyses that need no span of time."""
@@ -109,6 +112,7 @@ def expression_errors(model: AdamsModel, session: Session) -> list[Diagnostic]:
     bodies = {id(body): k for k, body in enumerate((model.mechanism.ground, *model.mechanism.bodies.values()))}
     scope = model.scope({id(m): k for k, m in enumerate(markers)}, [bodies[id(m.body)] for m in markers])
     found = []
+    read = read_variables(deck)
     for statement in deck:
         key = (st.KEYWORD_OF[type(statement)], statement.id)
         if key in session.inactive or getattr(statement, "implicit", False):
@@ -118,17 +122,54 @@ def expression_errors(model: AdamsModel, session: Session) -> list[Diagnostic]:
             text = getattr(statement, name)
             if spec.kind != EXPRESSION or text is None:
                 continue
+            left_out = False
             try:
                 tape = compile_expression(text, scope, accelerations=isinstance(statement, st.Request))
                 message = _misplaced(statement, text, tape)
             except ExpressionError as error:
                 message = str(error)
+                left_out = isinstance(error, NotEvaluatedError) and statement.id not in read
             if message:
                 own = (deck.file, statement.given.get(name, statement.line))
                 file, line = session.places.get((type(statement), statement.id, name), own)
                 message = f"{statement.label()}: {spec.keyword}: {message}"
+                if left_out and isinstance(statement, st.Variable):
+                    message += "; nothing that is computed here reads it, so it is left out"
+                    remark = Diagnostic(WARNING, message, file, line)
+                    if remark not in session.deck.diagnostics:
+                        session.deck.diagnostics.append(remark)
+                    continue
                 found.append(Diagnostic(ERROR, message, file, line))
     return found
+
+
+def read_variables(deck: Deck) -> set[int]:
+    """Return the VARIABLEs that anything but a list for a control program reads, directly or through others."""
+    read: set[int] = set()
+    waiting = [
+        text
+        for statement in deck
+        if not isinstance(statement, st.Variable)
+        for name, spec in specs_of(type(statement)).items()
+        if spec.kind == EXPRESSION and (text := getattr(statement, name)) is not None
+    ]
+    plants: dict[str, Mapping[int, st.Plant]] = {"PINVAL": deck.of(st.PlantInput), "POUVAL": deck.of(st.PlantOutput)}
+    while waiting:
+        for node in walk(parse(waiting.pop())):
+            first = node.args[0] if isinstance(node, Call) and node.args else None
+            if not isinstance(node, Call) or not isinstance(first, Number) or first.integer is None:
+                continue
+            members: tuple[int, ...] = ()
+            if node.name == "VARVAL":
+                members = (first.integer,)
+            elif node.name in plants and first.integer in plants[node.name]:
+                members = plants[node.name][first.integer].variables
+            for member in members:
+                variable = deck.of(st.Variable).get(member)
+                if variable is not None and member not in read:
+                    read.add(member)
+                    waiting.append(variable.function or "0")
+    return read
 
 
 def _misplaced(statement: st.Statement, text: str, tape: Tape) -> str:

@@ -60,7 +60,9 @@ def unsupported(command: Any, message: str) -> DeckError:
 
 
 def switch(session: Session, command: Switch) -> None:
-    """Activate or deactivate an element.
+    """Activate or deactivate an element, or all elements of its kind within a range of ids.
+
+    Of a kind that is not supported nothing acts: to switch it changes nothing, whether or not it is left out.
 
     Raises
     ------
@@ -68,10 +70,17 @@ def switch(session: Session, command: Switch) -> None:
         If the deck does not have it.
     """
     keyword, number = command.element or "", command.id or 0
-    if number not in session.deck.of(st.STATEMENTS[keyword]):
+    if keyword in st.UNSUPPORTED:
+        return
+    there = session.deck.of(st.STATEMENTS[keyword])
+    low, high = command.range or (number, number)
+    numbers = [n for n in there if low <= n <= high]
+    if not numbers:
         label = f"{keyword}/{number}" if number else keyword
+        label += f" from {low} to {high}" if command.range else ""
         raise DeckError([Diagnostic(ERROR, f"there is no {label} in the deck", command.file, command.line)])
-    (session.inactive.discard if command.on else session.inactive.add)((keyword, number))
+    for n in numbers:
+        (session.inactive.discard if command.on else session.inactive.add)((keyword, n))
 
 
 def change(session: Session, command: Change, allow_unsupported: bool) -> None:

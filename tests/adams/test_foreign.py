@@ -1,0 +1,129 @@
+"""What has no effect here does not stop a deck; what is not there is named as what it is."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gearmbs.adams import DeckError, parse_deck, run_deck
+from gearmbs.adams.parse.commands import parse_script
+from gearmbs.adams.run.script_check import read_variables
+from gearmbs.mechanism import Mechanism
+from tests.adams.decks import PENDULUM
+
+BEAM = (
+    "BEAM/{n}, I=0201, J=0101, LENGTH=2, IXX=1, IYY=1, IZZ=1, AREA=1, EMODULUS=1E3, GMODULUS=1E3, FORMULATION={kind}\n"
+)
+
+
+def with_lines(text: str) -> str:
+    return PENDULUM.replace("END\n", text + "END\n")
+
+
+def remarks(deck) -> list[str]:
+    return [d.message for d in deck.diagnostics]
+
+
+def test_formulations_of_beams_are_remarked_once():
+    lines = "".join(BEAM.format(n=n, kind="LINEAR" if n == 1 else "NONLINEAR") for n in range(1, 9))
+    deck = parse_deck(with_lines(lines))
+    (remark,) = [m for m in remarks(deck) if "FORMULATION" in m]
+    assert remark.startswith("BEAM/2, BEAM/3, BEAM/4, BEAM/5 and 3 more: FORMULATION = NONLINEAR is computed as LINEAR")
+
+
+def test_many_arguments_without_effect_are_one_remark():
+    lines = "".join(f"VARIABLE/{n}, IC={n}, FUNCTION=TIME\n" for n in range(1, 10)) + "VARIABLE/20, FUNCTION=TIME\n"
+    (remark,) = [m for m in remarks(parse_deck(with_lines(lines))) if "IC" in m]
+    assert remark.startswith("VARIABLE/1, VARIABLE/2, VARIABLE/3, VARIABLE/4 and 5 more: IC without effect")
+
+
+def test_friction_may_say_inactive_during_statics():
+    line = "FRICTION/1, JOINT=1, MU_STATIC=0.3, MU_DYNAMIC=0.2, PIN_RADIUS=0.01, INACTIVE_DURING=STATIC\n"
+    (friction,) = [s for s in parse_deck(with_lines(line)) if s.label() == "FRICTION/1"]
+    assert friction.inactive == "STATIC"
+
+
+@pytest.mark.parametrize("name", ["SECTION", "FE_NODE", "CLEARANCE"])
+def test_statements_of_adams_are_not_taken_for_misspelt_others(name):
+    deck = parse_deck(with_lines(f"{name}/1, I=0201\n"))
+    assert [d.message for d in deck.unsupported] == [f"{name}/1 is not supported; it changes the motion"]
+
+
+def test_libraries_of_subroutines_are_remarked():
+    script = parse_script("model\nout\nfile/model=x, users\nsimulate/dynamics, end=1, steps=3\n")
+    assert [d.message for d in script.diagnostics] == [
+        "FILE: USERS has no effect here: there are no compiled subroutines to load"
+    ]
+    assert not script.unsupported
+
+
+def test_a_range_of_elements_is_switched():
+    forces = "".join(f"SFORCE/{n}, I=0201, J=0101, ROTATIONAL, ACTIONONLY, FUNCTION={n}\n" for n in (3, 4, 7, 9))
+    deck = parse_deck(with_lines(forces))
+    script = parse_script("m\no\ndeactivate/sforce, range=4,8\nsimulate/dynamics, end=0.01, steps=1\n")
+    model = run_deck(deck, script).segments[-1].model
+    assert sorted(n for kind, n in model.names if kind == "sforce") == [3, 9]
+    for text, message in (
+        ("deactivate/sforce, range=10,20", "there is no SFORCE from 10 to 20 in the deck"),
+        ("deactivate/sforce, range=1,2", "there is no SFORCE from 1 to 2"),
+        ("deactivate/sforce, range=9,3", "the first must not be larger"),
+        ("deactivate/sforce, id=3, range=3,9", "not both"),
+    ):
+        with pytest.raises(DeckError, match=message):
+            run_deck(deck, parse_script(f"m\no\n{text}\nsimulate/dynamics, end=0.01, steps=1\n"))
+
+
+def test_a_sensor_or_contact_that_is_left_out_may_be_switched():
+    deck = parse_deck(with_lines("SENSOR/1, FUNCTION=TIME, VALUE=1\n"))
+    script = parse_script("m\no\ndeactivate/sensor, id=1\nsimulate/dynamics, end=0.01, steps=1\n")
+    assert run_deck(deck, script, allow_unsupported=True).success
+    with pytest.raises(DeckError, match="SENSOR/1 is not supported"):
+        run_deck(deck, script)
+
+
+VARIABLES = """\
+VARIABLE/1, FUNCTION=SENVAL(3)
+VARIABLE/2, FUNCTION=VARVAL(1)+1
+VARIABLE/3, FUNCTION=2*TIME
+VARIABLE/4, FUNCTION=VARVAL(3)+1
+POUTPUT/1, VARIABLES=1,2
+PINPUT/2, VARIABLES=3
+"""
+
+
+def test_a_function_that_only_an_unread_variable_uses_stops_nothing():
+    deck = parse_deck(with_lines(VARIABLES))
+    script = "m\no\nsimulate/dynamics, end=0.01, steps=2\n"
+    result = run_deck(deck, parse_script(script))
+    assert result.success
+    told = [m for m in result.messages if "nothing that is computed here reads it" in str(m)]
+    assert len(told) == 2
+    assert "VARIABLE/1" in str(told[0])
+    for reader in ("REQUEST/9, F2=VARVAL(2)\n", "SFORCE/1, I=0201, J=0101, ROTATIONAL, FUNCTION=POUVAL(1,2)\n"):
+        deck = parse_deck(with_lines(VARIABLES + reader))
+        with pytest.raises(DeckError, match=r"VARIABLE/1: FUNCTION: .*SENVAL"):
+            run_deck(deck, parse_script(script))
+
+
+def test_variables_are_read_through_others_and_through_lists():
+    deck = parse_deck(with_lines(VARIABLES + "SFORCE/1, I=0201, J=0101, ROTATIONAL, FUNCTION=VARVAL(4)\n"))
+    assert read_variables(deck) == {3, 4}
+    deck = parse_deck(with_lines(VARIABLES + "SFORCE/1, I=0201, J=0101, ROTATIONAL, FUNCTION=POUVAL(1,1)\n"))
+    assert read_variables(deck) == {1, 2}
+
+
+def test_included_angle():
+    """Between a fixed line along x and a pendulum's rod the angle is the pendulum's own, folded into 0 to pi."""
+    m = Mechanism("pendulum", gravity=(0.0, -9.81, 0.0))
+    rod = m.body("rod", 1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
+    m.revolute("pin", rod, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    m.ground.marker((2.0, 0.0, 0.0), name="ahead")
+    m.ground.marker(name="pivot")
+    rod.marker((1.0, 0.0, 0.0), name="tip")
+    solution = m.simulate(1.5, rate=200, tol=1e-9)
+    angle = solution.evaluate("INCANG(ahead, pivot, tip)")
+    x, y, _ = solution.com_position("rod").T
+    np.testing.assert_allclose(angle, np.abs(np.arctan2(y, x)), atol=1e-12)
+    assert angle.max() > 0.9 * math.pi / 2
+    with pytest.raises(Exception, match="vertex apart"):
+        solution.evaluate("INCANG(pivot, pivot, tip)")
