@@ -20,11 +20,13 @@ Mechanisms
 Differential-algebraic equations
     `solve_dae`, `DAEProblem`, `DAEResult`, `Status`
 Signals
-    `read_signal`, `write_signal`, `make_signal`, `analyse`, `compare`, `spectrum`, `envelope_spectrum`
+    `read_signal`, `write_signal`, `make_signal`, `to_signal`, `analyse`, `compare`, `features`, `spectrum`,
+    `envelope_spectrum`, `spectrogram`, `waterfall`, `order_map`, `order_track`, `campbell`
 ADAMS decks
     `read_deck`, `run_deck`, `write_deck`
 Views
-    `gear_scene`, `mechanism_scene`, `solution_scene`, `mesh_animation`, `average_plot`
+    `gear_scene`, `mechanism_scene`, `solution_scene`, `mesh_animation`, `average_plot`, `spectrogram_plot`,
+    `waterfall_plot`, `order_map_plot`, `order_track_plot`, `campbell_plot`
 Units
     `to_si`
 
@@ -46,11 +48,18 @@ if TYPE_CHECKING:
     from gearmbs.mechanism import JointFriction, Mechanism, linear_modes, simulate, static_equilibrium
     from gearmbs.signals import (
         analyse,
+        campbell,
         compare,
         envelope_spectrum,
+        features,
         make_signal,
+        order_map,
+        order_track,
         read_signal,
+        spectrogram,
         spectrum,
+        to_signal,
+        waterfall,
         write_signal,
     )
     from gearmbs.studies import (
@@ -65,7 +74,18 @@ if TYPE_CHECKING:
         run_paper,
     )
     from gearmbs.units import to_si
-    from gearmbs.view import average_plot, gear_scene, mechanism_scene, mesh_animation, solution_scene
+    from gearmbs.view import (
+        average_plot,
+        campbell_plot,
+        gear_scene,
+        mechanism_scene,
+        mesh_animation,
+        order_map_plot,
+        order_track_plot,
+        solution_scene,
+        spectrogram_plot,
+        waterfall_plot,
+    )
 
 __version__ = "0.1.0"
 
@@ -90,9 +110,12 @@ __all__ = [
     "Status",
     "analyse",
     "average_plot",
+    "campbell",
+    "campbell_plot",
     "compare",
     "envelope_spectrum",
     "faults",
+    "features",
     "gear_rig",
     "gear_scene",
     "linear_modes",
@@ -101,6 +124,10 @@ __all__ = [
     "make_signal",
     "mechanism_scene",
     "mesh_animation",
+    "order_map",
+    "order_map_plot",
+    "order_track",
+    "order_track_plot",
     "read_deck",
     "read_signal",
     "record_signal",
@@ -112,9 +139,14 @@ __all__ = [
     "simulate",
     "solution_scene",
     "solve_dae",
+    "spectrogram",
+    "spectrogram_plot",
     "spectrum",
     "static_equilibrium",
     "to_si",
+    "to_signal",
+    "waterfall",
+    "waterfall_plot",
     "write_deck",
     "write_signal",
 ]
@@ -142,9 +174,12 @@ late(
         "Status": ".dae",
         "analyse": ".signals",
         "average_plot": ".view",
+        "campbell": ".signals",
+        "campbell_plot": ".view",
         "compare": ".signals",
         "envelope_spectrum": ".signals",
         "faults": ".gears",
+        "features": ".signals",
         "gear_rig": ".studies",
         "gear_scene": ".view",
         "linear_modes": ".mechanism",
@@ -153,6 +188,10 @@ late(
         "make_signal": ".signals",
         "mechanism_scene": ".view",
         "mesh_animation": ".view",
+        "order_map": ".signals",
+        "order_map_plot": ".view",
+        "order_track": ".signals",
+        "order_track_plot": ".view",
         "read_deck": ".adams",
         "read_signal": ".signals",
         "record_signal": ".studies",
@@ -164,9 +203,14 @@ late(
         "simulate": ".mechanism",
         "solution_scene": ".view",
         "solve_dae": ".dae",
+        "spectrogram": ".signals",
+        "spectrogram_plot": ".view",
         "spectrum": ".signals",
         "static_equilibrium": ".mechanism",
         "to_si": ".units",
+        "to_signal": ".signals",
+        "waterfall": ".signals",
+        "waterfall_plot": ".view",
         "write_deck": ".adams",
         "write_signal": ".signals",
     },

@@ -12,14 +12,18 @@ if TYPE_CHECKING:
     from gearmbs.signals.analysis_report import AnalysisReport
     from gearmbs.signals.angular import angular_resample, order_spectrum, time_synchronous_average
     from gearmbs.signals.bands import band_rms, gmf_rms, order_rms, rms
+    from gearmbs.signals.campbell import campbell, critical_speeds
     from gearmbs.signals.cepstrum import power_cepstrum
     from gearmbs.signals.comparison import compare, compare_files
     from gearmbs.signals.comparison_report import ComparisonReport
     from gearmbs.signals.conversion import convert
+    from gearmbs.signals.door import to_signal
     from gearmbs.signals.envelope import envelope, envelope_spectrum, kurtogram, spectral_kurtosis
     from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
     from gearmbs.signals.expectations import EXPECTED
+    from gearmbs.signals.features import features
     from gearmbs.signals.filters import bandpass, decimate, resample
+    from gearmbs.signals.given import with_speed
     from gearmbs.signals.indicators import (
         INDICATORS,
         condition_indicators,
@@ -38,6 +42,7 @@ if TYPE_CHECKING:
         sideband_level,
     )
     from gearmbs.signals.io import FORMATS, read_signal, write_signal
+    from gearmbs.signals.order_tracking import order_map, order_track
     from gearmbs.signals.orders import harmonic_amplitudes
     from gearmbs.signals.ordinal import level_distance, ordinal_agreement
     from gearmbs.signals.phase import instantaneous_speed, phase_from_line, phase_from_speed, phase_from_tacho
@@ -55,6 +60,7 @@ if TYPE_CHECKING:
         quantise,
         sample,
     )
+    from gearmbs.signals.shaft import shaft_phase
     from gearmbs.signals.shaft_force import COMPONENTS, force_components, force_to_acceleration
     from gearmbs.signals.signal import (
         as_signal,
@@ -69,8 +75,11 @@ if TYPE_CHECKING:
     )
     from gearmbs.signals.spectra import spectrum
     from gearmbs.signals.speed import SpeedEstimate, estimate_speed
+    from gearmbs.signals.speed_curve import SpeedCurve, speed_curve
+    from gearmbs.signals.time_frequency import spectrogram, waterfall
     from gearmbs.signals.tsa import difference_signal, regular_signal, remove_orders, residual_signal
     from gearmbs.signals.uneven import even_signal
+    from gearmbs.signals.vibration_report import VibrationReport
 
 __all__ = [
     "COMPONENTS",
@@ -86,7 +95,9 @@ __all__ = [
     "Mode",
     "SignalError",
     "SignalFileError",
+    "SpeedCurve",
     "SpeedEstimate",
+    "VibrationReport",
     "accelerometer",
     "add_noise",
     "analyse",
@@ -95,12 +106,14 @@ __all__ = [
     "as_signal",
     "band_rms",
     "bandpass",
+    "campbell",
     "common_unit",
     "compare",
     "compare_files",
     "condition_indicators",
     "convert",
     "crest_factor",
+    "critical_speeds",
     "decimate",
     "difference_signal",
     "dynamic_rms",
@@ -109,6 +122,7 @@ __all__ = [
     "envelope_spectrum",
     "estimate_speed",
     "even_signal",
+    "features",
     "fm0",
     "fm4",
     "force_components",
@@ -129,8 +143,10 @@ __all__ = [
     "mesh_frequency",
     "na4",
     "nb4",
+    "order_map",
     "order_rms",
     "order_spectrum",
+    "order_track",
     "ordinal_agreement",
     "peak_to_peak",
     "phase_from_line",
@@ -152,36 +168,44 @@ __all__ = [
     "scale",
     "scale_states",
     "sections",
+    "shaft_phase",
     "sideband_index",
     "sideband_level",
     "spectral_kurtosis",
+    "spectrogram",
     "spectrum",
+    "speed_curve",
     "time_synchronous_average",
+    "to_signal",
     "trend",
     "trend_table",
     "trim",
     "units_of",
+    "waterfall",
     "with_metadata",
+    "with_speed",
     "write_signal",
 ]
 
 late(
     __name__,
     {
-        "COMPONENTS": ".shaft_force",
-        "EXPECTED": ".expectations",
-        "FORMATS": ".io",
-        "INDICATORS": ".indicators",
         "AnalysisOptions": ".analysis",
         "AnalysisReport": ".analysis_report",
+        "COMPONENTS": ".shaft_force",
         "ComparisonReport": ".comparison_report",
+        "EXPECTED": ".expectations",
+        "FORMATS": ".io",
         "FrfPath": ".sensors",
+        "INDICATORS": ".indicators",
         "MissingMetadataError": ".errors",
         "ModalPath": ".sensors",
         "Mode": ".sensors",
         "SignalError": ".errors",
         "SignalFileError": ".errors",
+        "SpeedCurve": ".speed_curve",
         "SpeedEstimate": ".speed",
+        "VibrationReport": ".vibration_report",
         "accelerometer": ".sensors",
         "add_noise": ".sensors",
         "analyse": ".analysis",
@@ -190,12 +214,14 @@ late(
         "as_signal": ".signal",
         "band_rms": ".bands",
         "bandpass": ".filters",
+        "campbell": ".campbell",
         "common_unit": ".signal",
         "compare": ".comparison",
         "compare_files": ".comparison",
         "condition_indicators": ".indicators",
         "convert": ".conversion",
         "crest_factor": ".indicators",
+        "critical_speeds": ".campbell",
         "decimate": ".filters",
         "difference_signal": ".tsa",
         "dynamic_rms": ".scaling",
@@ -204,6 +230,7 @@ late(
         "envelope_spectrum": ".envelope",
         "estimate_speed": ".speed",
         "even_signal": ".uneven",
+        "features": ".features",
         "fm0": ".indicators",
         "fm4": ".indicators",
         "force_components": ".shaft_force",
@@ -224,8 +251,10 @@ late(
         "mesh_frequency": ".signal",
         "na4": ".indicators",
         "nb4": ".indicators",
+        "order_map": ".order_tracking",
         "order_rms": ".bands",
         "order_spectrum": ".angular",
+        "order_track": ".order_tracking",
         "ordinal_agreement": ".ordinal",
         "peak_to_peak": ".indicators",
         "phase_from_line": ".phase",
@@ -247,16 +276,22 @@ late(
         "scale": ".scaling",
         "scale_states": ".scaling",
         "sections": ".sections",
+        "shaft_phase": ".shaft",
         "sideband_index": ".indicators",
         "sideband_level": ".indicators",
         "spectral_kurtosis": ".envelope",
+        "spectrogram": ".time_frequency",
         "spectrum": ".spectra",
+        "speed_curve": ".speed_curve",
         "time_synchronous_average": ".angular",
+        "to_signal": ".door",
         "trend": ".sections",
         "trend_table": ".sections",
         "trim": ".signal",
         "units_of": ".signal",
+        "waterfall": ".time_frequency",
         "with_metadata": ".signal",
+        "with_speed": ".given",
         "write_signal": ".io",
     },
 )

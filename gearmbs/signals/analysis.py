@@ -3,36 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import pandas as pd
 import scipy.fft
 import xarray as xr
 
 from .analysis_report import AnalysisReport
-from .angular import samples_per_revolution, time_synchronous_average
+from .angular import angular_resample, samples_per_revolution, time_synchronous_average
 from .bands import HALF_WIDTH, TRANSITION, band_rms
-from .envelope import kurtogram
+from .door import Given, Units, to_signal
 from .errors import SignalError
-from .indicators import condition_indicators, crest_factor, kurtosis, peak_to_peak
-from .io import read_signal
-from .phase import phase_from_line, phase_from_speed, phase_from_tacho
-from .signal import common_unit, rate_of, require, units_of
+from .given import given_rate
+from .indicators import condition_indicators
+from .report_parts import impulsive_band, levels, line_spectrum, strongest_lines
+from .shaft_finding import Known, Shaft, mesh_shaft
+from .signal import check_teeth, common_unit, make_signal, rate_of, units_of
+from .simulated import read_any
 from .spectra import spectrum
-from .speed import MIN_QUALITY, SpeedEstimate, estimate_speed
+from .vibration import vibration_report
+from .vibration_report import VibrationReport
 
 Progress = Callable[[float, str], None]
-SPEED_TOLERANCE = 0.02
-"""How far from its nominal speed a drive is looked for, as a part of it."""
-
-LINE_SECONDS = 2.0
 SIDEBANDS = 3
 MIN_AVERAGES = 2
-KURTOGRAM_LEVELS = 6
+LINE_TURNS = 32
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,45 +38,67 @@ class AnalysisOptions:
     """Settings of `analyse`; see there for what they mean."""
 
     teeth: int | Sequence[int] | None = None
-    speed: float | None = None
+    speed: Any = None
     speed_range: tuple[float, float] | None = None
+    phase: xr.DataArray | None = None
     tacho: str | None = None
     pulses_per_rev: float = 1.0
+    speed_channel: str | None = None
     wheel: int = 1
     harmonics: int = 3
     half_width: float = HALF_WIDTH
     lines: int = 5
 
+    @property
+    def known(self) -> Known:
+        """What is known of the shaft."""
+        return Known(**{name: getattr(self, name) for name in Known._fields})
+
+
+SETTINGS = tuple(f.name for f in fields(AnalysisOptions))
+
 
 def analyse(
-    signal: xr.DataArray,
+    signal: Any,
     teeth: int | Sequence[int] | None = None,
     *,
+    rate: Given | None = None,
+    units: Units | None = None,
+    channels: Sequence[str] | None = None,
+    gaps: str | None = None,
     progress: Progress | None = None,
     options: AnalysisOptions | None = None,
     **settings: Any,
-) -> AnalysisReport:
-    """Analyse a record of a running gear pair.
+) -> AnalysisReport | VibrationReport:
+    """Analyse a record: of a running gear pair if teeth are known, of plain vibration otherwise.
 
     Parameters
     ----------
-    signal : xarray.DataArray
-        Dimensions (time, channel).
+    signal : array_like, DataFrame, DataArray, Dataset or path
+        Data of any shape (`to_signal`): samples with `rate`, a table, a signal, a simulated record, a file.
     teeth : int or sequence, optional
-        Tooth counts, the wheel of the reference shaft first; default the signal's.
+        Tooth counts, the wheel of the reference shaft first; default the signal's. Without them the report is a
+        `VibrationReport`.
+    rate, units, channels, gaps : optional
+        As for `to_signal`.
     progress : callable, optional
         Called as progress(fraction, stage).
     options : AnalysisOptions, optional
         The settings below in one object, instead of keywords.
-    speed : float, optional
-        Speed of that wheel in rad/s; default the signal's. The mesh line is looked for within 2 % of it, and used if
-        found, for no drive holds its nominal speed exactly. Without a speed, see `estimate_speed`.
+    speed : float, str or curve, optional
+        Speed of that wheel in any shape that `speed_curve` reads; default the signal's. Near a constant speed the mesh
+        line is looked for within 2 %, and used if found, for no drive holds its nominal speed exactly; a curve gives
+        the angle as it is. Without a speed, see `estimate_speed`.
     speed_range : (float, float), optional
         Speeds in rad/s to look for, where none is given.
+    phase : xarray.DataArray, optional
+        The angle itself, rad, of dimension (time,).
     tacho : str, optional
         Name of a tacho channel; it gives the angle and is left out of the analysis.
     pulses_per_rev : float
         Of the tacho, default 1.
+    speed_channel : str, optional
+        Name of a channel that holds the speed in its own unit; it is left out of the analysis.
     wheel : int
         Which wheel's shaft the average, its indicators and the sidebands follow: 1, the default, is the first of
         `teeth`, 2 its mate.
@@ -92,90 +112,98 @@ def analyse(
 
     Returns
     -------
-    AnalysisReport
+    AnalysisReport or VibrationReport
 
     Raises
     ------
     MissingMetadataError
-        If the tooth count is unknown.
+        If no sampling rate is known.
     SignalError
         If no mesh line is found and no speed given, or the record is too short for the bands.
     TypeError
         For settings there are not.
     """
     if options is None:
+        unknown = [name for name in settings if name not in SETTINGS]
+        if unknown:
+            raise TypeError(f"analyse: there is no setting {unknown[0]!r}; settings are {', '.join(SETTINGS)}")
         options = AnalysisOptions(teeth=teeth, **settings)
     elif settings or teeth is not None:
         raise TypeError(f"analyse: give options or {', '.join(['teeth'] * (teeth is not None) + list(settings))}")
-    return _report(signal, options, _Stages(progress))
+    helpers = [name for name in (options.tacho, options.speed_channel) if name is not None]
+    kept = None if channels is None else [*channels, *(name for name in helpers if name not in channels)]
+    data = to_signal(signal, rate=rate, units=units, channels=kept, gaps=gaps)
+    counts = options.teeth if options.teeth is not None else data.attrs.get("teeth")
+    if counts is None:
+        return vibration_report(data, options.known, lines=options.lines, progress=progress)
+    return _report(data, check_teeth(counts), options, _Stages(progress))
 
 
-def analyse_file(
-    path: str | Path,
-    *,
-    teeth: int | Sequence[int] | None = None,
-    rate: float | None = None,
-    units: str | Sequence[str] | Mapping[str, str] | None = None,
-    speed: float | None = None,
-    channels: Sequence[str] | None = None,
-    format: str | None = None,
-    progress: Progress | None = None,
-    **settings: Any,
-) -> AnalysisReport:
-    """Read a file (`read_signal`) and analyse it.
+def analyse_file(path: str | Path, **settings: Any) -> AnalysisReport | VibrationReport:
+    """Read a file (`read_signal`) and analyse it; `analyse` takes a path as well.
 
     Parameters
     ----------
     path : str or Path
-    teeth, rate, units, speed, channels, format, progress
-        As for `read_signal`.
     **settings
-        The other settings of `analyse`.
+        As for `analyse`, and `format` as for `read_signal`.
 
     Returns
     -------
-    AnalysisReport
+    AnalysisReport or VibrationReport
 
     Raises
     ------
     SignalFileError, MissingMetadataError, SignalError
         See `read_signal` and `analyse`.
     """
-    options = AnalysisOptions(speed=speed, **settings)
-    signal = read_signal(
-        path, rate=rate, units=units, speed=speed, teeth=teeth, channels=channels, format=format, progress=progress
-    )
-    return analyse(signal, options=options, progress=progress)
+    if settings.get("format") is None:
+        settings.pop("format", None)
+        return analyse(path, **settings)
+    reading = {name: settings.pop(name) for name in ("rate", "units", "gaps", "format") if name in settings}
+    return analyse(read_any(path, **{**reading, "rate": given_rate(reading.get("rate"))}), **settings)
 
 
-def _report(signal: xr.DataArray, options: AnalysisOptions, tell: _Stages) -> AnalysisReport:
+def _report(signal: xr.DataArray, counts: tuple[int, ...], options: AnalysisOptions, tell: _Stages) -> AnalysisReport:
     """Carry out the stages of an analysis."""
-    counts = require(signal, "teeth", options.teeth, needed_for="the gear mesh frequency")
-    notes: list[str] = []
+    notes = [str(note) for note in signal.attrs.get("notes", ())]
+    missing: dict[str, str] = {}
     tell("speed")
-    shaft, signal = _shaft_angle(signal, counts, options, notes)
-    gmf = counts[0] * shaft.speed / (2.0 * math.pi)
-    rate = rate_of(signal)
-    harmonics = _fitting_harmonics(rate, gmf, options, notes)
-    tell("averaging")
     if not 1 <= options.wheel <= len(counts):
         raise SignalError(f"wheel: must be 1 to {len(counts)}, the number of tooth counts given, got {options.wheel!r}")
+    shaft, signal = mesh_shaft(signal, counts, options.known, notes)
+    gmf = counts[0] * shaft.speed / (2.0 * math.pi)
+    rate = rate_of(signal)
+    top = gmf if shaft.range is None else gmf * shaft.range[1] / shaft.speed
+    harmonics = _fitting_harmonics(rate, top, options, notes)
+    tell("averaging")
     own, phase = counts[options.wheel - 1], shaft.phase
     if options.wheel > 1:
         phase = phase * (counts[0] / own)
         notes.append(f"Averages, indicators and sidebands follow wheel {options.wheel} with {own} teeth.")
     average = _average(signal, phase, own, harmonics, shaft.speed * counts[0] / own, notes, tell)
+    if average is None:
+        turns = float(phase.values[-1] - phase.values[0]) / (2.0 * math.pi)
+        why = f"the record holds {turns:.2f} revolutions, an average needs {MIN_AVERAGES + 1}"
+        missing |= dict.fromkeys(("average", "indicators", "sidebands", "orders"), why)
     sidebands = None if average is None else _line_table(average, own, harmonics)
     by_orders = np.full((harmonics, signal.sizes["channel"]), np.nan)
     if sidebands is not None:
         by_orders = sidebands.sel(sideband=0).values
-    bands = _band_levels(signal, gmf, harmonics, options.half_width, tell)
+    followed = _in_angle(signal, shaft, counts[0], harmonics, notes)
+    source, scale = (signal, 1.0) if followed is None else (followed, shaft.speed / math.tau)
+    bands = _band_levels(source, gmf / scale, harmonics, options.half_width, tell)
     tell("lines")
-    strongest = _strongest(signal, gmf, options.lines)
+    spectral = line_spectrum(source) if followed is None else spectrum(source, scaling="rms", segment=float(LINE_TURNS))
+    strongest = strongest_lines(
+        spectral.assign_coords(frequency=spectral["frequency"] * scale), options.lines, gmf, "gmf_order"
+    )
     tell("kurtogram")
-    impulsive = None
-    if signal.sizes["time"] // 2 >= 16 << KURTOGRAM_LEVELS:
-        impulsive = kurtogram(signal, levels=KURTOGRAM_LEVELS, progress=lambda f, _: tell("kurtogram", f))
+    impulsive = impulsive_band(signal, lambda f, _: tell("kurtogram", f))
+    if isinstance(impulsive, str):
+        missing["impulsive"] = impulsive
+    if shaft.estimate is None:
+        missing["estimate"] = f"the speed is {shaft.origin}, it was not estimated"
     tell("done", 1.0)
     return AnalysisReport(
         source=str(signal.attrs.get("source", signal.name or "signal")),
@@ -186,14 +214,32 @@ def _report(signal: xr.DataArray, options: AnalysisOptions, tell: _Stages) -> An
         gmf=gmf,
         speed_origin=shaft.origin,
         harmonics=_harmonic_table(signal, bands, by_orders, gmf, options.half_width),
-        levels=_levels(signal),
+        levels=levels(signal),
         lines=strongest,
         sidebands=sidebands,
         indicators=None if average is None else condition_indicators(average, own, harmonics=harmonics),
-        impulsive=impulsive,
+        impulsive=None if isinstance(impulsive, str) else impulsive,
         average=average,
         estimate=shaft.estimate,
+        speed_range=shaft.range,
+        missing=missing,
         notes=notes,
+    )
+
+
+def _in_angle(signal: xr.DataArray, shaft: Shaft, teeth: int, harmonics: int, notes: list[str]) -> xr.DataArray | None:
+    """The record over revolutions, as a signal whose "Hz" are orders, where the speed varies; else None."""
+    if shaft.range is None:
+        return None
+    per_rev = 1 << math.ceil(math.log2(2.5 * teeth * (harmonics + 1)))
+    angular = angular_resample(signal, shaft.phase, samples_per_rev=per_rev)
+    low, high = (value * 30.0 / math.pi for value in shaft.range)
+    notes.append(
+        f"The speed varies from {low:.1f} to {high:.1f} rpm: bands and lines follow it in angle, their frequencies "
+        "in Hz are those at the mean speed."
+    )
+    return make_signal(
+        angular.values, float(per_rev), channels=[str(c) for c in angular["channel"].values], units=units_of(signal)
     )
 
 
@@ -212,11 +258,11 @@ def _fitting_harmonics(rate: float, gmf: float, options: AnalysisOptions, notes:
 def _band_levels(signal: xr.DataArray, gmf: float, harmonics: int, half_width: float, tell: _Stages) -> np.ndarray:
     """Return the RMS in the band of each harmonic, shape (harmonics, channels)."""
     widths = {"half_width": half_width * gmf, "transition": TRANSITION * gmf, "period": 1.0 / gmf}
-    levels = []
+    rows = []
     for k in range(1, harmonics + 1):
         tell("bands", (k - 1) / harmonics)
-        levels.append(band_rms(signal, k * gmf, **widths).values)
-    return np.stack(levels)
+        rows.append(band_rms(signal, k * gmf, **widths).values)
+    return np.stack(rows)
 
 
 class _Stages:
@@ -234,62 +280,6 @@ class _Stages:
         i = self.ORDER.index(stage)
         start, stop = self.STARTS[i], self.STARTS[min(i + 1, len(self.STARTS) - 1)]
         self.progress(start + fraction * (stop - start), stage)
-
-
-class _Shaft(NamedTuple):
-    """Angle of the reference shaft over time, its mean speed (rad/s) and where they are from."""
-
-    phase: xr.DataArray
-    speed: float
-    origin: str
-    estimate: SpeedEstimate | None = None
-
-
-def _shaft_angle(
-    signal: xr.DataArray, counts: tuple[int, ...], options: AnalysisOptions, notes: list[str]
-) -> tuple[_Shaft, xr.DataArray]:
-    """Return the shaft's angle from the tacho, the given speed or the mesh line, and the channels left to analyse."""
-    if options.tacho is not None:
-        return _from_tacho(signal, options.tacho, options.pulses_per_rev)
-    nominal = options.speed if options.speed is not None else signal.attrs.get("speed")
-    if nominal is not None:
-        return _near_speed(signal, counts, float(nominal), notes), signal
-    estimate = estimate_speed(signal, counts, speed_range=options.speed_range)
-    if estimate.phase is None:
-        notes.append("The mesh line is too weak to follow in phase; the speed is taken as constant.")
-    phase = phase_from_speed(signal, estimate.speed) if estimate.phase is None else estimate.phase
-    return _Shaft(phase, estimate.speed, "estimated from the mesh line", estimate), signal
-
-
-def _from_tacho(signal: xr.DataArray, tacho: str, pulses_per_rev: float) -> tuple[_Shaft, xr.DataArray]:
-    phase = phase_from_tacho(signal, tacho, pulses_per_rev=pulses_per_rev)
-    rest = [c for c in signal["channel"].values.tolist() if c != tacho]
-    if not rest:
-        raise SignalError(f"tacho: {tacho!r} is the only channel, nothing is left to analyse")
-    mean = float(phase.values[-1] - phase.values[0]) / float(phase["time"].values[-1] - phase["time"].values[0])
-    return _Shaft(phase, mean, f"from the tacho {tacho!r}"), signal.sel(channel=rest)
-
-
-def _near_speed(signal: xr.DataArray, counts: tuple[int, ...], nominal: float, notes: list[str]) -> _Shaft:
-    """Return the angle by the mesh line near a given speed, or at that speed where there is none."""
-    around = (nominal * (1.0 - SPEED_TOLERANCE), nominal * (1.0 + SPEED_TOLERANCE))
-    try:
-        found = estimate_speed(signal, counts, speed_range=around)
-    except SignalError:
-        found = None
-    if found is not None and found.phase is not None:
-        words = f"from the mesh line, {100 * (found.speed / nominal - 1):+.3f} % off the given speed"
-        return _Shaft(found.phase, found.speed, words, found)
-    try:
-        phase = phase_from_line(signal, nominal * counts[0] / (2.0 * math.pi), counts[0])
-    except SignalError:
-        phase = None
-    if phase is not None and phase.attrs["quality"] >= MIN_QUALITY:
-        followed = float(phase.attrs["mean_speed"])
-        if abs(followed / nominal - 1) < SPEED_TOLERANCE:
-            return _Shaft(phase, followed, "from the given speed, followed by the mesh line")
-    notes.append("No mesh line could be followed near the given speed; it is taken as constant.")
-    return _Shaft(phase_from_speed(signal, nominal), nominal, "as given")
 
 
 def _average(
@@ -339,34 +329,3 @@ def _harmonic_table(
         },
         attrs={"gmf": gmf, "half_width": half_width, "transition": TRANSITION},
     )
-
-
-def _levels(signal: xr.DataArray) -> xr.Dataset:
-    measures: dict[str, Callable[[np.ndarray], float]] = {
-        "rms": np.std,
-        "peak_to_peak": peak_to_peak,
-        "crest": crest_factor,
-        "kurtosis": kurtosis,
-    }
-    found: dict[str, list[float]] = {name: [] for name in measures}
-    for column in signal.values.T:
-        one = np.ascontiguousarray(column)
-        for name, measure in measures.items():
-            found[name].append(float(measure(one)))
-    unit = common_unit(signal)
-    variables = {
-        name: ("channel", np.asarray(values), {"units": "1" if name in ("crest", "kurtosis") else unit})
-        for name, values in found.items()
-    }
-    return xr.Dataset(variables, coords={"channel": signal["channel"].values})
-
-
-def _strongest(signal: xr.DataArray, gmf: float, count: int) -> pd.DataFrame:
-    lines = spectrum(signal, scaling="rms", segment=LINE_SECONDS)
-    frequency = lines["frequency"].values
-    rows = []
-    for name, column in zip(signal["channel"].values, lines.values.T):
-        peaks = 1 + np.flatnonzero((column[1:-1] > column[:-2]) & (column[1:-1] >= column[2:]))
-        for i in peaks[np.argsort(column[peaks])[::-1][:count]]:
-            rows.append((str(name), float(frequency[i]), float(frequency[i] / gmf), float(column[i])))
-    return pd.DataFrame(rows, columns=["channel", "frequency", "gmf_order", "rms"])

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
+from .features import By, feature_rows, rows_to_frame
+from .indicators import INDICATORS
 from .report import markdown_table, significant
+from .report_parts import BAND_FEATURES, IMPULSIVE, channel_table, missing_list, transposed
 from .speed import SpeedEstimate
-
-IMPULSIVE = {"best_centre": "centre, Hz", "best_bandwidth": "bandwidth, Hz", "best_kurtosis": "kurtosis - 2"}
 
 
 @dataclass
@@ -49,6 +50,10 @@ class AnalysisReport:
         Band with the highest kurtosis by channel (`best_centre`, `best_bandwidth`, `best_kurtosis`).
     average : xarray.DataArray or None
         The time-synchronous average, dimensions (angle, channel).
+    speed_range : tuple of float or None
+        Lowest and highest speed in rad/s where it varies, else None.
+    missing : dict of str to str
+        What could not be computed, and why: nothing is None or NaN throughout without an entry here.
     notes : list of str
         What a reader should know about the results.
     """
@@ -68,22 +73,46 @@ class AnalysisReport:
     impulsive: xr.Dataset | None = None
     average: xr.DataArray | None = None
     estimate: SpeedEstimate | None = None
+    speed_range: tuple[float, float] | None = None
+    missing: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """The numbers as tables: harmonics, levels, lines, and where known sidebands, indicators and impulsive."""
         stacked = self.harmonics[["band", "orders"]].to_dataframe().reset_index()
         keep = ["harmonic", "frequency", "channel", "band", "orders"]
-        tables = {"harmonics": stacked[keep], "levels": _channel_table(self.levels), "lines": self.lines}
+        tables = {"harmonics": stacked[keep], "levels": channel_table(self.levels), "lines": self.lines}
         if self.sidebands is not None:
             tables["sidebands"] = self.sidebands.to_dataframe(name="rms").reset_index()[
                 ["harmonic", "sideband", "channel", "rms"]
             ]
         if self.indicators is not None:
-            tables["indicators"] = _channel_table(self.indicators)
+            tables["indicators"] = channel_table(self.indicators)
         if self.impulsive is not None:
-            tables["impulsive"] = _channel_table(self.impulsive[["best_centre", "best_bandwidth", "best_kurtosis"]])
+            tables["impulsive"] = channel_table(self.impulsive[["best_centre", "best_bandwidth", "best_kurtosis"]])
         return tables
+
+    def to_frame(self, by: By = "record") -> pd.DataFrame:
+        """The numbers as one flat row, or one for each channel; see `features`."""
+        return rows_to_frame(feature_rows(self, by))
+
+    def record_features(self) -> dict[str, float]:
+        """Numbers of the whole record."""
+        return {"speed_rpm": self.speed * 30.0 / math.pi, "gmf_hz": self.gmf}
+
+    def channel_features(self) -> xr.Dataset:
+        """Numbers of each channel: levels, mesh harmonics, sidebands, indicators, most impulsive band."""
+        data = self.levels.copy()
+        for k in range(self.harmonics.sizes["harmonic"]):
+            data[f"band_{k + 1}"] = ("channel", self.harmonics["band"].values[k])
+            data[f"line_{k + 1}"] = ("channel", self.harmonics["orders"].values[k])
+        for name in INDICATORS:
+            values = np.full(data.sizes["channel"], np.nan) if self.indicators is None else self.indicators[name].values
+            data[name if name not in self.levels else f"average_{name}"] = ("channel", values)
+        for key, name in BAND_FEATURES.items():
+            values = np.full(data.sizes["channel"], np.nan) if self.impulsive is None else self.impulsive[key].values
+            data[name] = ("channel", values)
+        return data
 
     def to_markdown(self) -> str:
         """The report as Markdown text."""
@@ -109,7 +138,7 @@ class AnalysisReport:
             cells = [f"{significant(b)} ({significant(o)})" for b, o in zip(band, line)]
             rows.append([f"{k + 1} x GMF", f"{self.harmonics['frequency'].values[k]:.2f}", *cells])
         parts += [markdown_table(["harmonic", "Hz", *channels], rows), "", "## Levels of the record", ""]
-        parts += [_transposed(self.levels, channels), ""]
+        parts += [transposed(self.levels, channels), ""]
         if self.indicators is not None:
             count = self.indicators.attrs["averages"]
             parts += [
@@ -117,18 +146,19 @@ class AnalysisReport:
                 "",
                 f"Of the time-synchronous average over {count} revolutions.",
                 "",
-                _transposed(self.indicators, channels),
+                transposed(self.indicators, channels),
                 "",
             ]
         if self.sidebands is not None:
             parts += ["## Sidebands, dB relative to their harmonic", "", self._sideband_table(channels), ""]
         if self.impulsive is not None:
-            parts += ["## Most impulsive band", "", _transposed(self.impulsive, channels, IMPULSIVE), ""]
+            parts += ["## Most impulsive band", "", transposed(self.impulsive, channels, IMPULSIVE), ""]
         rows = [
             [r.channel, f"{r.frequency:.2f}", f"{r.gmf_order:.3f}", significant(r.rms)] for r in self.lines.itertuples()
         ]
         parts += ["## Strongest lines", "", markdown_table(["channel", "Hz", "x GMF", "RMS"], rows), ""]
-        return "\n".join(parts)
+        kept = {name: why for name, why in self.missing.items() if name != "estimate"}
+        return "\n".join(parts + missing_list(kept))
 
     def _sideband_table(self, channels: Sequence[str]) -> str:
         assert self.sidebands is not None
@@ -153,13 +183,3 @@ class AnalysisReport:
             f"<AnalysisReport of {self.source!r}: GMF {self.gmf:.2f} Hz, {self.speed * 30 / math.pi:.1f} rpm, "
             f"{self.levels.sizes['channel']} channels, {self.duration:.2f} s>"
         )
-
-
-def _channel_table(data: xr.Dataset) -> pd.DataFrame:
-    return pd.DataFrame({"channel": data["channel"].values, **{str(k): v.values for k, v in data.data_vars.items()}})
-
-
-def _transposed(data: xr.Dataset, channels: Sequence[str], names: Mapping[str, str] | None = None) -> str:
-    wanted = names or {str(k): str(k).replace("_", " ") for k in data.data_vars}
-    rows = [[label, *(significant(v) for v in data[key].values)] for key, label in wanted.items()]
-    return markdown_table(["", *channels], rows)

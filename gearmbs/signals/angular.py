@@ -11,12 +11,18 @@ import scipy.fft
 import xarray as xr
 
 from .errors import SignalError
+from .filters import apply_zero_phase, decimation_taps
 from .interpolation import interpolate
 from .signal import common_unit, rate_of, units_of
 from .spectra import periodograms, spectral_unit
 
 Progress = Callable[[float, str], None]
 BLOCK_SAMPLES = 1 << 17
+SLOWEST_PART = 0.25
+"""Below this part of the mean speed the default samples a revolution no longer keep all that was recorded."""
+FINEST = 10
+"""Steps of angle are divided by two so many times at most to keep aliases out near standstill."""
+BLOCK_STEPS = 64
 TURN = 2.0 * math.pi
 
 
@@ -28,10 +34,12 @@ def angular_resample(signal: xr.DataArray, phase: xr.DataArray, *, samples_per_r
     signal : xarray.DataArray
         Dimensions (time, channel).
     phase : xarray.DataArray
-        Shaft angle in rad, increasing, dimension (time,), covering all or part of the record
-        (`phase_from_tacho`, `phase_from_line`, `phase_from_speed`).
+        Shaft angle in rad, dimension (time,), covering all or part of the record (`phase_from_tacho`,
+        `phase_from_line`, `phase_from_speed`). It may rest, as before a run-up, but not turn back.
     samples_per_rev : int, optional
-        Default: the smallest power of two that samples nowhere coarser than the record does.
+        Default: the smallest power of two that samples nowhere coarser than the record does, at speeds from a quarter
+        of the mean speed (without rests) up. Where the shaft turns so slowly that the record holds more orders than
+        half of this number, they are filtered out before sampling (flat to 0.4 samples_per_rev, 100 dB down at 0.5).
 
     Returns
     -------
@@ -42,11 +50,10 @@ def angular_resample(signal: xr.DataArray, phase: xr.DataArray, *, samples_per_r
     Raises
     ------
     SignalError
-        If the phase does not increase, or does not overlap the record.
+        If the phase turns back or does not turn, or does not overlap the record.
     """
     clock = _Clock(signal, phase, samples_per_rev)
-    positions = clock.positions(clock.first, clock.last + 1)
-    values = np.stack([interpolate(column, positions) for column in signal.values.T], axis=1)
+    values = clock.sampled(signal.values, clock.first, clock.last + 1)
     angle = np.arange(clock.first, clock.last + 1) / clock.per_rev
     return _angular(signal, values, angle, clock.per_rev, {"mean_speed": clock.mean_speed})
 
@@ -95,9 +102,8 @@ def time_synchronous_average(
     for start in range(0, count, per_block):
         turns = min(per_block, count - start)
         begin = clock.first + start * length
-        positions = clock.positions(begin, begin + turns * length)
-        for channel, column in enumerate(signal.values.T):
-            total[:, channel] += interpolate(column, positions).reshape(turns, length).sum(axis=0)
+        block = clock.sampled(signal.values, begin, begin + turns * length)
+        total += block.reshape(turns, length, -1).sum(axis=0)
         if progress is not None:
             progress((start + turns) / count, "averaging")
     # Angles keep their origin: the first sample of the average is the same angle of the shaft in every record.
@@ -167,25 +173,74 @@ class _Clock:
         if self.at.size < 2:
             raise SignalError("phase: does not overlap the record; both need the same time axis in s")
         steps = np.diff(self.turns)
-        if not np.all(steps > 0.0):
+        if np.any(steps < 0.0) or not self.turns[-1] > self.turns[0]:
+            where = (
+                f"falls at t = {start + self.at[int(np.argmin(steps))] / rate:g} s" if steps.min() < 0.0 else "rests"
+            )
             raise SignalError(
-                "phase: must increase from sample to sample; give the angle of a shaft that keeps turning"
+                f"phase: must increase from sample to sample, or rest for a while, but it {where}; "
+                "give the angle of a shaft that keeps turning one way"
             )
         self.mean_speed = float((self.turns[-1] - self.turns[0]) / (self.at[-1] - self.at[0]) * rate * TURN)
         if per_rev is None:
-            per_rev = samples_per_revolution(rate, float((steps / np.diff(self.at)).min()) * rate)
+            speeds = steps / np.maximum(np.diff(self.at), 1e-9) * rate
+            moving = speeds[speeds > 0.0]
+            slowest = max(float(moving.min()), SLOWEST_PART * float(moving.mean()))
+            per_rev = samples_per_revolution(rate, slowest)
         if per_rev < 4:
             raise SignalError(f"samples_per_rev: must be at least 4, got {per_rev!r}")
         self.per_rev = int(per_rev)
         self.first = math.ceil(self.turns[0] * self.per_rev - 1e-9)
         self.last = math.floor(self.turns[-1] * self.per_rev + 1e-9)
 
-    def positions(self, begin: int, end: int) -> np.ndarray:
-        angles = np.arange(begin, end) / self.per_rev
+    def positions(self, begin: int, end: int, finer: int = 1) -> np.ndarray:
+        """Where steps `begin` to `end` (not included) of 1 / (per_rev finer) revolution fall in the record."""
+        angles = np.arange(begin, end) / (self.per_rev * finer)
         # Only the stretch that is needed: the whole record's tables would be copied each time.
         low = max(0, int(np.searchsorted(self.turns, angles[0])) - 1)
-        high = int(np.searchsorted(self.turns, angles[-1])) + 1
+        high = int(np.searchsorted(self.turns, angles[-1], side="right")) + 1
         return np.interp(angles, self.turns[low:high], self.at[low:high])
+
+    def times(self, angles: np.ndarray) -> np.ndarray:
+        """Where angles in revolutions fall in the record (fractional samples)."""
+        return np.interp(angles, self.turns, self.at)
+
+    def sampled(self, values: np.ndarray, begin: int, end: int) -> np.ndarray:
+        """Samples at steps `begin` to `end` (not included) of angle, shape (end - begin, channels).
+
+        Where a step of angle takes longer than a sample, steps are halved until it does not, and the finer ones
+        filtered and thinned out: a stretch of the record that was sampled too coarsely would show aliases.
+        """
+        positions = self.positions(begin, end)
+        halvings = _halvings(positions)
+        out = np.empty((positions.size, values.shape[1]))
+        edges = np.flatnonzero(np.diff(halvings)) + 1
+        for low, high in zip(np.r_[0, edges], np.r_[edges, positions.size]):
+            m = int(halvings[low])
+            if m == 0:
+                for channel, column in enumerate(values.T):
+                    out[low:high, channel] = interpolate(column, positions[low:high])
+                continue
+            taps = decimation_taps(1 << m, float(1 << m))
+            half = taps.size // 2
+            fine = self.positions((begin + low << m) - half, (begin + high - 1 << m) + half + 1, 1 << m)
+            source = np.stack([interpolate(column, fine) for column in values.T], axis=1)
+            out[low:high] = apply_zero_phase(source, taps, "trim", 1 << m)[0]
+        return out
+
+
+def _halvings(positions: np.ndarray) -> np.ndarray:
+    """How often each step of angle must be halved to be no longer than a sample, equal over blocks of steps."""
+    if positions.size < 2:
+        return np.zeros(positions.size, dtype=int)
+    steps = np.diff(positions)
+    longest = np.maximum(np.append(steps, steps[-1]), np.insert(steps, 0, steps[0]))
+    if longest.max() <= 1.0 + 1e-6:
+        return np.zeros(positions.size, dtype=int)
+    needed = np.clip(np.ceil(np.log2(np.maximum(longest, 1.0)) - 1e-6), 0, FINEST).astype(int)
+    blocks = -(-positions.size // BLOCK_STEPS)
+    padded = np.pad(needed, (0, blocks * BLOCK_STEPS - needed.size)).reshape(blocks, BLOCK_STEPS)
+    return np.repeat(padded.max(axis=1), BLOCK_STEPS)[: positions.size]
 
 
 def _angular(

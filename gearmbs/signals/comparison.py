@@ -10,21 +10,28 @@ import numpy as np
 import xarray as xr
 
 from .analysis import analyse
+from .analysis_report import AnalysisReport
 from .bands import HALF_WIDTH
 from .comparison_report import ComparisonReport
+from .door import Given, Units, to_signal
 from .errors import SignalError
-from .io import read_signal
+from .signal import require
 
 Progress = Callable[[float, str], None]
-States = Mapping[str, Mapping[str, xr.DataArray]]
+States = Mapping[str, Mapping[str, Any]]
 Scope = Literal["load", "all", "each"]
 FEATURES = ("kurtosis", "fm4", "energy_ratio", "sideband_level")
 
 
 def compare(
-    experiment: States,
-    model: States | None = None,
+    experiment: States | Mapping[str, Any],
+    model: States | Mapping[str, Any] | None = None,
     *,
+    rate: Given | None = None,
+    units: Units | None = None,
+    teeth: int | Sequence[int] | None = None,
+    speed: Any = None,
+    gaps: str | None = None,
     reference: str = "healthy",
     scope: Scope = "load",
     channel: str | None = None,
@@ -42,12 +49,15 @@ def compare(
 
     Parameters
     ----------
-    experiment : mapping of load to mapping of state to signal
-        E.g. {"low": {"healthy": s1, "misaligned": s2}, "high": {...}}, loads from low to high. Each signal needs
-        `teeth`; its speed is used if it has one, and found from the mesh line otherwise.
+    experiment : mapping of load to mapping of state to record
+        E.g. {"low": {"healthy": s1, "misaligned": s2}, "high": {...}}, loads from low to high, or of one load
+        {"healthy": s1, "misaligned": s2}. Records are data of any shape (`to_signal`): signals, arrays, tables, files.
+        Each needs `teeth`; its speed is used if it has one, and found from the mesh line otherwise.
     model : the same, optional
         Without it the report says what each state does to the experiment. Its loads and states must cover some of the
         experiment's; the rest is left out and named.
+    rate, units, teeth, speed, gaps : optional
+        What the records of the experiment do not say themselves, as for `to_signal`.
     reference : str
         The state the others are held against.
     scope : {"load", "all", "each"}
@@ -80,6 +90,8 @@ def compare(
         raise SignalError(f"scope: must be 'load', 'all' or 'each', got {scope!r}")
     if way not in ("band", "orders"):
         raise SignalError(f"way: must be 'band' or 'orders', got {way!r}")
+    experiment = _signals(experiment, rate=rate, units=units, teeth=teeth, speed=speed, gaps=gaps)
+    model = None if model is None else _signals(model)
     loads, states, left_out = _common_cases(experiment, model, reference)
     sides = [("experiment", experiment, channel)] + ([] if model is None else [("model", model, model_channel)])
     kept = [(load, s) for load in loads for s in states if all(s in cases[load] for _, cases, _ in sides)]
@@ -105,6 +117,18 @@ def compare(
     return ComparisonReport(data, reference, left_out)
 
 
+def _signals(cases: Mapping[str, Any], **known: Any) -> dict[str, dict[str, xr.DataArray]]:
+    """Records by load and state as signals; states alone are those of one load."""
+    nested = [isinstance(value, Mapping) and not isinstance(value, xr.Dataset) for value in cases.values()]
+    if not cases or (any(nested) and not all(nested)):
+        raise SignalError("experiment: give records by state, {'healthy': ...}, or by load and state, {'low': {...}}")
+    loads = cases if all(nested) else {"all": cases}
+    return {
+        str(load): {str(state): to_signal(data, **known) for state, data in states.items()}
+        for load, states in loads.items()
+    }
+
+
 def _with_model(data: xr.Dataset, model: xr.Dataset, reference: str, scope: str) -> xr.Dataset:
     """Put the model's levels beside the experiment's, scaled."""
     data, model = data.isel(channel=0, drop=True), model.isel(channel=0, drop=True)
@@ -127,12 +151,12 @@ def compare_files(
     model: Mapping[str, Mapping[str, str | Path]] | None = None,
     *,
     teeth: int | Sequence[int] | None = None,
-    rate: float | None = None,
-    units: str | None = None,
-    speed: float | None = None,
+    rate: Given | None = None,
+    units: Units | None = None,
+    speed: Any = None,
     **settings: Any,
 ) -> ComparisonReport:
-    """Read the files and `compare` them.
+    """Read the files and `compare` them, which takes files as well.
 
     Parameters
     ----------
@@ -146,14 +170,7 @@ def compare_files(
     -------
     ComparisonReport
     """
-    measured = {
-        load: {s: read_signal(p, rate=rate, units=units, teeth=teeth, speed=speed) for s, p in cases.items()}
-        for load, cases in experiment.items()
-    }
-    simulated = None
-    if model is not None:
-        simulated = {load: {s: read_signal(p) for s, p in cases.items()} for load, cases in model.items()}
-    return compare(measured, simulated, **settings)
+    return compare(experiment, model, teeth=teeth, rate=rate, units=units, speed=speed, **settings)
 
 
 def _common_cases(experiment: States, model: States | None, reference: str) -> tuple[list[str], list[str], list[str]]:
@@ -195,7 +212,9 @@ def _picked(signal: xr.DataArray, channel: str | None, side: str, single: bool) 
 def _features(
     signal: xr.DataArray, harmonics: int, half_width: float, way: str, wheel: int, tell: Progress
 ) -> xr.Dataset:
+    require(signal, "teeth", needed_for="the gear mesh frequency")
     report = analyse(signal, harmonics=harmonics, half_width=half_width, wheel=wheel, lines=1, progress=tell)
+    assert isinstance(report, AnalysisReport)
     found = report.harmonics.sizes["harmonic"]
     if found < harmonics:
         raise SignalError(

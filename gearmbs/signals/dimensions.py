@@ -37,7 +37,7 @@ def _dimension(unit: str) -> tuple[str, float]:
     text = unit.strip()
     for old, new in REPLACEMENTS:
         text = text.replace(old, new)
-    quantity = _registry().Quantity(1.0, ALIASES.get(text, text))
+    quantity = unit_registry().Quantity(1.0, ALIASES.get(text, text))
     for dimension, si in DIMENSIONS.items():
         if quantity.is_compatible_with(si):
             return dimension, float(quantity.to(si).magnitude)
@@ -45,7 +45,7 @@ def _dimension(unit: str) -> tuple[str, float]:
 
 
 @lru_cache(maxsize=1)
-def _registry() -> Any:
+def unit_registry() -> Any:
     import pint
 
     return pint.UnitRegistry()

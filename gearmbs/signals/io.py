@@ -3,24 +3,51 @@
 from __future__ import annotations
 
 import os
+import re
+import struct
 import tempfile
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
 from .errors import SignalError, SignalFileError
+from .gaps import checked_gaps
+from .given import given_rate, given_speed, with_speed
 from .io_csv import read_csv, write_csv
+from .io_frame import read_parquet, write_parquet
 from .io_hdf import read_hdf, read_netcdf3, write_netcdf
+from .io_lvm import read_lvm
 from .io_mat import read_mat, write_mat
+from .io_npy import read_npy, write_npy
 from .io_tdms import read_tdms, write_tdms
 from .io_uff import read_uff, write_uff
 from .io_wav import read_wav, write_wav
 from .record import Progress, Record, record_of, signal_from
 from .signal import as_signal
+from .speed_curve import is_curve
+from .unit_names import check_units
 
-FORMATS = ("csv", "csv.gz", "mat5", "mat7.3", "uff58", "wav", "netcdf", "hdf5", "tdms")
-"""Formats of files that are read and written."""
+FORMATS = (
+    "csv",
+    "csv.gz",
+    "mat5",
+    "mat7.3",
+    "uff58",
+    "wav",
+    "netcdf",
+    "hdf5",
+    "tdms",
+    "npy",
+    "parquet",
+    "feather",
+    "lvm",
+)
+"""Formats of files that are read; all but feather and lvm are written, too."""
+READ_ONLY = ("feather", "lvm")
 SUFFIXES = {
     ".csv": "csv",
     ".txt": "csv",
@@ -41,18 +68,30 @@ SUFFIXES = {
     ".hdf5": "hdf5",
     ".hdf": "hdf5",
     ".tdms": "tdms",
+    ".npy": "npy",
+    ".npz": "npy",
+    ".parquet": "parquet",
+    ".pq": "parquet",
+    ".feather": "feather",
+    ".lvm": "lvm",
+    ".asc": "csv",
+    ".prn": "csv",
 }
 # Which contents a name may stand for: version 7.3 of .mat is HDF5, and so is NetCDF-4.
 ACCEPTED = {
-    "csv": {"text"},
+    "csv": {"text", "utf16", "lvm"},
     "csv.gz": {"gzip"},
-    "mat5": {"mat5", "hdf5"},
+    "mat5": {"mat5", "hdf5", "mat4"},
     "mat7.3": {"hdf5"},
     "uff58": {"uff58"},
     "wav": {"wav"},
     "netcdf": {"hdf5", "netcdf3"},
     "hdf5": {"hdf5"},
     "tdms": {"tdms"},
+    "npy": {"npy", "zip"},
+    "parquet": {"parquet"},
+    "feather": {"feather"},
+    "lvm": {"lvm", "text", "utf16"},
 }
 CONTENT_NAMES = {
     "text": "plain text",
@@ -63,9 +102,21 @@ CONTENT_NAMES = {
     "wav": "a WAV file",
     "netcdf3": "classic NetCDF",
     "tdms": "a TDMS file",
-    "utf16": "text in UTF-16 (save it as UTF-8)",
+    "utf16": "text in UTF-16",
+    "npy": "an array of numpy",
+    "zip": "a zip archive, as .npz files are",
+    "parquet": "Parquet",
+    "feather": "Feather",
+    "lvm": "a LabVIEW measurement",
+    "mat4": "a MATLAB 4 file",
     "binary": "binary data of an unknown kind",
 }
+BY_CONTENT = {
+    "text": "csv", "gzip": "csv.gz", "mat5": "mat5", "hdf5": "hdf5", "uff58": "uff58", "wav": "wav",
+    "netcdf3": "netcdf", "tdms": "tdms", "npy": "npy", "parquet": "parquet", "lvm": "lvm", "utf16": "csv",
+}  # fmt: skip
+"""Formats of files whose names end in something else, as many recorders' do."""
+UFF_START = re.compile(rb"^\s*-1[ \t]*\r?\n[ \t]*\d+[a-z]?\b")
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 HEAD_BYTES = 4096
 
@@ -73,11 +124,12 @@ HEAD_BYTES = 4096
 def read_signal(
     path: str | Path,
     *,
-    rate: float | None = None,
+    rate: float | str | None = None,
     units: str | Sequence[str] | Mapping[str, str] | None = None,
-    speed: float | None = None,
+    speed: Any = None,
     teeth: int | Sequence[int] | None = None,
     channels: Sequence[str] | None = None,
+    gaps: str | None = None,
     format: str | None = None,
     progress: Progress | None = None,
 ) -> xr.DataArray:
@@ -96,6 +148,9 @@ def read_signal(
         Speed in rad/s and tooth counts; win over the file's.
     channels : sequence of str, optional
         Only these channels.
+    gaps : {"refuse", "interpolate", "longest"}, optional
+        What to do with samples that are missing or not finite: an error, straight lines across them, or the longest
+        stretch without any.
     format : str, optional
         One of `FORMATS`, for files with other names.
     progress : callable, optional
@@ -114,9 +169,33 @@ def read_signal(
         If the sampling rate is known neither to the file nor to the caller.
     """
     path = Path(path)
+    hertz, constant = given_rate(rate), given_speed(speed)
+    check_units(units)
+    checked_gaps(gaps)
     format, content = checked_format(path, format)
-    record = _read(path, format, content, channels, progress, rate)
-    return signal_from(record, path, rate=rate, units=units, speed=speed, teeth=teeth, channels=channels)
+    with damage_named(path, format):
+        record = _read(path, format, content, channels, progress, hertz, gaps)
+        signal = signal_from(
+            record, path, rate=hertz, units=units, speed=constant, teeth=teeth, channels=channels, gaps=gaps
+        )
+    return with_speed(signal, speed) if is_curve(speed) else signal
+
+
+@contextmanager
+def damage_named(path: Path, format: str) -> Iterator[None]:
+    """Keep other packages' warnings to themselves, and turn whatever fails while reading into an error of this one."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except (SignalError, MemoryError):
+        raise
+    except Exception as exc:
+        said = " ".join(str(exc).split())[:200]
+        raise SignalFileError(
+            path,
+            f"cannot be read as {format}: it is damaged, or of an unknown dialect ({type(exc).__name__}: {said})",
+        ) from exc
 
 
 def write_signal(
@@ -148,6 +227,8 @@ def write_signal(
     """
     path = Path(path)
     format = _format(path, format)
+    if format in READ_ONLY:
+        raise SignalFileError(path, f"{format} files are read, not written; write for instance .csv, .mat or .tdms")
     record = record_of(as_signal(signal))
     if not path.parent.is_dir():
         raise SignalFileError(path, f"there is no folder {path.parent}; make it first")
@@ -169,8 +250,8 @@ def write_signal(
 
 def checked_format(path: Path, format: str | None) -> tuple[str, str]:
     """The format a file's name or the caller says, and what the file holds; SignalFileError if they do not agree."""
-    format = _format(path, format)
     content = _content(path)
+    format = _format(path, format, content)
     if content not in ACCEPTED[format]:
         raise SignalFileError(
             path,
@@ -187,18 +268,25 @@ def _read(
     channels: Sequence[str] | None,
     progress: Progress | None,
     rate: float | None,
+    gaps: str | None = None,
 ) -> Record:
+    if content == "lvm" or format == "lvm":
+        return read_lvm(path, rate)
     if format in ("csv", "csv.gz"):
-        return read_csv(path, format == "csv.gz", progress, rate)
+        return read_csv(path, format == "csv.gz", progress, rate, gaps)
     if format in ("mat5", "mat7.3"):
-        return read_mat(path, channels)
+        return read_mat(path, channels, rate)
     if format == "uff58":
         return read_uff(path, channels)
     if format == "wav":
         return read_wav(path)
     if format == "tdms":
-        return read_tdms(path, channels)
-    return read_netcdf3(path, channels) if content == "netcdf3" else read_hdf(path, channels)
+        return read_tdms(path, channels, rate)
+    if format == "npy":
+        return read_npy(path, channels, rate)
+    if format in ("parquet", "feather"):
+        return read_parquet(path, format, rate)
+    return read_netcdf3(path, channels, rate) if content == "netcdf3" else read_hdf(path, channels, rate)
 
 
 def _write(record: Record, part: Path, format: str, progress: Progress | None) -> None:
@@ -212,11 +300,15 @@ def _write(record: Record, part: Path, format: str, progress: Progress | None) -
         write_wav(record, part)
     elif format == "tdms":
         write_tdms(record, part)
+    elif format == "npy":
+        write_npy(record, part)
+    elif format == "parquet":
+        write_parquet(record, part)
     else:
         write_netcdf(record, part)
 
 
-def _format(path: Path, format: str | None) -> str:
+def _format(path: Path, format: str | None, content: str | None = None) -> str:
     if format is not None:
         if format not in FORMATS:
             raise SignalError(f"format: must be one of {', '.join(FORMATS)}, got {format!r}")
@@ -225,6 +317,8 @@ def _format(path: Path, format: str | None) -> str:
     for suffix in ("".join(suffixes[-2:]), "".join(suffixes[-1:])):
         if suffix in SUFFIXES:
             return SUFFIXES[suffix]
+    if content in BY_CONTENT:
+        return BY_CONTENT[content]
     raise SignalFileError(
         path, f"its ending {path.suffix!r} determines no format; use one of {', '.join(SUFFIXES)} or pass format=..."
     )
@@ -253,11 +347,37 @@ def _content(path: Path) -> str:
         return "netcdf3"
     if head.startswith(b"MATLAB 5.0"):
         return "mat5"
-    if head.lstrip().startswith(b"-1\n") or head.lstrip().startswith(b"-1\r"):
+    if UFF_START.match(head.removeprefix(b"\xef\xbb\xbf")):
         return "uff58"
+    if head.startswith(b"\x93NUMPY"):
+        return "npy"
+    if head.startswith(b"PK\x03\x04"):
+        return "zip"
+    if head.startswith(b"PAR1"):
+        return "parquet"
+    if head.startswith((b"ARROW1", b"FEA1")):
+        return "feather"
+    if head.removeprefix(b"\xef\xbb\xbf").startswith(b"LabVIEW Measurement"):
+        return "lvm"
+    if _is_mat4(head):
+        return "mat4"
     # A MATLAB 7.3 header in front of nothing is a cut-off file, still one of HDF5's kind.
     if head.startswith(b"MATLAB 7.3"):
         return "hdf5"
     text = head.decode("utf-8", errors="replace")
     odd = sum(1 for c in text if (ord(c) < 32 and c not in "\t\r\n\f\x1a") or c == "\ufffd")
     return "binary" if "\x00" in text or odd > 0.05 * len(text) else "text"
+
+
+def _is_mat4(head: bytes) -> bool:
+    """True for the header of a MATLAB 4 matrix: type, rows, columns, imaginary flag and length of the name."""
+    if len(head) < 21:
+        return False
+    for order in ("<", ">"):
+        kind, rows, columns, imaginary, letters = struct.unpack(f"{order}5i", head[:20])
+        sane = 0 <= kind < 5000 and kind % 10 <= 2 and (kind // 10) % 10 <= 5 and imaginary in (0, 1)
+        if sane and 0 < rows < 1 << 30 and 0 < columns < 1 << 30 and 1 < letters < 64:
+            name = head[20 : 20 + letters - 1]
+            if name[:1].isalpha() and name.replace(b"_", b"").isalnum():
+                return True
+    return False

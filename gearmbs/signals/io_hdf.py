@@ -15,7 +15,8 @@ import numpy as np
 import xarray as xr
 
 from .errors import SignalFileError
-from .record import RATE_KEYS, Record, assemble, plain, rate_from_times
+from .metadata import rate_candidates
+from .record import Record, assemble, plain, rate_from_times
 from .signal import UNKNOWN_UNITS, check_teeth
 
 LAYOUT = "gearmbs signal"
@@ -46,7 +47,7 @@ def write_netcdf(record: Record, path: Path) -> None:
     Path(path).write_bytes(dataset.to_netcdf(engine="h5netcdf"))
 
 
-def read_hdf(path: Path, channels: Sequence[str] | None) -> Record:
+def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = None) -> Record:
     """Read NetCDF-4 or any HDF5 file with numeric arrays.
 
     Raises
@@ -65,12 +66,14 @@ def read_hdf(path: Path, channels: Sequence[str] | None) -> Record:
 
             def visit(name: str, item: Any) -> None:
                 if not isinstance(item, h5py.Dataset):
+                    for attr, value in item.attrs.items():
+                        scalars[f"{name.replace('/', '.')}.{attr}"] = _value(value)
                     return
                 short = name.rsplit("/", 1)[-1]
                 key = short if short not in arrays else name.replace("/", ".")
                 for attr, value in item.attrs.items():
-                    if attr.lower() in RATE_KEYS:
-                        scalars.setdefault("sampling_rate", _value(value))
+                    if rate_candidates({attr: _value(value)}):
+                        scalars[f"{key}.{attr}"] = _value(value)
                 if item.dtype.kind not in "fiu" or (item.attrs.get("CLASS") == b"DIMENSION_SCALE" and short != "time"):
                     return
                 if item.size == 1:
@@ -89,7 +92,7 @@ def read_hdf(path: Path, channels: Sequence[str] | None) -> Record:
     if scalars.get("layout") == LAYOUT:
         arrays = {key: arrays[key] for key in sorted(arrays, key=lambda key: order[key])}
         return _own(path, arrays, units, labels, scalars)
-    return assemble(path, arrays, scalars, units, channels)
+    return assemble(path, arrays, scalars, units, channels, rate)
 
 
 def hdf_pieces(path: Path) -> Iterator[tuple[Record, float]] | None:
@@ -141,7 +144,7 @@ def _slices(path: Path) -> Iterator[tuple[Record, float]]:
         raise SignalFileError(path, f"cannot be read as HDF5: it is damaged or cut short ({exc})") from exc
 
 
-def read_netcdf3(path: Path, channels: Sequence[str] | None) -> Record:
+def read_netcdf3(path: Path, channels: Sequence[str] | None, rate: float | None = None) -> Record:
     """Read a classic NetCDF file, array by array."""
     try:
         with xr.open_dataset(path, engine="scipy", decode_times=False) as file:
@@ -150,7 +153,7 @@ def read_netcdf3(path: Path, channels: Sequence[str] | None) -> Record:
             scalars = {str(k): _value(v) for k, v in file.attrs.items()}
     except Exception as exc:
         raise SignalFileError(path, f"cannot be read as NetCDF: it is damaged or cut short ({exc})") from exc
-    return assemble(path, arrays, scalars, units, channels)
+    return assemble(path, arrays, scalars, units, channels, rate)
 
 
 def _own(path: Path, arrays: dict, units: dict, labels: dict, scalars: dict) -> Record:

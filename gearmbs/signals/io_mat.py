@@ -6,8 +6,11 @@ known `speed`, `teeth` and `attrs` (JSON text).
 
 from __future__ import annotations
 
+import io
 import json
-from collections.abc import Mapping, Sequence
+import struct
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,36 +23,90 @@ from .record import Record, assemble, plain
 from .signal import check_teeth
 
 USER_BLOCK = 512
+COMPRESSED = 15
 HEADER_TEXT = b"MATLAB 7.3 MAT-file, Platform: any, Created by: gearmbs HDF5 schema 1.00 ."
 VERSION_AND_ENDIAN = b"\x00\x02IM"
 
 
-def read_mat(path: Path, channels: Sequence[str] | None) -> Record:
+def read_mat(path: Path, channels: Sequence[str] | None, rate: float | None = None) -> Record:
     """Read a MATLAB file of version 5 to 7.3, written here or elsewhere.
 
     Structs are searched too (names joined by dots). Without this package's layout, numeric arrays of equal length
-    become channels and a scalar such as fs gives the rate.
+    become channels and a scalar such as fs gives the rate. Blocks of one name, which MATLAB itself never writes but
+    instruments do, are all kept, numbered.
 
     Raises
     ------
     SignalFileError
         If the file is damaged or holds no record, or several of different lengths.
     """
+    notes: list[str] = []
     try:
         if h5py.is_hdf5(path):
             with h5py.File(path, "r") as file:
                 tree = {k: _from_hdf(v, file) for k, v in file.items() if not k.startswith("#")}
         else:
-            loaded = scipy.io.loadmat(path, simplify_cells=True)
-            tree = {k: v for k, v in loaded.items() if not k.startswith("__")}
+            tree = _load(path, notes)
     except Exception as exc:
         raise SignalFileError(path, f"cannot be read as a MATLAB file: it is damaged or cut short ({exc})") from exc
     flat = _flatten(tree)
     if {"data", "sampling_rate", "channels", "units", "t0"} <= set(flat):
         return _own(flat, path)
     arrays = {k: v for k, v in flat.items() if isinstance(v, np.ndarray) and v.dtype.kind in "fiu" and v.size > 1}
-    scalars = {k.rsplit(".", 1)[-1]: _scalar(v) for k, v in flat.items() if k not in arrays}
-    return assemble(path, arrays, scalars, {}, channels)
+    scalars = {k: _scalar(v) for k, v in flat.items() if k not in arrays}
+    record = assemble(path, arrays, scalars, _units(scalars, arrays), channels, rate)
+    record.notes = notes + record.notes
+    return record
+
+
+def _units(scalars: Mapping[str, Any], arrays: Mapping[str, Any]) -> dict[str, str]:
+    """Units that stand beside the arrays of a struct, as text under unit or units."""
+    found = {}
+    for name in arrays:
+        beside = name.rpartition(".")[0]
+        for key in ("units", "unit", "Units", "Unit"):
+            text = scalars.get(f"{beside}.{key}" if beside else key)
+            if isinstance(text, str) and text.strip():
+                found[name] = text.strip()
+    return found
+
+
+def _load(path: Path, notes: list[str]) -> dict[str, Any]:
+    """The variables of a file of version 4 to 7; several of one name as name, name_2 ..."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        names = [name for name, _, _ in scipy.io.whosmat(path)]
+        if len(set(names)) == len(names):
+            loaded = scipy.io.loadmat(path, simplify_cells=True)
+            return {k: v for k, v in loaded.items() if not k.startswith("__")}
+        tree: dict[str, Any] = {}
+        for single in _elements(path.read_bytes()):
+            try:
+                loaded = scipy.io.loadmat(io.BytesIO(single), simplify_cells=True)
+            except Exception:
+                notes.append("A variable of the file cannot be read and is left out.")
+                continue
+            for name, value in loaded.items():
+                if not name.startswith("__"):
+                    count = sum(key == name or key.startswith(f"{name}_block") for key in tree)
+                    tree[name if not count else f"{name}_block{count + 1}"] = value
+    for name in sorted({n for n in names if names.count(n) > 1}):
+        notes.append(f"The file holds {names.count(name)} blocks named {name}; the further ones are {name}_block2 ...")
+    return tree
+
+
+def _elements(data: bytes) -> Iterator[bytes]:
+    """Each variable of a version 5 file as a file of its own: header, and one element by its tag."""
+    order = "<" if data[126:128] == b"IM" else ">"
+    head = data[:116] + b" " * 8 + data[124:128]
+    at = 128
+    while at + 8 <= len(data):
+        kind, size = struct.unpack(f"{order}II", data[at : at + 8])
+        end = at + 8 + size
+        if kind == 0 or end > len(data):
+            break
+        yield head + data[at:end]
+        at = end if kind == COMPRESSED else end + (-size) % 8
 
 
 def write_mat(record: Record, path: Path, version: str) -> None:
@@ -105,9 +162,17 @@ def _flatten(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     for key, value in tree.items():
         if isinstance(value, Mapping):
             flat.update(_flatten(value, f"{prefix}{key}."))
+        elif isinstance(value, (list, np.ndarray)) and len(value) and all(isinstance(v, Mapping) for v in _few(value)):
+            for i, one in enumerate(value, 1):
+                flat.update(_flatten(one, f"{prefix}{key}{i}."))
         else:
             flat[f"{prefix}{key}"] = value
     return flat
+
+
+def _few(value: Any) -> Any:
+    """The entries of a list or array of structs; something that is no struct for any other array."""
+    return value if isinstance(value, list) or (value.dtype.kind == "O" and value.ndim == 1) else (None,)
 
 
 def _scalar(value: Any) -> Any:

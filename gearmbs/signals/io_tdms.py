@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from .errors import SignalFileError
+from .metadata import chosen_rate, rate_candidates, same_rate, speed_of
 from .record import Record, plain
 from .signal import UNKNOWN_UNITS, check_teeth
 
@@ -21,7 +22,7 @@ LEAD_IN = 28
 INCOMPLETE = 0xFFFFFFFFFFFFFFFF
 
 
-def read_tdms(path: Path, channels: Sequence[str] | None) -> Record:
+def read_tdms(path: Path, channels: Sequence[str] | None, rate: float | None = None) -> Record:
     """Read the channels of a TDMS file; waveform properties give rate, start and units.
 
     Raises
@@ -29,60 +30,103 @@ def read_tdms(path: Path, channels: Sequence[str] | None) -> Record:
     SignalFileError
         If npTDMS is not installed, a segment is cut short, or the channels' lengths or rates differ.
     """
-    return next(_read(path, channels, None))[0]
+    return next(_read(path, channels, None, rate))[0]
 
 
-def tdms_pieces(path: Path, channels: Sequence[str] | None) -> Iterator[tuple[Record, float]]:
+def tdms_pieces(
+    path: Path, channels: Sequence[str] | None, rate: float | None = None
+) -> Iterator[tuple[Record, float]]:
     """Read the channels of a TDMS file block by block; see `read_tdms`."""
-    return _read(path, channels, BLOCK)
+    return _read(path, channels, BLOCK, rate)
 
 
-def _read(path: Path, channels: Sequence[str] | None, block: int | None) -> Iterator[tuple[Record, float]]:
+def _read(
+    path: Path, channels: Sequence[str] | None, block: int | None, rate: float | None
+) -> Iterator[tuple[Record, float]]:
     nptdms = _library(path)
     _check_segments(path)
     try:
         with nptdms.TdmsFile.open(path) as file:
-            kept = _chosen(path, file, channels)
+            kept, names = _chosen(path, file, channels)
             count = len(kept[0])
             for start in range(0, count, block or count):
                 stop = min(start + (block or count), count)
                 values = np.stack([np.asarray(c[start:stop], dtype=float) for c in kept], axis=1)
-                yield _record(path, values, kept, dict(file.properties)), stop / count
+                yield _record(path, values, kept, names, file, rate), stop / count
     except SignalFileError:
         raise
     except Exception as exc:
         raise SignalFileError(path, f"cannot be read as TDMS ({exc})") from exc
 
 
-def _chosen(path: Path, file: Any, channels: Sequence[str] | None) -> list[Any]:
-    """The channels that become the record's; SignalFileError if they do not make one."""
-    found = [c for group in file.groups() for c in group.channels() if len(c) and np.issubdtype(c.dtype, np.number)]
-    kept = [c for c in found if channels is None or c.name in channels]
+def _chosen(path: Path, file: Any, channels: Sequence[str] | None) -> tuple[list[Any], list[str]]:
+    """The channels that become the record's and their names; SignalFileError if they do not make one.
+
+    Channels of equal names in different groups are called group/channel.
+    """
+    found = [
+        (group.name, c)
+        for group in file.groups()
+        for c in group.channels()
+        if len(c) and np.issubdtype(c.dtype, np.number) and not np.issubdtype(c.dtype, np.complexfloating)
+    ]
+    plain_names = [c.name for _, c in found]
+    names = [c.name if plain_names.count(c.name) == 1 else f"{group}/{c.name}" for group, c in found]
+    kept = [
+        (name, c)
+        for name, (group, c) in zip(names, found)
+        if channels is None or name in channels or f"{group}/{c.name}" in channels
+    ]
     if not kept:
-        raise SignalFileError(path, f"holds no samples{'' if channels is None else f' in {list(channels)}'}")
-    if len({c.name for c in kept}) != len(kept):
-        raise SignalFileError(path, "has channels of the same name in different groups; rename them")
-    if len({len(c) for c in kept}) > 1:
-        listed = ", ".join(f"{c.name} ({len(c)})" for c in kept)
-        raise SignalFileError(path, f"holds records of different lengths: {listed}; choose with channels=[...]")
-    return kept
+        listed = f"; it holds {', '.join(names) or 'none'}"
+        raise SignalFileError(path, f"holds no samples{'' if channels is None else f' in {list(channels)}'}{listed}")
+    if len({len(c) for _, c in kept}) > 1:
+        listed = ", ".join(f"{name} ({len(c)})" for name, c in kept)
+        raise SignalFileError(
+            path, f"holds records of different lengths: {listed}; choose with channels=[...] (--channel)"
+        )
+    wanted = {f"{group}/{c.name}" for group, c in found} & set(channels or ())
+    return [c for _, c in kept], [
+        f"{c.group_name}/{c.name}" if f"{c.group_name}/{c.name}" in wanted else name for name, c in kept
+    ]
 
 
-def _record(path: Path, values: np.ndarray, kept: Sequence[Any], root: dict) -> Record:
-    rates = {_rate(c.properties, root) for c in kept}
-    if len(rates) > 1:
-        raise SignalFileError(path, f"its channels have different sampling rates {rates}; choose with channels=[...]")
+def _record(
+    path: Path, values: np.ndarray, kept: Sequence[Any], names: list[str], file: Any, given: float | None
+) -> Record:
+    root = dict(file.properties)
+    notes: list[str] = []
+    rates: dict[str, float | None] = {}
+    speed = float(root["speed"]) if isinstance(root.get("speed"), (int, float)) else None
+    for name, channel in zip(names, kept):
+        rates[name], said = _rate(path, file, channel, root, given)
+        notes += [note for note in said if note not in notes]
+    if speed is None:
+        speed, said = speed_of({**root, **dict(file[kept[0].group_name].properties)})
+        notes += said
     teeth = root.get("teeth")
     return Record(
         values,
-        [c.name for c in kept],
+        list(names),
         [str(c.properties.get("unit_string") or UNKNOWN_UNITS) for c in kept],
-        rates.pop(),
+        same_rate(path, rates),
         float(kept[0].properties.get("wf_start_offset", 0.0)),
-        float(root["speed"]) if "speed" in root else None,
-        None if teeth is None else check_teeth(json.loads(teeth)),
+        speed,
+        None if teeth is None else check_teeth(json.loads(str(teeth))),
         json.loads(root.get("attrs", "{}")),
+        notes,
     )
+
+
+def _rate(path: Path, file: Any, channel: Any, root: dict, given: float | None) -> tuple[float | None, list[str]]:
+    """Rate of a channel: this package's own, the waveform's, or what the properties of channel, group or file name."""
+    if "attrs" in root and "sampling_rate" in root:
+        return float(root["sampling_rate"]), []
+    for properties in (channel.properties, file[channel.group_name].properties, root):
+        found, notes = chosen_rate(path, rate_candidates(dict(properties)), given)
+        if found is not None:
+            return found, notes
+    return None, []
 
 
 def write_tdms(record: Record, path: Path) -> None:
@@ -104,13 +148,6 @@ def write_tdms(record: Record, path: Path) -> None:
         objects.append(nptdms.ChannelObject(GROUP, name, np.ascontiguousarray(column), properties=properties))
     with nptdms.TdmsWriter(path) as writer:
         writer.write_segment(objects)
-
-
-def _rate(properties: dict, root: dict) -> float | None:
-    if "sampling_rate" in root:
-        return float(root["sampling_rate"])
-    step = properties.get("wf_increment")
-    return 1.0 / float(step) if step else None
 
 
 def _check_segments(path: Path) -> None:

@@ -8,7 +8,11 @@ are not kept.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import os
+import re
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +22,8 @@ from .errors import SignalFileError
 from .record import Record
 from .signal import UNKNOWN_UNITS, check_teeth, nice_rate
 
+BINARY = re.compile(rb"^\s*58b", re.MULTILINE | re.IGNORECASE)
+HEADER_ROWS = 12
 UNIT_WIDTH = 20
 LINE_WIDTH = 80
 # A count of samples over which a step of six digits is good to a twentieth of a sample.
@@ -38,22 +44,27 @@ def read_uff(path: Path, channels: Sequence[str] | None) -> Record:
     """
     pyuff = _library(path)
     with open(path, "rb") as file:
-        file.seek(max(0, path.stat().st_size - 200))
+        file.seek(max(0, path.stat().st_size - 400))
         tail = file.read().split()
     if not tail or tail[-1] != b"-1":
         raise SignalFileError(path, "is cut short: its last dataset has no end mark (-1)")
-    try:
-        file58 = pyuff.UFF(str(path))
-        kinds = [int(k) for k in file58.get_set_types()]
-        sets = [file58.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
-    except Exception as exc:
-        raise SignalFileError(path, f"cannot be read as UFF ({exc})") from exc
+    with _in_full_lines(path) as full:
+        try:
+            file58 = pyuff.UFF(str(full))
+            kinds = [int(k) for k in file58.get_set_types()]
+            sets = [file58.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
+        except Exception as exc:
+            raise SignalFileError(path, f"cannot be read as UFF ({exc})") from exc
     histories = [s for s in sets if s["func_type"] in (0, TIME_RESPONSE) and not np.iscomplexobj(s["data"])]
     if not histories:
         raise SignalFileError(path, f"holds no time history (dataset 58, function type 1); its datasets are {kinds}")
+    notes = []
     for index, s in enumerate(histories, 1):
-        if len(s["data"]) != s["num_pts"]:
-            raise SignalFileError(path, f"history {index} promises {s['num_pts']} samples, {len(s['data'])} are there")
+        if len(s["data"]) < s["num_pts"]:
+            notes.append(f"History {index} promises {s['num_pts']} samples, {len(s['data'])} are there and used.")
+        s["data"] = s["data"][: s["num_pts"]]
+        if not len(s["data"]):
+            raise SignalFileError(path, f"history {index} holds no samples")
         if not s["abscissa_spacing"]:
             raise SignalFileError(path, f"history {index} is unevenly sampled; resample it first")
     names = _names(histories)
@@ -75,6 +86,7 @@ def read_uff(path: Path, channels: Sequence[str] | None) -> Record:
         t0,
         extra.get("speed"),
         None if extra.get("teeth") is None else check_teeth(extra["teeth"]),
+        notes=notes,
     )
 
 
@@ -119,6 +131,35 @@ def write_uff(record: Record, path: Path) -> None:
     # pyuff's own "overwrite" loses the header of binary sets; an empty file to add to does not.
     path.write_bytes(b"")
     pyuff.UFF(str(path)).write_sets(sets, mode="add")
+
+
+@contextmanager
+def _in_full_lines(path: Path) -> Iterator[Path]:
+    """The path of a text UFF with lines as pyuff expects them; the file itself where it is so, or is binary.
+
+    Programs write marks (-1) padded by any number of blanks, headers cut off behind the last letter, and last rows of
+    which not all columns are filled.
+    """
+    data = path.read_bytes()
+    if BINARY.search(data):
+        yield path
+        return
+    lines, inside, row = [], False, 0
+    for line in data.removeprefix(b"\xef\xbb\xbf").splitlines():
+        if line.strip() == b"-1" and len(line.rstrip()) <= 6:
+            inside, row = not inside, 0
+            lines.append(b"    -1")
+        elif inside:
+            row += 1
+            lines.append(line[:80].ljust(80) if 1 < row <= HEADER_ROWS else line.rstrip())
+    full = b"\n".join(lines) + b"\n"
+    handle, name = tempfile.mkstemp(suffix=".uff")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(full)
+        yield Path(name)
+    finally:
+        Path(name).unlink(missing_ok=True)
 
 
 def _names(histories: list[dict]) -> list[str]:

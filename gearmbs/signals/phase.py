@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import scipy.fft
@@ -12,16 +13,46 @@ import xarray as xr
 
 from .errors import SignalError
 from .filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kaiser_taps
-from .signal import check_speed, rate_of
+from .monotone_cubic import monotone_cubic
+from .signal import rate_of
+from .speed_curve import speed_curve
 
 LINE_ATTENUATION_DB = 60.0
 PULSE_HYSTERESIS = 0.2
 
 
-def phase_from_speed(signal: xr.DataArray, speed: float) -> xr.DataArray:
-    """Angle (rad) of a shaft that turns at the constant `speed` (rad/s), zero at the first sample."""
-    times = signal["time"].values
-    return _phase(times, check_speed(speed) * (times - times[0]), "constant speed")
+def phase_from_speed(signal: xr.DataArray, speed: Any) -> xr.DataArray:
+    """Angle of a shaft whose speed is known, zero at the first sample.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        The record whose times are meant.
+    speed : float, str, or curve
+        As for `speed_curve`: a number in rad/s, "1500 rpm", points over time, a function. Rest is allowed.
+
+    Returns
+    -------
+    xarray.DataArray
+        rad, dimension (time,): the integral of the speed, over the samples that the curve covers.
+
+    Raises
+    ------
+    SignalError
+        If the speed cannot be read, or its curve covers less than two samples of the record.
+    """
+    times = np.asarray(signal["time"].values, dtype=float)
+    curve = speed_curve(speed, span=(float(times[0]), float(times[-1])))
+    if curve.times.size == 1:
+        return _phase(times, curve.angle(times), "constant speed")
+    half = 0.5 / rate_of(signal)
+    inside = (times >= curve.times[0] - half) & (times <= curve.times[-1] + half)
+    if inside.sum() < 2:
+        raise SignalError(
+            f"speed: the curve spans {curve.times[0]:g} to {curve.times[-1]:g} s, "
+            f"the record {times[0]:g} to {times[-1]:g} s"
+        )
+    return _phase(times[inside], curve.angle(times[inside]), "speed curve")
 
 
 def phase_from_tacho(
@@ -30,7 +61,8 @@ def phase_from_tacho(
     """Angle (rad) of the shaft from a tacho channel's rising pulse edges.
 
     Edges are placed between samples by linear interpolation at the threshold; the signal must fall below the threshold
-    by a fifth of its swing before the next edge counts. A cubic spline through the edges gives the angle between them.
+    by a fifth of its swing before the next edge counts. A cubic spline through the edges gives the angle between them;
+    where that would turn back, as beside a standstill, a monotone piecewise cubic does.
 
     Parameters
     ----------
@@ -83,10 +115,9 @@ def phase_from_tacho(
     edges = times[at] + (level - pulses[at]) / (pulses[at + 1] - pulses[at]) / rate_of(signal)
     angles = 2.0 * np.pi / pulses_per_rev * np.arange(at.size)
     inside = (times >= edges[0]) & (times <= edges[-1])
-    spline = scipy.interpolate.CubicSpline(edges, angles)
-    phase = spline(times[inside])
+    phase = scipy.interpolate.CubicSpline(edges, angles)(times[inside])
     if np.any(np.diff(phase) <= 0.0):
-        raise SignalError("channel: the pulses are too uneven for one shaft that keeps turning; check the threshold")
+        phase = monotone_cubic(edges, angles, times[inside])
     return _phase(times[inside], phase, "tacho")
 
 

@@ -12,11 +12,12 @@ import numpy as np
 import xarray as xr
 
 from .errors import MissingMetadataError, SignalError, SignalFileError
+from .gaps import without_gaps
+from .labels import is_clock
+from .metadata import chosen_rate, number_of, own_header, rate_candidates, same_rate, speed_of
 from .signal import UNKNOWN_UNITS, check_teeth, make_signal, rate_of, uniform_rate, units_of
 
 Progress = Callable[[float, str], None]
-RATE_KEYS = ("sampling_rate", "samplingrate", "sample_rate", "samplerate", "rate", "fs", "sr", "sampling_frequency")
-TIME_KEYS = ("time", "t", "times", "time_s", "zeit")
 RESERVED_ATTRS = ("sampling_rate", "speed", "teeth", "units")
 
 
@@ -39,6 +40,8 @@ class Record:
     teeth : tuple of int or None
     attrs : dict
         Anything else, JSON-like.
+    notes : list of str
+        What a reader should know: choices made, things left out.
     """
 
     values: np.ndarray
@@ -49,6 +52,7 @@ class Record:
     speed: float | None = None
     teeth: tuple[int, ...] | None = None
     attrs: dict[str, Any] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
 
 
 def record_of(signal: xr.DataArray) -> Record:
@@ -75,6 +79,7 @@ def signal_from(
     speed: float | None,
     teeth: int | Sequence[int] | None,
     channels: Sequence[str] | None,
+    gaps: str | None = None,
 ) -> xr.DataArray:
     """Join what the file and the caller say into a signal; errors name the file."""
     if channels is not None:
@@ -94,16 +99,20 @@ def signal_from(
     found = record.rate if record.rate is not None else rate
     if found is None:
         raise MissingMetadataError("rate", str(path), "the file does not hold it; pass rate=... in Hz")
+    if record.speed is not None and speed is not None:
+        record.notes = [note for note in record.notes if not note.startswith("The speed, ")]
     try:
+        values, first, said = without_gaps(record.values, gaps, found)
+        notes = [*record.notes, *said]
         return make_signal(
-            record.values,
+            values,
             found,
             units=record.units if units is None else units,
             channels=record.names,
-            t0=record.t0,
+            t0=record.t0 + first / found,
             speed=record.speed if speed is None else speed,
             teeth=record.teeth if teeth is None else teeth,
-            attrs={**record.attrs, "source": path.name},
+            attrs={**record.attrs, "source": path.name, **({"notes": notes} if notes else {})},
         )
     except MissingMetadataError:
         raise
@@ -169,18 +178,21 @@ def assemble(
     scalars: Mapping[str, Any],
     units: Mapping[str, str],
     channels: Sequence[str] | None,
+    given: float | None = None,
 ) -> Record:
     """Make a record of the named arrays of a file that is not laid out by this package.
 
     The arrays of the common length become channels, matrices one channel per column; an array called time gives the
-    rate, as does a scalar with a name such as fs. With `channels`, only the arrays they name (or whose columns they
-    name) count.
+    rate, as does a scalar with a name such as fs, sr or XInc (`gearmbs.signals.metadata`), beside the channel, above it
+    or, if there is none, anywhere. With `channels`, only the arrays they name (or whose columns they name) count. A
+    rate that the caller has `given` (Hz) decides where the file names two.
     """
-    times = next((v.ravel() for k, v in arrays.items() if k.lower() in TIME_KEYS and v.size > 1), None)
+    clocks = [k for k, v in arrays.items() if is_clock(k.rsplit(".", 1)[-1]) and v.size > 1]
     columns: dict[str, np.ndarray] = {}
     column_units: dict[str, str] = {}
+    owner: dict[str, str] = {}
     for key, array in arrays.items():
-        if key.lower() in TIME_KEYS or array.size < 2:
+        if key in clocks or array.size < 2:
             continue
         flat = np.squeeze(array)
         if flat.ndim > 2:
@@ -191,20 +203,41 @@ def assemble(
             if channels is None or name in channels:
                 columns[name] = table[:, i]
                 column_units[name] = units.get(key, UNKNOWN_UNITS)
+                owner[name] = key
     lengths = {name: column.size for name, column in columns.items()}
     if not columns:
         raise SignalFileError(path, f"holds no numeric record{_among(arrays, channels)}")
     if len(set(lengths.values())) > 1:
         listed = ", ".join(f"{name} ({size})" for name, size in lengths.items())
-        raise SignalFileError(path, f"holds records of different lengths: {listed}; choose with channels=[...]")
-    rate = next((float(v) for k, v in scalars.items() if k.lower() in RATE_KEYS and _is_number(v)), None)
+        raise SignalFileError(
+            path, f"holds records of different lengths: {listed}; choose with channels=[...] (--channel)"
+        )
+    notes: list[str] = []
+    rates: dict[str, float | None] = {}
+    for name, key in owner.items():
+        rates[name], said = chosen_rate(path, rate_candidates(own_header(scalars, key)), given)
+        notes += [note for note in said if note not in notes]
+    rate = same_rate(path, rates)
+    count = next(iter(lengths.values()))
     t0 = 0.0
-    if times is not None and times.size == next(iter(lengths.values())):
+    times = next((arrays[k].ravel() for k in clocks if arrays[k].size == count), None)
+    if times is not None and np.asarray(times).dtype.kind in "fiu":
         t0 = float(times[0])
         if rate is None:
             rate = rate_from_times(times, path)
-    speed = next((float(v) for k, v in scalars.items() if k == "speed" and _is_number(v)), None)
-    teeth = scalars.get("teeth")
+    known = {k: v for k, v in scalars.items() if not isinstance(v, (list, dict))}
+    speed, said = speed_of(known)
+    own = number_of(scalars.get("speed"))
+    if speed is None and own is not None and not own[1]:
+        speed = own[0]
+    counts = scalars.get("teeth")
+    if isinstance(counts, str):
+        counts = None if number_of(counts) is None else number_of(counts)[0]  # type: ignore[index]
+    try:
+        checked = None if counts is None else check_teeth(counts)
+    except (SignalError, TypeError, ValueError):
+        checked = None
+        notes.append(f"teeth = {counts!r} in the file is no tooth count and left out.")
     return Record(
         np.stack([np.asarray(c, dtype=float) for c in columns.values()], axis=1),
         list(columns),
@@ -212,7 +245,8 @@ def assemble(
         rate,
         t0,
         speed,
-        None if teeth is None else check_teeth(teeth),
+        checked,
+        notes=notes + said,
     )
 
 
@@ -222,10 +256,6 @@ def rate_from_times(times: np.ndarray, path: Path) -> float:
         return uniform_rate(np.asarray(times, dtype=float))
     except SignalError as exc:
         raise SignalFileError(path, str(exc)) from exc
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
 
 
 def _among(arrays: Mapping[str, np.ndarray], channels: Sequence[str] | None) -> str:

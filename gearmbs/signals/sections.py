@@ -16,8 +16,14 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from gearmbs.units import to_si
+
 from .analysis import analyse
+from .analysis_report import AnalysisReport
+from .door import to_signal
 from .errors import SignalError, SignalFileError
+from .gaps import checked_gaps
+from .given import given_rate, given_speed, with_speed
 from .indicators import INDICATORS
 from .io import checked_format, read_signal
 from .io_csv import csv_pieces
@@ -25,7 +31,10 @@ from .io_hdf import hdf_pieces
 from .io_tdms import tdms_pieces
 from .io_wav import wav_pieces
 from .record import Record, signal_from
-from .signal import require
+from .signal import rate_of
+from .speed_curve import is_curve
+from .unit_names import check_units
+from .vibration_report import VibrationReport
 
 Progress = Callable[[float, str], None]
 Pieces = Iterator[tuple[Record, float]]
@@ -33,28 +42,29 @@ LEAST_PART = 0.5
 
 
 def sections(
-    path: str | Path,
-    seconds: float,
+    path: Any,
+    seconds: float | str,
     *,
-    rate: float | None = None,
+    rate: float | str | None = None,
     units: str | Sequence[str] | Mapping[str, str] | None = None,
-    speed: float | None = None,
+    speed: Any = None,
     teeth: int | Sequence[int] | None = None,
     channels: Sequence[str] | None = None,
+    gaps: str | None = None,
     format: str | None = None,
     progress: Progress | None = None,
 ) -> Iterator[xr.DataArray]:
-    """Read a file section by section.
+    """Read a file section by section, or cut any other data into sections.
 
     Parameters
     ----------
-    path : path-like
-        As for `read_signal`.
-    seconds : float
-        Length of a section in s. What is left at the end is a section of its own if it is half as long or more, and
-        left out otherwise.
-    rate, units, speed, teeth, channels, format
-        As for `read_signal`.
+    path : path-like, or data
+        A file as for `read_signal`, or data of any shape as for `to_signal`.
+    seconds : float or str
+        Length of a section, s or text such as "1 min". What is left at the end is a section of its own if it is half as
+        long or more, and left out otherwise.
+    rate, units, speed, teeth, channels, gaps, format
+        As for `read_signal`. Of files that are read piece by piece, gaps="longest" is not possible.
     progress : callable, optional
         Called as progress(fraction, "reading") after each section.
 
@@ -70,10 +80,49 @@ def sections(
     SignalError
         If `seconds` is not positive.
     """
-    if not (math.isfinite(seconds) and seconds > 0.0):
+    seconds = _length(seconds)
+    hertz, constant = given_rate(rate), given_speed(speed)
+    check_units(units)
+    settings: dict[str, Any] = {"rate": hertz, "units": units, "speed": constant, "teeth": teeth, "channels": channels}
+    if not isinstance(path, (str, Path)):
+        whole = to_signal(path, rate=rate, units=units, speed=speed, teeth=teeth, channels=channels, gaps=gaps)
+        yield from _cut(whole, seconds, progress)
+        return
+    if checked_gaps(gaps) == "longest":
+        whole = read_signal(path, format=format, gaps=gaps, **{**settings, "speed": speed})
+        yield from _cut(whole, seconds, progress)
+        return
+    for section in _of_file(Path(path), seconds, format, {**settings, "gaps": gaps}, progress):
+        yield with_speed(section, speed) if is_curve(speed) else section
+
+
+def _length(seconds: float | str) -> float:
+    try:
+        value = to_si(seconds, "time", "seconds")
+    except (TypeError, ValueError) as error:
+        raise SignalError(str(error)) from error
+    if not (math.isfinite(value) and value > 0.0):
         raise SignalError(f"seconds: must be a positive length of a section, got {seconds!r}")
-    path = Path(path)
-    settings: dict[str, Any] = {"rate": rate, "units": units, "speed": speed, "teeth": teeth, "channels": channels}
+    return value
+
+
+def _cut(signal: xr.DataArray, seconds: float, progress: Progress | None) -> Iterator[xr.DataArray]:
+    """A signal in memory, section by section."""
+    length = max(1, round(seconds * rate_of(signal)))
+    total = signal.sizes["time"]
+    for start in range(0, total, length):
+        if start and total - start < LEAST_PART * length:
+            break
+        yield signal.isel(time=slice(start, start + length))
+        if progress is not None:
+            progress(min(1.0, (start + length) / total), "reading")
+
+
+def _of_file(
+    path: Path, seconds: float, format: str | None, settings: dict[str, Any], progress: Progress | None
+) -> Iterator[xr.DataArray]:
+    """A file, section by section, in memory for one section where its format allows."""
+    rate = settings["rate"]
     pieces = _pieces(path, format, settings)
     waiting: list[np.ndarray] = []
     held, used, known, done = 0, 0, None, 0.0
@@ -102,35 +151,36 @@ def sections(
 
 
 def trend(
-    path: str | Path,
-    seconds: float,
+    path: Any,
+    seconds: float | str,
     *,
     teeth: int | Sequence[int] | None = None,
-    speed: float | None = None,
+    speed: Any = None,
     speed_range: tuple[float, float] | None = None,
     harmonics: int = 3,
     progress: Progress | None = None,
     **reading: Any,
 ) -> xr.Dataset:
-    """Features of a long file over time: each section analysed on its own, in memory for one section.
+    """Features of a long record over time: each section analysed on its own, in memory for one section.
 
     Parameters
     ----------
     path, seconds
-        As for `sections`.
+        As for `sections`: a file, or data of any shape. Many files are one `series`.
     teeth, speed, speed_range, harmonics
-        As for `analyse`.
+        As for `analyse`. Without teeth the features are those of plain vibration.
     progress : callable, optional
         Called as progress(fraction, stage).
     **reading
-        `rate`, `units`, `channels`, `format` as for `read_signal`.
+        `rate`, `units`, `channels`, `gaps`, `format` as for `read_signal`.
 
     Returns
     -------
     xarray.Dataset
-        `band` and `orders` of dimensions (section, harmonic, channel); the level (`level`) and every condition
-        indicator of dimensions (section, channel); `gmf` (Hz) and `speed` (rad/s) of dimension (section,), NaN with
-        all features where no mesh line was found; coordinate `start` (s) and, along section, `note` (why).
+        With teeth `band` and `orders` of dimensions (section, harmonic, channel); the level (`level`) and every
+        condition indicator of dimensions (section, channel); `gmf` (Hz) and `speed` (rad/s) of dimension (section,),
+        NaN with all features where no mesh line was found. Without teeth, all features of `VibrationReport.to_frame`,
+        of dimensions (section, channel). Coordinate `start` (s) and, along section, `note` (why).
 
     Raises
     ------
@@ -139,12 +189,13 @@ def trend(
     SignalError
         If no section could be analysed; with the last reason.
     """
+    if isinstance(path, (list, tuple)) and path and isinstance(path[0], (str, Path)):
+        raise SignalError("path: give one record; series(files, ...) follows many files")
     rows: list[xr.Dataset | None] = []
     starts, notes = [], []
     done = [0.0]
     for section in sections(path, seconds, teeth=teeth, progress=lambda f, _: done.__setitem__(0, f), **reading):
         starts.append(float(section["time"].values[0]))
-        require(section, "teeth", needed_for="the gear mesh frequency")
         try:
             report = analyse(section, speed=speed, speed_range=speed_range, harmonics=harmonics, lines=1)
         except SignalError as error:
@@ -152,15 +203,20 @@ def trend(
             notes.append(str(error))
         else:
             rows.append(_row(report))
-            notes.append("; ".join(report.notes))
+            reasons = [f"{name}: {why}" for name, why in report.missing.items() if name != "estimate"]
+            notes.append("; ".join([*report.notes, *reasons]))
         if progress is not None:
             progress(done[0], f"section {len(starts)}")
     found = next((row for row in rows if row is not None), None)
     if found is None:
-        raise SignalError(f"{path}: no section could be analysed; the last says: {notes[-1]}")
+        raise SignalError(f"{_name(path)}: no section could be analysed; the last says: {notes[-1]}")
     empty = xr.full_like(found, np.nan)
     table = xr.concat([empty if row is None else row for row in rows], "section", join="outer")
     return table.assign_coords(start=("section", starts, {"units": "s"}), note=("section", notes))
+
+
+def _name(path: Any) -> str:
+    return str(path) if isinstance(path, (str, Path)) else "record"
 
 
 def trend_table(data: xr.Dataset) -> pd.DataFrame:
@@ -169,15 +225,24 @@ def trend_table(data: xr.Dataset) -> pd.DataFrame:
     for i in range(data.sizes["section"]):
         for channel in data["channel"].values:
             here = data.isel(section=i).sel(channel=channel)
-            row = {"start_s": float(here["start"]), "gmf_hz": float(here["gmf"]), "channel": str(channel)}
-            for k in data["harmonic"].values:
-                row[f"band_{k}"] = float(here["band"].sel(harmonic=k))
-            row |= {name: float(here[name]) for name in ("level", *INDICATORS)}
+            row: dict[str, Any] = {"start_s": float(here["start"]), "channel": str(channel)}
+            if "band" in data:
+                row = {"start_s": row["start_s"], "gmf_hz": float(here["gmf"]), "channel": str(channel)}
+                for k in data["harmonic"].values:
+                    row[f"band_{k}"] = float(here["band"].sel(harmonic=k))
+                row |= {name: float(here[name]) for name in ("level", *INDICATORS)}
+            else:
+                row |= {str(name): float(here[name]) for name in data.data_vars}
             rows.append({**row, "note": str(here["note"].item())})
     return pd.DataFrame(rows)
 
 
-def _row(report: Any) -> xr.Dataset:
+def _row(report: AnalysisReport | VibrationReport) -> xr.Dataset:
+    if isinstance(report, VibrationReport):
+        row = report.channel_features()
+        row["speed"] = ((), math.nan if report.speed is None else report.speed, {"units": "rad/s"})
+        row.attrs = {}
+        return row
     row = report.harmonics[["band", "orders"]].drop_vars(["frequency", "channel_units"])
     row["level"] = report.levels["rms"]
     for name in INDICATORS:
@@ -196,11 +261,11 @@ def _pieces(path: Path, format: str | None, settings: Mapping[str, Any]) -> Piec
     kind, content = checked_format(path, format)
     streamed: Pieces | None = None
     if kind in ("csv", "csv.gz"):
-        streamed = csv_pieces(path, kind == "csv.gz", settings["rate"])
+        streamed = None if content == "lvm" else csv_pieces(path, kind == "csv.gz", settings["rate"], settings["gaps"])
     elif kind == "wav":
         streamed = wav_pieces(path)
     elif kind == "tdms":
-        streamed = tdms_pieces(path, settings["channels"])
+        streamed = tdms_pieces(path, settings["channels"], settings["rate"])
     elif content == "hdf5" and kind in ("netcdf", "hdf5"):
         streamed = hdf_pieces(path)
     if streamed is not None:

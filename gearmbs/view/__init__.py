@@ -12,6 +12,13 @@ from gearmbs._lazy import late
 if TYPE_CHECKING:
     from gearmbs.view.animation import MeshAnimation, mesh_animation
     from gearmbs.view.bars import comparison_bars, gmf_bars
+    from gearmbs.view.changing_speed import (
+        campbell_plot,
+        order_map_plot,
+        order_track_plot,
+        spectrogram_plot,
+        waterfall_plot,
+    )
     from gearmbs.view.contacts import ContactPoints, ContactProbe
     from gearmbs.view.curves import contact_pattern_plot, load_sharing_plot, stiffness_plot, transmission_error_plot
     from gearmbs.view.export_dxf import write_dxf
@@ -43,6 +50,7 @@ __all__ = [
     "Scene",
     "analysis_figures",
     "average_plot",
+    "campbell_plot",
     "comparison_bars",
     "comparison_figures",
     "contact_pattern_plot",
@@ -54,7 +62,9 @@ __all__ = [
     "mechanism_scene",
     "mesh_animation",
     "mesh_view",
+    "order_map_plot",
     "order_plot",
+    "order_track_plot",
     "pair_solids",
     "profile_area",
     "read_stl",
@@ -62,11 +72,13 @@ __all__ = [
     "sensitivity_map",
     "solution_motion",
     "solution_scene",
+    "spectrogram_plot",
     "spectrum_plot",
     "static_motion",
     "stiffness_plot",
     "time_plot",
     "transmission_error_plot",
+    "waterfall_plot",
     "write_dxf",
     "write_step",
     "write_stl",
@@ -86,6 +98,7 @@ late(
         "Scene": ".scene",
         "analysis_figures": ".reports",
         "average_plot": ".revolution",
+        "campbell_plot": ".changing_speed",
         "comparison_bars": ".bars",
         "comparison_figures": ".reports",
         "contact_pattern_plot": ".curves",
@@ -97,7 +110,9 @@ late(
         "mechanism_scene": ".scenes",
         "mesh_animation": ".animation",
         "mesh_view": ".transverse",
+        "order_map_plot": ".changing_speed",
         "order_plot": ".signals",
+        "order_track_plot": ".changing_speed",
         "pair_solids": ".solid",
         "profile_area": ".outline",
         "read_stl": ".export_stl",
@@ -105,11 +120,13 @@ late(
         "sensitivity_map": ".maps",
         "solution_motion": ".motion",
         "solution_scene": ".scenes",
+        "spectrogram_plot": ".changing_speed",
         "spectrum_plot": ".signals",
         "static_motion": ".motion",
         "stiffness_plot": ".curves",
         "time_plot": ".signals",
         "transmission_error_plot": ".curves",
+        "waterfall_plot": ".changing_speed",
         "write_dxf": ".export_dxf",
         "write_step": ".export_step",
         "write_stl": ".export_stl",

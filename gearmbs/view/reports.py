@@ -7,30 +7,42 @@ import math
 import xarray as xr
 from matplotlib.figure import Figure
 
-from gearmbs.signals import AnalysisReport, ComparisonReport, spectrum
+from gearmbs.signals import AnalysisReport, ComparisonReport, VibrationReport, spectrum
 from gearmbs.view.bars import comparison_bars
 from gearmbs.view.revolution import average_plot
 from gearmbs.view.signals import spectrum_plot
 
+ENVELOPE_TOP, ENVELOPE_ORDERS, LEAKED = 1000.0, 20.0, 2
 SEGMENT = 2.0
 """Length of the averaged spectra's segments, s."""
 
 
-def analysis_figures(report: AnalysisReport, signal: xr.DataArray) -> dict[str, Figure]:
+def analysis_figures(report: AnalysisReport | VibrationReport, signal: xr.DataArray | None = None) -> dict[str, Figure]:
     """Return the figures of an analysed record.
 
     Parameters
     ----------
-    report : AnalysisReport
+    report : AnalysisReport or VibrationReport
         From `gearmbs.signals.analyse`.
-    signal : xarray.DataArray
-        The record it was made of, dimensions (time, channel); channels that the report left out are left out.
+    signal : xarray.DataArray, optional
+        The record it was made of, dimensions (time, channel); channels that the report left out are left out. Not
+        needed for a report without teeth.
 
     Returns
     -------
     dict of str to Figure
-        "spectrum" with the mesh lines and their first sidebands, and "average" over one revolution if there is one.
+        "spectrum" with the mesh lines and their first sidebands, and "average" over one revolution if there is one; of
+        a report without teeth "spectrum" and, if there is one, "envelope".
+
+    Raises
+    ------
+    ValueError
+        If the signal is needed and not given.
     """
+    if isinstance(report, VibrationReport):
+        return _vibration_figures(report)
+    if signal is None:
+        raise ValueError("signal: the figures of a report with teeth need the record it was made of")
     shaft = report.speed / (2.0 * math.pi)
     kept = signal.sel(channel=report.harmonics["channel"].values)
     lines = spectrum(kept, segment=SEGMENT)
@@ -52,6 +64,21 @@ def analysis_figures(report: AnalysisReport, signal: xr.DataArray) -> dict[str, 
             {name: report.average[:, [i]] for i, name in enumerate(names)},
             teeth=own,
             title=f"{report.source}: average over {report.average.attrs.get('averages', 1)} revolutions",
+        )
+    return figures
+
+
+def _vibration_figures(report: VibrationReport) -> dict[str, Figure]:
+    """The spectrum, and the envelope's spectrum up to some multiples of the shaft's speed or 1 kHz."""
+    top = float(report.spectrum["frequency"][-1])
+    figures = {"spectrum": spectrum_plot(report.spectrum, maximum=top, title=f"{report.source}: spectrum")}
+    if report.envelope is not None:
+        shaft = None if report.speed is None or report.speed_range is not None else report.speed / math.tau
+        end = min(ENVELOPE_TOP if shaft is None else ENVELOPE_ORDERS * shaft, float(report.envelope["frequency"][-1]))
+        # the mean, which is not part of the modulation, leaks into the first lines
+        kept = report.envelope.isel(frequency=slice(LEAKED, None))
+        figures["envelope"] = spectrum_plot(
+            kept, maximum=end, log=False, title=f"{report.source}: envelope of the most impulsive band"
         )
     return figures
 

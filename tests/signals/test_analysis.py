@@ -93,8 +93,8 @@ def test_analysis_notes_what_it_leaves_out():
 
 
 def test_analysis_errors():
-    with pytest.raises(MissingMetadataError, match="teeth is missing"):
-        analyse(make_signal(np.ones(10000), RATE))
+    with pytest.raises(MissingMetadataError, match="rate is missing"):
+        analyse(np.ones(10000), TEETH)
     with pytest.raises(SignalError, match="wheel: must be 1 to 1"):
         analyse(record()[:, [0]], wheel=2)
     with pytest.raises(SignalError, match="nothing is left"):

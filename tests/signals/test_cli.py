@@ -66,7 +66,6 @@ def test_compare_writes_bars_for_measured_states(tmp_path):
     ("words", "said"),
     [
         (["analyse", "none.csv", "--teeth", "32"], "none.csv: cannot be opened"),
-        (["analyse", "x.csv"], "On the command line: --teeth ..."),
         (["analyse", "x.csv", "--teeth", "thirty"], "--teeth is 'thirty'"),
         (["analyse", "x.csv", "--teeth", "32", "--speed", "30 mm"], "--speed"),
         (["analyse", "x.csv", "--teeth", "32", "--channel", "roof"], "has no channel"),
@@ -100,3 +99,13 @@ def test_commands_for_measurements_need_no_kernels(tmp_path):
 def test_tooth_counts():
     assert tooth_counts("32") == (32,)
     assert tooth_counts("32, 80") == (32, 80)
+
+
+def test_a_record_without_teeth_has_a_report(tmp_path):
+    path = write(tmp_path, "x.csv")
+    result = run("analyse", path, "--speed", "1800 rpm", "--figures", tmp_path / "f", "--tables", tmp_path / "t")
+    assert result.exit_code == 0, result.output
+    assert "# Vibration of x.csv" in result.output
+    assert "| housing | 1 | 30.00 |" in result.output
+    assert (tmp_path / "f" / "envelope.png").stat().st_size > 10_000
+    assert (tmp_path / "t" / "spectrum.csv").exists()

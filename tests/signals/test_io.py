@@ -159,16 +159,15 @@ def test_garbage_is_refused(tmp_path, suffix):
         read_signal(path)
 
 
-def test_text_of_a_spreadsheet_in_utf_16_is_told_from_binary(tmp_path):
+def test_text_of_a_spreadsheet_in_utf_16(tmp_path):
     (tmp_path / "x.csv").write_text("time,a\n0,1\n1,2\n", encoding="utf-16")
-    with pytest.raises(SignalFileError, match=r"x\.csv: is named as csv but holds text in UTF-16"):
-        read_signal(tmp_path / "x.csv")
+    assert read_signal(tmp_path / "x.csv").values[:, 0].tolist() == [1.0, 2.0]
 
 
 def test_missing_file_unknown_ending_and_missing_folder(tmp_path):
     with pytest.raises(SignalFileError, match="No such file"):
         read_signal(tmp_path / "none.csv")
-    (tmp_path / "x.xyz").write_text("1\n")
+    (tmp_path / "x.xyz").write_bytes(bytes(range(1, 200)))
     with pytest.raises(SignalFileError, match="determines no format"):
         read_signal(tmp_path / "x.xyz")
     with pytest.raises(SignalFileError, match="no folder"):
@@ -234,7 +233,7 @@ def test_csv_of_others(tmp_path, text, names, units, rate, first):
         ("a,b\n1,2\n3,4,5\n6,7\n", "line 3 has 3 values where 2 are expected"),
         ("a,b\n1,2\n3\n", "line 3 has 1 values where 2 are expected"),
         ("a,b\n1,2\n3,nan\n", "line 3 holds 'nan'"),
-        ("a,b\n1,2\n3,\n", "line 3 holds '', which is not a number"),
+        ("a,b\n1,2\n3,\n", "line 3 holds nothing in column 'b'; pass gaps="),
         ("<html>\n<body>not data</body>\n", "no row of numbers"),
         ("time,x\n0,1\n1,2\n5,3\n", "time: is not uniform"),
         ("# teeth: many\nx\n1\n2\n", "header is not understood"),

@@ -1,0 +1,46 @@
+"""What callers say about a signal, in numbers or texts: its rate and its speed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from gearmbs.units import to_si
+
+from .errors import SignalError
+from .signal import with_metadata
+from .speed_curve import is_curve, speed_curve
+
+
+def given_rate(rate: float | str | None) -> float | None:
+    """A sampling rate in Hz from a number or text ("12.8 kHz"); SignalError for what is neither."""
+    if rate is None:
+        return None
+    try:
+        value = float(rate)
+    except (TypeError, ValueError):
+        try:
+            value = to_si(rate, "frequency", "rate")
+        except (TypeError, ValueError) as error:
+            raise SignalError(str(error)) from None
+    if not (np.isfinite(value) and value > 0.0):
+        raise SignalError(f"rate: must be a positive number of Hz, got {rate!r}")
+    return value
+
+
+def given_speed(speed: Any) -> float | None:
+    """A constant speed in rad/s from a number or text; None for none, and for a curve, which `with_speed` takes."""
+    return None if speed is None or is_curve(speed) else float(speed_curve(speed).values[0])
+
+
+def with_speed(signal: xr.DataArray, speed: Any) -> xr.DataArray:
+    """The signal with a known speed: a number or text as attribute, a curve as coordinate `speed` over time."""
+    times = np.asarray(signal["time"].values, dtype=float)
+    curve = speed_curve(speed, span=(float(times[0]), float(times[-1])))
+    if curve.constant is not None:
+        return with_metadata(signal, speed=curve.constant)
+    result = signal.assign_coords(speed=("time", curve.at(times), {"units": "rad/s"}))
+    result.attrs = {k: v for k, v in signal.attrs.items() if k != "speed"}
+    return result

@@ -1,0 +1,251 @@
+"""The shaft of an analysis: its angle from tacho, known speed or mesh line, and remarks where a speed looks wrong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from .errors import MissingMetadataError, SignalError
+from .phase import phase_from_line, phase_from_speed
+from .shaft import shaft_phase
+from .signal import rate_of
+from .spectra import periodograms
+from .speed import MIN_QUALITY, MIN_SCORE_DB, SpeedEstimate, estimate_speed, prominence
+from .speed_curve import is_curve, speed_curve
+
+SPEED_TOLERANCE = 0.02
+"""How far from its nominal speed a drive is looked for, as a part of it."""
+VARYING = 0.02
+"""A speed that strays more than this part from its mean is followed in angle, not in frequency."""
+OTHER_COMB = 0.03
+STRONGER_DB = 3.0
+USUAL_RPM = (20.0, 15_000.0)
+USUAL_RATE = (100.0, 2e6)
+SHAFT_HARMONICS = 5
+
+
+class Shaft(NamedTuple):
+    """Angle of the reference shaft over time, its mean speed (rad/s) and where they are from."""
+
+    phase: xr.DataArray
+    speed: float
+    origin: str
+    estimate: SpeedEstimate | None = None
+    range: tuple[float, float] | None = None
+    """Lowest and highest speed, rad/s, where it varies."""
+
+
+class Known(NamedTuple):
+    """What the caller knows of the shaft; fields as the settings of `analyse`."""
+
+    speed: Any = None
+    phase: xr.DataArray | None = None
+    tacho: str | None = None
+    pulses_per_rev: float = 1.0
+    speed_channel: str | None = None
+    speed_range: tuple[float, float] | None = None
+
+
+def known_shaft(signal: xr.DataArray, known: Known) -> tuple[Shaft | float | None, xr.DataArray]:
+    """The shaft where its angle is known, or a constant speed in rad/s, or None; and the channels left to analyse.
+
+    Raises
+    ------
+    SignalError
+        If what is given contradicts itself, or nothing is left to analyse.
+    """
+    helper = known.tacho or known.speed_channel
+    nominal = _nominal(signal, known)
+    if nominal is not None:
+        return nominal, signal
+    try:
+        phase = shaft_phase(
+            signal,
+            known.speed,
+            phase=known.phase,
+            tacho=known.tacho,
+            pulses_per_rev=known.pulses_per_rev,
+            speed_channel=known.speed_channel,
+        )
+    except MissingMetadataError:
+        return None, signal
+    rest = [c for c in signal["channel"].values.tolist() if c != helper]
+    if not rest:
+        word = "tacho" if known.tacho else "speed_channel"
+        raise SignalError(f"{word}: {helper!r} is the only channel, nothing is left to analyse")
+    times = phase["time"].values
+    mean = float(phase.values[-1] - phase.values[0]) / float(times[-1] - times[0])
+    origin = (
+        f"from the tacho {known.tacho!r}"
+        if known.tacho
+        else f"from the channel {known.speed_channel!r}"
+        if known.speed_channel
+        else "from the given angle"
+        if known.phase is not None
+        else "from the given speed curve"
+    )
+    return Shaft(phase, mean, origin, None, _range(phase, mean)), signal.sel(channel=rest) if helper else signal
+
+
+def _nominal(signal: xr.DataArray, known: Known) -> float | None:
+    """The constant speed that is known and all that is, in rad/s."""
+    others = [known.phase, known.tacho, known.speed_channel]
+    given = known.speed
+    if any(other is not None for other in others):
+        return None
+    if given is None:
+        coordinates = any(n in signal.coords and signal.coords[n].dims == ("time",) for n in ("speed", "angle"))
+        given = None if coordinates else signal.attrs.get("speed")
+    if given is None or (isinstance(given, xr.DataArray) and given.attrs.get("units") == "rad"):
+        return None
+    if is_curve(given):
+        times = signal["time"].values
+        return speed_curve(given, span=(float(times[0]), float(times[-1]))).constant
+    return float(speed_curve(given).values[0])
+
+
+def mesh_shaft(
+    signal: xr.DataArray, counts: Sequence[int], known: Known, notes: list[str]
+) -> tuple[Shaft, xr.DataArray]:
+    """The shaft of a pair whose tooth counts are known, found from the mesh line where nothing else is known.
+
+    Raises
+    ------
+    SignalError
+        If nothing is known of the speed and no mesh line stands out.
+    """
+    teeth = tuple(counts)
+    found, signal = known_shaft(signal, known)
+    if isinstance(found, float):
+        shaft = _near_speed(signal, teeth, found, notes)
+    elif found is not None:
+        shaft = found
+    else:
+        estimate = estimate_speed(signal, teeth, speed_range=known.speed_range)
+        if estimate.phase is None:
+            notes.append("The mesh line is too weak to follow in phase; the speed is taken as constant.")
+        phase = phase_from_speed(signal, estimate.speed) if estimate.phase is None else estimate.phase
+        shaft = Shaft(phase, estimate.speed, "estimated from the mesh line", estimate)
+    remark_plausibility(signal, shaft.speed, found is None, notes)
+    return shaft, signal
+
+
+def remark_plausibility(signal: xr.DataArray, speed: float | None, estimated: bool, notes: list[str]) -> None:
+    """Say clearly where a sampling rate or a speed is outside what machines and instruments have."""
+    rate = rate_of(signal)
+    if not USUAL_RATE[0] <= rate <= USUAL_RATE[1]:
+        notes.append(f"CHECK THE RATE: {rate:g} Hz is unusual for vibration; every frequency here scales with it.")
+    if speed is None:
+        return
+    rpm = speed * 30.0 / math.pi
+    if not USUAL_RPM[0] <= rpm <= USUAL_RPM[1]:
+        cause = "the sampling rate, the tooth count or the mesh line may be wrong" if estimated else "check its unit"
+        notes.append(
+            f"CHECK THE SPEED: {rpm:.0f} rpm is outside {USUAL_RPM[0]:g} to {USUAL_RPM[1]:g} rpm; {cause}. "
+            f"(Sampling rate {rate:g} Hz.)"
+        )
+
+
+def _near_speed(signal: xr.DataArray, counts: tuple[int, ...], nominal: float, notes: list[str]) -> Shaft:
+    """Return the angle by the mesh line near a given speed, or at that speed where there is none."""
+    around = (nominal * (1.0 - SPEED_TOLERANCE), nominal * (1.0 + SPEED_TOLERANCE))
+    found = _estimate(signal, counts, around)
+    _remark_other(signal, counts, nominal, found, notes)
+    if found is not None and found.phase is not None:
+        words = f"from the mesh line, {100 * (found.speed / nominal - 1):+.3f} % off the given speed"
+        return Shaft(found.phase, found.speed, words, found)
+    try:
+        phase = phase_from_line(signal, nominal * counts[0] / math.tau, counts[0])
+    except SignalError:
+        phase = None
+    if phase is not None and phase.attrs["quality"] >= MIN_QUALITY:
+        followed = float(phase.attrs["mean_speed"])
+        if abs(followed / nominal - 1) < SPEED_TOLERANCE:
+            return Shaft(phase, followed, "from the given speed, followed by the mesh line")
+    notes.append("No mesh line could be followed near the given speed; it is taken as constant.")
+    return Shaft(phase_from_speed(signal, nominal), nominal, "as given")
+
+
+def _estimate(
+    signal: xr.DataArray, counts: tuple[int, ...], around: tuple[float, float] | None
+) -> SpeedEstimate | None:
+    try:
+        return estimate_speed(signal, counts, speed_range=around)
+    except SignalError:
+        return None
+
+
+def _remark_other(
+    signal: xr.DataArray, counts: tuple[int, ...], nominal: float, found: SpeedEstimate | None, notes: list[str]
+) -> None:
+    """Say so where the record, left to itself, shows another mesh frequency more clearly than near the given speed."""
+    blind = _estimate(signal, counts, None)
+    if blind is None or abs(blind.speed / nominal - 1.0) < OTHER_COMB:
+        return
+    if found is not None and blind.prominence < found.prominence + STRONGER_DB:
+        return
+    here = "no mesh line" if found is None else f"a mesh line {found.prominence:.0f} dB high"
+    ratio = blind.speed / nominal
+    notes.append(
+        f"CHECK THE SPEED: near the given {nominal * 30 / math.pi:.1f} rpm there is {here}, but the record shows one "
+        f"of {blind.prominence:.0f} dB at {blind.gmf:.2f} Hz, which with {counts[0]} teeth is "
+        f"{blind.speed * 30 / math.pi:.1f} rpm ({ratio:.3f} times the given speed)."
+    )
+
+
+def refined_speed(signal: xr.DataArray, nominal: float) -> float | None:
+    """The speed (rad/s) within 2 % of a nominal one at which the shaft's own first lines stand out, or None."""
+    rate, n = rate_of(signal), signal.sizes["time"]
+    power, _ = periodograms(signal.values, rate, n, "hann", 0.0, True, "power")
+    height = prominence(power).max(axis=1)
+    width = rate / n
+    shaft = nominal / math.tau
+    span = SPEED_TOLERANCE * shaft
+    if shaft < 8.0 * width:
+        return None
+    candidates = np.linspace(
+        shaft - span, shaft + span, max(9, 2 * math.ceil(8.0 * SHAFT_HARMONICS * span / width) + 1)
+    )
+    total = np.zeros_like(candidates)
+    present = 0
+    for k in range(1, SHAFT_HARMONICS + 1):
+        if k * (shaft + span) < rate / 2:
+            total += np.interp(k * candidates / width, np.arange(height.size), height) ** 2
+            present += 1
+    if not present:
+        return None
+    best = int(np.argmax(total))
+    if math.sqrt(total[best] / present) < MIN_SCORE_DB or best in (0, candidates.size - 1):
+        return None
+    coarse = float(candidates[np.isclose(total, total[best])].mean())
+    return _from_peaks(power.max(axis=1), height, coarse, width) * math.tau
+
+
+def _from_peaks(power: np.ndarray, height: np.ndarray, shaft: float, width: float) -> float:
+    """Shaft frequency (Hz) from the peaks beside its first multiples, higher ones counting more."""
+    total = weights = 0.0
+    for k in range(1, SHAFT_HARMONICS + 1):
+        middle = round(k * shaft / width)
+        if middle + 3 >= power.size or middle < 3:
+            continue
+        i = middle - 2 + int(np.argmax(power[middle - 2 : middle + 3]))
+        if height[i] < MIN_SCORE_DB:
+            continue
+        a, b, c = np.log(np.maximum(power[i - 1 : i + 2], 1e-300))
+        curve = a - 2.0 * b + c
+        shift = float(np.clip(0.5 * (a - c) / curve, -0.5, 0.5)) if curve < 0.0 else 0.0
+        total += (i + shift) * width
+        weights += k
+    return total / weights if weights else shaft
+
+
+def _range(phase: xr.DataArray, mean: float) -> tuple[float, float] | None:
+    """Lowest and highest speed (rad/s), over stretches of 1/200 of the record, if it varies."""
+    at = np.linspace(0, phase.size - 1, min(201, phase.size)).astype(int)
+    speeds = np.diff(phase.values[at]) / np.diff(phase["time"].values[at])
+    low, high = float(speeds.min()), float(speeds.max())
+    return (low, high) if max(high - mean, mean - low) > VARYING * mean else None

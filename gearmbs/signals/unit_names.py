@@ -1,0 +1,52 @@
+"""Whether a text is a unit at all: what a caller writes is checked, what files say is kept."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import Any
+
+from .dimensions import ALIASES, DIMENSIONS, REPLACEMENTS
+from .errors import SignalError
+
+USUAL = (
+    "m", "mm", "um", "m/s", "mm/s", "in/s", "m/s^2", "mm/s^2", "g", "mg", "N", "kN", "N*m", "V", "mV", "A", "mA", "Pa",
+    "kPa", "bar", "rpm", "Hz", "rad/s", "deg/s", "rad", "deg", "degC", "K", "s", "ms", "W", "kW", "%", "1", "dB", "ips",
+)  # fmt: skip
+COUNTS = frozenset(
+    {"", "unknown", "mixed", "counts", "count", "lsb", "digits", "digit", "adc", "eu", "a.u.", "au", "raw", "-"}
+)
+"""Texts that say that nothing is known of the unit, or that it is the converter's own."""
+
+
+def check_units(units: Any) -> None:
+    """Raise a SignalError for the first text among `units` (text, sequence or mapping of texts) that is no unit."""
+    if units is None:
+        return
+    texts = [units] if isinstance(units, str) else list(units.values() if isinstance(units, Mapping) else units)
+    for text in texts:
+        if not isinstance(text, str):
+            raise SignalError(f"units: must be text such as 'm/s^2', got {text!r}")
+        if not _is_unit(text):
+            near = difflib.get_close_matches(text, USUAL, 2, 0.5)
+            hint = (
+                f"; did you mean {' or '.join(repr(n) for n in near)}?"
+                if near
+                else "; write for example 'm/s^2' or 'g'"
+            )
+            raise SignalError(f"units: {text!r} is not a unit{hint}")
+
+
+def _is_unit(text: str) -> bool:
+    clean = text.strip()
+    if clean in USUAL or clean in ALIASES or clean in DIMENSIONS.values() or clean.lower() in COUNTS:
+        return True
+    for old, new in (*REPLACEMENTS, ("°", "deg"), ("%", "percent")):
+        clean = clean.replace(old, new)
+    from .dimensions import unit_registry
+
+    try:
+        unit_registry().Unit(clean.replace("Nm", "N*m").replace("ips", "inch/s"))
+    except Exception:
+        return False
+    return True

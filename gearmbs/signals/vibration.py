@@ -1,0 +1,173 @@
+"""Analysis of a record of which no teeth are known: levels, spectrum, impulsive band, envelope, orders of the shaft."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from .conversion import convert
+from .dimensions import unit_dimension
+from .envelope import envelope_spectrum
+from .errors import SignalError
+from .order_tracking import order_track
+from .orders import harmonic_amplitudes
+from .report_parts import FULL_LEVELS, impulsive_band, levels, line_spectrum, strongest_lines
+from .shaft_finding import Known, Shaft, known_shaft, refined_speed, remark_plausibility
+from .signal import rate_of, units_of
+from .vibration_report import VibrationReport
+
+ORDERS = 10
+VELOCITY_BAND = (10.0, 1000.0)
+"""Band of the RMS velocity in Hz, as in ISO 20816 for machines above 600 rpm."""
+EDGE = 0.05
+"""A band ends at least this part of its width above zero and below half the sampling rate."""
+NO_SPEED = "the speed is not known; give speed='1500 rpm', a curve, tacho=... or speed_channel=..."
+Progress = Callable[[float, str], None]
+
+
+def vibration_report(
+    signal: xr.DataArray, known: Known, *, lines: int = 5, progress: Progress | None = None
+) -> VibrationReport:
+    """Analyse a record of plain vibration.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel).
+    known : Known
+        What is known of the shaft.
+    lines : int
+        How many of the strongest lines to list per channel.
+    progress : callable, optional
+        Called as progress(fraction, stage).
+
+    Returns
+    -------
+    VibrationReport
+    """
+    tell = progress or (lambda fraction, stage: None)
+    notes = [str(note) for note in signal.attrs.get("notes", ())]
+    missing: dict[str, str] = {}
+    tell(0.0, "speed")
+    found, kept = known_shaft(signal, known)
+    speed, origin = _speed(kept, found, notes)
+    remark_plausibility(kept, speed, False, notes)
+    tell(0.1, "levels")
+    table = levels(kept, FULL_LEVELS)
+    velocity = _velocity(kept)
+    if isinstance(velocity, str):
+        missing["velocity_rms"] = velocity
+        table["velocity_rms"] = ("channel", np.full(kept.sizes["channel"], np.nan), {"units": "m/s"})
+    else:
+        table["velocity_rms"] = ("channel", velocity, {"units": "m/s"})
+    tell(0.25, "lines")
+    spectrum = line_spectrum(kept)
+    shaft_hz = None if speed is None else speed / math.tau
+    varying = isinstance(found, Shaft) and found.range is not None
+    orders = _orders(kept, found, speed)
+    if isinstance(orders, str):
+        missing["orders"] = orders
+    tell(0.45, "kurtogram")
+    impulsive = impulsive_band(kept, lambda f, _: tell(0.45 + 0.35 * f, "kurtogram"))
+    envelope = lines_of_envelope = None
+    if isinstance(impulsive, str):
+        missing["impulsive"] = impulsive
+        missing["envelope"] = missing["envelope_lines"] = "there is no impulsive band to take it in: " + impulsive
+    else:
+        tell(0.8, "envelope")
+        envelope = _envelope(kept, impulsive)
+        lines_of_envelope = strongest_lines(envelope, lines, None if varying else shaft_hz)
+    if varying:
+        notes.append("The speed varies: lines are listed in Hz as they are, orders are followed in angle.")
+    tell(1.0, "done")
+    return VibrationReport(
+        source=str(signal.attrs.get("source", signal.name or "signal")),
+        rate=rate_of(kept),
+        duration=kept.sizes["time"] / rate_of(kept),
+        units=units_of(kept),
+        levels=table,
+        spectrum=spectrum,
+        lines=strongest_lines(spectrum, lines, None if varying else shaft_hz),
+        impulsive=None if isinstance(impulsive, str) else impulsive,
+        envelope=envelope,
+        envelope_lines=lines_of_envelope,
+        orders=None if isinstance(orders, str) else orders,
+        speed=speed,
+        speed_range=found.range if isinstance(found, Shaft) else None,
+        speed_origin=origin,
+        missing=missing,
+        notes=notes,
+    )
+
+
+def _speed(signal: xr.DataArray, found: Shaft | float | None, notes: list[str]) -> tuple[float | None, str]:
+    """Mean speed (rad/s) and where it is from."""
+    if found is None:
+        return None, "not known"
+    if isinstance(found, Shaft):
+        return found.speed, found.origin
+    refined = refined_speed(signal, found)
+    if refined is None:
+        notes.append("No line of the shaft stands out near the given speed; orders are taken at exactly that speed.")
+        return found, "as given"
+    return refined, f"from the shaft's own lines, {100 * (refined / found - 1):+.3f} % off the given speed"
+
+
+def _velocity(signal: xr.DataArray) -> np.ndarray | str:
+    """RMS velocity (m/s) of each channel, or why there is none."""
+    rate = rate_of(signal)
+    try:
+        kinds = [unit_dimension(unit)[0] for unit in units_of(signal)]
+    except SignalError:
+        return "the units are not known; give units='m/s^2' or 'g'"
+    if any(kind not in ("acceleration", "velocity") for kind in kinds):
+        return "a channel is neither an acceleration nor a velocity"
+    low, high = VELOCITY_BAND
+    if rate < 2.5 * high:
+        return f"its band reaches to {high:g} Hz, the sampling rate is {rate:g} Hz"
+    try:
+        return np.std(convert(signal, "velocity", band=(low, high)).values, axis=0)
+    except SignalError as error:
+        return str(error)
+
+
+def _orders(signal: xr.DataArray, found: Shaft | float | None, speed: float | None) -> pd.DataFrame | str:
+    """RMS at the first orders of the shaft by channel, or why there are none."""
+    if found is None or speed is None:
+        return NO_SPEED
+    rate, shaft = rate_of(signal), speed / math.tau
+    fitting = min(ORDERS, math.ceil(rate / 2 / shaft) - 1)
+    if fitting < 1:
+        return f"the shaft's {shaft:g} Hz are not below half the sampling rate ({rate / 2:g} Hz)"
+    wanted = np.arange(1.0, fitting + 1.0)
+    try:
+        if isinstance(found, Shaft):
+            tracked = order_track(signal, orders=wanted.tolist(), phase=found.phase, scaling="rms", revolutions=4.0)
+            rms = np.sqrt((tracked.values**2).mean(axis=0))
+        else:
+            rms = np.abs(harmonic_amplitudes(signal.values, rate, shaft, wanted)) / math.sqrt(2.0)
+    except SignalError as error:
+        return str(error)
+    rows = [
+        (str(channel), float(order), float(order * shaft), float(rms[k, c]))
+        for c, channel in enumerate(signal["channel"].values)
+        for k, order in enumerate(wanted)
+    ]
+    return pd.DataFrame(rows, columns=["channel", "order", "frequency", "rms"])
+
+
+def _envelope(signal: xr.DataArray, impulsive: xr.Dataset) -> xr.DataArray:
+    """RMS spectrum of each channel's envelope in its most impulsive band, over segments of 2 s."""
+    rate = rate_of(signal)
+    parts = []
+    for i in range(signal.sizes["channel"]):
+        centre, width = (float(impulsive[key].values[i]) for key in ("best_centre", "best_bandwidth"))
+        low = max(centre - 0.5 * width, EDGE * width)
+        high = min(centre + 0.5 * width, rate / 2 - EDGE * width)
+        parts.append(envelope_spectrum(signal.isel(channel=[i]), (low, high), scaling="rms", segment=2.0))
+    joined = xr.concat(parts, "channel", join="override", combine_attrs="override")
+    return joined.transpose("frequency", "channel")
