@@ -7,13 +7,15 @@ import gc
 import os
 import signal
 import sys
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
+
+from gearmbs._command import fail, guarded
+from gearmbs.campaigns.commands import app as campaign_app
 
 if TYPE_CHECKING:
     from gearmbs.studies.simulation import SimulationFailed
@@ -26,32 +28,10 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+app.add_typer(campaign_app)
+
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")]
 ReportFile = Annotated[Path | None, typer.Option("--out", "-o", help="Write the report here instead of printing it.")]
-
-
-def fail(message: str) -> None:
-    """End with a message and exit status 1."""
-    typer.secho(f"gearmbs: {message}", fg="red", err=True)
-    raise typer.Exit(1)
-
-
-@contextmanager
-def guarded() -> Iterator[None]:
-    """Turn the library's errors into messages, its warnings into notes, and Ctrl-C into exit status 130."""
-    try:
-        with warnings.catch_warnings():
-            warnings.showwarning = lambda message, *_: typer.secho(f"gearmbs: note: {message}", err=True)
-            yield
-    except typer.Exit:
-        raise
-    except KeyboardInterrupt:
-        typer.secho("gearmbs: interrupted; finished cases are kept, nothing is half-written", err=True)
-        raise typer.Exit(130) from None
-    except (ValueError, RuntimeError, OSError) as error:
-        # what a function asks for by keyword is asked for here by the option of that name
-        asked = getattr(error, "name", None) if type(error).__name__ == "MissingMetadataError" else None
-        fail(f"{error}\nOn the command line: --{asked} ..." if asked else str(error))
 
 
 @contextmanager

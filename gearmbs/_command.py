@@ -1,0 +1,33 @@
+"""What every command of the command line does with errors."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import typer
+
+
+def fail(message: str) -> None:
+    """End with a message and exit status 1."""
+    typer.secho(f"gearmbs: {message}", fg="red", err=True)
+    raise typer.Exit(1)
+
+
+@contextmanager
+def guarded() -> Iterator[None]:
+    """Turn the library's errors into messages, its warnings into notes, and Ctrl-C into exit status 130."""
+    try:
+        with warnings.catch_warnings():
+            warnings.showwarning = lambda message, *_: typer.secho(f"gearmbs: note: {message}", err=True)
+            yield
+    except typer.Exit:
+        raise
+    except KeyboardInterrupt:
+        typer.secho("gearmbs: interrupted; finished cases are kept, nothing is half-written", err=True)
+        raise typer.Exit(130) from None
+    except (ValueError, RuntimeError, OSError) as error:
+        # what a function asks for by keyword is asked for here by the option of that name
+        asked = getattr(error, "name", None) if type(error).__name__ == "MissingMetadataError" else None
+        fail(f"{error}\nOn the command line: --{asked} ..." if asked else str(error))

@@ -1,0 +1,87 @@
+"""Campaigns: from one case to a million, on one machine or a cluster, with what is asked of the results.
+
+A plan says what is simulated, what varies and what is kept; a campaign is the folder in which it is carried out, and
+which is
+queue, memory and result at once::
+
+    from gearmbs.campaigns import Campaign, Factor, make_plan
+
+    plan = make_plan(case, [Factor("operation.torque", "50 N m", "200 N m")], "sobol", n=256, keep=["harmonics"])
+    campaign = Campaign("torque.campaign", plan)
+    campaign.run(workers=2)
+    campaign.table
+"""
+
+from typing import TYPE_CHECKING
+
+from gearmbs._lazy import late
+
+if TYPE_CHECKING:
+    from gearmbs.campaigns.campaign import Campaign
+    from gearmbs.campaigns.canonical import canonical, content_key
+    from gearmbs.campaigns.errors import CampaignError
+    from gearmbs.campaigns.factors import Choice, Factor, Specimens, choose
+    from gearmbs.campaigns.plan import Plan, load_plan, make_plan
+    from gearmbs.campaigns.runners.dask import dask_client
+    from gearmbs.campaigns.status import CampaignStatus
+    from gearmbs.campaigns.subjects import (
+        DeckSubject,
+        FunctionSubject,
+        Kept,
+        Outcome,
+        PairSubject,
+        Subject,
+        make_subject,
+        subject_kinds,
+    )
+
+__all__ = [
+    "Campaign",
+    "CampaignError",
+    "CampaignStatus",
+    "Choice",
+    "DeckSubject",
+    "Factor",
+    "FunctionSubject",
+    "Kept",
+    "Outcome",
+    "PairSubject",
+    "Plan",
+    "Specimens",
+    "Subject",
+    "canonical",
+    "choose",
+    "content_key",
+    "dask_client",
+    "load_plan",
+    "make_plan",
+    "make_subject",
+    "subject_kinds",
+]
+
+late(
+    __name__,
+    {
+        "Campaign": ".campaign",
+        "CampaignError": ".errors",
+        "CampaignStatus": ".status",
+        "Choice": ".factors",
+        "DeckSubject": ".subjects",
+        "Factor": ".factors",
+        "FunctionSubject": ".subjects",
+        "Kept": ".subjects",
+        "Outcome": ".subjects",
+        "PairSubject": ".subjects",
+        "Plan": ".plan",
+        "Specimens": ".factors",
+        "Subject": ".subjects",
+        "canonical": ".canonical:canonical",
+        "choose": ".factors",
+        "content_key": ".canonical",
+        "dask_client": ".runners.dask",
+        "load_plan": ".plan",
+        "make_plan": ".plan",
+        "make_subject": ".subjects",
+        "subject_kinds": ".subjects",
+    },
+)

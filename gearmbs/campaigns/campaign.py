@@ -1,0 +1,291 @@
+"""A campaign: a plan, the folder it is carried out in, and what came of it."""
+
+from __future__ import annotations
+
+import os
+import random
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.folder import Folder, extend_folder, make_folder
+from gearmbs.campaigns.plan import Plan
+from gearmbs.campaigns.status import CampaignStatus, read_status
+from gearmbs.campaigns.work import ALREADY, CLAIMED, DIED, STOPPED, UnitReport
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+MOST_TRIES = 8
+"""Attempts of a unit that end with a worker's death, after which the run gives up."""
+
+POLL = 0.5
+"""Seconds between looks at units that somebody else is at work on."""
+
+
+class Campaign:
+    """Many cases in a folder, which is queue, memory and result at once.
+
+    Parameters
+    ----------
+    path : path-like
+        Folder of the campaign.
+    plan : Plan, optional
+        Makes the folder; without it the campaign there is opened. A folder with the same plan is taken up again.
+
+    Raises
+    ------
+    CampaignError
+        If there is no campaign, another one, or if a corner of the plan is impossible.
+
+    Examples
+    --------
+    >>> plan = make_plan(Case(), [Factor("operation.torque", 50.0, 200.0)], n=128)  # doctest: +SKIP
+    >>> campaign = Campaign("torque.campaign", plan)  # doctest: +SKIP
+    >>> campaign.run(workers=2)  # doctest: +SKIP
+    >>> campaign.table["orders.line_of_action.1"].describe()  # doctest: +SKIP
+    """
+
+    def __init__(self, path: str | Path, plan: Plan | None = None) -> None:
+        _needed()
+        self.folder = Folder(path) if plan is None else make_folder(path, plan)
+
+    @property
+    def path(self) -> Path:
+        """The folder."""
+        return self.folder.path
+
+    @property
+    def plan(self) -> Plan:
+        """The plan."""
+        return self.folder.plan
+
+    def __repr__(self) -> str:
+        return f"Campaign({str(self.path)!r}): {self.status()}"
+
+    def run(
+        self,
+        workers: int | None = None,
+        *,
+        client: Any = None,
+        progress: bool | Callable[[CampaignStatus], None] = False,
+        minutes: float | None = None,
+    ) -> CampaignStatus:
+        """Work on what is not done yet, until all is.
+
+        Parameters
+        ----------
+        workers : int, optional
+            Processes of this machine; default the cores. 0: in this process.
+        client : distributed.Client, optional
+            Work on its cluster instead.
+        progress : bool or callable
+            Show a bar, or ``progress(status)`` after every unit.
+        minutes : float, optional
+            Start no unit after so long.
+
+        Raises
+        ------
+        OSError
+            If the disk is full. What is done stays, and another run goes on.
+        CampaignError
+            If workers die again and again over the same unit, or with ``on_failure="stop"`` at the first failed case.
+        """
+        from gearmbs.campaigns.runners import DaskRunner, ProcessRunner, SerialRunner
+        from gearmbs.studies.parallel import available_cores
+
+        runner: Any
+        if client is not None:
+            runner = DaskRunner(client)
+        elif workers == 0:
+            runner = SerialRunner()
+        else:
+            runner = ProcessRunner(min(workers or available_cores(), max(1, len(self._pending()))))
+        return self._drive(runner, self._pending(), progress, minutes)
+
+    def work(self, part: int, parts: int, *, minutes: float | None = None) -> CampaignStatus:
+        """Work here on one part of the units: an element of a job array, without any coordination.
+
+        Parameters
+        ----------
+        part, parts : int
+            Part 1 to parts.
+        minutes : float, optional
+            Start no unit after so long.
+        """
+        from gearmbs.campaigns.runners import SerialRunner
+
+        if not 1 <= part <= parts:
+            raise CampaignError(f"part {part} of {parts}: give a part from 1 to {parts}")
+        mine = [unit for unit in self._pending() if unit % parts == part - 1]
+        return self._drive(SerialRunner(), mine, False, minutes)
+
+    def _pending(self) -> list[int]:
+        done = set(self.folder.done())
+        return [unit for unit in range(self.folder.unit_count) if unit not in done]
+
+    def _drive(self, runner: Any, units: list[int], progress: Any, minutes: float | None) -> CampaignStatus:
+        # drivers side by side begin at different ends, so that they rarely want the same unit
+        offset = random.Random(os.getpid()).randrange(len(units)) if _driven(self.folder, units) else 0
+        queue = deque(units[offset:] + units[:offset])
+        elsewhere: list[int] = []
+        deaths: dict[int, int] = {}
+        end = None if minutes is None else time.monotonic() + 60.0 * minutes
+
+        def ahead() -> Iterator[int]:
+            while queue and (end is None or time.monotonic() < end):
+                yield queue.popleft()
+
+        with _shown(progress, self.status) as tell:
+            while queue or elsewhere:
+                # a runner ends when there is nothing to take; what came back meanwhile is taken up by the next round
+                for report in runner(str(self.path), ahead()):
+                    self._take_note(report, queue, elsewhere, deaths)
+                    tell()
+                if end is not None and time.monotonic() >= end:
+                    break
+                if elsewhere and not queue:
+                    time.sleep(POLL)
+                    queue.extend(unit for unit in elsewhere if not self.folder.ledger(unit).exists())
+                    elsewhere.clear()
+                    tell()
+        return self.status()
+
+    def _take_note(self, report: UnitReport, queue: deque, elsewhere: list[int], deaths: dict[int, int]) -> None:
+        if report.what == STOPPED:
+            raise CampaignError(f"stopped at the first failure, as the plan wants: {report.message}")
+        if report.what == CLAIMED:
+            elsewhere.append(report.unit)
+        elif report.what == DIED:
+            deaths[report.unit] = deaths.get(report.unit, 0) + 1
+            if deaths[report.unit] >= MOST_TRIES:
+                raise CampaignError(
+                    f"unit {report.unit}: its worker died {MOST_TRIES} times, also with its cases in "
+                    f"processes of their "
+                    f"own; is there enough memory for {self.plan.unit} results? {report.message}"
+                )
+            queue.append(report.unit)
+        else:
+            assert report.what in (ALREADY, "worked")
+
+    def status(self) -> CampaignStatus:
+        """Return how far it is; from anywhere, at any time."""
+        return read_status(self.folder)
+
+    def extend(self, n: int) -> Campaign:
+        """Draw further points up to n, keep what is there; `run` then works on the new ones."""
+        self.folder = extend_folder(self.folder, n)
+        return self
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """One row a finished case: the plan's columns, ``id``, ``status``, ``message``, ``advice`` and what is kept."""
+        from gearmbs.campaigns.results import read_table
+
+        return read_table(self.folder)
+
+    def failed(self) -> pd.DataFrame:
+        """Return the rows of the cases that failed, each with its message and what to do about it."""
+        table = self.table
+        return table[table["status"] != "done"].reset_index(drop=True)
+
+    def open(self) -> xr.Dataset:
+        """Return everything along ``case`` as one Dataset; signals are read when they are asked for."""
+        from gearmbs.campaigns.results import open_dataset
+
+        return open_dataset(self.folder)
+
+    def case(self, index: int) -> Any:
+        """Return the thing that a case simulates, made again from the plan."""
+        unit = self._unit_of(index)
+        row = next(row for row in self.folder.cases(unit) if row["index"] == index)
+        return self.plan.subject.check(self.plan.data(row), f"case {index}")
+
+    def _unit_of(self, index: int) -> int:
+        for extent in self.folder.extents:
+            if extent.first <= index < extent.last:
+                return extent.first_unit + (index - extent.first) // self.plan.unit
+        raise CampaignError(f"case {index}: there are cases 0 to {self.folder.case_count - 1}")
+
+    def check(self, *, sweep: bool = False) -> list[str]:
+        """Hold what is stored against the ledgers; return what is wrong, and what is left lying about.
+
+        Parameters
+        ----------
+        sweep : bool
+            Remove the litter of killed workers, and ledgers whose data are damaged, so that `run` does them again.
+        """
+        from gearmbs.campaigns.status import check_folder
+
+        return check_folder(self.folder, sweep=sweep)
+
+    def retry(self) -> int:
+        """Take failed cases' units out of the ledger, so that `run` does them again; return how many units."""
+        again = [unit for unit in self.folder.done() if _has_failures(self.folder, unit)]
+        for unit in again:
+            self.folder.ledger(unit).unlink(missing_ok=True)
+        return len(again)
+
+
+def _has_failures(folder: Folder, unit: int) -> bool:
+    from gearmbs.campaigns.status import read_ledger
+
+    entry = read_ledger(folder.ledger(unit))
+    return bool(entry and entry["failed"])
+
+
+def _driven(folder: Folder, units: list[int]) -> bool:
+    """Whether somebody is at work on some of the units."""
+    return bool(units) and any((folder.path / "units").glob("*.claim"))
+
+
+class _shown:
+    """A bar on a terminal or in a notebook, or calls of a function, about once a second."""
+
+    def __init__(self, progress: Any, status: Callable[[], CampaignStatus]) -> None:
+        self._progress, self._status, self._last = progress, status, -1e9
+        self._bar: Any = None
+
+    def __enter__(self) -> Callable[[], None]:
+        if self._progress is True:
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+            columns = (BarColumn(), TextColumn("{task.percentage:>3.0f} %  {task.description}"), TimeElapsedColumn())
+            self._bar = Progress(*columns, console=Console(stderr=True), refresh_per_second=2)
+            self._bar.start()
+            self._task = self._bar.add_task("", total=1.0)
+        self._tell(force=True)
+        return self._tell
+
+    def _tell(self, force: bool = False) -> None:
+        # reading many ledgers is not free
+        if not self._progress or (not force and time.monotonic() - self._last < 1.0):
+            return
+        self._last = time.monotonic()
+        status = self._status()
+        if self._bar is not None:
+            self._bar.update(self._task, completed=status.fraction, description=str(status))
+        else:
+            self._progress(status)
+
+    def __exit__(self, *_error: object) -> None:
+        self._tell(force=True)
+        if self._bar is not None:
+            self._bar.stop()
+
+
+def _needed() -> None:
+    """Say what to install if it is missing."""
+    try:
+        import pyarrow
+        import zarr  # noqa: F401
+    except ImportError as error:
+        raise CampaignError(
+            f"campaigns need pyarrow and zarr ({error}); install the extra: pip install 'gearmbs[campaigns]'"
+        ) from None
+    del pyarrow

@@ -1,0 +1,170 @@
+"""One case of a unit, carried out here or in a process of its own."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gearmbs.campaigns.canonical import content_key
+from gearmbs.campaigns.folder import Folder
+from gearmbs.campaigns.limits import TimeLimitReached, limited
+from gearmbs.campaigns.subjects.base import DIED, FAILED, MEMORY, TIME, Kept, Outcome
+
+DEATHS = 2
+"""A case whose own process has died so often is recorded as the cause."""
+
+
+@dataclass
+class CaseResult:
+    """What came of a case: how it ended, what is kept, its key, processor seconds inside the simulation."""
+
+    outcome: Outcome
+    kept: Kept = field(default_factory=Kept)
+    key: str = ""
+    seconds: float = 0.0
+    reused: bool = False
+
+
+class CaseRunner:
+    """Carries out cases of a campaign in this process.
+
+    Parameters
+    ----------
+    folder : Folder
+    """
+
+    def __init__(self, folder: Folder) -> None:
+        self.folder, self.plan, self.subject = folder, folder.plan, folder.plan.subject
+
+    def prepare(self, row: dict[str, Any]) -> tuple[Any, CaseResult]:
+        """Return the thing that a row stands for and a result with its key; None and the failure if it is
+        impossible."""
+        try:
+            thing = self.subject.check(self.plan.data(row), f"case {row['index']}")
+            return thing, CaseResult(Outcome(), key=content_key(self.subject.kind, self.subject.canonical(thing)))
+        except Exception as error:
+            return None, CaseResult(self.subject.explain(error))
+
+    def run(self, row: dict[str, Any]) -> CaseResult:
+        """Carry out a case; whatever it raises becomes its outcome."""
+        thing, result = self.prepare(row)
+        if thing is None:
+            return result
+        start = time.thread_time()
+        self._attempt(thing, result, row)
+        if result.outcome.status == FAILED and self.plan.on_failure == "tighter":
+            tighter = self.subject.tightened(thing)
+            if tighter is not None:
+                self._attempt(tighter, result, row)
+        result.seconds = time.thread_time() - start
+        return result
+
+    def _attempt(self, thing: Any, result: CaseResult, row: dict[str, Any]) -> None:
+        plan = self.plan
+        try:
+            with limited(plan.time_limit, plan.memory_limit) as check:
+                record = self.subject.run(thing, check)
+                result.kept = self.subject.reduce(thing, record, plan.keep)
+            if "record" in plan.keep:
+                self._write("records", row, record)
+            result.outcome = Outcome()
+        except TimeLimitReached as error:
+            result.outcome = Outcome(TIME, str(error), "Raise time_limit, or narrow the ranges.")
+        except MemoryError as error:
+            result.outcome = Outcome(MEMORY, f"MemoryError: {error}"[:500], "Raise memory_limit, or narrow the ranges.")
+        except OSError:
+            # the disk, not the case
+            raise
+        except Exception as error:
+            result.outcome = self.subject.explain(error)
+            partial = self.subject.partial(error)
+            if partial is not None:
+                self._write("failed", row, partial)
+
+    def _write(self, kind: str, row: dict[str, Any], record: Any) -> None:
+        from gearmbs.studies.store import write_dataset
+
+        write_dataset(self.folder.path / kind / f"{row['unit']:05d}" / f"{row['index']:07d}.nc", record)
+
+    def close(self) -> None:
+        """Let go of what the runner holds."""
+
+
+class GuardedRunner(CaseRunner):
+    """Carries out cases in a child process, whose death is that of one case.
+
+    For units that did not come to an end before: the guilty case is found, and its neighbours are not harmed.
+    """
+
+    def __init__(self, folder: Folder) -> None:
+        super().__init__(folder)
+        self._child: subprocess.Popen | None = None
+
+    def run(self, row: dict[str, Any]) -> CaseResult:
+        """Carry out a case in the child; one whose process dies twice is recorded as the cause."""
+        for _ in range(DEATHS):
+            child = self._start()
+            assert child.stdin is not None
+            assert child.stdout is not None
+            try:
+                pickle.dump(row, child.stdin)
+                child.stdin.flush()
+                kind, value = pickle.load(child.stdout)
+            except (EOFError, OSError, pickle.UnpicklingError):
+                code = child.wait()
+                self._child = None
+                cause = f"signal {-code}" if code < 0 else f"exit status {code}"
+                continue
+            if kind == "error":
+                raise value
+            return value
+        _, result = self.prepare(row)
+        result.outcome = Outcome(
+            DIED, f"the process of this case died {DEATHS} times ({cause})", "It may need more memory than there is."
+        )
+        return result
+
+    def _start(self) -> subprocess.Popen:
+        if self._child is None:
+            command = [sys.executable, "-m", "gearmbs.campaigns.case_runner", str(self.folder.path)]
+            self._child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        return self._child
+
+    def close(self) -> None:
+        """End the child."""
+        if self._child is not None:
+            assert self._child.stdin is not None
+            self._child.stdin.close()
+            self._child.wait()
+            self._child = None
+
+
+def serve(path: str | Path) -> None:
+    """Carry out the cases that come through standard input until it is closed."""
+    source, sink = sys.stdin.buffer, sys.stdout.buffer
+    # what a simulation prints must not get into the answers
+    sys.stdout = sys.stderr
+    runner = CaseRunner(Folder(path))
+    while True:
+        try:
+            row = pickle.load(source)
+        except EOFError:
+            return
+        try:
+            answer: tuple[str, Any] = ("result", runner.run(row))
+        except OSError as error:
+            answer = ("error", error)
+        pickle.dump(answer, sink)
+        sink.flush()
+
+
+if __name__ == "__main__":
+    # the classes of the answers must be those of the module, not of the script
+    from gearmbs.campaigns.case_runner import serve as serve_here
+
+    serve_here(sys.argv[1])

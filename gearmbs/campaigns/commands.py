@@ -1,0 +1,161 @@
+"""``gearmbs campaign``: campaigns from the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gearmbs._command import fail, guarded
+
+app = typer.Typer(
+    name="campaign", help="Plan, run and evaluate campaigns of many cases.", no_args_is_help=True, add_completion=False
+)
+
+Place = Annotated[Path, typer.Argument(help="Folder of the campaign.")]
+
+
+@app.command()
+def plan(
+    file: Annotated[Path, typer.Argument(help="Plan in TOML.")],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder; default: beside the plan.")] = None,
+) -> None:
+    """Check a plan and its corners, draw its cases and make the folder; nothing is simulated."""
+    with guarded():
+        from gearmbs.campaigns import Campaign, load_plan
+
+        campaign = Campaign(out or file.with_suffix(".campaign"), load_plan(file))
+        typer.echo(f"wrote {campaign.path}: {campaign.folder.case_count} cases in {campaign.folder.unit_count} units")
+
+
+@app.command()
+def run(
+    folder: Place,
+    workers: Annotated[int | None, typer.Option(help="Processes; default: the cores.")] = None,
+    dask: Annotated[
+        str | None, typer.Option(help='Address of a Dask scheduler, or "local" for a cluster here.')
+    ] = None,
+    minutes: Annotated[float | None, typer.Option(help="Start no further unit after so long.")] = None,
+) -> None:
+    """Work on what is not done yet; after an interruption, the same command goes on."""
+    with guarded():
+        from gearmbs.campaigns import Campaign, dask_client
+
+        campaign = Campaign(folder)
+        if dask is not None:
+            with dask_client(dask, workers) as client:
+                status = campaign.run(client=client, progress=True, minutes=minutes)
+        else:
+            status = campaign.run(workers, progress=True, minutes=minutes)
+        typer.echo(str(status))
+        if status.failed:
+            typer.echo(f"see gearmbs campaign failed {folder}")
+
+
+@app.command()
+def work(
+    folder: Place,
+    part: Annotated[str, typer.Option(help='Which part of how many, as "3/200".')] = "1/1",
+    minutes: Annotated[float | None, typer.Option(help="Start no further unit after so long.")] = None,
+) -> None:
+    """Work here on one part of the units, as an element of a job array; parts need not know of each other."""
+    with guarded():
+        from gearmbs.campaigns import Campaign
+
+        number, _, count = part.partition("/")
+        if not (number.isdigit() and count.isdigit()):
+            fail(f"--part is {part!r}; write it as 3/200")
+        typer.echo(str(Campaign(folder).work(int(number), int(count), minutes=minutes)))
+
+
+@app.command()
+def status(
+    folder: Place,
+    watch: Annotated[bool, typer.Option(help="Say it again every five seconds until all is done.")] = False,
+) -> None:
+    """Tell how far a campaign is, from any shell that sees its folder."""
+    with guarded():
+        import time
+
+        from gearmbs.campaigns import Campaign
+
+        while True:
+            now = Campaign(folder).status()
+            typer.echo(str(now))
+            if not watch or now.complete:
+                break
+            time.sleep(5.0)
+
+
+@app.command()
+def failed(
+    folder: Place,
+    retry: Annotated[
+        bool, typer.Option(help="Take their units out of the ledger, so that run does them again.")
+    ] = False,
+) -> None:
+    """List the cases that failed, with the reason and what to do about it."""
+    with guarded():
+        from gearmbs.campaigns import Campaign
+
+        campaign = Campaign(folder)
+        for row in campaign.failed().to_dict("records"):
+            typer.echo(f"case {row['index']}: {row['status']}: {row['message']}")
+            if row["advice"]:
+                typer.echo(f"    {row['advice']}")
+        if retry:
+            typer.echo(f"{campaign.retry()} units will be done again by gearmbs campaign run {folder}")
+
+
+@app.command()
+def show(folder: Place, case: Annotated[int, typer.Argument(help="Number of the case.")]) -> None:
+    """Print the case behind a number: what was simulated, and its row of the table."""
+    with guarded():
+        from gearmbs.campaigns import Campaign
+
+        campaign = Campaign(folder)
+        thing = campaign.case(case)
+        typer.echo(thing.model_dump_json(indent=1) if hasattr(thing, "model_dump_json") else str(thing))
+        if campaign.folder.done():
+            table = campaign.table
+            row = table[table["index"] == case]
+            typer.echo(row.T.to_string(header=False) if len(row) else f"case {case} is not done yet")
+
+
+@app.command()
+def extend(folder: Place, to: Annotated[int, typer.Option(help="Points of the design.")]) -> None:
+    """Draw further points of the design; what is done stays."""
+    with guarded():
+        from gearmbs.campaigns import Campaign
+
+        campaign = Campaign(folder).extend(to)
+        typer.echo(str(campaign.status()))
+
+
+@app.command()
+def check(
+    folder: Place,
+    sweep: Annotated[bool, typer.Option(help="Remove litter, and ledgers whose data are damaged.")] = False,
+) -> None:
+    """Hold what is stored against the ledgers."""
+    with guarded():
+        from gearmbs.campaigns import Campaign
+
+        found = Campaign(folder).check(sweep=sweep)
+        typer.echo("\n".join(found) if found else "all is as the ledgers say")
+        if any(not line.startswith("litter") for line in found):
+            raise typer.Exit(1)
+
+
+@app.command()
+def slurm(
+    folder: Place,
+    elements: Annotated[int, typer.Option(help="Elements of the job array.")] = 100,
+    minutes: Annotated[int, typer.Option(help="Wall time of an element.")] = 60,
+) -> None:
+    """Print a job script for Slurm that works on a campaign as a job array; nothing is submitted."""
+    with guarded():
+        from gearmbs.campaigns.job_script import job_script
+
+        typer.echo(job_script(folder, elements, minutes))

@@ -1,0 +1,376 @@
+"""What a plan varies: quantities over a range or a list, choices among alternatives, specimens.
+
+A factor takes some coordinates in the unit cube and turns them into columns of the plan's table, then a row of that
+table into changes of the nested data of a case. Columns hold numbers in SI or texts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.subjects.base import Subject
+from gearmbs.units import to_si
+
+Columns = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Factor:
+    """A field over a range, or one of several values.
+
+    Parameters
+    ----------
+    path : str
+        Field of the subject, as "operation.torque".
+    low, high : float or str
+        Range, in SI or with units.
+    scale : {"linear", "log"}
+    values : sequence, optional
+        Takes the place of the range: these values, equally likely.
+    whole : bool
+        Whole numbers, both ends included.
+    levels : int, optional
+        How many values of the range a grid takes; default 2.
+    name : str, optional
+        Of the column; default the path.
+
+    Examples
+    --------
+    >>> Factor("operation.torque", "20 N m", "200 N m", scale="log").path
+    'operation.torque'
+    """
+
+    path: str
+    low: Any = None
+    high: Any = None
+    scale: Literal["linear", "log"] = "linear"
+    values: tuple[Any, ...] = ()
+    whole: bool = False
+    levels: int | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", tuple(self.values))
+        object.__setattr__(self, "name", self.name or self.path)
+        if bool(self.values) == (self.low is not None or self.high is not None):
+            raise CampaignError(f"factor {self.path!r}: give low and high, or values")
+        if not self.values and (self.low is None or self.high is None):
+            raise CampaignError(f"factor {self.path!r}: low = {self.low!r}, high = {self.high!r}; give both")
+        if self.scale not in ("linear", "log"):
+            raise CampaignError(f"factor {self.path!r}: scale is {self.scale!r}; choose linear or log")
+
+    @property
+    def width(self) -> int:
+        """Coordinates of the unit cube it takes."""
+        return 1
+
+    @property
+    def count(self) -> int:
+        """Values of a grid."""
+        return len(self.values) or self.levels or 2
+
+    def in_si(self, subject: Subject) -> Factor:
+        """Return the factor with its texts in the subject's units.
+
+        Raises
+        ------
+        CampaignError
+            For unknown fields, wrong units, or a range that is empty.
+        """
+        unit = subject.unit_of(self.path)
+        if self.values:
+            values = tuple(_number(v, unit, self.path) for v in self.values)
+            return Factor(self.path, values=values, whole=self.whole, name=self.name)
+        low, high = (_real(v, unit, self.path) for v in (self.low, self.high))
+        if not low < high:
+            raise CampaignError(f"factor {self.path!r}: low = {low:g} is not below high = {high:g}")
+        if self.scale == "log" and low <= 0.0:
+            raise CampaignError(f"factor {self.path!r}: low = {low:g} has no logarithm; give a positive one")
+        return Factor(self.path, low, high, self.scale, whole=self.whole, levels=self.levels, name=self.name)
+
+    def columns(self, u: np.ndarray) -> Columns:
+        """Return the column for coordinates u, shape (n, 1), in [0, 1]."""
+        x = u[:, 0]
+        if self.values:
+            place = np.minimum((x * len(self.values)).astype(int), len(self.values) - 1)
+            return {self.name: np.array(self.values)[place]}
+        low, high = float(self.low), float(self.high)
+        if self.whole:
+            return {self.name: np.minimum(np.floor(low + x * (high - low + 1)), high).astype(np.int64)}
+        if self.scale == "log":
+            return {self.name: low * np.exp(x * math.log(high / low))}
+        return {self.name: low + x * (high - low)}
+
+    def coordinate(self, value: Any, unit: str) -> float:
+        """Return where a value lies in the range, between 0 and 1."""
+        if self.values:
+            number = _number(value, unit, self.path)
+            if number not in self.values:
+                raise CampaignError(f"{self.path}: {value!r} is none of {self.values}")
+            return (self.values.index(number) + 0.5) / len(self.values)
+        number = _real(value, unit, self.path)
+        if self.scale == "log":
+            return math.log(number / self.low) / math.log(self.high / self.low)
+        return (number - self.low) / (self.high - self.low)
+
+    def apply(self, data: dict[str, Any], row: Mapping[str, Any]) -> None:
+        """Set the field in nested data."""
+        set_path(data, self.path, plain(row[self.name]))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of several alternatives of a field, each with ranges of its own.
+
+    Parameters
+    ----------
+    path : str
+        Field, as "fault.teeth".
+    options : dict
+        Value or table by name. Two numbers or texts with units as an entry of a table are its range, drawn
+        uniformly, whole numbers as such: ``{"kind": "broken tooth", "lost": (0.1, 0.9), "tooth": (0, 28)}``.
+    crossed : bool
+        Take every point of the plan with each of the options, instead of choosing one: the same specimen and the same
+        operating point in all states.
+    name : str, optional
+        Of the column with the option's name; default the path. Its ranges are in ``NAME.ENTRY``; ``severity`` is
+        where in
+        its range the first of an option lies, between 0 and 1.
+    """
+
+    path: str
+    options: dict[str, Any]
+    crossed: bool = False
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", self.name or self.path)
+        if not self.options:
+            raise CampaignError(f"choice {self.path!r}: give at least one option by name")
+
+    @property
+    def ranges(self) -> dict[str, list[str]]:
+        """Names of the entries of each option that are ranges."""
+        return {
+            name: [k for k, v in table.items() if _is_range(v)] if isinstance(table, Mapping) else []
+            for name, table in self.options.items()
+        }
+
+    @property
+    def width(self) -> int:
+        """Coordinates of the unit cube it takes: which, and where in the ranges."""
+        return (0 if self.crossed else 1) + max(len(names) for names in self.ranges.values())
+
+    @property
+    def count(self) -> int:
+        """Values of a grid."""
+        return len(self.options)
+
+    def in_si(self, subject: Subject) -> Choice:
+        """Return the choice with the ranges of its tables in SI."""
+        subject.unit_of(self.path)
+        options = {}
+        for name, table in self.options.items():
+            if isinstance(table, Mapping):
+                table = dict(table)
+                for key, value in table.items():
+                    if _is_range(value):
+                        unit = subject.table_unit(self.path, table, key)
+                        table[key] = [_number(v, unit, f"{self.path}.{name}.{key}") for v in value]
+            options[name] = list(table) if isinstance(table, tuple) else table
+        return Choice(self.path, options, self.crossed, self.name)
+
+    def columns(self, u: np.ndarray, variant: np.ndarray | None = None) -> Columns:
+        """Return the columns for coordinates u, shape (n, width), and the options' numbers if they are crossed."""
+        names, ranges = list(self.options), self.ranges
+        if self.crossed:
+            which, rest = variant, u
+        else:
+            which, rest = np.minimum((u[:, 0] * len(names)).astype(int), len(names) - 1), u[:, 1:]
+        assert which is not None
+        found: Columns = {self.name: np.array(names)[which]}
+        entries = dict.fromkeys(key for keys in ranges.values() for key in keys)
+        for key in entries:
+            found[f"{self.name}.{key}"] = np.full(which.size, np.nan)
+        severity = np.zeros(which.size)
+        for k, name in enumerate(names):
+            here = which == k
+            for place, key in enumerate(ranges[name]):
+                low, high = self.options[name][key]
+                x = rest[here, place]
+                if isinstance(low, int) and isinstance(high, int):
+                    found[f"{self.name}.{key}"][here] = np.minimum(np.floor(low + x * (high - low + 1)), high)
+                else:
+                    found[f"{self.name}.{key}"][here] = low + x * (high - low)
+                if place == 0:
+                    severity[here] = x
+        found["severity" if self.name == self.path else f"{self.name}.severity"] = severity
+        return found
+
+    def apply(self, data: dict[str, Any], row: Mapping[str, Any]) -> None:
+        """Set the field in nested data to the chosen option with its values."""
+        name = str(row[self.name])
+        table = self.options[name]
+        if isinstance(table, Mapping):
+            chosen = dict(table)
+            for key in self.ranges[name]:
+                value = float(row[f"{self.name}.{key}"])
+                low, high = table[key]
+                chosen[key] = int(value) if isinstance(low, int) and isinstance(high, int) else value
+            set_path(data, self.path, [chosen])
+        else:
+            set_path(data, self.path, table)
+
+
+@dataclass(frozen=True)
+class Specimens:
+    """Seeded draws of manufacturing errors: the physical individuals of a plan, and the groups of every split.
+
+    Parameters
+    ----------
+    draws : int
+        How many specimens.
+    errors : dict
+        Range by field, as ``{"fault.backlash": ("60 um", "140 um")}``, drawn uniformly for each specimen.
+    faults : sequence of dict
+        Tables added to ``fault.teeth``; entries that are ranges are drawn, and an entry ``"seed": "drawn"`` gets a
+        seed of the
+        specimen's own: ``{"kind": "manufacturing grade", "grade": 6, "wheel": "driver", "seed": "drawn"}``.
+    seed : int
+    name : str
+        Of the column with the specimen's number.
+    """
+
+    draws: int
+    errors: dict[str, Any] = field(default_factory=dict)
+    faults: tuple[dict[str, Any], ...] = ()
+    seed: int = 0
+    name: str = "specimen"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "faults", tuple(self.faults))
+        if self.draws < 1:
+            raise CampaignError(f"specimens: draws = {self.draws!r}; give 1 or more")
+
+    @property
+    def width(self) -> int:
+        """Coordinates of the unit cube it takes."""
+        return 1
+
+    @property
+    def count(self) -> int:
+        """Values of a grid."""
+        return self.draws
+
+    def in_si(self, subject: Subject) -> Specimens:
+        """Return the specimens with their ranges in SI."""
+        errors = {path: [_number(v, subject.unit_of(path), path) for v in r] for path, r in self.errors.items()}
+        faults = []
+        for table in self.faults:
+            table = dict(table)
+            for key, value in table.items():
+                if _is_range(value):
+                    unit = subject.table_unit("fault.teeth", table, key)
+                    table[key] = [_number(v, unit, f"specimens.{key}") for v in value]
+            faults.append(table)
+        return Specimens(self.draws, errors, tuple(faults), self.seed, self.name)
+
+    def columns(self, u: np.ndarray) -> Columns:
+        """Return the specimens' numbers for coordinates u, shape (n, 1)."""
+        return {self.name: np.minimum((u[:, 0] * self.draws).astype(np.int64), self.draws - 1)}
+
+    def apply(self, data: dict[str, Any], row: Mapping[str, Any]) -> None:
+        """Set the specimen's errors in nested data."""
+        generator = np.random.default_rng([self.seed, int(row[self.name])])
+        for path, (low, high) in self.errors.items():
+            set_path(data, path, float(generator.uniform(low, high)))
+        added = []
+        for table in self.faults:
+            drawn = dict(table)
+            for key, value in table.items():
+                if value == "drawn":
+                    drawn[key] = int(generator.integers(1 << 31))
+                elif _is_range(value):
+                    drawn[key] = float(generator.uniform(*value))
+            added.append(drawn)
+        if added:
+            section = data.setdefault("fault", {})
+            section["teeth"] = [*section.get("teeth", ()), *added]
+
+
+AnyFactor = Factor | Choice | Specimens
+FACTORS = {"factor": Factor, "choice": Choice, "specimens": Specimens}
+
+
+def factor_table(factor: AnyFactor) -> dict[str, Any]:
+    """Return a factor as a table of numbers and texts, from which `factor_from` makes it again."""
+    kind = next(name for name, cls in FACTORS.items() if isinstance(factor, cls))
+    return {"type": kind, **asdict(factor)}
+
+
+def factor_from(table: Mapping[str, Any]) -> AnyFactor:
+    """Return the factor that a table describes.
+
+    Raises
+    ------
+    CampaignError
+        For unknown types and keys.
+    """
+    settings = dict(table)
+    default = "choice" if "options" in settings else "specimens" if "draws" in settings else "factor"
+    kind = settings.pop("type", default)
+    if kind not in FACTORS:
+        raise CampaignError(f"factor: type {kind!r} is unknown; choose one of {', '.join(FACTORS)}")
+    try:
+        return FACTORS[kind](**settings)
+    except TypeError as error:
+        raise CampaignError(f"{kind} {settings.get('path', '')}: {error}") from error
+
+
+def choose(path: str, *, crossed: bool = False, **options: Any) -> Choice:
+    """Return a choice among the options named.
+
+    Examples
+    --------
+    >>> choose("fault.teeth", none=(), broken={"kind": "broken tooth", "lost": (0.1, 0.9)}).width
+    2
+    """
+    return Choice(path, options, crossed)
+
+
+def set_path(data: dict[str, Any], path: str, value: Any) -> None:
+    """Set a field of nested data by its path; the sections on the way are copied, not changed."""
+    *sections, name = path.split(".")
+    for section in sections:
+        data[section] = dict(data.get(section, {}))
+        data = data[section]
+    data[name] = value
+
+
+def plain(value: Any) -> Any:
+    """Return a numpy scalar as Python's."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _is_range(value: Any) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str) and len(value) == 2
+
+
+def _number(value: Any, unit: str, where: str) -> Any:
+    """Return a value of a field in SI; texts of fields without a unit stay as they are."""
+    if unit == "1" or isinstance(value, (bool, list, tuple, dict)):
+        return list(value) if isinstance(value, tuple) else value
+    return _real(value, unit, where)
+
+
+def _real(value: Any, unit: str, where: str) -> float:
+    try:
+        return to_si(value, "dimensionless" if unit == "1" else unit, where)
+    except (ValueError, TypeError) as error:
+        raise CampaignError(str(error)) from None

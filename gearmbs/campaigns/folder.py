@@ -1,0 +1,229 @@
+"""The folder of a campaign: which file holds what, and its plan.
+
+::
+
+    plan.json            the plan, what has been drawn so far, the arrays of signals; written last when made or extended
+    cases/000-00000.parquet   the table of the design, so many units a file
+    units/00042.json     the ledger of a unit; the unit is done if and only if it is there
+    units/00042.claim    who is at work on it; saves work, decides nothing
+    table/00042.parquet  numbers of its cases
+    signals.zarr/        one array a signal, a shard a unit
+    records/, failed/    whole records, and what failed cases computed, as NetCDF
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.plan import FORMAT, Plan
+from gearmbs.campaigns.subjects.base import SignalSpec
+from gearmbs.view.files import whole_file, write_whole
+
+UNITS_A_FILE = 64
+"""Units whose cases stand in one file."""
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What was drawn at one go: points [first_point, points) of the design, which gave cases [first, last)."""
+
+    points: int
+    first_point: int
+    first: int
+    last: int
+    first_unit: int
+
+    def units(self, size: int) -> int:
+        """Return how many units it has."""
+        return -(-(self.last - self.first) // size)
+
+
+class Folder:
+    """Paths and plan of a campaign's folder.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Raises
+    ------
+    CampaignError
+        If there is no campaign.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        try:
+            tree = json.loads((self.path / "plan.json").read_text(encoding="utf-8"))
+        except OSError as error:
+            raise CampaignError(f"{self.path}: no campaign here (plan.json: {error.strerror})") from None
+        if tree["format"] != FORMAT:
+            raise CampaignError(f"{self.path}: format {tree['format']} is unknown; this version reads {FORMAT}")
+        self.tree = tree
+        self.extents = [Extent(**e) for e in tree["extents"]]
+        self.plan = Plan.from_dict(tree["plan"], self.extents[-1].points)
+        self.specs = [
+            SignalSpec(s["name"], tuple(s["channels"]), s["samples"], s["rate"], s["units"]) for s in tree["signals"]
+        ]
+
+    @property
+    def unit_count(self) -> int:
+        """Number of units."""
+        last = self.extents[-1]
+        return last.first_unit + last.units(self.plan.unit)
+
+    @property
+    def case_count(self) -> int:
+        """Number of cases."""
+        return self.extents[-1].last
+
+    def ledger(self, unit: int) -> Path:
+        """Return the path of a unit's ledger."""
+        return self.path / "units" / f"{unit:05d}.json"
+
+    def claim(self, unit: int) -> Path:
+        """Return the path of a unit's claim."""
+        return self.path / "units" / f"{unit:05d}.claim"
+
+    def table(self, unit: int) -> Path:
+        """Return the path of a unit's table."""
+        return self.path / "table" / f"{unit:05d}.parquet"
+
+    @property
+    def signals(self) -> Path:
+        """Return the path of the signals."""
+        return self.path / "signals.zarr"
+
+    def done(self) -> list[int]:
+        """Return the numbers of the units that are done."""
+        return sorted(int(p.stem) for p in (self.path / "units").glob("*.json") if p.stem.isdigit())
+
+    def size(self, unit: int) -> int:
+        """Return the number of cases of a unit."""
+        extent = self._extent(unit)
+        start = extent.first + (unit - extent.first_unit) * self.plan.unit
+        return min(self.plan.unit, extent.last - start)
+
+    def _extent(self, unit: int) -> Extent:
+        return max((e for e in self.extents if e.first_unit <= unit), key=lambda e: e.first_unit)
+
+    def cases(self, unit: int) -> list[dict[str, Any]]:
+        """Return the rows of the cases of a unit."""
+        import pyarrow.parquet as pq
+
+        extent = self._extent(unit)
+        block, place = divmod(unit - extent.first_unit, UNITS_A_FILE)
+        table = pq.ParquetFile(self._block(self.extents.index(extent), block)).read()
+        return table.slice(place * self.plan.unit, self.plan.unit).to_pylist()
+
+    def _block(self, extent: int, block: int) -> Path:
+        return self.path / "cases" / f"{extent:03d}-{block:05d}.parquet"
+
+    def case_files(self) -> list[Path]:
+        """Return the files of the design's table in order."""
+        size = self.plan.unit * UNITS_A_FILE
+        return [
+            self._block(k, block) for k, e in enumerate(self.extents) for block in range(-(-(e.last - e.first) // size))
+        ]
+
+
+def make_folder(path: str | Path, plan: Plan) -> Folder:
+    """Write a plan and the table of its cases to a new folder; plan.json comes last.
+
+    Raises
+    ------
+    CampaignError
+        If a corner is impossible, or the folder holds another campaign. The same plan is taken up again.
+    """
+    path = Path(path)
+    if (path / "plan.json").exists():
+        folder = Folder(path)
+        if folder.tree["plan"] != json.loads(json.dumps(plan.as_dict())):
+            raise CampaignError(f"{path}: holds another campaign; choose another folder, or extend that one")
+        return folder
+    specs = plan.check()
+    for name in ("units", "table", "cases"):
+        (path / name).mkdir(parents=True, exist_ok=True)
+    extent = _write_cases(path, plan, plan.n, [])
+    if specs:
+        from gearmbs.campaigns.signal_store import make_store
+
+        make_store(path / "signals.zarr", specs, plan.unit, extent.units(plan.unit))
+    tree = {
+        "format": FORMAT,
+        "plan": plan.as_dict(),
+        "extents": [asdict(extent)],
+        "signals": [asdict(s) for s in specs],
+    }
+    write_whole(path / "plan.json", json.dumps(tree, indent=1))
+    return Folder(path)
+
+
+def extend_folder(folder: Folder, n: int) -> Folder:
+    """Draw further points of a plan's design, up to n; what is there stays.
+
+    Raises
+    ------
+    CampaignError
+        If the design cannot go on, or n is not above what there is.
+    """
+    plan, last = folder.plan, folder.extents[-1]
+    if not plan.extends:
+        raise CampaignError(f"extend: a {plan.design} design cannot go on where it stopped; a Sobol' sequence can")
+    if n <= last.points:
+        raise CampaignError(f"extend: n = {n}, but {last.points} points have been drawn; give more")
+    extent = _write_cases(folder.path, plan, n, folder.extents)
+    if folder.specs:
+        from gearmbs.campaigns.signal_store import grow_store
+
+        grow_store(folder.signals, folder.specs, plan.unit * (extent.first_unit + extent.units(plan.unit)))
+    tree = {**folder.tree, "extents": [*folder.tree["extents"], asdict(extent)]}
+    write_whole(folder.path / "plan.json", json.dumps(tree, indent=1))
+    return Folder(folder.path)
+
+
+def _write_cases(path: Path, plan: Plan, n: int, before: list[Extent]) -> Extent:
+    """Write the cases of the points that are new and return their extent."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    first_point = first = first_unit = 0
+    if before:
+        last = before[-1]
+        per_n = len(plan.points(1)) if plan.design in ("saltelli", "morris") else 1
+        first_point, first = last.points * per_n, last.last
+        first_unit = last.first_unit + last.units(plan.unit)
+    points = plan.points(n)
+    step = plan.unit * UNITS_A_FILE
+    waiting: dict[str, np.ndarray] = {}
+    count, block = 0, 0
+
+    def write(columns: dict[str, np.ndarray]) -> None:
+        nonlocal block, count
+        size = len(columns["point"])
+        index = np.arange(first + count, first + count + size)
+        unit = first_unit + (count + np.arange(size)) // plan.unit
+        with whole_file(path / "cases" / f"{len(before):03d}-{block:05d}.parquet") as part:
+            pq.write_table(pa.table({"index": index, "unit": unit, **columns}), part, compression="zstd")
+        block, count = block + 1, count + size
+
+    for start in range(first_point, len(points), max(1, step // plan.variants)):
+        some = points[start : start + max(1, step // plan.variants)]
+        columns = plan.columns(some, start)
+        good = plan.allowed(columns)
+        columns = {name: values[good] for name, values in columns.items()}
+        waiting = {k: np.concatenate([waiting[k], v]) for k, v in columns.items()} if waiting else columns
+        while len(waiting["point"]) >= step:
+            write({k: v[:step] for k, v in waiting.items()})
+            waiting = {k: v[step:] for k, v in waiting.items()}
+    if waiting and len(waiting["point"]):
+        write(waiting)
+    if count == 0:
+        raise CampaignError("plan: not one of the points satisfies the constraints; widen them or the ranges")
+    return Extent(n, first_point, first, first + count, first_unit)

@@ -1,0 +1,383 @@
+"""A plan: what is simulated, what varies, by which design, what is kept, under which limits."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import tomllib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearmbs.campaigns import designs
+from gearmbs.campaigns.constraints import satisfied
+from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.factors import (
+    AnyFactor,
+    Choice,
+    Columns,
+    Factor,
+    Specimens,
+    factor_from,
+    factor_table,
+    plain,
+    set_path,
+)
+from gearmbs.campaigns.subjects.base import SignalSpec, Subject, check_keep, make_subject
+
+FORMAT = 1
+FAILURE_POLICIES = ("record", "tighter", "stop")
+ALL_CORNERS = 6
+"""Up to so many coordinates every corner is checked; beyond, both ends of each and some corners."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a campaign is to do; make it with `make_plan`, which checks it.
+
+    Attributes
+    ----------
+    subject : Subject
+    factors : tuple
+        Of `Factor`, `Choice` and `Specimens`, in SI.
+    design : str
+        One of `gearmbs.campaigns.designs.DESIGNS`.
+    n : int
+        Points of a sequence, base points of a Saltelli design, trajectories of a Morris design; of no meaning
+        otherwise.
+    seed : int
+    keep : tuple of str
+        What of each record is kept; see the subject.
+    constraints : tuple of str
+        Points that do not satisfy them all are left out.
+    options : dict
+        Of the design: ``generators``, ``faced``, ``centre``, ``levels``, ``rows``.
+    unit : int
+        Cases worked on and stored together.
+    time_limit : float, optional
+        Processor seconds of a case.
+    memory_limit : float, optional
+        Bytes a case may allocate beyond what its worker has.
+    on_failure : {"record", "tighter", "stop"}
+        Record a failed case and go on; try it once more with a tighter tolerance; or end the campaign.
+    reuse : tuple of str
+        Folders of other campaigns whose results of equal cases are taken over.
+    """
+
+    subject: Subject
+    factors: tuple[AnyFactor, ...] = ()
+    design: str = "sobol"
+    n: int = 0
+    seed: int = 0
+    keep: tuple[str, ...] = ()
+    constraints: tuple[str, ...] = ()
+    options: dict[str, Any] = field(default_factory=dict)
+    unit: int = 64
+    time_limit: float | None = None
+    memory_limit: float | None = None
+    on_failure: str = "record"
+    reuse: tuple[str, ...] = ()
+
+    @property
+    def dimensions(self) -> int:
+        """Coordinates of the unit cube."""
+        return sum(factor.width for factor in self.factors)
+
+    @property
+    def variants(self) -> int:
+        """Cases of each point: the options of its crossed choices."""
+        return math.prod(len(f.options) for f in self.factors if isinstance(f, Choice) and f.crossed)
+
+    @property
+    def extends(self) -> bool:
+        """Whether the design goes on where it stopped."""
+        return self.design in (*designs.SEQUENCES, *designs.ANALYSES)
+
+    @property
+    def group(self) -> str | None:
+        """Column of the physical individual, the group of every split; None without specimens."""
+        return next((f.name for f in self.factors if isinstance(f, Specimens)), None)
+
+    def points(self, n: int | None = None) -> np.ndarray:
+        """Return the points of the design in the unit cube, shape (points, dimensions)."""
+        n, d, o = self.n if n is None else n, self.dimensions, self.options
+        if self.design == "saltelli":
+            return designs.saltelli(n, d, self.seed)
+        if self.design == "morris":
+            return designs.morris(n, d, self.seed, int(o.get("levels", 4)))
+        if self.design == "grid":
+            return designs.grid(self._counts())
+        if self.design == "one at a time":
+            return designs.one_at_a_time(self._counts(), [self._base_coordinate(f) for f in self.factors])
+        if self.design == "factorial":
+            return 0.5 + 0.5 * designs.factorial(d, o.get("generators", ()))
+        if self.design == "plackett burman":
+            return 0.5 + 0.5 * designs.plackett_burman(d)
+        if self.design == "central composite":
+            settings = {k: o[k] for k in ("faced", "centre") if k in o}
+            return 0.5 + 0.5 * designs.central_composite(d, **settings)
+        if self.design == "box behnken":
+            return 0.5 + 0.5 * designs.box_behnken(d, int(o.get("centre", 1)))
+        if self.design == "list":
+            return np.zeros((len(o["rows"]), 0))
+        return designs.sequence(self.design, n, d, self.seed)
+
+    def _counts(self) -> list[int]:
+        return [count for f in self.factors for count in (f.count, *([1] * (f.width - 1)))]
+
+    def _base_coordinate(self, factor: AnyFactor) -> float:
+        if not isinstance(factor, Factor):
+            return 0.0
+        value: Any = self.subject.base()
+        for part in factor.path.split("."):
+            value = value[part]
+        return factor.coordinate(value, self.subject.unit_of(factor.path))
+
+    def columns(self, u: np.ndarray, first_point: int = 0) -> Columns:
+        """Return the columns of points u, each with all its variants, and the number of the point."""
+        count = self.variants
+        rows = np.repeat(np.arange(len(u)), count)
+        found: Columns = {"point": rows + first_point}
+        if self.design == "list":
+            for name in dict.fromkeys(key for row in self.options["rows"] for key in row):
+                values = [row.get(name) for row in self.options["rows"][first_point : first_point + len(u)]]
+                found[name] = np.array(values)
+            return found
+        variant = np.tile(np.arange(count), len(u))
+        at = 0
+        for factor in self.factors:
+            mine = u[rows, at : at + factor.width]
+            at += factor.width
+            if isinstance(factor, Choice) and factor.crossed:
+                found |= factor.columns(mine, variant % len(factor.options))
+                variant //= len(factor.options)
+            else:
+                found |= factor.columns(mine)
+        return found
+
+    def allowed(self, columns: Columns) -> np.ndarray:
+        """Return which rows satisfy all constraints."""
+        good = np.ones(len(columns["point"]), dtype=bool)
+        for text in self.constraints:
+            good &= satisfied(text, columns)
+        return good
+
+    def data(self, row: dict[str, Any]) -> dict[str, Any]:
+        """Return the nested data of a row of the table."""
+        data = self.subject.base()
+        if self.design == "list":
+            for name in dict.fromkeys(key for r in self.options["rows"] for key in r):
+                set_path(data, name, plain(row[name]))
+            return data
+        # the errors of a specimen come on top of what else is chosen
+        for factor in sorted(self.factors, key=lambda f: isinstance(f, Specimens)):
+            factor.apply(data, row)
+        return data
+
+    def corners(self) -> Columns:
+        """Return the columns of the corners that are checked before anything runs."""
+        if self.design == "list":
+            rows = len(self.options["rows"])
+            u = np.zeros((rows, 0))
+            return self.columns(u)
+        d = self.dimensions
+        if d <= ALL_CORNERS:
+            u = np.array(list(itertools.product((0.0, 1.0), repeat=d))).reshape(-1, d)
+        else:
+            middle = np.full((2 * d, d), 0.5)
+            for k in range(d):
+                middle[2 * k, k], middle[2 * k + 1, k] = 0.0, 1.0
+            random = np.random.default_rng(self.seed).integers(0, 2, (32, d)).astype(float)
+            u = np.vstack([np.zeros(d), np.ones(d), middle, random])
+        # every option of a choice is met, whichever corner it falls to
+        extra = []
+        at = 0
+        for factor in self.factors:
+            if isinstance(factor, Choice) and not factor.crossed:
+                for option in range(len(factor.options)):
+                    row = np.full(d, 0.5)
+                    row[at] = (option + 0.5) / len(factor.options)
+                    for end in (0.0, 1.0):
+                        row = row.copy()
+                        row[at + 1 : at + factor.width] = end
+                        extra.append(row)
+            at += factor.width
+        u = np.vstack([u, *extra]) if extra else u
+        # u = 1 is the end of a range, and never drawn of whole numbers and choices
+        columns = self.columns(u)
+        good = self.allowed(columns)
+        return {name: values[good] for name, values in columns.items()}
+
+    def check(self) -> list[SignalSpec]:
+        """Check every corner; return the arrays of the signals that are kept.
+
+        Raises
+        ------
+        CampaignError
+            Naming the first corners that are impossible, with the reasons.
+        """
+        corners = self.corners()
+        things, wrong = [], []
+        for k in range(len(corners["point"])):
+            row = {name: plain(values[k]) for name, values in corners.items()}
+            try:
+                things.append(self.subject.check(self.data(row), f"corner {k}"))
+            except ValueError as error:
+                shown = ", ".join(f"{n} = {_short(v)}" for n, v in row.items() if n != "point")
+                wrong.append(f"{shown}: {error}")
+        if wrong and self.options.get("corners") != "ignore":
+            more = f"\n(and {len(wrong) - 3} more corners)" if len(wrong) > 3 else ""
+            raise CampaignError(
+                f"plan: {len(wrong)} of {len(corners['point'])} corners are impossible; narrow the ranges or add a "
+                "constraint:\n" + "\n".join(wrong[:3]) + more
+            )
+        if not things:
+            raise CampaignError("plan: no corner satisfies the constraints and is possible; widen them")
+        return self.subject.signals(self.keep, things)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the plan as a tree of numbers and texts."""
+        return {
+            "subject": {"kind": self.subject.kind, "settings": self.subject.settings()},
+            "factors": [factor_table(f) for f in self.factors],
+            "design": self.design,
+            "seed": self.seed,
+            "keep": list(self.keep),
+            "constraints": list(self.constraints),
+            "options": self.options,
+            "unit": self.unit,
+            "time_limit": self.time_limit,
+            "memory_limit": self.memory_limit,
+            "on_failure": self.on_failure,
+            "reuse": list(self.reuse),
+        }
+
+    @classmethod
+    def from_dict(cls, tree: dict[str, Any], n: int) -> Plan:
+        """Return the plan that `as_dict` made."""
+        given = {k: tuple(v) if isinstance(v, list) else v for k, v in tree.items() if k not in ("subject", "factors")}
+        return cls(
+            make_subject(tree["subject"]["kind"], tree["subject"]["settings"]),
+            tuple(factor_from(table) for table in tree["factors"]),
+            n=n,
+            **given,
+        )
+
+
+def make_plan(
+    base: Any = None,
+    factors: Iterable[AnyFactor] = (),
+    design: str = "sobol",
+    n: int = 0,
+    *,
+    keep: Sequence[str] | None = None,
+    **settings: Any,
+) -> Plan:
+    """Return a checked plan.
+
+    Parameters
+    ----------
+    base : Case or Subject, optional
+        What is simulated, with everything that no factor changes; default the case of the preset.
+    factors : iterable of Factor, Choice, Specimens
+    design : str
+        ``sobol``, ``halton``, ``random`` (these go on where they stopped), ``latin hypercube``, ``grid``, ``list``,
+        ``one at a time``, ``factorial``, ``plackett burman``, ``central composite``, ``box behnken``, ``saltelli``,
+        ``morris``.
+    n : int
+        Points of a sequence or a hypercube, base points of a Saltelli design, trajectories of a Morris design.
+    keep : sequence of str, optional
+        Default: the first of what the subject keeps.
+    **settings
+        Further attributes of `Plan`.
+
+    Raises
+    ------
+    CampaignError
+        For whatever is wrong with it. Corners are checked when a campaign is made.
+
+    Examples
+    --------
+    >>> plan = make_plan(factors=[Factor("operation.torque", "50 N m", "200 N m")], n=8)
+    >>> plan.columns(plan.points())["operation.torque"].size
+    8
+    """
+    from gearmbs.campaigns.subjects.pair import PairSubject
+
+    subject = base if isinstance(base, Subject) else PairSubject(base)
+    own = tuple(factor.in_si(subject) for factor in factors)
+    if design not in designs.DESIGNS:
+        raise CampaignError(f"design {design!r} is unknown; choose one of {', '.join(designs.DESIGNS)}")
+    counted = (*designs.SEQUENCES, *designs.ANALYSES, "latin hypercube")
+    if design in counted and n < 1:
+        raise CampaignError(f"n = {n!r}: give the number of points of the {design} design")
+    keep = tuple(keep if keep is not None else subject.keeps[:1])
+    check_keep(subject, keep)
+    for name in ("constraints", "reuse"):
+        if name in settings:
+            settings[name] = tuple(str(item) for item in settings[name])
+    plan = Plan(subject, own, design, int(n), keep=keep, **settings)
+    _consistent(plan)
+    return plan
+
+
+def _consistent(plan: Plan) -> None:
+    """Refuse settings that contradict each other."""
+    names = [name for f in plan.factors for name in f.columns(np.full((1, f.width), 0.5), *_variant(f))]
+    doubled = {name for name in names if names.count(name) > 1}
+    if doubled:
+        raise CampaignError(
+            f"factors: {', '.join(sorted(doubled))} stand for several columns; give them names of their own"
+        )
+    if plan.design == "list":
+        if not plan.options.get("rows"):
+            raise CampaignError("design list: give options={'rows': [{path: value, ...}, ...]}")
+        for path in dict.fromkeys(key for row in plan.options["rows"] for key in row):
+            plan.subject.unit_of(path)
+    elif not plan.factors:
+        raise CampaignError("factors: give at least one")
+    if plan.constraints and plan.design in designs.ANALYSES:
+        raise CampaignError(
+            f"constraints: points left out would break the {plan.design} design; narrow the ranges instead"
+        )
+    if plan.unit < 1:
+        raise CampaignError(f"unit = {plan.unit!r}; give the number of cases stored together, 1 or more")
+    if plan.on_failure not in FAILURE_POLICIES:
+        raise CampaignError(f"on_failure = {plan.on_failure!r}; choose one of {', '.join(FAILURE_POLICIES)}")
+
+
+def _variant(factor: AnyFactor) -> tuple:
+    return (np.zeros(1, dtype=int),) if isinstance(factor, Choice) and factor.crossed else ()
+
+
+def load_plan(path: str | Path) -> Plan:
+    """Read a plan in TOML: ``[subject]`` or ``[base]``, ``[[factor]]`` and the attributes of `Plan`.
+
+    Raises
+    ------
+    CampaignError
+        If it cannot be read or is wrong.
+    """
+    path = Path(path)
+    try:
+        tree = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise CampaignError(f"{path}: cannot be read ({error.strerror or error})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise CampaignError(f"{path}: not a valid TOML file ({error})") from error
+    subject = tree.pop("subject", {})
+    kind = subject.pop("kind", "pair")
+    if "base" in tree:
+        subject["case"] = tree.pop("base")
+    factors = [factor_from(table) for table in tree.pop("factor", [])]
+    try:
+        return make_plan(make_subject(kind, subject), factors, **tree)
+    except TypeError as error:
+        raise CampaignError(f"{path}: {error}") from error
+
+
+def _short(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

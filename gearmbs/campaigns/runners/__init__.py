@@ -1,0 +1,18 @@
+"""Runners: they move units to where they are worked on, and know nothing of what is in them.
+
+A runner is called with the folder's path and an iterator of units and yields a `UnitReport` of each as it ends, in any
+order. It takes from the iterator only as many units as it can have on the way.
+"""
+
+from typing import TYPE_CHECKING
+
+from gearmbs._lazy import late
+
+if TYPE_CHECKING:
+    from gearmbs.campaigns.runners.dask import DaskRunner
+    from gearmbs.campaigns.runners.processes import ProcessRunner
+    from gearmbs.campaigns.runners.serial import SerialRunner
+
+__all__ = ["DaskRunner", "ProcessRunner", "SerialRunner"]
+
+late(__name__, {"DaskRunner": ".dask", "ProcessRunner": ".processes", "SerialRunner": ".serial"})

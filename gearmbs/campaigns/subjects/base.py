@@ -1,0 +1,203 @@
+"""The interface of what a campaign simulates.
+
+A subject turns nested data (a dictionary of sections and fields, numbers in SI or texts with units) into something that
+is checked, has a content identity, can be run, and leaves numbers and signals behind. A campaign knows nothing else of
+it, so that further things to simulate need one class and one line of `KINDS`.
+"""
+
+from __future__ import annotations
+
+import importlib
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gearmbs.campaigns.errors import CampaignError
+
+KINDS = {
+    "pair": "gearmbs.campaigns.subjects.pair:PairSubject",
+    "function": "gearmbs.campaigns.subjects.function:FunctionSubject",
+    "deck": "gearmbs.campaigns.subjects.deck:DeckSubject",
+    "paper claims": "gearmbs.campaigns.subjects.claims:ClaimsSubject",
+}
+"""Subjects that come with the package; a plan may also name one as ``"module:Class"``."""
+
+DONE, IMPOSSIBLE, FAILED, TIME, MEMORY, DIED = (
+    "done",
+    "impossible",
+    "failed",
+    "time limit",
+    "memory limit",
+    "worker died",
+)
+"""How a case may end. All but ``worker died`` are what the case itself does, and are never tried again."""
+
+
+@dataclass
+class Kept:
+    """What a case leaves behind.
+
+    Attributes
+    ----------
+    numbers : dict
+        Scalars by the name of their column.
+    signals : dict of ndarray, shape (channels, samples)
+        By the name of their array.
+    """
+
+    numbers: dict[str, float] = field(default_factory=dict)
+    signals: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a case ended: its status, and for a failure the message and what to do about it."""
+
+    status: str = DONE
+    message: str = ""
+    advice: str = ""
+
+
+@dataclass(frozen=True)
+class SignalSpec:
+    """An array of signals: its channels, its longest length, its sampling rate (Hz) and unit."""
+
+    name: str
+    channels: tuple[str, ...]
+    samples: int
+    rate: float
+    units: str
+
+
+class Subject(ABC):
+    """What a campaign simulates.
+
+    A subclass has a ``kind``, the name it is stored under, and is made again by every worker from `settings`.
+    """
+
+    kind: ClassVar[str]
+    keeps: ClassVar[tuple[str, ...]] = ()
+    """Names that `reduce` understands in ``keep``, without those of signals and of functions."""
+
+    @abstractmethod
+    def settings(self) -> dict[str, Any]:
+        """Return what `from_settings` makes the subject again from: a tree of numbers and texts."""
+
+    @classmethod
+    @abstractmethod
+    def from_settings(cls, settings: dict[str, Any]) -> Subject:
+        """Return the subject that `settings` describes."""
+
+    @abstractmethod
+    def base(self) -> dict[str, Any]:
+        """Return the nested data that the factors of a plan change."""
+
+    @abstractmethod
+    def unit_of(self, path: str) -> str:
+        """Return the SI unit of a field, ``"1"`` for plain numbers and texts.
+
+        Raises
+        ------
+        CampaignError
+            If there is no such field.
+        """
+
+    def table_unit(self, path: str, table: Mapping[str, Any], key: str) -> str:
+        """Return the SI unit of an entry of a table that stands in a field, as the depth of a fault."""
+        return "1"
+
+    @abstractmethod
+    def check(self, data: dict[str, Any], name: str) -> Any:
+        """Return the validated thing that nested data describe.
+
+        Raises
+        ------
+        ValueError
+            Naming the wrong field.
+        """
+
+    @abstractmethod
+    def canonical(self, thing: Any) -> Any:
+        """Return its content in SI with defaults filled in and without names; see `gearmbs.campaigns.canonical`."""
+
+    @abstractmethod
+    def run(self, thing: Any, progress: Callable[[float], None]) -> Any:
+        """Simulate and return a record; ``progress`` is called often and may raise to stop the run."""
+
+    @abstractmethod
+    def reduce(self, thing: Any, record: Any, keep: Sequence[str]) -> Kept:
+        """Return of a record what is kept."""
+
+    def signals(self, keep: Sequence[str], things: Sequence[Any]) -> list[SignalSpec]:
+        """Return the arrays that hold the signals of a campaign whose corners are ``things``."""
+        return []
+
+    def explain(self, error: Exception) -> Outcome:
+        """Return how a case that raised has ended."""
+        status = IMPOSSIBLE if isinstance(error, ValueError) else FAILED
+        return Outcome(status, f"{type(error).__name__}: {error}"[:2000])
+
+    def partial(self, error: Exception) -> Any:
+        """Return the dataset of what was computed before an error, or None."""
+        return None
+
+    def tightened(self, thing: Any) -> Any | None:
+        """Return the thing with a tighter tolerance for a second try, or None if there is none."""
+        return None
+
+
+def make_subject(kind: str, settings: dict[str, Any]) -> Subject:
+    """Return a subject by its kind, one of `KINDS` or ``"module:Class"``.
+
+    Raises
+    ------
+    CampaignError
+        For an unknown kind.
+    """
+    home = KINDS.get(kind, kind)
+    if ":" not in home:
+        raise CampaignError(f"kind {kind!r} is unknown; choose one of {', '.join(KINDS)}, or write module:Class")
+    return imported(home, "kind").from_settings(settings)
+
+
+def subject_kinds() -> list[str]:
+    """Return the kinds of subjects that come with the package."""
+    return list(KINDS)
+
+
+def imported(name: str, what: str) -> Any:
+    """Return the object that a text ``module:name`` stands for.
+
+    Raises
+    ------
+    CampaignError
+        If there is none.
+    """
+    module, _, attribute = name.partition(":")
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise CampaignError(f"{what} {name!r}: cannot be imported ({error}); write module:name") from error
+
+
+def kept_by_functions(keep: Sequence[str], record: Any) -> dict[str, float]:
+    """Return the numbers of those entries of ``keep`` that name functions ``module:name`` of a record."""
+    found: dict[str, float] = {}
+    for item in keep:
+        if ":" in item and not item.startswith("signal:"):
+            found.update({str(k): float(v) for k, v in imported(item, "keep")(record).items()})
+    return found
+
+
+def check_keep(subject: Subject, keep: Sequence[str]) -> None:
+    """Refuse entries of ``keep`` that the subject does not know."""
+    for item in keep:
+        if item not in subject.keeps and ":" not in item:
+            raise CampaignError(
+                f"keep: {item!r} is unknown; a {subject.kind} keeps {', '.join(subject.keeps)}, "
+                f"'signal:...' where it has "
+                "signals, or module:function of a record"
+            )

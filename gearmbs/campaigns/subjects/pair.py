@@ -1,0 +1,270 @@
+"""Cases of the gear pair as the subject of a campaign."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.subjects.base import (
+    FAILED,
+    Kept,
+    Outcome,
+    SignalSpec,
+    Subject,
+    kept_by_functions,
+)
+from gearmbs.studies.case import Case, make_case, units_of_fields
+from gearmbs.units import DIMENSIONS, to_si
+
+FIRST_ORDERS = 3
+PLAIN = {"name", "title"}
+
+
+class PairSubject(Subject):
+    """Cases of the gear pair on two shafts.
+
+    Keeps ``harmonics`` (RMS of the mesh harmonics of every component, by band and by orders), ``indicators`` (condition
+    indicators of the synchronous averages), ``contact`` (force, penetration and transmission error), ``signal:NAME`` of
+    ``acceleration``, a component of it, ``transmission_error``, ``force_1`` or ``force_2``, and ``record``, the whole
+    record as NetCDF.
+
+    Parameters
+    ----------
+    case : Case, optional
+        Holds everything that no factor changes.
+    """
+
+    kind: ClassVar[str] = "pair"
+    keeps: ClassVar[tuple[str, ...]] = ("harmonics", "indicators", "contact", "record")
+
+    def __init__(self, case: Case | None = None) -> None:
+        self.case = case or Case()
+
+    def settings(self) -> dict[str, Any]:
+        """Return the base case."""
+        return {"case": json.loads(self.case.model_dump_json())}
+
+    @classmethod
+    def from_settings(cls, settings: dict[str, Any]) -> PairSubject:
+        """Return the subject with the base case of a plan."""
+        return cls(make_case(settings.get("case", {}), "base case"))
+
+    def base(self) -> dict[str, Any]:
+        """Return the base case as nested data."""
+        return self.case.model_dump()
+
+    def unit_of(self, path: str) -> str:
+        """Return the SI unit of a field of a case, as "operation.torque"."""
+        section, _, name = path.partition(".")
+        fields = type(self.case).model_fields
+        if section not in fields or section in PLAIN:
+            raise CampaignError(f"{path}: a case has no section {section!r}; choose one of {', '.join(fields)}")
+        holder = getattr(self.case, section)
+        known = type(holder).model_fields
+        if name not in known:
+            raise CampaignError(f"{path}: unknown; fields of {section} are {', '.join(known)}")
+        return units_of_fields(holder).get(name, "1")
+
+    def table_unit(self, path: str, table: Mapping[str, Any], key: str) -> str:
+        """Return the SI unit of a parameter of a fault of a tooth."""
+        from gearmbs.studies.tooth_faults import kinds, tooth_fault
+
+        if path != "fault.teeth":
+            return "1"
+        label = tooth_fault(str(table.get("kind"))).label
+        dimension = kinds()[label].units.get(key, "dimensionless")
+        return "1" if dimension == "dimensionless" else DIMENSIONS[dimension].replace("*", " ")
+
+    def check(self, data: dict[str, Any], name: str) -> Case:
+        """Return the validated case, whose record can be evaluated."""
+        from gearmbs.studies.limits import check_record
+
+        case = make_case({**data, "name": name}, name)
+        check_record(case, name)
+        return case
+
+    def canonical(self, thing: Case) -> dict[str, Any]:
+        """Return the content of a case; see `canonical_case`."""
+        return canonical_case(thing)
+
+    def run(self, thing: Case, progress: Callable[[float], None]) -> Any:
+        """Return the record of a case."""
+        from gearmbs.studies.simulation import run_case
+
+        operation = thing.operation
+        span = operation.run_up + operation.settling + operation.duration
+        return run_case(thing, lambda t: progress(t / span))
+
+    def reduce(self, thing: Case, record: Any, keep: Sequence[str]) -> Kept:
+        """Return of a record what is kept."""
+        kept = Kept(numbers=kept_by_functions(keep, record))
+        if "harmonics" in keep:
+            kept.numbers |= harmonics(record)
+        if "contact" in keep:
+            kept.numbers |= contact_numbers(thing, record)
+        if "indicators" in keep:
+            kept.numbers |= indicators(record)
+        for item in keep:
+            if item.startswith("signal:"):
+                name, values = _signal(record, item)
+                kept.signals[name] = values
+        return kept
+
+    def signals(self, keep: Sequence[str], things: Sequence[Case]) -> list[SignalSpec]:
+        """Return the arrays of the signals, as long as the longest corner's."""
+        from gearmbs.signals import COMPONENTS
+
+        specs = []
+        for item in keep:
+            if not item.startswith("signal:"):
+                continue
+            name, channels = _chosen(item, tuple(COMPONENTS))
+            solver = [thing.solver for thing in things]
+            slow = name == "acceleration"
+            rates = [s.signal_rate if slow else s.output_rate for s in solver]
+            rate = max(float(r) for r in rates)
+            longest = max(thing.operation.duration for thing in things)
+            units = {"acceleration": "m/s^2", "transmission_error": "m"}.get(name, "N")
+            specs.append(SignalSpec(name, channels, int(np.ceil(longest * rate - 1e-6)), rate, units))
+        return specs
+
+    def explain(self, error: Exception) -> Outcome:
+        """Return the integrator's status, its message and what the settings of a case offer against it."""
+        from gearmbs.studies.simulation import ADVICE, SimulationFailed
+
+        if isinstance(error, SimulationFailed):
+            status = None if error.solution is None else error.solution.status
+            advice = ADVICE.get(status, "Raise contact.stiffness or make operation.run_up longer.")  # type: ignore[call-overload]
+            return Outcome(FAILED, str(error)[:2000], advice)
+        return super().explain(error)
+
+    def partial(self, error: Exception) -> Any:
+        """Return the record up to where the integrator stopped."""
+        from gearmbs.studies.simulation import SimulationFailed
+
+        return error.partial() if isinstance(error, SimulationFailed) else None
+
+    def tightened(self, thing: Case) -> Case | None:
+        """Return the case with a tenth of its tolerance."""
+        tolerance = 0.1 * thing.solver.used_tolerance
+        return thing.changed(solver={"tolerance": tolerance}) if tolerance >= 1e-12 else None
+
+
+def canonical_case(case: Case) -> dict[str, Any]:
+    """Return the content of a case: SI, defaults filled in, without its name and without what has no effect.
+
+    Values of wheels stand for both; heights of teeth are those the wheels have, whether given as radius, as height or
+    left to the default; the law is in N, m and s; without friction or misalignment their parameters are left out.
+    """
+    data: dict[str, Any] = case.model_dump(exclude={"name"})
+    for section in list(data):
+        holder = getattr(case, section)
+        for name in data[section] if isinstance(data[section], dict) else ():
+            if hasattr(type(holder), f"used_{name}"):
+                data[section][name] = getattr(holder, f"used_{name}")
+    wheels = case.pair().wheels
+    gears = data["gears"]
+    for name, value in gears.items():
+        gears[name] = list(value) if isinstance(value, (tuple, list)) else [value, value]
+    for name in ("module", "pressure_angle"):
+        gears[name] = gears[name][0]
+    for name in ("addendum", "dedendum", "fillet_radius"):
+        gears[name] = [getattr(wheel, name) for wheel in wheels]
+    for name in ("tip_radius", "root_radius"):
+        del gears[name]
+    contact = data["contact"]
+    contact["stiffness"] = to_si(case.contact.stiffness, case.contact.stiffness_unit, "stiffness")
+    contact["damping"] = to_si(case.contact.damping, "damping", "damping")
+    contact["slices"] = case.pair().face_slices
+    if not case.friction.enabled:
+        data["friction"] = {"enabled": False}
+    if case.fault.misalignment == 0.0:
+        for name in ("plane", "pivot"):
+            del data["fault"][name]
+    return data
+
+
+def harmonics(record: Any) -> dict[str, float]:
+    """Return the RMS of the mesh harmonics: ``band.COMPONENT.K`` and ``orders.COMPONENT.K``, m/s^2."""
+    levels = record["gmf_rms"].transpose("way", "component", "harmonic")
+    return {
+        f"{way}.{component}.{harmonic}": float(levels.values[i, j, k])
+        for i, way in enumerate(levels.way.values)
+        for j, component in enumerate(levels.component.values)
+        for k, harmonic in enumerate(levels.harmonic.values)
+    }
+
+
+def contact_numbers(case: Case, record: Any) -> dict[str, float]:
+    """Return numbers of contact and transmission error.
+
+    ``force.mean``, ``force.max`` (N), ``penetration.max`` (m), ``two_flanks`` (share of the time with contact on the
+    coast flank), ``error.mean``, ``error.peak_to_peak`` and its mesh harmonics' amplitudes ``error.K`` (m).
+    """
+    force, error = record["normal_force"].values, record["transmission_error"].values
+    rate, gmf = case.solver.output_rate, case.mesh_frequency
+    count = int(np.floor(error.size * gmf / rate) / gmf * rate)
+    t = np.arange(count) / rate
+    swing = error[:count] - error[:count].mean()
+    amplitudes = {
+        f"error.{k}": float(2.0 * np.abs(np.mean(swing * np.exp(-2j * np.pi * k * gmf * t))))
+        for k in range(1, FIRST_ORDERS + 1)
+    }
+    return {
+        "force.mean": float(force.mean()),
+        "force.max": float(force.max()),
+        "penetration.max": float(record["penetration_drive"].max()),
+        "two_flanks": float(np.mean(record["pairs_back"].values > 0)),
+        "error.mean": float(error.mean()),
+        "error.peak_to_peak": float(np.ptp(error)),
+        **amplitudes,
+    }
+
+
+def indicators(record: Any) -> dict[str, float]:
+    """Return the condition indicators of the driver's synchronous average: ``NAME.COMPONENT``; NaN if shorter than a
+    turn."""
+    from gearmbs.signals import INDICATORS, condition_indicators, record_signal, time_synchronous_average
+
+    signal = record_signal(record)
+    try:
+        found = condition_indicators(time_synchronous_average(signal))
+    except ValueError:
+        names = [str(c) for c in record.component.values]
+        return {f"{name}.{c}": float("nan") for name in INDICATORS for c in names}
+    return {
+        f"{name}.{channel}": float(found[name].values[k])
+        for name in INDICATORS
+        for k, channel in enumerate(found.channel.values)
+    }
+
+
+def _chosen(item: str, components: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
+    """Return the array and the channels that ``signal:NAME`` means."""
+    name = item.removeprefix("signal:")
+    if name in components:
+        return "acceleration", (name,)
+    channels = {
+        "acceleration": components,
+        "transmission_error": ("transmission_error",),
+        "force_1": ("x", "y", "z"),
+        "force_2": ("x", "y", "z"),
+    }
+    if name not in channels:
+        raise CampaignError(f"keep: signal {name!r} is unknown; choose one of {', '.join((*components, *channels))}")
+    return name, channels[name]
+
+
+def _signal(record: Any, item: str) -> tuple[str, np.ndarray]:
+    """Return the name of the array and the values of a signal, shape (channels, samples)."""
+    name, channels = _chosen(item, tuple(str(c) for c in record.component.values))
+    values = record[name]
+    if name == "acceleration":
+        values = values.sel(component=list(channels)).transpose("component", "signal_time")
+    elif name.startswith("force"):
+        values = values.transpose("xyz", "time")
+    return name, np.atleast_2d(values.values)

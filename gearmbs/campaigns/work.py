@@ -1,0 +1,150 @@
+"""A unit of cases: carried out, stored, entered in the ledger. A function of the folder and the unit's number.
+
+The order makes it safe to be killed at any moment: signals, then the table, then the ledger, each under its final name
+only when whole. Without the ledger the unit is done again, with the same bits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gearmbs.campaigns.case_runner import CaseResult, CaseRunner, GuardedRunner
+from gearmbs.campaigns.folder import Folder
+from gearmbs.campaigns.ledger import Claim, surroundings, take
+from gearmbs.campaigns.reuse import Reuse
+from gearmbs.campaigns.subjects.base import DONE
+from gearmbs.view.files import whole_file, write_whole
+
+GUARD_AFTER = 2
+"""Attempts of a unit that came to no end, after which its cases run in a process of their own."""
+
+WORKED, ALREADY, CLAIMED, DIED, STOPPED = "worked", "already done", "claimed", "worker died", "stopped"
+
+
+@dataclass(frozen=True)
+class UnitReport:
+    """What came of a unit: a few numbers, cheap to send."""
+
+    unit: int
+    what: str
+    cases: int = 0
+    failed: int = 0
+    message: str = ""
+
+
+_folders: dict[str, tuple[float, Folder]] = {}
+
+
+def open_folder(path: str | Path) -> Folder:
+    """Return the folder of a campaign, read again only when its plan has changed."""
+    key, stamp = str(path), (Path(path) / "plan.json").stat().st_mtime
+    if key not in _folders or _folders[key][0] != stamp:
+        _folders[key] = (stamp, Folder(path))
+    return _folders[key][1]
+
+
+def work_unit(path: str, unit: int) -> UnitReport:
+    """Carry out a unit unless it is done or somebody is at work on it.
+
+    Raises
+    ------
+    OSError
+        If the disk does not take the results; the unit is not done then.
+    """
+    folder = open_folder(path)
+    if folder.ledger(unit).exists():
+        return UnitReport(unit, ALREADY)
+    claim = take(folder.claim(unit))
+    if claim is None:
+        return UnitReport(unit, CLAIMED)
+    try:
+        # somebody may have finished it between the look and the claim
+        return UnitReport(unit, ALREADY) if folder.ledger(unit).exists() else _work(folder, unit, claim)
+    finally:
+        claim.release()
+
+
+def _work(folder: Folder, unit: int, claim: Claim) -> UnitReport:
+    started, cpu = time.time(), time.process_time()
+    rows = folder.cases(unit)
+    guarded = claim.attempts >= GUARD_AFTER
+    runner = GuardedRunner(folder) if guarded else CaseRunner(folder)
+    reuse = Reuse.of(folder)
+    results: list[CaseResult] = []
+    known: dict[str, CaseResult] = {}
+    stop = folder.plan.on_failure == "stop"
+    try:
+        for row in rows:
+            claim.beat()
+            result = _one(runner, row, known, reuse)
+            if stop and result.outcome.status != DONE:
+                return UnitReport(unit, STOPPED, message=f"case {row['index']}: {result.outcome.message}")
+            results.append(result)
+    finally:
+        runner.close()
+    digests = _store(folder, unit, rows, results)
+    seconds = [round(r.seconds, 4) for r in results]
+    failed = sum(r.outcome.status != DONE for r in results)
+    entry = {
+        "unit": unit,
+        "cases": len(rows),
+        "failed": failed,
+        "reused": sum(r.reused for r in results),
+        "index": [rows[0]["index"], rows[-1]["index"] + 1],
+        "status": {str(row["index"]): r.outcome.status for row, r in zip(rows, results) if r.outcome.status != DONE},
+        "seconds": seconds,
+        "processor_seconds": round(time.process_time() - cpu, 4),
+        "simulation_seconds": round(sum(seconds), 4),
+        "started": started,
+        "finished": time.time(),
+        "attempts": claim.attempts,
+        "guarded": guarded,
+        "digests": digests,
+        **surroundings(),
+    }
+    write_whole(folder.ledger(unit), json.dumps(entry))
+    return UnitReport(unit, WORKED, len(rows), failed)
+
+
+def _one(runner: CaseRunner, row: dict[str, Any], known: dict[str, CaseResult], reuse: Reuse | None) -> CaseResult:
+    """Return the result of a case: that of an equal one of this unit or of another campaign, or a new one."""
+    if reuse is not None:
+        thing, prepared = runner.prepare(row)
+        if thing is not None:
+            found = known.get(prepared.key) or reuse.find(prepared.key)
+            if found is not None:
+                return found
+    result = runner.run(row)
+    if reuse is not None and result.outcome.status == DONE:
+        known[result.key] = CaseResult(result.outcome, result.kept, result.key, reused=True)
+    return result
+
+
+def _store(folder: Folder, unit: int, rows: list[dict[str, Any]], results: list[CaseResult]) -> dict[str, str]:
+    """Write signals and table of a unit; return digests."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    plan = folder.plan
+    digests: dict[str, str] = {}
+    if folder.specs:
+        from gearmbs.campaigns.signal_store import write_signals
+
+        digests = write_signals(folder.signals, folder.specs, plan.unit, unit, [r.kept.signals for r in results])
+    columns: dict[str, Any] = {name: [row[name] for row in rows] for name in rows[0]}
+    columns["slot"] = [unit * plan.unit + k for k in range(len(rows))]
+    columns["id"] = [r.key for r in results]
+    for name in ("status", "message", "advice"):
+        columns[name] = [getattr(r.outcome, name) for r in results]
+    table = {name: pa.array(values) for name, values in columns.items()}
+    for name in dict.fromkeys(key for r in results for key in r.kept.numbers):
+        table[name] = pa.array([r.kept.numbers.get(name) for r in results], type=pa.float64())
+    with whole_file(folder.table(unit)) as part:
+        pq.write_table(pa.table(table), part, compression="zstd")
+        digests["table"] = hashlib.sha256(part.read_bytes()).hexdigest()
+    return digests
