@@ -36,7 +36,8 @@ MAY_KNOW = {
     "view": {"contact", "gears", "mechanism", "signals", "dae.results"},
     "adams": {"dae", "dae.equations", "dae.model", "dae.analyses", "dae.results", "mechanism"},
     "studies": {"bearings", "dae", "dae.results", "flexible", "gears", "mechanism", "signals", "view"},
-    "cli": {"adams", "signals", "studies", "view"},
+    "campaigns": {"adams", "gears", "signals", "studies", "view"},
+    "cli": {"adams", "campaigns", "signals", "studies", "view"},
 }
 """What a package may import, besides itself and what `SUPPORT` names. ``dae`` alone is what integrators and equations
 share: the problem, results, errors, and the function that solves a user's DAE."""

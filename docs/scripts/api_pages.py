@@ -19,6 +19,7 @@ PACKAGES = {
     "gearmbs.dae": "DAE: equations, formulations, integrators, solutions",
     "gearmbs.signals": "Signals: files, features, comparison, sensors",
     "gearmbs.studies": "Studies: cases and the paper's study",
+    "gearmbs.campaigns": "Campaigns: many cases",
     "gearmbs.adams": "ADAMS: decks in, results out",
     "gearmbs.view": "View: figures",
     "gearmbs.units": "Units and compilation",
@@ -114,6 +115,11 @@ MORE = {
         "gearmbs.studies.simulation": ["record"],
         "gearmbs.studies.store": ["write_dataset", "write_text", "whole_file"],
         "gearmbs.studies.iftomm": EXPORTED,
+    },
+    "gearmbs.campaigns": {
+        "gearmbs.campaigns.designs": EVERYTHING,
+        "gearmbs.campaigns.runners": EXPORTED,
+        "gearmbs.campaigns.subjects.pair": ["canonical_case", "harmonics", "contact_numbers", "indicators"],
     },
     "gearmbs.units": {"gearmbs.units": ["to_si"], "gearmbs.compile": ["compile_all"]},
 }

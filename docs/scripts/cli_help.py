@@ -26,6 +26,10 @@ def option_rows(command) -> list[str]:
 def show() -> None:
     """Display every command with its arguments and options."""
     group = typer.main.get_command(app)
+    listed = {}
     for name, command in group.commands.items():
+        inside = getattr(command, "commands", {})
+        listed |= {f"{name} {own}": below for own, below in inside.items()} or {name: command}
+    for name, command in listed.items():
         text = [f"**`gearmbs {name}`** — {(command.help or '').strip()}", "", *option_rows(command)]
         display(Markdown("\n".join(text)))

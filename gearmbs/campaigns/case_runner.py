@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import subprocess
 import sys
@@ -132,7 +133,9 @@ class GuardedRunner(CaseRunner):
     def _start(self) -> subprocess.Popen:
         if self._child is None:
             command = [sys.executable, "-m", "gearmbs.campaigns.case_runner", str(self.folder.path)]
-            self._child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            # modules of the user are found where this process finds them
+            environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+            self._child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
         return self._child
 
     def close(self) -> None:

@@ -83,6 +83,8 @@ def status(
         while True:
             now = Campaign(folder).status()
             typer.echo(str(now))
+            if now.done:
+                typer.echo(f"{now.processor_seconds:.4g} s of processor time, {now.overhead:.1%} outside simulations")
             if not watch or now.complete:
                 break
             time.sleep(5.0)

@@ -125,13 +125,6 @@ class Folder:
     def _block(self, extent: int, block: int) -> Path:
         return self.path / "cases" / f"{extent:03d}-{block:05d}.parquet"
 
-    def case_files(self) -> list[Path]:
-        """Return the files of the design's table in order."""
-        size = self.plan.unit * UNITS_A_FILE
-        return [
-            self._block(k, block) for k, e in enumerate(self.extents) for block in range(-(-(e.last - e.first) // size))
-        ]
-
 
 def make_folder(path: str | Path, plan: Plan) -> Folder:
     """Write a plan and the table of its cases to a new folder; plan.json comes last.

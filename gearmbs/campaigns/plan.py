@@ -258,7 +258,9 @@ class Plan:
     @classmethod
     def from_dict(cls, tree: dict[str, Any], n: int) -> Plan:
         """Return the plan that `as_dict` made."""
-        given = {k: tuple(v) if isinstance(v, list) else v for k, v in tree.items() if k not in ("subject", "factors")}
+        given: dict[str, Any] = {
+            k: tuple(v) if isinstance(v, list) else v for k, v in tree.items() if k not in ("subject", "factors")
+        }
         return cls(
             make_subject(tree["subject"]["kind"], tree["subject"]["settings"]),
             tuple(factor_from(table) for table in tree["factors"]),

@@ -53,6 +53,12 @@ class CampaignStatus:
         """Whether every unit is done."""
         return self.units_done == self.units
 
+    @property
+    def overhead(self) -> float:
+        """Part of the processor time that was spent outside simulations and their evaluation."""
+        spent = self.processor_seconds
+        return 1.0 - self.simulation_seconds / spent if spent else 0.0
+
     def __str__(self) -> str:
         parts = [f"{self.done} of {self.cases} cases done"]
         for count, word in ((self.failed, "failed"), (self.reused, "taken over"), (self.running, "in work")):

@@ -53,8 +53,12 @@ def test_commands_exist_with_their_options(path):
                 assert set(words[1:]) <= targets, line
             if words[:1] == ["gearmbs"] and not words[1].startswith("-"):
                 assert words[1] in commands, line
-                known = {o for p in commands[words[1]].params for o in (*p.opts, *p.secondary_opts)}
-                assert {w for w in words[2:] if w.startswith("--")} <= known, line
+                command, rest = commands[words[1]], words[2:]
+                if hasattr(command, "commands"):
+                    assert rest[0] in command.commands, line
+                    command, rest = command.commands[rest[0]], rest[1:]
+                known = {o for p in command.params for o in (*p.opts, *p.secondary_opts)}
+                assert {w for w in rest if w.startswith("--")} <= known, line
 
 
 @pytest.mark.parametrize("path", DOCTESTS, ids=name_of)

@@ -39,7 +39,7 @@ class DaskRunner:
 
     def __call__(self, path: str, units: Iterator[int]) -> Iterator[UnitReport]:
         """Yield the reports of units as they end."""
-        from distributed import FIRST_COMPLETED, wait
+        from distributed import wait
 
         path = os.path.abspath(path)
         at_work: dict[Any, int] = {}
@@ -55,7 +55,7 @@ class DaskRunner:
                     at_work[self.client.submit(work_unit, path, unit, key=key, pure=False)] = unit
                 if not at_work:
                     return
-                for future in wait(list(at_work), return_when=FIRST_COMPLETED).done:
+                for future in wait(list(at_work), return_when="FIRST_COMPLETED").done:
                     unit = at_work.pop(future)
                     yield self._report(future, unit)
                     future.release()

@@ -46,7 +46,7 @@ class PairSubject(Subject):
 
     def settings(self) -> dict[str, Any]:
         """Return the base case."""
-        return {"case": json.loads(self.case.model_dump_json())}
+        return {"case": json.loads(json.dumps(self.case.settings()))}
 
     @classmethod
     def from_settings(cls, settings: dict[str, Any]) -> PairSubject:
@@ -55,7 +55,7 @@ class PairSubject(Subject):
 
     def base(self) -> dict[str, Any]:
         """Return the base case as nested data."""
-        return self.case.model_dump()
+        return self.case.settings()
 
     def unit_of(self, path: str) -> str:
         """Return the SI unit of a field of a case, as "operation.torque"."""
@@ -123,10 +123,15 @@ class PairSubject(Subject):
             if not item.startswith("signal:"):
                 continue
             name, channels = _chosen(item, tuple(COMPONENTS))
-            solver = [thing.solver for thing in things]
             slow = name == "acceleration"
-            rates = [s.signal_rate if slow else s.output_rate for s in solver]
-            rate = max(float(r) for r in rates)
+            rates = {float(thing.signal_rate if slow else thing.output_rate) for thing in things}
+            if len(rates) > 1:
+                several = ", ".join(f"{rate:g}" for rate in sorted(rates))
+                raise CampaignError(
+                    f"keep: {item!r} would have the sampling rates {several} Hz, since they follow the mesh frequency; "
+                    "give solver.signal_rate and solver.output_rate of the base case"
+                )
+            rate = rates.pop()
             longest = max(thing.operation.duration for thing in things)
             units = {"acceleration": "m/s^2", "transmission_error": "m"}.get(name, "N")
             specs.append(SignalSpec(name, channels, int(np.ceil(longest * rate - 1e-6)), rate, units))
@@ -137,8 +142,8 @@ class PairSubject(Subject):
         from gearmbs.studies.simulation import ADVICE, SimulationFailed
 
         if isinstance(error, SimulationFailed):
-            status = None if error.solution is None else error.solution.status
-            advice = ADVICE.get(status, "Raise contact.stiffness or make operation.run_up longer.")  # type: ignore[call-overload]
+            slipped = "Raise contact.stiffness or make operation.run_up longer."
+            advice = slipped if error.solution is None else ADVICE.get(error.solution.status, slipped)
             return Outcome(FAILED, str(error)[:2000], advice)
         return super().explain(error)
 
@@ -166,6 +171,7 @@ def canonical_case(case: Case) -> dict[str, Any]:
         for name in data[section] if isinstance(data[section], dict) else ():
             if hasattr(type(holder), f"used_{name}"):
                 data[section][name] = getattr(holder, f"used_{name}")
+    data["solver"] |= {"signal_rate": case.signal_rate, "output_rate": case.output_rate}
     wheels = case.pair().wheels
     gears = data["gears"]
     for name, value in gears.items():
@@ -189,7 +195,12 @@ def canonical_case(case: Case) -> dict[str, Any]:
 
 
 def harmonics(record: Any) -> dict[str, float]:
-    """Return the RMS of the mesh harmonics: ``band.COMPONENT.K`` and ``orders.COMPONENT.K``, m/s^2."""
+    """Return the RMS of the mesh harmonics: ``band.COMPONENT.K`` and ``orders.COMPONENT.K``, m/s^2.
+
+    Nothing for a record of changing speed, which has none.
+    """
+    if "gmf_rms" not in record:
+        return {}
     levels = record["gmf_rms"].transpose("way", "component", "harmonic")
     return {
         f"{way}.{component}.{harmonic}": float(levels.values[i, j, k])
@@ -206,7 +217,7 @@ def contact_numbers(case: Case, record: Any) -> dict[str, float]:
     coast flank), ``error.mean``, ``error.peak_to_peak`` and its mesh harmonics' amplitudes ``error.K`` (m).
     """
     force, error = record["normal_force"].values, record["transmission_error"].values
-    rate, gmf = case.solver.output_rate, case.mesh_frequency
+    rate, gmf = case.output_rate, case.mesh_frequency
     count = int(np.floor(error.size * gmf / rate) / gmf * rate)
     t = np.arange(count) / rate
     swing = error[:count] - error[:count].mean()
@@ -228,12 +239,14 @@ def contact_numbers(case: Case, record: Any) -> dict[str, float]:
 def indicators(record: Any) -> dict[str, float]:
     """Return the condition indicators of the driver's synchronous average: ``NAME.COMPONENT``; NaN if shorter than a
     turn."""
-    from gearmbs.signals import INDICATORS, condition_indicators, record_signal, time_synchronous_average
+    from gearmbs.signals import INDICATORS, condition_indicators, phase_from_speed, time_synchronous_average
+    from gearmbs.signals.simulated import record_signal
 
     signal = record_signal(record)
     try:
-        found = condition_indicators(time_synchronous_average(signal))
-    except ValueError:
+        average = time_synchronous_average(signal, phase_from_speed(signal, float(signal.attrs["speed"])))
+        found = condition_indicators(average)
+    except (KeyError, ValueError):
         names = [str(c) for c in record.component.values]
         return {f"{name}.{c}": float("nan") for name in INDICATORS for c in names}
     return {

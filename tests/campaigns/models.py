@@ -1,0 +1,42 @@
+"""Cheap things to simulate, found by workers under their module's name."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+
+import numpy as np
+
+PI = 3.141592653589793
+PLACES = {"x1": 0.0, "x2": 0.0, "x3": 0.0}
+
+
+def ishigami(x1: float, x2: float, x3: float, a: float = 7.0, b: float = 0.1) -> dict:
+    """Return Ishigami's function and a signal."""
+    y = np.sin(x1) + a * np.sin(x2) ** 2 + b * x3**4 * np.sin(x1)
+    return {"y": y, "wave": np.sin(x1 * np.arange(50))}
+
+
+def burning(x1: float, x2: float, x3: float) -> dict:
+    """Return the same after twenty milliseconds of processor time."""
+    end = time.process_time() + 0.02
+    while time.process_time() < end:
+        pass
+    return ishigami(x1, x2, x3)
+
+
+def moody(x1: float, x2: float, x3: float, mood: str = "good") -> dict:
+    """Return the same, or go wrong in the way that ``mood`` says."""
+    if mood == "impossible":
+        raise ValueError("x1: no such thing")
+    if mood == "fails":
+        raise RuntimeError("did not converge")
+    if mood == "endless":
+        while True:
+            pass
+    if mood == "hungry":
+        return {"y": float(np.ones(1 << 31).sum())}
+    if mood == "deadly":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return ishigami(x1, x2, x3)

@@ -1,0 +1,50 @@
+"""``gearmbs campaign``."""
+
+from __future__ import annotations
+
+from typer.testing import CliRunner
+
+from gearmbs.cli import app
+
+PLAN = """
+design = "sobol"
+n = 8
+unit = 4
+keep = ["numbers"]
+
+[subject]
+kind = "function"
+function = "tests.campaigns.models:ishigami"
+parameters = { x1 = 0.0, x2 = 0.0, x3 = 0.0 }
+
+[[factor]]
+path = "x1"
+low = -3.14
+high = 3.14
+"""
+
+
+def call(*words: object, code: int = 0) -> str:
+    result = CliRunner().invoke(app, ["campaign", *(str(w) for w in words)])
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+def test_from_plan_to_end(tmp_path):
+    (tmp_path / "p.toml").write_text(PLAN)
+    folder = tmp_path / "p.campaign"
+    assert "8 cases in 2 units" in call("plan", tmp_path / "p.toml")
+    assert "0 of 8" in call("status", folder)
+    call("work", folder, "--part", "2/2")
+    assert "8 of 8" in call("run", folder, "--workers", 1)
+    assert call("failed", folder) == ""
+    assert "x1" in call("show", folder, 3)
+    assert "8 of 16" in call("extend", folder, "--to", 16)
+    assert "all is as" in call("check", folder)
+    assert "--part $SLURM_ARRAY_TASK_ID/50" in call("slurm", folder, "--elements", 50)
+
+
+def test_errors_are_one_line(tmp_path):
+    assert "no campaign here" in call("status", tmp_path, code=1)
+    (tmp_path / "p.toml").write_text(PLAN.replace("x1 = 0.0, ", ""))
+    assert "no such parameter" in call("plan", tmp_path / "p.toml", code=1)

@@ -1,0 +1,80 @@
+"""Kills, Dask, two drivers: the same bits."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from gearmbs.campaigns import Campaign
+from tests.campaigns.support import digest, small
+
+DRIVER = (
+    "import sys; from gearmbs.campaigns import Campaign\nif __name__ == '__main__': "
+    "Campaign(sys.argv[1]).run(workers=2)"
+)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    campaign = small(tmp_path_factory.mktemp("c") / "c", "burning", n=64)
+    campaign.run(workers=0)
+    return digest(campaign)
+
+
+def start(path) -> subprocess.Popen:
+    """Start a driver with two workers in a session of its own."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    script = path.parent / "driver.py"
+    script.write_text(DRIVER)
+    return subprocess.Popen([sys.executable, str(script), str(path)], env=environment, start_new_session=True)
+
+
+def test_kills_of_driver_and_workers(tmp_path, undisturbed):
+    campaign = small(tmp_path / "c", "burning", n=64)
+    generator = random.Random(5)
+    for _ in range(3):
+        driver = start(campaign.path)
+        # until something is at work, and then a moment more
+        end = time.monotonic() + 60.0
+        while not list((campaign.path / "units").glob("*.claim")) and time.monotonic() < end and driver.poll() is None:
+            time.sleep(0.02)
+        time.sleep(generator.uniform(0.0, 0.3))
+        os.killpg(driver.pid, signal.SIGKILL)
+        driver.wait()
+    campaign.run(workers=0)
+    assert digest(campaign) == undisturbed
+
+
+@pytest.mark.slow
+def test_two_drivers_at_once(tmp_path, undisturbed):
+    campaign = small(tmp_path / "c", "burning", n=64)
+    drivers = [start(campaign.path) for _ in range(2)]
+    assert [driver.wait(timeout=120) for driver in drivers] == [0, 0]
+    assert digest(campaign) == undisturbed
+
+
+@pytest.mark.slow
+def test_dask_with_a_worker_killed(tmp_path, undisturbed):
+    distributed = pytest.importorskip("distributed")
+    campaign = small(tmp_path / "c", "burning", n=64)
+    killed = []
+
+    def kill_once(status):
+        if status.done and not killed:
+            claims = [json.loads(p.read_text()) for p in (campaign.path / "units").glob("*.claim")]
+            if claims:
+                killed.append(claims[0]["pid"])
+                os.kill(killed[0], signal.SIGKILL)
+
+    cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
+    with cluster, distributed.Client(cluster) as client:
+        campaign.run(client=client, progress=kill_once)
+    assert digest(campaign) == undisturbed
+    assert Campaign(campaign.path).status().failed == 0

@@ -1,0 +1,91 @@
+"""Cases of the gear pair in campaigns: what is kept is what a single run gives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearmbs.campaigns import Campaign, CampaignError, DeckSubject, Factor, make_plan
+from gearmbs.campaigns.canonical import PHYSICS
+from gearmbs.studies import Case, run_case
+
+BASE = Case(operation={"duration": 0.08, "run_up": 0.02, "settling": 0.02})
+KEEP = ["harmonics", "contact", "indicators", "signal:line_of_action"]
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    plan = make_plan(BASE, [Factor("operation.torque", 80.0, 120.0)], "grid", keep=KEEP, unit=2)
+    campaign = Campaign(tmp_path_factory.mktemp("pair") / "c", plan)
+    campaign.run(workers=0)
+    return campaign
+
+
+def test_what_is_kept(campaign):
+    table, data = campaign.table, campaign.open()
+    assert list(table.status) == ["done"] * 2
+    case = campaign.case(1)
+    assert case.operation.torque == 120.0
+    record = run_case(case)
+    for way in ("band", "orders"):
+        for harmonic in (1, 2, 3):
+            expected = float(record["gmf_rms"].sel(way=way, component="line_of_action", harmonic=harmonic))
+            assert table[f"{way}.line_of_action.{harmonic}"][1] == expected
+    signal = record["acceleration"].sel(component="line_of_action").values.astype(np.float32)
+    np.testing.assert_array_equal(data.acceleration.sel(case=1).values[0], signal)
+    assert data.acceleration.attrs["units"] == "m/s^2"
+    assert table["force.mean"][1] / table["force.mean"][0] == pytest.approx(1.5, rel=0.02)
+
+
+def test_physics_is_counted_up_when_results_change(campaign):
+    """A result that differs needs ``PHYSICS`` counted up, or stored results of old code would be taken for new ones."""
+    assert PHYSICS in STORED, "store the numbers of the new physics"
+    for name, value in STORED[PHYSICS].items():
+        found = campaign.table[name][1]
+        assert found == pytest.approx(value, rel=0.01), f"{name}: count up gearmbs.campaigns.canonical.PHYSICS"
+
+
+STORED = {1: {"orders.line_of_centres.1": 64.972, "orders.line_of_action.1": 29.238, "orders.line_of_action.2": 33.594}}
+"""At a tolerance of 1e-9."""
+
+
+def test_rates_that_differ_are_named(tmp_path):
+    plan = make_plan(BASE, [Factor("operation.speed", "1000 rpm", "3000 rpm")], n=2, keep=KEEP)
+    with pytest.raises(CampaignError, match="would have the sampling rates 12800, 25600 Hz"):
+        Campaign(tmp_path / "c", plan)
+
+
+def test_unknown_things_to_keep_are_named():
+    with pytest.raises(CampaignError, match="a pair keeps harmonics"):
+        make_plan(BASE, [Factor("operation.torque", 80.0, 120.0)], n=2, keep=["everything"])
+
+
+DECK = """a mass on a spring
+PART/1, GROUND
+MARKER/1, PART=1
+PART/2, MASS=${mass}, CM=2, IP=1,1,1, QG=1,0,0
+MARKER/2, PART=2
+MARKER/3, PART=1
+JOINT/1, TRANSLATIONAL, I=2, J=4
+MARKER/4, PART=1, REULER=1.5707963267948966, 1.5707963267948966, 0
+MARKER/5, PART=2, REULER=1.5707963267948966, 1.5707963267948966, 0
+SPRINGDAMPER/1, TRANSLATIONAL, I=2, J=1, K=100, LENGTH=0.5
+REQUEST/1, F2=DX(2,1)
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+END
+"""
+
+
+def test_a_deck_with_parameters(tmp_path):
+    """The mass turns round half a period after its start, on the other side of the relaxed spring."""
+    deck = DECK.replace("I=2, J=4", "I=5, J=4")
+    subject = DeckSubject(deck, {"mass": 1.0}, end=1.0, steps=200)
+    plan = make_plan(subject, [Factor("mass", 1.0, 4.0)], "grid", unit=2)
+    campaign = Campaign(tmp_path / "c", plan)
+    status = campaign.run(workers=0)
+    assert status.failed == 0, campaign.failed().message.tolist()
+    np.testing.assert_allclose(campaign.table["request_1.F2.min"], 0.0, atol=2e-3)
+    last = 0.5 + 0.5 * np.cos(np.sqrt(100.0 / np.array([1.0, 4.0])))
+    np.testing.assert_allclose(campaign.table["request_1.F2.last"], last, atol=2e-3)
+    with pytest.raises(CampaignError, match="the places mass"):
+        DeckSubject(deck, {}, end=1.0)
