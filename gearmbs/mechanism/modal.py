@@ -22,6 +22,10 @@ COUPLING = ("full", "partial", "constant")
 """How much of the coupling between deformation and motion of the frame is kept, see `ShapeIntegrals.coupled`."""
 
 
+ROUNDING = 1e-12
+"""Share of their bounds below which integrals are rounding errors."""
+
+
 @dataclass(frozen=True)
 class Mode:
     """One mode of a body.
@@ -165,6 +169,16 @@ class ShapeIntegrals:
         mass = np.einsum("kpi,lpi->kl", psi, spun)
         return cls(mass, np.zeros((n, 3)), spun.sum(axis=1), cross, first + np.swapaxes(first, 1, 2), second)
 
+    def without_rounding(self, inertia: np.ndarray) -> ShapeIntegrals:
+        """Return the integrals with zeros where nothing but rounding is, by Schwarz's bounds: fewer terms to carry."""
+        size = np.sqrt(np.maximum(np.diag(self.mass), 0.0))
+        pairs = size[:, None] * size
+        turning = size * np.sqrt(max(float(np.trace(inertia)), 0.0))
+        bounds = (pairs, size[:, None] * 0.0, turning[:, None], pairs[..., None], turning[:, None, None],
+                  pairs[..., None, None])  # fmt: skip
+        parts = (getattr(self, key) for key in self.__dataclass_fields__)
+        return ShapeIntegrals(*(np.where(np.abs(x) > ROUNDING * bound, x, 0.0) for x, bound in zip(parts, bounds)))
+
     def __add__(self, other: ShapeIntegrals) -> ShapeIntegrals:
         """Return the integrals of two sets of points with the same modes together."""
         return ShapeIntegrals(*(getattr(self, key) + getattr(other, key) for key in self.__dataclass_fields__))
@@ -282,7 +296,7 @@ def make_modal_body(
         damping[k, k] = 2.0 * mode.damping_ratio * np.sqrt(stiffness[k, k] * given.mass[k, k])
     if rigid.mass <= 0.0:
         raise ModelError(f"{label}: a modal body needs a mass")
-    own = given.about_centre_of_mass(rigid.mass)
+    own = given.about_centre_of_mass(rigid.mass).without_rounding(rigid.inertia)
     coupled = np.block([[rigid.inertia, own.angular_momentum.T], [own.angular_momentum, own.mass]])
     scale = 1.0 / np.sqrt(np.maximum(np.diag(coupled), 1e-300))
     if np.linalg.eigvalsh(scale[:, None] * coupled * scale)[0] <= 0.0:

@@ -178,19 +178,19 @@ def put_inertia(mode, slot, vals, k, i, mass, j):
 
 
 @njit(cache=True, error_model="numpy")
-def put_modal_body(mode, slot, vals, k, y, at, modal, kin_row, rhs):
+def put_modal_body(mode, slot, vals, k, y, at, modal, partial, kin_row, rhs):
     """Hand over the modal inertia of a body and add its forces to ``rhs``; return the number of the next entry.
 
     Parameters
     ----------
     mode, slot, vals, k
         As of `gearmbs.dae.equations.entries.put`.
-    at, modal, kin_row
-        The body's places, the table of all integrals, its row of the kinematics table.
+    at, modal, partial, kin_row
+        The body's places, the table of all integrals, its present state, its row of the kinematics table.
     """
     n, first, turn = at[T.AT_MODES], at[T.AT_V_MODES], at[T.AT_V] + 3
     mass, h, force, moment = np.empty((n, n)), np.empty((n, 3)), np.empty(n), np.empty(3)
-    modal_acceleration_terms(y, at, modal, kin_row, mass, h, force, moment)
+    modal_acceleration_terms(y, at, modal, partial, kin_row, mass, h, force, moment)
     for c in range(3):
         rhs[turn + c] += moment[c]
     for i in range(n):
@@ -245,7 +245,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
         k = put_inertia(mode, slot, vals, k, i, mass, s)
         terms.cross3(kin, KIN_H, kin, KIN_W, rhs, i + 3)
         if tab.at[b, T.AT_MODES] > 0:
-            k = put_modal_body(mode, slot, vals, k, y, tab.at[b], tab.modal, kin, rhs)
+            k = put_modal_body(mode, slot, vals, k, y, tab.at[b], tab.modal, tab.partial, kin, rhs)
     g = vector_at(tab.scratch, S_GRADIENT, 12)
     gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
     apart = vector_at(tab.scratch, S_VECTOR, RELATIVE)
@@ -433,7 +433,7 @@ def poses(y, at, code, kin, out):
 def pose_record(y, idata, rdata, work, out):
     """Write the record of `poses` for y."""
     tab = T.unpack(idata, rdata, work)
-    update_bodies(y, tab.at, tab.code, tab.body, tab.modal, tab.kin, tab.partial, tab.scratch)
+    update_bodies(y, tab.at, tab.code, tab.body, tab.modal, tab.kin, tab.partial, tab.scratch, False)
     poses(y, tab.at, tab.code, tab.kin, out)
 
 

@@ -42,6 +42,9 @@ BIAS = 6
 
 POSITION, VELOCITY, FORCE = 0, 1, 2
 
+SMALL_TURN = 1e-3
+"""Angle below which the series of cosine and sine, three terms each, are exact to rounding."""
+
 
 def partials_size(modes: int) -> int:
     """Return how many numbers the partial derivatives of an elastic frame take."""
@@ -74,25 +77,31 @@ def partials(f, at, partial):
     return matrix_at(partial, at[f, T.AT_PARTIAL], 3 + at[f, T.AT_MODES], PARTIALS)
 
 
-@njit(cache=True, error_model="numpy")
-def turn_about(a, k, axis, angle, out):
-    """Turn the columns of the row-major matrix ``a[k:k+9]`` by the global vector ``axis`` times ``angle``."""
-    size = np.sqrt(dot3(axis, 0, axis, 0))
-    if size == 0.0 or angle == 0.0:
+@njit(cache=True, error_model="numpy", forceinline=True)
+def turn_about(a, k, axis, i, angle):
+    """Turn the columns of the row-major matrix ``a[k:k+9]`` by the global vector ``axis[i:i+3]`` times ``angle``."""
+    x, y, z = axis[i] * angle, axis[i + 1] * angle, axis[i + 2] * angle
+    square = x * x + y * y + z * z
+    if square == 0.0:
         return
-    x, y, z = axis[0] / size, axis[1] / size, axis[2] / size
-    c, s = np.cos(size * angle), np.sin(size * angle)
-    for j in range(3):
-        vx, vy, vz = a[k + j], a[k + 3 + j], a[k + 6 + j]
-        along = (1.0 - c) * (x * vx + y * vy + z * vz)
-        out[0] = c * vx + s * (y * vz - z * vy) + along * x
-        out[1] = c * vy + s * (z * vx - x * vz) + along * y
-        out[2] = c * vz + s * (x * vy - y * vx) + along * z
-        a[k + j], a[k + 3 + j], a[k + 6 + j] = out[0], out[1], out[2]
+    if square < SMALL_TURN**2:
+        # sin t / t and (1 - cos t) / t^2
+        first = 1.0 - square * (1.0 / 6.0 - square / 120.0)
+        second = 0.5 - square * (1.0 / 24.0 - square / 720.0)
+    else:
+        turn = np.sqrt(square)
+        first, second = np.sin(turn) / turn, (1.0 - np.cos(turn)) / square
+    for j in range(k, k + 3):
+        vx, vy, vz = a[j], a[j + 3], a[j + 6]
+        along = second * (x * vx + y * vy + z * vz)
+        rest = 1.0 - second * square
+        a[j] = rest * vx + first * (y * vz - z * vy) + along * x
+        a[j + 3] = rest * vy + first * (z * vx - x * vz) + along * y
+        a[j + 6] = rest * vz + first * (x * vy - y * vx) + along * z
 
 
 @njit(cache=True, error_model="numpy")
-def update_frame(f, y, at, modal, kin, partial):
+def update_frame(f, y, at, modal, kin, partial, derivatives):
     """Fill the row of elastic frame f in the kinematics table and its partial derivatives.
 
     Parameters
@@ -103,6 +112,8 @@ def update_frame(f, y, at, modal, kin, partial):
         Places of the unknowns; shapes: s0, then phi_k, then psi_k.
     kin, partial : ndarray
         Kinematics table, in which the body's row is up to date; table of partial derivatives.
+    derivatives : bool
+        Whether the derivatives of the velocities and the accelerations are wanted: the residual needs neither.
     """
     n, shape, q, v = at[f, T.AT_MODES], at[f, T.AT_SHAPE], at[f, T.AT_QF], at[f, T.AT_VF]
     body, row = kin[at[f, T.AT_BODY]], kin[f]
@@ -119,7 +130,7 @@ def update_frame(f, y, at, modal, kin, partial):
     for k in range(n):
         to_global(body, modal, shape + 3 + 3 * k, d[3 + k], DP)
         to_global(row, modal, shape + 3 + 3 * n + 3 * k, d[3 + k], DX)
-        turn_about(row, KIN_A, d[3 + k, DX : DX + 3], y[q + k], s[9:12])
+        turn_about(row, KIN_A, d[3 + k], DX, y[q + k])
         for c in range(3):
             s[3 + c] += d[3 + k, DP + c] * y[v + k]
             s[6 + c] += d[3 + k, DX + c] * y[v + k]
@@ -131,32 +142,48 @@ def update_frame(f, y, at, modal, kin, partial):
     for c in range(3):
         a = KIN_AXES + 3 * c
         cross3(body, a, s, 0, d[c], DP)
+        for m in range(3):
+            d[c, DX + m] = body[a + m]
+    own_axes(row)
+    if derivatives:
+        update_rates(n, v, y, body, d, s)
+        bias(f, n, v, y, at, body, partial, d, s)
+
+
+@njit(cache=True, error_model="numpy")
+def update_rates(n, v, y, body, d, s):
+    """Fill the derivatives of a frame's velocities; ``s[0:9]``: arm, its elastic rate, angular velocity of the modes.
+
+    Parameters
+    ----------
+    n, v : int
+        Number of modes, and where their rates are in y.
+    y
+        Unknowns.
+    body, d : ndarray
+        The body's row of the kinematics table; the frame's partial derivatives.
+    s : ndarray
+        18 places, the last nine of them scratch.
+    """
+    for c in range(3):
+        a = KIN_AXES + 3 * c
         # d(w x s + s')/dtheta_c = dw x s + w x (a x s) + a x s',  d(w + sum b v)/dtheta_c = dw + a x sum b v
         cross3(body, KIN_DW + 3 * c, s, 0, s, 9)
         cross3(body, KIN_W, d[c], DP, s, 12)
         cross3(body, a, s, 3, s, 15)
         for m in range(3):
-            d[c, DX + m] = body[a + m]
             d[c, DV + m] = s[9 + m] + s[12 + m] + s[15 + m]
         cross3(body, a, s, 6, s, 9)
         for m in range(3):
             d[c, DW + m] = body[KIN_DW + 3 * c + m] + s[9 + m]
-    update_modes(n, v, y, body, d, s)
-    own_axes(row)
-    bias(f, n, v, y, at, body, partial, d, s)
-
-
-@njit(cache=True, error_model="numpy")
-def update_modes(n, v, y, body, d, s):
-    """Fill the derivatives of a frame's velocities by the modal coordinates."""
-    for k in range(n):
+    for c in range(3):
+        s[9 + c] = 0.0
+    for k in range(n - 1, -1, -1):
+        # s[9:12] is the angular velocity of the modes after k
         cross3(body, KIN_W, d[3 + k], DP, d[3 + k], DV)
+        cross3(d[3 + k], DX, s, 9, d[3 + k], DW)
         for c in range(3):
-            d[3 + k, DW + c] = 0.0
-        for l in range(k + 1, n):
-            cross3(d[3 + k], DX, d[3 + l], DX, s, 9)
-            for c in range(3):
-                d[3 + k, DW + c] += y[v + l] * s[9 + c]
+            s[9 + c] += y[v + k] * d[3 + k, DX + c]
 
 
 @njit(cache=True, error_model="numpy")
@@ -308,7 +335,26 @@ def add_row_forces(frames, n_frames, g, lam, mu, at, partial, out):
 
 @njit(cache=True, error_model="numpy")
 def put_row(
-    mode, slot, vals, k, frames, n_frames, g, g_t, hess, width, coef, row, lam, mu, factor, rate_rows, y, at, partial
+    mode,
+    slot,
+    vals,
+    k,
+    frames,
+    n_frames,
+    linear,
+    g,
+    g_t,
+    hess,
+    width,
+    coef,
+    row,
+    lam,
+    mu,
+    factor,
+    rate_rows,
+    y,
+    at,
+    partial,
 ):
     """Hand over the entries of a constraint row, its rate and its multipliers' forces; return the next entry's number.
 
@@ -318,6 +364,8 @@ def put_row(
         As of `gearmbs.dae.equations.entries.put`.
     frames, n_frames : ndarray of int, int
         The frames the row depends on.
+    linear : int
+        Sum of 1 << frame of those whose displacement alone, to first order, enters: modes have no second derivatives.
     g, g_t : ndarray
         Gradients of the row and of its partial time derivative by the frames' own coordinates, six each.
     hess, width : ndarray, int
@@ -353,6 +401,8 @@ def put_row(
             for a2 in range(n_frames):
                 b2 = frames[a2]
                 for j in range(coordinates(b2, at)):
+                    if a == a2 and i >= 6 and j >= 6 and (linear >> a) & 1:
+                        continue
                     direction(b2, j, at, partial, t, 6)
                     value = 0.0
                     for c in range(6):
@@ -513,6 +563,9 @@ def put_load(mode, slot, vals, k, f, sign, force, torque, point, s, at, marker_b
                 k = put(mode, slot, vals, k, row, torque + m, -sign * d[c, DX + m])
         for j in range(3, coordinates(f, at)):
             e = j - 3
+            if e >= c >= 3:
+                # two modes turn one after the other; displacements are linear
+                continue
             value = 0.0
             if min(c, e) < 3:
                 cross3(d[min(c, e)], DX, d[max(c, e)], DP, s, 12)

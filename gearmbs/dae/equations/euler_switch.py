@@ -146,7 +146,7 @@ def hook(t, hist, npast, idata, rdata, work):
                     hist[row, th + c] -= 2.0 * np.pi * turns
         tab.code[b] = new
     if counts_angles(tab):
-        update_bodies(hist[0], tab.at, tab.code, tab.body, tab.modal, tab.kin, tab.partial, tab.scratch)
+        update_bodies(hist[0], tab.at, tab.code, tab.body, tab.modal, tab.kin, tab.partial, tab.scratch, False)
         update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
         track(t, hist[0], tab, True)
     if told == KEPT and npast > 1:

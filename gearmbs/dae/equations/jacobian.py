@@ -84,6 +84,12 @@ def body_entries(mode, b, cj, tab, slot, vals, k):
     return k
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def linear_sides(kind):
+    """Return on which sides (1: I, 2: J) a term is linear in the displacement and blind to the rotation of a frame."""
+    return 3 if kind == terms.POINT else 1 if kind == terms.DOT2 else 0
+
+
 @njit(cache=True, error_model="numpy")
 def elastic_term_entries(mode, j, coef, lam, mu, factor, rate_rows, row_lam, row_mu, y, g, gt, tab, slot, vals, k):
     """Entries of a constraint term between frames of which one at least is elastic; see `row_entries`.
@@ -113,8 +119,9 @@ def elastic_term_entries(mode, j, coef, lam, mu, factor, rate_rows, row_lam, row
             for c in range(3):
                 g[6 * side + 3 + c], gt[6 * side + 3 + c] = turn[c], turn_t[c]
     return put_row(
-        mode, slot, vals, k, frames, 2, g, gt, vector_at(tab.scratch, S_HESSIAN, 144), 12, coef,
-        np.array([row_lam, row_mu]), lam, mu, factor, rate_rows, y, tab.at, tab.partial,
+        mode, slot, vals, k, frames, 2, linear_sides(tab.term[j, T.TERM_TYPE]), g, gt,
+        vector_at(tab.scratch, S_HESSIAN, 144), 12, coef, np.array([row_lam, row_mu]), lam, mu, factor, rate_rows, y,
+        tab.at, tab.partial,
     )  # fmt: skip
 
 
@@ -253,7 +260,7 @@ def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k):
         for i in range(n):
             in_time[i] = hess[i * n + n - 1]
         return put_row(
-            mode, slot, vals, k, frames, bodies, grad, in_time, hess, n, 1.0, np.array([lam, mu]),
+            mode, slot, vals, k, frames, bodies, 0, grad, in_time, hess, n, 1.0, np.array([lam, mu]),
             lam_value, mu_value, factor, rate_rows, y, tab.at, tab.partial,
         )  # fmt: skip
     for i in range(n - 1):
@@ -538,7 +545,7 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
     y, yp, vals, idata = uncounted(y), uncounted(yp), uncounted(vals), uncounted(idata)
     tab = T.unpack(idata, rdata, work)
     mode = idata[T.H_MODE]
-    update_tables(t, y, tab)
+    update_tables(t, y, tab, True)
     slot = tab.slot
     if mode == NUMBERS:
         for k in range(vals.size):
@@ -552,7 +559,7 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
             tab.scratch[S_PRODUCT + l] = y[tab.at[b, T.AT_EPS] + l]
         k = body_entries(mode, b, cj, tab, slot, vals, k)
         if tab.at[b, T.AT_MODES] > 0:
-            k = modal_body_entries(mode, cj, y, tab.at[b], tab.modal, tab.kin[b], slot, vals, k)
+            k = modal_body_entries(mode, cj, y, tab.at[b], tab.modal, tab.partial, tab.kin[b], slot, vals, k)
     for r in range(idata[T.H_ROWS]):
         k = row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k)
         if tab.row[r, T.ROW_TAPE] >= 0:

@@ -113,7 +113,7 @@ AT_BODY = 11
 AT_SHAPE = 12
 """Offset of an elastic frame's shapes among the modal reals: s0, phi_k, psi_k; -1 of a body."""
 AT_PARTIAL = 13
-"""Offset of an elastic frame's partial derivatives; -1 of a body."""
+"""Offset of an elastic frame's partial derivatives, or of a modal body's present state."""
 AT_MODAL = 14
 """Offset of a modal body's integrals among the modal reals; -1 of a rigid body."""
 AT_COLUMNS = 15

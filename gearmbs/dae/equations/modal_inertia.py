@@ -77,29 +77,71 @@ class ModalInertia:
         return np.einsum("tk,kl,tl->t", v_f, self.damping, v_f)
 
     def table(self, inertia: np.ndarray) -> np.ndarray:
-        """Return the numbers as the kernels read them, see `integrals`; ``inertia`` is that of the undeformed body."""
-        parts = (inertia, self.j1, self.j2, self.c0, self.c1, self.mass, self.stiffness, self.damping)
-        return np.concatenate([np.ravel(part) for part in parts])
+        """Return the numbers as the kernels read them, see `integrals`; ``inertia`` is that of the undeformed body.
+
+        What is summed over modes l stands in one row for each, the other mode last, so that the sums are of whole rows.
+        """
+        n = self.modes
+        rows, columns = np.array(SYMMETRIC).T
+        first = np.moveaxis(self.j1[:, rows, columns], 0, 1)
+        second = np.moveaxis(self.j2[:, :, rows, columns], 1, 2).reshape(n, -1)
+        coupling = np.moveaxis(self.c1, 1, 2).reshape(n, -1)
+        turned = np.moveaxis(self.c1, (0, 1, 2), (2, 0, 1)).reshape(n, -1)
+        parts = (self.mass, self.stiffness, self.damping)
+        apart = all(np.array_equal(part, np.diag(np.diag(part))) for part in parts)
+        head = np.concatenate([inertia.ravel(), [float(apart)], first.ravel(), self.c0.T.ravel()])
+        return np.concatenate(
+            [head, np.hstack([second, coupling]).ravel(), turned.ravel(), *(np.ravel(x) for x in parts)]
+        )
+
+
+SYMMETRIC = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+"""Entries of a symmetric matrix in the order in which they are stored."""
+
+PRESENT = 12
+"""Numbers a mode that a body's present state takes: dJ/dq_k (6), H_k (3), sum_l C1_kl v_l (3)."""
+
+
+def present_size(modes: int) -> int:
+    """Return how many numbers the present state of a body takes."""
+    return PRESENT * modes
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def integrals(modal, at, n):
-    """Return the views J0, J1, J2, C0, C1, M, K, D of the table of a body with n modal coordinates."""
-    j1 = at + 9
-    j2 = j1 + 9 * n
-    c0 = j2 + 9 * n * n
-    c1 = c0 + 3 * n
-    m = c1 + 3 * n * n
+    """Return the table of a body with n modal coordinates as views.
+
+    Returns
+    -------
+    j0 : ndarray, shape (10,)
+        J0, and 1 if M, K and D are diagonal.
+    first : ndarray, shape (9 n,)
+        J1 (entries of `SYMMETRIC`, then modes) and C0.
+    second : ndarray, shape (n, 9 n)
+        J2 and C1_lk, a row for each l.
+    turned : ndarray, shape (n, 3 n)
+        C1_kl, a row for each l.
+    mass, stiffness, damping : ndarray, shape (n, n)
+    """
+    first = at + 10
+    second = first + 9 * n
+    turned = second + 9 * n * n
+    m = turned + 3 * n * n
     return (
-        vector_at(modal, at, 9),
-        matrix_at(modal, j1, n, 9),
-        matrix_at(modal, j2, n * n, 9),
-        matrix_at(modal, c0, n, 3),
-        matrix_at(modal, c1, n * n, 3),
+        vector_at(modal, at, 10),
+        vector_at(modal, first, 9 * n),
+        matrix_at(modal, second, n, 9 * n),
+        matrix_at(modal, turned, n, 3 * n),
         matrix_at(modal, m, n, n),
         matrix_at(modal, m + n * n, n, n),
         matrix_at(modal, m + 2 * n * n, n, n),
     )
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def present(partial, at, n):
+    """Return dJ/dq (6, n), H (3, n) and sum_l C1_kl v_l (3, n) of a body at present as views."""
+    return matrix_at(partial, at, 6, n), matrix_at(partial, at + 6 * n, 3, n), matrix_at(partial, at + 9 * n, 3, n)
 
 
 @njit(cache=True, error_model="numpy")
@@ -120,123 +162,122 @@ def to_global(kin_row, v, i, out, k):
 
 
 @njit(cache=True, error_model="numpy")
-def update_inertia(y, at, modal, body_row):
-    """Write J(q) to the body's row."""
-    n, q = at[T.AT_MODES], at[T.AT_QF]
-    j0, j1, j2, _, _, _, _, _ = integrals(modal, at[T.AT_MODAL], n)
-    for c in range(9):
-        total = j0[c]
-        for k in range(n):
-            total += y[q + k] * j1[k, c]
-            for l in range(n):
-                total += 0.5 * y[q + k] * y[q + l] * j2[n * k + l, c]
-        body_row[T.BODY_INERTIA + c] = total
+def update_inertia(y, at, modal, partial, body_row):
+    """Write J(q) to the body's row and dJ/dq, H and sum_l C1_kl v_l to its place in ``partial``."""
+    n, q, v, place = at[T.AT_MODES], at[T.AT_QF], at[T.AT_VF], at[T.AT_PARTIAL]
+    j0, first, second, turned, _, _, _ = integrals(modal, at[T.AT_MODAL], n)
+    both, gyro = vector_at(partial, place, 9 * n), vector_at(partial, place + 9 * n, 3 * n)
+    for k in range(9 * n):
+        both[k] = first[k]
+    for k in range(3 * n):
+        gyro[k] = 0.0
+    for l in range(n):
+        amount, rate = y[q + l], y[v + l]
+        row, other = second[l], turned[l]
+        for k in range(9 * n):
+            both[k] += amount * row[k]
+        for k in range(3 * n):
+            gyro[k] += rate * other[k]
+    i = 0
+    for r in range(3):
+        for c in range(r, 3):
+            total = 0.0
+            for k in range(n):
+                total += y[q + k] * (first[i * n + k] + both[i * n + k])
+            total = j0[3 * r + c] + 0.5 * total
+            body_row[T.BODY_INERTIA + 3 * r + c] = total
+            body_row[T.BODY_INERTIA + 3 * c + r] = total
+            i += 1
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def inertia_change(change, k, w, i, out, j):
+    """Write dJ/dq_k w to ``out[j:j+3]``, body components, w in ``w[i:i+3]``; ``change`` as of `present`."""
+    x, y, z = w[i], w[i + 1], w[i + 2]
+    out[j] = change[0, k] * x + change[1, k] * y + change[2, k] * z
+    out[j + 1] = change[1, k] * x + change[3, k] * y + change[4, k] * z
+    out[j + 2] = change[2, k] * x + change[4, k] * y + change[5, k] * z
 
 
 @njit(cache=True, error_model="numpy")
-def coupling(y, at, modal, k, out, i):
-    """Write H_k(q) to ``out[i:i+3]``, body components."""
-    n, q = at[T.AT_MODES], at[T.AT_QF]
-    _, _, _, c0, c1, _, _, _ = integrals(modal, at[T.AT_MODAL], n)
+def add_momentum(y, at, partial, kin_row):
+    """Add sum_k H_k v_k to the angular momentum h of the body's row."""
+    n, v = at[T.AT_MODES], at[T.AT_VF]
+    _, h, _ = present(partial, at[T.AT_PARTIAL], n)
+    s = np.zeros(6)
     for c in range(3):
-        out[i + c] = c0[k, c]
-        for l in range(n):
-            out[i + c] += y[q + l] * c1[n * l + k, c]
+        for k in range(n):
+            s[c] += h[c, k] * y[v + k]
+    to_global(kin_row, s, 0, s, 3)
+    for c in range(3):
+        kin_row[KIN_H + c] += s[3 + c]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def row_product(matrix, apart, k, y, i):
+    """Return row k of a matrix, which may be diagonal, times ``y[i:i+n]``."""
+    if apart:
+        return matrix[k, k] * y[i + k]
+    total = 0.0
+    for l in range(matrix.shape[0]):
+        total += matrix[k, l] * y[i + l]
+    return total
 
 
 @njit(cache=True, error_model="numpy")
-def inertia_change(y, at, modal, k, w, i, out, j):
-    """Write dJ/dq_k w to ``out[j:j+3]``, body components, w in ``w[i:i+3]``.
+def set_modal_momenta(y, at, modal, partial, kin_row):
+    """Write p_f = dT/dv_f to y."""
+    n = at[T.AT_MODES]
+    j0, _, _, _, mass, _, _ = integrals(modal, at[T.AT_MODAL], n)
+    _, h, _ = present(partial, at[T.AT_PARTIAL], n)
+    s = np.empty(3)
+    to_body(kin_row, kin_row, KIN_W, s, 0)
+    for k in range(n):
+        turning = h[0, k] * s[0] + h[1, k] * s[1] + h[2, k] * s[2]
+        y[at[T.AT_PF] + k] = turning + row_product(mass, j0[9] > 0.0, k, y, at[T.AT_VF])
+
+
+@njit(cache=True, error_model="numpy")
+def modal_residual(y, yp, at, modal, partial, kin_row, out):
+    """Write the rows p_f' - L_qf, p_f - L_vf and v_f - q_f' of a body; loads and constraints are added elsewhere.
 
     Parameters
     ----------
-    y
-        Unknowns.
-    at, modal : ndarray
-        The body's places, the table of all integrals.
-    k : int
-        Mode.
-    w, i : ndarray, int
-        The vector and its place.
-    out, j : ndarray, int
-        Where to write.
+    y, yp
+        Unknowns and their rates.
+    at, modal, partial : ndarray
+        The body's places, the table of all integrals, the present state of `present`.
+    kin_row, out : ndarray
+        The body's row of the kinematics table; the residual.
     """
-    n, q = at[T.AT_MODES], at[T.AT_QF]
-    _, j1, j2, _, _, _, _, _ = integrals(modal, at[T.AT_MODAL], n)
-    for r in range(3):
-        total = 0.0
-        for c in range(3):
-            entry = j1[k, 3 * r + c]
-            for l in range(n):
-                entry += y[q + l] * j2[n * k + l, 3 * r + c]
-            total += entry * w[i + c]
-        out[j + r] = total
-
-
-@njit(cache=True, error_model="numpy")
-def gyroscopic(y, at, modal, k, out, i):
-    """Write sum_l C1_kl v_l, the derivative of sum_l H_l v_l by q_k, to ``out[i:i+3]``, body components."""
-    n, v = at[T.AT_MODES], at[T.AT_VF]
-    _, _, _, _, c1, _, _, _ = integrals(modal, at[T.AT_MODAL], n)
-    for c in range(3):
-        out[i + c] = 0.0
-        for l in range(n):
-            out[i + c] += y[v + l] * c1[n * k + l, c]
-
-
-@njit(cache=True, error_model="numpy")
-def add_momentum(y, at, modal, kin_row):
-    """Add sum_k H_k v_k to the angular momentum h of the body's row."""
-    s = np.empty(6)
-    for k in range(at[T.AT_MODES]):
-        coupling(y, at, modal, k, s, 0)
-        to_global(kin_row, s, 0, s, 3)
-        for c in range(3):
-            kin_row[KIN_H + c] += s[3 + c] * y[at[T.AT_VF] + k]
-
-
-@njit(cache=True, error_model="numpy")
-def set_modal_momenta(y, at, modal, kin_row):
-    """Write p_f = dT/dv_f to y."""
-    n = at[T.AT_MODES]
-    _, _, _, _, _, mass, _, _ = integrals(modal, at[T.AT_MODAL], n)
-    s = np.empty(6)
-    to_body(kin_row, kin_row, KIN_W, s, 0)
-    for k in range(n):
-        coupling(y, at, modal, k, s, 3)
-        total = dot3(s, 3, s, 0)
-        for l in range(n):
-            total += mass[k, l] * y[at[T.AT_VF] + l]
-        y[at[T.AT_PF] + k] = total
-
-
-@njit(cache=True, error_model="numpy")
-def modal_residual(y, yp, at, modal, kin_row, out):
-    """Write the rows p_f' - L_qf, p_f - L_vf and v_f - q_f' of a body; loads and constraints are added elsewhere."""
     n, pf, vf, qf = at[T.AT_MODES], at[T.AT_PF], at[T.AT_VF], at[T.AT_QF]
-    _, _, _, _, _, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
-    s = np.empty(9)
+    j0, _, _, _, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
+    change, h, gyro = present(partial, at[T.AT_PARTIAL], n)
+    apart = j0[9] > 0.0
+    s = np.empty(3)
     to_body(kin_row, kin_row, KIN_W, s, 0)
+    wx, wy, wz = s[0], s[1], s[2]
     for k in range(n):
-        inertia_change(y, at, modal, k, s, 0, s, 3)
-        gyroscopic(y, at, modal, k, s, 6)
-        force = -0.5 * dot3(s, 0, s, 3) - dot3(s, 0, s, 6)
-        coupling(y, at, modal, k, s, 3)
-        momentum = dot3(s, 0, s, 3)
-        for l in range(n):
-            force += stiffness[k, l] * y[qf + l] + damping[k, l] * y[vf + l]
-            momentum += mass[k, l] * y[vf + l]
+        inertial = 0.5 * (change[0, k] * wx * wx + change[3, k] * wy * wy + change[5, k] * wz * wz)
+        inertial += change[1, k] * wx * wy + change[2, k] * wx * wz + change[4, k] * wy * wz
+        inertial += wx * gyro[0, k] + wy * gyro[1, k] + wz * gyro[2, k]
+        force = row_product(stiffness, apart, k, y, qf) + row_product(damping, apart, k, y, vf) - inertial
+        momentum = wx * h[0, k] + wy * h[1, k] + wz * h[2, k] + row_product(mass, apart, k, y, vf)
         out[pf + k] = yp[pf + k] + force
         out[vf + k] = y[pf + k] - momentum
         out[qf + k] = y[vf + k] - yp[qf + k]
 
 
 @njit(cache=True, error_model="numpy")
-def modal_acceleration_terms(y, at, modal, kin_row, mass_out, coupling_out, rhs_modes, rhs_rotation):
+def modal_acceleration_terms(y, at, modal, partial, kin_row, mass_out, coupling_out, rhs_modes, rhs_rotation):
     """Write what a body adds to the acceleration system.
 
     Parameters
     ----------
+    y
+        Unknowns.
+    at, modal, partial, kin_row
+        As of `modal_residual`.
     mass_out : ndarray, shape (n, n)
         Modal mass.
     coupling_out : ndarray, shape (n, 3)
@@ -247,31 +288,43 @@ def modal_acceleration_terms(y, at, modal, kin_row, mass_out, coupling_out, rhs_
         -sum_k v_k (dJ/dq_k w + sum_l C1_kl v_l), global components.
     """
     n, vf, qf = at[T.AT_MODES], at[T.AT_VF], at[T.AT_QF]
-    _, _, _, _, c1, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
-    s = np.empty(12)
+    j0, _, second, _, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
+    change, h, gyro = present(partial, at[T.AT_PARTIAL], n)
+    apart = j0[9] > 0.0
+    s = np.zeros(12)
     to_body(kin_row, kin_row, KIN_W, s, 0)
-    for c in range(3):
-        s[9 + c] = 0.0
     for k in range(n):
-        inertia_change(y, at, modal, k, s, 0, s, 3)
-        gyroscopic(y, at, modal, k, s, 6)
-        total = 0.5 * dot3(s, 0, s, 3) + dot3(s, 0, s, 6)
+        inertia_change(change, k, s, 0, s, 3)
+        total = 0.5 * dot3(s, 0, s, 3)
         for c in range(3):
-            s[9 + c] -= y[vf + k] * (s[3 + c] + s[6 + c])
+            total += s[c] * gyro[c, k]
+            s[9 + c] -= y[vf + k] * (s[3 + c] + gyro[c, k])
+            s[6 + c] = h[c, k]
         for l in range(n):
-            total -= stiffness[k, l] * y[qf + l] + (damping[k, l] + dot3(s, 0, c1[n * l + k], 0)) * y[vf + l]
             mass_out[k, l] = mass[k, l]
-        rhs_modes[k] = total
-        coupling(y, at, modal, k, s, 3)
-        to_global(kin_row, s, 3, s, 6)
+            for c in range(3):
+                total -= s[c] * second[l, (6 + c) * n + k] * y[vf + l]
+        rhs_modes[k] = total - row_product(stiffness, apart, k, y, qf) - row_product(damping, apart, k, y, vf)
+        to_global(kin_row, s, 6, s, 3)
         for c in range(3):
-            coupling_out[k, c] = s[6 + c]
+            coupling_out[k, c] = s[3 + c]
     to_global(kin_row, s, 9, rhs_rotation, 0)
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def any_of(row, first, last, step):
+    """Return whether one of ``row[first:last:step]`` is not zero: numbers that never change."""
+    for i in range(first, last, step):
+        if row[i] != 0.0:
+            return True
+    return False
+
+
 @njit(cache=True, error_model="numpy")
-def modal_body_entries(mode, cj, y, at, modal, kin_row, slot, vals, k):
+def modal_body_entries(mode, cj, y, at, modal, partial, kin_row, slot, vals, k):
     """Hand over the entries of a body's modal inertia, stiffness and damping; return the number of the next entry.
+
+    Entries whose integrals are all zero, and stay so, are left out.
 
     Parameters
     ----------
@@ -279,23 +332,22 @@ def modal_body_entries(mode, cj, y, at, modal, kin_row, slot, vals, k):
         As of `gearmbs.dae.equations.entries.put`.
     cj : float
         Factor of y'.
-    at, modal, kin_row
-        The body's places, the table of all integrals, its row of the kinematics table.
+    at, modal, partial, kin_row
+        The body's places, the table of all integrals, the present state, its row of the kinematics table.
     """
     n, p, e, th = at[T.AT_MODES], at[T.AT_P], at[T.AT_EPS], at[T.AT_THETA]
     pf, vf, qf = at[T.AT_PF], at[T.AT_VF], at[T.AT_QF]
-    _, _, j2, _, c1, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
+    change, h, gyro = present(partial, at[T.AT_PARTIAL], n)
     s = np.empty(30)
     to_body(kin_row, kin_row, KIN_W, s, 0)
     for c in range(3):
         to_body(kin_row, kin_row, KIN_AXES + 3 * c, s, 12 + 3 * c)
         to_body(kin_row, kin_row, KIN_ADOT + 3 * c, s, 21 + 3 * c)
     for i in range(n):
-        inertia_change(y, at, modal, i, s, 0, s, 3)
-        gyroscopic(y, at, modal, i, s, 6)
+        inertia_change(change, i, s, 0, s, 3)
         for c in range(3):
-            s[3 + c] += s[6 + c]
-        coupling(y, at, modal, i, s, 6)
+            s[3 + c] += gyro[c, i]
+            s[6 + c] = h[c, i]
         k = put(mode, slot, vals, k, pf + i, pf + i, cj)
         k = put(mode, slot, vals, k, vf + i, pf + i, 1.0)
         k = put(mode, slot, vals, k, qf + i, vf + i, 1.0)
@@ -313,13 +365,41 @@ def modal_body_entries(mode, cj, y, at, modal, kin_row, slot, vals, k):
             k = put(mode, slot, vals, k, pf + i, th + c, -along_rate)
             k = put(mode, slot, vals, k, vf + i, e + c, -about)
             k = put(mode, slot, vals, k, vf + i, th + c, -about_rate)
-        for l in range(n):
-            centrifugal = 0.0
-            for r in range(3):
-                for c in range(3):
-                    centrifugal += 0.5 * s[r] * j2[n * i + l, 3 * r + c] * s[c]
+        k = pair_entries(mode, i, at, modal, s, slot, vals, k)
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def pair_entries(mode, i, at, modal, s, slot, vals, k):
+    """Hand over the entries of mode i with all modes; return the number of the next entry.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.entries.put`.
+    i : int
+        Mode.
+    at, modal : ndarray
+        The body's places, the table of all integrals.
+    s : ndarray
+        Angular velocity in body components in ``s[0:3]``.
+    """
+    n, pf, vf, qf = at[T.AT_MODES], at[T.AT_PF], at[T.AT_VF], at[T.AT_QF]
+    _, _, second, turned, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
+    x, y, z = s[0], s[1], s[2]
+    for l in range(n):
+        row, other = second[l], turned[l]
+        spins, turns = any_of(row, 6 * n + i, 9 * n, n), any_of(other, i, 3 * n, n)
+        if stiffness[i, l] != 0.0 or any_of(row, i, 6 * n, n):
+            centrifugal = 0.5 * (row[i] * x * x + row[3 * n + i] * y * y + row[5 * n + i] * z * z)
+            centrifugal += row[n + i] * x * y + row[2 * n + i] * x * z + row[4 * n + i] * y * z
             k = put(mode, slot, vals, k, pf + i, qf + l, stiffness[i, l] - centrifugal)
-            k = put(mode, slot, vals, k, pf + i, vf + l, damping[i, l] - dot3(s, 0, c1[n * i + l], 0))
-            k = put(mode, slot, vals, k, vf + i, qf + l, -dot3(s, 0, c1[n * l + i], 0))
+        if damping[i, l] != 0.0 or turns:
+            gyro = x * other[i] + y * other[n + i] + z * other[2 * n + i]
+            k = put(mode, slot, vals, k, pf + i, vf + l, damping[i, l] - gyro)
+        if spins:
+            mixed = x * row[6 * n + i] + y * row[7 * n + i] + z * row[8 * n + i]
+            k = put(mode, slot, vals, k, vf + i, qf + l, -mixed)
+        if mass[i, l] != 0.0:
             k = put(mode, slot, vals, k, vf + i, vf + l, -mass[i, l])
     return k

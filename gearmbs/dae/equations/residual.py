@@ -53,7 +53,7 @@ S_VECTOR = 320
 def update(t, y, yp, idata, rdata, work):
     """Bring the kinematics and marker tables up to date with y."""
     tab = T.unpack(idata, rdata, work)
-    update_tables(t, y, tab)
+    update_tables(t, y, tab, True)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -220,7 +220,7 @@ def residual(t, y, yp, out, idata, rdata, work):
     """Evaluate G(t, y, y') of eq. (8) into ``out``."""
     y, yp, out, idata = uncounted(y), uncounted(yp), uncounted(out), uncounted(idata)
     tab = T.unpack(idata, rdata, work)
-    update_tables(t, y, tab)
+    update_tables(t, y, tab, False)
     for b in range(1, idata[T.H_BODIES]):
         kin, at = tab.kin[b], tab.at[b]
         u, p, e, r, th = at[T.AT_U], at[T.AT_P], at[T.AT_EPS], at[T.AT_R], at[T.AT_THETA]
@@ -232,7 +232,7 @@ def residual(t, y, yp, out, idata, rdata, work):
             out[r + c] = y[u + c] - yp[r + c]
             out[th + c] = y[e + c] - yp[th + c]
         if at[T.AT_MODES] > 0:
-            modal_residual(y, yp, at, tab.modal, kin, out)
+            modal_residual(y, yp, at, tab.modal, tab.partial, kin, out)
     add_constraints(t, y, yp, idata, tab, out)
     room = vector_at(tab.scratch, 0, 64)
     lam0 = idata[T.H_LAMBDA]

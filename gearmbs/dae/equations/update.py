@@ -51,7 +51,7 @@ def update_ground(kin):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def update_bodies(y, at, code, body, modal, kin, partial, scratch):
+def update_bodies(y, at, code, body, modal, kin, partial, scratch, derivatives):
     """Fill the kinematics table from the positions and velocities in y.
 
     Parameters
@@ -66,11 +66,13 @@ def update_bodies(y, at, code, body, modal, kin, partial, scratch):
         Kinematics table.
     scratch : ndarray
         3 places.
+    derivatives : bool
+        Whether the velocities' derivatives and the accelerations of elastic frames are wanted.
     """
     update_ground(kin)
     for b in range(1, code.size):
         if at[b, T.AT_MODES] > 0:
-            update_inertia(y, at[b], modal, body[b])
+            update_inertia(y, at[b], modal, partial, body[b])
         u, e, r, th = at[b, T.AT_U], at[b, T.AT_EPS], at[b, T.AT_R], at[b, T.AT_THETA]
         row = kin[b]
         for c in range(3):
@@ -81,9 +83,9 @@ def update_bodies(y, at, code, body, modal, kin, partial, scratch):
         axes_and_velocity(psi, theta, y[e], y[e + 1], y[e + 2], kin, b)
         inertia_times(row, body[b], row, KIN_W, row, KIN_H, scratch)
         if at[b, T.AT_MODES] > 0:
-            add_momentum(y, at[b], modal, row)
+            add_momentum(y, at[b], partial, row)
     for f in range(code.size, at.shape[0]):
-        update_frame(f, y, at, modal, kin, partial)
+        update_frame(f, y, at, modal, kin, partial, derivatives)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -136,9 +138,9 @@ def predict_angles(t, tab):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def update_tables(t, y, tab):
-    """Bring bodies, markers, functions of time and expected angles up to date with t and y."""
-    update_bodies(y, tab.at, tab.code, tab.body, tab.modal, tab.kin, tab.partial, tab.scratch)
+def update_tables(t, y, tab, derivatives):
+    """Bring bodies, markers, functions of time and expected angles up to date with t and y; see `update_bodies`."""
+    update_bodies(y, tab.at, tab.code, tab.body, tab.modal, tab.kin, tab.partial, tab.scratch, derivatives)
     update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
     update_functions(t, tab)
     predict_angles(t, tab)

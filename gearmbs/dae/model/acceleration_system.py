@@ -65,7 +65,7 @@ def unknowns_from_pose(pose, q_f, v_f, idata, rdata, work, y):
             y[at[T.AT_QF] + m] = q_f[first + m]
             y[at[T.AT_VF] + m] = v_f[first + m]
         if at[T.AT_MODES] > 0:
-            update_inertia(y, at, tab.modal, tab.body[b])
+            update_inertia(y, at, tab.modal, tab.partial, tab.body[b])
         th, e, p = at[T.AT_THETA], at[T.AT_EPS], at[T.AT_P]
         for c in range(3):
             y[at[T.AT_R] + c] = row[POSE_R + c]
@@ -79,8 +79,8 @@ def unknowns_from_pose(pose, q_f, v_f, idata, rdata, work, y):
         if at[T.AT_MODES] > 0:
             for c in range(3):
                 kin[b, KIN_W + c] = row[POSE_W + c]
-            add_momentum(y, at, tab.modal, kin[b])
-            set_modal_momenta(y, at, tab.modal, kin[b])
+            add_momentum(y, at, tab.partial, kin[b])
+            set_modal_momenta(y, at, tab.modal, tab.partial, kin[b])
         for m in range(3):
             y[p + m] = dot3(kin[b], KIN_AXES + 3 * m, kin[b], KIN_H)
 

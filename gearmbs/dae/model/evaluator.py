@@ -189,7 +189,7 @@ def project(t, at, phi, plan, factors, pair, idata, tab):
         pair[1, base + r] = -phi[3 * r + 1]
     solve_pair(plan, factors, pair)
     index1.displace(at, pair[0], pair[1], idata, tab)
-    update_tables(t, at, tab)
+    update_tables(t, at, tab, True)
     return strayed
 
 
@@ -228,7 +228,7 @@ def _evaluate(
         phi = vector_at(records.phi, 3 * rows * k, 3 * rows)
         loads = matrix_at(records.loads, elements * columns * k, elements, columns)
         solution = vector_at(records.solution, size * k, size)
-        update_tables(t[k], at, tab)
+        update_tables(t[k], at, tab, True)
         if counts_turns and not only_assemble:
             track(t[k], at, tab, False)
         projected = rows == 0 or only_assemble

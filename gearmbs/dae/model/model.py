@@ -14,7 +14,7 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.elastic import partials_size
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.force_elements import FORCE_SIG, Diagnostic
-from gearmbs.dae.equations.modal_inertia import ModalInertia
+from gearmbs.dae.equations.modal_inertia import ModalInertia, present_size
 from gearmbs.dae.equations.rotation import KIN_COLUMNS
 from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, Counts, Unknown, named, offsets, places
 
@@ -289,7 +289,8 @@ class Model:
         head[T.H_N_EXTRA_I], head[T.H_N_EXTRA_R] = len(self.extra_i), len(self.extra_r)
         head[T.H_N_FUNCTION_R] = len(self.function_r)
         head[T.H_FRAMES], head[T.H_N_MODAL] = len(self.bodies) + len(self.frame_body), self.modal.size
-        head[T.H_N_PARTIAL] = sum(partials_size(self.modes[b]) for b in self.frame_body)
+        head[T.H_N_PARTIAL] = sum(present_size(n) for n in self.modes)
+        head[T.H_N_PARTIAL] += sum(partials_size(self.modes[b]) for b in self.frame_body)
         head[T.H_W_KIN] = 0
         head[T.H_W_MARKER] = head[T.H_FRAMES] * KIN_COLUMNS
         head[T.H_W_FUNCTION] = head[T.H_W_MARKER] + len(self.marker_body) * T.MK_COLUMNS
@@ -303,8 +304,11 @@ class Model:
         """Return the table ``at``: bodies, then the elastic frames, which have the places of their bodies."""
         bodies = places(self.counts, formulation)
         bodies[:, T.AT_MODAL] = self.modal_at
-        frames = bodies[list(self.frame_body)]
         partial = 0
+        for row, modes in zip(bodies, self.modes):
+            row[T.AT_PARTIAL] = partial
+            partial += present_size(modes)
+        frames = bodies[list(self.frame_body)]
         for row, body, shape in zip(frames, self.frame_body, self.shape_at):
             row[T.AT_BODY], row[T.AT_SHAPE], row[T.AT_PARTIAL] = body, shape, partial
             partial += partials_size(self.modes[body])
