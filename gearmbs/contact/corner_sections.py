@@ -45,7 +45,7 @@ def corner_starts(side, corner, strip, n, rb, normal):
         lean = p * X + q * Y
         R2 = X * X + Y * Y
         strip.good[j] = 1.0 if R2 - lean * lean - rb * rb > near else 0.0
-        roll = np.sqrt(max(R2 - rb * rb, near))
+        roll = np.copysign(np.sqrt(max(R2 - rb * rb, near)), rb)
         sa = (roll * X - rb * Y) / R2
         ca = (rb * X + roll * Y) / R2
         # the angle from the normal nearby, by the series of the arctangent of its half

@@ -6,6 +6,7 @@ import numpy as np
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.corner_sections import corner_normals, corner_sections, corner_starts
+from gearmbs.contact.helical_sections import edge_normals, edge_sections
 from gearmbs.contact.jit import kernel
 from gearmbs.contact.lines import corner_on_plane
 from gearmbs.contact.sections import NEAR_BASE, normal_turns
@@ -13,7 +14,10 @@ from gearmbs.contact.sections import NEAR_BASE, normal_turns
 
 @kernel
 def set_corner(wheel, corner, j, f, roll):
-    """Make a tip corner the one at work in section ``j``: at the wheel's own tip, or sharp at a shorter ``roll``."""
+    """Make a tip corner the one at work in section ``j``: at the wheel's own tip, or sharp at a shorter ``roll``.
+
+    Returns the corner's polar angle at the wheel's middle.
+    """
     if roll >= wheel.tip_roll:
         psi = wheel.corner_angle
         corner.radius[j] = wheel.corner_radius
@@ -23,11 +27,12 @@ def set_corner(wheel, corner, j, f, roll):
         rb = wheel.base_radius
         tan = roll / rb
         psi = wheel.half_angle - tan + np.arctan(tan)
-        corner.radius[j] = np.sqrt(rb * rb + roll * roll)
+        corner.radius[j] = np.copysign(np.sqrt(rb * rb + roll * roll), rb)
         corner.rounding[j] = 0.0
         corner.roll[j] = roll
     corner.sin[j] = np.sin(f + psi)
     corner.cos[j] = np.cos(f + psi)
+    return f + psi
 
 
 @kernel
@@ -66,8 +71,12 @@ def corner_gaps(side, wheels, corner, strip, n, kind, f_mate, normal, want):
     rb = side.base_2 if kind == 1 else side.base_1
     start = f_mate + (wheels.wheel_2.half_angle if kind == 1 else wheels.wheel_1.half_angle)
     corner_starts(side, corner, strip, n, rb, normal)
-    corner_normals(side, corner, strip, n, rb * start, rb)
-    corner_sections(side, corner, strip, n, kind, start, want)
+    if side.twist_1 != 0.0:
+        edge_normals(side, corner, strip, n, kind == 1, rb * start, rb)
+        edge_sections(side, corner, strip, n, kind, start, want)
+    else:
+        corner_normals(side, corner, strip, n, rb * start, rb)
+        corner_sections(side, corner, strip, n, kind, start, want)
     mended = False
     for j in range(n):
         if strip.good[j] == 0.0:
@@ -93,7 +102,9 @@ def corner_near_base(side, corner, strip, j, kind, start, rb, want):
     want : int
         Nonzero to fill second derivatives.
     """
-    turned = start - NEAR_BASE
+    half = (0.5 if kind == 1 else -0.5) * side.x[L.H]
+    twist = side.twist_2 if kind == 1 else side.twist_1
+    turned = start - NEAR_BASE - twist * (strip.zeta[j] - half) / rb
     corner_on_plane(side, corner, strip, j, kind == 1, turned, rb, NEAR_BASE * rb, want)
     strip.kind[j] = float(kind)
     strip.alpha[j] = -turned

@@ -70,11 +70,14 @@ def roll_of_flanks(side, wheels, lookup, wheel, f1, f2, zeta):
     diff = 0.5 * sign * (rb1 * (f1 + half_1) - rb2 * (f2 + half_2) + side.base_difference * alpha)
     k1 = Rb / (a * l)
     turn = 2.0 * zeta * own
-    lookup.roll = diff + 0.5 * l + turn * (q / a - p * k1)
+    twist = side.twist_1 if wheel == 0 else side.twist_2
+    half = 0.5 * sign * side.x[L.H]
+    lookup.roll = diff + 0.5 * l + turn * (q / a - p * k1) - twist * (zeta + half)
     k1_a = -Rb * (1.0 / (a * a * l) + 1.0 / l**3)
     slope = 0.5 * sign * side.base_difference
     grad, hess = lookup.grad, lookup.hess
     grad[L.A] = slope * k1 + 0.5 * a / l + turn * (-q / (a * a) - p * k1_a)
+    grad[L.H] = -0.5 * sign * twist
     grad[L.P] = -turn * k1
     grad[L.Q] = turn / a
     grad[L.F1] = 0.5 * sign * rb1
@@ -115,22 +118,25 @@ def roll_under_corner(side, corner, strip, j, lookup, wheel, want):
     if s2 < SHORTEST * SHORTEST * mate * mate:
         lookup.roll += SHORTEST * mate - corner.rounding[j]
         return
-    s = np.sqrt(s2)
+    s = np.copysign(np.sqrt(s2), mate)
+    # a helical edge moves around its wheel with the axial offset
+    around = 0.5 * side.twist_2 / side.base_2 if wheel == 0 else -0.5 * side.twist_1 / side.base_1
     lookup.roll += s - corner.rounding[j]
     i_s = 1.0 / s
     for i in range(6):
-        dx = 1.0 if i == L.A else (-2.0 * zeta if i == L.P else (r * se if i == f else 0.0))
-        dy = -2.0 * zeta if i == L.Q else (-r * ce if i == f else 0.0)
+        turn_i = 1.0 if i == f else (around if i == L.H else 0.0)
+        dx = 1.0 if i == L.A else (-2.0 * zeta if i == L.P else r * se * turn_i)
+        dy = -2.0 * zeta if i == L.Q else -r * ce * turn_i
         by_i = (Px * dx + Py * dy) * i_s
         grad[i] += by_i
         if want == 0:
             continue
         for k in range(6):
-            ex = 1.0 if k == L.A else (-2.0 * zeta if k == L.P else (r * se if k == f else 0.0))
-            ey = -2.0 * zeta if k == L.Q else (-r * ce if k == f else 0.0)
+            turn_k = 1.0 if k == f else (around if k == L.H else 0.0)
+            ex = 1.0 if k == L.A else (-2.0 * zeta if k == L.P else r * se * turn_k)
+            ey = -2.0 * zeta if k == L.Q else -r * ce * turn_k
             value = dx * ex + dy * ey - by_i * (Px * ex + Py * ey) * i_s
-            if i == f and k == f:
-                value += r * (Px * ce + Py * se)
+            value += turn_i * turn_k * r * (Px * ce + Py * se)
             hess[i, k] += value * i_s
 
 

@@ -17,6 +17,13 @@ def roll_difference(side, wheels, f1, f2):
 
 
 @kernel
+def end_roll(side, wheels, end, roll):
+    """Length of roll on wheel 1 at an end of the face, from that at mid-face; ``end`` is +1 or -1."""
+    zeta = wheels.face_low if end < 0.0 else wheels.face_high
+    return roll - side.twist_1 * (zeta + 0.5 * wheels.axial_shift)
+
+
+@kernel
 def end_value(side, wheel, k, end, sig):
     """Limit set by one wheel's end face, from the transverse contact point at the length of roll ``sig``.
 

@@ -12,6 +12,7 @@ from gearmbs.contact.pair import side_contacts
 from gearmbs.contact.pose import pose_columns, pose_rate_slopes, pose_rates, pose_wrench, relative_pose
 from gearmbs.contact.records import options_at, pair_at, scratch_at
 from gearmbs.contact.root import root_contacts
+from gearmbs.contact.search import set_twist
 from gearmbs.contact.sums import clear_sums, mirror
 
 VEC = types.float64[::1]
@@ -184,6 +185,7 @@ def both_sides(options, wheels, scratch, want):
     clear_sums(sums, want)
     for i in range(6):
         side.x[i], side.xd[i], side.twist[i] = motion.x[i], motion.xd[i], motion.twist[i]
+    set_twist(wheels, side, 1.0)
     side_contacts(options, wheels, scratch, 1, totals, want)
     if root:
         root_contacts(options, wheels, scratch, 1, totals, want)
@@ -192,6 +194,7 @@ def both_sides(options, wheels, scratch, want):
         side.x[i] = sign * motion.x[i]
         side.xd[i] = sign * motion.xd[i]
         side.twist[i] = -motion.twist[i] if i % 2 == 1 else motion.twist[i]
+    set_twist(wheels, side, -1.0)
     turned = side_contacts(options, wheels, scratch, -1, totals, want)
     if root:
         if not turned:
@@ -257,7 +260,8 @@ def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want
     scratch = scratch_at(work)
     motion, sums, totals = scratch.motion, scratch.sums, scratch.totals
     clear_totals(totals)
-    touching = relative_pose(R1, A1, R2, A2, motion)
+    internal = pair_at(gr).wheel_2.base_radius < 0.0
+    touching = relative_pose(R1, A1, R2, A2, internal, motion)
     if touching:
         relative_twist(R1, v1, w1, R2, v2, w2, motion)
         both_sides(options_at(gi), pair_at(gr), scratch, want_jac)

@@ -78,7 +78,7 @@ FLANK_SHAPE, FLANK_TIP, FLANK_COMPLIANCE, FLANK = range(4)
 """A tooth flank's numbers of its shape, tip and compliance (-1: none), and how many numbers that makes."""
 
 WHEEL = record(
-    "base_radius",  # m
+    "base_radius",  # m; radii, lengths of roll and angles of an internal wheel are negative
     "half_angle",  # of the tooth at the base circle, rad
     "tip_roll",  # length of roll where the involute ends at the tip, m
     "corner_radius",  # of the centre of the tip rounding (the tip corner itself when sharp), m
@@ -93,6 +93,7 @@ WHEEL = record(
     "fillet_angle",  # half angle of the arc's centre from the tooth's middle, rad
     "shape_start",  # length of roll of the first place of a deviation shape, m
     "shape_spacing",  # of its places, m
+    "twist",  # tangent of the base helix angle, positive for an external left hand and an internal right hand
 )
 PAIR = record(
     ("wheel_1", WHEEL),
@@ -114,6 +115,7 @@ PAIR = record(
     "axial_shift",  # nominal axial offset of wheel 2, m
     "compliance_start",  # first place of the pair's compliance curve on wheel 1's length of roll, m
     "compliance_spacing",
+    "secant",  # of the base helix angle: normal force over its part in the transverse section
 )
 SLICES, FRICTION, LAW = place(OPTIONS, "slices"), place(OPTIONS, "friction"), place(OPTIONS, "law")
 
@@ -189,6 +191,11 @@ SIDE = record(
     "roll_sum",  # sum of base radius times (spin + half angle), tooth 0 of wheel 1 and the tooth facing it
     "start_1",  # spin plus half angle of tooth 0 of wheel 1, and of the tooth facing it
     "start_2",
+    "turn_2",  # angle between neighbouring teeth of wheel 2, rad; negative for an internal one
+    "twist_1",  # tangents of the base helix angles as seen on the side of the teeth at work
+    "twist_2",
+    "spread",  # how much the gap of helical flanks may differ from tooth pair to tooth pair under a tilt, m
+    "reference",  # number of the tooth of wheel 1 whose flanks the sections of the face describe
     "facing",  # number of the tooth of wheel 2 that faces tooth 0 of wheel 1
     "first",  # nodes of the face that may touch
     "last",

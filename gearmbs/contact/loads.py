@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.face import limit_slopes
+from gearmbs.contact.face import end_roll, limit_slopes
 from gearmbs.contact.jit import kernel
 from gearmbs.contact.slices import (
     Cut,
@@ -91,7 +91,8 @@ def face_end(wheels, scratch, law, strip, i, u, end, share, want):
     """
     side, pair, loads = scratch.side, scratch.pair, scratch.loads
     limit = scratch.low if end < 0.0 else scratch.high
-    limit_slopes(side, wheels, end, pair.roll, limit, scratch.end_1, scratch.end_2, want)
+    roll = end_roll(side, wheels, end, pair.roll)
+    limit_slopes(side, wheels, end, roll, limit, scratch.end_1, scratch.end_2, want)
     end_force(law, strip, i, side.step, u, end * share, limit, pair, scratch.sums, want)
     clipped = loads.clip_low[i] if end < 0.0 else loads.clip_high[i]
     if want != 0 and clipped == 0.0:

@@ -7,13 +7,15 @@ import numpy as np
 from gearmbs.contact import layout as L
 from gearmbs.contact.centroid import centroid_force
 from gearmbs.contact.deviations import pair_softness, tooth_flank
-from gearmbs.contact.face import limit_slopes, limit_value, roll_difference
+from gearmbs.contact.face import end_roll, limit_slopes, limit_value, roll_difference
+from gearmbs.contact.helical_friction import helical_points
 from gearmbs.contact.jit import kernel
 from gearmbs.contact.loads import add_softness, finish_softness, strip_forces
 from gearmbs.contact.pair_strips import copy_rows, pair_sections, strip_count
 from gearmbs.contact.points import contact_points
 from gearmbs.contact.records import strip_at
 from gearmbs.contact.search import (
+    face_pair,
     facing_teeth,
     flank_strips,
     middle_section,
@@ -57,23 +59,25 @@ def side_contacts(options, wheels, scratch, sign, totals, want):
     middle_section(options, wheels, side, middle, want if single else 0)
     wander = 0.0
     if single:
-        depth = wheels.added_material - middle.gap[0]
+        depth = wheels.added_material - middle.gap[0] + side.spread
         if depth <= 0.0:
             return False
         gap_rates(side, middle, 1, want)
     else:
         if not reach_of_face(options, wheels, side, middle):
             return False
-        depth = wheels.added_material - flank_strips(scratch, options.slices, want)
+        depth = wheels.added_material - flank_strips(scratch, options.slices, want) + side.spread
         if depth <= 0.0:
             return False
         turn = 2.0 * (side.x[L.Q] * middle.sin[0] - side.x[L.P] * middle.cos[0]) / (side.w * side.length)
-        wander = max(side.base_1, side.base_2) * abs(turn) * (wheels.face_high - wheels.face_low)
+        wander = max(side.base_1, abs(side.base_2)) * abs(turn) * (wheels.face_high - wheels.face_low)
     if sign < 0:
         mirror(scratch.sums, want)
     first, last = teeth_in_reach(wheels, side, depth, wander)
     for i in range(first, last + 1):
         set_pair(options, scratch, sign, i)
+        if side.spread != 0.0:
+            own_flanks(options, wheels, scratch, want)
         if single:
             depth = plane_contact(options, wheels, scratch, totals, want)
         else:
@@ -81,6 +85,17 @@ def side_contacts(options, wheels, scratch, sign, totals, want):
         if depth > 0.0:
             count_pair(options, sign, depth, totals)
     return sign < 0
+
+
+@kernel
+def own_flanks(options, wheels, scratch, want):
+    """Fill the sections of flank on flank anew for the pair at work: tilted helical wheels differ in their pitches."""
+    face_pair(wheels, scratch.side, scratch.pair)
+    if options.slices == 1:
+        middle_section(options, wheels, scratch.side, scratch.middle, want)
+        gap_rates(scratch.side, scratch.middle, 1, want)
+    else:
+        flank_strips(scratch, options.slices, want)
 
 
 @kernel
@@ -100,11 +115,11 @@ def set_pair(options, scratch, sign, i):
     side, pair = scratch.side, scratch.pair
     mate = int(side.facing) - i
     pair.f_1 = side.x[L.F1] + i * (2.0 * np.pi / options.teeth[0])
-    pair.f_2 = side.x[L.F2] + mate * (2.0 * np.pi / options.teeth[1])
+    pair.f_2 = side.x[L.F2] + mate * side.turn_2
     pair.shift = side.base_1 * (pair.f_1 - side.x[L.F1])
     if options.flanks != 0:
         pair.flank_1 = tooth_flank(options, 0, sign, i)
-        pair.flank_2 = tooth_flank(options, 1, sign, mate)
+        pair.flank_2 = tooth_flank(options, 1, sign, mate if side.base_2 > 0.0 else -mate)
     pair.soft = 1.0
     for k in range(6):
         pair.soft_x[k] = 0.0
@@ -158,8 +173,9 @@ def face_contact(options, wheels, scratch, totals, want):
 def set_limits(wheels, side, pair):
     """Fill where the common face of the pair at work ends."""
     pair.roll = roll_difference(side, wheels, pair.f_1, pair.f_2)
-    pair.low = (limit_value(side, wheels, -1.0, pair.roll) - wheels.face_low) / side.step
-    pair.high = (limit_value(side, wheels, 1.0, pair.roll) - wheels.face_low) / side.step
+    low, high = end_roll(side, wheels, -1.0, pair.roll), end_roll(side, wheels, 1.0, pair.roll)
+    pair.low = (limit_value(side, wheels, -1.0, low) - wheels.face_low) / side.step
+    pair.high = (limit_value(side, wheels, 1.0, high) - wheels.face_low) / side.step
 
 
 @kernel
@@ -205,8 +221,9 @@ def centroid_contact(options, wheels, scratch, law, totals, want):
         if not pair_sections(options, wheels, scratch, flanks, own, L.LANES, int(low), int(high), want):
             copy_rows(flanks, own, L.LANES, want)
     if want != 0:
-        limit_slopes(side, wheels, -1.0, pair.roll, scratch.low, scratch.end_1, scratch.end_2, 0)
-        limit_slopes(side, wheels, 1.0, pair.roll, scratch.high, scratch.end_1, scratch.end_2, 0)
+        low, high = end_roll(side, wheels, -1.0, pair.roll), end_roll(side, wheels, 1.0, pair.roll)
+        limit_slopes(side, wheels, -1.0, low, scratch.low, scratch.end_1, scratch.end_2, 0)
+        limit_slopes(side, wheels, 1.0, high, scratch.high, scratch.end_1, scratch.end_2, 0)
     k, depth = centroid_force(options, wheels, scratch, law, own_strips, totals, want)
     if depth > 0.0:
         # the corners at work are those of the last strip: find those of the strip that bears the force again
@@ -223,10 +240,13 @@ def centroid_contact(options, wheels, scratch, law, totals, want):
 def add_loads(options, wheels, scratch, strip, n, totals, want):
     """Add the nodal forces of the pair at work in a strip, and their friction, to the sums."""
     side, pair, sums, loads = scratch.side, scratch.pair, scratch.sums, scratch.loads
-    totals.normal_force += total_force(loads, n)
+    totals.normal_force += wheels.secant * total_force(loads, n)
     add_normal(sums, strip, loads, n, want)
     if options.friction == L.FRICTION_NONE:
         return
     f = pair.f_1 + wheels.wheel_1.half_angle
-    contact_points(side, scratch.corner_1, strip, loads, n, f, pair.corner_bears != 0.0, want)
+    if side.twist_1 != 0.0:
+        helical_points(side, scratch.corner_1, strip, loads, n, f, pair.corner_bears != 0.0, want)
+    else:
+        contact_points(side, scratch.corner_1, strip, loads, n, f, pair.corner_bears != 0.0, want)
     add_friction(wheels, options.friction, side, sums, strip, loads, n, totals, want)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from gearmbs.contact import layout as L
 from gearmbs.contact.corners import copy_corner, corner_gaps, set_corner
 from gearmbs.contact.deviations import add_deviations, tip_roll
+from gearmbs.contact.helical_sections import set_edge
 from gearmbs.contact.jit import kernel
 from gearmbs.contact.records import rows_of
 from gearmbs.contact.sections import gap_rates
@@ -129,7 +130,7 @@ def pair_corners(wheels, scratch, flanks, own, n, kind, whole, want):
         Nonzero to fill derivatives.
     """
     pair, loads = scratch.pair, scratch.loads
-    first = kind == 1
+    first, helical = kind == 1, scratch.side.twist_1 != 0.0
     corner = scratch.corner_1 if first else scratch.corner_2
     wheel = wheels.wheel_1 if first else wheels.wheel_2
     f, f_mate = (pair.f_1, pair.f_2) if first else (pair.f_2, pair.f_1)
@@ -139,10 +140,12 @@ def pair_corners(wheels, scratch, flanks, own, n, kind, whole, want):
         if loads.kind[j] != kind:
             continue
         roll = corner.roll[j]
-        if reference >= 0 and roll == corner.roll[reference]:
+        if reference >= 0 and roll == corner.roll[reference] and not helical:
             copy_corner(corner, reference, j)
         else:
-            set_corner(wheel, corner, j, f, roll)
+            eta = set_corner(wheel, corner, j, f, roll)
+            if helical:
+                set_edge(scratch.side, corner, j, first, eta, flanks.zeta[j])
             reference = j
     for j in range(n):
         source = j if loads.kind[j] == kind else reference

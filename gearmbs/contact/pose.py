@@ -14,8 +14,12 @@ from gearmbs.contact.jit import kernel
 
 
 @kernel
-def relative_pose(R1, A1, R2, A2, motion):
-    """Fill pose numbers and mean frame (columns are its axes); False when they are undefined."""
+def relative_pose(R1, A1, R2, A2, internal, motion):
+    """Fill pose numbers and mean frame (columns are its axes); False when they are undefined.
+
+    With an internal wheel 2 the line of centres points from it to wheel 1, on to where the teeth mesh: the centre
+    distance is negative, and both spins are counted from that direction.
+    """
     zx = A1[0, 2] + A2[0, 2]
     zy = A1[1, 2] + A2[1, 2]
     zz = A1[2, 2] + A2[2, 2]
@@ -35,6 +39,8 @@ def relative_pose(R1, A1, R2, A2, motion):
     a = np.sqrt(ex * ex + ey * ey + ez * ez)
     if not a > 0.0:
         return False
+    if internal:
+        a = -a
     ex /= a
     ey /= a
     ez /= a
@@ -60,7 +66,8 @@ def relative_pose(R1, A1, R2, A2, motion):
         vy = A[0, 0] * fx + A[1, 0] * fy + A[2, 0] * fz
         vz = A[0, 0] * zx + A[1, 0] * zy + A[2, 0] * zz
         back = (p * vx + q * vy) / (1.0 + w) + sign * vz
-        x[4 + k] = np.arctan2(sign * (vy - q * back), sign * (vx - p * back))
+        facing = 1.0 if internal else sign
+        x[4 + k] = np.arctan2(facing * (vy - q * back), facing * (vx - p * back))
     return True
 
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 from gearmbs.contact import layout as L
 from gearmbs.contact.corners import corner_gaps, set_corner
 from gearmbs.contact.deviations import add_deviations, pair_softness, tip_roll
-from gearmbs.contact.face import limit_value, roll_difference
+from gearmbs.contact.face import end_roll, limit_value, roll_difference
+from gearmbs.contact.helical_friction import helical_points
+from gearmbs.contact.helical_sections import helical_flanks, helical_normals, set_edge
 from gearmbs.contact.jit import kernel
 from gearmbs.contact.pair import set_pair
 from gearmbs.contact.points import contact_points
 from gearmbs.contact.pose import relative_pose
 from gearmbs.contact.records import options_at, pair_at, scratch_at
-from gearmbs.contact.search import facing_teeth, open_side, teeth_in_reach
+from gearmbs.contact.search import face_pair, facing_teeth, open_side, set_twist, teeth_in_reach
 from gearmbs.contact.sections import flank_normals, flank_sections
 
 COLUMNS: tuple[str, ...] = (
@@ -56,12 +58,13 @@ def pair_gaps(gi, gr, R1, A1, R2, A2, sections, rows, work):
     """
     scratch = scratch_at(work)
     options, wheels, side = options_at(gi), pair_at(gr), scratch.side
-    if not relative_pose(R1, A1, R2, A2, scratch.motion):
+    if not relative_pose(R1, A1, R2, A2, wheels.wheel_2.base_radius < 0.0, scratch.motion):
         return 0
     count = 0
     for sign in (1, -1):
         for i in range(6):
             side.x[i] = -scratch.motion.x[i] if sign == -1 and i > 2 else scratch.motion.x[i]
+        set_twist(wheels, side, float(sign))
         if not open_side(wheels, side):
             return 0
         facing_teeth(options, wheels, side)
@@ -98,15 +101,20 @@ def pair_rows(options, wheels, scratch, sign, i, sections, rows, count):
         pair_softness(options, wheels, side, pair, scratch.lookup_1)
     sig = roll_difference(side, wheels, pair.f_1, pair.f_2)
     mate = int(side.facing) - i
+    if side.base_2 < 0.0:
+        mate = -mate
     ends = sections.size == 0
     for j in range(2 if ends else sections.size):
         if count >= rows.shape[0]:
             return count
-        zeta = limit_value(side, wheels, -1.0 if j == 0 else 1.0, sig) if ends else sections[j]
+        end = -1.0 if j == 0 else 1.0
+        zeta = limit_value(side, wheels, end, end_roll(side, wheels, end, sig)) if ends else sections[j]
         section_of_pair(options, wheels, scratch, zeta)
-        contact_points(
-            side, scratch.corner_1, strip, loads, 1, pair.f_1 + wheels.wheel_1.half_angle, strip.kind[0] == 1.0, 0
-        )
+        start = pair.f_1 + wheels.wheel_1.half_angle
+        if side.twist_1 != 0.0:
+            helical_points(side, scratch.corner_1, strip, loads, 1, start, strip.kind[0] == 1.0, 0)
+        else:
+            contact_points(side, scratch.corner_1, strip, loads, 1, start, strip.kind[0] == 1.0, 0)
         rows[count, SIDE] = sign
         rows[count, TOOTH_1] = (sign * i) % options.teeth[0]
         rows[count, TOOTH_2] = (sign * mate) % options.teeth[1]
@@ -131,8 +139,13 @@ def section_of_pair(options, wheels, scratch, zeta):
     teeth = options.flanks != 0
     strip.zeta[0] = zeta
     strip.alpha[0], strip.sin[0], strip.cos[0] = side.alpha_0, side.sin_0, side.cos_0
-    flank_normals(side, strip, 1)
-    flank_sections(side, strip, 1, 0)
+    if side.twist_1 != 0.0:
+        face_pair(wheels, side, pair)
+        helical_normals(side, strip, 1)
+        helical_flanks(side, strip, 1, 0)
+    else:
+        flank_normals(side, strip, 1)
+        flank_sections(side, strip, 1, 0)
     strip.roll_1[0] += pair.shift
     strip.roll_2[0] -= pair.shift
     tip_1, tip_2 = wheels.wheel_1.tip_roll, wheels.wheel_2.tip_roll
@@ -147,10 +160,14 @@ def section_of_pair(options, wheels, scratch, zeta):
     elif over_2 > 0.0:
         kind = L.CORNER_2
     if kind == L.CORNER_1:
-        set_corner(wheels.wheel_1, scratch.corner_1, 0, pair.f_1, tip_1)
+        eta = set_corner(wheels.wheel_1, scratch.corner_1, 0, pair.f_1, tip_1)
+        if side.twist_1 != 0.0:
+            set_edge(side, scratch.corner_1, 0, True, eta, zeta)
         corner_gaps(side, wheels, scratch.corner_1, strip, 1, kind, pair.f_2, strip, 0)
     elif kind == L.CORNER_2:
-        set_corner(wheels.wheel_2, scratch.corner_2, 0, pair.f_2, tip_2)
+        eta = set_corner(wheels.wheel_2, scratch.corner_2, 0, pair.f_2, tip_2)
+        if side.twist_1 != 0.0:
+            set_edge(side, scratch.corner_2, 0, False, eta, zeta)
         corner_gaps(side, wheels, scratch.corner_2, strip, 1, kind, pair.f_1, strip, 0)
     if teeth:
         add_deviations(options, wheels, scratch, strip, 0, 0)

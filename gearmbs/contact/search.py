@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.helical_sections import helical_flanks, helical_normals
 from gearmbs.contact.jit import kernel
 from gearmbs.contact.records import strip_at
 from gearmbs.contact.sections import flank_normals, flank_sections, gap_rates, set_sections
@@ -12,6 +13,10 @@ from gearmbs.contact.support import GENTLE
 
 CORNER_SLACK = 0.45  # share of the corner gap's parabola taken as its lower bound
 STEEPEST = 3.0  # how much steeper the corner gap may grow than that bound
+BENDING = 4.0  # bound of the gap's bending along the face of an internal pair, as a multiple of the tilt squared
+SAME_PITCH = 1e-13  # tilt times the tangent of the base helix below which all pairs of helical flanks have one gap
+PITCHES_APART = 2.5  # bound of how normal pitches of tilted helical wheels differ, as a multiple of that product
+STEEPEST_HELICAL = 0.03  # square of the sine of half the angle between helical wheels' axes, beyond it no contact
 UNBOUNDED = 1e9  # curvature of a corner gap, 1/m, where the tip reaches beyond the line of action
 
 
@@ -19,14 +24,17 @@ UNBOUNDED = 1e9  # curvature of a corner gap, 1/m, where the tip reaches beyond 
 def open_side(wheels, side):
     """Fill what a side's pose implies; False when the base circles meet.
 
-    The only place where base radii are added and subtracted; an internal wheel would turn the signs.
+    With an internal wheel 2 its base radius, the centre distance and the length of the line of action are negative;
+    all that follows holds for both.
     """
     a, p, q = side.x[L.A], side.x[L.P], side.x[L.Q]
     rb1, rb2 = wheels.wheel_1.base_radius, wheels.wheel_2.base_radius
     Rb = rb1 + rb2
-    if a <= Rb * 1.0001:
+    if abs(a) <= abs(Rb) * 1.0001:
         return False
-    length = np.sqrt(a * a - Rb * Rb)
+    if p * p + q * q > STEEPEST_HELICAL and wheels.wheel_1.twist != 0.0:
+        return False
+    length = np.copysign(np.sqrt(a * a - Rb * Rb), a)
     lean = p * p + q * q
     w = np.sqrt(1.0 - lean)
     i_w = 1.0 / w
@@ -43,10 +51,29 @@ def open_side(wheels, side):
     side.gentle = 1.0 if 0.5 * lean * m < GENTLE else 0.0
     side.base_1, side.base_2, side.base_sum, side.base_difference = rb1, rb2, Rb, rb1 - rb2
     side.length = length
-    side.alpha_0 = np.arctan2(length, Rb)
+    side.alpha_0 = np.arctan2(abs(length), abs(Rb))
     side.sin_0 = length / a
     side.cos_0 = Rb / a
+    lean = abs(wheels.wheel_1.twist) * np.sqrt(lean)
+    side.spread = 0.0
+    if lean > SAME_PITCH:
+        side.spread = PITCHES_APART * lean * (abs(length) + 2.0 * wheels.pitch + wheels.face_high - wheels.face_low)
     return True
+
+
+@kernel
+def face_pair(wheels, side, pair):
+    """Count angles from the pair at work instead of from tooth 0, for flanks whose gap differs from pair to pair."""
+    side.start_1 = pair.f_1 + wheels.wheel_1.half_angle
+    side.start_2 = pair.f_2 + wheels.wheel_2.half_angle
+    pair.shift = 0.0
+
+
+@kernel
+def set_twist(wheels, side, sign):
+    """Fill the wheels' helices as seen on a side, which is a mirror image for ``sign`` -1."""
+    side.twist_1 = sign * wheels.wheel_1.twist
+    side.twist_2 = sign * wheels.wheel_2.twist
 
 
 @kernel
@@ -56,11 +83,22 @@ def facing_teeth(options, wheels, side):
     half_1, half_2 = wheels.wheel_1.half_angle, wheels.wheel_2.half_angle
     base_1 = side.base_1 * (side.x[L.F1] + half_1)
     base_2 = side.base_2 * (side.x[L.F2] + half_2)
-    n = np.floor((side.length - side.base_sum * side.alpha_0 - base_1 - base_2) / pitch + 0.5)
+    slack = side.length - side.base_sum * side.alpha_0 - base_1 - base_2 + side.twist_1 * side.x[L.H]
+    n = np.floor(slack / pitch + 0.5)
+    turn = 2.0 * np.pi / options.teeth[1]
+    side.turn_2 = turn if side.base_2 > 0.0 else -turn
     side.facing = n
     side.roll_sum = base_1 + base_2 + n * pitch
     side.start_1 = side.x[L.F1] + half_1
-    side.start_2 = side.x[L.F2] + n * (2.0 * np.pi / options.teeth[1]) + half_2
+    side.start_2 = side.x[L.F2] + n * side.turn_2 + half_2
+    side.reference = 0.0
+    if side.spread != 0.0:
+        # where gaps differ from pair to pair, they are bounded from the pair in the middle of the path of contact
+        middle = 0.5 * (side.length - wheels.wheel_2.tip_roll + wheels.wheel_1.tip_roll)
+        i = np.floor((middle - side.base_1 * (side.start_1 + side.alpha_0)) / pitch + 0.5)
+        side.reference = i
+        side.start_1 += i * (2.0 * np.pi / options.teeth[0])
+        side.start_2 -= i * side.turn_2
 
 
 @kernel
@@ -70,6 +108,10 @@ def middle_section(options, wheels, side, strip, want):
     strip.zeta[0] = 0.0 if single else 0.5 * (wheels.face_low + wheels.face_high)
     strip.alpha[0], strip.sin[0], strip.cos[0] = side.alpha_0, side.sin_0, side.cos_0
     strip.step[0] = 0.0
+    if side.twist_1 != 0.0:
+        helical_normals(side, strip, 1)
+        helical_flanks(side, strip, 1, want)
+        return
     if side.x[L.P] != 0.0 or side.x[L.Q] != 0.0:
         flank_normals(side, strip, 1)
     flank_sections(side, strip, 1, want)
@@ -79,19 +121,25 @@ def middle_section(options, wheels, side, strip, want):
 def reach_of_face(options, wheels, side, middle):
     """Fill the nodes ``side.first`` to ``side.last`` that may touch; False if none can.
 
-    The gap over the face is convex: its tangent in the middle bounds the touching part.
+    The gap over the face is convex: its tangent in the middle bounds the touching part. That of an internal pair is
+    concave, by as much as its curvature allows.
     """
     x, slices = side.x, options.slices
     p, q = x[L.P], x[L.Q]
     low, high = wheels.face_low, wheels.face_high
-    deepest = wheels.added_material - middle.gap[0]
+    deepest = wheels.added_material - middle.gap[0] + side.spread
     slope = 2.0 * (p * middle.sin[0] + q * middle.cos[0]) / side.w
+    if side.twist_1 != 0.0:
+        c = 1.0 + side.twist_1 * side.twist_1
+        slope *= c * side.w * side.w / (1.0 - c * (p * p + q * q))
     side.low = low
     side.step = (high - low) / slices
     # where a leaning or shifted wheel's end face goes beyond the slices, gaps are extrapolated
     shift = 0.5 * abs(x[L.H] - wheels.axial_shift)
-    side.overhang = abs(p) * x[L.A] + abs(q) * max(side.base_1, side.base_2) + shift + wheels.end_blend
+    side.overhang = abs(p * x[L.A]) + abs(q) * max(side.base_1, abs(side.base_2)) + shift + wheels.end_blend
     reach = 0.5 * (high - low) + side.overhang
+    if x[L.A] < 0.0:
+        deepest += BENDING * (p * p + q * q) * reach * reach / abs(side.length)
     if deepest + abs(slope) * reach <= 0.0:
         return False
     first, last = 0, slices
@@ -132,8 +180,12 @@ def flank_strips(scratch, slices, want):
         node = first + k * (L.LANES - 1)
         nodes = min(last - node + 1.0, float(L.LANES))
         set_sections(strip, L.LANES, side, node, nodes, middle)
-        flank_normals(side, strip, L.LANES)
-        flank_sections(side, strip, L.LANES, want)
+        if side.twist_1 != 0.0:
+            helical_normals(side, strip, L.LANES)
+            helical_flanks(side, strip, L.LANES, want)
+        else:
+            flank_normals(side, strip, L.LANES)
+            flank_sections(side, strip, L.LANES, want)
         gap_rates(side, strip, L.LANES, want)
         for j in range(int(nodes)):
             least = min(least, strip.gap[j])
@@ -146,6 +198,15 @@ def flank_strips(scratch, slices, want):
 
 
 @kernel
+def corner_growth(length, tip, rb):
+    """Curvature of a corner's gap beyond the path of contact, 1/m."""
+    # beyond the line of action's end there is no bound; an internal wheel's tip meets its own end from the other side
+    if (length - tip) * length * tip <= 0.0:
+        return UNBOUNDED
+    return length * tip / (2.0 * (length - tip) * rb * rb)
+
+
+@kernel
 def teeth_in_reach(wheels, side, depth, wander):
     """First and last tooth of wheel 1 that may bear, counted from tooth 0.
 
@@ -154,16 +215,16 @@ def teeth_in_reach(wheels, side, depth, wander):
     """
     tip_1, tip_2, length = wheels.wheel_1.tip_roll, wheels.wheel_2.tip_roll, side.length
     rb1, rb2, pitch = side.base_1, side.base_2, wheels.pitch
-    curve = CORNER_SLACK * min(
-        length * tip_1 / (2.0 * (length - tip_1) * rb1 * rb1) if length > tip_1 else UNBOUNDED,
-        length * tip_2 / (2.0 * (length - tip_2) * rb2 * rb2) if length > tip_2 else UNBOUNDED,
-    )
+    curve = CORNER_SLACK * min(corner_growth(length, tip_1, rb1), corner_growth(length, tip_2, rb2))
     side.curve = curve
     beyond = min(pitch, np.sqrt(max(depth, 0.0) / curve) + wander)
+    # a helix moves the contact along the profile from one end of the face to the other
+    beyond += abs(side.twist_1) * (wheels.face_high - wheels.face_low + abs(side.x[L.H]))
     at = rb1 * side.start_1 + rb1 * side.alpha_0
     first = np.ceil((length - tip_2 - beyond - at) / pitch)
     last = np.floor((tip_1 + beyond - at) / pitch)
-    return int(first), int(last)
+    i = int(side.reference)
+    return int(first) + i, int(last) + i
 
 
 @kernel

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.helical_friction import lay_directions, lay_slopes
 from gearmbs.contact.jit import inlined, kernel, summing
 from gearmbs.contact.laws import friction_law, friction_ratio
 from gearmbs.contact.matrices import add_curvatures, add_outer, add_stack, add_two_outers
@@ -188,11 +189,15 @@ def add_friction(wheels, kind, side, sums, strip, loads, n, totals, want):
         Nonzero to add derivatives.
     """
     friction_directions(side, strip, loads, n)
+    if side.twist_1 != 0.0:
+        lay_directions(side, strip, loads, n)
     friction_ratios(wheels, kind, loads, n)
     friction_forces(sums, loads, n, totals)
     if want == 0:
         return
     friction_slopes(side, strip, loads, n)
+    if side.twist_1 != 0.0:
+        lay_slopes(side, strip, loads, n)
     profile, axial = loads.profile, loads.axial
     add_two_outers(sums.f_x, profile, loads.profile_x, axial, loads.axial_x, n)
     add_stack(sums.f_x, loads.turned, n)

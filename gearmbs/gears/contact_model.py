@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import InitVar, dataclass, field
 from typing import Literal
@@ -13,6 +14,12 @@ from gearmbs.gears.spec import require
 
 TILTED_SLICES = 11
 """Slices along the face where the gap varies linearly along it: tilted axes or faces that are not opposite."""
+
+HELICAL_SLICES = 20
+"""Slices of helical wheels, at least."""
+
+SLICES_PER_OVERLAP = 20
+"""Slices of helical wheels over an axial pitch: neighbouring sections differ by a twentieth of a mesh cycle."""
 
 FAULTY_SLICES = 41
 """Slices where a fault varies along the face, so that a pit or a chipped corner of a few millimetres has several."""
@@ -70,20 +77,24 @@ class ContactModel:
     def face_slices(self, geometry: PairGeometry, faults: Iterable[Fault] = ()) -> int:
         """Slices along the face in use: those asked for, or else as many as the gap's variation needs.
 
-        One for parallel axes with opposite faces, where every section sees the same gap; `TILTED_SLICES` where
-        misalignment or an axial shift make it vary along the face; `FAULTY_SLICES` where a fault does.
+        One for spur wheels on parallel axes with opposite faces, where every section sees the same gap; `TILTED_SLICES`
+        where misalignment or an axial shift make it vary along the face; `FAULTY_SLICES` where a fault does; at least
+        `HELICAL_SLICES` and `SLICES_PER_OVERLAP` for each whole of the overlap ratio of helical wheels.
         """
         if self.slices is not None:
             return self.slices
         if any(fault.along_face for fault in faults):
             return FAULTY_SLICES
+        if geometry.driver.helix_angle:
+            return max(HELICAL_SLICES, math.ceil(SLICES_PER_OVERLAP * geometry.overlap_ratio))
         return 1 if geometry.uniform_along_face else TILTED_SLICES
 
     def tips_may_bottom(self, geometry: PairGeometry) -> bool:
         """Whether contact of tips with roots is looked for."""
         if self.root_contact is not None:
             return self.root_contact
-        return geometry.tip_clearance < BOTTOMING_CLEARANCE * geometry.driver.module
+        spur = geometry.driver.helix_angle == 0 and geometry.sign > 0
+        return spur and geometry.tip_clearance < BOTTOMING_CLEARANCE * geometry.driver.module
 
     def penetration(self, force: float, pairs: int = 1) -> float:
         """Static penetration when ``pairs`` tooth pairs of parallel wheels share a normal force (N) equally, m."""

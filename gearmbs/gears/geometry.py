@@ -1,8 +1,7 @@
 """Two wheels in space, as values: centre distance, backlash, misalignment and all that follows from them alone.
 
-Sums over the two wheels are signed as in DIN 3960: the radii of an external wheel count positive, those of an internal
-one would count negative, and with them centre distance and line of action of the pair. One set of formulas then holds
-for both.
+Sums over the two wheels are signed as in ISO 21771: the radii of an external wheel count positive, those of an internal
+one negative, and with them centre distance and line of action of the pair. One set of formulas then holds for both.
 """
 
 from __future__ import annotations
@@ -123,10 +122,25 @@ class PairGeometry:
         )
         require(
             abs(self.misalignment) <= LARGEST_MISALIGNMENT,
-            f"{name}.misalignment is {math.degrees(self.misalignment):.3f} deg; spur wheels mesh up to 10 deg "
+            f"{name}.misalignment is {math.degrees(self.misalignment):.3f} deg; wheels mesh up to 10 deg "
             "(a plain number is in radians: write '1 deg')",
         )
         one, two = self.driver, self.driven
+        require(
+            not one.internal,
+            f"{name}.driver is internal ({one.name}); make the internal wheel the driven one, whichever drives",
+        )
+        require(
+            abs(one.helix_angle - two.helix_angle) <= 1e-12,
+            f"{name}: helix angles differ ({one.name} {math.degrees(one.helix_angle):.6g} deg, {two.name} "
+            f"{math.degrees(two.helix_angle):.6g} deg); wheels on parallel axes need the same helix_angle",
+        )
+        wanted = "the same hand" if two.internal else "opposite hands"
+        require(
+            one.helix_angle == 0 or (one.hand == two.hand) == two.internal,
+            f"{name}: {one.name} is {one.hand}-handed and {two.name} {two.hand}-handed; "
+            f"{'an internal wheel and its mate' if two.internal else 'two external wheels'} need {wanted}",
+        )
         require(
             abs(one.base_pitch - two.base_pitch) <= 1e-9 * one.base_pitch,
             f"{name}: base pitches differ ({one.name} {one.base_pitch * MM:.6f} mm, {two.name} "
@@ -140,12 +154,23 @@ class PairGeometry:
             f"{name}.centre_distance_error is {self.centre_distance_error * MM:.4f} mm: the base circles meet; "
             "increase it",
         )
+        if self.sign < 0:
+            self._check_ring_size()
         self._check_clearance(PRESSED_IN * self.driver.module)
         reach = self.tip_radius_sum
         require(
             self.sign * a < reach,
             f"{name}: the wheels do not reach each other: centre distance {a * MM:.4f} mm, tip radii sum up to "
             f"{reach * MM:.4f} mm; reduce centre_distance_error",
+        )
+
+    def _check_ring_size(self) -> None:
+        one, two = self.driver, self.driven
+        require(
+            one.teeth < two.teeth and one.outer_radius < two.root_radius,
+            f"{self._name}: the internal wheel {two.name} ({two.teeth} teeth, root circle {two.root_radius * MM:.4f} "
+            f"mm) is no larger than {one.name} ({one.teeth} teeth, tip circle {one.tip_radius * MM:.4f} mm); "
+            "give it more teeth",
         )
 
     def _check_clearance(self, overlap: float) -> None:
@@ -167,11 +192,22 @@ class PairGeometry:
             high > low, f"{name}.axial_shift is {self.axial_shift * MM:.4f} mm: the faces do not overlap; reduce it"
         )
         for near, far, start in zip((self.driver, self.driven), (self.driven, self.driver), self.first_roll_lengths):
+            # the involute of an internal wheel ends outwards, at its root
+            side, where, to = ("beyond", "end", "to") if near.internal else ("inside", "start", "from")
+            free = near.sign * (start - near.form_roll_length) > -1e-12 and start > 0
+            remedy = "reduce" if self.sign < 0 else "increase"
             require(
-                start > near.form_roll_length - 1e-12 and start > 0,
-                f"{name}: the tip of {far.name} meets {near.name} inside the start of its involute (length of roll "
-                f"{start * MM:.4f} mm, involute from {near.form_roll_length * MM:.4f} mm): interference; reduce the "
-                f"addendum of {far.name} or increase centre_distance_error",
+                free,
+                f"{name}: the tip of {far.name} meets {near.name} {side} the {where} of its involute (length of roll "
+                f"{start * MM:.4f} mm, involute {to} {near.form_roll_length * MM:.4f} mm): interference; reduce the "
+                f"addendum of {far.name} or {remedy} centre_distance_error",
+            )
+        if self.sign < 0:
+            needed, free = self.fouling_angles
+            require(
+                free >= needed,
+                f"{name}: the tips of {self.driver.name} and {self.driven.name} foul where they leave each other "
+                f"(angle {free:.5f} rad, {needed:.5f} needed); use a greater difference of teeth or lower addenda",
             )
 
     # --- signed sums --------------------------------------------------------------------------------
@@ -197,9 +233,9 @@ class PairGeometry:
 
     @property
     def base_arc_sum(self) -> float:
-        """Signed sum of half the teeth's thickness on the base circles, r_b1 psi_1 + r_b2 psi_2, m, thinned teeth."""
+        """Sum of half the teeth's thickness on the base circles, r_b1 psi_1 + r_b2 psi_2, m, thinned teeth."""
         one, two = self.wheels
-        return one.sign * one.base_radius * one.base_half_angle + two.sign * two.base_radius * two.base_half_angle
+        return one.base_radius * one.base_half_angle + two.base_radius * two.base_half_angle
 
     # --- transverse section -------------------------------------------------------------------------
 
@@ -208,7 +244,7 @@ class PairGeometry:
         """Driver and driven with their teeth thinned for the backlash."""
         if self.backlash == 0:
             return self.driver, self.driven
-        cut = 0.5 * self.backlash / math.cos(self.driver.pressure_angle)
+        cut = 0.5 * self.backlash / math.cos(self.driver.transverse_pressure_angle)
         return (
             replace(self.driver, thinning=self.driver.thinning + cut),
             replace(self.driven, thinning=self.driven.thinning + cut),
@@ -216,21 +252,31 @@ class PairGeometry:
 
     @property
     def ratio(self) -> float:
-        """Speed ratio, driven teeth over driver teeth."""
+        """Speed ratio, driven teeth over driver teeth; with an internal wheel both turn in the same sense."""
         return self.driven.teeth / self.driver.teeth
 
     @property
     def nominal_centre_distance(self) -> float:
         """Centre distance without backlash for unthinned teeth, m."""
-        one, two = self.driver, self.driven
-        shift = one.sign * one.profile_shift + two.sign * two.profile_shift
+        shift = self.driver.profile_shift + self.driven.profile_shift
         if shift == 0:
             return abs(self._sum("pitch_radius"))
-        alpha = one.pressure_angle
-        target = involute(alpha) + 2 * shift * math.tan(alpha) / self._sum("teeth")
+        alpha = self.driver.transverse_pressure_angle
+        target = involute(alpha) + 2 * shift * math.tan(self.driver.pressure_angle) / self._sum("teeth")
         for _ in range(50):
             alpha -= (involute(alpha) - target) / math.tan(alpha) ** 2
         return abs(self.base_radius_sum) / math.cos(alpha)
+
+    @property
+    def shift_sum(self) -> float:
+        """Sum of the profile shifts x_1 + x_2 (ISO 21771) that the working centre distance needs without backlash."""
+        return self.shift_sum_of(self.centre_distance)
+
+    def shift_sum_of(self, centre_distance: float) -> float:
+        """Sum of the profile shifts that a centre distance, m, needs without backlash."""
+        alpha = self.driver.transverse_pressure_angle
+        working = math.acos(self.base_radius_sum / (self.sign * centre_distance))
+        return (involute(working) - involute(alpha)) * self._sum("teeth") / (2 * math.tan(self.driver.pressure_angle))
 
     @property
     def centre_distance(self) -> float:
@@ -254,8 +300,77 @@ class PairGeometry:
 
     @property
     def contact_ratio(self) -> float:
-        """Path of contact over base pitch."""
+        """Transverse contact ratio eps_alpha: path of contact over base pitch."""
         return self.path_of_contact / self.driver.base_pitch
+
+    @property
+    def overlap_ratio(self) -> float:
+        """Overlap ratio eps_beta: common face width over axial pitch; 0 for spur wheels."""
+        low, high = self.common_face
+        return (high - low) * math.sin(self.driver.helix_angle) / (math.pi * self.driver.module)
+
+    @property
+    def total_contact_ratio(self) -> float:
+        """Total contact ratio eps_gamma, transverse plus overlap."""
+        return self.contact_ratio + self.overlap_ratio
+
+    @property
+    def working_helix_angle(self) -> float:
+        """Helix angle on the working pitch cylinders, rad."""
+        return math.atan(math.tan(self.driver.base_helix_angle) / math.cos(self.working_pressure_angle))
+
+    def contact_line_length(self, phase: float) -> float:
+        """Sum of the lengths of the contact lines, m, parallel axes.
+
+        Parameters
+        ----------
+        phase : float
+            Turn of the wheels in pitches; 0 with the first line about to enter.
+        """
+        pitch, width = self.driver.base_pitch, self.common_face[1] - self.common_face[0]
+        tangent, path = math.tan(self.driver.base_helix_angle), self.path_of_contact
+        if tangent == 0:
+            first, last = math.ceil(-phase), math.ceil(path / pitch - phase)
+            return width * max(0, last - first)
+        total = 0.0
+        for k in range(-math.ceil(phase) - 1, math.ceil(self.total_contact_ratio - phase) + 1):
+            front = (phase + k) * pitch
+            total += max(0.0, min(front, path) - max(front - width * tangent, 0.0))
+        return total / math.sin(self.driver.base_helix_angle)
+
+    @property
+    def fouling_angles(self) -> tuple[float, float]:
+        """Angles of an internal pair's tips where they leave each other, rad: needed, and free.
+
+        Tips foul where the free one is smaller.
+        """
+        one, two, a = self.driver, self.driven, self.centre_distance
+        working = involute(self.working_pressure_angle)
+        at_tip_1 = involute(math.acos(one.base_radius / one.tip_radius))
+        at_tip_2 = involute(math.acos(two.base_radius / two.tip_radius))
+        r1, r2 = one.tip_radius, two.tip_radius
+        cosine = (r2 * r2 - r1 * r1 - a * a) / (2 * a * r1)
+        if cosine >= 1:
+            return 0.0, math.inf
+        turn_1 = math.acos(cosine) + at_tip_1 - working
+        turn_2 = math.acos((a * a + r2 * r2 - r1 * r1) / (2 * a * r2))
+        return turn_2, turn_1 * one.teeth / two.teeth + working - at_tip_2
+
+    @property
+    def radial_assembly(self) -> bool:
+        """Whether the wheels go together radially; an internal pair with too few teeth of difference only axially."""
+        if self.sign > 0:
+            return True
+        one, two = self.driver, self.driven
+        cos_1, cos_2 = one.base_radius / one.tip_radius, two.base_radius / two.tip_radius
+        ratio, working = two.teeth / one.teeth, involute(self.working_pressure_angle)
+        first = (1 - (cos_1 / cos_2) ** 2) / (1 - ratio**-2)
+        second = ((cos_2 / cos_1) ** 2 - 1) / (ratio**2 - 1)
+        if not (0 <= first <= 1 and 0 <= second <= 1):
+            return first > 1
+        turn_1 = math.asin(math.sqrt(first)) + involute(math.acos(cos_1)) - working
+        turn_2 = math.asin(math.sqrt(second)) + involute(math.acos(cos_2)) - working
+        return turn_1 >= ratio * turn_2
 
     @overload
     def mate_roll_length(self, wheel: int, roll_length: float) -> float: ...

@@ -45,5 +45,5 @@ class OperatingPoint:
         require(self.rotation in (1, -1), f"{owner}.rotation is {self.rotation!r}; give 1 or -1")
 
     def normal_force(self, geometry: PairGeometry) -> float:
-        """Sum of normal forces that carries the load torque, N: F_n = T / r_b2."""
-        return self.torque / geometry.driven.base_radius
+        """Sum of normal forces that carries the load torque, N: F_n = T / (r_b2 cos beta_b)."""
+        return self.torque / (geometry.driven.base_radius * math.cos(geometry.driven.base_helix_angle))

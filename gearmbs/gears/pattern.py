@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearmbs.contact import GAP_COLUMNS
+from gearmbs.contact import GAP_COLUMNS, layout
 from gearmbs.gears.fault import COAST_ALIASES
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
@@ -121,14 +121,15 @@ def contact_pattern(
     pressure = np.zeros((points, sections))
     roll_length = np.full((points, sections), np.nan)
     total = np.zeros(points)
-    lag = rotation * static_lag(pair, load)
+    lag = mesh.turning * static_lag(pair, load)
+    face_ends = np.zeros(1 if mesh.gi[layout.SLICES] == 1 else 0)
     for k, turn in enumerate(roll):
         angle = offset + rotation * turn
         ideal = mesh.ideal_angle(angle)
         driven = mesh.loaded_angle(angle, load, ideal + lag)
         lag = driven - ideal
         rows = mesh.gaps(angle, driven, section).copy()
-        ends = mesh.gaps(angle, driven)
+        ends = mesh.gaps(angle, driven, face_ends)
         rows, ends = (found[found[:, SIDE] == flank] for found in (rows, ends))
         both = np.concatenate([rows, ends])
         for one in np.unique(both[both[:, GAP] < 0][:, TEETH], axis=0):
@@ -173,6 +174,7 @@ def _pair_load(pair: Mesh, rows: np.ndarray, ends: np.ndarray, low: float, width
     middle = 0.5 * (edges[1:] + edges[:-1])
     depth = np.maximum(0.0, -np.interp(middle, place, gap))
     law, soft = pair.contact_model.law, rows[0, SOFT]
+    cosine = math.cos(pair.geometry.driver.base_helix_angle)
     if pair.contact_model.load == "adams":
         section = share * depth**1.5
         if not section.sum() > 0:
@@ -181,5 +183,7 @@ def _pair_load(pair: Mesh, rows: np.ndarray, ends: np.ndarray, low: float, width
         force = law.stiffness * soft * max(0.0, -float(np.interp(centre, place, gap))) ** law.exponent
         loads = force * section / section.sum()
     else:
-        loads = law.stiffness / pair.geometry.common_face_width * soft * depth**law.exponent * share
+        loads = (
+            law.stiffness / pair.geometry.common_face_width * soft * (cosine * depth) ** law.exponent / cosine * share
+        )
     return loads.reshape(-1, FINE).sum(axis=1) / width

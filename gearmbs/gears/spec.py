@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, Literal
 
 from gearmbs.units import Quantity, to_si
 
@@ -23,6 +23,11 @@ def convert_fields(obj: object, units: dict[str, str], owner: str) -> None:
         if value is not None:
             object.__setattr__(obj, name, to_si(value, unit, f"{owner}.{name}"))
 
+
+ROOT_SHARES = (0.9, 0.89, 0.87, 0.86, 0.83, 0.8, 0.75, 0.67, 0.5)
+"""Steps in which the default root arc is made smaller, from 0.38 to 0.04 modules."""
+
+LARGEST_HELIX = math.radians(45)
 
 LARGEST_MODULE = 0.2
 """m; the largest gears made have a third of it, and a forgotten unit is far above."""
@@ -60,30 +65,42 @@ class Material:
 
 @dataclass(frozen=True)
 class GearSpec:
-    """An external spur wheel.
+    """A cylindrical involute wheel: external or internal, spur or helical.
 
     Parameters
     ----------
     teeth : int
-        Number of teeth.
+        Number of teeth; negative, as in ISO 21771, for an internal wheel.
     module : float or str
-        Module, m.
+        Module, m; the normal module of a helical wheel.
     pressure_angle : float or str
-        Of the basic rack, rad or text.
+        Of the basic rack (normal section), rad or text.
     face_width : float or str
     addendum, dedendum : float or str, optional
-        From the pitch circle; default ``(1 + profile_shift) m`` and ``(1.25 - profile_shift) m``.
+        From the pitch circle; default ``(1 + profile_shift) m`` and ``(1.25 - profile_shift) m``. Those of an internal
+        wheel point inwards and outwards.
     fillet_radius : float or str, optional
-        Radius of the concave root arc; default 0.38 m.
+        Radius of the concave root arc; default 0.38 m, of an internal wheel 0.2 m, or less where a narrow root has no
+        room for it.
     profile_shift : float
-        Coefficient x; the tooth is thickened by ``2 x m tan(alpha)``.
+        Coefficient x of ISO 21771: the tooth is thickened by ``2 x m tan(alpha)`` and moved towards its tip, which
+        for an internal wheel is inwards. See `outward_shift` and `ring` for the other convention in use.
     thinning : float or str
-        Reduction of the tooth thickness at the pitch circle, to make backlash.
+        Reduction of the (transverse) tooth thickness at the pitch circle, to make backlash.
     tip_rounding : float or str
         Radius of the rounded tip edge; 0 is a sharp corner.
     bore_radius : float or str
+        Of an external wheel.
     material : Material
     name : str
+    helix_angle : float or str
+        At the pitch circle, rad or text; 0 is a spur wheel.
+    hand : {"right", "left"}
+        Sense of the helix. External wheels mesh with opposite hands, an internal one with its own.
+    internal : bool
+        Whether the teeth point inwards.
+    rim_thickness : float or str, optional
+        Material of an internal wheel outside its root circle; default 3 m.
 
     Raises
     ------
@@ -110,11 +127,18 @@ class GearSpec:
     bore_radius: Quantity = 0.0
     material: Material = field(default_factory=Material)
     name: str = "gear"
+    helix_angle: Quantity = 0.0
+    hand: Literal["right", "left"] = "right"
+    internal: bool = False
+    rim_thickness: Quantity = None
 
     def __post_init__(self) -> None:
         lengths = ("module", "face_width", "addendum", "dedendum", "fillet_radius", "thinning", "tip_rounding")
-        units = {name: "length" for name in (*lengths, "bore_radius")} | {"pressure_angle": "angle"}
-        convert_fields(self, units, self.name)
+        units = {name: "length" for name in (*lengths, "bore_radius", "rim_thickness")}
+        convert_fields(self, units | {"pressure_angle": "angle", "helix_angle": "angle"}, self.name)
+        if isinstance(self.teeth, int) and self.teeth < 0:
+            object.__setattr__(self, "teeth", -self.teeth)
+            object.__setattr__(self, "internal", True)
         for item in fields(self):
             value = getattr(self, item.name)
             if isinstance(value, float) and not math.isfinite(value):
@@ -127,12 +151,36 @@ class GearSpec:
         defaults = {
             "addendum": (1.0 + self.profile_shift) * self.module,
             "dedendum": (1.25 - self.profile_shift) * self.module,
-            "fillet_radius": 0.38 * self.module,
+            "fillet_radius": (0.2 if self.internal else 0.38) * self.module,
+            "rim_thickness": 3.0 * self.module if self.internal else 0.0,
         }
+        fit_root = self.fillet_radius is None
         for name, value in defaults.items():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
+        self._check_numbers()
+        if fit_root:
+            self._fit_root()
         self._check()
+
+    def _fit_root(self) -> None:
+        """Reduce the default root arcs where neighbours would overlap, or a shifted flank lose what a rack leaves it."""
+        for share in ROOT_SHARES:
+            arc = share * self.fillet_radius
+            if arc >= abs(self.root_radius) or self.fillet_centre_radius <= arc:
+                return
+            overlapping = self.fillet_half_angle >= math.pi / self.teeth
+            shortened = self.profile_shift > 0 and not self.internal and self.form_roll_length > self._rack_form_roll
+            if not (overlapping or shortened):
+                return
+            object.__setattr__(self, "fillet_radius", arc)
+
+    @property
+    def _rack_form_roll(self) -> float:
+        """Length of roll down to which a rack with a tip radius of 0.38 modules cuts an involute, m."""
+        depth = self.dedendum - 0.38 * self.module * (1 - math.sin(self.pressure_angle))
+        sine = math.sin(self.transverse_pressure_angle)
+        return max(0.0, self.pitch_radius * sine - depth / sine)
 
     @classmethod
     def from_radii(
@@ -145,18 +193,63 @@ class GearSpec:
     ) -> GearSpec:
         """Wheel from its tip and root radii instead of addendum and dedendum."""
         name = str(others.get("name", "gear"))
-        pitch = 0.5 * teeth * to_si(module, "length", f"{name}.module")
+        inwards = teeth < 0 or bool(others.get("internal", False))
+        helix = to_si(others.get("helix_angle", 0.0), "angle", f"{name}.helix_angle")
+        pitch = 0.5 * abs(teeth) * to_si(module, "length", f"{name}.module") / math.cos(helix)
         tip = to_si(tip_radius, "length", f"{name}.tip_radius")
         root = to_si(root_radius, "length", f"{name}.root_radius")
-        require(tip > pitch, f"{name}.tip_radius is {tip * 1e3:.4f} mm, inside the pitch circle {pitch * 1e3:.4f} mm")
+        sign = -1 if inwards else 1
+        words = ("outside", "inside") if inwards else ("inside", "outside")
         require(
-            root < pitch, f"{name}.root_radius is {root * 1e3:.4f} mm, outside the pitch circle {pitch * 1e3:.4f} mm"
+            sign * tip > sign * pitch,
+            f"{name}.tip_radius is {tip * 1e3:.4f} mm, {words[0]} the pitch circle {pitch * 1e3:.4f} mm",
         )
-        return cls(teeth, module, addendum=tip - pitch, dedendum=pitch - root, **others)
+        require(
+            sign * root < sign * pitch,
+            f"{name}.root_radius is {root * 1e3:.4f} mm, {words[1]} the pitch circle {pitch * 1e3:.4f} mm",
+        )
+        return cls(teeth, module, addendum=sign * (tip - pitch), dedendum=sign * (pitch - root), **others)
+
+    @classmethod
+    def ring(
+        cls, teeth: int, module: Quantity, *, outward_shift: float | None = None, name: str = "ring", **others: Any
+    ) -> GearSpec:
+        """Internal wheel.
+
+        Parameters
+        ----------
+        teeth : int
+        module : float or str
+        outward_shift : float, optional
+            Profile shift in the convention of catalogues and of sums ``x_ring - x_planet``: positive outwards, that is
+            ``-profile_shift``. Give one of the two.
+        name : str
+        **others
+            Further fields of `GearSpec`.
+
+        Examples
+        --------
+        >>> ring = GearSpec.ring(56, "45 mm", outward_shift=0.501, addendum="45 mm", dedendum="56.25 mm")
+        >>> ring.profile_shift
+        -0.501
+        """
+        if outward_shift is not None:
+            require(
+                "profile_shift" not in others,
+                f"{name}: both profile_shift and outward_shift are given; give one (profile_shift = -outward_shift)",
+            )
+            others["profile_shift"] = -outward_shift
+        return cls(abs(teeth), module, internal=True, name=name, **others)
 
     def _check(self) -> None:
-        n = self.name
-        mm = 1e3
+        if self.internal:
+            self._check_internal()
+        else:
+            self._check_external()
+        self._check_teeth()
+
+    def _check_numbers(self) -> None:
+        n, mm = self.name, 1e3
         require(
             isinstance(self.teeth, int) and self.teeth >= 5,
             f"{n}.teeth is {self.teeth!r}; give an integer of 5 or more",
@@ -165,10 +258,15 @@ class GearSpec:
             math.radians(5) <= self.pressure_angle <= math.radians(40),
             f"{n}.pressure_angle is {math.degrees(self.pressure_angle):.3f} deg; give 5 to 40 deg (text needs a unit)",
         )
+        require(
+            0 <= self.helix_angle <= LARGEST_HELIX,
+            f"{n}.helix_angle is {math.degrees(self.helix_angle):.3f} deg; give 0 to 45 deg and the sense as hand",
+        )
+        require(self.hand in ("right", "left"), f"{n}.hand is {self.hand!r}; choose 'right' or 'left'")
         for name in ("face_width", "addendum", "dedendum", "fillet_radius"):
             value = getattr(self, name)
             require(value > 0, f"{n}.{name} is {value * mm:.6g} mm; it must be positive")
-        for name in ("tip_rounding", "bore_radius"):
+        for name in ("tip_rounding", "bore_radius", "rim_thickness"):
             value = getattr(self, name)
             require(value >= 0, f"{n}.{name} is {value * mm:.6g} mm; it must not be negative")
         require(
@@ -176,12 +274,38 @@ class GearSpec:
             f"{n}.thinning is {self.thinning * mm:.6g} mm: negative backlash; "
             "thicken teeth with profile_shift and a larger centre distance instead",
         )
+
+    def _check_internal(self) -> None:
+        n, mm = self.name, 1e3
+        require(self.bore_radius == 0, f"{n}.bore_radius is {self.bore_radius * mm:.4f} mm; an internal wheel has none")
+        require(
+            self.rim_thickness > 0, f"{n}.rim_thickness is 0; an internal wheel needs material outside its root circle"
+        )
+
+    def _check_external(self) -> None:
+        n, mm = self.name, 1e3
         require(self.root_radius > 0, f"{n}.dedendum is {self.dedendum * mm:.4f} mm, larger than the pitch radius")
         require(
             self.bore_radius < self.root_radius,
             f"{n}.bore_radius is {self.bore_radius * mm:.4f} mm, not inside the root circle "
             f"{self.root_radius * mm:.4f} mm; make the bore smaller",
         )
+        require(
+            self.rim_thickness == 0,
+            f"{n}.rim_thickness is {self.rim_thickness * mm:.4f} mm; only internal wheels have it, give bore_radius",
+        )
+        cutter = self.dedendum - self.fillet_radius * (1 - math.sin(self.pressure_angle))
+        clear = self.pitch_radius * math.sin(self.transverse_pressure_angle) ** 2
+        if self.tip_radius > self.base_radius and self.tooth_thickness > 0:
+            require(
+                clear >= UNDERCUT_TOLERANCE * cutter,
+                f"{n} is undercut: with {self.teeth} teeth the cutter reaches {cutter * mm:.3f} mm below the pitch "
+                f"circle where {clear * mm:.3f} mm is free; use more teeth, a larger profile_shift or a smaller "
+                "dedendum",
+            )
+
+    def _check_teeth(self) -> None:
+        n, mm = self.name, 1e3
         require(
             self.tip_radius > self.base_radius,
             f"{n}.addendum is {self.addendum * mm:.4f} mm: the tip circle {self.tip_radius * mm:.4f} mm lies inside "
@@ -190,13 +314,6 @@ class GearSpec:
         require(
             self.tooth_thickness > 0,
             f"{n}.thinning is {self.thinning * mm:.4f} mm and leaves no tooth thickness at the pitch circle",
-        )
-        cutter = self.dedendum - self.fillet_radius * (1 - math.sin(self.pressure_angle))
-        clear = self.pitch_radius * math.sin(self.pressure_angle) ** 2
-        require(
-            clear >= UNDERCUT_TOLERANCE * cutter,
-            f"{n} is undercut: with {self.teeth} teeth the cutter reaches {cutter * mm:.3f} mm below the pitch circle "
-            f"where {clear * mm:.3f} mm is free; use more teeth, a larger profile_shift or a smaller dedendum",
         )
         require(
             self.tip_thickness > 0,
@@ -208,10 +325,12 @@ class GearSpec:
             f"{n}.tip_rounding is {self.tip_rounding * mm:.4f} mm, too large for a tip "
             f"{self.tip_thickness * mm:.4f} mm thick",
         )
+        below = "above" if self.internal else "below"
+        form = self.sign * self.form_radius
         require(
-            self.form_radius < self.tip_radius and self.form_radius < self.pitch_radius,
+            form < self.sign * self.tip_radius and form < self.sign * self.pitch_radius,
             f"{n}: root circle {self.root_radius * mm:.4f} mm and fillet_radius {self.fillet_radius * mm:.4f} mm leave "
-            f"no involute below the pitch circle (base circle {self.base_radius * mm:.4f} mm); increase dedendum or "
+            f"no involute {below} the pitch circle (base circle {self.base_radius * mm:.4f} mm); increase dedendum or "
             "reduce fillet_radius",
         )
         require(
@@ -221,49 +340,87 @@ class GearSpec:
         )
 
     @property
+    def sign(self) -> int:
+        """Sign of the wheel's radii in the sums over a pair (ISO 21771): 1 for external wheels, -1 for internal."""
+        return -1 if self.internal else 1
+
+    @property
+    def outward_shift(self) -> float:
+        """Profile shift counted positive outwards, as catalogues and sums ``x_ring - x_planet`` have it."""
+        return self.sign * self.profile_shift
+
+    @property
+    def transverse_module(self) -> float:
+        """Module in the transverse section, m."""
+        return self.module / math.cos(self.helix_angle)
+
+    @property
+    def transverse_pressure_angle(self) -> float:
+        """Pressure angle in the transverse section, rad: tan alpha_t = tan alpha_n / cos beta."""
+        if self.helix_angle == 0:
+            return self.pressure_angle
+        return math.atan(math.tan(self.pressure_angle) / math.cos(self.helix_angle))
+
+    @property
+    def base_helix_angle(self) -> float:
+        """Helix angle on the base cylinder, rad: sin beta_b = sin beta cos alpha_n."""
+        return math.asin(math.sin(self.helix_angle) * math.cos(self.pressure_angle))
+
+    @property
+    def twist_tangent(self) -> float:
+        """Tangent of the base helix angle, positive for a right hand: the section at z turns by it times z/r_b."""
+        return (1.0 if self.hand == "right" else -1.0) * math.tan(self.base_helix_angle)
+
+    @property
+    def virtual_teeth(self) -> float:
+        """Teeth of the equivalent spur wheel, z / (cos^2 beta_b cos beta)."""
+        return self.teeth / (math.cos(self.base_helix_angle) ** 2 * math.cos(self.helix_angle))
+
+    @property
     def pitch_radius(self) -> float:
         """Pitch circle radius, m."""
-        return 0.5 * self.teeth * self.module
+        return 0.5 * self.teeth * self.transverse_module
 
     @property
     def base_radius(self) -> float:
         """Base circle radius, m."""
-        return self.pitch_radius * math.cos(self.pressure_angle)
+        return self.pitch_radius * math.cos(self.transverse_pressure_angle)
 
     @property
     def tip_radius(self) -> float:
-        """Tip (outer) circle radius, m."""
-        return self.pitch_radius + self.addendum
+        """Tip circle radius, m; the smaller one of an internal wheel."""
+        return self.pitch_radius + self.sign * self.addendum
 
     @property
     def root_radius(self) -> float:
         """Root circle radius, m."""
-        return self.pitch_radius - self.dedendum
+        return self.pitch_radius - self.sign * self.dedendum
+
+    @property
+    def outer_radius(self) -> float:
+        """Largest radius of the body, m: the tip circle, or the rim of an internal wheel."""
+        return self.root_radius + self.rim_thickness if self.internal else self.tip_radius
 
     @property
     def base_pitch(self) -> float:
-        """Distance of neighbouring flanks along the base tangent, m."""
+        """Transverse distance of neighbouring flanks along the base tangent, m."""
         return 2 * math.pi * self.base_radius / self.teeth
 
     @property
     def tooth_thickness(self) -> float:
-        """Arc thickness at the pitch circle, m."""
+        """Transverse arc thickness at the pitch circle, m."""
         half_pitch = 0.5 * math.pi * self.module
-        return half_pitch + 2 * self.profile_shift * self.module * math.tan(self.pressure_angle) - self.thinning
+        normal = half_pitch + 2 * self.profile_shift * self.module * math.tan(self.pressure_angle)
+        return normal / math.cos(self.helix_angle) - self.thinning
 
     @property
     def base_half_angle(self) -> float:
-        """Half angle of the tooth on the base circle, rad."""
-        return self.tooth_thickness / (2 * self.pitch_radius) + involute(self.pressure_angle)
+        """Half angle of the tooth on the base circle, rad; that of an internal one may be negative."""
+        return self.tooth_thickness / (2 * self.pitch_radius) + self.sign * involute(self.transverse_pressure_angle)
 
     def half_angle(self, radius: float) -> float:
-        """Half angle of the tooth at a radius between base and tip circle, rad."""
-        return self.base_half_angle - involute(math.acos(min(1.0, self.base_radius / radius)))
-
-    @property
-    def sign(self) -> int:
-        """Sign of the wheel's radii in the sums over a pair (DIN 3960): 1, since its teeth point outwards."""
-        return 1
+        """Half angle of the tooth at a radius outside the base circle, rad."""
+        return self.base_half_angle - self.sign * involute(math.acos(min(1.0, self.base_radius / radius)))
 
     @property
     def tip_thickness(self) -> float:
@@ -273,13 +430,12 @@ class GearSpec:
     @property
     def tip_roll_length(self) -> float:
         """Length of roll (along the base tangent) where the involute ends at the tip, m."""
-        centre = self.tip_radius - self.tip_rounding
-        return math.sqrt(centre**2 - self.base_radius**2) + self.tip_rounding
+        return math.sqrt(self.corner_radius**2 - self.base_radius**2) + self.sign * self.tip_rounding
 
     @property
     def corner_radius(self) -> float:
         """Radius of the tip corner, or of the centre of its rounding, m."""
-        return self.tip_radius - self.tip_rounding
+        return self.tip_radius - self.sign * self.tip_rounding
 
     @property
     def corner_half_angle(self) -> float:
@@ -289,7 +445,7 @@ class GearSpec:
     @property
     def fillet_centre_radius(self) -> float:
         """Radius of the centre of the root arc, which touches the root circle, m."""
-        return self.root_radius + self.fillet_radius
+        return self.root_radius + self.sign * self.fillet_radius
 
     @property
     def form_radius(self) -> float:
@@ -308,14 +464,19 @@ class GearSpec:
         return start + math.asin(self.fillet_radius / self.fillet_centre_radius)
 
     @property
+    def _body_radii(self) -> tuple[float, float]:
+        return (self.pitch_radius, self.outer_radius) if self.internal else (self.bore_radius, self.pitch_radius)
+
+    @property
     def mass(self) -> float:
-        """Mass of a disc of the pitch radius with the bore removed, kg."""
-        area = math.pi * (self.pitch_radius**2 - self.bore_radius**2)
-        return self.material.density * area * self.face_width
+        """Mass of a disc of the pitch radius with the bore removed, or of a rim from the pitch radius outwards, kg."""
+        inner, outer = self._body_radii
+        return self.material.density * (math.pi * (outer**2 - inner**2)) * self.face_width
 
     @property
     def inertia(self) -> tuple[float, float, float]:
-        """Principal moments of inertia (Ixx, Iyy, Izz) of that disc about its centre, z the axis, kg m^2."""
-        squares = self.pitch_radius**2 + self.bore_radius**2
+        """Principal moments of inertia (Ixx, Iyy, Izz) of that body about its centre, z the axis, kg m^2."""
+        inner, outer = self._body_radii
+        squares = outer**2 + inner**2
         across = self.mass * (3 * squares + self.face_width**2) / 12
         return across, across, 0.5 * self.mass * squares

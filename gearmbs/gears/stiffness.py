@@ -57,7 +57,8 @@ def rack_root(gear: GearSpec, points: int = POINTS) -> tuple[np.ndarray, np.ndar
 
     The rack's tip circle rolls off on the pitch circle; ``gamma`` is the angle at which it touches the curve.
     """
-    alpha = gear.pressure_angle
+    _external(gear)
+    alpha = gear.transverse_pressure_angle
     radius, depth, across = _rack_tip(gear)
     gamma = np.linspace(math.pi / 2, alpha, points)
     turn = (depth / np.tan(gamma) + across) / gear.pitch_radius
@@ -67,9 +68,17 @@ def rack_root(gear: GearSpec, points: int = POINTS) -> tuple[np.ndarray, np.ndar
     return half, height
 
 
+def _external(gear: GearSpec) -> None:
+    if gear.internal:
+        raise ValueError(
+            f"{gear.name} is internal: the potential-energy method is for teeth cut by a rack; give the contact law of "
+            "an internal pair a constant stiffness, for instance by with_iso_stiffness()"
+        )
+
+
 def _rack_tip(gear: GearSpec) -> tuple[float, float, float]:
     """Tip radius of the rack, depth of its centre below the pitch circle and distance from the tooth's middle, m."""
-    alpha = gear.pressure_angle
+    alpha = gear.transverse_pressure_angle
     radius = gear.fillet_radius
     depth = gear.dedendum - radius
     return radius, depth, 0.5 * gear.tooth_thickness + depth * math.tan(alpha) + radius / math.cos(alpha)
@@ -260,17 +269,45 @@ def mesh_stiffness(
     return MeshStiffness(phase, stiffness, single, single_phase)
 
 
-def iso_single_stiffness(pair: PairGeometry) -> float:
-    """Single stiffness c' of ISO 6336-1 (method B, solid discs, high load), N/(m of face width * m)."""
+def iso_theoretical_stiffness(pair: PairGeometry) -> float:
+    """Theoretical single stiffness c'_th = 1 / q' of ISO 6336-1, N/(m of face width * m).
+
+    Teeth count as those of the equivalent spur wheels; an internal wheel as a rack.
+    """
     one, two = pair.driver, pair.driven
-    z1, z2, x1, x2 = one.teeth, two.teeth, one.profile_shift, two.profile_shift
+    x1, x2 = one.profile_shift, two.profile_shift
+    z1, z2 = one.virtual_teeth, math.inf if two.internal else two.virtual_teeth
     q = 0.04723 + 0.15551 / z1 + 0.25791 / z2 - 0.00635 * x1 - 0.11654 * x1 / z1 - 0.00193 * x2
     q += -0.24188 * x2 / z2 + 0.00529 * x1**2 + 0.00182 * x2**2
-    depth = 0.5 * (one.dedendum / one.module + two.dedendum / two.module)
+    return 1e9 / q
+
+
+def iso_single_stiffness(pair: PairGeometry, web: tuple[float, float] | None = None) -> float:
+    """Single stiffness c' of ISO 6336-1 (method B, high load), N/(m of face width * m).
+
+    Parameters
+    ----------
+    pair : PairGeometry
+    web : (float, float), optional
+        Thickness of the web and of the rim, m, of a wheel that is no solid disc: the factor
+        ``C_R = 1 + ln(b_s / b) / (5 exp(s_R / (5 m_n)))``, within the standard's limits 0.2 <= b_s / b <= 1.2 and
+        s_R >= m_n.
+
+    Notes
+    -----
+    c' = c'_th C_M C_R C_B cos beta with C_M = 0.8 and C_B = (1 + 0.5 (1.2 - h_fP / m_n)) (1 - 0.02 (20 - alpha_n)),
+    where h_fP is the dedendum of the basic rack.
+    """
+    one, two = pair.driver, pair.driven
+    depth = 0.5 * (one.dedendum / one.module + one.profile_shift + two.dedendum / two.module + two.profile_shift)
+    blank = 1.0
+    if web is not None:
+        share = min(max(web[0] / pair.common_face_width, 0.2), 1.2)
+        blank = 1 + math.log(share) / (5 * math.exp(max(web[1] / one.module, 1.0) / 5))
     rack = (1 + 0.5 * (1.2 - depth)) * (1 - 0.02 * (20 - math.degrees(one.pressure_angle)))
     moduli = [w.material.youngs_modulus for w in (one, two)]
     material = 2 * moduli[0] * moduli[1] / sum(moduli) / ISO_STEEL_MODULUS
-    return 0.8 * rack / q * material * 1e9
+    return 0.8 * rack * material * blank * math.cos(one.helix_angle) * iso_theoretical_stiffness(pair)
 
 
 def iso_mesh_stiffness(pair: PairGeometry) -> float:

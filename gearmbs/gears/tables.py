@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from gearmbs.contact import layout as L
@@ -23,19 +25,21 @@ END_BLEND = 1e-6
 
 
 def _pack_wheel(gear: GearSpec, table: np.void) -> None:
-    table["base_radius"] = gear.base_radius
-    table["half_angle"] = gear.base_half_angle
-    table["tip_roll"] = gear.tip_roll_length
-    table["corner_radius"] = gear.corner_radius
-    table["corner_angle"] = gear.corner_half_angle
+    sign = gear.sign
+    table["base_radius"] = sign * gear.base_radius
+    table["half_angle"] = sign * gear.base_half_angle
+    table["tip_roll"] = sign * gear.tip_roll_length
+    table["corner_radius"] = sign * gear.corner_radius
+    table["corner_angle"] = sign * gear.corner_half_angle
     table["tip_rounding"] = gear.tip_rounding
-    table["tip_radius"] = gear.tip_radius
-    table["root_radius"] = gear.root_radius
+    table["tip_radius"] = sign * gear.tip_radius
+    table["root_radius"] = sign * gear.root_radius
     table["face_width"] = gear.face_width
-    table["form_roll"] = gear.form_roll_length
+    table["form_roll"] = sign * gear.form_roll_length
     table["fillet_radius"] = gear.fillet_radius
-    table["fillet_centre_radius"] = gear.fillet_centre_radius
-    table["fillet_angle"] = gear.fillet_half_angle
+    table["fillet_centre_radius"] = sign * gear.fillet_centre_radius
+    table["fillet_angle"] = sign * gear.fillet_half_angle
+    table["twist"] = -sign * gear.twist_tangent
 
 
 def pack(pair: Mesh, slices: int | None = None) -> tuple[np.ndarray, np.ndarray, int]:
@@ -63,7 +67,7 @@ def pack(pair: Mesh, slices: int | None = None) -> tuple[np.ndarray, np.ndarray,
     _pack_wheel(second, reals["wheel_2"])
     reals["pitch"] = first.base_pitch
     reals["width"] = geometry.common_face_width
-    _pack_laws(model, geometry.common_face_width, reals)
+    _pack_laws(model, geometry.common_face_width, math.cos(first.base_helix_angle), reals)
     reals["end_blend"] = END_BLEND
     reals["face_low"], reals["face_high"] = geometry.common_face
     reals["axial_shift"] = geometry.axial_shift
@@ -75,14 +79,20 @@ def pack(pair: Mesh, slices: int | None = None) -> tuple[np.ndarray, np.ndarray,
     return gi, gr, L.work_size(slices)
 
 
-def _pack_laws(model: ContactModel, width: float, reals: np.void) -> None:
+def _pack_laws(model: ContactModel, width: float, cosine: float, reals: np.void) -> None:
+    """Fill the laws; those of helical teeth hold along the normal, the kernel works in the transverse section.
+
+    ``cosine`` is that of the base helix angle: penetration and force along the normal are ``cosine`` times and
+    ``1 / cosine`` times theirs in the section, while the contact line is ``1 / cosine`` times the width.
+    """
     law, friction = model.law, model.friction
-    reals["stiffness"] = law.stiffness / width
+    reals["stiffness"] = law.stiffness / width * cosine**law.exponent
     reals["exponent"] = law.exponent
-    reals["damping"] = law.damping if law.kind == "hunt-crossley" else law.damping / width
-    reals["damping_depth"] = law.depth
-    reals["static_friction"] = friction.static
-    reals["dynamic_friction"] = friction.dynamic
+    reals["damping"] = (law.damping if law.kind == "hunt-crossley" else law.damping / width) * cosine
+    reals["damping_depth"] = law.depth / cosine
+    reals["secant"] = 1.0 / cosine
+    reals["static_friction"] = friction.static / cosine
+    reals["dynamic_friction"] = friction.dynamic / cosine
     reals["static_speed"] = friction.static_speed
     reals["dynamic_speed"] = friction.dynamic_speed
 
@@ -124,10 +134,11 @@ def _pack_teeth(pair: Mesh, integers: np.void, reals: np.void) -> tuple[np.ndarr
     start = 0
     for k, deviations in enumerate(both):
         rows = slice(start, start + records[k])
+        sign = deviations.gear.sign
         parts["offset"].append(deviations.offset.ravel())
         kinds = (
             ("shape", deviations.shape.reshape(records[k], -1), 0.0),
-            ("tip", deviations.tip.reshape(records[k], -1), deviations.gear.tip_roll_length),
+            ("tip", sign * deviations.tip.reshape(records[k], -1), sign * deviations.gear.tip_roll_length),
             ("compliance", deviations.compliance.reshape(records[k], -1) * base_curve, 0.0),
         )
         for column, (name, data, plain) in enumerate(kinds):
@@ -137,7 +148,8 @@ def _pack_teeth(pair: Mesh, integers: np.void, reals: np.void) -> tuple[np.ndarr
             parts[name].append(distinct.ravel())
         removed = deviations.offset[:, :, None, None] + deviations.shape
         added += max(0.0, -float(removed.min()))
-        reals[f"wheel_{k + 1}"]["shape_spacing"] = deviations.roll_length[1] - deviations.roll_length[0]
+        reals[f"wheel_{k + 1}"]["shape_start"] = sign * deviations.roll_length[0]
+        reals[f"wheel_{k + 1}"]["shape_spacing"] = sign * (deviations.roll_length[1] - deviations.roll_length[0])
         start += records[k]
     reals["added_material"] = added
     softened = pair.contact_model.stiffness_curve != "constant" or (tooth[:, L.FLANK_COMPLIANCE] >= 0).any()

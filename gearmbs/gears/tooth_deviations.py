@@ -25,7 +25,8 @@ class ToothDeviations:
     drive : int
         The flank that carries the load.
     roll_length : ndarray, shape (ns,)
-        Points of the profile from the base circle to the tip, by their length of roll, m.
+        Points of the profile from the base circle (of an internal wheel: from the root) to the tip, by their length of
+        roll, m.
     section : ndarray, shape (nz,)
         Transverse sections along the face, from mid-face, m.
     offset : ndarray, shape (2, z)
@@ -45,7 +46,8 @@ class ToothDeviations:
         nz = FACE_SECTIONS if along_face else 2
         self.gear = gear
         self.drive = 0 if rotation > 0 else 1
-        self.roll_length = np.linspace(0.0, gear.tip_roll_length, PROFILE_POINTS)
+        start = gear.form_roll_length if gear.internal else 0.0
+        self.roll_length = np.linspace(start, gear.tip_roll_length, PROFILE_POINTS)
         self.section = np.linspace(-0.5, 0.5, nz) * gear.face_width
         self.offset = np.zeros((2, z))
         self.shape = np.zeros((2, z, nz, PROFILE_POINTS))

@@ -85,6 +85,8 @@ class StaticMesh:
         self.pair = pair
         self.geometry = pair.geometry
         self.rotation = pair.operating_point.rotation
+        # an internal wheel turns with its mate: its angle grows where that of an external one falls
+        self.turning = self.rotation * pair.geometry.sign
         self.gi, self.gr, size = pack(pair, slices)
         self.gi[layout.FRICTION] = layout.FRICTION_NONE
         self.work = np.zeros(size)
@@ -93,6 +95,10 @@ class StaticMesh:
         self.diag = np.zeros(8)
         self.rows = np.zeros((MAX_ROWS, len(GAP_COLUMNS)))
         self._zero = np.zeros(3)
+        self.sections = np.zeros(1 if self.gi[layout.SLICES] == 1 else 0)
+        if self.geometry.driver.helix_angle and self.gi[layout.SLICES] > 1:
+            # a contact line that leans over the flank may begin and end anywhere
+            self.sections = np.linspace(*self.geometry.common_face, self.gi[layout.SLICES] + 1)
 
     def torque(self, driver_angle: float, driven_angle: float) -> tuple[float, float]:
         """Contact torque on the driven wheel about its axis, N m, and its derivative by the driven angle."""
@@ -110,10 +116,14 @@ class StaticMesh:
         return float(on_driven @ axis), float(slope @ axis)
 
     def gaps(self, driver_angle: float, driven_angle: float, sections: np.ndarray | None = None) -> np.ndarray:
-        """Rows of ``gearmbs.contact.pair_gaps`` (by default at the ends of the common face, mid-face for one slice)."""
+        """Rows of ``gearmbs.contact.pair_gaps``.
+
+        By default in the sections where flanks may come closest: at the ends of the common face, mid-face for one
+        slice, at the nodes of all slices for helical wheels.
+        """
         place = self.geometry.frames(driver_angle, driven_angle)
         if sections is None:
-            sections = np.zeros(1 if self.gi[layout.SLICES] == 1 else 0)
+            sections = self.sections
         count = pair_gaps(
             self.gi, self.gr, place.origin_1, place.axes_1, place.origin_2, place.axes_2, sections, self.rows, self.work
         )
@@ -125,7 +135,10 @@ class StaticMesh:
         alpha, pitch = geometry.working_pressure_angle, geometry.driver.base_pitch
         slack = geometry.base_radius_sum * (math.tan(alpha) - alpha) - geometry.base_arc_sum
         slack -= round(slack / pitch) * pitch
-        return math.pi + self.rotation * slack / geometry.driven.base_radius - driver_angle / geometry.ratio
+        turned = self.rotation * slack / geometry.driven.base_radius
+        if geometry.sign < 0:
+            return math.pi - turned + (driver_angle - math.pi) / geometry.ratio
+        return math.pi + turned - driver_angle / geometry.ratio
 
     def touching_angle(self, driver_angle: float) -> float:
         """Driven angle at which the drive flanks just touch."""
@@ -135,14 +148,14 @@ class StaticMesh:
         for _ in range(PHASE_STEPS):
             rows = self.gaps(driver_angle, angle)
             gap = rows[rows[:, SIDE] == side, GAP].min()
-            angle += side * gap / rb
+            angle += self.turning * gap / rb
             if abs(gap) < TOUCH_TOLERANCE:
                 break
         return angle
 
     def loaded_angle(self, driver_angle: float, torque: float, start: float) -> float:
         """Driven angle at which the contact carries ``torque``, by Newton's method kept inside a bracket."""
-        side = self.rotation
+        side = self.turning
         lag = side * start
         longest = static_lag(self.pair, torque)
         low, high = -math.inf, math.inf
@@ -203,7 +216,7 @@ def kinematic_transmission_error(
         driven = mesh.touching_angle(angle)
         rows = mesh.gaps(angle, driven)
         on_drive = rows[(rows[:, SIDE] == side) & (rows[:, GAP] < TOUCHING)]
-        return side * (driven - mesh.ideal_angle(angle)) * rb, np.unique(on_drive[:, 1]).size
+        return mesh.turning * (driven - mesh.ideal_angle(angle)) * rb, np.unique(on_drive[:, 1]).size
 
     error, pairs = _over_phases(mesh, phase, touching)
     none = np.zeros(phase.size)
@@ -245,7 +258,7 @@ def loaded_transmission_error(
         raise ValueError(f"torque is {load} N m; give a positive load, or use kinematic_transmission_error for none")
     phase = _phases(pair, points, start, cycles)
     mesh = StaticMesh(pair, slices)
-    side, rb = mesh.rotation, mesh.geometry.driven.base_radius
+    side, rb = mesh.turning, mesh.geometry.driven.base_radius
     lag = side * static_lag(pair, load)
 
     def loaded(angle: float) -> tuple[float, float, float, float]:
@@ -336,4 +349,5 @@ def _passing(pair: Mesh, begin: float, end: float) -> tuple[set[int], set[int]]:
     rows = mesh.gaps(angle, mesh.ideal_angle(angle))
     met = int(rows[(rows[:, SIDE] == side) & (rows[:, TOOTH_1] == 0)][0, TOOTH_2])
     turns = range(math.ceil(begin - centre - last), math.floor(end - centre - first) + 1)
-    return {-side * m % gear.teeth for m in turns}, {(met + side * m) % mate.teeth for m in turns}
+    on = mesh.turning
+    return {-side * m % gear.teeth for m in turns}, {(met + on * m) % mate.teeth for m in turns}

@@ -52,6 +52,8 @@ def half_tooth(gear: GearSpec, tolerance: float = TOLERANCE) -> HalfTooth:
     """
     if not (math.isfinite(tolerance) and tolerance > 0.0):
         raise ValueError(f"tolerance is {tolerance} m; give a positive length such as 1e-6")
+    if gear.internal:
+        raise ValueError(f"{gear.name} is an internal wheel, which has no outline of its own here; see ring_outline")
     pieces = [_root_arc(gear, tolerance), _flank(gear, tolerance)]
     if gear.tip_rounding > 0.0:
         pieces.append(_tip_arc(gear, tolerance))

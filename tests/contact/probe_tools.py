@@ -45,11 +45,11 @@ class Contact:
     def state(self, driver_angle: float, depth: float, speed: float = 0.0) -> list[np.ndarray]:
         """Wheels on their axes, turned ``depth`` (m at the base circle) beyond touching, at a driver speed."""
         pair = self.pair
-        turn = pair.rotation * depth / pair.driven.base_radius
+        turn = pair.sign * pair.rotation * depth / pair.driven.base_radius
         place = pair.frames(driver_angle, self.mesh.touching_angle(driver_angle) + turn)
         spin = pair.rotation * speed
         w1 = spin * place.axes_1[:, 2]
-        w2 = -spin / pair.ratio * place.axes_2[:, 2]
+        w2 = -pair.sign * spin / pair.ratio * place.axes_2[:, 2]
         zero = np.zeros(3)
         return [place.origin_1, place.axes_1, zero, w1, place.origin_2, place.axes_2, zero, w2]
 

@@ -1,0 +1,231 @@
+"""Internal and helical wheels: gaps against searches on the tooth surfaces, derivatives, balances, limits."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
+from gearmbs.gears.transmission import StaticMesh, kinematic_transmission_error, loaded_transmission_error
+from tests.contact.probe_tools import Contact, differences, rotation, shaken
+
+HELIX = {"helix_angle": "15 deg"}
+PAIRS = {
+    "ring": GearPair(GearSpec(23, "3 mm"), GearSpec.ring(70, "3 mm"), backlash="0.2 mm"),
+    "ring +0.4 mm": GearPair(
+        GearSpec(23, "3 mm"), GearSpec.ring(70, "3 mm"), centre_distance_error="0.4 mm", backlash="0.9 mm", slices=7
+    ),
+    "ring -1 mm": GearPair(
+        GearSpec(23, "3 mm"), GearSpec.ring(70, "3 mm", addendum="2 mm"), centre_distance_error="-1 mm", slices=7
+    ),
+    "ring skew": GearPair(GearSpec(23, "3 mm"), GearSpec.ring(70, "3 mm"), misalignment="1 deg", backlash="0.9 mm"),
+    "ring inclination": GearPair(
+        GearSpec(23, "3 mm", tip_rounding="0.2 mm"),
+        GearSpec.ring(70, "3 mm", tip_rounding="0.15 mm"),
+        misalignment="-1 deg",
+        plane="inclination",
+        backlash="0.9 mm",
+        axial_shift="2 mm",
+    ),
+    "helical": GearPair(GearSpec(23, "3 mm", **HELIX), GearSpec(37, "3 mm", hand="left", **HELIX), backlash="0.2 mm"),
+    "helical left, skew": GearPair(
+        GearSpec(23, "3 mm", hand="left", **HELIX),
+        GearSpec(37, "3 mm", **HELIX),
+        misalignment="1 deg",
+        backlash="0.9 mm",
+        axial_shift="1.5 mm",
+    ),
+    "helical inclination": GearPair(
+        GearSpec(23, "3 mm", **HELIX),
+        GearSpec(37, "3 mm", hand="left", **HELIX),
+        misalignment="1 deg",
+        plane="inclination",
+        backlash="0.9 mm",
+        centre_distance_error="1 mm",
+    ),
+    "helical ring": GearPair(GearSpec(23, "3 mm", **HELIX), GearSpec.ring(70, "3 mm", **HELIX), backlash="0.2 mm"),
+    "helical ring skew": GearPair(
+        GearSpec(23, "3 mm", hand="left", **HELIX),
+        GearSpec.ring(70, "3 mm", hand="left", **HELIX),
+        misalignment="1 deg",
+        backlash="0.9 mm",
+        axial_shift="-1 mm",
+    ),
+}
+
+
+def surface_point(gear, side, tooth, string, z):
+    """Point of a tooth flank in the wheel's frame, straight from the definition of the involute and the helix."""
+    rb = gear.base_radius
+    tangent = string / rb
+    around = gear.base_half_angle - gear.sign * (tangent - math.atan(tangent))
+    lead = (1 if gear.hand == "right" else -1) * math.tan(gear.helix_angle) / gear.pitch_radius
+    angle = side * around + 2 * math.pi * tooth / gear.teeth + lead * z
+    radius = math.hypot(rb, string)
+    return np.array([radius * math.cos(angle), radius * math.sin(angle), z])
+
+
+def section_point(gear, side, tooth, string, frame, centre, normal, zeta):
+    """Where a flank's curve of constant length of roll pierces the section plane."""
+    origin, axes = frame
+    z = 0.0
+    for _ in range(12):
+        point = origin + axes @ surface_point(gear, side, tooth, string, z)
+        z -= (normal @ (point - centre) - zeta) / (normal @ axes[:, 2])
+    return origin + axes @ surface_point(gear, side, tooth, string, z)
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_section_gap_against_search(name):
+    pair = PAIRS[name]
+    mesh = StaticMesh(pair)
+    one, two = pair.wheels
+    rng = np.random.default_rng(11)
+    kinds, worst, looked = set(), 0.0, 0
+    for driver_angle in rng.uniform(0, 2 * np.pi, 2):
+        driven = mesh.touching_angle(driver_angle) - pair.sign * 60e-6 / two.base_radius
+        place = pair.frames(driver_angle, driven)
+        normal = place.axes_1[:, 2] + place.axes_2[:, 2]
+        normal /= np.linalg.norm(normal)
+        centre = 0.5 * (place.origin_1 + place.origin_2)
+        low, high = np.sort([one.sign * one.tip_roll_length, one.base_radius * 0.02]) * 1e3
+        tip = two.tip_roll_length * 1e3
+        far = math.sqrt(two.root_radius**2 - two.base_radius**2) * 1e3 if two.internal else 0.02 * two.base_radius * 1e3
+        bounds = [(low, high), (min(tip, far), max(tip, far))]
+        for row in mesh.gaps(driver_angle, driven, np.array([-0.008, 0.003])).copy():
+            side, i, j, zeta, gap, kind = row[:6]
+            if not 0 < gap < 0.4e-3:
+                continue
+            kinds.add(int(kind))
+            looked += 1
+
+            def distance(s, side=side, i=i, j=j, zeta=zeta, place=place, centre=centre, normal=normal):
+                p = section_point(one, side, i, s[0] * 1e-3, place.frames[0], centre, normal, zeta)
+                q = section_point(two, side * two.sign, j, s[1] * 1e-3, place.frames[1], centre, normal, zeta)
+                return 1e3 * np.linalg.norm(p - q)
+
+            if one.tip_rounding and kind:
+                continue  # the search knows sharp corners
+            start = [np.clip(abs(r) * 1e3, *b) for r, b in zip(row[6:8], bounds)]
+            found = minimize(distance, start, bounds=bounds, method="L-BFGS-B", options={"ftol": 1e-16, "gtol": 1e-13})
+            options = {"xatol": 1e-10, "fatol": 1e-13}
+            found = minimize(distance, found.x, bounds=bounds, method="Nelder-Mead", options=options)
+
+            worst = max(worst, abs(found.fun * 1e-3 - gap))
+    assert looked > 3
+    assert 0 in kinds
+    assert worst < 1e-8
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_derivatives(name):
+    rng = np.random.default_rng(3)
+    contact = Contact(PAIRS[name])
+    worst = 0.0
+    for _ in range(3):
+        state = shaken(contact.state(rng.uniform(0, 6), rng.uniform(5e-5, 9e-5), 50.0), rng)
+        wrench = contact(state, 1)
+        assert np.linalg.norm(wrench[:3]) > 1
+        exact = contact.jac.copy()
+        scale = np.repeat(abs(exact).max(axis=0).reshape(8, 3).max(axis=1), 3)  # of the kinds of variation
+        found = differences(contact, state, 0.5)
+        worst = max(worst, float((abs(found - exact) / scale).max()))
+    assert worst < 1e-6
+
+
+FRICTIONLESS = FlankFriction.none()
+LINEAR = ContactLaw.linear("4e8 N/m")
+
+
+def whole_overlap(ring=False):
+    """Pairs whose overlap ratio is one, or nothing: with a helix of any angle the contact line is constant."""
+    width = math.pi * 3e-3 / math.sin(math.radians(15))
+    sizes = {"contact": LINEAR, "friction": FRICTIONLESS, "torque": 300.0}
+    mate = {"internal": True, "hand": "right"} if ring else {"hand": "left"}
+    one = GearSpec(23, "3 mm", face_width=width, **HELIX)
+    return GearPair(one, GearSpec(70 if ring else 37, "3 mm", face_width=width, **mate, **HELIX), slices=60, **sizes)
+
+
+@pytest.mark.parametrize("name", ["ring", "ring +0.4 mm", "helical", "helical ring"])
+def test_kinematic_transmission_error_vanishes(name):
+    error = kinematic_transmission_error(PAIRS[name], 12)
+    assert abs(error.error).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", ["ring", "helical", "helical ring"])
+def test_ratio_of_torques_and_axial_force(name):
+    pair = PAIRS[name].with_changes(friction=FRICTIONLESS, contact=LINEAR)
+    contact = Contact(pair)
+    for angle in (0.3, 0.41, 0.52):
+        state = contact.state(angle, 1e-11)
+        wrench = contact(state)
+        arm = state[4] - state[0]
+        on_driven = -wrench[3:] + np.cross(arm, wrench[:3])
+        # the same sense on both axes for an external pair, the opposite one for an internal
+        assert on_driven[2] / wrench[5] == pytest.approx(pair.sign * pair.ratio, rel=1e-8)
+        tangential = abs(wrench[5]) / pair.driver.pitch_radius
+        assert abs(wrench[2]) == pytest.approx(tangential * math.tan(pair.driver.helix_angle), rel=1e-8)
+        # the driver is held back: a right-hand one that turns to the left is pushed towards -z
+        assert wrench[5] < 0
+        if pair.driver.helix_angle:
+            assert wrench[2] * (1 if pair.driver.hand == "right" else -1) > 0
+        normal = tangential / math.cos(pair.driver.transverse_pressure_angle) / math.cos(pair.driver.base_helix_angle)
+        assert contact.diag[7] == pytest.approx(normal, rel=1e-8)
+
+
+@pytest.mark.parametrize("ring", [False, True])
+def test_transmission_error_is_constant_at_whole_overlap_ratios(ring):
+    pair = whole_overlap(ring)
+    assert pair.overlap_ratio == pytest.approx(1, abs=1e-12)
+    spur = GearPair(
+        GearSpec(23, "3 mm"),
+        GearSpec(70 if ring else 37, "3 mm", internal=ring),
+        contact=LINEAR,
+        friction=FRICTIONLESS,
+        torque=300.0,
+    )
+    ripple, most = (loaded_transmission_error(p, points=24).peak_to_peak for p in (pair, spur))
+    assert ripple < 0.01 * most
+
+
+@pytest.mark.parametrize("name", ["ring skew", "helical left, skew", "helical ring skew", "helical inclination"])
+def test_closed_cycle_does_no_work(name):
+    contact = Contact(PAIRS[name].with_changes(friction=FRICTIONLESS, contact=LINEAR, slices=40))
+    rng = np.random.default_rng(5)
+    start = contact.state(0.4, 60e-6)
+    energy = contact.energy(start)
+    assert energy > 0
+    shift, turn = rng.normal(size=(2, 2, 3)) * 3e-6, rng.normal(size=(2, 2, 3)) * 6e-5
+
+    def at(angle):
+        c, s = math.cos(angle), math.sin(angle)
+        state = [a.copy() for a in start]
+        state[0] += c * shift[0, 0] + s * shift[0, 1]
+        state[1] = rotation(c * turn[0, 0] + s * turn[0, 1]) @ state[1]
+        return state
+
+    work, count = 0.0, 400
+    for k in range(count):
+        angle = 2 * math.pi * (k + 0.5) / count
+        before, after = at(angle - 1e-6), at(angle + 1e-6)
+        wrench = contact(at(angle))
+        moved = (after[0] - before[0]) / 2e-6
+        spun = (after[1] - before[1]) @ at(angle)[1].T / 2e-6
+        spin = 0.5 * np.array([spun[2, 1] - spun[1, 2], spun[0, 2] - spun[2, 0], spun[1, 0] - spun[0, 1]])
+        work += (wrench[:3] @ moved + wrench[3:] @ spin) * 2 * math.pi / count
+    assert abs(work) < 2e-6 * energy
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_random_poses_are_finite_and_never_pull(name):
+    contact = Contact(PAIRS[name].with_changes(slices=min(PAIRS[name].face_slices, 11)))
+    rng = np.random.default_rng(7)
+    for _ in range(300):
+        state = contact.state(rng.uniform(0, 6), rng.uniform(-1e-4, 3e-4), rng.normal() * 100)
+        state = shaken(state, rng, shift=rng.choice([1e-6, 1e-4, 1e-3]), turn=rng.choice([1e-5, 3e-3]), speed=1.0)
+        wrench = contact(state, 1)
+        assert np.isfinite(wrench).all()
+        assert np.isfinite(contact.jac).all()
+        assert contact.diag[7] >= 0
+        assert contact.diag[0] >= 0
