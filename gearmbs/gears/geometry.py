@@ -194,10 +194,10 @@ class PairGeometry:
         for near, far, start in zip((self.driver, self.driven), (self.driven, self.driver), self.first_roll_lengths):
             # the involute of an internal wheel ends outwards, at its root
             side, where, to = ("beyond", "end", "to") if near.internal else ("inside", "start", "from")
-            free = near.sign * (start - near.form_roll_length) > -1e-12 and start > 0
+            within = near.sign * (start - near.form_roll_length) > -1e-12 and start > 0
             remedy = "reduce" if self.sign < 0 else "increase"
             require(
-                free,
+                within,
                 f"{name}: the tip of {far.name} meets {near.name} {side} the {where} of its involute (length of roll "
                 f"{start * MM:.4f} mm, involute {to} {near.form_roll_length * MM:.4f} mm): interference; reduce the "
                 f"addendum of {far.name} or {remedy} centre_distance_error",
@@ -313,11 +313,6 @@ class PairGeometry:
     def total_contact_ratio(self) -> float:
         """Total contact ratio eps_gamma, transverse plus overlap."""
         return self.contact_ratio + self.overlap_ratio
-
-    @property
-    def working_helix_angle(self) -> float:
-        """Helix angle on the working pitch cylinders, rad."""
-        return math.atan(math.tan(self.driver.base_helix_angle) / math.cos(self.working_pressure_angle))
 
     def contact_line_length(self, phase: float) -> float:
         """Sum of the lengths of the contact lines, m, parallel axes.
