@@ -164,7 +164,7 @@ class GearSpec:
         self._check()
 
     def _fit_root(self) -> None:
-        """Reduce the default root arcs where neighbours would overlap or shifted flanks lose what a rack leaves them."""
+        """Reduce the default root arcs where neighbours overlap or shifted flanks lose what a rack leaves them."""
         for share in ROOT_SHARES:
             arc = share * self.fillet_radius
             if arc >= abs(self.root_radius) or self.fillet_centre_radius <= arc:
