@@ -1,0 +1,281 @@
+"""Bearings between a shaft and a housing, the ground or another shaft."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from gearmbs.dae.equations.force_elements import DISSIPATED, STORED, Diagnostic
+from gearmbs.drivetrain.errors import require, told_of
+from gearmbs.drivetrain.part import Part
+from gearmbs.mechanism.elements import Compiled, ForceElement
+from gearmbs.mechanism.parts import Marker
+from gearmbs.units import Quantity
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.mechanism import Mechanism
+
+
+@dataclass(frozen=True, kw_only=True)
+class RollingGeometry(Part):
+    """What the characteristic frequencies of a rolling bearing need.
+
+    Parameters
+    ----------
+    balls : int
+    ball_diameter, pitch_diameter : float or str
+        m.
+    contact_angle : float or str
+        rad.
+    """
+
+    title: ClassVar[str] = "rolling bearing"
+    units: ClassVar[Mapping[str, str]] = {
+        "ball_diameter": "length", "pitch_diameter": "length", "contact_angle": "angle"
+    }  # fmt: skip
+    positive: ClassVar[tuple[str, ...]] = ("ball_diameter", "pitch_diameter")
+
+    balls: int
+    ball_diameter: Quantity
+    pitch_diameter: Quantity
+    contact_angle: Quantity = 0.0
+
+    def multiples(self) -> dict[str, float]:
+        """Return FTF, BPFO, BPFI and BSF as multiples of the inner ring's speed against the outer one's.
+
+        With g = d cos(a) / D: FTF = (1 - g)/2, BPFO = Z (1 - g)/2, BPFI = Z (1 + g)/2, BSF = D (1 - g^2)/(2 d).
+        """
+        g = self.ball_diameter * math.cos(self.contact_angle) / self.pitch_diameter
+        return {
+            "FTF": 0.5 * (1.0 - g),
+            "BPFO": 0.5 * self.balls * (1.0 - g),
+            "BPFI": 0.5 * self.balls * (1.0 + g),
+            "BSF": 0.5 * self.pitch_diameter / self.ball_diameter * (1.0 - g * g),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bearing(Part):
+    """What all bearings share.
+
+    Parameters
+    ----------
+    shaft : str
+    station : float or str, optional
+        Along the shaft, m; default: its middle.
+    on : str, optional
+        Housing or shaft that carries it, or "ground"; default: the housing if there is exactly one, else the ground.
+    on_station : float or str, optional
+        Of a bearing on a shaft, where on that, m; default: its middle.
+    rolling : RollingGeometry or mapping, optional
+        For the table of frequencies.
+    """
+
+    title: ClassVar[str] = "bearing"
+    units: ClassVar[Mapping[str, str]] = {"station": "length", "on_station": "length"}
+    kind: ClassVar[str] = "bearing"
+
+    shaft: str
+    station: Quantity = None
+    on: str | None = None
+    on_station: Quantity = None
+    rolling: Any = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.rolling, Mapping):
+            with told_of(f"{self.label}: rolling"):
+                object.__setattr__(self, "rolling", RollingGeometry(name=self.name, **self.rolling))
+
+    def holds(self, count: int) -> np.ndarray:
+        """Return what it holds of its point and the shaft's tilts, rows over (x, y, z, tilt x, tilt y).
+
+        Parameters
+        ----------
+        count : int
+            How many bearings of its kind the shaft has.
+        """
+        return np.eye(5)[:3]
+
+    def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
+        """Add the bearing to a mechanism.
+
+        Parameters
+        ----------
+        m : Mechanism
+        shaft, seat : Marker
+            Coinciding frames on the shaft and on what carries it, z along the axis.
+        role : str
+            Of an ideal bearing: the joint it is, so that several on a shaft are not redundant.
+        """
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdealBearing(Bearing):
+    """A joint. One on a shaft is revolute; of two the first is spherical (it locates), the second slides (inline)."""
+
+    kind: ClassVar[str] = "ideal"
+
+    def holds(self, count: int) -> np.ndarray:
+        return np.eye(5) if count == 1 else np.eye(5)[:3]
+
+    def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
+        m.joint(role, self.name, shaft, seat)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElasticBearing(Bearing):
+    """Linear springs and dampers in the seat's axes: K and C, 6 x 6, without stiffness against rotation.
+
+    Parameters
+    ----------
+    stiffness : sequence of 3 or of 6 x 6 floats
+        Along x, y, z (N/m), or the whole matrix in SI.
+    tilting : sequence of 2 floats
+        Stiffness against tilting about x and y, N m/rad.
+    damping : sequence of 3 or of 6 x 6 floats
+    damping_time : float or str
+        Instead of ``damping``: damping over stiffness, s. Rolling bearings have 0.25e-5 to 2.5e-5 s.
+    """
+
+    kind: ClassVar[str] = "elastic"
+    units: ClassVar[Mapping[str, str]] = {**Bearing.units, "damping_time": "time"}
+    not_negative: ClassVar[tuple[str, ...]] = ("damping_time",)
+
+    stiffness: Any = (1e8, 1e8, 1e8)
+    tilting: tuple[Quantity, Quantity] = (0.0, 0.0)
+    damping: Any = None
+    damping_time: Quantity = 1e-5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        k = self._matrix("stiffness", self.stiffness, "stiffness")
+        k[3, 3], k[4, 4] = k[3, 3] + float(self.tilting[0]), k[4, 4] + float(self.tilting[1])
+        require(not np.any(k[5]) and not np.any(k[:, 5]), f"{self.label}: stiffness resists rotation; leave it zero")
+        require(bool(np.any(k)), f"{self.label}: all stiffnesses are zero; give stiffness")
+        c = self.damping_time * k if self.damping is None else self._matrix("damping", self.damping, "damping")
+        object.__setattr__(self, "_matrices", (k, c))
+
+    def _matrix(self, field: str, value: Any, unit: str) -> np.ndarray:
+        if np.shape(value) == (6, 6):
+            return np.array(value, dtype=float)
+        require(np.shape(value) == (3,), f"{self.label}: {field} has shape {np.shape(value)}; give 3 numbers or 6 x 6")
+        return np.diag([*self._in_si(field, tuple(value), unit), 0.0, 0.0, 0.0])
+
+    def holds(self, count: int) -> np.ndarray:
+        return self.matrices[0][:5, :5]
+
+    @property
+    def matrices(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stiffness and damping, each 6 x 6, SI."""
+        return self.__dict__["_matrices"]
+
+    def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
+        k, c = self.matrices
+        m.field(self.name, shaft, seat, stiffness=k, damping=c)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClearanceBearing(Bearing):
+    """A journal with radial clearance in a bore: F = K delta^m + C S(delta) delta', never pulling.
+
+    Parameters
+    ----------
+    clearance : float or str
+        Radial, m: half the diametral clearance of catalogues.
+    stiffness : float or str
+        K, N/m^m.
+    exponent : float
+    damping : float or str
+        N s/m.
+    depth : float or str
+        Penetration at which the damping is fully on, m.
+    axial : bool
+        Whether the bearing also holds the shaft along the axis, as a joint.
+    """
+
+    kind: ClassVar[str] = "clearance"
+    units: ClassVar[Mapping[str, str]] = {
+        **Bearing.units, "clearance": "length", "damping": "damping", "depth": "length",
+    }  # fmt: skip
+    positive: ClassVar[tuple[str, ...]] = ("clearance", "depth")
+    not_negative: ClassVar[tuple[str, ...]] = ("damping",)
+
+    clearance: Quantity
+    stiffness: Quantity = 1e8
+    exponent: float = 1.0
+    damping: Quantity = 1e3
+    depth: Quantity = 1e-6
+    axial: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(self.exponent >= 1.0, f"{self.label}: exponent is {self.exponent}; give 1 or more")
+        k = self._in_si("stiffness", self.stiffness, f"N/m^{float(self.exponent)!r}" if self.exponent != 1 else "N/m")
+        object.__setattr__(self, "stiffness", k)
+        require(k > 0.0, f"{self.label}: stiffness is {k:g}; it must be positive")
+
+    def holds(self, count: int) -> np.ndarray:
+        return np.eye(5)[: 3 if self.axial else 2]
+
+    def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
+        reals = (self.clearance, self.stiffness, self.exponent, self.damping, self.depth)
+        m.add(ClearanceForce(self.name, shaft, seat, reals))
+        if self.axial:
+            m.joint("inplane", f"{self.name} axial", shaft, seat)
+
+
+@dataclass(eq=False, repr=False)
+class ClearanceForce(ForceElement):
+    """The force of a bore on a journal with clearance; ``reals`` as in `gearmbs.drivetrain.clearance_kernel`."""
+
+    reals: tuple[float, ...]
+
+    kind = "clearance bearing"
+    has_torque = False
+    diagnostics = (
+        Diagnostic("elastic_energy", "J", STORED),
+        Diagnostic("damping_power", "W", DISSIPATED),
+        Diagnostic("penetration", "m"),
+    )
+
+    def compiled(self) -> Compiled:
+        from gearmbs.drivetrain.clearance_kernel import WORK, clearance_bearing
+
+        return Compiled(clearance_bearing, reals=self.reals, scratch=WORK)
+
+    def __repr__(self) -> str:
+        return f"ClearanceForce({self.name!r}, {self.i.body.name!r} in {self.j.body.name!r})"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElementBearing(Bearing):
+    """Any force element between shaft and seat.
+
+    Parameters
+    ----------
+    element : callable
+        ``element(name, shaft_marker, seat_marker)`` returns a `gearmbs.mechanism.ForceElement`, or a list of them, for
+        instance a rolling bearing. The markers coincide at the start, z along the axis.
+    """
+
+    kind: ClassVar[str] = "element"
+
+    element: Callable[[str, Marker, Marker], Any]
+
+    def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
+        made = self.element(self.name, shaft, seat)
+        for one in made if isinstance(made, list | tuple) else (made,):
+            require(isinstance(one, ForceElement), f"{self.label}: element made {one!r}; return a ForceElement")
+            m.add(one)
+
+
+BEARINGS: dict[str, type[Bearing]] = {
+    kind.kind: kind for kind in (IdealBearing, ElasticBearing, ClearanceBearing, ElementBearing)
+}
+"""Bearings by their ``kind``; a further kind is one more entry."""

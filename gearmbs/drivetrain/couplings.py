@@ -1,0 +1,208 @@
+"""What joins two coaxial shafts: elastic clutches, torsional shafts, rigid couplings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from gearmbs.dae.equations.force_elements import Diagnostic
+from gearmbs.drivetrain.attached import Attached
+from gearmbs.drivetrain.errors import require
+from gearmbs.drivetrain.part import Part
+from gearmbs.drivetrain.torque_element import ACCOUNTS, ShaftTorque
+from gearmbs.units import Quantity
+
+TWIST = Diagnostic("twist", "rad")
+ROTATIONAL_STIFFNESS, ROTATIONAL_DAMPING = "N*m/rad", "N*m*s/rad"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coupling(Part):
+    """What all couplings share.
+
+    Parameters
+    ----------
+    first, second : str
+        Shafts; the twist is the angle of the second against the first.
+    stations : sequence of 2 floats, optional
+        Where it is on either, m; default: right end of the first, left end of the second. The shafts lie so that both
+        places meet.
+    """
+
+    title: ClassVar[str] = "coupling"
+    units: ClassVar[Mapping[str, str]] = {"stations": "length"}
+    kind: ClassVar[str] = "coupling"
+
+    first: str
+    second: str
+    stations: tuple[Quantity, Quantity] | None = None
+
+    @property
+    def tangent(self) -> float:
+        """Torsional stiffness at small twist, N m/rad; infinite for rigid couplings."""
+        return math.inf
+
+    @property
+    def tangent_damping(self) -> float:
+        """Torsional damping at small twist, N m s/rad."""
+        return 0.0
+
+    def add(self, at: Attached) -> None:
+        """Add the coupling to a mechanism: I on the second shaft, J on the first."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidCoupling(Coupling):
+    """A fixed joint."""
+
+    kind: ClassVar[str] = "rigid"
+
+    def add(self, at: Attached) -> None:
+        at.mechanism.fixed(self.name, at.i, at.j)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElasticClutch(Coupling):
+    """An elastic clutch: T = k_1 d + k_3 d^3, a second stage, damping, and a dead band in which it is silent.
+
+    The equations are those of `gearmbs.drivetrain.laws.couplings`.
+
+    Parameters
+    ----------
+    stiffness, cubic : float or str
+        k_1, N m/rad; k_3, N m/rad^3.
+    damping : float or str
+        N m s/rad; or give
+    relative_damping, damping_frequency : float, float or str
+        Relative damping psi, the part of the largest stored energy that a cycle loses, and the frequency it was
+        measured at (Hz): c = psi k_1 / (2 pi omega).
+    dead_band : float or str
+        Whole free angle b, rad. Beyond it a side that has let go never pulls.
+    depth : float or str
+        Angle behind the dead band at which the damping is fully on, rad.
+    second_stiffness, second_stage, transition : float or str
+        Stiffness of a second stage, twist at which it begins, and over which it comes in.
+    free_angle : float or str
+        Twist without load, rad; default: as the shafts are at the start.
+    """
+
+    kind: ClassVar[str] = "clutch"
+    units: ClassVar[Mapping[str, str]] = {
+        **Coupling.units, "stiffness": ROTATIONAL_STIFFNESS, "cubic": "N*m/rad^3", "damping": ROTATIONAL_DAMPING,
+        "damping_frequency": "frequency", "dead_band": "angle", "depth": "angle",
+        "second_stiffness": ROTATIONAL_STIFFNESS, "second_stage": "angle", "transition": "angle", "free_angle": "angle",
+    }  # fmt: skip
+    positive: ClassVar[tuple[str, ...]] = ("stiffness", "depth", "second_stiffness", "transition", "damping_frequency")
+    not_negative: ClassVar[tuple[str, ...]] = ("cubic", "damping", "dead_band", "second_stage")
+
+    stiffness: Quantity
+    cubic: Quantity = 0.0
+    damping: Quantity = None
+    relative_damping: float | None = None
+    damping_frequency: Quantity = None
+    dead_band: Quantity = 0.0
+    depth: Quantity = 1e-4
+    second_stiffness: Quantity = None
+    second_stage: Quantity = 0.0
+    transition: Quantity = 1e-3
+    free_angle: Quantity = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.relative_damping is None:
+            return
+        require(self.damping is None, f"{self.label}: give damping or relative_damping, not both")
+        require(
+            self.damping_frequency is not None,
+            f"{self.label}: relative_damping needs damping_frequency, at which it was measured (Hz)",
+        )
+        require(
+            0.0 <= self.relative_damping <= 6.3,
+            f"{self.label}: relative_damping is {self.relative_damping:g}; it is between 0 and 2 pi",
+        )
+
+    @property
+    def tangent(self) -> float:
+        return self.stiffness
+
+    @property
+    def tangent_damping(self) -> float:
+        if self.relative_damping is not None:
+            return self.relative_damping * self.stiffness / (4.0 * math.pi**2 * self.damping_frequency)
+        return self.damping or 0.0
+
+    def add(self, at: Attached) -> None:
+        more = 0.0 if self.second_stiffness is None else self.second_stiffness - self.stiffness
+        parameters = (
+            self.free_angle, self.stiffness, self.cubic, self.tangent_damping, 0.5 * self.dead_band, self.depth, more,
+            self.second_stage, self.transition,
+        )  # fmt: skip
+        at.mechanism.add(
+            ShaftTorque(
+                self.name, at.i, at.j, "couplings.clutch", parameters, counts_angle=True, told=(*ACCOUNTS, TWIST),
+                what="clutch",
+            )
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorsionalShaft(Coupling):
+    """A massless shaft that twists: k = G I_p / l of a solid or hollow circle, or a stiffness given.
+
+    Parameters
+    ----------
+    stiffness : float or str, optional
+        N m/rad; or give
+    length, diameter, bore : float or str
+        m.
+    shear_modulus : float or str
+        Pa.
+    damping_ratio : float or str
+        Damping over stiffness, s.
+    """
+
+    kind: ClassVar[str] = "shaft"
+    units: ClassVar[Mapping[str, str]] = {
+        **Coupling.units, "stiffness": ROTATIONAL_STIFFNESS, "length": "length", "diameter": "length", "bore": "length",
+        "shear_modulus": "pressure", "damping_ratio": "time",
+    }  # fmt: skip
+    positive: ClassVar[tuple[str, ...]] = ("stiffness", "length", "diameter", "shear_modulus")
+    not_negative: ClassVar[tuple[str, ...]] = ("bore", "damping_ratio")
+
+    stiffness: Quantity = None
+    length: Quantity = None
+    diameter: Quantity = None
+    bore: Quantity = 0.0
+    shear_modulus: Quantity = 8.02e10
+    damping_ratio: Quantity = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        sized = self.length is not None and self.diameter is not None
+        require((self.stiffness is None) == sized, f"{self.label}: give stiffness, or length and diameter")
+
+    @property
+    def tangent(self) -> float:
+        if self.stiffness is not None:
+            return self.stiffness
+        return self.shear_modulus * math.pi * (self.diameter**4 - self.bore**4) / (32.0 * self.length)
+
+    @property
+    def tangent_damping(self) -> float:
+        return self.damping_ratio * self.tangent
+
+    def add(self, at: Attached) -> None:
+        parameters = (0.0, self.tangent, 0.0, self.tangent_damping, 0.0, 1.0, 0.0, 0.0, 1.0)
+        at.mechanism.add(
+            ShaftTorque(
+                self.name, at.i, at.j, "couplings.clutch", parameters, counts_angle=True, told=(*ACCOUNTS, TWIST),
+                what="torsional shaft",
+            )
+        )  # fmt: skip
+
+
+COUPLINGS: dict[str, type[Coupling]] = {kind.kind: kind for kind in (RigidCoupling, ElasticClutch, TorsionalShaft)}
+"""Couplings by their ``kind``."""

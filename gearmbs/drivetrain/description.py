@@ -1,0 +1,280 @@
+"""Drivetrains as TOML files or nested tables.
+
+Each kind of part is a table of named tables::
+
+    name = "two stages"
+    running = true
+
+    [shafts.input]
+    length = "200 mm"
+    radius = "15 mm"
+
+    [wheels.z1]
+    shaft = "input"
+    teeth = 21
+    module = "3 mm"
+
+    [meshes."stage 1"]
+    driver = "z1"
+    driven = "z2"
+    backlash = "0.1 mm"
+    contact = { kind = "impact", stiffness = "2.9852e5 N/mm^1.3" }
+
+    [[meshes."stage 1".faults]]
+    kind = "broken tooth"
+    lost = 0.5
+
+    [bearings.a]
+    kind = "elastic"
+    shaft = "input"
+
+    [couplings.clutch]
+    kind = "clutch"
+
+    [drives.motor]
+    kind = "induction motor"
+
+    [loads.pump]
+    kind = "pump"
+
+    [sensors.laser]
+    kind = "laser"
+
+    [run]
+    duration = "1 s"
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from gearmbs.drivetrain.bearings import BEARINGS
+from gearmbs.drivetrain.couplings import COUPLINGS
+from gearmbs.drivetrain.drives import DRIVES
+from gearmbs.drivetrain.drivetrain import GROUPS, Drivetrain
+from gearmbs.drivetrain.errors import DrivetrainError, require, told_of
+from gearmbs.drivetrain.loads import LOADS
+from gearmbs.drivetrain.part import Part
+from gearmbs.drivetrain.parts import GearMesh, Housing, HousingMode, Mount, Shaft, Wheel
+from gearmbs.drivetrain.sensors import SENSORS
+from gearmbs.gears.pair import GearPair
+from gearmbs.gears.spec import GearSpec, Material
+from gearmbs.units import Quantity, to_si
+
+FaultReader = Callable[[Any], Any]
+"""Makes a fault of a table."""
+
+KINDS: dict[str, tuple[Mapping[str, type[Part]], str]] = {
+    "bearings": (BEARINGS, "ideal"),
+    "couplings": (COUPLINGS, "clutch"),
+    "drives": (DRIVES, "speed"),
+    "loads": (LOADS, "torque"),
+    "sensors": (SENSORS, "speed"),
+}
+"""Kinds of parts by group, and the kind of a part that names none."""
+
+PAIR_KEYS = tuple(
+    f.name for f in fields(GearPair) if f.init and f.name not in ("driver", "driven", "rotation", "torque")
+)
+GEAR_KEYS = tuple(f.name for f in fields(GearSpec) if f.init and f.name != "name")
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """How a drivetrain is simulated and recorded.
+
+    Parameters
+    ----------
+    settling, duration : float or str
+        Time between the run-up and the record, and the record's length, s.
+    tolerance : float
+        Local error allowed a step.
+    rate : float or str, optional
+        Of the record, Hz; default: at least twenty samples in the shortest mesh period, 12 800 Hz or more.
+    integrator : {"WSTIFF", "GSTIFF", "IDA"}
+    harmonics : int
+        Mesh harmonics in the record's table.
+    """
+
+    settling: Quantity = 0.05
+    duration: Quantity = 1.0
+    tolerance: float = 1e-7
+    rate: Quantity = None
+    integrator: str = "WSTIFF"
+    harmonics: int = 3
+
+    def __post_init__(self) -> None:
+        for name, unit in (("settling", "time"), ("duration", "time"), ("rate", "frequency")):
+            value = getattr(self, name)
+            if value is not None:
+                with told_of(f"run.{name}"):
+                    object.__setattr__(self, name, to_si(value, unit, f"run.{name}"))
+        require(self.duration > 0.0, f"run.duration is {self.duration:g} s; it must be positive")
+        require(self.settling >= 0.0, f"run.settling is {self.settling:g} s; it must not be negative")
+        require(self.integrator in ("WSTIFF", "GSTIFF", "IDA"),
+                f"run.integrator is {self.integrator!r}; choose WSTIFF, GSTIFF or IDA")  # fmt: skip
+        require(1e-12 <= self.tolerance <= 5e-6, f"run.tolerance is {self.tolerance:g}; give 1e-12 to 5e-6")
+        require(self.rate is None or self.rate > 0.0, f"run.rate is {self.rate} Hz; it must be positive")
+
+    def output_rate(self, train: Drivetrain) -> float:
+        """Return the rate of the record, Hz."""
+        if self.rate is not None:
+            return float(self.rate)
+        fastest = max((train.kinematics.mesh_frequency(m.name) for m in train.meshes), default=0.0)
+        return max(12800.0, 100.0 * math.ceil(20.0 * fastest / 100.0))
+
+
+@dataclass(frozen=True)
+class Description:
+    """A drivetrain and how it is run.
+
+    Attributes
+    ----------
+    train : Drivetrain
+    run : RunSettings
+    """
+
+    train: Drivetrain
+    run: RunSettings
+
+
+def is_description(data: Mapping[str, Any]) -> bool:
+    """Return whether a TOML file holds a drivetrain."""
+    return "shafts" in data
+
+
+def read_description(path: str | Path, fault: FaultReader | None = None) -> Description:
+    """Read a TOML file.
+
+    Parameters
+    ----------
+    path : path-like
+    fault : callable, optional
+        Makes a fault of a table, see `gearmbs.studies.tooth_fault`; without it a file cannot hold faults.
+
+    Raises
+    ------
+    DrivetrainError
+        One line that names the file, the part, the key, the value and the remedy.
+    """
+    path = Path(path)
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise DrivetrainError(f"{path}: cannot be read ({error.strerror or error})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DrivetrainError(f"{path}: not a valid TOML file ({error})") from error
+    data.setdefault("name", path.stem)
+    return make_description(data, str(path), fault)
+
+
+def make_description(
+    data: Mapping[str, Any], source: str = "drivetrain", fault: FaultReader | None = None
+) -> Description:
+    """Return the drivetrain that nested tables describe; see `gearmbs.drivetrain.description` for their form."""
+    try:
+        return _made(data, fault)
+    except ValueError as error:
+        raise DrivetrainError(f"{source}: {error}") from error
+
+
+def _made(data: Mapping[str, Any], fault: FaultReader | None) -> Description:
+    known = ("name", "gravity", "run_up", "running", "run", *GROUPS)
+    _check_keys("the file", data, known)
+    parts: dict[str, Any] = {}
+    for group in GROUPS:
+        tables = data.get(group, {})
+        require(isinstance(tables, Mapping), f"{group}: write a table for each, such as [{group}.a]")
+        parts[group] = [_part(group, str(name), table, fault) for name, table in tables.items()]
+    others: dict[str, Any] = {key: data[key] for key in ("name", "running") if key in data}
+    if "gravity" in data:
+        others["gravity"] = tuple(to_si(g, "acceleration", "gravity") for g in data["gravity"])
+    if "run_up" in data:
+        others["run_up"] = to_si(data["run_up"], "time", "run_up")
+    run = data.get("run", {})
+    _check_keys("[run]", run, [f.name for f in fields(RunSettings)])
+    return Description(Drivetrain(**parts, **others), RunSettings(**run))
+
+
+def _check_keys(where: str, table: Mapping[str, Any], known: Any) -> None:
+    for key in table:
+        if key not in known:
+            near = difflib.get_close_matches(key, list(known), n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known ones are {', '.join(known)}"
+            raise DrivetrainError(f"{where}: unknown key {key!r}; {hint}")
+
+
+def _part(group: str, name: str, table: Any, fault: FaultReader | None) -> Part:
+    where = f"{group}.{name}"
+    require(isinstance(table, Mapping), f"{where}: write a table, such as [{where}]")
+    given = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
+    if group == "wheels":
+        return _wheel(where, name, given)
+    if group == "meshes":
+        return _mesh(where, name, given, fault)
+    if group == "housings":
+        return _housing(where, name, given)
+    if group == "shafts":
+        return _of_kind(where, Shaft, name, given)
+    kinds, usual = KINDS[group]
+    kind = str(given.pop("kind", usual))
+    if kind not in kinds:
+        raise DrivetrainError(f"{where}: kind {kind!r} is unknown; choose one of {', '.join(kinds)}")
+    return _of_kind(where, kinds[kind], name, given)
+
+
+def _of_kind(where: str, kind: type[Part], name: str, given: Mapping[str, Any]) -> Any:
+    _check_keys(where, given, [f.name for f in fields(kind) if f.init and f.name != "name"])
+    with told_of(where):
+        try:
+            return kind(name=name, **given)
+        except TypeError as error:
+            missing = str(error).partition("argument")[2].lstrip("s: ")
+            raise DrivetrainError(f"{where}: {missing} is missing") from None
+
+
+def _wheel(where: str, name: str, given: dict[str, Any]) -> Wheel:
+    own: dict[str, Any] = {key: given.pop(key) for key in ("shaft", "station", "angle") if key in given}
+    material = {key: given.pop(key) for key in ("density", "youngs_modulus", "poisson_ratio") if key in given}
+    _check_keys(where, given, ["shaft", "station", "angle", *GEAR_KEYS, "tip_radius", "root_radius"])
+    for key in ("teeth", "module"):
+        require(key in given, f"{where}: {key} is missing")
+    with told_of(where):
+        if material:
+            given["material"] = Material(**material)
+        radii = [key for key in ("tip_radius", "root_radius") if key in given]
+        if radii:
+            require(len(radii) == 2, f"{where}: give tip_radius and root_radius, or addendum and dedendum")
+            gear = GearSpec.from_radii(name=name, **given)
+        else:
+            gear = GearSpec(name=name, **given)
+    return _of_kind(where, Wheel, name, {**own, "gear": gear})
+
+
+def _mesh(where: str, name: str, given: dict[str, Any], fault: FaultReader | None) -> GearMesh:
+    own: dict[str, Any] = {key: given.pop(key) for key in ("driver", "driven", "direction", "phase") if key in given}
+    _check_keys(where, given, ["driver", "driven", "direction", "phase", *PAIR_KEYS, "stiffness"])
+    if "faults" in given:
+        require(fault is not None, f"{where}: faults cannot be read here; run the file with gearmbs run")
+        assert fault is not None
+        with told_of(f"{where}.faults"):
+            given["faults"] = tuple(fault(table) for table in given["faults"])
+    return _of_kind(where, GearMesh, name, {**own, "settings": given})
+
+
+def _housing(where: str, name: str, given: dict[str, Any]) -> Housing:
+    for key, kind in (("mounts", Mount), ("modes", HousingMode)):
+        tables = given.pop(key, {})
+        require(isinstance(tables, Mapping), f"{where}.{key}: write a table for each, such as [{where}.{key}.a]")
+        made = []
+        for part, table in tables.items():
+            fitted = {k: tuple(v) if isinstance(v, list) else v for k, v in table.items()}
+            made.append(_of_kind(f"{where}.{key}.{part}", kind, f"{name} {part}", fitted))
+        given[key] = tuple(made)
+    return _of_kind(where, Housing, name, given)

@@ -1,0 +1,356 @@
+"""What turns a drivetrain: prescribed speed, torque, induction motors, motors by curve, speed control."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gearmbs.dae.equations import constraint_terms as terms
+from gearmbs.dae.equations.force_elements import Diagnostic
+from gearmbs.drivetrain.attached import Attached, over_time, share_of
+from gearmbs.drivetrain.curves import slopes
+from gearmbs.drivetrain.errors import DrivetrainError, require
+from gearmbs.drivetrain.part import Part
+from gearmbs.drivetrain.torque_element import FROM_OWN, ShaftTorque
+from gearmbs.mechanism.elements import State
+from gearmbs.mechanism.functions import as_function, constant, ramp, step
+from gearmbs.mechanism.joints import Joint, Row, Term
+from gearmbs.units import Quantity
+
+SLIP = (Diagnostic("slip", "1"),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive(Part):
+    """What all drives share.
+
+    Parameters
+    ----------
+    shaft : str
+    speed : float or str
+        Operating speed, rad/s or text such as "1450 rpm"; negative about -z. The speeds of all other shafts follow.
+    station : float or str, optional
+        Along the shaft, m; default: its left end.
+    on : str, optional
+        Housing or shaft that takes the reaction; default the ground.
+    """
+
+    title: ClassVar[str] = "drive"
+    units: ClassVar[Mapping[str, str]] = {"speed": "angular speed", "station": "length"}
+    kind: ClassVar[str] = "drive"
+
+    shaft: str
+    speed: Quantity
+    station: Quantity = None
+    on: str | None = None
+
+    def add(self, at: Attached) -> None:
+        """Add the drive to a mechanism."""
+        raise NotImplementedError
+
+    def damping(self) -> float:
+        """Return the drive's torsional damping at the operating point, -dT/dw, N m s/rad."""
+        return 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedDrive(Drive):
+    """A prescribed rotation, which reaches ``speed`` after the run-up.
+
+    Parameters
+    ----------
+    function : TimeFunction or str, optional
+        The rotation itself, rad, in place of the run-up and the speed.
+    """
+
+    kind: ClassVar[str] = "speed"
+    function: Any = None
+
+    def add(self, at: Attached) -> None:
+        if self.function is not None:
+            turned = as_function(self.function, "rad", self.label)
+        else:
+            turned = ramp(at.speed, over=0.0 if at.running else at.run_up)
+        row = Row("angle", (Term(terms.ROTATION, at.i, at.j),), None, turned)
+        at.mechanism.joints[self.name] = Joint(self.name, "rotation", at.i, at.j, [row])
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueDrive(Drive):
+    """A torque over time about the sense of rotation; ``speed`` is where the shafts start, or are expected.
+
+    Parameters
+    ----------
+    torque : float, str or TimeFunction
+        N m; a number is switched on over the run-up.
+    """
+
+    kind: ClassVar[str] = "torque"
+    torque: Any = 0.0
+
+    def add(self, at: Attached) -> None:
+        given = over_time(self.torque, "torque", self.label, at)
+        parameters = (at.sense, 0.0, 2.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0)
+        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "loads.table", parameters, times=(given,), what="torque"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class InductionMotor(Drive):
+    """An induction motor by Kloss's formula, from its name plate.
+
+    With the rated slip s_n = 1 - w_n/w_s and l = T_b/T_n the breakdown slip is s_b = s_n (l + sqrt(l^2 - 1)), and
+    T = 2 T_b / (s/s_b + s_b/s).
+
+    Parameters
+    ----------
+    power : float or str
+        Rated, W.
+    poles : int
+    frequency : float or str
+        Of the supply, Hz.
+    breakdown : float
+        Breakdown torque over rated torque, l > 1.
+    lag : bool or float or str
+        Electrical lag of the torque: False; True for 1/(s_b w_e), with w_e = 2 pi times the supply's frequency; or s.
+    speed : float or str
+        Rated.
+    """
+
+    kind: ClassVar[str] = "induction motor"
+    units: ClassVar[Mapping[str, str]] = {**Drive.units, "power": "power", "frequency": "frequency"}
+    positive: ClassVar[tuple[str, ...]] = ("power", "frequency")
+
+    power: Quantity
+    poles: int = 4
+    frequency: Quantity = 50.0
+    breakdown: float = 2.5
+    lag: Any = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(
+            isinstance(self.poles, int) and self.poles >= 2 and self.poles % 2 == 0,
+            f"{self.label}: poles is {self.poles!r}; give an even number of 2 or more",
+        )
+        require(
+            self.breakdown > 1.0, f"{self.label}: breakdown is {self.breakdown:g}; give more than 1 (rated torques)"
+        )
+        require(
+            0.0 < self.rated_slip < 1.0,
+            f"{self.label}: speed is {abs(self.speed) * 30 / math.pi:.6g} rpm; the synchronous speed is "
+            f"{self.synchronous * 30 / math.pi:.6g} rpm, and a motor turns a little slower",
+        )
+
+    @property
+    def synchronous(self) -> float:
+        """Synchronous speed w_s, rad/s."""
+        return 4.0 * math.pi * self.frequency / self.poles
+
+    @property
+    def rated_slip(self) -> float:
+        """s_n."""
+        return 1.0 - abs(self.speed) / self.synchronous
+
+    @property
+    def rated_torque(self) -> float:
+        """T_n = P/w_n, N m."""
+        return self.power / abs(self.speed)
+
+    @property
+    def breakdown_torque(self) -> float:
+        """T_b, N m."""
+        return self.breakdown * self.rated_torque
+
+    @property
+    def breakdown_slip(self) -> float:
+        """s_b."""
+        return self.rated_slip * (self.breakdown + math.sqrt(self.breakdown**2 - 1.0))
+
+    @property
+    def lag_time(self) -> float:
+        """Time constant of the electrical lag, s; 0 without."""
+        if self.lag is True:
+            return 1.0 / (self.breakdown_slip * 2.0 * math.pi * self.frequency)
+        return 0.0 if self.lag is False else self._in_si("lag", self.lag, "time")
+
+    def torque(self, speed: float) -> float:
+        """Return Kloss's torque at a speed (rad/s), N m."""
+        s = 1.0 - speed / self.synchronous
+        return 2.0 * self.breakdown_torque * s * self.breakdown_slip / (s**2 + self.breakdown_slip**2)
+
+    def damping(self) -> float:
+        s, sb = self.rated_slip, self.breakdown_slip
+        return 2.0 * self.breakdown_torque * sb * (sb**2 - s**2) / (s**2 + sb**2) ** 2 / self.synchronous
+
+    def _law(self) -> tuple[str, tuple[float, ...]]:
+        return "motors.kloss", (self.breakdown_torque, self.breakdown_slip)
+
+    def add(self, at: Attached) -> None:
+        law, numbers = self._law()
+        lag = self.lag_time
+        start = self.torque(abs(at.speed)) if at.running else 0.0
+        states = (State(f"{self.name}.torque", start=start),) if lag > 0.0 else ()
+        on = share_of(at)
+        at.mechanism.add(
+            ShaftTorque(
+                self.name, at.i, at.j, law, (at.sense, self.synchronous, lag, *numbers), times=(on,),
+                own_states=states, told=SLIP, first_told=FROM_OWN, what="motor",
+            )
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class CircuitMotor(InductionMotor):
+    """An induction motor by its equivalent circuit, T = n p U^2 R_2 s / (w_e [(R_1 s + R_2)^2 + X^2 s^2]).
+
+    With a magnetising reactance, stator and supply are replaced by their Thevenin equivalent. ``power`` and
+    ``breakdown`` have no meaning here.
+
+    Parameters
+    ----------
+    voltage : float
+        Of a phase, V (RMS).
+    phases : int
+    stator_resistance, rotor_resistance, stator_reactance, rotor_reactance : float
+        R_1, R_2, X_1, X_2 at the supply's frequency, referred to the stator, ohm.
+    magnetising_reactance : float, optional
+        X_m, ohm; default: none.
+    """
+
+    kind: ClassVar[str] = "circuit motor"
+
+    power: Quantity = 1.0
+    voltage: float = 230.0
+    phases: int = 3
+    stator_resistance: float = 0.0
+    rotor_resistance: float = 1.0
+    stator_reactance: float = 0.0
+    rotor_reactance: float = 1.0
+    magnetising_reactance: float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for field in ("voltage", "rotor_resistance", "rotor_reactance"):
+            value = getattr(self, field)
+            require(value > 0.0, f"{self.label}: {field} is {value:g}; it must be positive")
+
+    @property
+    def equivalent(self) -> tuple[float, float, float, float]:
+        """A (V^2 s/rad), R_1, R_2 and X of the circuit as the rotor sees it."""
+        supply, source = complex(self.voltage), complex(self.stator_resistance, self.stator_reactance)
+        if self.magnetising_reactance is not None:
+            branch = 1j * self.magnetising_reactance
+            supply, source = supply * branch / (source + branch), source * branch / (source + branch)
+        gain = self.phases * 0.5 * self.poles * abs(supply) ** 2 / (2.0 * math.pi * self.frequency)
+        return gain, source.real, self.rotor_resistance, source.imag + self.rotor_reactance
+
+    @property
+    def breakdown_slip(self) -> float:
+        _, r1, r2, x = self.equivalent
+        return r2 / math.hypot(r1, x)
+
+    @property
+    def breakdown_torque(self) -> float:
+        return self.torque(self.synchronous * (1.0 - self.breakdown_slip))
+
+    @property
+    def rated_torque(self) -> float:
+        return self.torque(abs(self.speed))
+
+    def torque(self, speed: float) -> float:
+        """Return the circuit's torque at a speed (rad/s), N m."""
+        gain, r1, r2, x = self.equivalent
+        s = 1.0 - speed / self.synchronous
+        return gain * r2 * s / ((r1 * s + r2) ** 2 + (x * s) ** 2)
+
+    def damping(self) -> float:
+        gain, r1, r2, x = self.equivalent
+        s = self.rated_slip
+        size = (r1 * s + r2) ** 2 + (x * s) ** 2
+        return gain * r2 * (r2**2 - (r1**2 + x**2) * s**2) / size**2 / self.synchronous
+
+    def _law(self) -> tuple[str, tuple[float, ...]]:
+        return "motors.circuit", self.equivalent
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurveMotor(Drive):
+    """A motor by its torque over speed: a monotone cubic through points.
+
+    Parameters
+    ----------
+    speeds, torques : sequence of float or str
+        Increasing speeds (rad/s) about the sense of rotation, and torques (N m). Beyond its ends the curve goes on
+        along its tangents.
+    """
+
+    kind: ClassVar[str] = "curve"
+    units: ClassVar[Mapping[str, str]] = {**Drive.units, "speeds": "angular speed", "torques": "torque"}
+
+    speeds: Sequence[Quantity]
+    torques: Sequence[Quantity]
+
+    def add(self, at: Attached) -> None:
+        on = share_of(at)
+        points = slopes(self.label, self.speeds, self.torques)
+        parameters = np.concatenate([[at.sense, 0.0, len(points[0])], *points])
+        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "loads.table", parameters, times=(on,), what="motor"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControlledDrive(Drive):
+    """A drive whose controller holds a speed: proportional and integral, with a largest torque.
+
+    Parameters
+    ----------
+    proportional, integral : float
+        k_p, N m s/rad; k_i, N m/rad.
+    largest : float or str
+        N m.
+    reference : TimeFunction or str, optional
+        Speed asked for over time, rad/s about the sense of rotation; default: ``speed`` after the run-up.
+    """
+
+    kind: ClassVar[str] = "controlled"
+    units: ClassVar[Mapping[str, str]] = {**Drive.units, "largest": "torque"}
+    positive: ClassVar[tuple[str, ...]] = ("largest",)
+
+    proportional: float
+    integral: float
+    largest: Quantity
+    reference: Any = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for field in ("proportional", "integral"):
+            value = getattr(self, field)
+            if not value > 0.0:
+                raise DrivetrainError(f"{self.label}: {field} is {value:g}; it must be positive")
+
+    def damping(self) -> float:
+        return self.proportional
+
+    def add(self, at: Attached) -> None:
+        size = abs(at.speed)
+        if self.reference is not None:
+            wanted = as_function(self.reference, "angular speed", self.label)
+        else:
+            wanted = constant(size) if at.running else step(0.0, 0.0, at.run_up, size)
+        at.mechanism.add(
+            ShaftTorque(
+                self.name, at.i, at.j, "motors.controller",
+                (at.sense, self.proportional, self.integral, self.largest), times=(wanted,),
+                own_states=(State(f"{self.name}.integral"),), told=(Diagnostic("speed_error", "rad/s"),),
+                first_told=FROM_OWN, what="motor",
+            )
+        )  # fmt: skip
+
+
+DRIVES: dict[str, type[Drive]] = {
+    kind.kind: kind for kind in (SpeedDrive, TorqueDrive, InductionMotor, CircuitMotor, CurveMotor, ControlledDrive)
+}
+"""Drives by their ``kind``."""

@@ -1,0 +1,262 @@
+"""The drivetrain: shafts, wheels, meshes, bearings, couplings, housings, drives, loads and sensors by name."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+
+from gearmbs.drivetrain.bearings import Bearing
+from gearmbs.drivetrain.couplings import Coupling
+from gearmbs.drivetrain.drives import Drive
+from gearmbs.drivetrain.errors import DrivetrainError, require
+from gearmbs.drivetrain.loads import Load
+from gearmbs.drivetrain.part import Part
+from gearmbs.drivetrain.parts import GearMesh, Housing, Shaft, Wheel
+from gearmbs.drivetrain.sensors import Sensor
+
+if TYPE_CHECKING:
+    from gearmbs.drivetrain.kinematics import KinematicTable
+    from gearmbs.drivetrain.placement import Layout
+    from gearmbs.drivetrain.power import PowerFlow
+    from gearmbs.drivetrain.torsional import TorsionalModel
+    from gearmbs.gears.spec import GearSpec
+    from gearmbs.mechanism.mechanism import Mechanism
+
+P = TypeVar("P", bound=Part)
+
+GROUPS = ("shafts", "wheels", "meshes", "bearings", "couplings", "housings", "drives", "loads", "sensors")
+
+
+@dataclass(frozen=True)
+class Drivetrain:
+    """Shafts, the wheels on them, and all that holds, turns and loads them; see `gearmbs.drivetrain`.
+
+    Every part has a name. Where shafts are, how wheels are turned at the start, which way and how fast everything
+    turns and which flanks drive follows from the meshes, couplings, drives and loads. All of it is checked when the
+    drivetrain is made, before anything is compiled.
+
+    Parameters
+    ----------
+    name : str
+    shafts, wheels, meshes, bearings, couplings, housings, drives, loads, sensors : sequence
+        The parts.
+    gravity : sequence of 3 floats
+        m/s^2, global components.
+    run_up : float
+        Duration of the STEP over which speeds and loads come on, s.
+    running : bool
+        Whether the shafts turn at their operating speeds from the start; else from rest.
+
+    Raises
+    ------
+    DrivetrainError
+        For a part of an unknown or doubtful name, chains that do not close, wheels that do not mesh or run through
+        shafts or other wheels, two speeds for one shaft, loads that nothing drives, shafts that nothing holds.
+
+    Examples
+    --------
+    >>> from gearmbs.drivetrain import (
+    ...     Drivetrain, GearMesh, IdealBearing, Shaft, SpeedDrive, TorqueLoad, Wheel,
+    ... )
+    >>> from gearmbs.gears import GearSpec
+    >>> train = Drivetrain(
+    ...     "one stage",
+    ...     shafts=[Shaft(name="in"), Shaft(name="out")],
+    ...     wheels=[
+    ...         Wheel(name="pinion", shaft="in", gear=GearSpec(20, "3 mm")),
+    ...         Wheel(name="gear", shaft="out", gear=GearSpec(60, "3 mm")),
+    ...     ],
+    ...     meshes=[GearMesh(name="stage", driver="pinion", driven="gear", settings={"backlash": "0.1 mm"})],
+    ...     bearings=[IdealBearing(name="a", shaft="in"), IdealBearing(name="b", shaft="out")],
+    ...     drives=[SpeedDrive(name="motor", shaft="in", speed="1500 rpm")],
+    ...     loads=[TorqueLoad(name="brake", shaft="out", torque="300 N m")],
+    ... )
+    >>> round(train.kinematics.mesh_frequency("stage"), 6)
+    500.0
+    """
+
+    name: str = "drivetrain"
+    shafts: Sequence[Shaft] = ()
+    wheels: Sequence[Wheel] = ()
+    meshes: Sequence[GearMesh] = ()
+    bearings: Sequence[Bearing] = ()
+    couplings: Sequence[Coupling] = ()
+    housings: Sequence[Housing] = ()
+    drives: Sequence[Drive] = ()
+    loads: Sequence[Load] = ()
+    sensors: Sequence[Sensor] = ()
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    run_up: float = 0.05
+    running: bool = False
+    parts: Mapping[str, Part] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        known: dict[str, Part] = {}
+        for group in GROUPS:
+            object.__setattr__(self, group, tuple(getattr(self, group)))
+            for part in getattr(self, group):
+                require(
+                    isinstance(part, KINDS[group]),
+                    f"{self.name}: {group} holds {part!r}; give objects of {KINDS[group].__name__}",
+                )
+                require(
+                    part.name not in known and part.name != "ground",
+                    f"{part.label}: the name is in use; choose another",
+                )
+                known[part.name] = part
+        object.__setattr__(self, "parts", known)
+        require(self.run_up > 0.0, f"{self.name}: run_up is {self.run_up:g} s; it must be positive")
+        from gearmbs.drivetrain.checks import check
+
+        check(self)
+
+    def with_parts(self, *parts: Part) -> Drivetrain:
+        """Return a drivetrain with these parts; parts whose names are there take the place of those."""
+        groups: dict[str, Any] = {group: list(getattr(self, group)) for group in GROUPS}
+        for part in parts:
+            group = next((g for g in GROUPS if isinstance(part, KINDS[g])), None)
+            require(group is not None, f"{part!r} is no part of a drivetrain")
+            assert group is not None
+            names = [p.name for p in groups[group]]
+            if part.name in names:
+                groups[group][names.index(part.name)] = part
+            else:
+                groups[group].append(part)
+        return replace(self, **groups)
+
+    def changed(self, name: str, **fields: Any) -> Drivetrain:
+        """Return a drivetrain with fields of one part changed; of a mesh, ``settings`` are merged."""
+        part: Part = self.part(name)
+        if isinstance(part, GearMesh) and "settings" in fields:
+            fields["settings"] = {**part.settings, **fields["settings"]}
+        return self.with_parts(replace(part, **fields))
+
+    # --- access by name -----------------------------------------------------------------------------
+
+    def part(self, name: str, kind: type[P] | None = None, asked_by: str = "") -> P:
+        """Return the part of a name.
+
+        Raises
+        ------
+        DrivetrainError
+            If there is none, or it is of another kind.
+        """
+        found = self.parts.get(name)
+        if found is None or (kind is not None and not isinstance(found, kind)):
+            names = [n for n, p in self.parts.items() if kind is None or isinstance(p, kind)]
+            near = difflib.get_close_matches(str(name), names, n=1)
+            hint = f"did you mean '{near[0]}'?" if near else f"known ones are {', '.join(names) or 'none'}"
+            what = "part" if kind is None else kind.title
+            raise DrivetrainError(f"{asked_by or self.name}: there is no {what} '{name}'; {hint}")
+        return found  # type: ignore[return-value]
+
+    def wheels_of(self, mesh: str | GearMesh) -> tuple[Wheel, Wheel]:
+        """Return driver and driven wheel of a mesh."""
+        one = self.part(mesh, GearMesh) if isinstance(mesh, str) else mesh
+        return self.part(one.driver, Wheel, one.label), self.part(one.driven, Wheel, one.label)
+
+    def station(self, part: Any, default: Literal["left", "middle", "right"] = "middle") -> float:
+        """Return the station of a part on its shaft, m."""
+        if part.station is not None:
+            return part.station
+        length = self.part(part.shaft, Shaft, part.label).length
+        return {"left": 0.0, "middle": 0.5 * length, "right": length}[default]
+
+    def carrier(self, part: Any, default: str | None = None) -> str:
+        """Return the name of what carries a bearing or takes a reaction: a housing, a shaft or "ground"."""
+        if part.on is not None:
+            return part.on
+        if default is not None:
+            return default
+        return self.housings[0].name if len(self.housings) == 1 else "ground"
+
+    # --- what follows -------------------------------------------------------------------------------
+
+    @cached_property
+    def speeds(self) -> dict[str, float]:
+        """Operating speed of each shaft about its own z axis, rad/s; zero for those that nothing drives."""
+        from gearmbs.drivetrain.power import operating_speeds
+
+        return operating_speeds(self)
+
+    @cached_property
+    def power(self) -> PowerFlow:
+        """Torques that the meshes and couplings transmit at the operating point, and who pushes."""
+        from gearmbs.drivetrain.power import power_flow
+
+        return power_flow(self)
+
+    @cached_property
+    def pairs(self) -> dict[str, Any]:
+        """The pair of each mesh, by name, with its drive flank and torque."""
+        out = {}
+        for mesh in self.meshes:
+            driver, driven = self.wheels_of(mesh)
+            sense = self.power.rotation(mesh.name)
+            out[mesh.name] = mesh.make(driver.gear, driven.gear, sense, self.power.on_driven(mesh.name))
+        return out
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Where the shafts are and how they are turned at the start, flanks touching."""
+        from gearmbs.drivetrain.placement import assembled
+
+        return assembled(self)
+
+    @cached_property
+    def kinematics(self) -> KinematicTable:
+        """Speeds, mesh, shaft, hunting-tooth and bearing frequencies, and expected sidebands."""
+        from gearmbs.drivetrain.kinematics import KinematicTable
+
+        return KinematicTable(self)
+
+    def torsional(self) -> TorsionalModel:
+        """Return the chain of inertias and torsional springs of this drivetrain: rigid bodies that only turn."""
+        from gearmbs.drivetrain.torsional import torsional_model
+
+        return torsional_model(self)
+
+    def build(self) -> Mechanism:
+        """Return the drivetrain as an ordinary mechanism, to which anything may be added.
+
+        Returns
+        -------
+        Mechanism
+            A body for each shaft (with its wheels) and housing, under its name; a marker for each wheel; joints and
+            force elements under the names of bearings, couplings, meshes, drives and loads.
+        """
+        from gearmbs.drivetrain.build import build
+
+        return build(self)
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> Drivetrain:
+        """Read a drivetrain from a TOML file; see `gearmbs.drivetrain.description`."""
+        from gearmbs.drivetrain.description import read_description
+
+        return read_description(path).train
+
+    @property
+    def rate_scale(self) -> float:
+        """Angular frequency of interest, the fastest mesh or else shaft, rad/s: for ``simulate(rate_scale=...)``."""
+        teeth: list[tuple[str, GearSpec]] = [(w.shaft, w.gear) for w in self.wheels]
+        fastest = [abs(self.speeds[shaft]) * gear.teeth for shaft, gear in teeth]
+        return max([1.0, *(fastest or map(abs, self.speeds.values()))])
+
+    def _repr_html_(self) -> str:
+        return self.kinematics.to_html()
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{len(getattr(self, g))} {g}" for g in GROUPS if getattr(self, g))
+        return f"Drivetrain({self.name!r}: {counts})"
+
+
+KINDS: dict[str, type[Part]] = {
+    "shafts": Shaft, "wheels": Wheel, "meshes": GearMesh, "bearings": Bearing, "couplings": Coupling,
+    "housings": Housing, "drives": Drive, "loads": Load, "sensors": Sensor,
+}  # fmt: skip
+"""What each group holds."""

@@ -1,0 +1,352 @@
+"""What a drivetrain works against: torques, displacement pumps, brakes, fans, drag, tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gearmbs.dae.equations.force_elements import DISSIPATED, Diagnostic
+from gearmbs.drivetrain.attached import Attached, fixed_value, over_time, share_of
+from gearmbs.drivetrain.curves import slopes
+from gearmbs.drivetrain.errors import require
+from gearmbs.drivetrain.part import Part
+from gearmbs.drivetrain.torque_element import FROM_LOST, FROM_OWN, ShaftTorque
+from gearmbs.mechanism.elements import State
+from gearmbs.mechanism.functions import TimeFunction, as_function, constant
+from gearmbs.units import Quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load(Part):
+    """What all loads share.
+
+    Parameters
+    ----------
+    shaft : str
+    station : float or str, optional
+        Along the shaft, m; default: its right end.
+    on : str, optional
+        Housing or shaft that takes the reaction; default the ground.
+    """
+
+    title: ClassVar[str] = "load"
+    units: ClassVar[Mapping[str, str]] = {"station": "length"}
+    kind: ClassVar[str] = "load"
+
+    shaft: str
+    station: Quantity = None
+    on: str | None = None
+
+    def nominal(self, speed: float) -> float:
+        """Return the torque that resists at the operating speed (rad/s, not negative), N m."""
+        raise NotImplementedError
+
+    def add(self, at: Attached) -> None:
+        """Add the load to a mechanism."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueLoad(Load):
+    """A torque against the sense of rotation.
+
+    Parameters
+    ----------
+    torque : float, str or TimeFunction
+        N m; a number is switched on over the run-up, an expression of TIME is taken as it is.
+    """
+
+    kind: ClassVar[str] = "torque"
+    torque: Any
+
+    def nominal(self, speed: float) -> float:
+        return fixed_value(self.torque, "torque") or 0.0
+
+    def add(self, at: Attached) -> None:
+        given = over_time(self.torque, "torque", self.label, at)
+        parameters = (at.sense, 0.0, 2.0, 0.0, 1.0, -1.0, -1.0, 0.0, 0.0)
+        at.mechanism.add(ShaftTorque(self.name, at.i, at.j, "loads.table", parameters, times=(given,), what="load"))
+
+
+def gear_pump_ripple(teeth: int, pressure_angle: Quantity = "20 deg", addendum: float = 1.0) -> tuple[float, float]:
+    """Return the non-uniformity of an external gear pump of two equal wheels, and the parabola's part of the mean.
+
+    With u along the line of action from the pitch point, one pair delivering at a time (relief at half a base pitch),
+    the delivery is proportional to r_a^2 - r_p^2 - u^2 for |u| <= p_b/2.
+
+    Returns
+    -------
+    nonuniformity : float
+        (max - min)/mean = h^2/(Q - h^2/3), h = p_b/2, Q = r_a^2 - r_p^2.
+    factor : float
+        The harmonics of the mean are a_k = factor (-1)^(k+1)/k^2.
+
+    References
+    ----------
+    N. D. Manring, S. B. Kasaragadda, The theoretical flow ripple of an external gear pump, ASME J. Dyn. Syst. Meas.
+    Control 125 (2003) 396-404.
+
+    Examples
+    --------
+    >>> nonuniformity, factor = gear_pump_ripple(10)
+    >>> round(nonuniformity, 4)
+    0.2121
+    """
+    from gearmbs.units import to_si
+
+    alpha = to_si(pressure_angle, "angle", "pressure_angle")
+    # in modules
+    room = (0.5 * teeth + addendum) ** 2 - (0.5 * teeth) ** 2
+    half = 0.5 * math.pi * math.cos(alpha)
+    mean = room - half**2 / 3.0
+    require(mean > 0.0, f"pump: {teeth} teeth with addendum {addendum:g} deliver nothing; give a larger addendum")
+    return half**2 / mean, 4.0 * half**2 / (math.pi**2 * mean)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pump(Load):
+    """A displacement pump: T = (V_g dp / 2 pi) / eta [1 + ripple] + T_0 + c w.
+
+    Parameters
+    ----------
+    displacement : float or str
+        V_g a revolution, m^3 or text such as "157.1 cm^3".
+    pressure : float, str or TimeFunction
+        Pressure difference dp, Pa or "5 MPa"; a number is switched on over the run-up.
+    efficiency : float
+        Hydraulic-mechanical.
+    idle, viscous : float or str
+        T_0 (N m) and c (N m s/rad).
+    teeth : int
+        Displacement cycles a turn, Z; 0: no ripple.
+    ripple : sequence of float, optional
+        a_1, a_2, ... of the mean; default: `harmonics` of the ideal external gear pump of ``teeth``.
+    harmonics : int
+    lag : float or str
+        Time constant with which the pressure follows, s; the state ``name.pressure`` is in MPa.
+    start : float or str
+        Angle at which the ripple's cosines begin, rad.
+    """
+
+    kind: ClassVar[str] = "pump"
+    units: ClassVar[Mapping[str, str]] = {
+        **Load.units, "displacement": "m^3", "idle": "torque", "viscous": "N*m*s/rad", "lag": "time", "start": "angle"
+    }  # fmt: skip
+    positive: ClassVar[tuple[str, ...]] = ("displacement",)
+    not_negative: ClassVar[tuple[str, ...]] = ("idle", "viscous", "lag")
+
+    displacement: Quantity
+    pressure: Any
+    efficiency: float = 1.0
+    idle: Quantity = 0.0
+    viscous: Quantity = 0.0
+    teeth: int = 0
+    ripple: Sequence[float] | None = None
+    harmonics: int = 4
+    lag: Quantity = 0.0
+    start: Quantity = 0.0
+    smoothing: float = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(0.0 < self.efficiency <= 1.0, f"{self.label}: efficiency is {self.efficiency:g}; give above 0, up to 1")
+
+    @property
+    def per_pressure(self) -> float:
+        """Displacement a radian, V_g / 2 pi, m^3."""
+        return self.displacement / (2.0 * math.pi)
+
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """Harmonics a_k of the ripple, of the mean."""
+        if self.ripple is not None:
+            return tuple(self.ripple)
+        if not self.teeth:
+            return ()
+        _, factor = gear_pump_ripple(self.teeth)
+        return tuple(factor * (-1) ** (k + 1) / k**2 for k in range(1, self.harmonics + 1))
+
+    def torque(self, pressure: float, speed: float) -> float:
+        """Return the mean torque at a pressure difference (Pa) and speed (rad/s), N m."""
+        return self.per_pressure * pressure / self.efficiency + self.idle + self.viscous * speed
+
+    def nominal(self, speed: float) -> float:
+        return self.torque(fixed_value(self.pressure, "pressure") or 0.0, speed)
+
+    def add(self, at: Attached) -> None:
+        pressure = over_time(self.pressure, "pressure", self.label, at)
+        states = (State(f"{self.name}.pressure"),) if self.lag > 0.0 else ()
+        parameters = (
+            at.sense, self.per_pressure, self.idle, self.viscous, self.smoothing, float(self.teeth), self.start,
+            self.lag, self.efficiency, *self.factors,
+        )  # fmt: skip
+        at.mechanism.add(
+            ShaftTorque(
+                self.name, at.i, at.j, "loads.pump", parameters, times=(pressure,), counts_angle=bool(self.factors),
+                own_states=states, told=(Diagnostic("flow", "m^3/s"),), first_told=FROM_OWN, what="pump",
+            )
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Brake(Load):
+    """A dry brake: T = T_b f(t) tanh(w/w_0).
+
+    Parameters
+    ----------
+    torque : float or str
+        T_b, N m.
+    share : float, str or TimeFunction
+        f(t); a number is switched on over the run-up.
+    smoothing : float or str
+        w_0, rad/s.
+    """
+
+    kind: ClassVar[str] = "brake"
+    units: ClassVar[Mapping[str, str]] = {**Load.units, "torque": "torque", "smoothing": "angular speed"}
+    positive: ClassVar[tuple[str, ...]] = ("smoothing",)
+    not_negative: ClassVar[tuple[str, ...]] = ("torque",)
+
+    torque: Quantity
+    share: Any = 1.0
+    smoothing: Quantity = 0.1
+
+    def nominal(self, speed: float) -> float:
+        share = fixed_value(self.share, "dimensionless")
+        return self.torque * (1.0 if share is None else share) * math.tanh(speed / self.smoothing)
+
+    def add(self, at: Attached) -> None:
+        share = over_time(self.share, "dimensionless", self.label, at)
+        _resist(self.name, at, share, self.torque, 0.0, 0.0, self.smoothing)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fan(Load):
+    """A fan or a ship's propeller: T = T_n (w/w_n)^2.
+
+    Parameters
+    ----------
+    torque, at_speed : float or str
+        T_n (N m) and w_n (rad/s).
+    """
+
+    kind: ClassVar[str] = "fan"
+    units: ClassVar[Mapping[str, str]] = {**Load.units, "torque": "torque", "at_speed": "angular speed"}
+    positive: ClassVar[tuple[str, ...]] = ("torque", "at_speed")
+
+    torque: Quantity
+    at_speed: Quantity
+
+    def nominal(self, speed: float) -> float:
+        return self.torque * (speed / self.at_speed) ** 2
+
+    def add(self, at: Attached) -> None:
+        _resist(self.name, at, constant(1.0), 0.0, 0.0, self.torque / self.at_speed**2, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drag(Load):
+    """Drag of bearings, seals and oil: T = T_0 tanh(w/w_0) + c w, against the shaft or housing it is ``on``.
+
+    Parameters
+    ----------
+    torque, viscous : float or str
+        T_0 (N m), c (N m s/rad).
+    smoothing : float or str
+        w_0, rad/s.
+    """
+
+    kind: ClassVar[str] = "drag"
+    units: ClassVar[Mapping[str, str]] = {
+        **Load.units, "torque": "torque", "viscous": "N*m*s/rad", "smoothing": "angular speed"
+    }  # fmt: skip
+    positive: ClassVar[tuple[str, ...]] = ("smoothing",)
+    not_negative: ClassVar[tuple[str, ...]] = ("torque", "viscous")
+
+    torque: Quantity = 0.0
+    viscous: Quantity = 0.0
+    smoothing: Quantity = 0.1
+
+    def nominal(self, speed: float) -> float:
+        return self.torque * math.tanh(speed / self.smoothing) + self.viscous * speed
+
+    def add(self, at: Attached) -> None:
+        _resist(self.name, at, constant(1.0), self.torque, self.viscous, 0.0, self.smoothing)
+
+
+def _resist(
+    name: str, at: Attached, share: TimeFunction, dry: float, viscous: float, square: float, smoothing: float
+) -> None:
+    told = (Diagnostic("damping_power", "W", DISSIPATED),)
+    parameters = (dry, viscous, square, smoothing)
+    at.mechanism.add(
+        ShaftTorque(
+            name, at.i, at.j, "loads.resistance", parameters, times=(share,), told=told, first_told=FROM_LOST,
+            what="load",
+        )
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableLoad(Load):
+    """A load by points over speed, angle or time.
+
+    Parameters
+    ----------
+    over : {"speed", "angle", "time"}
+        Speed: a monotone cubic; angle: the periodic spline over one turn; time: ADAMS's CUBSPL.
+    places : sequence of float or str
+        rad/s, rad or s; increasing.
+    torques : sequence of float or str
+        Torques that resist, N m.
+    """
+
+    kind: ClassVar[str] = "table"
+
+    over: str
+    places: Sequence[Quantity]
+    torques: Sequence[Quantity]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        units = {"speed": "angular speed", "angle": "angle", "time": "time"}
+        require(self.over in units, f"{self.label}: over is {self.over!r}; choose one of {', '.join(units)}")
+        object.__setattr__(self, "places", self._in_si("places", tuple(self.places), units[self.over]))
+        object.__setattr__(self, "torques", self._in_si("torques", tuple(self.torques), "torque"))
+        least = 4 if self.over == "time" else 2
+        require(
+            len(self.places) == len(self.torques) >= least,
+            f"{self.label}: {len(self.places)} places and {len(self.torques)} torques; give as many of both, "
+            f"{least} or more",
+        )
+
+    def nominal(self, speed: float) -> float:
+        if self.over == "speed":
+            return float(np.interp(speed, self.places, self.torques))
+        return float(np.mean(self.torques))
+
+    def add(self, at: Attached) -> None:
+        if self.over == "time":
+            at.mechanism.spline(f"{self.name}.table", self.places, self.torques)
+            given = as_function(f"CUBSPL(TIME, 0, '{self.name}.table', 0)", "torque", self.label)
+            parameters: Any = (at.sense, 0.0, 2.0, 0.0, 1.0, -1.0, -1.0, 0.0, 0.0)
+            times = (given,)
+        else:
+            period = 2.0 * math.pi if self.over == "angle" else 0.0
+            x, y, m = slopes(self.label, self.places, self.torques, period)
+            parameters = np.concatenate([[at.sense, period, x.size], x, -y, -m])
+            times = (share_of(at),)
+        at.mechanism.add(
+            ShaftTorque(
+                self.name, at.i, at.j, "loads.table", parameters, times=times, counts_angle=self.over == "angle",
+                what="load",
+            )
+        )  # fmt: skip
+
+
+LOADS: dict[str, type[Load]] = {kind.kind: kind for kind in (TorqueLoad, Pump, Brake, Fan, Drag, TableLoad)}
+"""Loads by their ``kind``."""

@@ -1,0 +1,296 @@
+"""Shafts, wheels, meshes, housings and their mounts, by name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gearmbs.drivetrain.errors import require, told_of
+from gearmbs.drivetrain.part import Part
+from gearmbs.gears.laws import ContactLaw, FlankFriction
+from gearmbs.gears.pair import GearPair
+from gearmbs.gears.spec import GearSpec
+from gearmbs.units import Quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shaft(Part):
+    """A rigid shaft: a cylinder, sections one after the other, or a rotor given by its numbers.
+
+    Stations are measured from its left end, along its axis.
+
+    Parameters
+    ----------
+    length, radius : float or str
+        m. A solid cylinder.
+    sections : sequence of (length, radius), optional
+        Instead: cylinders from left to right, m.
+    density : float or str
+        kg/m^3.
+    mass, inertia : float or str, optional
+        kg, and moment of inertia about the axis, kg m^2: take the place of the cylinder's.
+    position : sequence of 3 floats, optional
+        Left end in global components, m. Only one shaft of each connected group needs a place; those of the others
+        follow from meshes, couplings and bearings, and where given they are checked.
+    angle : float or str
+        At the start, about its axis, rad; of a shaft that others follow.
+
+    Raises
+    ------
+    DrivetrainError
+    """
+
+    title: ClassVar[str] = "shaft"
+    units: ClassVar[Mapping[str, str]] = {
+        "length": "length", "radius": "length", "density": "density", "mass": "mass", "inertia": "inertia",
+        "angle": "angle", "position": "length",
+    }  # fmt: skip
+    positive: ClassVar[tuple[str, ...]] = ("length", "radius", "density", "mass", "inertia")
+
+    length: Quantity = None
+    radius: Quantity = 0.015
+    sections: tuple[tuple[Quantity, Quantity], ...] | None = None
+    density: Quantity = 7850.0
+    mass: Quantity = None
+    inertia: Quantity = None
+    position: tuple[Quantity, Quantity, Quantity] | None = None
+    angle: Quantity = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.sections is not None:
+            require(self.length is None, f"{self.label}: give length or sections, not both")
+            require(len(self.sections) > 0, f"{self.label}: sections is empty; give pairs of length and radius")
+            cut = tuple(self._in_si("sections", pair, "length") for pair in self.sections)
+            for pair in cut:
+                require(
+                    len(pair) == 2 and min(pair) > 0.0,
+                    f"{self.label}: sections has {pair}; give pairs of a positive length and radius",
+                )
+            object.__setattr__(self, "sections", cut)
+            object.__setattr__(self, "length", math.fsum(pair[0] for pair in cut))
+        elif self.length is None:
+            object.__setattr__(self, "length", 0.2)
+        if self.position is not None:
+            require(len(self.position) == 3, f"{self.label}: position is {self.position}; give three lengths")
+
+    @property
+    def cylinders(self) -> tuple[tuple[float, float], ...]:
+        """Lengths and radii from left to right, m."""
+        return self.sections if self.sections is not None else ((self.length, self.radius),)
+
+    def body(self) -> tuple[float, float, float, float]:
+        """Return mass (kg), place of the centre of mass along the axis (m), moments along and across the axis."""
+        z, m, moment, polar, across = 0.0, 0.0, 0.0, 0.0, 0.0
+        for length, radius in self.cylinders:
+            part = self.density * math.pi * radius**2 * length
+            middle = z + 0.5 * length
+            m += part
+            moment += part * middle
+            polar += 0.5 * part * radius**2
+            across += part * ((3.0 * radius**2 + length**2) / 12.0 + middle**2)
+            z += length
+        centre = moment / m
+        across -= m * centre**2
+        if self.mass is not None:
+            polar, across, m = polar * self.mass / m, across * self.mass / m, self.mass
+        if self.inertia is not None:
+            # no body has less across than half of what it has along, and a rod adds to it
+            across = max(across, 0.5 * self.inertia)
+            polar = self.inertia
+        return m, centre, polar, across
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wheel(Part):
+    """A toothed wheel on a shaft.
+
+    Parameters
+    ----------
+    shaft : str
+    gear : GearSpec
+    station : float or str, optional
+        Mid-face along the shaft, m; default: the shaft's middle.
+    angle : float or str, optional
+        Assembly angle of tooth 0 against the shaft's x axis, rad; default 0, or what a mesh's ``phase`` or a closed
+        chain asks for.
+    """
+
+    title: ClassVar[str] = "wheel"
+    units: ClassVar[Mapping[str, str]] = {"station": "length", "angle": "angle"}
+
+    shaft: str
+    gear: GearSpec
+    station: Quantity = None
+    angle: Quantity = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(isinstance(self.gear, GearSpec), f"{self.label}: gear is {self.gear!r}; give a GearSpec")
+
+
+@dataclass(frozen=True, kw_only=True)
+class GearMesh(Part):
+    """Two wheels in mesh.
+
+    Parameters
+    ----------
+    driver, driven : str
+        The wheels. Names only: which one pushes follows from the drives and loads.
+    direction : float or str
+        Of the line from the driver's to the driven wheel's centre, in the transverse plane of the driver's shaft from
+        its x direction at angle zero, rad.
+    phase : float, optional
+        Where the driver's tooth 0 is at the start, in pitches past the line of centres; sets the driver's assembly
+        angle. Two meshes whose phases differ by a half have their first mesh harmonics in opposition.
+    settings : mapping
+        Keywords of `gearmbs.gears.GearPair`: backlash, contact, friction, misalignment, centre_distance_error, faults,
+        slices, ...; ``contact`` may be a table with ``kind``, and ``stiffness`` "iso" or "potential-energy".
+    pair : type, optional
+        What is made of the two wheels, ``pair(driver, driven, **settings)``; default `GearPair`.
+    """
+
+    title: ClassVar[str] = "mesh"
+    units: ClassVar[Mapping[str, str]] = {"direction": "angle"}
+
+    driver: str
+    driven: str
+    direction: Quantity = 0.0
+    phase: float | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)  # type: ignore[assignment]
+    pair: Any = None
+
+    def make(self, driver: GearSpec, driven: GearSpec, rotation: Any, torque: float) -> Any:
+        """Return the pair of the two wheels for a sense of the driver and a torque on the driven wheel (N m)."""
+        with told_of(self.label):
+            given = dict(self.settings)
+            if "contact" in given:
+                given["contact"] = contact_law(given["contact"])
+            if "friction" in given:
+                given["friction"] = flank_friction(given["friction"])
+            stiffness = given.pop("stiffness", None)
+            pair = (self.pair or GearPair)(driver, driven, rotation=rotation, torque=abs(torque), **given)
+            if stiffness == "iso":
+                return pair.with_iso_stiffness(damping=given.get("damping", 0.0))
+            if stiffness == "potential-energy":
+                return pair.with_potential_energy_stiffness()
+            require(
+                stiffness is None, f"{self.label}: stiffness is {stiffness!r}; choose 'iso' or 'potential-energy', "
+                "or give contact"
+            )  # fmt: skip
+            return pair
+
+
+def contact_law(value: Any) -> ContactLaw:
+    """Return the law that a table such as ``{"kind": "linear", "stiffness": "3e8 N/m"}`` stands for, or a law itself.
+
+    Raises
+    ------
+    ValueError
+        For an unknown kind.
+    """
+    if isinstance(value, ContactLaw):
+        return value
+    table = dict(value)
+    kinds: dict[str, Any] = {
+        "impact": ContactLaw.impact, "hunt-crossley": ContactLaw.hunt_crossley, "linear": ContactLaw.linear,
+        "hertz": ContactLaw.hertz_line,
+    }  # fmt: skip
+    kind = table.pop("kind", "impact")
+    require(kind in kinds, f"contact.kind is {kind!r}; choose one of {', '.join(kinds)}")
+    return kinds[kind](**table)
+
+
+def flank_friction(value: Any) -> FlankFriction:
+    """Return the friction that a table, False (none), or a friction itself stands for."""
+    if isinstance(value, FlankFriction):
+        return value
+    return FlankFriction.none() if value is False else FlankFriction(**dict(value))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mount(Part):
+    """An elastic mount between a housing and the ground.
+
+    Parameters
+    ----------
+    at : sequence of 3 floats
+        Place in global components, m.
+    stiffness, damping : sequence of 3 floats
+        Along the global axes, N/m and N s/m.
+    """
+
+    title: ClassVar[str] = "mount"
+    units: ClassVar[Mapping[str, str]] = {"at": "length", "stiffness": "stiffness", "damping": "damping"}
+    not_negative: ClassVar[tuple[str, ...]] = ("stiffness", "damping")
+
+    at: tuple[Quantity, Quantity, Quantity]
+    stiffness: tuple[Quantity, Quantity, Quantity]
+    damping: tuple[Quantity, Quantity, Quantity] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class HousingMode(Part):
+    """A structural mode of a housing by its modal mass and stiffness, and how the bearing seats move in it.
+
+    Parameters
+    ----------
+    mass, stiffness : float or str
+        Modal mass (kg) and stiffness (N/m) for a displacement of one metre at shape 1.
+    damping_ratio : float
+        Of critical damping.
+    shape : mapping of str to 3 floats
+        Displacement of bearing seats and sensors, by name, in global components at the start; others stay.
+    """
+
+    title: ClassVar[str] = "mode"
+    units: ClassVar[Mapping[str, str]] = {"mass": "mass", "stiffness": "stiffness"}
+    positive: ClassVar[tuple[str, ...]] = ("mass", "stiffness")
+
+    mass: Quantity
+    stiffness: Quantity
+    shape: Mapping[str, tuple[float, float, float]]
+    damping_ratio: float = 0.02
+
+    @property
+    def frequency(self) -> float:
+        """Natural frequency with the housing held, Hz."""
+        return math.sqrt(self.stiffness / self.mass) / (2.0 * math.pi)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Housing(Part):
+    """A housing on mounts, rigid or with structural modes.
+
+    Parameters
+    ----------
+    mass : float or str
+        kg.
+    inertia : sequence of 3 floats
+        About the centre of mass in global axes, kg m^2.
+    at : sequence of 3 floats
+        Centre of mass in global components, m.
+    mounts : sequence of Mount
+        None: fixed to the ground.
+    modes : sequence of HousingMode
+    """
+
+    title: ClassVar[str] = "housing"
+    units: ClassVar[Mapping[str, str]] = {"mass": "mass", "inertia": "inertia", "at": "length"}
+    positive: ClassVar[tuple[str, ...]] = ("mass", "inertia")
+
+    mass: Quantity
+    inertia: tuple[Quantity, Quantity, Quantity]
+    at: tuple[Quantity, Quantity, Quantity] = (0.0, 0.0, 0.0)
+    mounts: tuple[Mount, ...] = ()
+    modes: tuple[HousingMode, ...] = ()
+
+
+def turn_z(angle: float) -> np.ndarray:
+    """Return the rotation about z by an angle, shape (3, 3)."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -1,0 +1,295 @@
+"""Where shafts are, and how they are turned at the start.
+
+A shaft has a left end O, a frame A_0 that does not turn (z along the axis) and an angle phi about it. With D = A_0
+turned about z by a mesh's direction, the mate's wheel is at D r and tilted by D T, where r and T are those of the pair
+in its own frame (x from the driver's to the driven wheel's centre). Coaxial shafts share A_0 and phi.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from gearmbs.drivetrain.errors import DrivetrainError, require
+from gearmbs.drivetrain.parts import GearMesh, Shaft, Wheel, turn_z
+
+if TYPE_CHECKING:
+    from gearmbs.drivetrain.drivetrain import Drivetrain
+
+CLOSED = 1e-6
+"""Largest distance between what two ways round a closed chain give, m, and angle, rad."""
+ANGLE_STEPS = 30
+MM = 1e3
+
+
+class Seat(NamedTuple):
+    """Place of a shaft: left end, and the frame that does not turn."""
+
+    origin: np.ndarray
+    axes: np.ndarray
+
+    def at(self, station: float) -> np.ndarray:
+        """Return the point of the axis at a station."""
+        return self.origin + station * self.axes[:, 2]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Places and starting angles of shafts and wheels.
+
+    Attributes
+    ----------
+    seats : dict of str to Seat
+    angles : dict of str to float
+        Of shafts about their axes, rad.
+    wheels : dict of str to float
+        Assembly angle of each wheel against its shaft, rad.
+    directions : dict of str to float
+        Of each mesh, from the driver's A_0, rad.
+    """
+
+    seats: dict[str, Seat]
+    angles: dict[str, float]
+    wheels: dict[str, float]
+    directions: dict[str, float]
+
+    def wheel_angle(self, wheel: Wheel) -> float:
+        """Return the angle of a wheel's tooth 0 from x of its shaft's frame that does not turn, rad."""
+        return self.angles[wheel.shaft] + self.wheels[wheel.name]
+
+
+class Tie(NamedTuple):
+    """Something that places one shaft by another: a mesh, or what makes them coaxial."""
+
+    name: str
+    first: str
+    second: str
+    mesh: GearMesh | None
+    stations: tuple[float, float]
+
+
+def ties(train: Drivetrain) -> list[Tie]:
+    """Return what places shafts by each other: couplings, bearings on shafts, then meshes."""
+    out = []
+    for coupling in train.couplings:
+        one, two = (train.part(name, Shaft, coupling.label) for name in (coupling.first, coupling.second))
+        stations = coupling.stations or (one.length, 0.0)
+        out.append(Tie(coupling.name, one.name, two.name, None, (stations[0], stations[1])))
+    for bearing in train.bearings:
+        if bearing.on is not None and isinstance(train.parts.get(bearing.on), Shaft):
+            station = train.station(bearing)
+            carrier = train.part(bearing.on, Shaft)
+            place = 0.5 * carrier.length if bearing.on_station is None else bearing.on_station
+            out.append(Tie(bearing.name, carrier.name, bearing.shaft, None, (place, station)))
+    for mesh in train.meshes:
+        driver, driven = train.wheels_of(mesh)
+        out.append(Tie(mesh.name, driver.shaft, driven.shaft, mesh, (train.station(driver), train.station(driven))))
+    return out
+
+
+def order(train: Drivetrain) -> Iterator[tuple[Tie, bool, bool]]:
+    """Yield ties from placed shafts outwards: the tie, whether it leads from its first shaft, and to a new one."""
+    waiting = ties(train)
+    placed: set[str] = set()
+    drives = [drive.shaft for drive in train.drives]
+    given = [shaft.name for shaft in train.shafts if shaft.position is not None]
+    # a shaft with a place is a beginning, and where none has one that of the drive
+    for root in [*given[:1], *drives, *(shaft.name for shaft in train.shafts)]:
+        if root in placed:
+            continue
+        placed.add(root)
+        while True:
+            tie = next((t for t in waiting if t.first in placed or t.second in placed), None)
+            if tie is None:
+                break
+            waiting.remove(tie)
+            forward = tie.first in placed
+            second = tie.second if forward else tie.first
+            new = second not in placed
+            placed.add(second)
+            yield tie, forward, new
+
+
+def seats(train: Drivetrain, pairs: dict[str, Any]) -> tuple[dict[str, Seat], dict[str, float]]:
+    """Return the places of all shafts and the directions of all meshes.
+
+    Raises
+    ------
+    DrivetrainError
+        If a closed chain or two given places do not agree with a mesh or coupling.
+    """
+    out: dict[str, Seat] = {}
+    directions: dict[str, float] = {}
+    for shaft in train.shafts:
+        if shaft.position is not None:
+            out[shaft.name] = Seat(np.array(shaft.position, dtype=float), np.eye(3))
+    steps = list(order(train))
+    followers = {(tie.second if forward else tie.first) for tie, forward, new in steps if new}
+    for shaft in train.shafts:
+        if shaft.name not in followers and shaft.name not in out:
+            out[shaft.name] = Seat(np.zeros(3), np.eye(3))
+    for tie, forward, _ in steps:
+        here, there = (tie.first, tie.second) if forward else (tie.second, tie.first)
+        if tie.mesh is None:
+            _place_coaxial(train, tie, forward, here, there, out)
+            continue
+        geometry = pairs[tie.name].geometry
+        direction = tie.mesh.direction
+        if there in out:
+            direction = _direction_between(train, tie, out)
+        directions[tie.name] = direction
+        found = _by_mesh(tie, forward, out[here], direction, geometry)
+        known = out.get(there)
+        if known is None:
+            out[there] = found
+        else:
+            _check_closed(train, tie, known, found, geometry, forward)
+    return out, directions
+
+
+def _place_coaxial(train: Drivetrain, tie: Tie, forward: bool, here: str, there: str, out: dict[str, Seat]) -> None:
+    mine, theirs = tie.stations if forward else tie.stations[::-1]
+    point = out[here].at(mine)
+    known = out.get(there)
+    if known is None:
+        out[there] = Seat(point - theirs * out[here].axes[:, 2], out[here].axes)
+        return
+    gap = known.at(theirs) - point
+    along = float(gap @ out[here].axes[:, 2])
+    across = float(np.linalg.norm(gap - along * out[here].axes[:, 2]))
+    require(
+        across <= CLOSED and float(np.linalg.norm(known.axes[:, 2] - out[here].axes[:, 2])) <= CLOSED,
+        f"{train.parts[tie.name].label}: shafts '{tie.first}' and '{tie.second}' are not coaxial: their axes are "
+        f"{MM * across:.4g} mm apart; change their places or the meshes between them",
+    )
+
+
+def _direction_between(train: Drivetrain, tie: Tie, out: dict[str, Seat]) -> float:
+    """Return the direction of a mesh between two shafts that have their places."""
+    one, two = out[tie.first], out[tie.second]
+    apart = one.axes.T @ (two.at(tie.stations[1]) - one.at(tie.stations[0]))
+    return math.atan2(apart[1], apart[0])
+
+
+def _by_mesh(tie: Tie, forward: bool, here: Seat, direction: float, geometry: Any) -> Seat:
+    """Return the place a mesh gives the other shaft."""
+    place = geometry.frames(0.0, 0.0)
+    turned, back = turn_z(direction), turn_z(-direction)
+    if forward:
+        axes = here.axes @ turned @ geometry.tilt @ back
+        wheel = here.at(tie.stations[0]) + here.axes @ turned @ place.origin_2
+        return Seat(wheel - tie.stations[1] * axes[:, 2], axes)
+    axes = here.axes @ turned @ geometry.tilt.T @ back
+    wheel = here.at(tie.stations[1]) - axes @ turned @ place.origin_2
+    return Seat(wheel - tie.stations[0] * axes[:, 2], axes)
+
+
+def _check_closed(train: Drivetrain, tie: Tie, known: Seat, found: Seat, geometry: Any, forward: bool) -> None:
+    gap = known.origin - found.origin
+    along = abs(float(gap @ found.axes[:, 2]))
+    across = float(np.linalg.norm(gap - (gap @ found.axes[:, 2]) * found.axes[:, 2]))
+    label = train.parts[tie.name].label
+    if across > CLOSED:
+        wanted = MM * geometry.centre_distance
+        raise DrivetrainError(
+            f"{label}: the chain does not close: the axes are {MM * across:.4g} mm away from the centre distance of "
+            f"{wanted:.6g} mm that its wheels need; move a shaft or give centre_distance_error"
+        )
+    require(
+        along <= CLOSED,
+        f"{label}: the wheels' faces are {MM * along:.4g} mm apart along the axis; change a station, or give "
+        "axial_shift",
+    )
+    require(
+        float(np.linalg.norm(known.axes[:, 2] - found.axes[:, 2])) <= CLOSED,
+        f"{label}: the axes of '{tie.first}' and '{tie.second}' are not as inclined as its misalignment says",
+    )
+
+
+def assembled(train: Drivetrain) -> Layout:
+    """Return the places and the starting angles at which all drive flanks just touch.
+
+    Raises
+    ------
+    DrivetrainError
+        If wheels whose angles are given overlap, or a phase cannot be had.
+    """
+    pairs = train.pairs
+    places, directions = seats(train, pairs)
+    wheels = {wheel.name: wheel.angle for wheel in train.wheels}
+    angles: dict[str, float] = {}
+    steps = list(order(train))
+    followers = {(tie.second if forward else tie.first) for tie, forward, new in steps if new}
+    for shaft in train.shafts:
+        if shaft.name not in followers:
+            angles[shaft.name] = shaft.angle
+    for tie, forward, new in steps:
+        here, there = (tie.first, tie.second) if forward else (tie.second, tie.first)
+        if tie.mesh is None:
+            angles.setdefault(there, angles[here])
+            continue
+        _turn(train, tie, forward, new, pairs[tie.name], directions[tie.name], angles, wheels)
+    return Layout(places, angles, {n: 0.0 if a is None else a for n, a in wheels.items()}, directions)
+
+
+def _turn(
+    train: Drivetrain, tie: Tie, forward: bool, new: bool, pair: Any, direction: float,
+    angles: dict[str, float], wheels: dict[str, float | None],
+) -> None:  # fmt: skip
+    """Turn the other shaft of a mesh, or a wheel on it, so that the drive flanks touch."""
+    mesh = tie.mesh
+    assert mesh is not None
+    driver, driven = train.wheels_of(mesh)
+    here, there = (driver, driven) if forward else (driven, driver)
+    pitch = 2.0 * math.pi / driver.gear.teeth
+    if mesh.phase is not None:
+        require(
+            forward and wheels[driver.name] is None,
+            f"{mesh.label}: phase turns wheel '{driver.name}' on its shaft, whose angle is given already; leave out "
+            "one of them",
+        )
+        wheels[driver.name] = _near_zero(direction + mesh.phase * pitch - angles[driver.shaft], pitch)
+    mine = wheels[here.name]
+    if mine is None:
+        mine = wheels[here.name] = 0.0
+    known = angles[here.shaft] + mine - direction
+    wanted = direction + (pair.driven_angle(known) if forward else _driver_angle(pair, known))
+    mate_pitch = 2.0 * math.pi / there.gear.teeth
+    if new:
+        own = wheels[there.name]
+        if own is None:
+            own = wheels[there.name] = 0.0
+        angles[there.shaft] = wanted - own
+        return
+    if wheels[there.name] is None:
+        wheels[there.name] = _near_zero(wanted - angles[there.shaft], mate_pitch)
+        return
+    own = wheels[there.name]
+    assert own is not None
+    off = _near_zero(angles[there.shaft] + own - wanted, mate_pitch)
+    free = pair.geometry.normal_backlash / there.gear.base_radius
+    require(
+        abs(off) <= free,
+        f"{mesh.label}: at the start its teeth overlap by {MM * (abs(off) - free) * there.gear.base_radius:.4g} mm: "
+        f"the chain is closed and the angles of its wheels are given; leave out the angle of wheel '{there.name}'",
+    )
+
+
+def _near_zero(angle: float, pitch: float) -> float:
+    return angle - pitch * round(angle / pitch)
+
+
+def _driver_angle(pair: Any, driven_angle: float) -> float:
+    """Return the driver's angle at which the driven wheel, at its angle, just touches."""
+    geometry = pair.geometry
+    angle = 0.0
+    for _ in range(ANGLE_STEPS):
+        off = driven_angle - pair.driven_angle(angle)
+        angle -= off * geometry.sign * geometry.driven.teeth / geometry.driver.teeth
+        if abs(off) < 1e-14 * max(1.0, abs(driven_angle)):
+            break
+    return angle

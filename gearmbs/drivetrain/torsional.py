@@ -1,0 +1,188 @@
+"""The torsional chain of a drivetrain: what it is when everything but rotation is rigid.
+
+M theta'' + C theta' + K theta = T, one angle a shaft. A coupling of stiffness k between shafts i and j adds k to the
+diagonal and -k beside it; a mesh of stiffness k along the line of action adds k g g^T with g = (r_b1, s r_b2) in the
+angles of its shafts, where s is 1 for external and -1 for internal pairs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.linalg
+
+from gearmbs.drivetrain.drives import SpeedDrive
+from gearmbs.drivetrain.errors import require
+
+if TYPE_CHECKING:
+    from gearmbs.drivetrain.drivetrain import Drivetrain
+
+
+@dataclass(frozen=True)
+class TorsionalSpring:
+    """A spring between two shafts: k (g . theta), with g from its two levers.
+
+    Attributes
+    ----------
+    name : str
+    shafts : tuple of int
+    levers : tuple of float
+        1 and -1 of a coupling; base radii of a mesh, m.
+    stiffness, damping : float
+        N m/rad and N m s/rad of a coupling, N/m and N s/m of a mesh.
+    backlash : float
+        Of a mesh along the line of action, or of a clutch its dead band, m or rad.
+    preload : float
+        Force or torque at the operating point.
+    """
+
+    name: str
+    shafts: tuple[int, int]
+    levers: tuple[float, float]
+    stiffness: float
+    damping: float = 0.0
+    backlash: float = 0.0
+    preload: float = 0.0
+
+    def row(self, size: int) -> np.ndarray:
+        """Return g, shape (shafts,)."""
+        g = np.zeros(size)
+        for shaft, lever in zip(self.shafts, self.levers, strict=True):
+            g[shaft] += lever
+        return g
+
+
+@dataclass(frozen=True)
+class TorsionalModel:
+    """Inertias and torsional springs; see `gearmbs.drivetrain.torsional` for the equations.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Shafts.
+    inertias : ndarray, shape (n,)
+        kg m^2.
+    springs : tuple of TorsionalSpring
+    ground : ndarray, shape (n,)
+        Torsional damping against the ground (of drives and loads), N m s/rad.
+    held : tuple of int
+        Shafts whose rotation is prescribed.
+    """
+
+    names: tuple[str, ...]
+    inertias: np.ndarray
+    springs: tuple[TorsionalSpring, ...]
+    ground: np.ndarray
+    held: tuple[int, ...] = field(default=())
+
+    def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return M, C and K, each (n, n)."""
+        n = len(self.names)
+        k, c = np.zeros((n, n)), np.diag(self.ground).astype(float)
+        for spring in self.springs:
+            g = spring.row(n)
+            k += spring.stiffness * np.outer(g, g)
+            c += spring.damping * np.outer(g, g)
+        return np.diag(self.inertias), c, k
+
+    def frequencies(self) -> np.ndarray:
+        """Return the undamped natural frequencies with prescribed shafts held, increasing, Hz."""
+        return self.modes()[0]
+
+    def modes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return natural frequencies (Hz) and shapes, columns scaled to a largest entry of 1."""
+        m, _, k = self.matrices()
+        free = [i for i in range(len(self.names)) if i not in self.held]
+        squares, vectors = scipy.linalg.eigh(k[np.ix_(free, free)], m[np.ix_(free, free)])
+        largest = np.abs(squares).max(initial=0.0)
+        squares[np.abs(squares) < 1e-10 * largest] = 0.0
+        shapes = np.zeros((len(self.names), len(free)))
+        shapes[free] = vectors / np.abs(vectors).max(axis=0)
+        return np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi), shapes
+
+    def response(self, frequency: np.ndarray, force: dict[str, complex]) -> np.ndarray:
+        """Return the complex amplitudes of the angles under harmonic torques, or motions of prescribed shafts.
+
+        Parameters
+        ----------
+        frequency : ndarray, shape (m,)
+            Hz.
+        force : dict of str to complex
+            Amplitude of the torque (N m) by shaft; of a prescribed shaft that of its angle (rad).
+
+        Returns
+        -------
+        ndarray of complex, shape (m, n)
+        """
+        m, c, k = self.matrices()
+        for name in force:
+            require(name in self.names, f"response: there is no shaft '{name}'; they are {', '.join(self.names)}")
+        held = list(self.held)
+        free = [i for i in range(len(self.names)) if i not in self.held]
+        given = np.array([complex(force.get(name, 0.0)) for name in self.names])
+        out = np.zeros((np.size(frequency), len(self.names)), dtype=complex)
+        for row, f in enumerate(np.atleast_1d(frequency)):
+            w = 2.0 * np.pi * f
+            dynamic = k + 1j * w * c - w * w * m
+            out[row, held] = given[held]
+            load = given[free] - dynamic[np.ix_(free, held)] @ given[held]
+            out[row, free] = np.linalg.solve(dynamic[np.ix_(free, free)], load)
+        return out
+
+    def __repr__(self) -> str:
+        shown = ", ".join(f"{f:.5g}" for f in self.frequencies())
+        return f"TorsionalModel({len(self.names)} inertias, {len(self.springs)} springs: {shown} Hz)"
+
+
+def torsional_model(train: Drivetrain) -> TorsionalModel:
+    """Return the torsional chain of a drivetrain; meshes have their mean stiffness at the operating torque.
+
+    The mean over a mesh cycle is the tangent stiffness of one tooth pair (of the law, under the force it has to carry)
+    times the contact ratio.
+    """
+    names = tuple(shaft.name for shaft in train.shafts)
+    inertias = np.array([shaft.body()[2] for shaft in train.shafts])
+    for wheel in train.wheels:
+        inertias[names.index(wheel.shaft)] += wheel.gear.inertia[2]
+    springs = []
+    for coupling in train.couplings:
+        shafts = names.index(coupling.first), names.index(coupling.second)
+        require(
+            coupling.kind != "rigid", f"{coupling.label}: a torsional chain needs an elastic coupling; make it a shaft"
+        )
+        springs.append(
+            TorsionalSpring(
+                coupling.name, shafts, (1.0, -1.0), coupling.tangent, coupling.tangent_damping,
+                getattr(coupling, "dead_band", 0.0), train.power.torques[coupling.name][1],
+            )
+        )  # fmt: skip
+    for mesh in train.meshes:
+        springs.append(_mesh_spring(train, mesh.name, names))
+    ground = np.zeros(len(names))
+    for drive in train.drives:
+        ground[names.index(drive.shaft)] += drive.damping()
+    held = tuple(sorted({names.index(d.shaft) for d in train.drives if isinstance(d, SpeedDrive)}))
+    return TorsionalModel(names, inertias, tuple(springs), ground, held)
+
+
+def _mesh_spring(train: Drivetrain, mesh: str, names: tuple[str, ...]) -> TorsionalSpring:
+    driver, driven = train.wheels_of(mesh)
+    pair = train.pairs[mesh]
+    geometry, law = pair.geometry, pair.contact_model
+    force = train.power.on_driven(mesh) / geometry.driven.base_radius
+    share = max(1.0, geometry.contact_ratio)
+    # at no load laws with an exponent have no stiffness; a linear one has it always
+    one = law.tangent_stiffness(force / share, 1) if force > 0.0 else law.law.stiffness
+    if law.law.exponent == 1.0:
+        one = law.law.stiffness
+    return TorsionalSpring(
+        mesh,
+        (names.index(driver.shaft), names.index(driven.shaft)),
+        (geometry.driver.base_radius, geometry.sign * geometry.driven.base_radius),
+        one * geometry.contact_ratio,
+        0.0,
+        max(0.0, geometry.normal_backlash),
+        force,
+    )

@@ -1,0 +1,109 @@
+"""Drivetrains from TOML files: the same as in Python, and what is refused."""
+
+import pytest
+
+from gearmbs.drivetrain import Drivetrain, DrivetrainError, read_description
+from tests.drivetrain.support import stage
+
+TEXT = """
+name = "one stage"
+
+[shafts.in]
+length = "100 mm"
+[shafts.out]
+length = "100 mm"
+
+[wheels.pinion]
+shaft = "in"
+teeth = 20
+module = "3 mm"
+[wheels.gear]
+shaft = "out"
+teeth = 60
+module = "3 mm"
+
+[meshes.mesh]
+driver = "pinion"
+driven = "gear"
+backlash = "0.1 mm"
+
+[bearings.a]
+shaft = "in"
+[bearings.b]
+kind = "elastic"
+shaft = "out"
+stiffness = [1e8, "100 kN/mm", 1e8]
+tilting = [1e5, 1e5]
+
+[drives.motor]
+shaft = "in"
+speed = "1500 rpm"
+
+[loads.brake]
+shaft = "out"
+torque = "300 N m"
+
+[housings.box]
+mass = "50 kg"
+inertia = [1, 1, 1]
+[housings.box.mounts.left]
+at = ["-100 mm", 0, 0]
+stiffness = [1e7, 1e7, 1e7]
+[housings.box.modes.panel]
+mass = 4
+stiffness = 4e7
+shape = { b = [0, 0, 1] }
+
+[sensors.seat]
+kind = "accelerometer"
+bearing = "b"
+
+[run]
+duration = "0.2 s"
+"""
+
+
+def written(tmp_path, text):
+    path = tmp_path / "train.toml"
+    path.write_text(text)
+    return path
+
+
+def test_file_says_the_same_as_python(tmp_path):
+    found = read_description(written(tmp_path, TEXT))
+    train, same = found.train, stage()
+    assert train.shafts == same.shafts
+    assert train.wheels == same.wheels
+    assert train.meshes == same.meshes
+    assert train.drives == same.drives
+    assert train.loads == same.loads
+    assert train.housings[0].mounts[0].at == (-0.1, 0.0, 0.0)
+    assert found.run.duration == 0.2
+    assert found.run.output_rate(train) == 12800.0
+    assert train.part("b").matrices[0][1, 1] == 1e8
+    assert Drivetrain.from_file(written(tmp_path, TEXT)).name == "one stage"
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ('shaft = "in"\nteeth', 'shft = "in"\nteeth', r"wheels.pinion: unknown key 'shft'; did you mean 'shaft'"),
+    ("teeth = 20\n", "", "wheels.pinion: teeth is missing"),
+    ('kind = "elastic"', 'kind = "soft"', "bearings.b: kind 'soft' is unknown; choose one of ideal, elastic"),
+    ('"1500 rpm"', '"1500 mm"', "drive 'motor': speed"),
+    ('speed = "1500 rpm"', "", "drives.motor: 'speed' is missing"),
+    ("[loads.brake]", "[load.brake]", "unknown key 'load'; did you mean 'loads'"),
+    ("backlash =", "faults = [1]\nbacklash =", "faults cannot be read here"),
+    ("teeth = 20", "teeth = 2", "wheels.pinion: .*teeth is 2"),
+    ('duration = "0.2 s"', "duration = -1", "run.duration is -1 s"),
+    ("mass = 4\n", "mass = -4\n", "mode 'box panel': mass is -4"),
+    ("[run]", "[run", "not a valid TOML file"),
+])  # fmt: skip
+def test_mistakes_are_named_in_one_line(tmp_path, old, new, words):
+    assert old in TEXT
+    with pytest.raises(DrivetrainError, match=words) as caught:
+        read_description(written(tmp_path, TEXT.replace(old, new, 1)))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_not_there():
+    with pytest.raises(DrivetrainError, match=r"nowhere\.toml: cannot be read"):
+        read_description("nowhere.toml")
