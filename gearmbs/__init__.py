@@ -11,6 +11,8 @@ Studies
     `Case`, `CaseError`, `load_case`, `make_case`, `run_case`, `run_cases`, `run_paper`, `record_signal`, `gear_rig`
 Gears
     `GearPair`, `GearSpec`, `Material`, `ContactLaw`, `FlankFriction`, `faults`
+Drivetrains
+    `Drivetrain`, `DrivetrainError`; the parts are in `gearmbs.drivetrain`
 Flexible bodies
     `Shaft`, `ShaftSection`, `Rotor`, `reduce_model`
 Rolling bearings
@@ -30,8 +32,8 @@ Views
 Units
     `to_si`
 
-The subpackages hold the rest: `gearmbs.studies`, `gearmbs.gears`, `gearmbs.flexible`, `gearmbs.bearings`,
-`gearmbs.mechanism`, `gearmbs.dae`, `gearmbs.signals`, `gearmbs.adams`, `gearmbs.view`.
+The subpackages hold the rest: `gearmbs.studies`, `gearmbs.gears`, `gearmbs.drivetrain`, `gearmbs.flexible`,
+`gearmbs.bearings`, `gearmbs.mechanism`, `gearmbs.dae`, `gearmbs.signals`, `gearmbs.adams`, `gearmbs.view`.
 """
 
 from typing import TYPE_CHECKING
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
     from gearmbs.bearings import Bearing, RollingBearing
     from gearmbs.dae import DAEProblem, DAEResult, Status, solve_dae
     from gearmbs.dae.results.solution import Solution
+    from gearmbs.drivetrain import Drivetrain, DrivetrainError
     from gearmbs.flexible import Rotor, Shaft, ShaftSection, reduce_model
     from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, Material, faults
     from gearmbs.mechanism import JointFriction, Mechanism, linear_modes, simulate, static_equilibrium
@@ -96,6 +99,8 @@ __all__ = [
     "ContactLaw",
     "DAEProblem",
     "DAEResult",
+    "Drivetrain",
+    "DrivetrainError",
     "FlankFriction",
     "GearPair",
     "GearSpec",
@@ -160,6 +165,8 @@ late(
         "ContactLaw": ".gears",
         "DAEProblem": ".dae",
         "DAEResult": ".dae",
+        "Drivetrain": ".drivetrain",
+        "DrivetrainError": ".drivetrain",
         "FlankFriction": ".gears",
         "GearPair": ".gears",
         "GearSpec": ".gears",

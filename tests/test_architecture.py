@@ -32,10 +32,11 @@ MAY_KNOW = {
     "gears": {"contact", "mechanism", "dae"},
     "bearings": {"mechanism", "dae"},
     "flexible": {"mechanism"},
+    "drivetrain": {"bearings", "dae", "gears", "mechanism"},
     "signals": set(),
     "view": {"contact", "gears", "mechanism", "signals", "dae.results"},
     "adams": {"dae", "dae.equations", "dae.model", "dae.analyses", "dae.results", "mechanism"},
-    "studies": {"bearings", "dae", "dae.results", "flexible", "gears", "mechanism", "signals", "view"},
+    "studies": {"bearings", "dae", "dae.results", "drivetrain", "flexible", "gears", "mechanism", "signals", "view"},
     "campaigns": {"adams", "gears", "signals", "studies", "view"},
     "cli": {"adams", "campaigns", "signals", "studies", "view"},
 }
@@ -49,6 +50,8 @@ EXCEPTIONS = {
     ("flexible", "dae"): "the error of models, of which its own is one",
     ("bearings", "dae.equations"): "the same door: a bearing hands its kernel to the mechanism",
     ("bearings", "dae.compiled"): "its kernels: views of flat tables",
+    ("drivetrain", "dae.equations"): "the same door: torques about an axis hand their kernels to the mechanism",
+    ("drivetrain", "dae.compiled"): "its kernels: views of tables, calls of laws through addresses",
     ("mechanism", "dae.compiled"): "kernels of force elements: views of tables, calls through addresses",
     ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
     ("adams", "gears"): "pairs are written as the contact forces of a deck",
@@ -60,6 +63,9 @@ EXCEPTIONS = {
 CIRCLES = {
     ("_jit", "_kernel_calls", "compile"): "a kernel that is not there is compiled when it is called",
     ("dae.integrators.driver", "dae.integrators.start"): "a run and its beginning, parted by length; types only",
+    ("drivetrain.build", "drivetrain.checks", "drivetrain.description", "drivetrain.drivetrain",
+     "drivetrain.kinematics", "drivetrain.placement", "drivetrain.power", "drivetrain.torsional"):
+        "methods of Drivetrain, and the functions that carry them out",
     ("bearings.catalogue", "bearings.geometry", "bearings.ratings"):
         "a bearing is found by its designation and tells its ratings; methods, and types only",
     ("mechanism.compile", "mechanism.friction", "mechanism.lumping", "mechanism.measures", "mechanism.mechanism",

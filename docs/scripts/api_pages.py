@@ -13,6 +13,7 @@ import gearmbs
 PACKAGES = {
     "gearmbs.mechanism": "Mechanism: bodies, markers, joints, motions, forces",
     "gearmbs.gears": "Gears: wheels, pairs, laws, static analyses",
+    "gearmbs.drivetrain": "Drivetrains: gear trains by name, motors, clutches, pumps",
     "gearmbs.flexible": "Flexible bodies: shafts, finite elements, reduction",
     "gearmbs.bearings": "Bearings: rolling bearings, defects, statics, ratings",
     "gearmbs.contact": "Contact: compiled kernels",
@@ -47,6 +48,13 @@ DESCRIBED = {
     "gearmbs.studies.iftomm": {
         "PROBLEMS": "The benchmark problems by name.",
         "PUBLISHED": "Numbers published for them, with their sources.",
+    },
+    "gearmbs.drivetrain": {
+        "BEARINGS": "Classes of bearings by their ``kind`` in files.",
+        "COUPLINGS": "Classes of couplings by their ``kind`` in files.",
+        "DRIVES": "Classes of drives by their ``kind`` in files.",
+        "LOADS": "Classes of loads by their ``kind`` in files.",
+        "SENSORS": "Classes of sensors by their ``kind`` in files.",
     },
     "gearmbs.contact": {
         "GAP_COLUMNS": "Names of the columns of the rows that ``pair_gaps`` fills.",

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
         ElasticBearing,
         ElementBearing,
         IdealBearing,
-        RollingGeometry,
+        RollingContactBearing,
     )
     from gearmbs.drivetrain.couplings import COUPLINGS, Coupling, ElasticClutch, RigidCoupling, TorsionalShaft
     from gearmbs.drivetrain.description import Description, RunSettings, read_description
@@ -79,7 +79,7 @@ __all__ = [
     "Mount",
     "Pump",
     "RigidCoupling",
-    "RollingGeometry",
+    "RollingContactBearing",
     "RunSettings",
     "Sensor",
     "Shaft",
@@ -133,7 +133,7 @@ late(
         "Mount": ".parts",
         "Pump": ".loads",
         "RigidCoupling": ".couplings",
-        "RollingGeometry": ".bearings",
+        "RollingContactBearing": ".bearings",
         "RunSettings": ".description",
         "SENSORS": ".sensors",
         "Sensor": ".sensors",

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -20,42 +19,19 @@ if TYPE_CHECKING:
     from gearmbs.mechanism.mechanism import Mechanism
 
 
-@dataclass(frozen=True, kw_only=True)
-class RollingGeometry(Part):
-    """What the characteristic frequencies of a rolling bearing need.
+def rolling_bearing(value: Any) -> Any:
+    """Return the `gearmbs.bearings.Bearing` that a designation, a table of its fields, or one itself stands for."""
+    from gearmbs import bearings
 
-    Parameters
-    ----------
-    balls : int
-    ball_diameter, pitch_diameter : float or str
-        m.
-    contact_angle : float or str
-        rad.
-    """
-
-    title: ClassVar[str] = "rolling bearing"
-    units: ClassVar[Mapping[str, str]] = {
-        "ball_diameter": "length", "pitch_diameter": "length", "contact_angle": "angle"
-    }  # fmt: skip
-    positive: ClassVar[tuple[str, ...]] = ("ball_diameter", "pitch_diameter")
-
-    balls: int
-    ball_diameter: Quantity
-    pitch_diameter: Quantity
-    contact_angle: Quantity = 0.0
-
-    def multiples(self) -> dict[str, float]:
-        """Return FTF, BPFO, BPFI and BSF as multiples of the inner ring's speed against the outer one's.
-
-        With g = d cos(a) / D: FTF = (1 - g)/2, BPFO = Z (1 - g)/2, BPFI = Z (1 + g)/2, BSF = D (1 - g^2)/(2 d).
-        """
-        g = self.ball_diameter * math.cos(self.contact_angle) / self.pitch_diameter
-        return {
-            "FTF": 0.5 * (1.0 - g),
-            "BPFO": 0.5 * self.balls * (1.0 - g),
-            "BPFI": 0.5 * self.balls * (1.0 + g),
-            "BSF": 0.5 * self.pitch_diameter / self.ball_diameter * (1.0 - g * g),
-        }
+    if isinstance(value, bearings.Bearing):
+        return value
+    if isinstance(value, str):
+        return bearings.Bearing.from_designation(value)
+    if isinstance(value, Mapping):
+        given = dict(value)
+        designation = given.pop("designation", None)
+        return bearings.Bearing.from_designation(designation, **given) if designation else bearings.Bearing(**given)
+    raise TypeError(f"rolling is {value!r}; give a designation such as '6205', a table, or a gearmbs.bearings.Bearing")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,8 +47,8 @@ class Bearing(Part):
         Housing or shaft that carries it, or "ground"; default: the housing if there is exactly one, else the ground.
     on_station : float or str, optional
         Of a bearing on a shaft, where on that, m; default: its middle.
-    rolling : RollingGeometry or mapping, optional
-        For the table of frequencies.
+    rolling : gearmbs.bearings.Bearing, str or mapping, optional
+        What rolls in it, for the table of frequencies: a bearing, its designation, or its fields.
     """
 
     title: ClassVar[str] = "bearing"
@@ -87,9 +63,9 @@ class Bearing(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if isinstance(self.rolling, Mapping):
+        if self.rolling is not None:
             with told_of(f"{self.label}: rolling"):
-                object.__setattr__(self, "rolling", RollingGeometry(name=self.name, **self.rolling))
+                object.__setattr__(self, "rolling", rolling_bearing(self.rolling))
 
     def holds(self, count: int) -> np.ndarray:
         """Return what it holds of its point and the shaft's tilts, rows over (x, y, z, tilt x, tilt y).
@@ -275,7 +251,32 @@ class ElementBearing(Bearing):
             m.add(one)
 
 
+@dataclass(frozen=True, kw_only=True)
+class RollingContactBearing(Bearing):
+    """A rolling bearing, `gearmbs.bearings.RollingBearing`, whose inner ring is on the shaft.
+
+    Parameters
+    ----------
+    rolling : gearmbs.bearings.Bearing, str or mapping
+    settings : mapping
+        Keywords of `gearmbs.bearings.RollingBearing`: damping, preload, sense, defects, ...
+    """
+
+    kind: ClassVar[str] = "rolling"
+
+    settings: Mapping[str, Any] = field(default_factory=dict)  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(self.rolling is not None, f"{self.label}: rolling is missing; give a designation such as '6205'")
+
+    def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
+        from gearmbs.bearings import RollingBearing
+
+        m.add(RollingBearing(self.name, shaft, seat, bearing=self.rolling, **self.settings))
+
+
 BEARINGS: dict[str, type[Bearing]] = {
-    kind.kind: kind for kind in (IdealBearing, ElasticBearing, ClearanceBearing, ElementBearing)
+    kind.kind: kind for kind in (IdealBearing, ElasticBearing, ClearanceBearing, RollingContactBearing, ElementBearing)
 }
 """Bearings by their ``kind``; a further kind is one more entry."""

@@ -144,11 +144,6 @@ class Description:
     run: RunSettings
 
 
-def is_description(data: Mapping[str, Any]) -> bool:
-    """Return whether a TOML file holds a drivetrain."""
-    return "shafts" in data
-
-
 def read_description(path: str | Path, fault: FaultReader | None = None) -> Description:
     """Read a TOML file.
 

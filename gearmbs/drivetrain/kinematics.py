@@ -6,7 +6,6 @@ import math
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from gearmbs.drivetrain.bearings import RollingGeometry
 from gearmbs.drivetrain.errors import DrivetrainError
 from gearmbs.drivetrain.parts import GearMesh
 
@@ -24,7 +23,7 @@ class KinematicTable:
     With the wheels' teeth z_1, z_2 and the shafts' speeds relative to the axes' carrier (here fixed), f_m = z_1 f_1 =
     z_2 f_2; the same two teeth meet f_m gcd(z_1, z_2) / (z_1 z_2) times a second (hunting-tooth frequency). A deviation
     of a wheel on shaft i modulates its meshes: sidebands h f_m +- k f_i. Bearings: see
-    :meth:`gearmbs.drivetrain.RollingGeometry.multiples`, times the speed of the shaft against what carries it.
+    `gearmbs.bearings.Bearing.multiples`, times the speed of the shaft against what carries it.
 
     Parameters
     ----------
@@ -74,14 +73,14 @@ class KinematicTable:
     def bearing_frequencies(self, bearing: str) -> dict[str, float]:
         """Return FTF, BPFO, BPFI and BSF of a bearing with ``rolling``, Hz."""
         part = next((b for b in self.train.bearings if b.name == bearing), None)
-        if part is None or not isinstance(part.rolling, RollingGeometry):
+        if part is None or part.rolling is None:
             known = [b.name for b in self.train.bearings if b.rolling is not None]
             raise DrivetrainError(
                 f"bearing '{bearing}': no rolling geometry is known of it; known of {known or 'none'}"
             )
         carrier = self.speeds.get(self.train.carrier(part), 0.0)
         turns = abs(self.speeds[part.shaft] - carrier) / HZ
-        return {name: multiple * turns for name, multiple in part.rolling.multiples().items()}
+        return {name: multiple * turns for name, multiple in part.rolling.multiples.items()}
 
     def common_period(self) -> float:
         """Return the time after which all teeth of all meshes stand as before, s; infinite without meshes."""

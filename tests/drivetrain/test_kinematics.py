@@ -9,9 +9,8 @@ from tests.drivetrain.support import stage
 
 @pytest.fixture(scope="module")
 def table():
-    rolling = {"balls": 9, "ball_diameter": "0.3126 in", "pitch_diameter": "1.537 in"}
     return stage(
-        bearings=[IdealBearing(name="a", shaft="in", rolling=rolling), IdealBearing(name="b", shaft="out")],
+        bearings=[IdealBearing(name="a", shaft="in", rolling="6205"), IdealBearing(name="b", shaft="out")],
         loads=[Pump(name="pump", shaft="out", displacement=1e-4, pressure=1e6, teeth=11)],
     ).kinematics
 
