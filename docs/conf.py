@@ -19,6 +19,7 @@ import gearmbs  # noqa: E402
 os.environ["PYTHONPATH"] = os.pathsep.join([str(SCRIPTS), str(HERE.parent), os.environ.get("PYTHONPATH", "")])
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(name, "1")
+os.environ["GEARMBS_PROGRESS"] = "0"
 
 # the kernels' remark about their transport is no fault of a page
 profile = HERE / "_build" / "ipython" / "profile_default"

@@ -8,7 +8,8 @@
     report = gm.analyse(gm.read_signal("gearbox.csv", rate=12800.0), teeth=29)
 
 Studies
-    `Case`, `CaseError`, `load_case`, `make_case`, `run_case`, `run_cases`, `run_paper`, `record_signal`, `gear_rig`
+    `Case`, `CaseError`, `load_case`, `make_case`, `run_case`, `run_cases`, `run_paper`, `sweep`, `record_signal`,
+    `gear_rig`
 Gears
     `GearPair`, `GearSpec`, `Material`, `ContactLaw`, `FlankFriction`, `faults`
 Drivetrains
@@ -29,8 +30,8 @@ ADAMS decks
 Views
     `gear_scene`, `mechanism_scene`, `solution_scene`, `mesh_animation`, `average_plot`, `spectrogram_plot`,
     `waterfall_plot`, `order_map_plot`, `order_track_plot`, `campbell_plot`
-Units
-    `to_si`
+Units and files
+    `to_si`, `save`
 
 The subpackages hold the rest: `gearmbs.studies`, `gearmbs.gears`, `gearmbs.drivetrain`, `gearmbs.flexible`,
 `gearmbs.bearings`, `gearmbs.mechanism`, `gearmbs.dae`, `gearmbs.signals`, `gearmbs.adams`, `gearmbs.view`.
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from gearmbs.flexible import Rotor, Shaft, ShaftSection, reduce_model
     from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, Material, faults
     from gearmbs.mechanism import JointFriction, Mechanism, linear_modes, simulate, static_equilibrium
+    from gearmbs.saving import save
     from gearmbs.signals import (
         analyse,
         campbell,
@@ -75,6 +77,7 @@ if TYPE_CHECKING:
         run_case,
         run_cases,
         run_paper,
+        sweep,
     )
     from gearmbs.units import to_si
     from gearmbs.view import (
@@ -141,6 +144,7 @@ __all__ = [
     "run_cases",
     "run_deck",
     "run_paper",
+    "save",
     "simulate",
     "solution_scene",
     "solve_dae",
@@ -148,6 +152,7 @@ __all__ = [
     "spectrogram_plot",
     "spectrum",
     "static_equilibrium",
+    "sweep",
     "to_si",
     "to_signal",
     "waterfall",
@@ -207,6 +212,7 @@ late(
         "run_cases": ".studies",
         "run_deck": ".adams",
         "run_paper": ".studies",
+        "save": ".saving",
         "simulate": ".mechanism",
         "solution_scene": ".view",
         "solve_dae": ".dae",
@@ -214,6 +220,7 @@ late(
         "spectrogram_plot": ".view",
         "spectrum": ".signals",
         "static_equilibrium": ".mechanism",
+        "sweep": ".studies",
         "to_si": ".units",
         "to_signal": ".signals",
         "waterfall": ".signals",

@@ -23,7 +23,7 @@ PACKAGES = {
     "gearmbs.campaigns": "Campaigns: many cases",
     "gearmbs.adams": "ADAMS: decks in, results out",
     "gearmbs.view": "View: figures",
-    "gearmbs.units": "Units and compilation",
+    "gearmbs.units": "Units, files, progress and compilation",
 }
 
 EVERYTHING = ["*"]
@@ -129,7 +129,12 @@ MORE = {
         "gearmbs.campaigns.runners": EXPORTED,
         "gearmbs.campaigns.subjects.pair": ["canonical_case", "harmonics", "contact_numbers", "indicators"],
     },
-    "gearmbs.units": {"gearmbs.units": ["to_si"], "gearmbs.compile": ["compile_all"]},
+    "gearmbs.units": {
+        "gearmbs.units": ["to_si"],
+        "gearmbs.compile": ["compile_all"],
+        "gearmbs.saving": ["save"],
+        "gearmbs.progress": EVERYTHING,
+    },
 }
 """Names worth a page that their package does not export; names that do not exist are an error."""
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from gearmbs._shown import Shown
 from gearmbs.gears.contact_model import ContactModel
 from gearmbs.gears.fault import Fault
 from gearmbs.gears.geometry import PairGeometry, Placement
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class GearPair(PairGeometry):
+class GearPair(PairGeometry, Shown):
     """A driver and a driven wheel, placed in space, with their contact, operating point and faults.
 
     The geometry is that of `PairGeometry`; everything else is composed: `contact_model`, `operating_point`, ``faults``.

@@ -6,10 +6,26 @@ import html
 import math
 from typing import TYPE_CHECKING
 
+from gearmbs._shown import html_table
 from gearmbs.gears.mesh import Mesh
 
 if TYPE_CHECKING:
     from rich.table import Table
+
+    from gearmbs.gears.spec import GearSpec
+
+
+SIZES = (
+    ("module", "module"),
+    ("pitch radius", "pitch_radius"),
+    ("tip radius", "tip_radius"),
+    ("base radius", "base_radius"),
+    ("root radius", "root_radius"),
+    ("root arc", "fillet_radius"),
+    ("face width", "face_width"),
+    ("bore radius", "bore_radius"),
+)
+"""Lengths of a wheel that its table shows."""
 
 
 def pair_table(pair: Mesh) -> Table:
@@ -75,3 +91,17 @@ def pair_html(pair: Mesh) -> str:
     )
     title = html.escape(str(table.title))
     return f"<table><caption>{title}</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+
+
+def wheel_html(gear: GearSpec) -> str:
+    """Return a wheel as a table for a notebook."""
+    mm = 1e3
+    rows = [
+        ("teeth", str(gear.teeth)),
+        *((label, f"{getattr(gear, name) * mm:.4f} mm") for label, name in SIZES),
+        ("pressure angle", f"{math.degrees(gear.pressure_angle):.6g} deg"),
+        ("profile shift", f"{gear.profile_shift:.6g}"),
+        ("mass", f"{gear.mass:.4f} kg"),
+        ("material", f"E = {gear.material.youngs_modulus * 1e-9:.6g} GPa, {gear.material.density:.6g} kg/m^3"),
+    ]
+    return html_table(f"Wheel {gear.name}", ("", ""), rows)

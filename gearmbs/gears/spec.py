@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
+from gearmbs._shown import Shown
 from gearmbs.units import Quantity, to_si
 
 UNDERCUT_TOLERANCE = 0.8  # share of the cutter height that must clear the base circle's normal (14 teeth at 20 deg)
@@ -64,7 +65,7 @@ class Material:
 
 
 @dataclass(frozen=True)
-class GearSpec:
+class GearSpec(Shown):
     """A cylindrical involute wheel: external or internal, spur or helical.
 
     Parameters
@@ -240,6 +241,11 @@ class GearSpec:
             )
             others["profile_shift"] = -outward_shift
         return cls(abs(teeth), module, internal=True, name=name, **others)
+
+    def _repr_html_(self) -> str:
+        from gearmbs.gears.show import wheel_html
+
+        return wheel_html(self)
 
     def _check(self) -> None:
         if self.internal:

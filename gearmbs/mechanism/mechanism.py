@@ -8,6 +8,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from gearmbs._shown import Shown
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.dae.errors import ModelError
@@ -37,7 +38,7 @@ class ContactPair(Protocol):
         ...
 
 
-class Mechanism(LoadMethods):
+class Mechanism(LoadMethods, Shown):
     """A system of bodies, rigid or with modes of deformation, joints, motions and forces.
 
     Every part has a name. Joints take two bodies with a point and an axis in global components at the
@@ -635,6 +636,11 @@ class Mechanism(LoadMethods):
             self._check_body(f"joint '{joint.name}'", marker.body)
         self.joints[joint.name] = joint
         return joint
+
+    def _repr_html_(self) -> str:
+        from gearmbs.mechanism.show import mechanism_html
+
+        return mechanism_html(self)
 
     def __repr__(self) -> str:
         rows = sum(len(joint.rows) for joint in self.joints.values())

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from gearmbs.studies.preset import paper_cases
     from gearmbs.studies.rig import gear_rig
     from gearmbs.studies.simulation import SimulationFailed, SimulationInterrupted, run_case, simulate_case
+    from gearmbs.studies.sweep import Sweep, sweep
 
 __all__ = [
     "Case",
@@ -23,6 +24,7 @@ __all__ = [
     "PaperStudy",
     "SimulationFailed",
     "SimulationInterrupted",
+    "Sweep",
     "flexible_rig",
     "gear_rig",
     "load_case",
@@ -33,6 +35,7 @@ __all__ = [
     "run_cases",
     "run_paper",
     "simulate_case",
+    "sweep",
 ]
 
 late(
@@ -45,6 +48,7 @@ late(
         "PaperStudy": ".paper",
         "SimulationFailed": ".simulation",
         "SimulationInterrupted": ".simulation",
+        "Sweep": ".sweep",
         "flexible_rig": ".flexible_rig",
         "gear_rig": ".rig",
         "load_case": ".case",
@@ -55,5 +59,6 @@ late(
         "run_cases": ".parallel",
         "run_paper": ".paper",
         "simulate_case": ".simulation",
+        "sweep": ".sweep",
     },
 )

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
+from gearmbs._shown import Shown
 from gearmbs.studies import quantities as q
 from gearmbs.studies.section import CaseError, CaseWarning, Section, measures_of
 from gearmbs.units import to_si
@@ -292,7 +293,7 @@ class Solver(Section):
         return self
 
 
-class Case(Section):
+class Case(Section, Shown):
     """One simulated measurement of a gear pair on two shafts.
 
     Attributes
@@ -458,6 +459,11 @@ class Case(Section):
         for key, value in sections.items():
             data[key] = {**data[key], **value} if isinstance(value, dict) and key in data else value
         return make_case(data)
+
+    def _repr_html_(self) -> str:
+        from gearmbs.studies.show import case_html
+
+        return case_html(self)
 
     def settings(self) -> dict[str, Any]:
         """Return all settings as nested dictionaries, quantities as the user wrote them, else in SI."""

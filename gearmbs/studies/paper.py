@@ -9,6 +9,7 @@ from pathlib import Path
 
 import xarray as xr
 
+from gearmbs._shown import Shown, html_table
 from gearmbs.dae.result import SolverStats
 from gearmbs.signals import COMPONENTS, rms_factor
 from gearmbs.studies.case import Case, CaseError
@@ -26,7 +27,7 @@ COSTS = ("mesh_cycles", "real_time_factor", "time_per_mesh_cycle")
 
 
 @dataclass(frozen=True)
-class PaperStudy:
+class PaperStudy(Shown):
     """Results of the six cases.
 
     Attributes
@@ -50,6 +51,18 @@ class PaperStudy:
         """Judge the paper's three claims for a force component."""
         name = component or self.component
         return judge(self.table(name, way), name)
+
+    def _repr_html_(self) -> str:
+        claims = [(claim.name, "held" if claim.held else "not held", claim.numbers) for claim in self.claims()]
+        table = self.table()
+        rows = [
+            (str(load), str(state), *(float(v) for v in table.sel(load=load, state=state).values))
+            for load in table["load"].values
+            for state in table.state.values
+        ]
+        names = ("load", "state", "1 x GMF", "2 x GMF", "3 x GMF")
+        levels = html_table(f"RMS of the GMF harmonics, {self.component.replace('_', ' ')}, scaled, m/s^2", names, rows)
+        return html_table("The paper's study", ("claim", "", "numbers"), claims) + levels
 
     def to_csv(self) -> str:
         """Return the GMF table of all components as CSV."""

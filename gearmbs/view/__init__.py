@@ -36,7 +36,10 @@ if TYPE_CHECKING:
     from gearmbs.view.scenes import gear_scene, mechanism_scene, solution_scene
     from gearmbs.view.signals import order_plot, spectrum_plot, time_plot
     from gearmbs.view.solid import gear_solid, pair_solids
+    from gearmbs.view.solution_figures import solution_plot
+    from gearmbs.view.topology import mechanism_plot
     from gearmbs.view.transverse import mesh_view
+    from gearmbs.view.wheel import wheel_plot
 
 __all__ = [
     "COLOURS",
@@ -59,6 +62,7 @@ __all__ = [
     "gear_solid",
     "gmf_bars",
     "load_sharing_plot",
+    "mechanism_plot",
     "mechanism_scene",
     "mesh_animation",
     "mesh_view",
@@ -71,6 +75,7 @@ __all__ = [
     "save_figure",
     "sensitivity_map",
     "solution_motion",
+    "solution_plot",
     "solution_scene",
     "spectrogram_plot",
     "spectrum_plot",
@@ -79,6 +84,7 @@ __all__ = [
     "time_plot",
     "transmission_error_plot",
     "waterfall_plot",
+    "wheel_plot",
     "write_dxf",
     "write_step",
     "write_stl",
@@ -107,6 +113,7 @@ late(
         "gear_solid": ".solid",
         "gmf_bars": ".bars",
         "load_sharing_plot": ".curves",
+        "mechanism_plot": ".topology",
         "mechanism_scene": ".scenes",
         "mesh_animation": ".animation",
         "mesh_view": ".transverse",
@@ -118,6 +125,7 @@ late(
         "read_stl": ".export_stl",
         "save_figure": ".figure_style",
         "sensitivity_map": ".maps",
+        "solution_plot": ".solution_figures",
         "solution_motion": ".motion",
         "solution_scene": ".scenes",
         "spectrogram_plot": ".changing_speed",
@@ -127,6 +135,7 @@ late(
         "time_plot": ".signals",
         "transmission_error_plot": ".curves",
         "waterfall_plot": ".changing_speed",
+        "wheel_plot": ".wheel",
         "write_dxf": ".export_dxf",
         "write_step": ".export_step",
         "write_stl": ".export_stl",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from gearmbs.gears import GearPair
 from gearmbs.view.contacts import ContactPoints, ContactProbe, mean_frame
 from gearmbs.view.figure_style import png_bytes
 from gearmbs.view.files import whole_file
+from gearmbs.view.film import write_film
 from gearmbs.view.motion import (
     PairMotion,
     chosen_times,
@@ -52,12 +54,22 @@ class MeshAnimation(Page):
         super().__init__(title, f"{len(motion)} instants", ("player.js", "transverse.js"), data)
 
     def save(self, path: str | Path) -> Path:
-        """Write the animation as ``.html`` (stands alone) or ``.gif``."""
-        if Path(path).suffix.lower() != ".gif":
+        """Write the animation as ``.html`` (stands alone), ``.gif``, or where ffmpeg is installed ``.mp4``."""
+        ending = Path(path).suffix.lower()
+        if ending == ".mp4":
+            return write_film(path, self._pictures(dpi=120))
+        if ending != ".gif":
             return super().save(path)
         from PIL import Image
 
-        images = []
+        palette = Image.Palette.ADAPTIVE
+        images = [Image.open(io.BytesIO(p)).convert("P", palette=palette) for p in self._pictures(dpi=80)]
+        with whole_file(path) as part:
+            images[0].save(part, format="GIF", save_all=True, append_images=images[1:], duration=60, loop=0)
+        return Path(path)
+
+    def _pictures(self, dpi: float) -> Iterator[bytes]:
+        """Yield each instant as a PNG image."""
         for k in range(len(self.motion)):
             figure = mesh_view(
                 self.motion.pair,
@@ -67,12 +79,7 @@ class MeshAnimation(Page):
                 section=self.section,
                 title=f"{self.title}: {self.motion.label} {self.motion.value[k]:.5f} {self.motion.unit}",
             )
-            images.append(
-                Image.open(io.BytesIO(png_bytes(figure, dpi=80))).convert("P", palette=Image.Palette.ADAPTIVE)
-            )
-        with whole_file(path) as part:
-            images[0].save(part, format="GIF", save_all=True, append_images=images[1:], duration=60, loop=0)
-        return Path(path)
+            yield png_bytes(figure, dpi=dpi)
 
 
 def mesh_animation(
@@ -110,7 +117,7 @@ def mesh_animation(
     Returns
     -------
     MeshAnimation
-        Shows itself in notebooks; ``save("mesh.html")`` and ``save("mesh.gif")``.
+        Shows itself in notebooks; ``save("mesh.html")``, ``save("mesh.gif")``, ``save("mesh.mp4")``.
 
     Examples
     --------

@@ -14,6 +14,8 @@ import numpy.typing as npt
 
 from gearmbs.view.files import write_whole
 
+FILMS = ", which plays in any browser; films (.mp4, .gif) are made of mesh animations and scenes that move"
+
 
 class Page:
     """A self-contained HTML page that shows itself in notebooks.
@@ -53,7 +55,7 @@ class Page:
     def save(self, path: str | Path) -> Path:
         """Write the page as an HTML file that opens in any browser without a network."""
         if Path(path).suffix.lower() not in (".html", ".htm"):
-            raise ValueError(f"path is {str(path)!r}; a page is an .html file")
+            raise ValueError(f"path is {str(path)!r}; a page is an .html file{FILMS}")
         return write_whole(path, self.to_html())
 
     def _repr_html_(self) -> str:

@@ -10,7 +10,9 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from gearmbs.view.figure_style import VERMILLION, look, new_figure
+from gearmbs.view.figure_style import DPI, VERMILLION, look, new_figure, png_bytes
+from gearmbs.view.files import whole_file
+from gearmbs.view.film import write_film
 from gearmbs.view.page import Page
 from gearmbs.view.plotly_scene import plotly_figure
 from gearmbs.view.render import Camera, render
@@ -106,6 +108,26 @@ class Scene(SceneData):
             count = len(self.parts) + len(self.lines)
             figure.legend(loc="outside lower center", ncols=min(count, 4), handlelength=1.4)
         return figure
+
+    def save(self, path: str | Path, **options: Any) -> Path:
+        """Write the scene: ``.html`` to turn and play, ``.png`` of one instant, ``.mp4`` of all where ffmpeg is there.
+
+        Parameters
+        ----------
+        path : path
+        **options
+            Of `still`, for pictures and films: the direction of view.
+        """
+        ending = Path(path).suffix.lower()
+        if ending == ".mp4":
+            # all of one size
+            options.setdefault("height", float(self.still(**options).get_figheight()))
+            return write_film(path, (png_bytes(self.still(instant=k, **options), dpi=110) for k in range(len(self))))
+        if ending == ".png":
+            with whole_file(path) as part:
+                self.still(**options).savefig(part, dpi=DPI)
+            return Path(path)
+        return self.page().save(path)
 
     def page(self) -> Page:
         """Return the scene as a page to turn, zoom and play, which stands alone as an HTML file."""

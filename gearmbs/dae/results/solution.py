@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs._deprecation import former_name
+from gearmbs._shown import Shown
 from gearmbs.dae.model import evaluator as outputs
 from gearmbs.dae.model.configuration import Configuration
 from gearmbs.dae.result import DAEResult, Status
@@ -34,7 +35,7 @@ CONFLICT_SAMPLES = 50
 """Outputs at which constraints removed as redundant are looked at."""
 
 
-class Solution:
+class Solution(Shown):
     """Motion and forces of a mechanism over the output times.
 
     Attributes
@@ -409,6 +410,11 @@ class Solution:
             f"Solution({name!r}: {self.t.size} times from {self.t[0]:g} to {self.t[-1]:g} s, "
             f"{self.status.name}; {self.stats})"
         )
+
+    def _repr_html_(self) -> str:
+        from gearmbs.dae.results.show import solution_html
+
+        return solution_html(self)
 
     def to_dataset(self) -> xr.Dataset:
         """Return everything as an :class:`xarray.Dataset` with units in the attributes."""

@@ -1,0 +1,120 @@
+"""One word for everything that is written: ``save(thing, path)``, the ending of the path says as what."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+WRITERS: dict[str, dict[str, str]] = {
+    "Case": {".toml": "gearmbs.studies.case_file:write_case"},
+    "GearSpec": {
+        ".dxf": "gearmbs.view:write_dxf",
+        ".step": "gearmbs.view:write_step",
+        ".stp": "gearmbs.view:write_step",
+        ".stl": "gearmbs.view:write_stl",
+    },
+    "Mesh": {".stl": "gearmbs.view:write_stl"},
+    "Mechanism": {".adm": "gearmbs.adams:write_deck"},
+    "Solution": {".nc": "gearmbs.saving:_solution"},
+    "Dataset": {".nc": "gearmbs.saving:_dataset"},
+    "DataFrame": {".csv": "gearmbs.saving:_table"},
+    "AnalysisReport": {".md": "gearmbs.saving:_report"},
+}
+WRITERS["GearPair"] = WRITERS["GearSpec"]
+WRITERS["ComparisonReport"] = WRITERS["AnalysisReport"]
+SIGNAL_ENDINGS = (".csv", ".gz", ".mat", ".uff", ".unv", ".wav", ".nc", ".h5", ".hdf5", ".tdms")
+FIGURE_ENDINGS = (".png", ".svg", ".pdf")
+
+
+def save(thing: Any, path: str | Path) -> Path | list[Path]:
+    """Write an object as a file that appears under its name only when it is whole.
+
+    Parameters
+    ----------
+    thing : object
+        A case (``.toml``), a wheel or pair (``.dxf``, ``.step``, ``.stl``), a mechanism (``.adm``), a solution or data
+        set (``.nc``), a signal (any format of `gearmbs.write_signal`), a figure (``.png``, ``.svg``, ``.pdf``), a table
+        (``.csv``), a report (``.md``), or anything with a ``save`` of its own, such as scenes, animations and studies.
+    path : path
+        Folders are made.
+
+    Returns
+    -------
+    Path or list of Path
+        What was written.
+
+    Raises
+    ------
+    ValueError
+        If an object of this kind cannot be written in that form; the message names the endings that will do.
+    TypeError
+        If objects of this kind cannot be written.
+
+    Examples
+    --------
+    >>> import gearmbs as gm
+    >>> gm.save(gm.GearSpec(20, "2 mm"), "wheel.pdf")
+    Traceback (most recent call last):
+        ...
+    ValueError: path is 'wheel.pdf'; a GearSpec is saved as .dxf, .step, .stp or .stl
+    """
+    path = Path(path)
+    kinds = [kind.__name__ for kind in type(thing).__mro__]
+    name = next((kind for kind in kinds if kind in WRITERS), "")
+    if name:
+        return _by_ending(thing, path, type(thing).__name__, WRITERS[name])
+    if "DataArray" in kinds:
+        return _by_ending(thing, path, "signal", dict.fromkeys(SIGNAL_ENDINGS, "gearmbs.signals:write_signal"))
+    if "Figure" in kinds:
+        return _by_ending(thing, path, "figure", dict.fromkeys(FIGURE_ENDINGS, "gearmbs.saving:_figure"))
+    own: Callable | None = getattr(thing, "save", None)
+    if callable(own):
+        written = own(path)
+        return written if written is not None else path
+    raise TypeError(f"{type(thing).__name__}: an object of this kind cannot be saved")
+
+
+def _by_ending(thing: Any, path: Path, kind: str, writers: dict[str, str]) -> Path | list[Path]:
+    writer = writers.get(path.suffix.lower())
+    if writer is None:
+        *others, last = writers
+        known = f"{', '.join(others)} or {last}" if others else last
+        article = "an" if kind[0] in "AEIOU" else "a"
+        raise ValueError(f"path is {str(path)!r}; {article} {kind} is saved as {known}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    module, _, name = writer.partition(":")
+    written = getattr(importlib.import_module(module), name)(thing, path)
+    return written if isinstance(written, (Path, list)) else path
+
+
+def _dataset(data: Any, path: Path) -> Path:
+    from gearmbs.studies.store import write_dataset
+
+    return write_dataset(path, data)
+
+
+def _solution(solution: Any, path: Path) -> Path:
+    return _dataset(solution.to_dataset(), path)
+
+
+def _table(table: Any, path: Path) -> Path:
+    from gearmbs.view.files import write_whole
+
+    return write_whole(path, table.to_csv(index=table.index.name is not None))
+
+
+def _report(report: Any, path: Path) -> Path:
+    from gearmbs.view.files import write_whole
+
+    return write_whole(path, report.to_markdown())
+
+
+def _figure(figure: Any, path: Path) -> Path:
+    from gearmbs.view.figure_style import DPI, look
+    from gearmbs.view.files import whole_file
+
+    with look(), whole_file(path) as part:
+        figure.savefig(part, dpi=DPI)
+    return path

@@ -1,0 +1,108 @@
+"""One word for everything that is written."""
+
+import shutil
+import subprocess
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import gearmbs as gm
+from gearmbs.mechanism import Mechanism
+from gearmbs.view import film, gear_scene, spectrum_plot
+from gearmbs.view.figure_style import new_figure
+
+
+def pendulum():
+    m = Mechanism("pendulum", gravity=(0, 0, -9.81))
+    rod = m.body("rod", mass=1.0, inertia=(0.1, 0.1, 0.01), position=(0.5, 0, 0))
+    m.revolute("pin", rod, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+    return m
+
+
+def signal():
+    return gm.make_signal(np.sin(np.arange(64.0)), 640.0, units="m/s^2")
+
+
+def test_everything_is_saved_with_one_word(tmp_path):
+    """Each is there under its name, in folders that are made, and is read again where there is a reader."""
+    solution = pendulum().simulate(0.05)
+    things = {
+        "a/case.toml": gm.Case(),
+        "a/wheel.dxf": gm.GearSpec(20, "2 mm"),
+        "a/pair.stl": gm.GearPair.paper(),
+        "b/pendulum.adm": pendulum(),
+        "b/solution.nc": solution,
+        "b/data.nc": solution.to_dataset(),
+        "b/signal.csv": signal(),
+        "c/figure.svg": new_figure(),
+        "c/figure.png": solution.plot(),
+        "c/table.csv": pd.DataFrame({"x": [1.0, 2.0]}),
+        "c/mesh.html": gm.mesh_animation(gm.GearPair.paper(), frames=3),
+    }
+    for name, thing in things.items():
+        gm.save(thing, tmp_path / name)
+        assert (tmp_path / name).stat().st_size >= 10, name
+    assert gm.load_case(tmp_path / "a" / "case.toml") == gm.Case(name="case")
+    assert gm.read_signal(tmp_path / "b" / "signal.csv").shape == (64, 1)
+    assert "pendulum" in (tmp_path / "b" / "pendulum.adm").read_text()
+    with xr.open_dataset(tmp_path / "b" / "solution.nc", engine="h5netcdf") as data:
+        np.testing.assert_allclose(data.time, solution.t)
+    assert pd.read_csv(tmp_path / "c" / "table.csv").columns.tolist() == ["x"]
+    assert not [path for path in tmp_path.rglob(".*") if path.is_file()]
+
+
+@pytest.mark.parametrize(
+    ("thing", "name", "words"),
+    [
+        (gm.Case(), "case.nc", "a Case is saved as .toml"),
+        (gm.GearSpec(20, "2 mm"), "wheel.png", "a GearSpec is saved as .dxf, .step, .stp or .stl"),
+        (signal(), "signal.docx", "a signal is saved as .csv, .gz"),
+        (new_figure(), "figure", "a figure is saved as .png, .svg or .pdf"),
+    ],
+)
+def test_endings_that_will_not_do_are_named(thing, name, words, tmp_path):
+    with pytest.raises(ValueError, match=words):
+        gm.save(thing, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_other_things_are_refused(tmp_path):
+    with pytest.raises(TypeError, match="int: an object of this kind cannot be saved"):
+        gm.save(3, tmp_path / "three.nc")
+    with pytest.raises(ValueError, match=r"a page is an \.html file, which plays in any browser; films"):
+        gear_scene(gm.GearPair.paper()).page().save(tmp_path / "page.pdf")
+
+
+def test_a_film_without_ffmpeg_says_what_to_do(tmp_path, monkeypatch):
+    monkeypatch.setattr(film.shutil, "which", lambda name: None)
+    with pytest.raises(ValueError, match=r"films need the program ffmpeg, .*; save as \.html or \.gif instead"):
+        gm.mesh_animation(gm.GearPair.paper(), frames=2).save(tmp_path / "mesh.mp4")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
+def test_films_play(tmp_path):
+    """As many pictures as instants, of one even size."""
+    path = gm.mesh_animation(gm.GearPair.paper(), frames=4).save(tmp_path / "mesh.mp4")
+    scene = gear_scene(gm.GearPair.paper(), frames=2).save(tmp_path / "scene.mp4", width=3.0)
+    for film_path, count in ((path, 4), (scene, 2)):
+        told = subprocess.run(["ffmpeg", "-i", str(film_path), "-f", "null", "-"], capture_output=True, text=True)
+        assert told.returncode == 0
+        assert f"frame={count:5d}" in told.stderr.replace(f"frame= {count:4d}", f"frame={count:5d}")
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
+def test_what_ffmpeg_refuses_is_told(tmp_path):
+    with pytest.raises(RuntimeError, match="ffmpeg failed: "):
+        film.write_film(tmp_path / "broken.mp4", [b"no picture"])
+    assert not list(tmp_path.iterdir())
+
+
+def test_nothing_draws_a_plain_thing():
+    from gearmbs._shown import draw
+
+    with pytest.raises(TypeError, match="int: nothing is known that draws it"):
+        draw(3)
+    assert spectrum_plot(gm.spectrum(signal())).axes
