@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import html
 import importlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,14 @@ PLOTS = {
     "PaperStudy": "gearmbs.studies.show:study_plot",
 }
 """What draws an object, by the name of its class."""
+
+TABLES = {
+    "GearSpec": "gearmbs.gears.show:wheel_html",
+    "Mechanism": "gearmbs.mechanism.show:mechanism_html",
+    "Solution": "gearmbs.dae.results.show:solution_html",
+    "Case": "gearmbs.studies.show:case_html",
+}
+"""What makes a table of an object for notebooks, where its class does not do so itself."""
 
 
 class Shown:
@@ -41,6 +49,10 @@ class Shown:
         """
         return draw(self, **options)
 
+    def _repr_html_(self) -> str:
+        maker = _found(self, TABLES)
+        return f"<pre>{html.escape(repr(self))}</pre>" if maker is None else maker(self)
+
     def save(self, path: str | Path) -> Path | list[Path]:
         """Write the object; the ending of the path says as what. See `gearmbs.save`."""
         from gearmbs import save
@@ -56,11 +68,21 @@ def draw(thing: Any, **options: Any) -> Any:
     TypeError
         If nothing is known that draws it.
     """
+    maker = _found(thing, PLOTS)
+    if maker is None:
+        raise TypeError(
+            f"{type(thing).__name__}: nothing is known that draws it; gearmbs.view has figures for many things"
+        )
+    return maker(thing, **options)
+
+
+def _found(thing: Any, makers: dict[str, str]) -> Callable | None:
+    """Return what a table of makers has for the class of an object, or for one that it is made from."""
     for kind in type(thing).__mro__:
-        if kind.__name__ in PLOTS and kind.__module__.startswith("gearmbs."):
-            module, _, name = PLOTS[kind.__name__].partition(":")
-            return getattr(importlib.import_module(module), name)(thing, **options)
-    raise TypeError(f"{type(thing).__name__}: nothing is known that draws it; gearmbs.view has figures for many things")
+        if kind.__name__ in makers and kind.__module__.startswith("gearmbs."):
+            module, _, name = makers[kind.__name__].partition(":")
+            return getattr(importlib.import_module(module), name)
+    return None
 
 
 def html_table(caption: str, header: Sequence[str], rows: Iterable[Sequence[Any]], note: str = "") -> str:

@@ -242,11 +242,6 @@ class GearSpec(Shown):
             others["profile_shift"] = -outward_shift
         return cls(abs(teeth), module, internal=True, name=name, **others)
 
-    def _repr_html_(self) -> str:
-        from gearmbs.gears.show import wheel_html
-
-        return wheel_html(self)
-
     def _check(self) -> None:
         if self.internal:
             self._check_internal()

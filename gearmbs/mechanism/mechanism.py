@@ -637,11 +637,6 @@ class Mechanism(LoadMethods, Shown):
         self.joints[joint.name] = joint
         return joint
 
-    def _repr_html_(self) -> str:
-        from gearmbs.mechanism.show import mechanism_html
-
-        return mechanism_html(self)
-
     def __repr__(self) -> str:
         rows = sum(len(joint.rows) for joint in self.joints.values())
         lines = [f"Mechanism({self.name!r}: {6 * len(self.bodies)} coordinates, {rows} constraint rows)"]

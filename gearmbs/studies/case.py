@@ -460,11 +460,6 @@ class Case(Section, Shown):
             data[key] = {**data[key], **value} if isinstance(value, dict) and key in data else value
         return make_case(data)
 
-    def _repr_html_(self) -> str:
-        from gearmbs.studies.show import case_html
-
-        return case_html(self)
-
     def settings(self) -> dict[str, Any]:
         """Return all settings as nested dictionaries, quantities as the user wrote them, else in SI."""
         data = self.model_dump()

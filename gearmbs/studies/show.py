@@ -110,7 +110,9 @@ def study_plot(study: PaperStudy, load: str = "low", *, title: str | None = None
 
 
 def sweep_plot(sweep: Sweep, component: str | None = None, **options: Any) -> Figure:
-    """Draw the levels of the mesh harmonics of a sweep over its values."""
+    """Draw a sweep: over speeds a waterfall of spectra, over other settings the levels of the mesh harmonics."""
+    if sweep.field == "operation.speed":
+        return waterfall_of(sweep, component, **options)
     table = sweep.table(component)
     with look():
         figure = new_figure(7.2, 4.2)
@@ -122,3 +124,12 @@ def sweep_plot(sweep: Sweep, component: str | None = None, **options: Any) -> Fi
         ax.set_title(options.get("title") or f"{sweep.case.name}: mesh harmonics, {sweep.component(component)}")
         ax.legend()
     return figure
+
+
+def waterfall_of(sweep: Sweep, component: str | None = None, **options: Any) -> Figure:
+    """Draw the spectra of a sweep over speeds, one behind the other."""
+    from gearmbs.view import waterfall_plot
+
+    title = options.pop("title", f"{sweep.case.name}: {sweep.component(component)}")
+    teeth = sweep.case.gears.teeth[0]
+    return waterfall_plot(sweep.waterfall(component), orders=(teeth, 2 * teeth, 3 * teeth), title=title, **options)

@@ -97,6 +97,12 @@ class Sweep(Shown):
         index = pd.Index(self.values, name=f"{self.field.rpartition('.')[2]}, {self.unit}")
         return pd.DataFrame(rows, index=index)
 
+    def waterfall(self, component: str | None = None, **settings: Any) -> xr.DataArray:
+        """Return the spectra of the records over speed; ``settings`` are those of `gearmbs.signals.waterfall`."""
+        from gearmbs.signals import waterfall
+
+        return waterfall(self.signals(component), **settings)
+
     def save(self, folder: str | Path) -> list[Path]:
         """Write the records that are there, the table and the figure to a folder; return the paths."""
         from gearmbs.view import save_figure
@@ -147,7 +153,7 @@ def sweep(
     Returns
     -------
     Sweep
-        Shows itself as a table and with ``plot()``.
+        Shows itself as a table and with ``plot()``: over speeds a waterfall of spectra.
 
     Raises
     ------

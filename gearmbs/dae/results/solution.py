@@ -411,11 +411,6 @@ class Solution(Shown):
             f"{self.status.name}; {self.stats})"
         )
 
-    def _repr_html_(self) -> str:
-        from gearmbs.dae.results.show import solution_html
-
-        return solution_html(self)
-
     def to_dataset(self) -> xr.Dataset:
         """Return everything as an :class:`xarray.Dataset` with units in the attributes."""
         import xarray as xr
