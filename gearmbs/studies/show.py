@@ -130,6 +130,6 @@ def waterfall_of(sweep: Sweep, component: str | None = None, **options: Any) -> 
     """Draw the spectra of a sweep over speeds, one behind the other."""
     from gearmbs.view import waterfall_plot
 
-    title = options.pop("title", f"{sweep.case.name}: {sweep.component(component)}")
+    title = options.pop("title", f"{sweep.case.name}: {sweep.component(component).replace('_', ' ')}")
     teeth = sweep.case.gears.teeth[0]
     return waterfall_plot(sweep.waterfall(component), orders=(teeth, 2 * teeth, 3 * teeth), title=title, **options)
