@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from gearmbs.signals.analysis_report import AnalysisReport
     from gearmbs.signals.angular import angular_resample, order_spectrum, time_synchronous_average
     from gearmbs.signals.bands import band_rms, gmf_rms, order_rms, rms
+    from gearmbs.signals.bearing_diagnosis import diagnose_bearing
+    from gearmbs.signals.bearing_lines import BearingLines, bearing_lines
+    from gearmbs.signals.bearing_report import BearingReport, PartFinding
     from gearmbs.signals.campbell import campbell, critical_speeds
     from gearmbs.signals.cepstrum import power_cepstrum
     from gearmbs.signals.comparison import compare, compare_files
@@ -60,6 +63,7 @@ if TYPE_CHECKING:
         quantise,
         sample,
     )
+    from gearmbs.signals.separation import discrete_random, edit_cepstrum, prewhiten, remove_average
     from gearmbs.signals.shaft import shaft_phase
     from gearmbs.signals.shaft_force import COMPONENTS, force_components, force_to_acceleration
     from gearmbs.signals.signal import (
@@ -88,11 +92,14 @@ __all__ = [
     "INDICATORS",
     "AnalysisOptions",
     "AnalysisReport",
+    "BearingLines",
+    "BearingReport",
     "ComparisonReport",
     "FrfPath",
     "MissingMetadataError",
     "ModalPath",
     "Mode",
+    "PartFinding",
     "SignalError",
     "SignalFileError",
     "SpeedCurve",
@@ -106,6 +113,7 @@ __all__ = [
     "as_signal",
     "band_rms",
     "bandpass",
+    "bearing_lines",
     "campbell",
     "common_unit",
     "compare",
@@ -115,8 +123,11 @@ __all__ = [
     "crest_factor",
     "critical_speeds",
     "decimate",
+    "diagnose_bearing",
     "difference_signal",
+    "discrete_random",
     "dynamic_rms",
+    "edit_cepstrum",
     "energy_ratio",
     "envelope",
     "envelope_spectrum",
@@ -153,10 +164,12 @@ __all__ = [
     "phase_from_speed",
     "phase_from_tacho",
     "power_cepstrum",
+    "prewhiten",
     "quantise",
     "rate_of",
     "read_signal",
     "regular_signal",
+    "remove_average",
     "remove_mean",
     "remove_orders",
     "require",
@@ -190,6 +203,19 @@ __all__ = [
 late(
     __name__,
     {
+        "BearingLines": ".bearing_lines",
+        "BearingReport": ".bearing_report",
+        "PartFinding": ".bearing_report",
+        "bearing_lines": ".bearing_lines",
+        "diagnose_bearing": ".bearing_diagnosis",
+        "discrete_random": ".separation",
+        "edit_cepstrum": ".separation",
+        "prewhiten": ".separation",
+        "remove_average": ".separation",
+        "COMPONENTS": ".shaft_force",
+        "EXPECTED": ".expectations",
+        "FORMATS": ".io",
+        "INDICATORS": ".indicators",
         "AnalysisOptions": ".analysis",
         "AnalysisReport": ".analysis_report",
         "COMPONENTS": ".shaft_force",

@@ -1,0 +1,234 @@
+"""What was found of rolling bearings in a record, as data, tables and words."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import pandas as pd
+
+from .bearing_lines import CAGE, ELEMENT, BearingLines
+from .report import markdown_table, significant
+
+WORDS = {
+    "outer race": "the outer race",
+    "inner race": "the inner race",
+    "rolling element": "a rolling element",
+    "cage": "a rolling element or the cage",
+}
+SHOWN = 4
+
+
+@dataclass(frozen=True)
+class PartFinding:
+    """Evidence for one part of one bearing in one channel.
+
+    Attributes
+    ----------
+    bearing, part, channel : str
+    kinematic, found : float
+        Hz: where the fundamental should be and where the lines are that fit best.
+    ratios : tuple of float
+        Power of each harmonic by the mean power round it.
+    log_chance : float
+        Decimal logarithm of the probability of such lines by chance.
+    sidebands : float
+        Power of the first sidebands by that of the line; NaN for parts that have none.
+    where : str
+        Band in which they are clearest.
+    score : float
+        Sum of the harmonics' levels in decades.
+    grade : {"clear", "signs", "none"}
+    beside : bool
+        Whether another part of the bearing explains more lines: some of these are then its own.
+    """
+
+    bearing: str
+    part: str
+    channel: str
+    kinematic: float
+    found: float
+    ratios: tuple[float, ...]
+    log_chance: float
+    sidebands: float
+    where: str
+    score: float
+    grade: str = "none"
+    beside: bool = False
+
+    @property
+    def slip(self) -> float:
+        """found/kinematic - 1."""
+        return self.found / self.kinematic - 1.0
+
+    @property
+    def level(self) -> float:
+        """Level of the fundamental over its neighbourhood, dB."""
+        return 10.0 * math.log10(max(self.ratios[0], 1e-3)) if self.ratios else -30.0
+
+    def graded(self, grade: str, beside: bool = False) -> PartFinding:
+        """Return the finding with a grade."""
+        return replace(self, grade=grade, beside=beside)
+
+    def sentence(self) -> str:
+        """Return what it means, with its grounds."""
+        strength = "Clear lines" if self.grade == "clear" else "Signs"
+        heard = sum(r >= 10.0 for r in self.ratios)
+        text = (
+            f"{strength} of a defect of {WORDS[self.part]} of bearing {self.bearing} in channel {self.channel}: "
+            f"{self.found:.2f} Hz, {100 * self.slip:+.2f} % beside the kinematic {self.kinematic:.2f} Hz, "
+            f"{self.level:.0f} dB above its neighbourhood, {heard} of {len(self.ratios)} harmonics "
+            f"({self.where}); by chance with a probability of {_chance(self.log_chance)}"
+        )
+        if self.part in ("inner race", ELEMENT) and self.sidebands > 0.1:
+            kind = "the shaft's turns, as an inner race has them" if self.part != ELEMENT else "the cage's turns"
+            text += f"; sidebands at {kind}"
+        return text + "."
+
+
+def _chance(log_chance: float) -> str:
+    return f"1e{log_chance:.0f}" if log_chance > -300 else "less than 1e-300"
+
+
+@dataclass
+class BearingReport:
+    """What was found of bearings in one record.
+
+    Attributes
+    ----------
+    source : str
+    rate, duration, shaft : float
+        Sampling rate (Hz), length (s), turns of the shaft a second.
+    bearings : tuple of BearingLines
+    findings : list of PartFinding
+        All parts of all bearings in all channels.
+    bands : dict
+        Band in Hz by channel: the kurtogram's or the one given.
+    spectra : dict of DataFrame
+        Squared envelope spectrum by channel: ``frequency`` and ``power`` by its median, mean 1 in noise.
+    levels : DataFrame
+        RMS, crest factor and kurtosis by channel.
+    notes : list of str
+    """
+
+    source: str
+    rate: float
+    duration: float
+    shaft: float
+    bearings: tuple[BearingLines, ...]
+    findings: list[PartFinding]
+    bands: dict[str, tuple[float, float]]
+    spectra: dict[str, pd.DataFrame]
+    levels: pd.DataFrame
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def accused(self) -> list[PartFinding]:
+        """Findings that name a part, the strongest first; of lines that coincide only those of the better fit."""
+        named = [f for f in self.findings if f.grade != "none" and not f.beside]
+        return sorted(named, key=lambda f: (f.grade != "clear", -f.score))
+
+    @property
+    def fault(self) -> str | None:
+        """Part of the strongest finding: "outer race", "inner race", "rolling element", "cage"; None without."""
+        return self.accused[0].part if self.accused else None
+
+    @property
+    def clear(self) -> bool:
+        """Whether the strongest finding is clear, and not only a sign."""
+        return bool(self.accused) and self.accused[0].grade == "clear"
+
+    @property
+    def verdict(self) -> str:
+        """What the record says of the bearings, in words with grounds."""
+        if not self.accused:
+            names = " and ".join(lines.name for lines in self.bearings)
+            return (
+                f"No lines of a defect of bearing {names} stand out. A defect of a rolling element often shows none, "
+                "and an old, spread one may have lost its lines: this acquits the races of a fresh local defect only."
+            )
+        parts = [finding.sentence() for finding in self.accused]
+        if self.accused[0].part == CAGE:
+            parts.append(
+                "Modulation at the cage's turns comes from elements that differ more often than from the cage."
+            )
+        return " ".join(parts)
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The numbers as tables: bearing_evidence, bearing_lines, bearing_levels."""
+        rows = [
+            (f.bearing, f.channel, f.part, f.kinematic, f.found, 100 * f.slip, f.level, f.log_chance, f.sidebands,
+             f.where, "beside" if f.beside else f.grade)
+            for f in self.findings
+        ]  # fmt: skip
+        columns = ["bearing", "channel", "part", "kinematic", "found", "slip_percent", "level_db", "log10_chance",
+                   "sidebands", "where", "grade"]  # fmt: skip
+        kinematic = pd.concat([lines.table(self.shaft) for lines in self.bearings], ignore_index=True)
+        return {
+            "bearing_evidence": pd.DataFrame(rows, columns=columns),
+            "bearing_lines": kinematic,
+            "bearing_levels": self.levels,
+        }
+
+    def to_markdown(self) -> str:
+        """The report as Markdown text."""
+        parts = [
+            f"# Bearings in {self.source}",
+            "",
+            f"- Record: {', '.join(self.bands)}; {self.duration:.3f} s at {self.rate:g} Hz",
+            f"- Shaft: {60 * self.shaft:.1f} rpm ({self.shaft:.4f} Hz)",
+            *(f"- Band for {name}: {low:.0f} to {high:.0f} Hz" for name, (low, high) in self.bands.items()),
+            *(f"- {note}" for note in self.notes),
+            "",
+            f"**{self.verdict}**",
+            "",
+            "## Evidence",
+            "",
+            self._evidence(),
+            "",
+            "## Kinematic lines",
+            "",
+            self._lines(),
+            "",
+            "## Levels",
+            "",
+            markdown_table(
+                ["channel", "RMS", "crest factor", "kurtosis"],
+                [
+                    [
+                        f"{r.channel} [{r.units}]",
+                        significant(r.rms),
+                        significant(r.crest, 3),
+                        significant(r.kurtosis, 3),
+                    ]
+                    for r in self.levels.itertuples()
+                ],
+            ),
+        ]
+        return "\n".join(parts)
+
+    def _evidence(self) -> str:
+        head = ["bearing", "channel", "part", "kinematic Hz", "found Hz", "slip %", "dB", "chance", "verdict"]
+        shown = [
+            [
+                f.bearing, f.channel, f.part, f"{f.kinematic:.2f}", f"{f.found:.2f}", f"{100 * f.slip:+.2f}",
+                f"{f.level:.0f}", _chance(f.log_chance), "lines of another part" if f.beside else f.grade,
+            ]
+            for f in self.findings
+        ]  # fmt: skip
+        return markdown_table(head, shown)
+
+    def _lines(self) -> str:
+        table = pd.concat([lines.table(self.shaft, SHOWN) for lines in self.bearings], ignore_index=True)
+        rows = []
+        for (bearing, part), group in table.groupby(["bearing", "part"], sort=False):
+            spacing = group["sideband_spacing"].iloc[0]
+            sides = f"{spacing:.2f}" if spacing else "-"
+            rows.append([bearing, part, *(f"{f:.2f}" for f in group["frequency"]), sides])
+        return markdown_table(["bearing", "part", *(f"{k} x" for k in range(1, SHOWN + 1)), "sidebands, Hz"], rows)
+
+    def _repr_markdown_(self) -> str:
+        return self.to_markdown()
+
+    def __repr__(self) -> str:
+        return f"<BearingReport of {self.source!r}: {self.verdict}>"

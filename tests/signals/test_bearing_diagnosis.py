@@ -1,0 +1,205 @@
+"""Bearing lines in records made of pulses, noise and mesh lines: found where they are, and nowhere else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearmbs.signals import (
+    BearingLines,
+    MissingMetadataError,
+    SignalError,
+    bearing_lines,
+    diagnose_bearing,
+    discrete_random,
+    edit_cepstrum,
+    make_signal,
+    phase_from_speed,
+    prewhiten,
+    remove_average,
+    spectrum,
+    with_metadata,
+)
+from gearmbs.signals.bearing_evidence import find_lines, log_tail, power_of
+
+RATE, SHAFT, SECONDS = 12000.0, 29.0, 5.0
+LINES = bearing_lines("6205")
+TIME = np.arange(int(RATE * SECONDS)) / RATE
+
+
+def pulses(
+    frequency: float, slip: float = 0.0, jitter: float = 0.01, modulation: float = 0.0, seed: int = 1
+) -> np.ndarray:
+    """Decaying resonances at 3 kHz, one a period with a random delay, their size following the shaft."""
+    rng = np.random.default_rng(seed)
+    period = 1.0 / (frequency * (1.0 + slip))
+    out = np.zeros(TIME.size + 400)
+    decay = np.arange(400) / RATE
+    at = 0.0
+    while at < SECONDS:
+        first = int(np.ceil(at * RATE))
+        size = 1.0 + modulation * np.cos(2.0 * np.pi * SHAFT * at)
+        ring = np.exp(-decay * 900.0) * np.sin(2.0 * np.pi * 3000.0 * (decay + first / RATE - at))
+        out[first : first + 400] += size * ring
+        at += period * (1.0 + jitter * rng.normal())
+    return out[: TIME.size]
+
+
+def record(*parts: np.ndarray, noise: float = 0.3, seed: int = 0):
+    rng = np.random.default_rng(seed)
+    return make_signal(sum(parts) + noise * rng.standard_normal(TIME.size), RATE, channels=["case"], units="m/s^2")
+
+
+MESH = 3.0 * np.cos(2 * np.pi * 23 * SHAFT * TIME) * (1 + 0.4 * np.cos(2 * np.pi * SHAFT * TIME))
+
+
+@pytest.mark.parametrize(
+    ("part", "order"), [("outer race", LINES.bpfo), ("inner race", LINES.bpfi), ("rolling element", 2 * LINES.bsf)]
+)
+@pytest.mark.parametrize("slip", [-0.009, 0.0, 0.004])
+def test_names_the_part(part, order, slip):
+    modulation = 0.6 if part == "inner race" else 0.0
+    report = diagnose_bearing(record(pulses(order * SHAFT, slip, modulation=modulation), MESH), "6205", f"{SHAFT} Hz")
+    assert report.fault == part
+    assert report.clear
+    found = report.accused[0]
+    assert found.slip == pytest.approx(slip, abs=1e-3)
+    assert found.kinematic == pytest.approx(order * SHAFT)
+    assert f"{found.found:.2f} Hz" in report.verdict
+    if part == "inner race":
+        assert "sidebands at the shaft's turns" in report.verdict
+    assert report.accused == [f for f in report.accused if f.part == part]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_accuses_nothing_in_gears_and_noise(seed):
+    report = diagnose_bearing(record(MESH, noise=0.5, seed=seed), "6205", f"{SHAFT} Hz")
+    assert report.fault is None
+    assert "No lines of a defect of bearing 6205 stand out" in report.verdict
+
+
+def test_chance_is_the_share_of_noise_that_reaches_it():
+    """Of envelopes of noise, the share with a chance below p is about p."""
+    rng = np.random.default_rng(3)
+    chances = []
+    for _ in range(150):
+        frequency, power = power_of(rng.standard_normal(1 << 14) ** 2, 4096.0)
+        chances.append(find_lines(frequency, power, 103.7, 29.0).log_chance)
+    shares = [np.mean(np.array(chances) < level) for level in (-1.0, -2.0)]
+    assert 0.01 < shares[0] < 0.2
+    assert shares[1] < 0.05
+
+
+def test_tail_of_a_gamma_distribution():
+    from scipy.stats import gamma
+
+    for count in (1, 3, 4):
+        assert log_tail(20.0, count) == pytest.approx(gamma.logsf(20.0, count), rel=1e-9)
+
+
+def test_several_bearings_and_ratios():
+    slow = 0.3
+    other = bearing_lines("6206", slow)
+    data = record(pulses(other.bpfo * slow * SHAFT), MESH)
+    report = diagnose_bearing(data, {"input": "6205", "output": ("6206", slow)}, f"{SHAFT} Hz")
+    assert [lines.name for lines in report.bearings] == ["input", "output"]
+    assert (report.fault, report.accused[0].bearing) == ("outer race", "output")
+    tables = report.tables()
+    assert len(tables["bearing_evidence"]) == 8
+    assert tables["bearing_lines"].frequency.max() == pytest.approx(3 * LINES.bpfi * SHAFT)
+    assert "| output | case | outer race |" in report.to_markdown()
+
+
+def test_speed_that_varies_is_followed_in_angle():
+    speed = SHAFT * (1.0 + 0.15 * np.sin(2 * np.pi * 0.3 * TIME))
+    turns = np.cumsum(speed) / RATE
+    crossings = np.interp(np.arange(0.0, turns[-1] * LINES.bpfo) / LINES.bpfo, turns, TIME)
+    signal = np.zeros(TIME.size + 400)
+    decay = np.arange(400) / RATE
+    for at in crossings:
+        first = int(at * RATE)
+        signal[first : first + 400] += np.exp(-900.0 * decay) * np.sin(2 * np.pi * 3000.0 * decay)
+    data = record(signal[: TIME.size])
+    phase = phase_from_speed(data, 1.0).copy(data=2.0 * np.pi * turns)
+    report = diagnose_bearing(data, "6205", phase=phase)
+    assert report.fault == "outer race"
+    assert report.accused[0].slip == pytest.approx(0.0, abs=2e-3)
+    assert diagnose_bearing(data, "6205", f"{SHAFT} Hz").fault != "inner race"
+
+
+def test_own_band_and_its_limits():
+    data = record(pulses(LINES.bpfo * SHAFT), MESH)
+    report = diagnose_bearing(data, "6205", f"{SHAFT} Hz", band=(2000.0, 4000.0))
+    assert report.bands == {"case": (2000.0, 4000.0)}
+    assert report.fault == "outer race"
+    with pytest.raises(SignalError, match="band: must lie inside 0 to 6000 Hz"):
+        diagnose_bearing(data, "6205", f"{SHAFT} Hz", band=(2000.0, 9000.0))
+
+
+def test_multiples_by_name():
+    given = {"FTF": 0.4, "BSF": 2.3, "BPFO": 3.6, "BPFI": 5.4}
+    assert bearing_lines(given) == BearingLines("bearing", 0.4, 2.3, 3.6, 5.4)
+    with pytest.raises(SignalError, match="BPFI missing"):
+        bearing_lines({"FTF": 0.4, "BSF": 2.3, "BPFO": 3.6})
+    with pytest.raises(SignalError, match="how many balls it has"):
+        bearing_lines("6305")
+    with pytest.raises(SignalError, match="is none; give a designation"):
+        bearing_lines(17)
+
+
+def test_what_is_missing_is_asked_for():
+    data = record(MESH)
+    with pytest.raises(MissingMetadataError, match="speed"):
+        diagnose_bearing(data, "6205")
+    assert diagnose_bearing(with_metadata(data, speed=2 * np.pi * SHAFT), "6205").shaft == pytest.approx(SHAFT)
+    with pytest.raises(SignalError, match="turns of the shaft"):
+        diagnose_bearing(data.isel(time=slice(0, 5000)), "6205", f"{SHAFT} Hz")
+    with pytest.raises(SignalError, match="needs a sampling rate above"):
+        diagnose_bearing(data, "6205", "60000 rpm")
+
+
+# --- separation of gears and bearings ---------------------------------------------------------------------------
+
+
+def test_average_removal_parts_gear_and_bearing():
+    bearing = pulses(LINES.bpfo * SHAFT)
+    data = record(bearing, MESH, noise=0.0)
+    repeating, rest = remove_average(data, phase_from_speed(data, 2 * np.pi * SHAFT))
+    times = rest["time"].values
+    kept = np.interp(times, TIME, bearing)
+    np.testing.assert_allclose(repeating.values + rest.values, data.sel(time=times).values, atol=1e-12)
+    assert np.corrcoef(rest.values[:, 0], kept)[0, 1] > 0.98
+    assert np.std(repeating.values[:, 0] - np.interp(times, TIME, MESH)) < 0.1 * np.std(MESH)
+
+
+def test_discrete_random_separation():
+    """The lines go to one side and the bearing, whose pulses come at random, to the other."""
+    bearing = pulses(LINES.bpfo * SHAFT, jitter=0.02)
+    data = record(bearing, MESH, noise=0.05)
+    discrete, random = discrete_random(data, segment=1024, delay=0.5)
+    np.testing.assert_allclose(discrete.values + random.values, data.values, atol=1e-12)
+    inner = slice(2000, -2000)
+    assert np.std((discrete.values[:, 0] - MESH)[inner]) < 0.25 * np.std(MESH)
+    assert np.corrcoef(random.values[inner, 0], bearing[inner])[0, 1] > 0.8
+
+
+def test_cepstrum_editing_levels_a_family_only():
+    data = record(pulses(LINES.bpfo * SHAFT, jitter=0.02), MESH, noise=0.2)
+    edited = edit_cepstrum(data, SHAFT)
+    before, after = (
+        spectrum(s, scaling="rms").sel(frequency=23 * SHAFT, method="nearest").item() for s in (data, edited)
+    )
+    assert after < 0.3 * before
+    quiet = spectrum(data, scaling="power"), spectrum(edited, scaling="power")
+    levels = [float(s.sel(frequency=slice(2800, 3200)).sum()) for s in quiet]
+    assert levels[1] == pytest.approx(levels[0], rel=0.3)
+    with pytest.raises(SignalError, match="frequencies: must be above"):
+        edit_cepstrum(data, 0.0)
+
+
+def test_prewhitened_spectrum_is_flat():
+    white = prewhiten(record(MESH))
+    lines = np.abs(np.fft.rfft(white.values[:, 0]))[1:-1]
+    np.testing.assert_allclose(lines, lines.mean(), rtol=1e-6)
+    with pytest.raises(SignalError, match="a channel that is zero"):
+        prewhiten(make_signal(np.zeros(1000), RATE))
