@@ -24,7 +24,8 @@ Differential-algebraic equations
     `solve_dae`, `DAEProblem`, `DAEResult`, `Status`
 Signals
     `read_signal`, `write_signal`, `make_signal`, `to_signal`, `analyse`, `compare`, `features`, `spectrum`,
-    `envelope_spectrum`, `spectrogram`, `waterfall`, `order_map`, `order_track`, `campbell`
+    `envelope_spectrum`, `spectrogram`, `waterfall`, `order_map`, `order_track`, `campbell`,
+    `diagnose_bearing`
 ADAMS decks
     `read_deck`, `run_deck`, `write_deck`
 Views
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
         analyse,
         campbell,
         compare,
+        diagnose_bearing,
         envelope_spectrum,
         features,
         make_signal,
@@ -121,6 +123,7 @@ __all__ = [
     "campbell",
     "campbell_plot",
     "compare",
+    "diagnose_bearing",
     "envelope_spectrum",
     "faults",
     "features",
@@ -189,6 +192,7 @@ late(
         "campbell": ".signals",
         "campbell_plot": ".view",
         "compare": ".signals",
+        "diagnose_bearing": ".signals",
         "envelope_spectrum": ".signals",
         "faults": ".gears",
         "features": ".signals",

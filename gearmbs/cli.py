@@ -255,12 +255,19 @@ def analyse(
     pulses: Annotated[float, typer.Option(help="Tacho pulses a revolution.")] = 1.0,
     wheel: Annotated[int, typer.Option(help="Whose shaft the averages follow: 1, or 2 for the mate.")] = 1,
     harmonics: Annotated[int, typer.Option(help="Mesh harmonics to evaluate.")] = 3,
+    bearing: Annotated[
+        list[str] | None,
+        typer.Option(help='Bearing, e.g. 6205; "6205@0.345" on a shaft of 0.345 times the speed; repeat for several.'),
+    ] = None,
+    band: Annotated[
+        str | None, typer.Option(help='Band of the envelope, e.g. "1 kHz, 5 kHz"; default: kurtogram.')
+    ] = None,
     format: Annotated[str | None, typer.Option(help="Format of the file, if its name does not say.")] = None,
     tables: Annotated[Path | None, typer.Option(help="Folder for the tables as CSV.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for spectrum and average as PNG and SVG.")] = None,
     out: ReportFile = None,
 ) -> None:
-    """Analyse a vibration record, measured or simulated: mesh frequency, harmonics, sidebands, indicators."""
+    """Analyse a vibration record, measured or simulated: mesh lines, bearing lines, sidebands, indicators."""
     with guarded(), stage_bar(file.name) as move:
         from gearmbs.signals import analyse as analyse_signal
         from gearmbs.signals.simulated import read_any
@@ -282,12 +289,22 @@ def analyse(
             harmonics=harmonics,
             progress=lambda f, s: move(0.3 + 0.7 * f, s),
         )
-        files = _save_tables(report.tables(), tables)
+        found = report.tables()
+        text = report.to_markdown()
+        if bearing:
+            from gearmbs.signals import diagnose_bearing
+
+            one = signal if channel is None else signal.sel(channel=channel)
+            turns = given["speed"] if given["speed"] is not None else getattr(report, "speed", None)
+            bearings = diagnose_bearing(one, bearing_list(bearing), turns, band=None if band is None else pair_of(band))
+            found |= bearings.tables()
+            text = f"{bearings.to_markdown()}\n\n{text}"
+        files = _save_tables(found, tables)
         if figures is not None:
             from gearmbs.view import analysis_figures
 
             files += _save_figures(analysis_figures(report, signal), figures)
-    _hand_over(report.to_markdown(), out, files)
+    _hand_over(text, out, files)
 
 
 @app.command()
@@ -382,6 +399,33 @@ def compare(
 
             files += _save_figures(comparison_figures(report), figures)
     _hand_over(report.to_markdown(), out, files)
+
+
+def bearing_list(texts: list[str]) -> dict[str, tuple[str, float]]:
+    """Return bearings and the ratios of their shafts, given as "6205" or "6205@0.345"."""
+    found: dict[str, tuple[str, float]] = {}
+    for text in texts:
+        name, _, ratio = text.partition("@")
+        try:
+            value = float(ratio) if ratio else 1.0
+        except ValueError:
+            raise ValueError(f"--bearing {text!r}: {ratio!r} is no number; write for example 6205@0.345") from None
+        key = name.strip() if name.strip() not in found else text
+        found[key] = (name.strip(), value)
+    return found
+
+
+def pair_of(text: str) -> tuple[float, float]:
+    """Return a band in Hz given as "1000, 5000" or "1 kHz, 5 kHz"."""
+    from gearmbs.units import to_si
+
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 2:
+        raise ValueError(f"--band {text!r}: give two frequencies such as '1 kHz, 5 kHz'")
+    low, high = (
+        to_si(p if any(c.isalpha() for c in p.replace("e", "")) else f"{p} Hz", "frequency", "--band") for p in parts
+    )
+    return low, high
 
 
 def tooth_counts(text: str) -> tuple[int, ...]:

@@ -50,6 +50,7 @@ EXCEPTIONS = {
     ("gears", "dae.equations"): "the same door: a pair hands its kernel to the mechanism",
     ("flexible", "dae"): "the error of models, of which its own is one",
     ("bearings", "dae.equations"): "the same door: a bearing hands its kernel to the mechanism",
+    ("signals", "bearings"): "the kinematic lines of a bearing by its designation",
     ("bearings", "dae.compiled"): "its kernels: views of flat tables",
     ("drivetrain", "dae.equations"): "the same door: torques about an axis hand their kernels to the mechanism",
     ("drivetrain", "dae.compiled"): "its kernels: views of tables, calls of laws through addresses",
