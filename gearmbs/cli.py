@@ -240,7 +240,15 @@ def _level_table(data: Any) -> str:
             lines.append(f"{component!s:<18}" + "".join(f"{v:10.4g}" for v in row))
         return "\n".join(lines)
     speed = data["speed"] * 30.0 / 3.141592653589793
-    return f"driver from {float(speed[0]):.4g} to {float(speed[-1]):.4g} rpm, at most {float(speed.max()):.4g} rpm"
+    lines = [f"driver from {float(speed[0]):.4g} to {float(speed[-1]):.4g} rpm, at most {float(speed.max()):.4g} rpm"]
+    levels, at = data["order_rms"], data["track_speed"] * 30.0 / 3.141592653589793
+    heads = "".join(f"{int(h):>8} x GMF   at rpm" for h in levels.harmonic.values)
+    lines.append(f"{'highest':<18}{heads}   RMS, m/s^2")
+    for component in levels.component.values:
+        row = levels.sel(component=component).transpose("harmonic", "track_time").values
+        best = [int(v.argmax()) for v in row]
+        lines.append(f"{component!s:<18}" + "".join(f"{v[k]:14.4g}{float(at[k]):9.4g}" for v, k in zip(row, best)))
+    return "\n".join(lines)
 
 
 @app.command()

@@ -557,6 +557,12 @@ class Mechanism(LoadMethods, Shown):
 
         return simulate(self, t_end, **options)
 
+    def linear_modes(self, **options):
+        """Return the natural frequencies and mode shapes; see :func:`gearmbs.mechanism.linear_modes`."""
+        from gearmbs.mechanism.analyses import linear_modes
+
+        return linear_modes(self, **options)
+
     def measures(self, solution):
         """Return what can be measured on a solution of this mechanism; its methods offer it by name."""
         from gearmbs.mechanism.measures import Measures

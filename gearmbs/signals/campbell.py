@@ -36,9 +36,9 @@ def campbell(
     ----------
     modes : array_like, object with `frequencies`, or callable
         Natural frequencies in Hz: of shape (modes,) for modes that do not depend on the speed, (speeds, modes) for
-        those that do; the result of `linear_modes`, or one for each speed; or a function of the speed in rad/s that
-        returns either. Modes are followed from speed to speed in the order of their frequencies; rigid motions are
-        left out.
+        those that do; a mechanism, whose modes are those of its initial position, or the result of `linear_modes`, or
+        one for each speed; or a function of the speed in rad/s that returns any of them. Modes are followed from speed
+        to speed in the order of their frequencies; rigid motions are left out.
     speeds : sequence
         Increasing, rad/s or texts such as "1500 rpm"; two or more.
     orders : sequence of float, or mapping of name to float
@@ -133,7 +133,8 @@ def _orders(orders: Sequence[float] | Mapping[str, float]) -> tuple[list[str], n
 def _frequencies(modes: Any, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
     """Frequencies (Hz) and, where known, damping ratios, each of shape (speeds, modes); short rows end in NaN."""
     if callable(modes):
-        modes = [modes(float(speed)) for speed in omega]
+        modes = [_modes_of(modes(float(speed))) for speed in omega]
+    modes = _modes_of(modes)
     if hasattr(modes, "frequencies"):
         modes = [modes] * omega.size
     rows = list(modes)
@@ -158,6 +159,11 @@ def _frequencies(modes: Any, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray 
     if frequency.ndim != 2 or frequency.shape[0] != omega.size or not frequency.shape[1]:
         raise SignalError(f"modes: shape {frequency.shape} does not fit {omega.size} speeds; give (speeds, modes)")
     return frequency, damping
+
+
+def _modes_of(thing: Any) -> Any:
+    """Return the modes of a mechanism, or of anything that has ``linear_modes()``; of all else itself."""
+    return thing.linear_modes() if callable(getattr(thing, "linear_modes", None)) else thing
 
 
 def _padded(rows: list[np.ndarray]) -> np.ndarray:

@@ -22,7 +22,7 @@ EDGE = 0.01
 DEEPEST = 0.25
 """Static penetration of one tooth pair, in modules, beyond which teeth would have to pass through each other."""
 
-LEAST_TURNS = 4.0
+LEAST_TURNS = 4.25
 """Revolutions that a record of changing speed must hold."""
 
 SLIPPED = 0.5

@@ -23,13 +23,14 @@ from gearmbs.signals import (
     force_to_acceleration,
     gmf_rms,
     make_signal,
+    order_track,
     trim,
 )
 from gearmbs.signals.monotone_cubic import monotone_cubic
 from gearmbs.studies import rig
 from gearmbs.studies.case import Case, units_of_fields
 from gearmbs.studies.drive import drive_angle
-from gearmbs.studies.limits import check_record, edge, remarks, slip
+from gearmbs.studies.limits import HARMONICS, check_record, edge, remarks, slip
 from gearmbs.studies.measured import COUNTS, SMOOTH, Measured, Recorder, measure, rows_of_record
 
 ADVICE = {
@@ -133,8 +134,10 @@ def run_case(case: Case, progress: bool | Callable[[float], None] | None = None)
     Dataset
         ``force_1``, ``force_2``: force of the shaft on each gear at its seat, N, over ``time`` at the output rate;
         ``acceleration``: force on the driven gear over its mass, decimated to the signal rate, by component;
-        ``gmf_rms``: RMS of the first three mesh harmonics by component, by band-pass and by orders; transmission
-        error, contact forces and penetrations; parameters, versions and solver statistics in the attributes.
+        ``gmf_rms``: RMS of the first three mesh harmonics by component, by band-pass and by orders; of a run-up instead
+        ``order_rms``, the same followed by order tracking over ``track_time`` and ``track_speed``, and ``speed`` and
+        ``angle`` of the driver over ``signal_time``; transmission error, contact forces and penetrations; parameters,
+        versions and solver statistics in the attributes.
 
     Raises
     ------
@@ -252,6 +255,7 @@ def _evaluated(case: Case, solution: Solution, known: Measured, *, even: bool) -
         dataset["gmf_rms"] = _mesh_levels(acceleration)
     else:
         dataset = dataset.assign_coords(_turning(case, dataset["signal_time"].values))
+        dataset["order_rms"] = _tracked_levels(case, acceleration, dataset)
     dataset.attrs = attributes_of(case, solution)
     return dataset
 
@@ -262,6 +266,18 @@ def _mesh_levels(acceleration: xr.DataArray) -> xr.DataArray:
     ways = xr.concat([levels["band"], levels["orders"]], dim="way").assign_coords(way=["band", "orders"])
     found = ways.drop_vars(["channel_units", "units"], errors="ignore").rename(channel="component")
     found.attrs = {"units": "m/s^2", "long_name": "RMS of the gear mesh frequency harmonics"}
+    return found
+
+
+def _tracked_levels(case: Case, acceleration: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray:
+    """Return the RMS of the mesh orders along a run-up, by order tracking over four revolutions at a time."""
+    turning = {name: ("time", dataset[name].values, dataset[name].attrs) for name in ("speed", "angle")}
+    orders = [float(case.gears.teeth[0] * k) for k in range(1, HARMONICS + 1)]
+    tracks = order_track(acceleration.assign_coords(turning), orders=orders, scaling="rms")
+    found = tracks.rename(time="track_time", speed="track_speed", angle="track_angle", order="harmonic")
+    found = found.rename(channel="component").drop_vars(["units", "channel_units"], errors="ignore")
+    found = found.assign_coords(harmonic=np.arange(1, HARMONICS + 1))
+    found.attrs = {"units": "m/s^2", "long_name": "RMS of the mesh orders along the run-up"}
     return found
 
 

@@ -67,6 +67,20 @@ def test_order_lines_stay_where_they_are(run_up):
         assert float(near.order[int(np.argmax(near.values))]) == pytest.approx(29.0, rel=0.01)
 
 
+def test_the_record_follows_the_mesh_orders(run_up):
+    """Levels over speed as those of runs at constant speeds near by, whose mesh harmonics are known otherwise."""
+    case, record = run_up
+    levels = record["order_rms"].sel(component="line_of_action")
+    assert levels.dims == ("track_time", "harmonic")
+    assert np.all(np.diff(record["track_speed"].values) > 0.0)
+    k = int(np.argmin(np.abs(record["track_speed"].values - 50.0 * np.pi)))
+    speed = float(record["track_speed"][k])
+    steady = run_case(case.changed(operation={"speed": speed, "duration": 0.1, "run_up": 0.05}))
+    wanted = steady["gmf_rms"].sel(component="line_of_action", way="orders").values
+    # the torque that accelerates the driven side loads the mesh besides
+    np.testing.assert_allclose(levels.values[k], wanted, rtol=0.25)
+
+
 def test_a_coast_down_and_a_torque_that_changes():
     case = Case(
         operation={
@@ -98,3 +112,4 @@ def test_from_a_file_on_the_command_line(tmp_path):
     result = CliRunner().invoke(cli.app, ["run", str(path)])
     assert result.exit_code == 0, result.output
     assert "to 1800 rpm" in result.output
+    assert "1 x GMF   at rpm" in result.output

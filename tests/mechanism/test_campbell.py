@@ -1,0 +1,46 @@
+"""A Campbell diagram straight from a mechanism: modes against speed, and where the mesh orders meet them."""
+
+import numpy as np
+import pytest
+
+from gearmbs.mechanism import Mechanism
+from gearmbs.signals import campbell
+from gearmbs.view import campbell_plot
+from tests.view.looking import assert_readable
+
+
+def torsional(stiffness=2000.0):
+    """Two discs of 0.02 and 0.05 kg m^2 on a torsion spring, free to turn together."""
+    m = Mechanism("two discs")
+    one = m.body("pinion", 1.0, (0.1, 0.1, 0.02))
+    two = m.body("wheel", 2.0, (0.1, 0.1, 0.05), position=(0, 0, 0.2))
+    m.revolute("bearing 1", one, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    m.revolute("bearing 2", two, m.ground, at=(0, 0, 0.2), axis=(0, 0, 1))
+    m.bushing("shaft", one.marker(name="a"), two.marker((0, 0, -0.2), name="b"), torsional_stiffness=(0, 0, stiffness))
+    return m
+
+
+def natural(stiffness=2000.0):
+    return np.sqrt(stiffness * (1 / 0.02 + 1 / 0.05)) / (2 * np.pi)
+
+
+def test_mesh_orders_meet_the_mode_of_a_mechanism():
+    """f = sqrt(k (1/J1 + 1/J2)) / 2 pi, met by order z at the speed f / z; the rigid turning is no mode to meet."""
+    diagram = campbell(torsional(), ["0 rpm", "3000 rpm"], {"mesh": 29, "2 x mesh": 58})
+    np.testing.assert_allclose(diagram["frequency"].values, natural(), rtol=1e-9)
+    crossings = sorted(diagram["critical_speed"].values / (2 * np.pi))
+    np.testing.assert_allclose(crossings, [natural() / 58, natural() / 29], rtol=1e-9)
+    np.testing.assert_allclose(torsional().linear_modes().frequencies.max(), natural(), rtol=1e-9)
+
+
+def test_a_function_of_the_speed_may_return_mechanisms():
+    diagram = campbell(lambda speed: torsional(2000.0 + 10.0 * speed), [0.0, 100.0, 200.0], (29,))
+    np.testing.assert_allclose(
+        diagram["frequency"].values[:, 0], [natural(k) for k in (2000.0, 3000.0, 4000.0)], rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize("orders", [(29, 58), {"mesh": 29}])
+def test_it_is_drawn_in_one_line(orders):
+    figure = campbell_plot(torsional(), speeds=["0 rpm", "1000 rpm"], orders=orders)
+    assert_readable(figure, overlap=0.3)
