@@ -16,6 +16,7 @@ import typer
 
 from gearmbs._command import fail, guarded
 from gearmbs.campaigns.commands import app as campaign_app
+from gearmbs.identify.commands import identify as identify_command
 
 if TYPE_CHECKING:
     from gearmbs.studies.simulation import SimulationFailed
@@ -29,6 +30,7 @@ app = typer.Typer(
 )
 
 app.add_typer(campaign_app)
+app.command("identify")(identify_command)
 
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")]
 ReportFile = Annotated[Path | None, typer.Option("--out", "-o", help="Write the report here instead of printing it.")]

@@ -39,7 +39,8 @@ MAY_KNOW = {
     "adams": {"dae", "dae.equations", "dae.model", "dae.analyses", "dae.results", "mechanism"},
     "studies": {"bearings", "dae", "dae.results", "drivetrain", "flexible", "gears", "mechanism", "signals", "view"},
     "campaigns": {"adams", "gears", "signals", "studies", "view"},
-    "cli": {"adams", "campaigns", "signals", "studies", "view"},
+    "identify": {"signals", "studies", "view"},
+    "cli": {"adams", "campaigns", "identify", "signals", "studies", "view"},
 }
 """What a package may import, besides itself and what `SUPPORT` names. ``dae`` alone is what integrators and equations
 share: the problem, results, errors, and the function that solves a user's DAE."""

@@ -21,6 +21,7 @@ PACKAGES = {
     "gearmbs.signals": "Signals: files, features, comparison, sensors",
     "gearmbs.studies": "Studies: cases and the paper's study",
     "gearmbs.campaigns": "Campaigns: many cases",
+    "gearmbs.identify": "Identification: parameters from measurements",
     "gearmbs.adams": "ADAMS: decks in, results out",
     "gearmbs.view": "View: figures",
     "gearmbs.units": "Units, files, progress and compilation",
@@ -128,6 +129,11 @@ MORE = {
         "gearmbs.campaigns.designs": EVERYTHING,
         "gearmbs.campaigns.runners": EXPORTED,
         "gearmbs.campaigns.subjects.pair": ["canonical_case", "harmonics", "contact_numbers", "indicators"],
+    },
+    "gearmbs.identify": {
+        "gearmbs.identify.differences": EVERYTHING,
+        "gearmbs.identify.posterior": ["make_surrogate"],
+        "gearmbs.identify.study": ["load_problem"],
     },
     "gearmbs.units": {
         "gearmbs.units": ["to_si"],

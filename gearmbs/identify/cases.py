@@ -1,0 +1,325 @@
+"""Parameters of cases from measured mesh harmonics.
+
+The residual is (ln model - ln measured) / sigma, so that all harmonics count by their relative deviations. Sensors
+with unknown
+gains shift the logarithms of a channel by the same amount: such shifts are projected out, which is the fit of a free
+gain
+without its being a parameter of the search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from gearmbs.identify.differences import SIMULATION_STEP, central, noise_of_columns, steps
+from gearmbs.identify.errors import IdentifyError
+from gearmbs.identify.fit import fit
+from gearmbs.identify.identifiability import LIMIT, Identifiability
+from gearmbs.identify.measured import check_table
+from gearmbs.identify.parameters import Free, Scale
+from gearmbs.identify.result import Fit
+from gearmbs.units import to_si
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from gearmbs.studies import Case
+
+TOLERANCE = 1e-8
+"""Of the integrator, so that differences over a step of 1e-2 are right to a few percent."""
+
+Gains = Literal["none", "one", "channel", "case"]
+
+
+class CaseProblem:
+    """Measured harmonics, and cases that predict them.
+
+    Parameters
+    ----------
+    measured : DataFrame
+        Columns ``case``, ``channel``, ``harmonic``, ``value`` and ``sigma`` (relative); see `harmonic_table`.
+    cases : mapping of str to Case
+        By the names in the column ``case``.
+    free : sequence of Free or str
+        Paths of fields with their starts and bounds in any unit; of a plain path the start is the first case's value.
+    gains : {"none", "one", "channel", "case"}
+        Free gains: none, one for all, one for each channel, one for each channel of each case.
+    channels : mapping of str to str, optional
+        Component of the force that stands for each measured channel; default the channel's own name.
+    way : {"band", "orders"}
+        How the levels were taken.
+    workers : int
+        Simulations side by side.
+
+    Raises
+    ------
+    IdentifyError
+        For unknown cases, channels, fields and units.
+    """
+
+    def __init__(
+        self,
+        measured: pd.DataFrame,
+        cases: Mapping[str, Case],
+        free: Sequence[Free | str],
+        *,
+        gains: Gains = "none",
+        channels: Mapping[str, str] | None = None,
+        way: str = "band",
+        workers: int = 1,
+    ) -> None:
+        self.table = check_table(measured)
+        self.cases = {name: case.changed(solver={"tolerance": TOLERANCE}) for name, case in cases.items()}
+        self.way, self.workers = way, workers
+        self.free = [_in_si(item, next(iter(self.cases.values()))) for item in free]
+        unknown = set(self.table["case"]) - set(self.cases)
+        if unknown:
+            raise IdentifyError(f"measured: no case is given for {', '.join(sorted(unknown))}")
+        from gearmbs.signals import COMPONENTS
+
+        self.components = [str((channels or {}).get(c, c)) for c in self.table["channel"]]
+        wrong = sorted(set(self.components) - set(COMPONENTS))
+        if wrong:
+            raise IdentifyError(
+                f"channels: {', '.join(wrong)} is no component of the force; say which one it stands for, "
+                f"channels={{...: "
+                f"one of {', '.join(COMPONENTS)}}}"
+            )
+        self.groups = _groups(self.table, gains)
+        self._known: dict[tuple[str, tuple[float, ...]], dict[tuple[str, int], float]] = {}
+
+    @property
+    def lost(self) -> int:
+        """Degrees of freedom that the gains use up."""
+        return 0 if self.groups is None else int(self.groups.max()) + 1
+
+    @property
+    def simulations(self) -> int:
+        """Simulations so far."""
+        return len(self._known)
+
+    def case(self, name: str, p: Sequence[float]) -> Case:
+        """Return a case with the parameters p."""
+        sections: dict[str, dict[str, float]] = {}
+        for free, value in zip(self.free, p):
+            for path, factor in {free.name: 1.0, **free.also}.items():
+                section, _, field = path.partition(".")
+                sections.setdefault(section, {})[field] = factor * float(value)
+        return self.cases[name].changed(**sections)
+
+    def _simulate(self, key: tuple[str, tuple[float, ...]]) -> dict[tuple[str, int], float]:
+        from gearmbs.studies import SimulationFailed, run_case
+
+        name, p = key
+        try:
+            levels = run_case(self.case(name, p), False)["gmf_rms"].sel(way=self.way)
+        except (SimulationFailed, ValueError):
+            return {}
+        return {
+            (str(c), int(h)): float(levels.sel(component=c, harmonic=h))
+            for c in levels.component.values
+            for h in levels.harmonic.values
+        }
+
+    def predictions(self, points: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return the logarithms of the predicted values, gains left out, for several parameter vectors; NaN where it
+        fails."""
+        names = list(dict.fromkeys(self.table["case"]))
+        keys = [(name, tuple(float(v) for v in p)) for p in points for name in names]
+        new = [key for key in dict.fromkeys(keys) if key not in self._known]
+        if self.workers > 1 and len(new) > 1:
+            with ThreadPoolExecutor(self.workers) as pool:
+                self._known.update(zip(new, pool.map(self._simulate, new)))
+        else:
+            self._known.update((key, self._simulate(key)) for key in new)
+        found = []
+        for p in points:
+            q = tuple(float(v) for v in p)
+            rows = zip(self.table["case"], self.components, self.table["harmonic"])
+            levels = [self._known[(str(n), q)].get((c, int(h)), np.nan) for n, c, h in rows]
+            with np.errstate(all="ignore"):
+                found.append(self._without_gains(np.log(np.array(levels))))
+        return found
+
+    def _without_gains(self, logs: np.ndarray) -> np.ndarray:
+        """Return logarithms less the weighted mean of their group."""
+        if self.groups is None:
+            return logs
+        weight = 1.0 / self.table["sigma"].to_numpy() ** 2
+        total = np.bincount(self.groups, weight)
+        mean = np.bincount(self.groups, weight * logs) / total
+        return logs - mean[self.groups]
+
+    @property
+    def measured(self) -> np.ndarray:
+        """Logarithms of the measured values, gains left out."""
+        return self._without_gains(np.log(self.table["value"].to_numpy()))
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """Standard deviations of the logarithms."""
+        return self.table["sigma"].to_numpy()
+
+    def derivatives(self, p: Sequence[float] | None = None) -> np.ndarray:
+        """Return the derivatives of the predictions in z over their standard deviations, shape (m, n)."""
+        return self._derivatives(p)[0]
+
+    def _derivatives(self, p: Sequence[float] | None) -> tuple[np.ndarray, np.ndarray, Any]:
+        scale = Scale(tuple(self.free))
+        z = scale.z([f.start for f in self.free] if p is None else p)
+
+        def many(points: Sequence[np.ndarray]) -> list[np.ndarray]:
+            return [f / self.sigma for f in self.predictions([scale.p(q) for q in points])]
+
+        h = steps(z, scale.logs, SIMULATION_STEP)
+        matrix = central(many, z, h)
+        if not np.isfinite(matrix).all():
+            raise IdentifyError("the simulations fail about the start; give another one")
+        return matrix, h, many
+
+    def identifiability(
+        self, p: Sequence[float] | None = None, *, noise: bool = True, limit: float = LIMIT
+    ) -> Identifiability:
+        """Return what the measured numbers can tell at p, default the starts: four simulations a parameter and case.
+
+        Parameters
+        ----------
+        noise : bool
+            Judge the noise of the differences, too, at half the step; else two simulations suffice.
+        """
+        matrix, h, many = self._derivatives(p)
+        scale = Scale(tuple(self.free))
+        z = scale.z([f.start for f in self.free] if p is None else p)
+        floor = noise_of_columns(many, z, h, matrix) if noise else np.zeros(len(self.free))
+        return Identifiability(scale.names, matrix, floor, limit)
+
+    def fit(self, **settings: Any) -> Fit:
+        """Find the parameters; see `gearmbs.identify.fit` for the settings.
+
+        The step and the end of the search are those that fit the integrator's noise.
+        """
+        settings = {"step": SIMULATION_STEP, "tolerance": 1e-4, **settings}
+        return fit(
+            lambda p: self.predictions([p])[0],
+            self.measured,
+            self.free,
+            sigma=self.sigma,
+            many=self.predictions,
+            lost=self.lost,
+            **settings,
+        )
+
+
+def identify(
+    measured: pd.DataFrame,
+    cases: Mapping[str, Case] | Case,
+    free: Sequence[Free | str],
+    *,
+    check: bool = True,
+    tell: Callable[[str], None] | None = None,
+    starts: int = 1,
+    **settings: Any,
+) -> Fit:
+    """Find parameters of cases from measured mesh harmonics.
+
+    Parameters
+    ----------
+    measured : DataFrame
+        See `CaseProblem`.
+    cases : Case or mapping of str to Case
+        One case stands for everything measured.
+    free : sequence of Free or str
+    check : bool
+        Look first at what the numbers can tell, and refuse what they cannot.
+    tell : callable, optional
+        Is told the remarks, when they are not to be an error.
+    starts : int
+        Searches from different starts.
+    **settings
+        Of `CaseProblem`.
+
+    Raises
+    ------
+    IdentifyError
+        If a combination of the parameters is not determined; the message names it. With ``tell``, or ``check=False``,
+        the
+        fit is made all the same.
+
+    Examples
+    --------
+    >>> found = identify(table, case, ["contact.depth", "friction.static"], gains="one")  # doctest: +SKIP
+    >>> print(found.report())  # doctest: +SKIP
+    """
+    from gearmbs.studies import Case as CaseClass
+
+    given = {name: cases for name in dict.fromkeys(measured["case"])} if isinstance(cases, CaseClass) else cases
+    problem = CaseProblem(measured, given, free, **settings)
+    if check:
+        remarks = problem.identifiability(noise=tell is not None).remarks()
+        if remarks and tell is None:
+            raise IdentifyError("measured: not enough for these parameters. " + ". ".join(remarks))
+        for line in remarks:
+            assert tell is not None
+            tell(line)
+    return problem.fit(starts=starts)
+
+
+def compare_models(problems: Mapping[str, CaseProblem], **settings: Any) -> pd.DataFrame:
+    """Fit several models to the same data and compare them: skew or inclination, with or without friction.
+
+    Returns
+    -------
+    DataFrame
+        By model cost, chi-square over degrees of freedom, AIC, BIC, their differences from the best and Akaike's
+        weights,
+        best first; the fits are in ``attrs["fits"]``.
+    """
+    import pandas as pd
+
+    fits = {name: problem.fit(**settings) for name, problem in problems.items()}
+    rows = {n: {"cost": f.cost, "chi_square": f.chi_square, "aic": f.aic, "bic": f.bic} for n, f in fits.items()}
+    table = pd.DataFrame.from_dict(rows, orient="index").sort_values("aic")
+    table["delta_aic"] = table.aic - table.aic.min()
+    weight = np.exp(-0.5 * table["delta_aic"])
+    table["weight"] = weight / weight.sum()
+    table.attrs["fits"] = fits
+    return table
+
+
+def _groups(table: pd.DataFrame, gains: str) -> np.ndarray | None:
+    """Return which free gain each row has."""
+    keys = {"none": None, "one": [], "channel": ["channel"], "case": ["case", "channel"]}
+    if gains not in keys:
+        raise IdentifyError(f"gains is {gains!r}; choose one of {', '.join(keys)}")
+    columns = keys[gains]
+    if columns is None:
+        return None
+    rows = list(zip(*(table[c] for c in columns))) if columns else [()] * len(table)
+    places = {row: k for k, row in enumerate(dict.fromkeys(rows))}
+    return np.array([places[row] for row in rows])
+
+
+def _in_si(item: Free | str, case: Case) -> Free:
+    """Return a parameter with its start and bounds in SI; a path starts at the case's value."""
+    from gearmbs.studies.case import units_of_fields
+
+    path = item if isinstance(item, str) else item.name
+    section, _, field = path.partition(".")
+    holder = getattr(case, section, None)
+    if holder is None or field not in type(holder).model_fields:
+        raise IdentifyError(f"{path}: a case has no such field; write section.field, for instance contact.depth")
+    unit = units_of_fields(holder).get(field, "1")
+    unit = "dimensionless" if unit == "1" else unit
+    value = to_si(getattr(holder, field), unit, path)
+    if isinstance(item, str):
+        return Free(path, value, log=value > 0.0)
+
+    def number(given: Any) -> Any:
+        return None if given is None else to_si(given, unit, path)
+
+    return replace(item, start=number(item.start), low=number(item.low), high=number(item.high))

@@ -1,0 +1,239 @@
+"""Least squares of any model, with what one must know of the answer: errors, correlations, residuals, profiles.
+
+In terms of the weighted residuals r = (f(p) - y) / sigma and their Jacobian J the estimate minimises r.r, its
+covariance is
+(J'J)^-1, times s^2 = r.r / (m - n) where the noise is not known (G. A. F. Seber, C. J. Wild, Nonlinear Regression,
+Wiley,
+1989, chapters 2 and 5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gearmbs.identify.differences import SMOOTH_STEP, central, steps
+from gearmbs.identify.errors import IdentifyError
+from gearmbs.identify.parameters import Free, Scale
+from gearmbs.identify.result import Fit
+
+Model = Callable[[np.ndarray], np.ndarray]
+POLISH = 50
+"""Gauss-Newton steps at most after the search."""
+
+
+def fit(
+    model: Model,
+    measured: ArrayLike,
+    free: Sequence[Free],
+    *,
+    sigma: ArrayLike | None = None,
+    many: Callable[[Sequence[np.ndarray]], list[np.ndarray]] | None = None,
+    step: float = SMOOTH_STEP,
+    starts: int = 1,
+    loss: str = "linear",
+    tolerance: float = 1e-12,
+    most_runs: int = 2000,
+    seed: int = 0,
+    lost: int = 0,
+) -> Fit:
+    """Find the parameters of a model that fit measured values best.
+
+    Parameters
+    ----------
+    model : callable
+        ``model(p)`` returns the prediction, shape (m,), for parameters p in the order of ``free``.
+    measured : array_like, shape (m,)
+    free : sequence of Free
+    sigma : float or array_like, optional
+        Standard deviation of the measured values. Without it all weigh the same and the noise is estimated.
+    many : callable, optional
+        Predictions for several parameter vectors at once; default one after the other.
+    step : float
+        Of the differences, in ln p or as a part of p; `gearmbs.identify.differences.SIMULATION_STEP` for simulations.
+    starts : int
+        Searches: the first from ``start``, further ones from a Sobol' sequence between the bounds.
+    loss : {"linear", "soft_l1", "huber", "cauchy"}
+        Robust against outliers if not linear; standard errors are those of the weighted problem then.
+    tolerance : float
+        Relative change of cost and parameters at which a search ends; above the noise of the model.
+    most_runs : int
+        Evaluations of the model in one search.
+    seed : int
+        Of the starts.
+    lost : int
+        Degrees of freedom that the model itself has used up, as by gains it fits.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    IdentifyError
+        If there are fewer values than parameters, or the model fails at every start.
+
+    Examples
+    --------
+    >>> x = np.linspace(0.0, 1.0, 20)
+    >>> found = fit(lambda p: p[0] * np.exp(p[1] * x), 2.0 * np.exp(-0.5 * x), [Free("a", 1.0), Free("b", -1.0,
+    log=False)])
+    >>> found.values.round(6).tolist()
+    [2.0, -0.5]
+    """
+    problem = _Problem(model, measured, free, sigma, many, step, lost)
+    low, high = problem.scale.bounds()
+    attempts = []
+    for z0 in _starts(problem.scale, low, high, starts, seed):
+        problem.runs = 0
+        found = _search(problem, z0, low, high, loss, tolerance, most_runs)
+        if found is not None:
+            attempts.append(found)
+    if not attempts:
+        raise IdentifyError(
+            "fit: the model gives no finite values at any of the starts; give others, or narrower bounds"
+        )
+    attempts.sort(key=lambda a: a[1])
+    z = attempts[0][0]
+    if loss == "linear":
+        z = _polished(problem, z, low, high, tolerance)
+    return problem.result(z, waterfall=[cost for _, cost in attempts], runs=problem.total)
+
+
+class _Problem:
+    """Weighted residuals of a model over z."""
+
+    def __init__(self, model, measured, free, sigma, many, step, lost) -> None:
+        self.scale = Scale(tuple(free))
+        self.measured = np.asarray(measured, dtype=float)
+        size, count = self.measured.size, len(self.scale.free)
+        if size - lost < count:
+            raise IdentifyError(
+                f"fit: {size - lost} independent values for {count} parameters; measure more or free fewer"
+            )
+        self.known = sigma is not None
+        self.sigma = np.broadcast_to(np.asarray(1.0 if sigma is None else sigma, dtype=float), (size,))
+        if not (self.sigma > 0.0).all():
+            raise IdentifyError("fit: every sigma must be positive")
+        self._many = many or (lambda points: [np.asarray(model(p), dtype=float) for p in points])
+        self.step, self.lost = step, lost
+        self.runs = self.total = 0
+
+    def residuals(self, points: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return the residuals at several z."""
+        self.runs += len(points)
+        self.total += len(points)
+        with np.errstate(all="ignore"):
+            found = self._many([self.scale.p(np.asarray(z)) for z in points])
+        return [(np.asarray(f, dtype=float) - self.measured) / self.sigma for f in found]
+
+    def residual(self, z: np.ndarray) -> np.ndarray:
+        """Return the residuals at z, large where the model has no value."""
+        r = self.residuals([z])[0]
+        return np.where(np.isfinite(r), r, 1e10)
+
+    def jacobian(self, z: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """Return their central differences."""
+        matrix = central(self.residuals, z, steps(z, self.scale.logs, self.step), low, high)
+        return np.where(np.isfinite(matrix), matrix, 0.0)
+
+    def result(self, z: np.ndarray, waterfall: list[float], runs: int) -> Fit:
+        low, high = self.scale.bounds()
+        r, matrix = self.residual(z), self.jacobian(z, low, high)
+        return Fit.of(self, z, r, matrix, waterfall=waterfall, runs=runs)
+
+    def refit(self, fixed: int, value: float, z: np.ndarray, tolerance: float) -> tuple[np.ndarray, float]:
+        """Return the other parameters' best z and the cost r.r with one held at a value."""
+        from scipy.optimize import least_squares
+
+        low, high = self.scale.bounds()
+        others = [k for k in range(len(z)) if k != fixed]
+
+        def whole(part: np.ndarray) -> np.ndarray:
+            full = z.copy()
+            full[fixed] = value
+            full[others] = part
+            return full
+
+        if not others:
+            r = self.residual(whole(np.empty(0)))
+            return whole(np.empty(0)), float(r @ r)
+        found = least_squares(
+            lambda part: self.residual(whole(part)),
+            np.clip(z[others], low[others], high[others]),
+            jac=lambda part: self.jacobian(whole(part), low, high)[:, others],
+            bounds=(low[others], high[others]),
+            x_scale="jac",
+            ftol=tolerance,
+            xtol=tolerance,
+            gtol=None if tolerance > 1e-6 else 1e-15,
+            max_nfev=100,
+        )
+        return whole(found.x), 2.0 * float(found.cost)
+
+
+def _starts(scale: Scale, low: np.ndarray, high: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
+    """Return the given start and further ones of a Sobol' sequence between the bounds."""
+    from scipy.stats import qmc
+
+    first = scale.z([f.start for f in scale.free])
+    if count <= 1:
+        return [first]
+    if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        raise IdentifyError("fit: several starts need bounds, low and high, of every parameter")
+    exponent = int(np.ceil(np.log2(count)))
+    points = qmc.Sobol(len(first), rng=np.random.default_rng(seed)).random_base2(exponent)[: count - 1]
+    return [first, *(low + points * (high - low))]
+
+
+def _search(problem: _Problem, z0, low, high, loss, tolerance, most_runs) -> tuple[np.ndarray, float] | None:
+    """Return where the searches from one start end, the better of two methods where both apply."""
+    from scipy.optimize import least_squares
+
+    if not np.isfinite(problem.residuals([z0])[0]).all():
+        return None
+    free = not (np.isfinite(low).any() or np.isfinite(high).any())
+    n = len(z0)
+    best: tuple[np.ndarray, float] | None = None
+    settings: dict[str, Any] = {"x_scale": "jac", "ftol": tolerance, "xtol": tolerance, "gtol": 1e-15}
+    if tolerance > 1e-6:
+        settings["gtol"] = None
+    for method in ("lm", "trf") if free and loss == "linear" else ("trf",):
+        most = max(10, most_runs // (2 * n + 1))
+        try:
+            found = least_squares(
+                problem.residual,
+                z0,
+                jac=lambda z: problem.jacobian(z, low, high),
+                method=method,  # type: ignore[arg-type]
+                max_nfev=most,
+                **({"bounds": (low, high), "loss": loss} if method == "trf" else {}),
+                **settings,
+            )
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+        if best is None or found.cost < best[1] * (1.0 - 1e-10):
+            best = found.x, float(found.cost)
+    return best
+
+
+def _polished(problem: _Problem, z: np.ndarray, low, high, tolerance: float) -> np.ndarray:
+    """Return z after Gauss-Newton steps, as long as they lower the cost: the last digits, which a trust region
+    leaves."""
+    if tolerance > 1e-9:
+        return z
+    r = problem.residual(z)
+    for _ in range(POLISH):
+        matrix = problem.jacobian(z, low, high)
+        size = np.linalg.norm(matrix, axis=0)
+        size[size == 0.0] = 1.0
+        move = np.linalg.lstsq(matrix / size, -r, rcond=1e-14)[0] / size
+        trial = np.clip(z + move, low, high)
+        after = problem.residual(trial)
+        if not after @ after < r @ r:
+            break
+        z, r = trial, after
+    return z

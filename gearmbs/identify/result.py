@@ -1,0 +1,238 @@
+"""The answer of a fit and what one must know of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.identify.errors import IdentifyError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from gearmbs.identify.parameters import Scale
+
+LEVEL = 0.95
+CORRELATED = 0.95
+"""Correlation from which two parameters are said to be told apart badly."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Parameters found, with their uncertainty.
+
+    Attributes
+    ----------
+    names : list of str
+    values : ndarray, shape (n,)
+    errors : ndarray, shape (n,)
+        Standard errors; of parameters fitted by their logarithm the value times that of the logarithm.
+    correlation : ndarray, shape (n, n)
+        Of the estimates; one of 1 in absolute value are only known together.
+    residuals : ndarray, shape (m,)
+        (prediction - measured) / sigma.
+    cost : float
+        Sum of squares of the residuals.
+    freedom : int
+        Values less parameters.
+    waterfall : list of float
+        Half the costs at which the searches ended, best first: if several are lowest, it is found more than once.
+    runs : int
+        Evaluations of the model.
+    """
+
+    names: list[str]
+    values: np.ndarray
+    errors: np.ndarray
+    correlation: np.ndarray
+    residuals: np.ndarray
+    cost: float
+    freedom: int
+    known_noise: bool
+    waterfall: list[float]
+    runs: int
+    scale: Scale
+    z: np.ndarray
+    z_errors: np.ndarray
+    singular_values: np.ndarray
+    problem: Any = field(repr=False, default=None)
+
+    @classmethod
+    def of(cls, problem: Any, z: np.ndarray, r: np.ndarray, matrix: np.ndarray, *, waterfall: list, runs: int) -> Fit:
+        """Return the result of a problem at z."""
+        scale = problem.scale
+        freedom = r.size - problem.lost - z.size
+        cost = float(r @ r)
+        covariance, singular = covariance_of(matrix)
+        if not problem.known:
+            covariance = covariance * (cost / freedom if freedom > 0 else np.nan)
+        z_errors = np.sqrt(np.diag(covariance))
+        values = scale.p(z)
+        with np.errstate(all="ignore"):
+            correlation = covariance / np.outer(z_errors, z_errors)
+        return cls(
+            scale.names,
+            values,
+            np.where(scale.logs, np.abs(values) * z_errors, z_errors),
+            correlation,
+            r,
+            cost,
+            freedom,
+            problem.known,
+            waterfall,
+            runs,
+            scale,
+            z,
+            z_errors,
+            singular,
+            problem,
+        )
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[self._place(name)])
+
+    def _place(self, name: str) -> int:
+        if name not in self.names:
+            raise IdentifyError(f"{name!r} was not fitted; fitted are {', '.join(self.names)}")
+        return self.names.index(name)
+
+    def interval(self, name: str, level: float = LEVEL) -> tuple[float, float]:
+        """Return the confidence interval of a parameter from its standard error (Wald).
+
+        Student's t where the noise was estimated. For strongly correlated or bounded parameters see `profile`.
+        """
+        from scipy.stats import norm, t
+
+        k = self._place(name)
+        q = norm.ppf(0.5 + 0.5 * level) if self.known_noise else t.ppf(0.5 + 0.5 * level, max(1, self.freedom))
+        ends = np.tile(self.z, (2, 1))
+        ends[:, k] += np.array([-q, q]) * self.z_errors[k]
+        return float(self.scale.p(ends[0])[k]), float(self.scale.p(ends[1])[k])
+
+    @property
+    def chi_square(self) -> float:
+        """Cost over degrees of freedom: about 1 where model and noise are right; NaN without degrees of freedom."""
+        return self.cost / self.freedom if self.freedom > 0 else float("nan")
+
+    @property
+    def aic(self) -> float:
+        """Akaike's criterion, for the comparison of models of the same data: the lower, the better."""
+        return self._deviance + 2.0 * self._count
+
+    @property
+    def bic(self) -> float:
+        """Schwarz's criterion, which asks more of further parameters."""
+        return self._deviance + self._count * float(np.log(self.residuals.size))
+
+    @property
+    def _deviance(self) -> float:
+        m = self.residuals.size
+        return self.cost if self.known_noise else m * float(np.log(self.cost / m))
+
+    @property
+    def _count(self) -> int:
+        return len(self.names) + (0 if self.known_noise else 1)
+
+    def table(self, level: float = LEVEL) -> pd.DataFrame:
+        """Return value, standard error, relative error and interval by parameter."""
+        import pandas as pd
+
+        ends = [self.interval(name, level) for name in self.names]
+        return pd.DataFrame(
+            {
+                "value": self.values,
+                "error": self.errors,
+                "relative": self.errors / np.abs(self.values),
+                "low": [a for a, _ in ends],
+                "high": [b for _, b in ends],
+            },
+            index=pd.Index(self.names, name="parameter"),
+        )
+
+    def profile(self, name: str, points: int = 9, reach: float = 3.0) -> pd.DataFrame:
+        """Return the least cost over values of one parameter, all others fitted again at each.
+
+        Parameters
+        ----------
+        name : str
+        points : int
+            Values, over ``reach`` standard errors to both sides.
+
+        Returns
+        -------
+        DataFrame
+            ``value``, ``rise`` of the cost over its least in units of the noise's variance, and the other parameters.
+            The
+            95 % interval is where the rise stays below 3.84.
+        """
+        import pandas as pd
+
+        k = self._place(name)
+        low, high = self.scale.bounds()
+        at = np.linspace(-reach, reach, points) * self.z_errors[k] + self.z[k]
+        unit = 1.0 if self.known_noise else self.cost / max(1, self.freedom)
+        rows: list[dict[str, float]] = []
+        for side in (at[at < self.z[k]][::-1], at[at >= self.z[k]]):
+            z = self.z
+            for value in side[(side >= low[k]) & (side <= high[k])]:
+                z, cost = self.problem.refit(k, float(value), z, 1e-8)
+                p = self.scale.p(z)
+                rows.append({"value": float(p[k]), "rise": (cost - self.cost) / unit} | dict(zip(self.names, p)))
+        return pd.DataFrame(rows).sort_values("value", ignore_index=True)
+
+    def profile_interval(self, name: str, level: float = LEVEL, points: int = 25) -> tuple[float, float]:
+        """Return the interval in which the profile stays below its threshold (F, or chi-square where the noise is
+        known)."""
+        from scipy.stats import chi2, f
+
+        data = self.profile(name, points=points, reach=4.0)
+        threshold = chi2.ppf(level, 1) if self.known_noise else f.ppf(level, 1, max(1, self.freedom))
+        best = self.values[self._place(name)]
+        ends = []
+        for side in (data[data.value <= best][::-1], data[data.value >= best]):
+            root = np.sqrt(np.maximum(side.rise.to_numpy(), 0.0))
+            x = side.value.to_numpy()
+            root, x = np.maximum.accumulate(np.concatenate([[0.0], root])), np.concatenate([[best], x])
+            reached = root[-1] >= np.sqrt(threshold)
+            ends.append(float(np.interp(np.sqrt(threshold), root, x)) if reached else float("nan"))
+        return ends[0], ends[1]
+
+    def report(self) -> str:
+        """Return values, errors and correlations as Markdown."""
+        lines = ["| parameter | value | standard error | 95 % interval |", "|---|---|---|---|"]
+        for name, row in self.table().iterrows():
+            lines.append(
+                f"| {name} | {row.value:.6g} | {row.error:.2g} ({100 * row.relative:.2g} %) | {row.low:.5g} "
+                f"to {row.high:.5g} |"
+            )
+        lines += ["", f"{self.residuals.size} values, {self.freedom} degrees of freedom, {self.runs} evaluations."]
+        if self.known_noise:
+            lines.append(f"Chi-square over degrees of freedom: {self.chi_square:.3g}.")
+        else:
+            lines.append(f"Standard deviation of the residuals: {np.sqrt(max(self.chi_square, 0.0)):.3g}.")
+        close = [
+            (abs(self.correlation[i, j]), i, j) for i in range(len(self.names)) for j in range(i)
+            if abs(self.correlation[i, j]) > CORRELATED
+        ]  # fmt: skip
+        for size, i, j in sorted(close, reverse=True):
+            lines.append(f"{self.names[j]} and {self.names[i]} are told apart badly: correlation {size:.3f}.")
+        if len(self.waterfall) > 1:
+            best = self.waterfall[0]
+            again = sum(cost <= best * 1.01 + 1e-12 for cost in self.waterfall)
+            lines.append(f"{again} of {len(self.waterfall)} searches ended at the best cost.")
+        return "\n".join(lines) + "\n"
+
+
+def covariance_of(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (J'J)^-1 and the singular values of J; columns are scaled first, so that units do not matter."""
+    size = np.linalg.norm(matrix, axis=0)
+    size = np.where(size == 0.0, 1.0, size)
+    _, singular, right = np.linalg.svd(matrix / size, full_matrices=False)
+    smallest = np.finfo(float).eps * max(matrix.shape) * singular[0]
+    inverse = np.where(singular > smallest, 1.0 / np.maximum(singular, smallest), np.inf)
+    with np.errstate(all="ignore"):
+        half = right.T * np.where(np.isfinite(inverse), inverse, 1e300)
+        covariance = half @ half.T / np.outer(size, size)
+    return covariance, np.linalg.svd(matrix, compute_uv=False)

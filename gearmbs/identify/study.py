@@ -1,0 +1,111 @@
+"""A fit described in a file: recordings, the cases that model them, what is free."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gearmbs.identify.cases import CaseProblem
+from gearmbs.identify.errors import IdentifyError
+from gearmbs.identify.measured import harmonic_table
+from gearmbs.identify.parameters import Free
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from gearmbs.studies import Case
+
+SECTIONS = ("recording", "case", "free", "measured", "gains", "channels", "starts", "workers")
+LEVELS = ("harmonics", "way", "sections", "floor")
+
+
+def load_problem(path: str | Path) -> tuple[CaseProblem, dict[str, Any]]:
+    """Read a fit in TOML; return its problem and the settings of the search.
+
+    ``[recording]`` names a file for each case, ``[case.NAME]`` the case that models it, with what all have in common
+    under
+    ``[case.all]``; ``[measured]`` says how recordings are read and cut; each ``[[free]]`` is a parameter;
+    ``channels`` says which
+    component of the force stands for which channel. A recording may be a CSV table of harmonics, too.
+
+    Raises
+    ------
+    IdentifyError
+        For unknown keys, missing parts, and whatever is wrong with them.
+    """
+    path = Path(path)
+    try:
+        tree = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise IdentifyError(f"{path}: cannot be read ({error.strerror or error})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise IdentifyError(f"{path}: not a valid TOML file ({error})") from error
+    for key in tree:
+        if key not in SECTIONS:
+            raise IdentifyError(f"{path}: unknown key {key!r}; known ones are {', '.join(SECTIONS)}")
+    for key in ("recording", "free"):
+        if not tree.get(key):
+            raise IdentifyError(f"{path}: [{key}] is missing")
+    measured = dict(tree.get("measured", {}))
+    way = str(measured.get("way", "band"))
+    table = _table(tree["recording"], measured, path.parent, tuple(tree.get("channels", {})))
+    try:
+        free = [Free(item.pop("path"), **item) for item in tree["free"]]
+    except (KeyError, TypeError) as error:
+        raise IdentifyError(f"{path}: [[free]]: {error}; give path, start, low, high, log, also") from None
+    problem = CaseProblem(
+        table,
+        _cases(tree.get("case", {}), tree["recording"]),
+        free,
+        gains=tree.get("gains", "channel"),
+        channels=tree.get("channels"),
+        way=way,
+        workers=int(tree.get("workers", 1)),
+    )
+    return problem, {"starts": int(tree.get("starts", 1))}
+
+
+def _cases(given: dict[str, Any], recordings: dict[str, str]) -> dict[str, Case]:
+    """Return the case of each recording: what all have in common, changed by its own."""
+    from gearmbs.studies import make_case
+
+    common = given.get("all", {})
+    cases = {}
+    for name in recordings:
+        data = {section: dict(values) if isinstance(values, dict) else values for section, values in common.items()}
+        for section, values in given.get(name, {}).items():
+            data[section] = {**data.get(section, {}), **values} if isinstance(values, dict) else values
+        cases[name] = make_case({**data, "name": name}, name)
+    return cases
+
+
+def _table(
+    recordings: dict[str, str], measured: dict[str, Any], folder: Path, channels: tuple[str, ...]
+) -> pd.DataFrame:
+    """Return the harmonics of all recordings."""
+    import pandas as pd
+
+    from gearmbs.signals import estimate_speed
+    from gearmbs.signals.simulated import read_any
+    from gearmbs.units import to_si
+
+    levels = {key: measured.pop(key) for key in LEVELS if key in measured}
+    if "speed" in measured:
+        measured["speed"] = to_si(measured["speed"], "angular speed", "measured.speed")
+    if isinstance(measured.get("teeth"), list):
+        measured["teeth"] = tuple(measured["teeth"])
+    parts = []
+    for name, file in recordings.items():
+        place = folder / file
+        if place.suffix == ".csv" and place.exists():
+            with place.open(encoding="utf-8") as lines:
+                head = lines.readline()
+            if "harmonic" in head:
+                parts.append(pd.read_csv(place).assign(case=name))
+                continue
+        signal = read_any(place, **measured)
+        if "speed" not in signal.attrs:
+            signal.attrs["speed"] = estimate_speed(signal).speed
+        parts.append(harmonic_table({name: signal}, channels=channels or None, **levels))
+    return pd.concat(parts, ignore_index=True)

@@ -1,0 +1,93 @@
+"""What cannot be told is named."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gearmbs.identify import CaseProblem, Free, Identifiability, IdentifyError, harmonic_table, identify
+from gearmbs.signals import make_signal
+from gearmbs.studies import Case, run_case
+
+SHORT = {"duration": 0.08, "run_up": 0.02, "settling": 0.02}
+COMPONENTS = ("line_of_action", "line_of_centres")
+
+
+def test_a_planted_combination_is_named():
+    """Only the product of the first two acts; the fourth does nothing."""
+    generator = np.random.default_rng(0)
+    act, other = generator.standard_normal((2, 20)) * 50.0
+    matrix = np.array([act, act, other, np.zeros(20)]).T
+    found = Identifiability(["mass", "gain", "speed", "colour"], matrix, np.zeros(4))
+    directions = found.undetermined()
+    assert [set(parts) for _, parts in directions] == [{"colour"}, {"mass", "gain"}] or [
+        set(parts) for _, parts in directions
+    ] == [{"mass", "gain"}, {"colour"}]
+    text = "\n".join(found.remarks())
+    assert "mass and gain can be told only as a combination" in text or "gain and mass" in text
+    assert "colour has hardly any influence" in text
+    assert "speed" not in text
+
+
+def test_what_would_tell_them_apart_comes_first():
+    matrix = np.array([[10.0, 10.0], [20.0, 20.0]])
+    now = Identifiability(["a", "b"], matrix, np.zeros(2))
+    ranked = now.worth({"the same again": matrix, "another": np.array([[10.0, -10.0]])})
+    assert list(ranked.measurement) == ["another", "the same again"]
+    assert ranked.gain[0] > 1e6
+
+
+@pytest.fixture(scope="module")
+def measured():
+    """Two loads of the healthy pair, without noise."""
+    cases = {name: Case(operation={**SHORT, "torque": torque}) for name, torque in (("low", 100.0), ("high", 200.0))}
+    rows = []
+    for name, case in cases.items():
+        levels = run_case(case.changed(solver={"tolerance": 1e-8}), False)["gmf_rms"].sel(way="orders")
+        for component in COMPONENTS:
+            for k in (1, 2, 3):
+                rows.append((name, component, k, float(levels.sel(component=component, harmonic=k)), 0.02))
+    return pd.DataFrame(rows, columns=["case", "channel", "harmonic", "value", "sigma"]), cases
+
+
+def test_backlash_of_a_healthy_pair_cannot_be_told(measured):
+    table, cases = measured
+    with pytest.raises(IdentifyError, match=r"fault\.backlash has hardly any influence"):
+        identify(table, cases, ["friction.dynamic", "fault.backlash"], way="orders")
+
+
+def test_friction_is_found_again(measured):
+    """From numbers with a gain of three that the fit does not know."""
+    table, cases = measured
+    table = table.assign(value=3.0 * table["value"])
+    free = [Free("friction.dynamic", 0.035, 0.01, 0.2, also={"friction.static": 2.0})]
+    problem = CaseProblem(table, cases, free, gains="one", way="orders")
+    found = problem.fit()
+    assert found["friction.dynamic"] == pytest.approx(0.05, rel=0.005)
+    assert found.freedom == 12 - 1 - 1
+    assert problem.simulations < 40
+
+
+def test_wrong_tables_are_named(measured):
+    table, cases = measured
+    with pytest.raises(IdentifyError, match="no case is given for high"):
+        CaseProblem(table, {"low": cases["low"]}, ["contact.depth"])
+    with pytest.raises(IdentifyError, match="is no component of the force"):
+        CaseProblem(table.assign(channel="a1"), cases, ["contact.depth"])
+    with pytest.raises(IdentifyError, match="no such field"):
+        CaseProblem(table, cases, ["contact.deepness"])
+    with pytest.raises(IdentifyError, match="columns value are missing"):
+        CaseProblem(table.drop(columns="value"), cases, ["contact.depth"])
+
+
+def test_tables_of_recordings():
+    """A tone of known level in noise, cut into sections."""
+    rate, gmf = 12800.0, 480.0
+    t = np.arange(int(4 * rate)) / rate
+    x = 2.0 * np.sin(2 * np.pi * gmf * t) + 0.5 * np.sin(4 * np.pi * gmf * t) + 5.0
+    x = x + 0.05 * np.random.default_rng(0).standard_normal(t.size)
+    table = harmonic_table({"one": make_signal({"a1": x}, rate, units="m/s^2")}, gmf=gmf, harmonics=2)
+    assert list(table.channel) == ["a1", "a1"]
+    np.testing.assert_allclose(table["value"], [2.0 / np.sqrt(2), 0.5 / np.sqrt(2)], rtol=0.01)
+    assert (table.sigma >= 0.02).all()
