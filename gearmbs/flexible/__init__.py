@@ -6,37 +6,19 @@ from gearmbs._lazy import late
 
 if TYPE_CHECKING:
     from gearmbs.flexible.beam import BeamSection, shear_coefficient
+    from gearmbs.flexible.check import ModelReport, ReductionReport, check_model, check_reduction
     from gearmbs.flexible.damping import damping_ratios
     from gearmbs.flexible.errors import FlexibleError
     from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
     from gearmbs.flexible.interfaces import Interface
     from gearmbs.flexible.material import ElasticMaterial
+    from gearmbs.flexible.matrices import from_matrices, read_abaqus, read_calculix, read_nodes, read_op4
+    from gearmbs.flexible.mnf import ModalNeutralFile, mnf_of, read_mnf, write_mnf
     from gearmbs.flexible.modal_model import ModalModel, Seat
     from gearmbs.flexible.reduction import reduce_model
     from gearmbs.flexible.rotor import Campbell, Rotor, Support, UnbalanceResponse, WhirlModes
     from gearmbs.flexible.shaft import Disc, Shaft, ShaftSection
-
-_HOMES = {
-    "BeamSection": ".beam",
-    "Campbell": ".rotor",
-    "Disc": ".shaft",
-    "ElasticMaterial": ".material",
-    "FiniteElementModel": ".fe_model",
-    "FlexibleError": ".errors",
-    "Interface": ".interfaces",
-    "MassProperties": ".fe_model",
-    "ModalModel": ".modal_model",
-    "Rotor": ".rotor",
-    "Seat": ".modal_model",
-    "Shaft": ".shaft",
-    "ShaftSection": ".shaft",
-    "Support": ".rotor",
-    "UnbalanceResponse": ".rotor",
-    "WhirlModes": ".rotor",
-    "damping_ratios": ".damping",
-    "reduce_model": ".reduction",
-    "shear_coefficient": ".beam",
-}
+    from gearmbs.flexible.solid import block_mesh, nodes_where, ring_mesh, solid_model
 
 __all__ = [
     "BeamSection",
@@ -48,6 +30,9 @@ __all__ = [
     "Interface",
     "MassProperties",
     "ModalModel",
+    "ModalNeutralFile",
+    "ModelReport",
+    "ReductionReport",
     "Rotor",
     "Seat",
     "Shaft",
@@ -55,9 +40,63 @@ __all__ = [
     "Support",
     "UnbalanceResponse",
     "WhirlModes",
+    "block_mesh",
+    "check_model",
+    "check_reduction",
     "damping_ratios",
+    "from_matrices",
+    "mnf_of",
+    "nodes_where",
+    "read_abaqus",
+    "read_calculix",
+    "read_mnf",
+    "read_nodes",
+    "read_op4",
     "reduce_model",
+    "ring_mesh",
     "shear_coefficient",
+    "solid_model",
+    "write_mnf",
 ]
 
-late(__name__, _HOMES)
+late(
+    __name__,
+    {
+        "BeamSection": ".beam",
+        "Campbell": ".rotor",
+        "Disc": ".shaft",
+        "ElasticMaterial": ".material",
+        "FiniteElementModel": ".fe_model",
+        "FlexibleError": ".errors",
+        "Interface": ".interfaces",
+        "MassProperties": ".fe_model",
+        "ModalModel": ".modal_model",
+        "ModalNeutralFile": ".mnf",
+        "ModelReport": ".check",
+        "ReductionReport": ".check",
+        "Rotor": ".rotor",
+        "Seat": ".modal_model",
+        "Shaft": ".shaft",
+        "ShaftSection": ".shaft",
+        "Support": ".rotor",
+        "UnbalanceResponse": ".rotor",
+        "WhirlModes": ".rotor",
+        "block_mesh": ".solid",
+        "check_model": ".check",
+        "check_reduction": ".check",
+        "damping_ratios": ".damping",
+        "from_matrices": ".matrices",
+        "mnf_of": ".mnf",
+        "nodes_where": ".solid",
+        "read_abaqus": ".matrices",
+        "read_calculix": ".matrices",
+        "read_mnf": ".mnf",
+        "read_nodes": ".matrices",
+        "read_op4": ".matrices",
+        "reduce_model": ".reduction",
+        "ring_mesh": ".solid",
+        "shear_coefficient": ".beam",
+        "solid_model": ".solid",
+        "write_mnf": ".mnf",
+    },
+)

@@ -41,7 +41,8 @@ class FiniteElementModel:
     positions : ndarray, shape (N, 3)
         m.
     dofs : ndarray of int, shape (d, 2)
-        Row of the node, and direction 0 to 5 (ux, uy, uz, rx, ry, rz), of each degree of freedom.
+        Row of the node, and direction 0 to 5 (ux, uy, uz, rx, ry, rz), of each degree of freedom; row -1 is a
+        generalised coordinate that no rigid motion moves, as modes of a superelement are.
     stiffness, mass : sparse matrix, shape (d, d)
         N/m and kg, with their rotational counterparts; symmetric.
     name : str
@@ -85,7 +86,7 @@ class FiniteElementModel:
             object.__setattr__(self, label, sp.csc_array(0.5 * (matrix + matrix.T)))
         if self.positions.shape != (len(self.ids), 3):
             raise FlexibleError(f"{self.name}: positions have shape {self.positions.shape} for {len(self.ids)} nodes")
-        if d and (self.dofs[:, 0].max() >= len(self.ids) or self.dofs[:, 1].max() > 5 or self.dofs.min() < 0):
+        if d and (self.dofs[:, 0].max() >= len(self.ids) or self.dofs[:, 1].max() > 5 or self.dofs.min() < -1):
             raise FlexibleError(f"{self.name}: degrees of freedom name nodes or directions that do not exist")
 
     @property
@@ -123,12 +124,12 @@ class FiniteElementModel:
         arm = self.positions - (np.zeros(3) if about is None else about)
         out = np.zeros((len(self.dofs), 6))
         node, direction = self.dofs[:, 0], self.dofs[:, 1]
+        shift, turn = (direction < 3) & (node >= 0), (direction > 2) & (node >= 0)
         for c in range(3):
             turned = np.cross(np.eye(3)[c], arm)
-            shift = direction < 3
             out[shift, c] = direction[shift] == c
             out[shift, 3 + c] = turned[node[shift], direction[shift]]
-            out[~shift, 3 + c] = direction[~shift] == 3 + c
+            out[turn, 3 + c] = direction[turn] == 3 + c
         return out
 
     def mass_properties(self) -> MassProperties:
@@ -169,7 +170,8 @@ class FiniteElementModel:
         """
         n = vectors.shape[1]
         both = np.zeros((len(self.ids), 6, n))
-        both[self.dofs[:, 0], self.dofs[:, 1]] = vectors
+        placed = self.dofs[:, 0] >= 0
+        both[self.dofs[placed, 0], self.dofs[placed, 1]] = vectors[placed]
         both = np.moveaxis(both, 2, 0)
         return both[:, :, :3].copy(), both[:, :, 3:].copy()
 

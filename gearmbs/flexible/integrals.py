@@ -28,7 +28,7 @@ def shape_integrals(model: FiniteElementModel, shapes: np.ndarray, properties: M
     """
     if model.slices is not None:
         return of_slices(model.slices, shapes, properties.com)
-    if not model.has_rotations:
+    if not model.has_rotations and model.dofs[:, 0].min() >= 0:
         return of_mass_matrix(model, shapes, properties.com)
     lumped = of_lumps(model, shapes, properties)
     rigid = model.rigid_motion(properties.com)
@@ -86,11 +86,16 @@ def lumps(model: FiniteElementModel) -> tuple[np.ndarray, np.ndarray]:
     node, direction = model.dofs[:, 0], model.dofs[:, 1]
     masses, inertias = np.zeros((3, count)), np.zeros((count, 3, 3))
     for c in range(3):
-        unit = ((direction == c) * 1.0)[:, None]
-        row = (model.mass @ unit)[:, 0]
-        np.add.at(masses[c], node[direction == c], row[direction == c])
+        chosen = (direction == c) & (node >= 0)
+        row = (model.mass @ (chosen * 1.0)[:, None])[:, 0]
+        np.add.at(masses[c], node[chosen], row[chosen])
     entries = model.mass.tocoo()
-    same = (node[entries.row] == node[entries.col]) & (direction[entries.row] > 2) & (direction[entries.col] > 2)
+    same = (
+        (node[entries.row] == node[entries.col])
+        & (node[entries.row] >= 0)
+        & (direction[entries.row] > 2)
+        & (direction[entries.col] > 2)
+    )
     r, c = entries.row[same], entries.col[same]
     inertias[node[r], direction[r] - 3, direction[c] - 3] = entries.data[same]
     return masses.mean(axis=0), inertias

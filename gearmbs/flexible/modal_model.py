@@ -59,6 +59,8 @@ class ModalModel:
         Corners of the surface, rows of nodes.
     line : bool
         Whether the nodes are those of a beam along z, between which shapes are interpolated.
+    masses, inertias : ndarray, shapes (N,), (N, 3, 3), optional
+        Lumped at the nodes, kg and kg m^2.
     """
 
     name: str
@@ -72,6 +74,8 @@ class ModalModel:
     seats: dict[str, Seat] = field(default_factory=dict)
     faces: np.ndarray | None = None
     line: bool = False
+    masses: np.ndarray | None = None
+    inertias: np.ndarray | None = None
 
     @property
     def modes(self) -> int:

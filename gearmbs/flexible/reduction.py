@@ -17,7 +17,7 @@ import scipy.sparse.linalg as spl
 
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
-from gearmbs.flexible.integrals import shape_integrals
+from gearmbs.flexible.integrals import lumps, shape_integrals
 from gearmbs.flexible.interfaces import Interface, Resolved, resolve
 from gearmbs.flexible.modal_model import ModalModel, Seat
 from gearmbs.mechanism.quantities import quantity
@@ -146,6 +146,7 @@ def as_modal_model(
         six = np.zeros((6, shapes.shape[1]))
         six[rows >= 0] = held[rows[rows >= 0]]
         seats[key] = Seat(position, six[:3].T.copy(), six[3:].T.copy(), bool(np.all(rows[3:] >= 0)))
+    masses, inertias = lumps(model)
     return ModalModel(
         name=name,
         properties=properties,
@@ -158,6 +159,8 @@ def as_modal_model(
         seats=seats,
         faces=model.faces,
         line=model.slices is not None,
+        masses=masses,
+        inertias=inertias,
     )
 
 

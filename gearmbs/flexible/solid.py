@@ -1,0 +1,142 @@
+"""Solid finite elements of simple bodies, meshed and assembled by scikit-fem: no file is needed to try one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gearmbs.flexible.errors import FlexibleError
+from gearmbs.flexible.fe_model import FiniteElementModel
+from gearmbs.flexible.material import STEEL, ElasticMaterial
+from gearmbs.flexible.matrices import from_matrices
+from gearmbs.mechanism.quantities import quantities, quantity
+from gearmbs.units import Quantity
+
+if TYPE_CHECKING:
+    import skfem
+
+
+def _skfem() -> Any:
+    try:
+        import skfem
+    except ImportError:
+        raise FlexibleError(
+            "meshes of solids are assembled by scikit-fem; install it with 'pip install gearmbs[fem]'"
+        ) from None
+    return skfem
+
+
+def solid_model(
+    mesh: skfem.Mesh, material: ElasticMaterial = STEEL, *, name: str = "solid", quadratic: bool = True
+) -> FiniteElementModel:
+    """Return the finite elements of any mesh of hexahedra or tetrahedra, with consistent mass.
+
+    Parameters
+    ----------
+    mesh : skfem.MeshHex or skfem.MeshTet
+        In metres; meshio reads what other programs write.
+    material : ElasticMaterial
+    name : str
+    quadratic : bool
+        Elements of second order. Those of first order are much too stiff in bending.
+
+    Raises
+    ------
+    FlexibleError
+        If scikit-fem is not installed, or for another mesh.
+    """
+    fem = _skfem()
+    kinds = {
+        "MeshHex1": (fem.ElementHex1, fem.ElementHex2), "MeshTet1": (fem.ElementTetP1, fem.ElementTetP2),
+        "MeshHex2": (fem.ElementHex1, fem.ElementHex2), "MeshTet2": (fem.ElementTetP1, fem.ElementTetP2),
+    }  # fmt: skip
+    if type(mesh).__name__ not in kinds:
+        raise FlexibleError(f"{name}: a mesh of {type(mesh).__name__}; give one of hexahedra or tetrahedra")
+    from skfem.helpers import ddot, dot, eye, sym_grad, trace
+
+    shear = material.shear_modulus
+    lame = material.youngs_modulus * material.poisson_ratio
+    lame = lame / ((1 + material.poisson_ratio) * (1 - 2 * material.poisson_ratio))
+
+    @fem.BilinearForm
+    def stiffness(u, v, _):
+        strain = sym_grad(u)
+        return ddot(2.0 * shear * strain + lame * eye(trace(strain), 3), sym_grad(v))
+
+    @fem.BilinearForm
+    def inertia(u, v, _):
+        return material.density * dot(u, v)
+
+    basis = fem.Basis(mesh, fem.ElementVector(kinds[type(mesh).__name__][int(quadratic)]()), intorder=5)
+    k, m = stiffness.assemble(basis), inertia.assemble(basis)
+    # degrees of freedom come in threes, one for each direction at one place
+    places = basis.doflocs[:, ::3].T
+    dofs = np.column_stack([np.repeat(np.arange(1, len(places) + 1), 3), np.tile([1, 2, 3], len(places))])
+    facets = mesh.facets[:, mesh.boundary_facets()].T
+    return from_matrices(k, m, places, dofs=dofs, name=name, faces=facets)
+
+
+def block_mesh(size: npt.ArrayLike, divisions: tuple[int, int, int] = (4, 4, 4)) -> skfem.MeshHex:
+    """Return the mesh of a block from the origin to ``size`` (m, or texts with units)."""
+    fem = _skfem()
+    lengths = quantities(size, "length", "block_mesh: size")
+    if lengths.shape != (3,) or np.any(lengths <= 0.0):
+        raise FlexibleError(f"block_mesh: size = {size!r}; give three positive lengths")
+    return fem.MeshHex.init_tensor(*(np.linspace(0.0, a, n + 1) for a, n in zip(lengths, divisions)))
+
+
+def ring_mesh(
+    inner: Quantity, outer: Quantity, width: Quantity, divisions: tuple[int, int, int] = (2, 48, 2)
+) -> skfem.MeshHex:
+    """Return the mesh of a ring about z between two diameters, centred on the origin: a rim, a ring gear's body.
+
+    Parameters
+    ----------
+    inner, outer, width : float or str
+        m.
+    divisions : tuple of 3 ints
+        Elements over the thickness, round about, and over the width.
+    """
+    fem = _skfem()
+    a, b, w = (
+        quantity(v, "length", f"ring_mesh: {n}") for v, n in ((inner, "inner"), (outer, "outer"), (width, "width"))
+    )
+    if not (0.0 < a < b and w > 0.0):
+        raise FlexibleError(f"ring_mesh: inner {a}, outer {b}, width {w} m; give 0 < inner < outer and a width")
+    radial, around, across = divisions
+    radius = np.linspace(a / 2, b / 2, radial + 1)
+    angle = np.arange(around) * 2 * np.pi / around
+    z = np.linspace(-w / 2, w / 2, across + 1)
+    r, t, h = (x.ravel() for x in np.meshgrid(radius, angle, z, indexing="ij"))
+    points = np.vstack([r * np.cos(t), r * np.sin(t), h])
+
+    def number(i, j, k):
+        return (i * around + j % around) * (across + 1) + k
+
+    # corners in the order of scikit-fem's reference element: (0,0,0) (0,0,1) (0,1,0) (1,0,0) (0,1,1) (1,0,1) (1,1,0)
+    # (1,1,1)
+    steps = [(0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0), (0, 1, 1), (1, 0, 1), (1, 1, 0), (1, 1, 1)]
+    cells = [
+        [number(i + p, j + q, k + s) for p, q, s in steps]
+        for i in range(radial)
+        for j in range(around)
+        for k in range(across)
+    ]
+    return fem.MeshHex(points, np.array(cells).T)
+
+
+def nodes_where(model: FiniteElementModel, condition) -> list[int]:
+    """Return the numbers of the nodes at which a condition on x, y and z (arrays, m) holds: the face of an interface.
+
+    Raises
+    ------
+    FlexibleError
+        If it holds nowhere.
+    """
+    chosen = np.flatnonzero(np.asarray(condition(*model.positions.T), dtype=bool))
+    if chosen.size == 0:
+        low, high = model.positions.min(axis=0), model.positions.max(axis=0)
+        raise FlexibleError(f"{model.name}: no node meets the condition; nodes are between {low} and {high} m")
+    return [int(k) for k in model.ids[chosen]]

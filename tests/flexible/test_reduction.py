@@ -1,0 +1,141 @@
+"""Interfaces and reductions of finite elements: rigid and averaging faces, convergence, integrals without slices."""
+
+import numpy as np
+import pytest
+
+from gearmbs.flexible import FlexibleError, Interface, Shaft, ShaftSection, check_reduction, from_matrices, reduce_model
+from gearmbs.flexible.integrals import of_lumps, of_mass_matrix
+from gearmbs.mechanism import ShapeIntegrals
+from tests.flexible.test_files import cube
+
+
+def tower(floors: int = 6):
+    """Square floors of four masses, with springs between all neighbours."""
+    corners = np.array([[x, y, 0.5 * z] for z in range(floors) for x in (0, 1) for y in (0, 1)], dtype=float)
+    n = len(corners)
+    k = np.zeros((3 * n, 3 * n))
+    for a in range(n):
+        for b in range(a):
+            line = corners[a] - corners[b]
+            length = np.linalg.norm(line)
+            if length > 1.6:
+                continue
+            part = 1e6 / length * np.outer(line, line) / length**2
+            for i, j, sign in ((a, a, 1), (b, b, 1), (a, b, -1), (b, a, -1)):
+                k[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] += sign * part
+    return from_matrices(k, np.eye(3 * n), corners, name="tower")
+
+
+def ends(kind):
+    return [Interface("foot", [1, 2, 3, 4], kind), Interface("head", [21, 22, 23, 24], kind)]
+
+
+@pytest.mark.parametrize("kind", ["rigid", "average"])
+@pytest.mark.parametrize("method", ["craig-bampton", "free"])
+def test_reductions_converge_from_above_and_keep_static_flexibility(kind, method):
+    model, errors = tower(), []
+    for internal in (2, 10, 30):
+        report = check_reduction(model, reduce_model(model, ends(kind), internal=internal, method=method), ends(kind))
+        assert np.all(report.errors[:4] > -1e-8)
+        assert all(abs(share) < 1e-6 for share in report.flexibility.values())
+        errors.append(np.abs(report.errors[:3]).max())
+    assert errors[2] < 5e-3
+    assert errors[2] <= errors[1] + 1e-9 <= errors[0] + 2e-9
+    assert "errors below 1 %" in repr(report)
+    assert report.converged_up_to(0.5) > 0.0
+
+
+def test_rigid_faces_stiffen_and_averages_do_not():
+    model = tower()
+    free = reduce_model(model, [], modes=4, method="free").frequencies
+    rigid, average = (
+        check_reduction(model, reduce_model(model, ends(kind), internal=10), ends(kind)).exact[:4]
+        for kind in ("rigid", "average")
+    )
+    np.testing.assert_allclose(average, free, rtol=1e-9)
+    assert np.all(rigid >= free * (1 - 1e-9))
+    assert rigid.max() > 1.0001 * free.max() or np.any(rigid > 1.0001 * free)
+
+
+def test_average_follows_rigid_motion_and_shares_loads():
+    model = tower()
+    reduced = reduce_model(model, ends("average"), internal=8)
+    seat = reduced.seats["head"]
+    nodes = [20, 21, 22, 23]
+    np.testing.assert_allclose(seat.moved, reduced.moved[:, nodes].mean(axis=1), atol=1e-9)
+    np.testing.assert_allclose(reduced.place("head"), [0.5, 0.5, 2.5])
+
+
+def test_integrals_from_the_mass_matrix_are_those_of_its_points():
+    corners, k, m = cube()
+    model = from_matrices(k, m, corners)
+    properties = model.mass_properties()
+    shapes = np.random.default_rng(2).standard_normal((24, 3))
+    own = of_mass_matrix(model, shapes, properties.com)
+    moved, _ = model.field(shapes)
+    points = ShapeIntegrals.of_points([0.5] * 8, corners - properties.com, moved)
+    lumped = of_lumps(model, shapes, properties)
+    for key in ShapeIntegrals.__dataclass_fields__:
+        np.testing.assert_allclose(getattr(own, key), getattr(points, key), atol=1e-12)
+        np.testing.assert_allclose(getattr(lumped, key), getattr(points, key), atol=1e-12)
+
+
+def test_lumped_integrals_of_a_shaft_are_near_those_of_its_slices():
+    shaft = Shaft([ShaftSection(1.0, 0.05)], seats={"A": 0.0, "B": 1.0}, elements=40).model()
+    from dataclasses import replace
+
+    exact = reduce_model(shaft, internal=6)
+    lumped = reduce_model(replace(shaft, slices=None), internal=6)
+    np.testing.assert_allclose(lumped.frequencies, exact.frequencies, rtol=1e-9)
+    for a, b in zip(exact.frequencies[:4], range(4)):
+        del a
+        np.testing.assert_allclose(
+            np.trace(lumped.integrals.second[b, b]), np.trace(exact.integrals.second[b, b]), rtol=2e-2
+        )
+
+
+def test_sparse_and_dense_solvers_agree():
+    from gearmbs.flexible import reduction
+
+    model = tower(9)
+    faces = [Interface("foot", [1, 2, 3, 4]), Interface("head", [33, 34, 35, 36], "average")]
+    dense = reduce_model(model, faces, internal=6).frequencies
+    before = reduction.DENSE
+    try:
+        reduction.DENSE = 10
+        sparse = reduce_model(model, faces, internal=6).frequencies
+    finally:
+        reduction.DENSE = before
+    np.testing.assert_allclose(sparse, dense, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Interface("f", [1, 2, 3], "soft"), "choose one of rigid, average"),
+        (lambda: Interface("f", []), "no nodes"),
+        (lambda: Interface("f", [1, 2, 3], weights=[1.0]), "1 weights for 3 nodes"),
+        (lambda: reduce_model(tower(), [Interface("f", [1, 2])]), "determine no rotation"),
+        (lambda: reduce_model(tower(), [Interface("f", [1, 2, 99])]), "there is no node 99"),
+        (lambda: reduce_model(tower(), ["f"]), "there is no seat 'f'"),
+        (lambda: reduce_model(tower(), [*ends("rigid"), Interface("x", [4, 5, 6])]), "in the rigid faces"),
+        (lambda: reduce_model(tower(), [*ends("rigid"), *ends("rigid")]), "is there twice"),
+        (lambda: reduce_model(tower(), []), "needs interfaces"),
+        (lambda: reduce_model(tower(), ends("rigid"), modes=0), "needs one at least"),
+        (lambda: reduce_model(tower(), ends("rigid"), method="guess"), "choose one of craig-bampton, free"),
+        (lambda: reduce_model(tower(), ends("rigid"), modes=500, internal=3), "ask for more internal modes"),
+        (lambda: reduce_model(tower(), ends("rigid"), internal=4).shapes(np.array([0.3, 0.3, 0.3])), "the nearest, "),
+        (lambda: reduce_model(tower(), ends("rigid"), internal=4).place("roof"), "there is no seat 'roof'"),
+    ],
+)
+def test_wrong_interfaces_are_named(make, message):
+    with pytest.raises(FlexibleError, match=message):
+        make()
+
+
+def test_mass_differs_by_direction_where_degrees_of_freedom_are_missing():
+    from gearmbs.flexible import check_model
+
+    report = check_model(tower())
+    np.testing.assert_allclose(report.directional_mass, 24.0)
+    assert report.massless == 0

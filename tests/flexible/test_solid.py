@@ -1,0 +1,60 @@
+"""Meshes made and assembled by scikit-fem."""
+
+import numpy as np
+import pytest
+
+from gearmbs.flexible import ElasticMaterial, FlexibleError, Interface, check_model, reduce_model
+from gearmbs.flexible.solid import block_mesh, nodes_where, ring_mesh, solid_model
+
+skfem = pytest.importorskip("skfem")
+
+
+def test_a_free_bar_of_solids_bends_and_stretches_as_a_bar():
+    length, depth, e, rho = 1.0, 0.05, 2e11, 7800.0
+    model = solid_model(block_mesh((depth, depth, length), (1, 1, 10)), ElasticMaterial(e, 0.0, rho))
+    report = check_model(model, 10)
+    assert report.good
+    np.testing.assert_allclose(report.properties.mass, rho * depth**2 * length, rtol=1e-12)
+    np.testing.assert_allclose(report.properties.com, [depth / 2, depth / 2, length / 2], rtol=1e-9)
+    frequencies = report.frequencies[6:]
+    # Euler-Bernoulli less what shear and rotary inertia take, half a per cent
+    bending = 22.3733 / (2 * np.pi * length**2) * np.sqrt(e * depth**2 / 12 / rho)
+    np.testing.assert_allclose(frequencies[:2], bending, rtol=0.02)
+    stretching = np.sqrt(e / rho) / (2 * length)
+    assert np.abs(frequencies / stretching - 1).min() < 1e-3
+
+
+def test_a_thin_ring_has_the_frequencies_of_the_closed_form():
+    """w_n^2 = E I n^2 (n^2 - 1)^2 / (rho A R^4 (n^2 + 1)) in the plane of the ring."""
+    radius, thick, wide, e, rho = 0.2, 0.01, 0.02, 2.1e11, 7850.0
+    model = solid_model(
+        ring_mesh(2 * radius - thick, 2 * radius + thick, wide, (1, 32, 1)), ElasticMaterial(e, 0.3, rho)
+    )
+    frequencies = check_model(model, 8).frequencies[6:]
+    for n in (2, 3):
+        closed = np.sqrt(e * thick**2 / 12 * n**2 * (n**2 - 1) ** 2 / (rho * radius**4 * (n**2 + 1))) / (2 * np.pi)
+        assert np.sum(np.abs(frequencies / closed - 1) < 0.02) == 2
+
+
+def test_a_housing_with_seats():
+    model = solid_model(block_mesh(("200 mm", "100 mm", "20 mm"), (4, 2, 1)), quadratic=False)
+    left = Interface("left", nodes_where(model, lambda x, y, z: x < 1e-9))
+    right = Interface("right", nodes_where(model, lambda x, y, z: x > 0.2 - 1e-9), "average")
+    reduced = reduce_model(model, [left, right], modes=8)
+    assert reduced.modes == 8
+    np.testing.assert_allclose(reduced.place("right"), [0.2, 0.05, 0.01])
+    assert reduced.faces is not None
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: block_mesh((1.0, 0.0, 1.0)), "three positive lengths"),
+        (lambda: ring_mesh(0.2, 0.1, 0.1), "0 < inner < outer"),
+        (lambda: solid_model(skfem.MeshTri()), "hexahedra or tetrahedra"),
+        (lambda: nodes_where(solid_model(block_mesh((1, 1, 1), (1, 1, 1))), lambda x, y, z: x > 2), "no node meets"),
+    ],
+)
+def test_wrong_meshes_are_named(make, message):
+    with pytest.raises(FlexibleError, match=message):
+        make()
