@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -49,6 +50,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
+    "sphinx-mathjax-offline",
     "sphinx.ext.viewcode",
     "numpydoc",
     "sphinx_copybutton",
@@ -86,8 +88,17 @@ copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True
 
 
+def refuse_servers(app, failed) -> None:
+    """Raise an error if a page needs a script from a server: the site is to be read without a network."""
+    for page in () if failed else Path(app.outdir).rglob("*.html"):
+        found = re.search(r'<script[^>]+src="(https?://[^"]+)', page.read_text(encoding="utf-8"))
+        if found:
+            raise RuntimeError(f"{page.name} loads {found[1]}; give the script with the site")
+
+
 def setup(app) -> None:
     """Write the API pages and let autodoc see through compiled functions and docstrings' vertical bars."""
     api_pages.write(HERE / "_generated")
     api_pages.unwrap_compiled()
     app.connect("autodoc-process-docstring", api_pages.escape_bars, priority=100)
+    app.connect("build-finished", refuse_servers)

@@ -14,6 +14,7 @@ from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.results.stream import Stream
+from gearmbs.mechanism.locked import locking_remark
 from gearmbs.mechanism.lumping import lumped, why_not_lumped
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
@@ -154,7 +155,8 @@ def simulate(
             result = solve_wstiff(
                 problem, times, t_end=last, tol=tol, method=name, progress=report, consumer=stream, **options
             )
-    remark = why_not_lumped(mechanism) if lump and one is None else ""
+    remarks = [locking_remark(mechanism, system), why_not_lumped(mechanism) if lump and one is None else ""]
+    remark = " ".join(text for text in remarks if text)
     solution = Solution(system, problem, result, members, remark)
     if stream is None or consumer is None:
         return solution
