@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,7 +16,7 @@ MM = 1e3
 
 
 def wheel_plot(gear: GearSpec, *, title: str | None = None, ax: Axes | None = None) -> Figure:
-    """Draw a wheel across its axis, with its bore and its pitch, base and root circles.
+    """Draw a wheel across its axis, with its bore and its pitch, base and root circles; an internal one by its circles.
 
     Parameters
     ----------
@@ -30,9 +32,15 @@ def wheel_plot(gear: GearSpec, *, title: str | None = None, ax: Axes | None = No
     """
     with look():
         figure, ax = drawn_on(ax, 5.2, 5.6)
-        outline = gear_outline(gear) * MM
-        ax.fill(*np.vstack([outline, outline[:1]]).T, facecolor="#DCE8F3", edgecolor=BLUE, linewidth=1.1)
         turn = np.linspace(0.0, 2.0 * np.pi, 361)
+        if gear.internal:
+            # its circles alone: the rim, and the tips inside
+            for radius, face in ((gear.outer_radius, "#DCE8F3"), (gear.tip_radius, "white")):
+                edge = radius * MM
+                ax.fill(edge * np.cos(turn), edge * np.sin(turn), facecolor=face, edgecolor=BLUE, linewidth=1.1)
+        else:
+            outline = gear_outline(gear) * MM
+            ax.fill(*np.vstack([outline, outline[:1]]).T, facecolor="#DCE8F3", edgecolor=BLUE, linewidth=1.1)
         circles = (
             ("pitch circle", gear.pitch_radius, VERMILLION, (0, (8, 3, 2, 3))),
             ("base circle", gear.base_radius, GREEN, (0, (4, 3))),
@@ -47,9 +55,8 @@ def wheel_plot(gear: GearSpec, *, title: str | None = None, ax: Axes | None = No
         ax.set_aspect("equal")
         ax.set_xlabel("mm")
         ax.set_ylabel("mm")
-        default = (
-            f"{gear.name}: {gear.teeth} teeth, module {gear.module * MM:.4g} mm, face {gear.face_width * MM:.4g} mm"
-        )
-        ax.set_title(title or default)
+        helix = f", helix {math.degrees(gear.helix_angle):.4g}°" if gear.helix_angle else ""
+        sizes = f"module {gear.module * MM:.4g} mm, face {gear.face_width * MM:.4g} mm{helix}"
+        ax.set_title(title or f"{gear.name}: {abs(gear.teeth)} teeth, {sizes}")
         legend_below(ax, 2)
     return figure

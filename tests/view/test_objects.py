@@ -27,12 +27,14 @@ def four_bar():
     "thing",
     [
         GearSpec(20, "2 mm", bore_radius="6 mm"),
+        GearSpec.ring(60, "2 mm"),
+        GearSpec(23, "2 mm", helix_angle="15 deg"),
         GearPair.paper(backlash="0.1 mm"),
         four_bar(),
         gear_rig(GearPair.paper(), speed="1000 rpm"),
         Case(operation={"speed": [["0 s", "0 rpm"], ["1 s", "3000 rpm"]]}),
     ],
-    ids=["wheel", "pair", "four bar", "rig", "case"],
+    ids=["wheel", "ring", "helical wheel", "pair", "four bar", "rig", "case"],
 )
 def test_things_draw_themselves(thing):
     figure = thing.plot()
