@@ -71,8 +71,9 @@ CIRCLES = {
         "methods of Drivetrain, and the functions that carry them out",
     ("bearings.catalogue", "bearings.geometry", "bearings.ratings"):
         "a bearing is found by its designation and tells its ratings; methods, and types only",
-    ("mechanism.analyses", "mechanism.compile", "mechanism.friction", "mechanism.lumping", "mechanism.measures",
-     "mechanism.mechanism", "mechanism.simulate"): "methods of Mechanism, and the functions that carry them out",
+    ("mechanism.analyses", "mechanism.compile", "mechanism.friction", "mechanism.locked", "mechanism.lumping",
+     "mechanism.measures", "mechanism.mechanism", "mechanism.simulate"):
+        "methods of Mechanism, and the functions that carry them out",
     ("adams.builders.builder", "adams.builders.constraints", "adams.builders.forces", "adams.builders.initial",
      "adams.builders.mechanism", "adams.builders.model", "adams.parse.check", "adams.parse.deck"):
         "a deck builds its mechanism; types only, and one method",
