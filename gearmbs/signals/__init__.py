@@ -64,6 +64,7 @@ if TYPE_CHECKING:
         sample,
     )
     from gearmbs.signals.separation import discrete_random, edit_cepstrum, prewhiten, remove_average
+    from gearmbs.signals.series import series
     from gearmbs.signals.shaft import shaft_phase
     from gearmbs.signals.shaft_force import COMPONENTS, force_components, force_to_acceleration
     from gearmbs.signals.signal import (
@@ -181,6 +182,7 @@ __all__ = [
     "scale",
     "scale_states",
     "sections",
+    "series",
     "shaft_phase",
     "sideband_index",
     "sideband_level",
@@ -298,6 +300,7 @@ late(
         "scale": ".scaling",
         "scale_states": ".scaling",
         "sections": ".sections",
+        "series": ".series",
         "shaft_phase": ".shaft",
         "sideband_index": ".indicators",
         "sideband_level": ".indicators",

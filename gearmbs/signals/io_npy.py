@@ -40,6 +40,12 @@ def read_npy(path: Path, channels: Sequence[str] | None, rate: float | None = No
             named[name] = array
     numbers = {k: v for k, v in named.items() if v.dtype.kind in "fiu" and v.size > 1}
     scalars = {k: _scalar(v) for k, v in named.items() if k not in numbers}
+    if list(named) == [path.stem]:
+        array = np.squeeze(next(iter(named.values())))
+        table = np.atleast_2d(array)
+        table = table if table.shape[0] >= table.shape[-1] else table.T
+        if table.ndim == 2:
+            numbers = {f"ch{i + 1}": table[:, i] for i in range(table.shape[1])}
     return assemble(path, numbers, scalars, {}, channels, rate)
 
 
