@@ -30,4 +30,4 @@ def guarded() -> Iterator[None]:
     except (ValueError, RuntimeError, OSError) as error:
         # what a function asks for by keyword is asked for here by the option of that name
         asked = getattr(error, "name", None) if type(error).__name__ == "MissingMetadataError" else None
-        fail(f"{error}\nOn the command line: --{asked} ..." if asked else str(error))
+        fail(f"{error} (on the command line: --{asked} ...)" if asked else str(error))

@@ -33,6 +33,12 @@ app.add_typer(campaign_app)
 app.command("identify")(identify_command)
 
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")]
+Rate = Annotated[str | None, typer.Option(help='Sampling rate, Hz or "12.8 kHz", if the file does not name it.')]
+Speed = Annotated[
+    str | None,
+    typer.Option(help='Shaft speed, e.g. "1780 rpm", or a file with the speed over time; default: from the GMF line.'),
+]
+Gaps = Annotated[str | None, typer.Option(help='Missing samples: "refuse", "interpolate" or "longest" stretch.')]
 ReportFile = Annotated[Path | None, typer.Option("--out", "-o", help="Write the report here instead of printing it.")]
 
 
@@ -255,10 +261,11 @@ def _level_table(data: Any) -> str:
 
 @app.command()
 def analyse(
-    file: Annotated[Path, typer.Argument(help="CSV, CSV.GZ, MAT, UFF, WAV, NetCDF, HDF5 or TDMS.")],
+    file: Annotated[Path, typer.Argument(help="CSV, MAT, UFF, WAV, TDMS, LVM, NPY, Parquet, NetCDF or HDF5.")],
     teeth: Annotated[str | None, typer.Option(help='Teeth of the wheel on the reference shaft; or "32,80".')] = None,
-    rate: Annotated[float | None, typer.Option(help="Sampling rate in Hz, if the file does not name it.")] = None,
-    speed: Annotated[str | None, typer.Option(help='Shaft speed, e.g. "1780 rpm"; default: from the GMF line.')] = None,
+    rate: Rate = None,
+    speed: Speed = None,
+    speed_channel: Annotated[str | None, typer.Option(help="Channel that holds the speed.")] = None,
     units: Annotated[str | None, typer.Option(help='Units of the samples, e.g. "m/s^2".')] = None,
     channel: Annotated[list[str] | None, typer.Option(help="Channel to use; repeat for several; default: all.")] = None,
     tacho: Annotated[str | None, typer.Option(help="Channel with the tacho pulses.")] = None,
@@ -272,27 +279,34 @@ def analyse(
     band: Annotated[
         str | None, typer.Option(help='Band of the envelope, e.g. "1 kHz, 5 kHz"; default: kurtogram.')
     ] = None,
+    gaps: Gaps = None,
     format: Annotated[str | None, typer.Option(help="Format of the file, if its name does not say.")] = None,
     tables: Annotated[Path | None, typer.Option(help="Folder for the tables as CSV.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for spectrum and average as PNG and SVG.")] = None,
     out: ReportFile = None,
 ) -> None:
-    """Analyse a vibration record, measured or simulated: mesh lines, bearing lines, sidebands, indicators."""
+    """Analyse a record, measured or simulated: of a gear pair with --teeth, of bearings with --bearing, of any machine."""
     with guarded(), stage_bar(file.name) as move:
         from gearmbs.signals import analyse as analyse_signal
         from gearmbs.signals.simulated import read_any
-        from gearmbs.units import to_si
+        from gearmbs.signals.speed_file import parse_speed
 
-        names = None if channel is None else [*channel, *([tacho] if tacho and tacho not in channel else [])]
-        given: dict[str, Any] = {
-            "teeth": None if teeth is None else tooth_counts(teeth),
-            "speed": None if speed is None else to_si(speed, "angular speed", "--speed"),
-        }
+        helpers = [name for name in (tacho, speed_channel) if name and name not in (channel or ())]
         signal = read_any(
-            file, rate=rate, units=units, channels=names, format=format, progress=lambda f, s: move(0.3 * f, s), **given
+            file,
+            rate=rate,
+            units=units,
+            channels=None if channel is None else [*channel, *helpers],
+            gaps=gaps,
+            format=format,
+            teeth=None if teeth is None else tooth_counts(teeth),
+            progress=lambda f, s: move(0.3 * f, s),
         )
+        known = parse_speed(speed)
         report = analyse_signal(
             signal,
+            speed=known,
+            speed_channel=speed_channel,
             tacho=tacho,
             pulses_per_rev=pulses,
             wheel=wheel,
@@ -304,8 +318,8 @@ def analyse(
         if bearing:
             from gearmbs.signals import diagnose_bearing
 
-            one = signal if channel is None else signal.sel(channel=channel)
-            turns = given["speed"] if given["speed"] is not None else getattr(report, "speed", None)
+            one = signal.sel(channel=report.levels["channel"].values)
+            turns = known if isinstance(known, float) else report.speed
             bearings = diagnose_bearing(one, bearing_list(bearing), turns, band=None if band is None else pair_of(band))
             found |= bearings.tables()
             text = f"{bearings.to_markdown()}\n\n{text}"
@@ -319,37 +333,49 @@ def analyse(
 
 @app.command()
 def trend(
-    file: Annotated[Path, typer.Argument(help="A long record; see analyse for the formats.")],
-    section: Annotated[str, typer.Option(help='Length of the pieces, e.g. "10 s".')] = "10 s",
+    files: Annotated[list[Path], typer.Argument(help="A long record, or a folder or many files as one series.")],
+    section: Annotated[str | None, typer.Option(help='Length of the pieces [default: "10 s" of one record].')] = None,
     teeth: Annotated[str | None, typer.Option(help='Teeth of the wheel on the reference shaft; or "32,80".')] = None,
-    rate: Annotated[float | None, typer.Option(help="Sampling rate in Hz, if the file does not name it.")] = None,
-    speed: Annotated[str | None, typer.Option(help='Shaft speed, e.g. "1780 rpm"; default: from the GMF line.')] = None,
+    rate: Rate = None,
+    speed: Speed = None,
+    speed_channel: Annotated[str | None, typer.Option(help="Channel that holds the speed.")] = None,
     units: Annotated[str | None, typer.Option(help='Units of the samples, e.g. "m/s^2".')] = None,
     channel: Annotated[list[str] | None, typer.Option(help="Channel to use; repeat for several; default: all.")] = None,
     harmonics: Annotated[int, typer.Option(help="Mesh harmonics to evaluate.")] = 3,
+    gaps: Gaps = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="CSV file instead of the terminal.")] = None,
 ) -> None:
-    """Follow the features of a long record over time, piece by piece, in memory for one piece."""
-    with guarded(), stage_bar(file.name) as move:
+    """Follow features over time: of a long record piece by piece, or of many files, taken up again if interrupted."""
+    with guarded(), stage_bar(files[0].name) as move:
+        from gearmbs.signals import series, trend_table
         from gearmbs.signals import trend as follow
-        from gearmbs.signals import trend_table
-        from gearmbs.units import to_si
+        from gearmbs.signals.speed_file import parse_speed
         from gearmbs.view.files import write_whole
 
-        data = follow(
-            file,
-            to_si(section, "time", "--section"),
-            teeth=None if teeth is None else tooth_counts(teeth),
-            rate=rate,
-            speed=None if speed is None else to_si(speed, "angular speed", "--speed"),
-            units=units,
-            channels=channel,
-            harmonics=harmonics,
-            progress=move,
-        )
-        table = trend_table(data)
-        if out is not None:
-            write_whole(out, table.to_csv(index=False))
+        known: dict[str, Any] = {
+            "teeth": None if teeth is None else tooth_counts(teeth),
+            "rate": rate,
+            "speed": parse_speed(speed),
+            "units": units,
+            "channels": channel,
+            "harmonics": harmonics,
+            "gaps": gaps,
+        }
+        if len(files) > 1 or files[0].is_dir():
+            known["speed_channel"] = speed_channel
+            table = series(
+                files[0] if len(files) == 1 else files,
+                section=section,
+                store=out,
+                progress=lambda name, fraction: move(fraction, name),
+                **known,
+            )
+        else:
+            if speed_channel is not None:
+                known["speed_channel"] = speed_channel
+            table = trend_table(follow(files[0], section or "10 s", progress=move, **known))
+            if out is not None:
+                write_whole(out, table.to_csv(index=False))
     if out is None:
         typer.echo(table.to_csv(index=False, float_format="%.5g"), nl=False)
     else:
@@ -365,11 +391,12 @@ def compare(
     ] = None,
     component: Annotated[str, typer.Option(help="Force component of the model.")] = "line_of_action",
     teeth: Annotated[str | None, typer.Option(help='Teeth of the measured wheel; or both, "32,80".')] = None,
-    rate: Annotated[float | None, typer.Option(help="Sampling rate of the measured files, Hz.")] = None,
+    rate: Rate = None,
     speed: Annotated[
         str | None, typer.Option(help="Shaft speed of the measured files; default: from the line.")
     ] = None,
     units: Annotated[str | None, typer.Option(help="Units of the measured samples.")] = None,
+    gaps: Gaps = None,
     channel: Annotated[str | None, typer.Option(help="Measured channel.")] = None,
     reference: Annotated[str, typer.Option(help="State the others are held against.")] = "healthy",
     scope: Annotated[str, typer.Option(help="What sets the scaling: load, all or each.")] = "load",
@@ -382,16 +409,17 @@ def compare(
     with guarded(), stage_bar("comparison") as move:
         from gearmbs.signals import compare as compare_signals
         from gearmbs.signals.simulated import parse_models, parse_states, read_any
-        from gearmbs.units import to_si
+        from gearmbs.signals.speed_file import parse_speed
 
-        given: dict[str, Any] = {
+        known = {
             "teeth": None if teeth is None else tooth_counts(teeth),
-            "speed": None if speed is None else to_si(speed, "angular speed", "--speed"),
+            "speed": parse_speed(speed),
             "rate": rate,
             "units": units,
+            "gaps": gaps,
         }
         measured = {
-            load: {state: read_any(path, **given) for state, path in states.items()}
+            load: {state: read_any(path, **known) for state, path in states.items()}
             for load, states in parse_states(experiment).items()
         }
         report = compare_signals(

@@ -71,13 +71,8 @@ class Times:
         return column * factor
 
     def _of_dates(self, texts: pd.Series) -> np.ndarray:
-        day_first = bool(re.match(r"^\d{1,2}[-/.]", texts.iloc[0]))
         try:
-            if day_first:
-                found = pd.to_datetime(texts, dayfirst=True, format="mixed", utc=True)
-            else:
-                clean = texts.str.replace(r"^(\d{4})[/.](\d{1,2})[/.](\d{1,2})", r"\1-\2-\3", regex=True)
-                found = pd.to_datetime(clean, format="ISO8601", utc=True)
+            found = pd.to_datetime(_iso(texts), format="ISO8601", utc=True)
         except (ValueError, OverflowError) as exc:
             raise SignalFileError(self.path, f"its time stamps cannot be read ({str(exc).splitlines()[0]})") from exc
         if found.isna().any():
@@ -101,6 +96,21 @@ class Times:
         out = seconds + DAY * (self.days / DAY + midnights)
         self.days += DAY * float(midnights[-1])
         return out
+
+
+def _iso(texts: pd.Series) -> pd.Series:
+    """Stamps with their dates as year-month-day; of 3/4/2024 the day comes first unless that cannot be."""
+    year_first = texts.str.extract(r"^(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})(.*)$")
+    if year_first[0].notna().all():
+        parts = [year_first[k] for k in (0, 1, 2, 3)]
+    else:
+        found = texts.str.extract(r"^(\d{1,2})[-/.](\d{1,2})[-/.](\d{4})(.*)$")
+        if found[0].isna().any():
+            return texts
+        american = bool((found[1].astype(int) > 12).any())
+        parts = [found[k] for k in ((2, 0, 1, 3) if american else (2, 1, 0, 3))]
+    year, month, day, rest = parts
+    return year + "-" + month.str.zfill(2) + "-" + day.str.zfill(2) + rest
 
 
 def index_meaning(column: np.ndarray, clock: np.ndarray | None) -> tuple[str | None, np.ndarray | None]:

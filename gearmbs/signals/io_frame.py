@@ -40,7 +40,7 @@ def record_of_frame(frame: pd.DataFrame, path: Path, rate: float | None = None) 
     times, clock = _clock(frame, notes)
     names, units, columns, left_out = [], [], [], []
     for label, column in frame.items():
-        if label is clock:
+        if clock is not None and label == clock:
             continue
         if column.dtype.kind not in "fiub":
             left_out.append(str(label))

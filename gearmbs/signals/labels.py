@@ -9,6 +9,7 @@ from .metadata import key_of
 from .signal import UNKNOWN_UNITS
 
 NAME_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*$")
+SUFFIX = re.compile(r"[_\s](s|sec|ms|us|µs|ns|min)$", re.IGNORECASE)
 CLOCK_NAMES = frozenset(
     "time t times timesec timeseconds timestamp timestamps zeit zeitpunkt datetime elapsedtime relativetime "
     "xvalue sampletime tempo temps timems timeus".split()
@@ -25,8 +26,7 @@ def name_and_unit(label: str) -> tuple[str, str]:
 
 def is_clock(name: str) -> bool:
     """True for the names that columns of times have."""
-    key = key_of(name)[0]
-    return key in CLOCK_NAMES
+    return key_of(SUFFIX.sub("", name))[0] in CLOCK_NAMES
 
 
 def unique_names(names: Sequence[str]) -> list[str]:

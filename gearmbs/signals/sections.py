@@ -157,6 +157,7 @@ def trend(
     teeth: int | Sequence[int] | None = None,
     speed: Any = None,
     speed_range: tuple[float, float] | None = None,
+    speed_channel: str | None = None,
     harmonics: int = 3,
     progress: Progress | None = None,
     **reading: Any,
@@ -167,7 +168,7 @@ def trend(
     ----------
     path, seconds
         As for `sections`: a file, or data of any shape. Many files are one `series`.
-    teeth, speed, speed_range, harmonics
+    teeth, speed, speed_range, speed_channel, harmonics
         As for `analyse`. Without teeth the features are those of plain vibration.
     progress : callable, optional
         Called as progress(fraction, stage).
@@ -191,13 +192,22 @@ def trend(
     """
     if isinstance(path, (list, tuple)) and path and isinstance(path[0], (str, Path)):
         raise SignalError("path: give one record; series(files, ...) follows many files")
+    if speed_channel is not None and reading.get("channels") is not None:
+        reading["channels"] = [*reading["channels"], speed_channel]
     rows: list[xr.Dataset | None] = []
     starts, notes = [], []
     done = [0.0]
     for section in sections(path, seconds, teeth=teeth, progress=lambda f, _: done.__setitem__(0, f), **reading):
         starts.append(float(section["time"].values[0]))
         try:
-            report = analyse(section, speed=speed, speed_range=speed_range, harmonics=harmonics, lines=1)
+            report = analyse(
+                section,
+                speed=speed,
+                speed_range=speed_range,
+                speed_channel=speed_channel,
+                harmonics=harmonics,
+                lines=1,
+            )
         except SignalError as error:
             rows.append(None)
             notes.append(str(error))

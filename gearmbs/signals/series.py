@@ -80,19 +80,17 @@ def series(
     """
     if errors not in ("keep", "raise"):
         raise SignalError(f"errors: must be 'keep' or 'raise', got {errors!r}")
-    paths, labels = _files(files)
     AnalysisOptions(**{k: v for k, v in settings.items() if k not in READING})
+    paths, labels = _files(files)
     journal = None
     if store is not None:
         journal = Journal(Path(store), _digest({"teeth": teeth, "section": section, "by": by, **settings}))
     rows: list[dict[str, Any]] = []
     first: list[str] = []
     name = "series"
-    with bars(progress if not callable(progress) else None, [name]) as move:
+    own = progress if callable(progress) else None
+    with bars(None if own is not None else progress, [name]) as move:  # type: ignore[arg-type]
         for i, path in enumerate(paths):
-            tell = (lambda f, i=i, p=path: progress(p.name, (i + f) / len(paths))) if callable(progress) else None
-            if tell is None and move is not None:
-                tell = lambda f, i=i: move(name, (i + f) / len(paths))  # noqa: E731
             kept = None if journal is None else journal.rows_of(path)
             if kept is None:
                 kept = _rows(path, teeth, section, by, errors, settings)
@@ -101,8 +99,10 @@ def series(
             head: dict[str, Any] = {"file": path.name} | ({} if labels is None else {"label": labels[i]})
             first = first or _channels(kept)
             rows += [{**head, **_renamed(row, first)} for row in kept]
-            if tell is not None:
-                tell(1.0)
+            if own is not None:
+                own(path.name, (i + 1) / len(paths))
+            elif move is not None:
+                move(name, (i + 1) / len(paths))
     table = rows_to_frame(rows)
     if store is not None:
         _write(table, Path(store))

@@ -23,7 +23,7 @@ VARYING = 0.02
 """A speed that strays more than this part from its mean is followed in angle, not in frequency."""
 OTHER_COMB = 0.03
 STRONGER_DB = 3.0
-USUAL_RPM = (20.0, 15_000.0)
+USUAL_RPM = (20.0, 12_000.0)
 USUAL_RATE = (100.0, 2e6)
 SHAFT_HARMONICS = 5
 
@@ -186,13 +186,13 @@ def _remark_other(
     blind = _estimate(signal, counts, None)
     if blind is None or abs(blind.speed / nominal - 1.0) < OTHER_COMB:
         return
-    if found is not None and blind.prominence < found.prominence + STRONGER_DB:
+    if found is not None and blind.score < found.score + STRONGER_DB:
         return
-    here = "no mesh line" if found is None else f"a mesh line {found.prominence:.0f} dB high"
+    here = "no mesh line" if found is None else f"only a comb of {found.score:.0f} dB"
     ratio = blind.speed / nominal
     notes.append(
         f"CHECK THE SPEED: near the given {nominal * 30 / math.pi:.1f} rpm there is {here}, but the record shows one "
-        f"of {blind.prominence:.0f} dB at {blind.gmf:.2f} Hz, which with {counts[0]} teeth is "
+        f"of {blind.score:.0f} dB at {blind.gmf:.2f} Hz, which with {counts[0]} teeth is "
         f"{blind.speed * 30 / math.pi:.1f} rpm ({ratio:.3f} times the given speed)."
     )
 

@@ -53,6 +53,8 @@ class SpeedEstimate:
         Root mean square height of the mesh harmonics over the floor around them in dB.
     phase : xarray.DataArray or None
         Shaft angle (rad) from the line's phase, if it could be followed.
+    score : float
+        Height of the comb of harmonics, shaft orders and sidebands in dB, less what lies between (`estimate_speed`).
     """
 
     speed: float
@@ -61,6 +63,7 @@ class SpeedEstimate:
     spread: float
     prominence: float
     phase: xr.DataArray | None
+    score: float = math.nan
 
 
 def estimate_speed(
@@ -134,7 +137,9 @@ def estimate_speed(
     if phase is not None:
         gmf = phase.attrs["mean_speed"] * count / (2.0 * math.pi)
     gmf = float(gmf)
-    return SpeedEstimate(2.0 * math.pi * gmf / count, gmf, rate / n, spread, float(direct[best]), phase)
+    return SpeedEstimate(
+        2.0 * math.pi * gmf / count, gmf, rate / n, spread, float(direct[best]), phase, float(score[best])
+    )
 
 
 def prominence(power: np.ndarray) -> np.ndarray:

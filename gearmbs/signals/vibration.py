@@ -11,21 +11,23 @@ import xarray as xr
 
 from .conversion import convert
 from .dimensions import unit_dimension
-from .envelope import envelope_spectrum
+from .envelope import envelope
 from .errors import SignalError
 from .order_tracking import order_track
 from .orders import harmonic_amplitudes
 from .report_parts import FULL_LEVELS, impulsive_band, levels, line_spectrum, strongest_lines
 from .shaft_finding import Known, Shaft, known_shaft, refined_speed, remark_plausibility
 from .signal import rate_of, units_of
+from .spectra import spectrum
 from .vibration_report import VibrationReport
 
 ORDERS = 10
 VELOCITY_BAND = (10.0, 1000.0)
 """Band of the RMS velocity in Hz, as in ISO 20816 for machines above 600 rpm."""
 EDGE = 0.05
+LEAST_FALL = 16.0
 """A band ends at least this part of its width above zero and below half the sampling rate."""
-NO_SPEED = "the speed is not known; give speed='1500 rpm', a curve, tacho=... or speed_channel=..."
+NO_SPEED = "the speed is not known; give speed='1500 rpm' (--speed), a curve or a tacho"
 Progress = Callable[[float, str], None]
 
 
@@ -65,7 +67,7 @@ def vibration_report(
     else:
         table["velocity_rms"] = ("channel", velocity, {"units": "m/s"})
     tell(0.25, "lines")
-    spectrum = line_spectrum(kept)
+    average = line_spectrum(kept)
     shaft_hz = None if speed is None else speed / math.tau
     varying = isinstance(found, Shaft) and found.range is not None
     orders = _orders(kept, found, speed)
@@ -73,14 +75,17 @@ def vibration_report(
         missing["orders"] = orders
     tell(0.45, "kurtogram")
     impulsive = impulsive_band(kept, lambda f, _: tell(0.45 + 0.35 * f, "kurtogram"))
-    envelope = lines_of_envelope = None
+    demodulated = lines_of_envelope = None
     if isinstance(impulsive, str):
         missing["impulsive"] = impulsive
         missing["envelope"] = missing["envelope_lines"] = "there is no impulsive band to take it in: " + impulsive
     else:
         tell(0.8, "envelope")
-        envelope = _envelope(kept, impulsive)
-        lines_of_envelope = strongest_lines(envelope, lines, None if varying else shaft_hz)
+        try:
+            demodulated = _envelope(kept, impulsive)
+            lines_of_envelope = strongest_lines(demodulated, lines, None if varying else shaft_hz)
+        except SignalError as error:
+            missing["envelope"] = missing["envelope_lines"] = str(error)
     if varying:
         notes.append("The speed varies: lines are listed in Hz as they are, orders are followed in angle.")
     tell(1.0, "done")
@@ -90,10 +95,10 @@ def vibration_report(
         duration=kept.sizes["time"] / rate_of(kept),
         units=units_of(kept),
         levels=table,
-        spectrum=spectrum,
-        lines=strongest_lines(spectrum, lines, None if varying else shaft_hz),
+        spectrum=average,
+        lines=strongest_lines(average, lines, None if varying else shaft_hz),
         impulsive=None if isinstance(impulsive, str) else impulsive,
-        envelope=envelope,
+        envelope=demodulated,
         envelope_lines=lines_of_envelope,
         orders=None if isinstance(orders, str) else orders,
         speed=speed,
@@ -168,6 +173,10 @@ def _envelope(signal: xr.DataArray, impulsive: xr.Dataset) -> xr.DataArray:
         centre, width = (float(impulsive[key].values[i]) for key in ("best_centre", "best_bandwidth"))
         low = max(centre - 0.5 * width, EDGE * width)
         high = min(centre + 0.5 * width, rate / 2 - EDGE * width)
-        parts.append(envelope_spectrum(signal.isel(channel=[i]), (low, high), scaling="rms", segment=2.0))
+        room = min(low, rate / 2 - high)
+        # a short record has no room for a steep filter
+        fall = min(max(0.1 * (high - low), LEAST_FALL * rate / signal.sizes["time"]), 1.9 * room)
+        cut = envelope(signal.isel(channel=[i]), (low, high), transition=fall)
+        parts.append(spectrum(cut, scaling="rms", segment=2.0))
     joined = xr.concat(parts, "channel", join="override", combine_attrs="override")
     return joined.transpose("frequency", "channel")

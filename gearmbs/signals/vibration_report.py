@@ -128,10 +128,11 @@ class VibrationReport:
             "",
         ]
         if self.orders is not None:
+            table = self.orders.pivot(index=["order", "frequency"], columns="channel", values="rms")[self.channels]
             rows = [
-                [r.channel, f"{r.order:g}", f"{r.frequency:.2f}", significant(r.rms)] for r in self.orders.itertuples()
+                [f"{o:g}", f"{f:.2f}", *map(significant, row)] for (o, f), row in zip(table.index, table.to_numpy())
             ]
-            parts += ["## Orders of the shaft", "", markdown_table(["channel", "order", "Hz", "RMS"], rows), ""]
+            parts += ["## Orders of the shaft, RMS", "", markdown_table(["order", "Hz", *channels], rows), ""]
         parts += ["## Strongest lines", "", self._line_table(self.lines), ""]
         if self.impulsive is not None:
             parts += ["## Most impulsive band", "", transposed(self.impulsive, channels, IMPULSIVE), ""]

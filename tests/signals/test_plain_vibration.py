@@ -1,0 +1,93 @@
+"""Reports without teeth, and remarks on speeds and rates that cannot be right."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gearmbs.signals import SignalError, VibrationReport, analyse, compare, make_signal
+
+RATE = 12800.0
+SHAFT = 25.0
+KNOCKS = 87.3
+
+
+def machine(seconds=4.0, g=True):
+    """Orders 1 and 3 of a shaft at 25.1 Hz, a bearing that knocks at 87.3 Hz around 3 kHz, and noise."""
+    t = np.arange(round(seconds * RATE)) / RATE
+    rng = np.random.default_rng(1)
+    turn = 2 * np.pi * 25.1 * t
+    x = 0.2 * np.cos(turn) + 0.1 * np.cos(3 * turn) + 0.02 * rng.standard_normal(t.size)
+    since = np.mod(t, 1 / KNOCKS)
+    x = x + 1.5 * np.exp(-since * 800) * np.sin(2 * np.pi * 3000 * since)
+    return make_signal({"housing": x}, RATE, units="g" if g else None)
+
+
+def test_levels_lines_orders_and_envelope():
+    report = analyse(machine(), speed="1500 rpm")
+    assert isinstance(report, VibrationReport)
+    # found beside the 1500 rpm that were given
+    assert report.speed / (2 * np.pi) == pytest.approx(25.1, abs=0.02)
+    orders = report.orders.set_index("order")["rms"]
+    assert orders[1.0] == pytest.approx(0.2 / math.sqrt(2), rel=0.03)
+    assert orders[3.0] == pytest.approx(0.1 / math.sqrt(2), rel=0.06)
+    assert report.envelope_lines["frequency"][0] == pytest.approx(KNOCKS, abs=0.5)
+    assert report.envelope_lines["order"][0] == pytest.approx(KNOCKS / 25.1, rel=0.01)
+    x = machine().values[:, 0]
+    assert float(report.levels["peak"][0]) == pytest.approx(np.abs(x - x.mean()).max())
+    # 0.2 g at 25.1 Hz and 0.1 g at 75.3 Hz, mostly
+    expected = 9.80665 / (2 * np.pi) * math.hypot(0.2 / 25.1, 0.1 / 75.3) / math.sqrt(2)
+    assert float(report.levels["velocity_rms"][0]) == pytest.approx(expected, rel=0.1)
+    assert report.missing == {}
+    assert set(report.tables()) == {"levels", "lines", "spectrum", "orders", "impulsive", "envelope_lines"}
+    text = report.to_markdown()
+    assert "## Orders of the shaft, RMS" in text
+    assert "None" not in text
+
+
+def test_nothing_is_missing_without_a_reason():
+    report = analyse(machine(0.1, g=False))
+    for name in ("orders", "impulsive", "envelope", "envelope_lines"):
+        assert getattr(report, name) is None
+        assert report.missing[name]
+    assert "give units=" in report.missing["velocity_rms"]
+    row = report.to_frame().iloc[0]
+    assert np.isnan(row["speed_rpm"])
+    assert "orders: the speed is not known" in row["notes"]
+    assert len(report.to_frame(by="channel")) == 1
+
+
+def pair(rate=RATE, shaft=SHAFT, teeth=32):
+    t = np.arange(round(6 * rate)) / rate
+    turn = 2 * np.pi * shaft * t
+    x = (1 + 0.4 * np.cos(turn)) * (np.cos(teeth * turn) + 0.5 * np.cos(2 * teeth * turn)) + 0.2 * np.cos(turn)
+    return x + 0.1 * np.random.default_rng(0).standard_normal(t.size)
+
+
+def checks(report):
+    return [note for note in report.notes if note.startswith("CHECK")]
+
+
+def test_half_or_double_the_speed_is_remarked():
+    assert checks(analyse(pair(), 32, rate=RATE, speed="1500 rpm")) == []
+    assert checks(analyse(pair(), 32, rate=RATE)) == []
+    for wrong in ("750 rpm", "3000 rpm", "1000 rpm"):
+        said = checks(analyse(pair(), 32, rate=RATE, speed=wrong))
+        assert any("CHECK THE SPEED" in note and "1500.0 rpm" in note for note in said), (wrong, said)
+        assert said[0] in analyse(pair(), 32, rate=RATE, speed=wrong).to_markdown()
+
+
+def test_rates_and_speeds_that_no_machine_has_are_remarked():
+    said = checks(analyse(pair(), 32, rate=10 * RATE))
+    assert any("15000" in note and "sampling rate" in note for note in said)
+    assert any("CHECK THE RATE" in note for note in checks(analyse(np.random.default_rng(0).random(500), rate=30.0)))
+    assert any("check its unit" in note for note in checks(analyse(machine(), speed="0.5 rpm")))
+
+
+def test_states_as_arrays_and_loads_left_out():
+    report = compare({"healthy": pair(), "worn": 2 * pair()}, rate="12.8 kHz", teeth=32, units="m/s^2")
+    assert float(report.changes().sel(state="worn").mean()) == pytest.approx(20 * math.log10(2), abs=0.01)
+    with pytest.raises(SignalError, match="by state"):
+        compare({"healthy": pair(), "low": {"worn": pair()}}, rate=RATE, teeth=32)
+    with pytest.raises(TypeError, match="there is no setting 'speeed'"):
+        analyse(pair(), 32, rate=RATE, speeed=1)
