@@ -285,7 +285,7 @@ def analyse(
     figures: Annotated[Path | None, typer.Option(help="Folder for spectrum and average as PNG and SVG.")] = None,
     out: ReportFile = None,
 ) -> None:
-    """Analyse a record, measured or simulated: of a gear pair with --teeth, of bearings with --bearing, of any machine."""
+    """Analyse a record, measured or simulated: of gears (--teeth), of bearings (--bearing), or of any machine."""
     with guarded(), stage_bar(file.name) as move:
         from gearmbs.signals import analyse as analyse_signal
         from gearmbs.signals.simulated import read_any
