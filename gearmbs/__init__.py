@@ -11,7 +11,8 @@ Studies
     `Case`, `CaseError`, `load_case`, `make_case`, `run_case`, `run_cases`, `run_paper`, `sweep`, `record_signal`,
     `gear_rig`
 Gears
-    `GearPair`, `GearSpec`, `Material`, `ContactLaw`, `FlankFriction`, `faults`
+    `GearPair`, `GearSpec`, `Material`, `ContactLaw`, `FlankFriction`, `faults`, `IdealMesh`, `planetary`,
+    `planetary_mechanism`
 Drivetrains
     `Drivetrain`, `DrivetrainError`; the parts are in `gearmbs.drivetrain`
 Flexible bodies
@@ -49,7 +50,17 @@ if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
     from gearmbs.drivetrain import Drivetrain, DrivetrainError
     from gearmbs.flexible import Rotor, Shaft, ShaftSection, reduce_model
-    from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, Material, faults
+    from gearmbs.gears import (
+        ContactLaw,
+        FlankFriction,
+        GearPair,
+        GearSpec,
+        IdealMesh,
+        Material,
+        faults,
+        planetary,
+        planetary_mechanism,
+    )
     from gearmbs.mechanism import JointFriction, Mechanism, linear_modes, simulate, static_equilibrium
     from gearmbs.saving import save
     from gearmbs.signals import (
@@ -109,6 +120,7 @@ __all__ = [
     "FlankFriction",
     "GearPair",
     "GearSpec",
+    "IdealMesh",
     "JointFriction",
     "Material",
     "Mechanism",
@@ -139,6 +151,8 @@ __all__ = [
     "order_map_plot",
     "order_track",
     "order_track_plot",
+    "planetary",
+    "planetary_mechanism",
     "read_deck",
     "read_signal",
     "record_signal",
@@ -178,6 +192,7 @@ late(
         "FlankFriction": ".gears",
         "GearPair": ".gears",
         "GearSpec": ".gears",
+        "IdealMesh": ".gears",
         "JointFriction": ".mechanism",
         "Material": ".gears",
         "Mechanism": ".mechanism",
@@ -208,6 +223,8 @@ late(
         "order_map_plot": ".view",
         "order_track": ".signals",
         "order_track_plot": ".view",
+        "planetary": ".gears",
+        "planetary_mechanism": ".gears",
         "read_deck": ".adams",
         "read_signal": ".signals",
         "record_signal": ".studies",

@@ -9,9 +9,12 @@ if TYPE_CHECKING:
     from gearmbs.gears.contact_element import GearContact
     from gearmbs.gears.contact_model import ContactModel
     from gearmbs.gears.geometry import PairGeometry, Placement
+    from gearmbs.gears.ideal_mesh import IdealMesh
     from gearmbs.gears.laws import ContactLaw, FlankFriction
     from gearmbs.gears.operating_point import OperatingPoint
     from gearmbs.gears.pair import GearPair
+    from gearmbs.gears.planetary_rig import Support, planetary_mechanism
+    from gearmbs.gears.planetary_set import PlanetarySet, planetary
     from gearmbs.gears.spec import GearSpec, Material, involute
     from gearmbs.gears.transmission import TransmissionError, kinematic_transmission_error, loaded_transmission_error
 
@@ -22,15 +25,20 @@ __all__ = [
     "GearContact",
     "GearPair",
     "GearSpec",
+    "IdealMesh",
     "Material",
     "OperatingPoint",
     "PairGeometry",
     "Placement",
+    "PlanetarySet",
+    "Support",
     "TransmissionError",
     "faults",
     "involute",
     "kinematic_transmission_error",
     "loaded_transmission_error",
+    "planetary",
+    "planetary_mechanism",
 ]
 
 late(
@@ -42,14 +50,19 @@ late(
         "GearContact": ".contact_element",
         "GearPair": ".pair",
         "GearSpec": ".spec",
+        "IdealMesh": ".ideal_mesh",
         "Material": ".spec",
         "OperatingPoint": ".operating_point",
         "PairGeometry": ".geometry",
         "Placement": ".geometry",
+        "PlanetarySet": ".planetary_set",
+        "Support": ".planetary_rig",
         "TransmissionError": ".transmission",
         "faults": ".faults:",
         "involute": ".spec",
         "kinematic_transmission_error": ".transmission",
         "loaded_transmission_error": ".transmission",
+        "planetary": ".planetary_set",
+        "planetary_mechanism": ".planetary_rig",
     },
 )

@@ -63,9 +63,13 @@ class GearContact(ForceElement):
                 f"{label}, less than the sum of the base radii, {1e3 * least:.4g} mm; place the wheels as the pair's "
                 "placement() says"
             )
-        if distance > most:
+        if geometry.sign > 0 and distance > most:
             warnings.warn(
                 f"{label}, more than the tip radii together, {1e3 * most:.4g} mm: the teeth cannot touch", stacklevel=4
+            )
+        if geometry.sign < 0 and distance < most:
+            warnings.warn(
+                f"{label}, less than the tip radii differ, {1e3 * most:.4g} mm: the teeth cannot touch", stacklevel=4
             )
 
     def __repr__(self) -> str:

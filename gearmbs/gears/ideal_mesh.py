@@ -1,0 +1,178 @@
+"""A pair of wheels whose mesh is one spring along the line of action: for modes, fast models and comparison."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.dae.equations.force_elements import DISSIPATED, STORED, Diagnostic
+from gearmbs.gears.geometry import PairGeometry, Placement
+from gearmbs.gears.pair import GearPair
+from gearmbs.gears.spec import convert_fields, require
+from gearmbs.gears.tables import pack
+from gearmbs.mechanism.elements import Compiled, ForceElement
+from gearmbs.units import Quantity
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.parts import Marker
+
+POINTS = 64
+"""Least number of points of the tables over a mesh cycle."""
+
+
+@dataclass(frozen=True)
+class IdealMesh:
+    """A gear pair that meshes through one spring and damper along its line of action.
+
+    It takes the place of a `GearPair` in ``Mechanism.gear_contact`` and in planetary sets.
+
+    Parameters
+    ----------
+    pair : GearPair
+        Its wheels and places; contact law, friction, faults and slices are not used.
+    stiffness : float or str
+        Along the normal, N/m.
+    damping : float or str
+        N s/m.
+    backlash : bool
+        Whether teeth can part and touch on the other flank, with the pair's backlash. Otherwise the spring pulls as it
+        pushes, and the mesh is linear.
+    depth : float or str
+        Deflection of full damping where there is backlash, m.
+    stiffness_curve : sequence of float, optional
+        Stiffness over one mesh cycle of the driver from angle 0 on, relative to ``stiffness``, equally spaced.
+    error : sequence of float, optional
+        Transmission error over the same, m at the base circles, positive for a driven wheel that lags.
+
+    Raises
+    ------
+    ValueError
+        For a stiffness that is not positive, or a curve of fewer than four points or not positive.
+
+    Examples
+    --------
+    >>> mesh = IdealMesh(GearPair.paper(), stiffness="4e8 N/m")
+    >>> mesh.stiffness
+    400000000.0
+    """
+
+    pair: GearPair
+    stiffness: Quantity
+    damping: Quantity = 0.0
+    backlash: bool = False
+    depth: Quantity = "1 um"
+    stiffness_curve: Sequence[float] | None = None
+    error: Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        convert_fields(self, {"stiffness": "N/m", "damping": "N*s/m", "depth": "length"}, "IdealMesh")
+        require(self.stiffness > 0, f"IdealMesh.stiffness is {self.stiffness} N/m; it must be positive")
+        require(self.damping >= 0, f"IdealMesh.damping is {self.damping} N s/m; it must not be negative")
+        require(self.depth > 0, f"IdealMesh.depth is {self.depth} m; it must be positive")
+        for name in ("stiffness_curve", "error"):
+            curve = getattr(self, name)
+            if curve is not None:
+                values = np.asarray(curve, dtype=float)
+                fine = values.ndim == 1 and values.size >= 4 and np.isfinite(values).all()
+                require(fine, f"IdealMesh.{name} needs four finite numbers or more over a mesh cycle")
+                require(
+                    name == "error" or values.min() > 0, f"IdealMesh.{name} holds {values.min():g}; give positive ones"
+                )
+                object.__setattr__(self, name, values)
+
+    @classmethod
+    def from_contact(
+        cls, pair: GearPair, torque: float | None = None, points: int = POINTS, **others: Any
+    ) -> IdealMesh:
+        """Mesh with the stiffness curve and the transmission error that a pair's tooth contact has under a torque.
+
+        Parameters
+        ----------
+        pair : GearPair
+        torque : float, optional
+            On the driven wheel, N m; default the pair's.
+        points : int
+            Over a mesh cycle.
+        **others
+            Further fields of `IdealMesh`.
+
+        Notes
+        -----
+        The error is what the loaded transmission error exceeds the deflection of the tangent stiffness by.
+        """
+        from gearmbs.gears.transmission import loaded_transmission_error
+
+        loaded = loaded_transmission_error(pair, torque, points)
+        cosine = math.cos(pair.driver.base_helix_angle)
+        along = loaded.stiffness / cosine**2
+        mean = float(along.mean())
+        error = loaded.error - loaded.load / pair.driven.base_radius / loaded.stiffness
+        return cls(pair, mean, stiffness_curve=(along / mean).tolist(), error=error.tolist(), **others)
+
+    @property
+    def geometry(self) -> PairGeometry:
+        """The wheels and their places."""
+        return self.pair.geometry
+
+    def tables(self) -> tuple[np.ndarray, np.ndarray]:
+        """Relative stiffness and error over the phase that the kernel counts: length of roll over base pitch."""
+        sizes = [len(c) for c in (self.stiffness_curve, self.error) if c is not None]
+        n = max([POINTS, *sizes])
+        geometry = self.geometry
+        gear = geometry.wheels[0]
+        start = gear.base_half_angle + geometry.working_pressure_angle - (math.pi if geometry.sign < 0 else 0.0)
+        phase = np.arange(n) / n - start * gear.teeth / (2 * math.pi)
+
+        def at(curve: Sequence[float] | None, plain: float) -> np.ndarray:
+            if curve is None:
+                return np.full(n, plain)
+            given = np.arange(len(curve)) / len(curve)
+            return np.interp(phase, given, np.asarray(curve), period=1.0)
+
+        return at(self.stiffness_curve, 1.0), at(self.error, 0.0)
+
+    def contact_element(self, name: str, i: Marker, j: Marker) -> IdealMeshForce:
+        """Return the mesh as a force element between the frames of the driver and the driven wheel."""
+        return IdealMeshForce(name, i, j, self)
+
+    def placement(self, driver_angle: float = 0.0) -> Placement:
+        """Frames at which the drive flanks just touch, for a given driver angle (rad)."""
+        return self.pair.placement(driver_angle)
+
+
+@dataclass(eq=False, repr=False)
+class IdealMeshForce(ForceElement):
+    """Spring and damper along the line of action of the wheels whose frames are the markers I and J."""
+
+    mesh: IdealMesh
+
+    kind = "ideal mesh"
+    diagnostics = (
+        Diagnostic("elastic_energy", "J", STORED),
+        Diagnostic("damping_power", "W", DISSIPATED),
+        Diagnostic("deflection", "m"),
+        Diagnostic("normal_force", "N"),
+    )
+
+    def compiled(self) -> Compiled:
+        from gearmbs.contact.ideal import ideal_mesh
+
+        mesh = self.mesh
+        integers, reals, scratch = pack(mesh.pair.with_changes(faults=(), stiffness_curve="constant"), 1)
+        stiffness, error = mesh.tables()
+        cosine = math.cos(mesh.geometry.driver.base_helix_angle)
+        own = [mesh.stiffness, mesh.damping, mesh.depth, cosine, float(mesh.backlash), stiffness.size]
+        return Compiled(
+            ideal_mesh,
+            np.concatenate([[reals.size], integers]),
+            np.concatenate([reals, own, stiffness, error]),
+            scratch=scratch,
+        )
+
+    def __repr__(self) -> str:
+        bodies = f"{self.i.body.name!r} with {self.j.body.name!r}"
+        return f"IdealMeshForce({self.name!r}, {bodies}, {self.mesh.stiffness:g} N/m)"

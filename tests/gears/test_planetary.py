@@ -1,0 +1,231 @@
+"""Planetary sets: assembly, phases, Willis, modes against a published table, load sharing, faults, bad input."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gearmbs.gears import ContactLaw, FlankFriction, GearSpec, IdealMesh, PlanetarySet, Support, faults, planetary
+from gearmbs.gears import planetary_mechanism as mechanism_of
+from gearmbs.mechanism import linear_modes, static_equilibrium
+
+TABLE = {
+    3: (
+        [1475.7, 1930.3, 2658.3, 7462.8, 11775.3],
+        [743.2, 1102.4, 1896.0, 2276.4, 6986.3, 9647.9],
+        [],
+    ),
+    5: (
+        [1567.4, 2006.1, 2614.8, 8065.4, 14253.1],
+        [710.0, 1072.0, 1888.1, 2425.3, 7382.4, 11172.3],
+        [1808.2, 5963.8, 6981.7],
+    ),
+}
+"""Lin and Parker, J. Vib. Acoust. 121 (1999) 316: rotational, translational (double) and planet modes, Hz."""
+
+
+def published_set(count, **settings):
+    # only the inertias over the squares of the radii matter, and the pressure angle
+    settings.setdefault("ideal", (5e8, 5e8))
+    return planetary((60, 30, 120), "2 mm", count, pressure_angle="24.6 deg", wheels={"addendum": "1.6 mm"}, **settings)
+
+
+def published_mechanism(gears):
+    radii = {"sun": gears.sun.base_radius, "planet": gears.planet.base_radius, "ring": gears.ring.base_radius}
+    radii["carrier"] = gears.carrier_radius
+    masses = {"sun": (0.40, 0.39), "planet": (0.66, 0.61), "ring": (2.35, 3.00), "carrier": (5.43, 6.29)}
+    free = Support(radial=1e8)
+    return mechanism_of(
+        gears,
+        held=None,
+        supports={"sun": free, "carrier": free, "ring": Support(radial=1e8, torsional=1e9 * radii["ring"] ** 2)},
+        pins=free,
+        masses={name: (mass, share * radii[name] ** 2) for name, (mass, share) in masses.items()},
+    )
+
+
+@pytest.mark.parametrize("count", [3, 4, 5, 6])
+def test_natural_frequencies(count):
+    found = np.sort(linear_modes(published_mechanism(published_set(count))).frequencies)
+    assert found.size == 6 + 12 + 3 * (count - 3)
+    assert found[0] < 1
+    single, double, planets = TABLE.get(count, ([], [], TABLE[5][2]))
+    expected = single + 2 * double + (count - 3) * planets
+    for value in expected:
+        assert np.abs(found - value).min() < 0.1
+    if count in TABLE:
+        np.testing.assert_allclose(found[1:], np.sort(expected), atol=0.1)
+    for value in planets if count > 3 else []:
+        assert (np.abs(found - value) < 0.1).sum() == count - 3
+
+
+def test_planet_modes_do_not_know_the_central_members():
+    gears = published_set(5)
+    expected = [1808.181, 5963.760, 6981.705]
+    found = linear_modes(published_mechanism(gears)).frequencies
+    for value in expected:
+        np.testing.assert_allclose(np.sort(np.abs(found - value))[:2], 0, atol=2e-3)
+
+
+def test_unequal_spacing_splits_pairs():
+    angles = [0, 2 * math.pi * 44 / 180, 2 * math.pi * 90 / 180, 2 * math.pi * 134 / 180]
+    found = np.sort(linear_modes(published_mechanism(published_set(4, angles=angles))).frequencies)
+    equal = np.sort(linear_modes(published_mechanism(published_set(4))).frequencies)
+    assert found.size == equal.size == 21
+    assert np.diff(equal[1:3]) < 1e-3
+    assert np.diff(found[1:3]) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("teeth", "count", "ring_shift", "phases"),
+    [
+        ((30, 20, 70), 4, 0, [0, 0.5, 0, 0.5]),
+        ((18, 36, 93), 3, 1.5, [0, 0, 0]),  # a ring whose teeth only fit with a shift
+        ((21, 39, 99), 3, 0, [0, 0, 0]),
+        ((28, 36, 100), 4, 0, [0, 0, 0, 0]),
+    ],
+)
+def test_mesh_phases(teeth, count, ring_shift, phases):
+    gears = planetary(teeth, "2 mm", count, profile_shifts=(0, 0, ring_shift))
+    np.testing.assert_allclose(gears.mesh_phases("sun"), phases, atol=1e-9)
+    np.testing.assert_allclose(gears.mesh_phases("ring"), -np.array(phases) % 1, atol=1e-9)
+
+
+def test_phases_of_the_first_stage_of_a_wind_turbine():
+    gears = planetary((19, 17, 56), "45 mm", 3, profile_shifts=(0.617, 0.802, -0.501), carrier_radius="863 mm")
+    np.testing.assert_allclose(gears.mesh_phases("ring"), [0, 1 / 3, 2 / 3], atol=1e-9)
+    assert gears.speeds(sun=1.0, ring=0.0)["carrier"] == pytest.approx(1 / 3.9473684, rel=1e-7)
+    assert [gears.harmonic_action(h) for h in (1, 2, 3)] == ["force", "force", "torque"]
+
+
+def test_laws_of_speeds_and_torques():
+    gears = planetary((28, 36, 100), "2 mm", 4)
+    speeds = gears.speeds(sun=30.0, carrier=2.0)
+    left = (speeds["sun"] - speeds["carrier"]) * 28
+    assert left == pytest.approx(-(speeds["ring"] - speeds["carrier"]) * 100, abs=1e-12)
+    torques = gears.torques(sun=28.0)
+    assert torques == pytest.approx({"sun": 28.0, "ring": 100.0, "carrier": -128.0})
+    power = sum(torques[m] * speeds[m] for m in torques)
+    assert power == pytest.approx(0, abs=1e-9)
+    assert gears.efficiency(1.0) == 1.0
+    f = gears.frequencies(carrier=2 * math.pi, ring=0.0)
+    assert f["mesh"] == pytest.approx(100)
+    assert f["mesh_ring"] == pytest.approx(100)
+    assert f["planet_fault"] == pytest.approx(100 / 36)
+    assert f["sun_fault"] == pytest.approx(4 * 100 / 28)
+    assert f["ring_fault"] == pytest.approx(4)
+
+
+LINEAR = ContactLaw.linear("3e8 N/m", "1500 N*s/m", "10 um")
+
+
+def small_set(**settings):
+    return planetary((24, 30, 84), "1.5 mm", 3, contact=LINEAR, friction=FlankFriction.none(), **settings)
+
+
+def equilibrium_forces(gears, **more):
+    m = mechanism_of(gears, speeds={"sun": 0.0}, torques={"carrier": -90.0}, run_up=0, **more)
+    found = static_equilibrium(m)
+    names = [f"sun-planet {k + 1}" for k in range(gears.planets)]
+    return np.array([float(np.asarray(found.solution.diagnostics(n)["normal_force"])[-1]) for n in names])
+
+
+def test_planets_share_the_load():
+    forces = equilibrium_forces(small_set(backlash_sun="0.05 mm", backlash_ring="0.05 mm"))
+    np.testing.assert_allclose(forces / forces.sum(), 1 / 3, atol=1e-8)
+
+
+def test_a_pin_error_shifts_load_by_the_linear_value():
+    error, sun, ring = 2e-6, 3e8, 4e8
+    gears = small_set(ideal=(sun, ring), pin_errors={1: (0.0, error)})
+    forces = equilibrium_forces(gears)
+    alpha = gears.pairs_sun[0].working_pressure_angle
+    # a pin that is off by u along its path deflects both meshes: F (1 / k_s + 1 / k_r) = 2 u cos(alpha)
+    by_error = 2 * error * math.cos(alpha) / (1 / sun + 1 / ring)
+    expected = np.array([-1 / 3, 2 / 3, -1 / 3]) * by_error
+    # loads are negative: the carrier is held back, the pin error relieves or loads with the sense of the torque
+    shift = forces - forces.mean()
+    np.testing.assert_allclose(np.abs(shift), np.abs(expected), rtol=2e-3)
+    assert shift[0] == pytest.approx(shift[2], rel=1e-3)
+
+
+def test_willis_in_a_simulation_with_tooth_contact():
+    gears = small_set(backlash_sun="0.05 mm", backlash_ring="0.05 mm")
+    m = mechanism_of(gears, speeds={"sun": "300 rpm"}, torques={"carrier": "-60 N m"}, run_up="0.01 s")
+    solution = m.simulate(0.06, rate=2000)
+    turned = solution.joint_angle("carrier seat"), solution.joint_angle("sun seat")
+    ratio = (turned[0][-1] - turned[0][60]) / (turned[1][-1] - turned[1][60])
+    assert ratio == pytest.approx(1 / 4.5, rel=2e-4)
+    force = np.mean([solution.diagnostics(f"sun-planet {k}")["normal_force"][60:].mean() for k in (1, 2, 3)])
+    assert 3 * force * gears.sun.base_radius == pytest.approx(60 / 4.5, rel=0.02)
+
+
+def test_torques_of_ideal_meshes_are_exact():
+    gears = small_set(ideal=(3e8, 4e8))
+    m = mechanism_of(gears, speeds={"sun": 0.0}, torques={"carrier": -90.0}, run_up=0)
+    found = static_equilibrium(m).solution
+    forces = equilibrium_forces(gears)
+    assert forces.sum() * gears.sun.base_radius == pytest.approx(90 / 4.5, rel=1e-6)
+    ring = [float(np.asarray(found.diagnostics(f"planet {k}-ring")["normal_force"])[-1]) for k in (1, 2, 3)]
+    assert sum(ring) * gears.ring.base_radius == pytest.approx(90 * 84 / 108, rel=1e-6)
+
+
+def test_faults_sit_where_they_belong():
+    gears = small_set(
+        faults=[
+            ("planet 2 sun side", faults.BrokenTooth(tooth=3)),
+            ("ring", faults.BrokenTooth(tooth=5)),
+            ("planet 3", faults.BrokenTooth(tooth=1)),
+        ]
+    )
+    first, second = (
+        [[(f.label, f.wheel) for f in p.faults] for p in pairs] for pairs in (gears.pairs_sun, gears.pairs_ring)
+    )
+    assert [len(f) for f in first] == [0, 1, 1]
+    assert [len(f) for f in second] == [1, 1, 2]
+    assert first[1][0][1] == "driven"
+    assert {wheel for _, wheel in second[2]} == {"driver", "driven"}
+
+
+def test_stepped_planets_fit_by_their_own_timing():
+    sun, large, small = GearSpec(24, "2 mm"), GearSpec(40, "2 mm"), GearSpec(20, "2 mm", name="small")
+    ring = GearSpec.ring(84, "2 mm")
+    gears = PlanetarySet(sun, large, ring, 3, planet_at_ring=small)
+    assert gears.basic_ratio == pytest.approx(-40 / 24 * 84 / 20)
+    start = gears.start_angles()
+    assert start["steps"][0] == 0
+    for psi, planet, step in zip(gears.angles, start["planets"], start["steps"]):
+        pair = gears.pairs_ring[0]
+        ring_angle = pair.driven_angle(planet + step - psi - math.pi) + psi + math.pi
+        pitch = 2 * math.pi / 84
+        assert abs((ring_angle - start["ring"] + 0.5 * pitch) % pitch - 0.5 * pitch) < 1e-9
+
+
+def test_ideal_mesh_of_a_pair_has_its_stiffness():
+    pair = small_set().pairs_sun[0]
+    mesh = IdealMesh.from_contact(pair, 20.0, 16)
+    stiffness, error = mesh.tables()
+    assert stiffness.mean() == pytest.approx(1, abs=0.02)
+    assert np.isfinite(error).all()
+    assert mesh.stiffness == pytest.approx(3e8 * pair.contact_ratio, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("build", "words"),
+    [
+        (lambda: planetary((24, 30, 85), "2 mm", 3), "cannot be assembled.*nearest"),
+        (lambda: planetary((24, 30, 84), "2 mm", 5), "nearest angles are 0.0000, 73.3333"),
+        (lambda: planetary((24, 30, 84), "2 mm", 6), "neighbouring planets"),
+        (lambda: planetary((24, 30, 28), "2 mm", 2), "no larger than|inside the base|assembled"),
+        (lambda: planetary((24, 30, 84), "2 mm", 3, faults=[("planet 4", faults.BrokenTooth())]), "planet 4"),
+        (lambda: planetary((24, 30, 84), "2 mm", 3, angles=[0, 1]), "2 numbers for 3 planets"),
+        (lambda: small_set().speeds(sun=1.0), "give two"),
+        (lambda: mechanism_of(small_set(), speeds={"ring": 1.0}), "ring is held"),
+        (lambda: mechanism_of(small_set(), speeds={"sun": 1.0, "carrier": 1.0}), "all three members"),
+        (lambda: mechanism_of(small_set(), held="planet"), "choose among"),
+    ],
+)
+def test_bad_sets_are_one_line(build, words):
+    with pytest.raises(ValueError, match=words) as caught:
+        build()
+    assert "\n" not in str(caught.value)
