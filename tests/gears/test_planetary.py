@@ -77,18 +77,25 @@ def test_unequal_spacing_splits_pairs():
 
 
 @pytest.mark.parametrize(
-    ("teeth", "count", "ring_shift", "phases"),
+    ("teeth", "count", "shifts", "phases"),
     [
-        ((30, 20, 70), 4, 0, [0, 0.5, 0, 0.5]),
-        ((18, 36, 93), 3, 1.5, [0, 0, 0]),  # a ring whose teeth only fit with a shift
-        ((21, 39, 99), 3, 0, [0, 0, 0]),
-        ((28, 36, 100), 4, 0, [0, 0, 0, 0]),
+        ((30, 20, 70), 4, (0, 0, 0), [0, 0.5, 0, 0.5]),
+        ((21, 39, 99), 3, (0, 0, 0), [0, 0, 0]),
+        ((28, 36, 100), 4, (0, 0, 0), [0, 0, 0, 0]),
     ],
 )
-def test_mesh_phases(teeth, count, ring_shift, phases):
-    gears = planetary(teeth, "2 mm", count, profile_shifts=(0, 0, ring_shift))
+def test_mesh_phases(teeth, count, shifts, phases):
+    gears = planetary(teeth, "2 mm", count, profile_shifts=shifts)
     np.testing.assert_allclose(gears.mesh_phases("sun"), phases, atol=1e-9)
     np.testing.assert_allclose(gears.mesh_phases("ring"), -np.array(phases) % 1, atol=1e-9)
+
+
+def test_phases_of_a_set_that_only_fits_with_shifts():
+    sun, planet = (GearSpec(z, "2 mm", profile_shift=0.4, name=n) for z, n in ((18, "sun"), (36, "planet")))
+    ring = GearSpec.ring(93, "2 mm", profile_shift=0.45, addendum="1.6 mm")
+    gears = PlanetarySet(sun, planet, ring, 3)
+    assert not gears.mesh_phases("sun").any()
+    assert not gears.mesh_phases("ring").any()
 
 
 def test_phases_of_the_first_stage_of_a_wind_turbine():
