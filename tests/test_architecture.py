@@ -77,6 +77,8 @@ CIRCLES = {
     ("adams.builders.builder", "adams.builders.constraints", "adams.builders.forces", "adams.builders.initial",
      "adams.builders.mechanism", "adams.builders.model", "adams.parse.check", "adams.parse.deck"):
         "a deck builds its mechanism; types only, and one method",
+    ("campaigns.campaign", "campaigns.exports", "campaigns.report", "campaigns.response", "campaigns.sensitivity"):
+        "methods of Campaign, and the functions that carry them out",
 }  # fmt: skip
 """Groups of modules that may know each other, and why."""
 

@@ -128,6 +128,9 @@ MORE = {
     "gearmbs.campaigns": {
         "gearmbs.campaigns.designs": EVERYTHING,
         "gearmbs.campaigns.runners": EXPORTED,
+        "gearmbs.campaigns.exports": ["export"],
+        "gearmbs.campaigns.response": ["response_surface"],
+        "gearmbs.campaigns.sensitivity": ["sensitivity"],
         "gearmbs.campaigns.subjects.pair": ["canonical_case", "harmonics", "contact_numbers", "indicators"],
     },
     "gearmbs.identify": {

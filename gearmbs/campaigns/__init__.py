@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from gearmbs.campaigns.errors import CampaignError
     from gearmbs.campaigns.factors import Choice, Factor, Specimens, choose
     from gearmbs.campaigns.plan import Plan, load_plan, make_plan
+    from gearmbs.campaigns.response import ResponseSurface, condition_map, fit_surface
     from gearmbs.campaigns.runners.dask import dask_client
+    from gearmbs.campaigns.sensitivity import SobolIndices, main_effects, morris_effects, sobol_indices
     from gearmbs.campaigns.status import CampaignStatus
     from gearmbs.campaigns.subjects import (
         DeckSubject,
@@ -47,21 +49,35 @@ __all__ = [
     "Outcome",
     "PairSubject",
     "Plan",
+    "ResponseSurface",
+    "SobolIndices",
     "Specimens",
     "Subject",
     "canonical",
     "choose",
+    "condition_map",
     "content_key",
     "dask_client",
+    "fit_surface",
     "load_plan",
+    "main_effects",
     "make_plan",
     "make_subject",
+    "morris_effects",
+    "sobol_indices",
     "subject_kinds",
 ]
 
 late(
     __name__,
     {
+        "sobol_indices": ".sensitivity",
+        "morris_effects": ".sensitivity",
+        "main_effects": ".sensitivity",
+        "SobolIndices": ".sensitivity",
+        "fit_surface": ".response",
+        "condition_map": ".response",
+        "ResponseSurface": ".response",
         "Campaign": ".campaign",
         "CampaignError": ".errors",
         "CampaignStatus": ".status",

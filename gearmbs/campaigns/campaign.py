@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from gearmbs.campaigns.response import ResponseSurface
+
 MOST_TRIES = 8
 """Attempts of a unit that end with a worker's death, after which the run gives up."""
 
@@ -198,6 +200,30 @@ class Campaign:
         from gearmbs.campaigns.results import open_dataset
 
         return open_dataset(self.folder)
+
+    def sensitivity(self, result: str) -> Any:
+        """Return what decides a result, by the design; see `gearmbs.campaigns.sensitivity.sensitivity`."""
+        from gearmbs.campaigns.sensitivity import sensitivity
+
+        return sensitivity(self, result)
+
+    def response_surface(self, result: str, degree: int = 2) -> ResponseSurface:
+        """Return a polynomial of a result over the factors, with its error at points left out."""
+        from gearmbs.campaigns.response import response_surface
+
+        return response_surface(self, result, degree)
+
+    def export(self, target: str | Path, format: str = "parquet", **settings: Any) -> list[Path]:
+        """Write the campaign as CSV, NetCDF, MATLAB or parquet; see `gearmbs.campaigns.exports.export`."""
+        from gearmbs.campaigns.exports import export
+
+        return export(self, target, format, **settings)
+
+    def report(self, path: str | Path, results: list[str] | None = None) -> Path:
+        """Write one HTML page with plan, results, what decides them, and failures."""
+        from gearmbs.campaigns.report import write_report
+
+        return write_report(self, path, results)
 
     def case(self, index: int) -> Any:
         """Return the thing that a case simulates, made again from the plan."""

@@ -151,6 +151,43 @@ def check(
 
 
 @app.command()
+def export(
+    folder: Place,
+    out: Annotated[Path, typer.Option("--out", "-o", help="File, or folder for parquet.")],
+    format: Annotated[str, typer.Option("--as", help="csv, netcdf, matlab or parquet.")] = "parquet",
+) -> None:
+    """Write the results for others."""
+    with guarded():
+        from gearmbs.campaigns import Campaign
+
+        for path in Campaign(folder).export(out, format):
+            typer.echo(f"wrote {path}")
+
+
+@app.command()
+def report(
+    folder: Place,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="HTML file; default: in the folder.")] = None,
+    result: Annotated[list[str] | None, typer.Option(help="Column to look at; repeat; default: the first few.")] = None,
+) -> None:
+    """Write one HTML page: plan, results, what decides them, failures."""
+    with guarded():
+        from gearmbs.campaigns import Campaign
+
+        typer.echo(f"wrote {Campaign(folder).report(out or folder / 'report.html', result or None)}")
+
+
+@app.command()
+def sensitivity(folder: Place, result: Annotated[str, typer.Argument(help="Column of the table.")]) -> None:
+    """Print what decides a result: Sobol' indices, elementary or main effects, by the design."""
+    with guarded():
+        from gearmbs.campaigns import Campaign
+
+        found = Campaign(folder).sensitivity(result)
+        typer.echo((found.table() if hasattr(found, "table") else found).to_string(float_format="%.4g"))
+
+
+@app.command()
 def slurm(
     folder: Place,
     elements: Annotated[int, typer.Option(help="Elements of the job array.")] = 100,

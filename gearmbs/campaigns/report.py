@@ -1,0 +1,154 @@
+"""A campaign as one HTML page that a colleague can open: plan, results, what decides them, failures."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.results import factor_names, result_names
+from gearmbs.campaigns.sensitivity import SobolIndices, sensitivity
+from gearmbs.view.files import write_whole
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from gearmbs.campaigns.campaign import Campaign
+
+STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:1000px;margin:2em auto;padding:0 1em;color:#222}
+table{border-collapse:collapse;margin:1em 0;font-size:14px}td,th{border-bottom:1px solid #ddd;padding:3px
+10px;text-align:right}
+td:first-child,th:first-child{text-align:left}img{max-width:100%}h2{margin-top:2em}small{color:#666}"""
+MOST_RESULTS = 4
+SHOWN_FAILURES = 50
+
+
+def write_report(campaign: Campaign, path: str | Path, results: list[str] | None = None) -> Path:
+    """Write the report of a campaign.
+
+    Parameters
+    ----------
+    path : path-like
+    results : list of str, optional
+        Columns to look at; default the first few that vary.
+    """
+    table = campaign.table
+    known = result_names(campaign.folder, table)
+    if results is None:
+        results = [name for name in known if table[name].std() > 0.0][:MOST_RESULTS]
+    for name in results:
+        if name not in known:
+            raise CampaignError(f"report: result {name!r} is unknown; known are {', '.join(known[:12])} ...")
+    parts = [f"<h1>{html.escape(campaign.path.name)}</h1>", _plan(campaign)]
+    for name in results:
+        parts += [f"<h2>{html.escape(name)}</h2>", _numbers(table[name]), _scatter(campaign, table, name)]
+        parts.append(_decides(campaign, name))
+    parts.append(_failures(campaign))
+    head = f"<meta charset='utf-8'><title>{html.escape(campaign.path.name)}</title><style>{STYLE}</style>"
+    return write_whole(path, f"<!doctype html><html><head>{head}</head><body>{''.join(parts)}</body></html>\n")
+
+
+def _plan(campaign: Campaign) -> str:
+    plan, status = campaign.plan, campaign.status()
+    rows = "".join(f"<tr><td>{html.escape(f.name)}</td><td>{html.escape(_span(f))}</td></tr>" for f in plan.factors)
+    about = (
+        f"<p>{html.escape(plan.subject.kind)}, {html.escape(plan.design)} design, seed {plan.seed}. "
+        f"{html.escape(str(status))}. "
+        f"{status.processor_seconds:.4g} s of processor time.</p>"
+    )
+    return f"{about}<table><tr><th>factor</th><th>range (SI)</th></tr>{rows}</table>"
+
+
+def _span(factor: Any) -> str:
+    if getattr(factor, "values", ()):
+        return ", ".join(str(v) for v in factor.values)
+    if hasattr(factor, "low"):
+        return f"{factor.low:.5g} to {factor.high:.5g}" + (", logarithmic" if factor.scale == "log" else "")
+    return ", ".join(factor.options) if hasattr(factor, "options") else f"{factor.draws} specimens"
+
+
+def _numbers(values: pd.Series) -> str:
+    q = values.quantile([0.0, 0.05, 0.5, 0.95, 1.0])
+    cells = "".join(f"<td>{v:.5g}</td>" for v in (values.mean(), values.std(), *q))
+    heads = "".join(f"<th>{n}</th>" for n in ("mean", "deviation", "least", "5 %", "median", "95 %", "largest"))
+    return f"<table><tr>{heads}</tr><tr>{cells}</tr></table>"
+
+
+def _scatter(campaign: Campaign, table: pd.DataFrame, result: str) -> str:
+    """Return a picture of the result over each factor."""
+    from gearmbs.view.figure_style import new_figure
+
+    names = [n for n in factor_names(campaign.folder) if not n.endswith("severity")][:8]
+    rows = -(-len(names) // 4)
+    figure = new_figure(10.0, 2.6 * rows)
+    for k, name in enumerate(names):
+        ax = figure.add_subplot(rows, min(4, len(names)), k + 1)
+        x = table[name]
+        if x.dtype.kind in "fi":
+            ax.plot(x, table[result], ".", ms=3, alpha=0.5)
+        else:
+            levels = sorted(x.astype(str).unique())
+            ax.boxplot([table[result][x.astype(str) == level].dropna() for level in levels], tick_labels=levels)
+        ax.set_xlabel(name, fontsize=8)
+        ax.tick_params(labelsize=7)
+    return _picture(figure, f"{result} over the factors")
+
+
+def _decides(campaign: Campaign, result: str) -> str:
+    """Return what decides the result, where the design tells, else a response surface."""
+    try:
+        found = sensitivity(campaign, result)
+    except CampaignError:
+        return _surface(campaign, result)
+    if isinstance(found, SobolIndices):
+        note = f"<p><small>{found.base_points} base points, {found.left_out} left out for want of results.</small></p>"
+        return "<h3>Sobol' indices</h3>" + _table(found.table()) + note
+    return "<h3>Effects</h3>" + _table(found.head(20))
+
+
+def _surface(campaign: Campaign, result: str) -> str:
+    from gearmbs.campaigns.response import response_surface
+
+    for degree in (2, 1):
+        try:
+            surface = response_surface(campaign, result, degree)
+        except CampaignError:
+            continue
+        table = surface.table()
+        table = table.reindex(table["coefficient"].abs().sort_values(ascending=False).index).head(12)
+        note = (
+            f"<p>R<sup>2</sup> = {surface.r_squared:.3f}, of points left out {surface.q_squared:.3f}, RMS error there "
+            f"{surface.error:.3g}.</p>"
+        )
+        return f"<h3>Response surface of degree {degree}, factors from -1 to 1</h3>{note}" + _table(table)
+    return ""
+
+
+def _failures(campaign: Campaign) -> str:
+    failed = campaign.failed()
+    if failed.empty:
+        return "<h2>Failures</h2><p>none</p>"
+    shown = failed[["index", "status", "message", "advice"]].head(SHOWN_FAILURES)
+    rows = "".join("<tr>" + "".join(f"<td>{html.escape(str(v))}</td>" for v in row) + "</tr>" for row in shown.values)
+    return f"<h2>Failures</h2><p>{len(failed)} cases</p><table>{rows}</table>"
+
+
+def _table(table: pd.DataFrame) -> str:
+    heads = "".join(f"<th>{html.escape(str(c))}</th>" for c in (table.index.name, *table.columns))
+    rows = "".join(
+        f"<tr><td>{html.escape(str(name))}</td>" + "".join(f"<td>{v:.4g}</td>" for v in row) + "</tr>"
+        for name, row in zip(table.index, np.asarray(table, dtype=float))
+    )
+    return f"<table><tr>{heads}</tr>{rows}</table>"
+
+
+def _picture(figure: Any, text: str) -> str:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=110)
+    data = base64.b64encode(buffer.getvalue()).decode()
+    return f"<img alt='{html.escape(text)}' src='data:image/png;base64,{data}'>"

@@ -1,0 +1,237 @@
+"""What decides a result: effects, elementary effects, Sobol' indices.
+
+References
+----------
+.. [1] A. Saltelli et al., Variance based sensitivity analysis of model output, Comput. Phys. Commun. 181 (2010) 259.
+.. [2] M. J. W. Jansen, Analysis of variance designs for model output, Comput. Phys. Commun. 117 (1999) 35.
+.. [3] F. Campolongo, J. Cariboni, A. Saltelli, An effective screening design for sensitivity analysis of large models,
+   Environ. Model. Softw. 22 (2007) 1509.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.campaigns.errors import CampaignError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from gearmbs.campaigns.campaign import Campaign
+
+RESAMPLES = 200
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class SobolIndices:
+    """Sobol' indices of a result.
+
+    Attributes
+    ----------
+    names : list of str
+    first, total : ndarray, shape (d,)
+        Parts of the variance: of each factor alone, and of each with all its interactions.
+    first_confidence, total_confidence : ndarray, shape (d,)
+        Half widths of their 95 % intervals, by resampling of the base points.
+    base_points, left_out : int
+        Base points used, and those left out since one of their cases has no result.
+    mean, variance : float
+        Of the result.
+    """
+
+    names: list[str]
+    first: np.ndarray
+    total: np.ndarray
+    first_confidence: np.ndarray
+    total_confidence: np.ndarray
+    base_points: int
+    left_out: int
+    mean: float
+    variance: float
+
+    def table(self) -> pd.DataFrame:
+        """Return the indices by factor, the most important first."""
+        import pandas as pd
+
+        table = pd.DataFrame(
+            {
+                "first": self.first,
+                "first_confidence": self.first_confidence,
+                "total": self.total,
+                "total_confidence": self.total_confidence,
+            },
+            index=pd.Index(self.names, name="factor"),
+        )
+        return table.sort_values("total", ascending=False)
+
+
+def sobol_indices(values: np.ndarray, names: list[str], *, resamples: int = RESAMPLES, seed: int = 0) -> SobolIndices:
+    """Return first and total Sobol' indices of results on a Saltelli design.
+
+    With A, B and AB_i, A with coordinate i of B, standardised together: first index the mean of f_B (f_AB - f_A)
+    [1]_, total index
+    half the mean of (f_A - f_AB)^2 [2]_, over the variance of f_A and f_B.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n (d + 2),)
+        In the order of `gearmbs.campaigns.designs.saltelli`; NaN where there is none.
+    names : list of str
+        The d factors' coordinates.
+
+    Returns
+    -------
+    SobolIndices
+    """
+    d = len(names)
+    blocks = np.asarray(values, dtype=float).reshape(-1, d + 2)
+    good = np.isfinite(blocks).all(axis=1)
+    left_out = int((~good).sum())
+    blocks = blocks[good]
+    if len(blocks) < 4:
+        raise CampaignError(f"sobol: {len(blocks)} base points have all their results; at least four are needed")
+    mean, variance = float(blocks[:, [0, -1]].mean()), float(blocks[:, [0, -1]].var())
+    if variance == 0.0:
+        raise CampaignError("sobol: the result is the same everywhere; it depends on none of the factors")
+    blocks = (blocks - blocks.mean()) / blocks.std()
+    first, total = _indices(blocks)
+    generator = np.random.default_rng(seed)
+    drawn = [_indices(blocks[generator.integers(len(blocks), size=len(blocks))]) for _ in range(resamples)]
+    spread = np.std(np.array(drawn), axis=0, ddof=1)
+    from scipy.stats import norm
+
+    q = norm.ppf(0.5 + 0.5 * CONFIDENCE)
+    return SobolIndices(names, first, total, q * spread[0], q * spread[1], len(blocks), left_out, mean, variance)
+
+
+def _indices(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    a, b, mixed = blocks[:, :1], blocks[:, -1:], blocks[:, 1:-1]
+    variance = np.var(np.r_[a, b])
+    return (b * (mixed - a)).mean(axis=0) / variance, 0.5 * ((a - mixed) ** 2).mean(axis=0) / variance
+
+
+def morris_effects(values: np.ndarray, points: np.ndarray, names: list[str], *, seed: int = 0) -> pd.DataFrame:
+    """Return the elementary effects on a Morris design: mean, mean of the absolute value, spread, and its confidence.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n (d + 1),)
+        In the order of `gearmbs.campaigns.designs.morris`; trajectories with a NaN are left out.
+    points : ndarray, shape (n (d + 1), d)
+        The design.
+
+    Returns
+    -------
+    DataFrame
+        ``mu``, ``mu_star`` [3]_, ``sigma`` and ``confidence`` (half width of the 95 % interval of mu_star) by factor.
+        An effect is the
+        change of the result over the whole range of the factor.
+    """
+    import pandas as pd
+    from scipy.stats import norm
+
+    d = len(names)
+    y, x = np.asarray(values, dtype=float).reshape(-1, d + 1), np.asarray(points).reshape(-1, d + 1, d)
+    good = np.isfinite(y).all(axis=1)
+    y, x = y[good], x[good]
+    if not len(y):
+        raise CampaignError("morris: no trajectory has all its results")
+    moves = np.diff(x, axis=1)
+    axis = np.abs(moves).argmax(axis=2)
+    effect = np.empty((len(y), d))
+    rows = np.arange(len(y))[:, None]
+    effect[rows, axis] = np.diff(y, axis=1) / np.take_along_axis(moves, axis[..., None], axis=2)[..., 0]
+    size = np.abs(effect)
+    drawn = np.random.default_rng(seed).integers(len(y), size=(RESAMPLES, len(y)))
+    spread = size[drawn].mean(axis=1).std(axis=0, ddof=1)
+    table = pd.DataFrame(
+        {
+            "mu": effect.mean(axis=0),
+            "mu_star": size.mean(axis=0),
+            "sigma": effect.std(axis=0, ddof=1) if len(y) > 1 else np.full(d, np.nan),
+            "confidence": norm.ppf(0.5 + 0.5 * CONFIDENCE) * spread,
+        },
+        index=pd.Index(names, name="factor"),
+    )
+    return table.sort_values("mu_star", ascending=False)
+
+
+def main_effects(coded: np.ndarray, values: np.ndarray, names: list[str], *, interactions: bool = True) -> pd.DataFrame:
+    """Return main effects and two-factor interactions of a two-level design: mean at high less mean at low.
+
+    Parameters
+    ----------
+    coded : ndarray, shape (n, d)
+        -1 and 1.
+    values : ndarray, shape (n,)
+    """
+    import pandas as pd
+
+    good = np.isfinite(values)
+    coded, values = coded[good], np.asarray(values, dtype=float)[good]
+    terms = {name: coded[:, k] for k, name in enumerate(names)}
+    if interactions:
+        for i, j in itertools.combinations(range(len(names)), 2):
+            terms[f"{names[i]} x {names[j]}"] = coded[:, i] * coded[:, j]
+    rows = {}
+    for name, column in terms.items():
+        up, down = column > 0, column < 0
+        if up.any() and down.any():
+            rows[name] = float(values[up].mean() - values[down].mean())
+    table = pd.DataFrame({"effect": rows})
+    table.index.name = "term"
+    return table.reindex(table.effect.abs().sort_values(ascending=False).index)
+
+
+def coordinates(campaign: Campaign) -> tuple[list[str], np.ndarray]:
+    """Return the names of the coordinates of a campaign's plan and its points in the unit cube."""
+    plan = campaign.plan
+    names = []
+    for factor in plan.factors:
+        names += [factor.name] + [f"{factor.name}[{k}]" for k in range(1, factor.width)]
+    return names, plan.points()
+
+
+def results_in_order(campaign: Campaign, result: str) -> np.ndarray:
+    """Return a result by case, NaN for cases that failed or are not done."""
+    table = campaign.table
+    if result not in table.columns:
+        from gearmbs.campaigns.results import result_names
+
+        known = ", ".join(result_names(campaign.folder, table)[:12])
+        raise CampaignError(f"result {result!r} is unknown; known are {known} ...")
+    values = np.full(campaign.folder.case_count, np.nan)
+    values[table["index"].to_numpy()] = table[result].to_numpy(dtype=float)
+    return values
+
+
+def sensitivity(campaign: Campaign, result: str) -> Any:
+    """Return what decides a result, by the campaign's design: `SobolIndices`, or a table of effects.
+
+    Raises
+    ------
+    CampaignError
+        For a design that is made for something else.
+    """
+    plan = campaign.plan
+    names, points = coordinates(campaign)
+    values = results_in_order(campaign, result)
+    if plan.variants > 1:
+        raise CampaignError(
+            "sensitivity: not of crossed choices; make the choice a factor, or ask for one option's cases"
+        )
+    if plan.design == "saltelli":
+        return sobol_indices(values, names)
+    if plan.design == "morris":
+        return morris_effects(values, points, names)
+    if plan.design in ("factorial", "plackett burman"):
+        return main_effects(2.0 * points - 1.0, values, names, interactions=plan.design == "factorial")
+    raise CampaignError(
+        f"sensitivity: a {plan.design} design has none of its own; take saltelli, morris or factorial, or "
+        f"response_surface"
+    )

@@ -1,0 +1,148 @@
+"""What is asked of results, against analytic answers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from scipy.io import loadmat
+from scipy.stats import qmc
+
+from gearmbs.campaigns import (
+    Campaign,
+    CampaignError,
+    condition_map,
+    fit_surface,
+    main_effects,
+    make_plan,
+    morris_effects,
+    sobol_indices,
+)
+from gearmbs.campaigns.designs import factorial, morris, saltelli
+from tests.campaigns.models import PI
+from tests.campaigns.support import function, ranges, small
+
+NAMES = ["x1", "x2", "x3"]
+FIRST, TOTAL = (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437)
+"""Ishigami's function with a = 7 and b = 0.1."""
+
+
+def _values(u):
+    x = PI * (2.0 * u - 1.0)
+    return np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
+
+
+def test_sobol_indices_of_ishigami():
+    found = sobol_indices(_values(saltelli(8192, 3, 0)), NAMES)
+    np.testing.assert_allclose(found.first, FIRST, atol=0.01)
+    np.testing.assert_allclose(found.total, TOTAL, atol=0.01)
+    assert found.variance == pytest.approx(13.845, rel=0.01)
+
+
+def test_sobol_estimators_on_fixed_numbers():
+    """The estimators written out for each factor, with the normalisation of a well-known library."""
+    n, d = 64, 3
+    y = _values(saltelli(n, d, 1)).reshape(n, d + 2)
+    z = (y - y.mean()) / y.std()
+    found = sobol_indices(y.ravel(), NAMES)
+    for k in range(d):
+        variance = np.var(np.concatenate([z[:, 0], z[:, -1]]))
+        assert found.first[k] == pytest.approx(np.mean(z[:, -1] * (z[:, k + 1] - z[:, 0])) / variance, rel=1e-12)
+        assert found.total[k] == pytest.approx(np.mean((z[:, 0] - z[:, k + 1]) ** 2) / 2 / variance, rel=1e-12)
+
+
+def test_confidence_covers_the_spread_over_seeds():
+    found = [sobol_indices(_values(qmc_free(256, seed)), NAMES, seed=seed) for seed in range(40)]
+    inside = [np.abs(f.total - TOTAL) <= f.total_confidence for f in found]
+    assert np.mean(inside) > 0.88
+
+
+def qmc_free(n, seed):
+    """A Saltelli design of independent points, whose spread is that of random sampling."""
+    generator = np.random.default_rng(seed)
+    a, b = generator.random((2, n, 3))
+    rows = [a, *(np.where(np.arange(3) == k, b, a) for k in range(3)), b]
+    return np.stack(rows, axis=1).reshape(-1, 3)
+
+
+def test_points_without_results_are_left_out_as_blocks():
+    y = _values(saltelli(1024, 3, 0))
+    y[7] = np.nan
+    found = sobol_indices(y, NAMES)
+    assert (found.base_points, found.left_out) == (1023, 1)
+    np.testing.assert_allclose(found.total, TOTAL, atol=0.05)
+
+
+def test_morris_of_a_linear_function_is_exact():
+    points = morris(20, 3, 0)
+    table = morris_effects(points @ [1.0, -3.0, 0.0], points, NAMES)
+    assert list(table.index) == ["x2", "x1", "x3"]
+    np.testing.assert_allclose(table.mu, [-3.0, 1.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(table.sigma, 0.0, atol=1e-12)
+
+
+def test_main_effects_and_interactions():
+    runs = factorial(3)
+    y = 1.0 + 2.0 * runs[:, 0] - 0.5 * runs[:, 1] * runs[:, 2]
+    table = main_effects(runs, y, NAMES)
+    assert table.effect["x1"] == pytest.approx(4.0)
+    assert table.effect["x2 x x3"] == pytest.approx(-1.0)
+    assert table.effect.drop(["x1", "x2 x x3"]).abs().max() < 1e-12
+
+
+def test_response_surface_tells_its_own_error():
+    u = qmc.Sobol(2, rng=np.random.default_rng(0)).random(64)
+    exact = fit_surface(u, 1 + u[:, 0] - u[:, 0] * u[:, 1], ["a", "b"])
+    assert exact.q_squared == pytest.approx(1.0)
+    assert exact.predict(np.array([[0.25, 0.5]]))[0] == pytest.approx(1.125)
+    rough = fit_surface(u, np.sin(12 * u[:, 0]), ["a", "b"])
+    v = np.random.default_rng(1).random((2000, 2))
+    real = np.sqrt(np.mean((rough.predict(v) - np.sin(12 * v[:, 0])) ** 2))
+    assert rough.error == pytest.approx(real, rel=0.25)
+    with pytest.raises(CampaignError, match="do not determine"):
+        fit_surface(u[:4], u[:4, 0], ["a", "b"])
+
+
+def test_from_campaign_to_report(tmp_path):
+    campaign = Campaign(tmp_path / "c", make_plan(function(), ranges(), "saltelli", n=256, unit=512))
+    campaign.run(workers=0)
+    found = campaign.sensitivity("y")
+    np.testing.assert_allclose(found.total, TOTAL, atol=0.12)
+    page = campaign.report(tmp_path / "report.html").read_text()
+    assert "Sobol' indices" in page
+    assert "data:image/png;base64" in page
+    with pytest.raises(CampaignError, match="result 'z' is unknown"):
+        campaign.sensitivity("z")
+
+
+def test_condition_map(tmp_path):
+    campaign = small(tmp_path / "c", n=512, unit=256, keep=["numbers"])
+    campaign.run(workers=0)
+    share, counts, _, edges = condition_map(campaign, "x2 > 0", "x1", "x2", bins=4)
+    assert counts.sum() == 512
+    np.testing.assert_allclose(share[:2], 0.0)
+    np.testing.assert_allclose(share[2:], 1.0)
+    assert abs(edges[2]) < 0.05
+    with pytest.raises(CampaignError, match="has none of its own"):
+        campaign.sensitivity("y")
+    assert campaign.response_surface("y").q_squared < 0.9
+
+
+def test_exports(tmp_path):
+    campaign = small(tmp_path / "c", n=16)
+    campaign.run(workers=0)
+    table = campaign.table
+    (csv,) = campaign.export(tmp_path / "t.csv", "csv")
+    np.testing.assert_allclose(pd.read_csv(csv).y, table.y)
+    (nc,) = campaign.export(tmp_path / "t.nc", "netcdf")
+    with xr.open_dataset(nc) as data:
+        np.testing.assert_array_equal(data.y, table.y)
+        assert data.wave.shape == (16, 1, 50)
+    (mat,) = campaign.export(tmp_path / "t.mat", "matlab")
+    np.testing.assert_array_equal(loadmat(mat)["y"].ravel(), table.y)
+    (file,) = campaign.export(tmp_path / "hf", "parquet")
+    rows = pd.read_parquet(file)
+    np.testing.assert_array_equal(rows["signal.wave"][3], campaign.open().wave.values[3, 0])
+    with pytest.raises(CampaignError, match="choose one of csv"):
+        campaign.export(tmp_path / "x", "xml")
