@@ -1,0 +1,250 @@
+"""The test bench of the paper's Fig. 2: motor, elastic clutch, two pairs of wheels, shafts, hydraulic pump.
+
+Nothing of the bench but its wheels is published: every other number is a choice, listed by `bench_choices`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
+
+from gearmbs.drivetrain import (
+    Accelerometer,
+    Drivetrain,
+    ElasticBearing,
+    ElasticClutch,
+    GearMesh,
+    Housing,
+    IdealBearing,
+    InductionMotor,
+    Laser,
+    Mount,
+    Pump,
+    Shaft,
+    SpeedDrive,
+    SpeedSensor,
+    TorsionalShaft,
+    TorqueSensor,
+    Wheel,
+)
+from gearmbs.gears import GearSpec
+from gearmbs.units import Quantity, to_si
+
+PRESSURES = {"low": 1e6, "high": 5e6}
+"""Pa, as the paper has them."""
+STATES = {
+    "healthy": {},
+    "misaligned": {"misalignment": math.radians(1.0)},
+    "distance": {"centre_distance_error": 3e-3},
+}
+"""The three states of the first pair."""
+SEATS = ("one", "two", "three", "four")
+
+DISPLACEMENT = 2.0 * math.pi * (200.0 - 100.0) / (5e6 - 1e6)
+IDLE = 75.0
+"""The one displacement (m^3) and idle torque (N m) with which 1 and 5 MPa are the paper's 100 and 200 N m."""
+
+
+@dataclass(frozen=True)
+class BenchSettings:
+    """What the bench is made of; see `bench_choices` for why.
+
+    Parameters
+    ----------
+    speed : float or str
+    motor : {"induction", "speed"}
+    motor_inertia, pump_inertia : float
+        kg m^2.
+    clutch, shafts : float
+        Torsional stiffnesses, N m/rad.
+    clutch_damping : float
+        Relative damping of the clutch.
+    bearings : {"elastic", "ideal"}
+    bearing_stiffness : float
+        Radial, N/m.
+    housing_mass : float
+        kg.
+    mount_stiffness : float
+        Of each of four mounts, N/m.
+    backlash : float or str
+    phase : float
+        Of the second mesh, pitches.
+    pump_teeth : int
+        0: no ripple.
+    displacement, idle : float
+        Of the pump, m^3 and N m.
+    """
+
+    speed: Quantity = "1000 rpm"
+    motor: str = "induction"
+    motor_inertia: float = 0.030
+    pump_inertia: float = 0.004
+    clutch: float = 3000.0
+    shafts: float = 20000.0
+    clutch_damping: float = 0.8
+    bearings: str = "elastic"
+    bearing_stiffness: float = 2e8
+    housing_mass: float = 60.0
+    mount_stiffness: float = 5e6
+    backlash: Quantity = "0.1 mm"
+    phase: float = 0.0
+    pump_teeth: int = 12
+    displacement: float = DISPLACEMENT
+    idle: float = IDLE
+
+
+def bench_train(
+    pressure: Quantity = "1 MPa", state: str = "healthy", settings: BenchSettings | None = None
+) -> Drivetrain:
+    """Return the bench at a pressure, its first pair in one of three states.
+
+    Parameters
+    ----------
+    pressure : float or str
+        At the pump, Pa.
+    state : {"healthy", "misaligned", "distance"}
+    settings : BenchSettings, optional
+
+    Returns
+    -------
+    Drivetrain
+        Shafts motor, one, two, three, four, pump; meshes "pair 1" and "pair 2"; sensors laser, support, speed, torque.
+
+    Examples
+    --------
+    >>> train = bench_train("5 MPa")
+    >>> round(train.power.torques["pair 1"][1], 3)
+    -200.0
+    """
+    s = settings or BenchSettings()
+    if state not in STATES:
+        raise ValueError(f"state is {state!r}; choose one of {', '.join(STATES)}")
+    if s.motor not in ("induction", "speed"):
+        raise ValueError(f"motor is {s.motor!r}; choose 'induction' or 'speed'")
+    if s.bearings not in ("elastic", "ideal"):
+        raise ValueError(f"bearings is {s.bearings!r}; choose 'elastic' or 'ideal'")
+    speed = to_si(s.speed, "angular speed", "speed")
+    pair = {"backlash": s.backlash}
+    motor: Any = SpeedDrive(name="drive", shaft="motor", speed=speed)
+    if s.motor == "induction":
+        # 22 kW on an inverter that holds 1.026 of the speed as synchronous speed
+        motor = InductionMotor(
+            name="drive", shaft="motor", speed=speed, power=22e3 * speed / to_si("1000 rpm", "angular speed", ""),
+            poles=4, frequency=1.026 * speed / math.pi, breakdown=2.8,
+        )  # fmt: skip
+    return Drivetrain(
+        f"bench, {state}",
+        shafts=[
+            Shaft(name="motor", length=0.15, inertia=s.motor_inertia),
+            *(Shaft(name=name, length=0.20, radius=0.015) for name in SEATS),
+            Shaft(name="pump", length=0.10, inertia=s.pump_inertia),
+        ],
+        wheels=[_wheel(f"z{k}", shaft) for k, shaft in enumerate(SEATS, 1)],
+        meshes=[
+            GearMesh(name="pair 1", driver="z1", driven="z2", settings={**pair, **STATES[state]}),
+            GearMesh(name="pair 2", driver="z3", driven="z4", direction=math.pi, phase=s.phase, settings=pair),
+        ],
+        couplings=[
+            ElasticClutch(name="clutch", first="motor", second="one", stiffness=s.clutch,
+                          relative_damping=s.clutch_damping, damping_frequency=100.0),
+            TorsionalShaft(name="middle", first="two", second="three", stiffness=s.shafts, damping_ratio=1e-5),
+            TorsionalShaft(name="end", first="four", second="pump", stiffness=s.shafts, damping_ratio=1e-5),
+        ],
+        bearings=[
+            IdealBearing(name="motor bearing", shaft="motor", on="ground"),
+            *(bearing for name in SEATS for bearing in _bearings(name, s)),
+            IdealBearing(name="pump bearing", shaft="pump", on="ground"),
+        ],
+        housings=[_housing(s)],
+        drives=[motor],
+        loads=[Pump(name="pump load", shaft="pump", displacement=s.displacement, pressure=pressure, idle=s.idle,
+                    teeth=s.pump_teeth)],
+        sensors=[
+            Laser(name="laser", shaft="two", station=0.05, direction=(0.0, 1.0, 0.0)),
+            Accelerometer(name="support", bearing="two a", direction=(0.0, 1.0, 0.0)),
+            SpeedSensor(name="speed", shaft="two"),
+            TorqueSensor(name="torque", of="clutch"),
+        ],
+        run_up=0.02,
+        running=True,
+    )  # fmt: skip
+
+
+def _wheel(name: str, shaft: str) -> Wheel:
+    return Wheel(name=name, shaft=shaft, gear=GearSpec(29, 95e-3 / 31, face_width=0.020, name=name))
+
+
+def _bearings(shaft: str, s: BenchSettings) -> list[Any]:
+    kind: Any = IdealBearing
+    others: dict[str, Any] = {}
+    if s.bearings == "elastic":
+        kind = ElasticBearing
+        others = {"stiffness": (s.bearing_stiffness, s.bearing_stiffness, 0.5 * s.bearing_stiffness),
+                  "damping_time": 1e-5}  # fmt: skip
+    return [
+        kind(name=f"{shaft} {side}", shaft=shaft, station=z, **others) for side, z in (("a", 0.02), ("b", 0.18))
+    ]
+
+
+def _housing(s: BenchSettings) -> Housing:
+    # a box of 0.3 x 0.3 x 0.6 m about the shafts
+    m = s.housing_mass
+    inertia = (m * (0.3**2 + 0.6**2) / 12.0, m * (0.3**2 + 0.6**2) / 12.0, m * (0.3**2 + 0.3**2) / 12.0)
+    corners = [(x, -0.15, z) for x in (-0.1, 0.2) for z in (0.15, 0.65)]
+    k = s.mount_stiffness
+    # 5 % of critical damping of the housing on its mounts
+    c = 2.0 * 0.05 * math.sqrt(4.0 * k * m) / 4.0
+    mounts = [
+        Mount(name=f"mount {n}", at=at, stiffness=(k, k, k), damping=(c, c, c)) for n, at in enumerate(corners, 1)
+    ]
+    return Housing(name="housing", mass=m, inertia=inertia, at=(0.045, 0.0, 0.4), mounts=tuple(mounts))
+
+
+class BenchChoice(NamedTuple):
+    """One choice of the bench.
+
+    Attributes
+    ----------
+    what, chosen, why : str
+    """
+
+    what: str
+    chosen: str
+    why: str
+
+
+def bench_choices(settings: BenchSettings | None = None) -> list[BenchChoice]:
+    """Return every choice of the bench that the paper leaves open, with its reason."""
+    s = settings or BenchSettings()
+    usual = BenchSettings()
+    changed = [f.name for f in fields(s) if getattr(s, f.name) != getattr(usual, f.name)]
+    low, high = (s.displacement / (2.0 * math.pi) * p + s.idle for p in PRESSURES.values())
+    rows = [
+        ("the two loads", f"one pump, V_g = {1e6 * s.displacement:.4g} cm^3, T_0 = {s.idle:g} N m: {low:.4g} and {high:.4g} "
+         "N m", "1 to 5 MPa is a factor of 5, 100 to 200 N m one of 2: no pump whose torque is proportional to its pressure "
+         "has both (1 MPa would need 628 cm^3, 5 MPa 251 cm^3); with an idle torque exactly one pump has"),
+        ("pump ripple", f"{s.pump_teeth} teeth, ideal external gear pump" if s.pump_teeth else "none",
+         "a usual number; its lines lie apart from the mesh's"),
+        ("motor", "induction motor of 22 kW by Kloss's formula on an inverter" if s.motor == "induction" else
+         "prescribed speed", "the bench's control system holds the speed; a motor gives the drive end its damping"),
+        ("inertias", f"motor {s.motor_inertia:g}, pump {s.pump_inertia:g} kg m^2", "usual for this power"),
+        ("clutch", f"{s.clutch:g} N m/rad, relative damping {s.clutch_damping:g}", "an elastomer clutch for this torque"),
+        ("shafts", f"diameter 30 mm, {s.shafts:g} N m/rad between the pairs and to the pump", "carries 200 N m"),
+        ("second pair", f"as the first, phase {s.phase:g} pitches", "only one pair is published; equal teeth lock both "
+         "meshes in phase, so that their lines add or cancel with the assembly angle"),
+        ("faults", "on the first pair; everything behind it is placed by it", "the paper does not say which pair"),
+        ("bearings", f"{s.bearings}" + (f", {s.bearing_stiffness:.3g} N/m radially" if s.bearings == "elastic" else ""),
+         "a laser on the shaft sees nothing move in rigid bearings"),
+        ("housing", f"{s.housing_mass:g} kg on four mounts of {s.mount_stiffness:.3g} N/m, 5 % damping",
+         "a support that cannot move has no acceleration"),
+        ("laser", "on the shaft of the second wheel, aimed at its axis, along y (along the tangent at the pitch point)",
+         "the line of the mesh force but for the pressure angle"),
+        ("support", "bearing 'two a', along y", "nearest to the laser"),
+        ("backlash", f"{s.backlash}", "as for the pair"),
+        ("start", "at speed, load over 20 ms", "the steady state is what is recorded"),
+    ]  # fmt: skip
+    out = [BenchChoice(*row) for row in rows]
+    if changed:
+        out.append(BenchChoice("changed here", ", ".join(f"{n} = {getattr(s, n)}" for n in changed), "by the user"))
+    return out

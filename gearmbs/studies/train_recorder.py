@@ -1,0 +1,152 @@
+"""What the record of a drivetrain is made from, taken from the solution while it is being computed."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gearmbs.dae.results.solution import Solution
+from gearmbs.drivetrain import Accelerometer, Drivetrain, Laser, SpeedSensor, TorqueSensor
+from gearmbs.mechanism import Mechanism
+
+CONTACT = {
+    "normal_force": "N", "penetration_drive": "m", "penetration_back": "m", "pairs_drive": "1", "pairs_back": "1",
+}  # fmt: skip
+"""Quantities of a mesh that its contact tells, with units."""
+
+
+class TrainColumns(NamedTuple):
+    """What is recorded of a drivetrain at some times.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+    contact : ndarray, shape (m, meshes, 5)
+        The quantities of `CONTACT`.
+    bearing_force : ndarray, shape (m, bearings, 3)
+        Force of the seat on the shaft, global components, N.
+    sensors : ndarray, shape (m, sensors)
+    turned : ndarray, shape (m, shafts)
+        Angles about the shafts' axes, rad; within one turn until they are joined.
+    speed : ndarray, shape (m, shafts)
+        rad/s.
+    """
+
+    t: np.ndarray
+    contact: np.ndarray
+    bearing_force: np.ndarray
+    sensors: np.ndarray
+    turned: np.ndarray
+    speed: np.ndarray
+
+
+class TrainRecorder:
+    """Collects the columns of a drivetrain's record from the parts of a solution, as a consumer of `simulate`.
+
+    Parameters
+    ----------
+    train : Drivetrain
+    mechanism : Mechanism
+        What is simulated: the train's own, or with more added.
+    begin : float
+        Of what is done before this time only angles are kept, s.
+    """
+
+    def __init__(self, train: Drivetrain, mechanism: Mechanism, begin: float = 0.0) -> None:
+        self.train, self.mechanism, self.begin = train, mechanism, begin
+        self._parts: list[TrainColumns] = []
+        self._axes = {name: seat.axes for name, seat in train.layout.seats.items()}
+
+    def take(self, part: Solution) -> None:
+        """Take the next steps of a run; before the record's beginning only the last ones."""
+        if part.t[-1] >= self.begin:
+            self._parts.append(self.columns(part))
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing has been taken yet."""
+        return not self._parts
+
+    def joined(self) -> TrainColumns:
+        """Return all columns, angles counted through full turns."""
+        whole = TrainColumns(*(np.concatenate(c) for c in zip(*self._parts, strict=True)))
+        return whole._replace(turned=np.unwrap(whole.turned, axis=0))
+
+    def columns(self, part: Solution) -> TrainColumns:
+        """Return what is recorded of one part of a solution."""
+        train, m = self.train, part.t.size
+        contact = np.empty((m, len(train.meshes), len(CONTACT)))
+        for k, mesh in enumerate(train.meshes):
+            told = part.contact(mesh.name)
+            contact[:, k] = np.stack([told[name] for name in CONTACT], axis=1)
+        force = np.empty((m, len(train.bearings), 3))
+        for k, bearing in enumerate(train.bearings):
+            is_joint = bearing.name in self.mechanism.joints
+            force[:, k] = (part.reaction(bearing.name) if is_joint else part.load(bearing.name))[0]
+        turned, speed = np.empty((m, len(train.shafts))), np.empty((m, len(train.shafts)))
+        for k, shaft in enumerate(train.shafts):
+            axes = self._axes[shaft.name]
+            x = part.orientation(shaft.name)[:, :, 0] @ axes[:, :2]
+            turned[:, k] = np.arctan2(x[:, 1], x[:, 0])
+            speed[:, k] = part.angular_velocity(shaft.name) @ axes[:, 2]
+        sensors = np.empty((m, len(train.sensors)))
+        for k, sensor in enumerate(train.sensors):
+            sensors[:, k] = self._sensed(sensor, part, speed)
+        return TrainColumns(part.t.copy(), contact, force, sensors, turned, speed)
+
+    def _sensed(self, sensor: object, part: Solution, speed: np.ndarray) -> np.ndarray:
+        train = self.train
+        if isinstance(sensor, SpeedSensor):
+            return speed[:, [s.name for s in train.shafts].index(sensor.shaft)]
+        if isinstance(sensor, Laser):
+            return self._laser(sensor, part)
+        if isinstance(sensor, Accelerometer):
+            return self._accelerometer(sensor, part)
+        assert isinstance(sensor, TorqueSensor)
+        of = sensor.of
+        moment = (part.reaction(of) if of in self.mechanism.joints else part.load(of))[1]
+        source = train.parts[of]
+        shaft = getattr(source, "shaft", None) or source.second  # type: ignore[attr-defined]
+        return moment @ self._axes[shaft][:, 2]
+
+    def _laser(self, sensor: Laser, part: Solution) -> np.ndarray:
+        """Return (v + w x r) . d at a spot fixed in space: at rest on the axis or beside it."""
+        seat = self.train.layout.seats[sensor.shaft]
+        d = np.asarray(sensor.direction, dtype=float)
+        d = d / np.linalg.norm(d)
+        across = np.cross(seat.axes[:, 2], d)
+        spot = seat.at(self.train.station(sensor)) + sensor.offset * across
+        arm = spot - part.com_position(sensor.shaft)
+        return (part.com_velocity(sensor.shaft) + np.cross(part.angular_velocity(sensor.shaft), arm)) @ d
+
+    def _accelerometer(self, sensor: Accelerometer, part: Solution) -> np.ndarray:
+        """Return the acceleration of a bearing's seat on its housing along a direction that moves with the housing."""
+        train = self.train
+        bearing = next(b for b in train.bearings if b.name == sensor.bearing)
+        housing = train.carrier(bearing)
+        body = self.mechanism.bodies[housing]
+        place = train.layout.seats[bearing.shaft].at(train.station(bearing))
+        turned = part.orientation(housing)
+        d = np.asarray(sensor.direction, dtype=float)
+        d = d / np.linalg.norm(d)
+        d = turned @ (body.orientation.T @ d)
+        start = body.position + body.orientation @ body.com
+        arm = turned @ (body.orientation.T @ (place - start))
+        w, alpha = part.angular_velocity(housing), part.angular_acceleration(housing)
+        a = part.com_acceleration(housing) + np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
+        shape = self._modal_shape(housing, bearing.name)
+        if shape is not None:
+            # in the floating frame: a_f + 2 w x v_f
+            q, v, qa = part.evaluated.modal(part.system.body_names.index(housing) + 1)
+            moved = turned @ body.orientation.T
+            rate, second = (np.einsum("tij,tj->ti", moved, x @ shape) for x in (v, qa))
+            a = a + second + 2.0 * np.cross(w, rate)
+        return np.sum(a * d, axis=1)
+
+    def _modal_shape(self, housing: str, bearing: str) -> np.ndarray | None:
+        part = self.train.parts[housing]
+        modes = getattr(part, "modes", ())
+        if not modes:
+            return None
+        return np.array([mode.shape.get(bearing, (0.0, 0.0, 0.0)) for mode in modes], dtype=float)

@@ -1,0 +1,127 @@
+"""The report of a drivetrain's record in Markdown, and its 3-D view."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from gearmbs.drivetrain import Drivetrain
+from gearmbs.drivetrain.parts import turn_z
+
+if TYPE_CHECKING:
+    from gearmbs.view.mesh import Mesh
+    from gearmbs.view.scene import Scene
+
+RPM = 30.0 / np.pi
+
+
+def train_report(train: Drivetrain, record: xr.Dataset) -> str:
+    """Return the report of a record: frequencies, torques, meshes, bearings, sensors, harmonics, cost."""
+    sections = (_frequencies, _meshes, _bearings, _sensors, _levels, _cost)
+    lines = [f"# {train.name}", ""]
+    for section in sections:
+        lines += [*section(train, record), ""]
+    return "\n".join(lines)
+
+
+def _frequencies(train: Drivetrain, record: xr.Dataset) -> list[str]:
+    lines = ["## Speeds and frequencies", "", "| shaft | nominal, rpm | mean of the record, rpm |", "|---|---|---|"]
+    for shaft in train.shafts:
+        mean = float(record["speed"].sel(shaft=shaft.name).mean())
+        lines.append(f"| {shaft.name} | {train.speeds[shaft.name] * RPM:.6g} | {mean * RPM:.6g} |")
+    return [*lines, "", train.kinematics.to_markdown()]
+
+
+def _meshes(train: Drivetrain, record: xr.Dataset) -> list[str]:
+    lines = ["## Meshes", "",
+             "| mesh | torque on the driven wheel, N m | torque over base radius, N | mean normal force, N | both flanks, % of "
+             "time | no contact, % | transmission error p-p, um |", "|---|---|---|---|---|---|---|"]  # fmt: skip
+    for mesh in train.meshes:
+        one = record.sel(mesh=mesh.name)
+        drive, back = one["pairs_drive"].values > 0, one["pairs_back"].values > 0
+        torque = train.power.on_driven(mesh.name)
+        radius = train.pairs[mesh.name].geometry.driven.base_radius
+        lines.append(
+            f"| {mesh.name} | {torque:.5g} | {torque / radius:.5g} | {float(one['normal_force'].mean()):.5g} "
+            f"| {100 * np.mean(drive & back):.3g} | {100 * np.mean(~drive & ~back):.3g} "
+            f"| {1e6 * np.ptp(one['transmission_error'].values):.4g} |"
+        )
+    return lines
+
+
+def _bearings(train: Drivetrain, record: xr.Dataset) -> list[str]:
+    lines = ["## Bearings", "", "| bearing | mean x, y, z, N | RMS about the mean x, y, z, N | largest, N |", "|---|---|---|---|"]
+    for bearing in train.bearings:
+        force = record["bearing_force"].sel(bearing=bearing.name).values
+        mean = ", ".join(f"{v:.4g}" for v in force.mean(axis=0))
+        rms = ", ".join(f"{v:.4g}" for v in force.std(axis=0))
+        lines.append(f"| {bearing.name} | {mean} | {rms} | {np.linalg.norm(force, axis=1).max():.5g} |")
+    return lines
+
+
+def _sensors(train: Drivetrain, record: xr.Dataset) -> list[str]:
+    if not train.sensors:
+        return []
+    lines = ["## Sensors", "", "| sensor | unit | mean | RMS about the mean | peak to peak |", "|---|---|---|---|---|"]
+    for sensor in train.sensors:
+        values = record["measured"].sel(sensor=sensor.name).values
+        lines.append(
+            f"| {sensor.name} | {sensor.unit} | {values.mean():.5g} | {values.std():.5g} | {np.ptp(values):.5g} |"
+        )
+    return lines
+
+
+def _levels(train: Drivetrain, record: xr.Dataset) -> list[str]:
+    lines = ["## Mesh harmonics, RMS", ""]
+    harmonics = record.harmonic.values
+    for mesh in train.meshes:
+        levels = record["mesh_rms"].sel(mesh=mesh.name)
+        lines += [f"### {mesh.name}, {float(levels.mesh_frequency):.6g} Hz", "",
+                  "| signal | " + " | ".join(f"{h} x" for h in harmonics) + " |", "|---|" + "---|" * harmonics.size]  # fmt: skip
+        for signal in record.signal.values:
+            row = levels.sel(signal=signal).values
+            lines.append(f"| {signal} | " + " | ".join(f"{v:.4g}" for v in row) + " |")
+        lines.append("")
+    return lines
+
+
+def _cost(train: Drivetrain, record: xr.Dataset) -> list[str]:
+    kept = ("steps", "residuals", "jacobians", "wall_time", "time_per_mesh_cycle")
+    lines = ["## Integration", "", "| quantity | value |", "|---|---|"]
+    for key in kept:
+        value = record.attrs.get(f"solver_{key}")
+        if value is not None:
+            lines.append(f"| {key.replace('_', ' ')} | {value:.6g} |")
+    return lines
+
+
+def train_shapes(train: Drivetrain) -> dict[str, Mesh]:
+    """Return the meshes of all shafts with their wheels, in the bodies' frames, for scenes."""
+    from gearmbs.view.mesh import cylinder, joined
+    from gearmbs.view.solid import pair_solids
+
+    wheels: dict[str, Mesh] = {}
+    for mesh in train.meshes:
+        for name, solid in zip((mesh.driver, mesh.driven), pair_solids(train.pairs[mesh.name]), strict=True):
+            wheels.setdefault(name, solid)
+    out = {}
+    for shaft in train.shafts:
+        pieces, z = [], 0.0
+        for length, radius in shaft.cylinders:
+            pieces.append(cylinder(radius, length, 48).placed(np.array([0.0, 0.0, z + 0.5 * length]), np.eye(3)))
+            z += length
+        for wheel in train.wheels:
+            if wheel.shaft == shaft.name and wheel.name in wheels:
+                place = np.array([0.0, 0.0, train.station(wheel)])
+                pieces.append(wheels[wheel.name].placed(place, turn_z(train.layout.wheels[wheel.name])))
+        out[shaft.name] = joined(pieces)
+    return out
+
+
+def train_scene(train: Drivetrain) -> Scene:
+    """Return the 3-D view of a drivetrain at its start: shafts with their wheels, housings as boxes, joints."""
+    from gearmbs.view import mechanism_scene
+
+    return mechanism_scene(train.build(), shapes=train_shapes(train), title=train.name)
