@@ -9,6 +9,7 @@
 
 Studies
     `Case`, `CaseError`, `load_case`, `make_case`, `run_case`, `run_cases`, `run_paper`, `sweep`, `record_signal`,
+    `run_train`, `run_bench`,
     `gear_rig`
 Gears
     `GearPair`, `GearSpec`, `Material`, `ContactLaw`, `FlankFriction`, `faults`, `IdealMesh`, `planetary`,
@@ -87,9 +88,11 @@ if TYPE_CHECKING:
         load_case,
         make_case,
         record_signal,
+        run_bench,
         run_case,
         run_cases,
         run_paper,
+        run_train,
         sweep,
     )
     from gearmbs.units import to_si
@@ -157,10 +160,12 @@ __all__ = [
     "read_signal",
     "record_signal",
     "reduce_model",
+    "run_bench",
     "run_case",
     "run_cases",
     "run_deck",
     "run_paper",
+    "run_train",
     "save",
     "simulate",
     "solution_scene",
@@ -232,7 +237,9 @@ late(
         "run_case": ".studies",
         "run_cases": ".studies",
         "run_deck": ".adams",
+        "run_bench": ".studies",
         "run_paper": ".studies",
+        "run_train": ".studies",
         "save": ".saving",
         "simulate": ".mechanism",
         "solution_scene": ".view",

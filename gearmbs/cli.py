@@ -312,7 +312,7 @@ def bench(
     out: Out = Path("out/bench"),
     speed: Annotated[str, typer.Option(help='Speed of the motor, e.g. "1000 rpm".')] = "1000 rpm",
     duration: Annotated[str, typer.Option(help='Length of the record, e.g. "1 s".')] = "1 s",
-    bearings: Annotated[str, typer.Option(help="elastic or ideal (joints).")] = "elastic",
+    stiffness: Annotated[float, typer.Option(help="Radial, of each bearing, N/m.")] = 2e8,
     motor: Annotated[str, typer.Option(help="induction, or speed for a prescribed one.")] = "induction",
     phase: Annotated[float, typer.Option(help="Phase of the second mesh, pitches.")] = 0.0,
     pump_teeth: Annotated[int, typer.Option(help="Teeth of the pump; 0: no ripple.")] = 12,
@@ -326,7 +326,9 @@ def bench(
         from gearmbs.studies.store import check_place
         from gearmbs.studies.trains import check_record
 
-        settings = BenchSettings(speed=speed, bearings=bearings, motor=motor, phase=phase, pump_teeth=pump_teeth)
+        settings = BenchSettings(
+            speed=speed, bearing_stiffness=stiffness, motor=motor, phase=phase, pump_teeth=pump_teeth
+        )
         run = RunSettings(settling=0.2, duration=duration)
         check_record(bench_train(settings=settings), run)
         check_place(out, 0)

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from .errors import SignalError
@@ -80,6 +81,41 @@ def record_signal(record: xr.Dataset, component: str | None = None) -> xr.DataAr
     return signal.assign_coords({name: ("time", record[name].values, record[name].attrs) for name in turning})
 
 
+def sensor_signals(record: xr.Dataset, sensor: str | None = None, **settings: Any) -> xr.DataArray:
+    """Return what the sensors of a drivetrain's record measured as a signal, with speed and teeth of its first mesh.
+
+    Parameters
+    ----------
+    record : Dataset
+        From `run_train`, or its file.
+    sensor : str, optional
+        One of them only; default: each is a channel.
+    **settings
+        ``channels``; ``teeth`` and ``speed`` of another mesh.
+
+    Raises
+    ------
+    SignalError
+        If there is no such sensor.
+    """
+    names = [str(s) for s in record.sensor.values]
+    kept = [sensor] if sensor is not None else list(settings.get("channels") or names)
+    for name in kept:
+        if name not in names:
+            raise SignalError(f"channel: there is no {name!r}; choose one of {', '.join(names) or 'none'}")
+    attributes = record.attrs
+    return make_signal(
+        record["measured"].sel(sensor=kept).values,
+        float(attributes["run_rate"]),
+        units=[str(u) for u in record.sensor_units.sel(sensor=kept).values],
+        channels=kept,
+        t0=float(record.time.values[0]),
+        speed=settings.get("speed") or float(attributes["mesh_speed"]),
+        teeth=settings.get("teeth") or tuple(int(z) for z in np.ravel(attributes["mesh_teeth"])),
+        attrs={"source": str(attributes.get("title", "simulation"))},
+    )
+
+
 def read_any(path: str | Path, component: str | None = None, **settings: Any) -> xr.DataArray:
     """Return a measured file, or the record that ``gearmbs run`` wrote, as a signal.
 
@@ -96,6 +132,8 @@ def read_any(path: str | Path, component: str | None = None, **settings: Any) ->
         with contextlib.suppress(OSError, ValueError), xr.open_dataset(path, engine="h5netcdf") as data:
             if "acceleration" in data and "case_json" in data.attrs and "load" not in data.dims:
                 return record_signal(data[["acceleration"]].load(), component)
+            if "measured" in data and "train_json" in data.attrs:
+                return sensor_signals(data[["measured"]].load(), component, **settings)
     return read_signal(path, **settings)
 
 

@@ -6,6 +6,8 @@ from gearmbs._lazy import late
 
 if TYPE_CHECKING:
     from gearmbs.signals.simulated import record_signal
+    from gearmbs.studies.bench import BenchSettings, bench_choices, bench_train
+    from gearmbs.studies.bench_study import BenchStudy, run_bench
     from gearmbs.studies.case import Case, CaseError, CaseWarning, load_case, make_case
     from gearmbs.studies.claims import Claim
     from gearmbs.studies.flexible_rig import flexible_rig
@@ -15,8 +17,12 @@ if TYPE_CHECKING:
     from gearmbs.studies.rig import gear_rig
     from gearmbs.studies.simulation import SimulationFailed, SimulationInterrupted, run_case, simulate_case
     from gearmbs.studies.sweep import Sweep, sweep
+    from gearmbs.studies.train_report import train_report, train_scene
+    from gearmbs.studies.trains import load_train, run_train, train_signal
 
 __all__ = [
+    "BenchSettings",
+    "BenchStudy",
     "Case",
     "CaseError",
     "CaseWarning",
@@ -25,22 +31,40 @@ __all__ = [
     "SimulationFailed",
     "SimulationInterrupted",
     "Sweep",
+    "bench_choices",
+    "bench_train",
     "flexible_rig",
     "gear_rig",
     "load_case",
+    "load_train",
     "make_case",
     "paper_cases",
     "record_signal",
+    "run_bench",
     "run_case",
     "run_cases",
     "run_paper",
+    "run_train",
     "simulate_case",
     "sweep",
+    "train_report",
+    "train_scene",
+    "train_signal",
 ]
 
 late(
     __name__,
     {
+        "run_train": ".trains",
+        "load_train": ".trains",
+        "train_signal": ".trains",
+        "train_report": ".train_report",
+        "train_scene": ".train_report",
+        "bench_train": ".bench",
+        "BenchSettings": ".bench",
+        "bench_choices": ".bench",
+        "BenchStudy": ".bench_study",
+        "run_bench": ".bench_study",
         "Case": ".case",
         "CaseError": ".case",
         "CaseWarning": ".case",

@@ -6,7 +6,7 @@ Nothing of the bench but its wheels is published: every other number is a choice
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
 from gearmbs.drivetrain import (
@@ -24,8 +24,8 @@ from gearmbs.drivetrain import (
     Shaft,
     SpeedDrive,
     SpeedSensor,
-    TorsionalShaft,
     TorqueSensor,
+    TorsionalShaft,
     Wheel,
 )
 from gearmbs.gears import GearSpec
@@ -61,6 +61,7 @@ class BenchSettings:
     clutch_damping : float
         Relative damping of the clutch.
     bearings : {"elastic", "ideal"}
+        Ideal: joints on the ground, shafts that do not twist and no housing: four bodies; nothing for a laser to see.
     bearing_stiffness : float
         Radial, N/m.
     housing_mass : float
@@ -125,6 +126,7 @@ def bench_train(
     if s.bearings not in ("elastic", "ideal"):
         raise ValueError(f"bearings is {s.bearings!r}; choose 'elastic' or 'ideal'")
     speed = to_si(s.speed, "angular speed", "speed")
+    rigid = s.bearings == "ideal"
     pair = {"backlash": s.backlash}
     motor: Any = SpeedDrive(name="drive", shaft="motor", speed=speed)
     if s.motor == "induction":
@@ -137,10 +139,9 @@ def bench_train(
         f"bench, {state}",
         shafts=[
             Shaft(name="motor", length=0.15, inertia=s.motor_inertia),
-            *(Shaft(name=name, length=0.20, radius=0.015) for name in SEATS),
-            Shaft(name="pump", length=0.10, inertia=s.pump_inertia),
+            *_shafts(s),
         ],
-        wheels=[_wheel(f"z{k}", shaft) for k, shaft in enumerate(SEATS, 1)],
+        wheels=[_wheel(f"z{k}", *place) for k, place in enumerate(JOINED if rigid else APART, 1)],
         meshes=[
             GearMesh(name="pair 1", driver="z1", driven="z2", settings={**pair, **STATES[state]}),
             GearMesh(name="pair 2", driver="z3", driven="z4", direction=math.pi, phase=s.phase, settings=pair),
@@ -148,21 +149,25 @@ def bench_train(
         couplings=[
             ElasticClutch(name="clutch", first="motor", second="one", stiffness=s.clutch,
                           relative_damping=s.clutch_damping, damping_frequency=100.0),
-            TorsionalShaft(name="middle", first="two", second="three", stiffness=s.shafts, damping_ratio=1e-5),
-            TorsionalShaft(name="end", first="four", second="pump", stiffness=s.shafts, damping_ratio=1e-5),
+            *([] if rigid else [
+                TorsionalShaft(name="middle", first="two", second="three", stiffness=s.shafts, damping_ratio=1e-5),
+                TorsionalShaft(name="end", first="four", second="pump", stiffness=s.shafts, damping_ratio=1e-5),
+            ]),
         ],
         bearings=[
             IdealBearing(name="motor bearing", shaft="motor", on="ground"),
-            *(bearing for name in SEATS for bearing in _bearings(name, s)),
-            IdealBearing(name="pump bearing", shaft="pump", on="ground"),
+            *(bearing for name in ("one", "two", "four") for bearing in _bearings(name, s)),
+            *([] if rigid else [*_bearings("three", s), IdealBearing(name="pump bearing", shaft="pump", on="ground")]),
         ],
-        housings=[_housing(s)],
+        housings=[] if rigid else [_housing(s)],
         drives=[motor],
-        loads=[Pump(name="pump load", shaft="pump", displacement=s.displacement, pressure=pressure, idle=s.idle,
-                    teeth=s.pump_teeth)],
+        loads=[Pump(name="pump load", shaft="four" if rigid else "pump", displacement=s.displacement,
+                    pressure=pressure, idle=s.idle, teeth=s.pump_teeth)],
         sensors=[
-            Laser(name="laser", shaft="two", station=0.05, direction=(0.0, 1.0, 0.0)),
-            Accelerometer(name="support", bearing="two a", direction=(0.0, 1.0, 0.0)),
+            *([] if rigid else [
+                Laser(name="laser", shaft="two", station=0.05, direction=(0.0, 1.0, 0.0)),
+                Accelerometer(name="support", bearing="two a", direction=(0.0, 1.0, 0.0)),
+            ]),
             SpeedSensor(name="speed", shaft="two"),
             TorqueSensor(name="torque", of="clutch"),
         ],
@@ -171,19 +176,31 @@ def bench_train(
     )  # fmt: skip
 
 
-def _wheel(name: str, shaft: str) -> Wheel:
-    return Wheel(name=name, shaft=shaft, gear=GearSpec(29, 95e-3 / 31, face_width=0.020, name=name))
+APART = (("one", 0.1), ("two", 0.1), ("three", 0.1), ("four", 0.1))
+JOINED = (("one", 0.1), ("two", 0.1), ("two", 0.3), ("four", 0.1))
+"""Shaft and station of each wheel."""
+
+
+def _shafts(s: BenchSettings) -> list[Shaft]:
+    if s.bearings == "ideal":
+        last = Shaft(name="four", length=0.20, radius=0.015)
+        joined = replace(last, inertia=last.body()[2] + s.pump_inertia)
+        return [Shaft(name="one", length=0.20, radius=0.015), Shaft(name="two", length=0.40, radius=0.015), joined]
+    four = [Shaft(name=name, length=0.20, radius=0.015) for name in SEATS]
+    return [*four, Shaft(name="pump", length=0.10, inertia=s.pump_inertia)]
+
+
+def _wheel(name: str, shaft: str, station: float) -> Wheel:
+    return Wheel(name=name, shaft=shaft, station=station, gear=GearSpec(29, 95e-3 / 31, face_width=0.020, name=name))
 
 
 def _bearings(shaft: str, s: BenchSettings) -> list[Any]:
-    kind: Any = IdealBearing
-    others: dict[str, Any] = {}
-    if s.bearings == "elastic":
-        kind = ElasticBearing
-        others = {"stiffness": (s.bearing_stiffness, s.bearing_stiffness, 0.5 * s.bearing_stiffness),
-                  "damping_time": 1e-5}  # fmt: skip
+    if s.bearings == "ideal":
+        return [IdealBearing(name=f"{shaft} a", shaft=shaft, station=0.02, on="ground")]
+    k = s.bearing_stiffness
     return [
-        kind(name=f"{shaft} {side}", shaft=shaft, station=z, **others) for side, z in (("a", 0.02), ("b", 0.18))
+        ElasticBearing(name=f"{shaft} {side}", shaft=shaft, station=z, stiffness=(k, k, 0.5 * k), damping_time=1e-5)
+        for side, z in (("a", 0.02), ("b", 0.18))
     ]
 
 
@@ -221,15 +238,16 @@ def bench_choices(settings: BenchSettings | None = None) -> list[BenchChoice]:
     changed = [f.name for f in fields(s) if getattr(s, f.name) != getattr(usual, f.name)]
     low, high = (s.displacement / (2.0 * math.pi) * p + s.idle for p in PRESSURES.values())
     rows = [
-        ("the two loads", f"one pump, V_g = {1e6 * s.displacement:.4g} cm^3, T_0 = {s.idle:g} N m: {low:.4g} and {high:.4g} "
-         "N m", "1 to 5 MPa is a factor of 5, 100 to 200 N m one of 2: no pump whose torque is proportional to its pressure "
-         "has both (1 MPa would need 628 cm^3, 5 MPa 251 cm^3); with an idle torque exactly one pump has"),
+        ("the two loads", f"one pump, V_g = {1e6 * s.displacement:.4g} cm^3, T_0 = {s.idle:g} N m: {low:.4g} and "
+         f"{high:.4g} N m", "1 to 5 MPa is a factor of 5, 100 to 200 N m one of 2: no pump whose torque is "
+         "proportional to its pressure has both (1 MPa would need 628 cm^3, 5 MPa 251 cm^3); with an idle torque "
+         "exactly one has"),
         ("pump ripple", f"{s.pump_teeth} teeth, ideal external gear pump" if s.pump_teeth else "none",
          "a usual number; its lines lie apart from the mesh's"),
         ("motor", "induction motor of 22 kW by Kloss's formula on an inverter" if s.motor == "induction" else
          "prescribed speed", "the bench's control system holds the speed; a motor gives the drive end its damping"),
         ("inertias", f"motor {s.motor_inertia:g}, pump {s.pump_inertia:g} kg m^2", "usual for this power"),
-        ("clutch", f"{s.clutch:g} N m/rad, relative damping {s.clutch_damping:g}", "an elastomer clutch for this torque"),
+        ("clutch", f"{s.clutch:g} N m/rad, relative damping {s.clutch_damping:g}", "an elastomer clutch of this size"),
         ("shafts", f"diameter 30 mm, {s.shafts:g} N m/rad between the pairs and to the pump", "carries 200 N m"),
         ("second pair", f"as the first, phase {s.phase:g} pitches", "only one pair is published; equal teeth lock both "
          "meshes in phase, so that their lines add or cancel with the assembly angle"),

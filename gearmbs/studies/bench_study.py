@@ -65,8 +65,8 @@ class BenchStudy:
         for sensor in SENSORS:
             for load in PRESSURES:
                 for state in STATES:
-                    row = self.table.sel(sensor=sensor, load=load, state=state).values
-                    lines.append(f"| {sensor} | {load} | {state} | " + " | ".join(f"{v:.4g}" for v in row) + " |")
+                    levels_of = self.table.sel(sensor=sensor, load=load, state=state).values
+                    lines.append(f"| {sensor} | {load} | {state} | " + " | ".join(f"{v:.4g}" for v in levels_of) + " |")
         lines += ["", "## Meshes", "", "| load | state | mesh | mean normal force, N | both flanks, % of time |",
                   "|---|---|---|---|---|"]  # fmt: skip
         for (load, state), record in self.records.items():
@@ -90,7 +90,9 @@ class BenchStudy:
             figure = new_figure(4.6 * len(panels), 4.2)
             axes = figure.subplots(1, len(panels))
             for ax, (title, table) in zip(np.atleast_1d(axes), panels, strict=True):
-                gmf_bars(table.drop_vars(["sensor"], errors="ignore"), title=f"{title}, {load} load", ax=ax, values=False)
+                gmf_bars(
+                    table.drop_vars(["sensor"], errors="ignore"), title=f"{title}, {load} load", ax=ax, values=False
+                )
         return figure
 
     def save(self, folder: str | Path) -> list[Path]:
@@ -139,6 +141,8 @@ def run_bench(
         If a run stops early.
     """
     settings = settings or BenchSettings()
+    if settings.bearings == "ideal":
+        raise ValueError("bearings is 'ideal': a laser sees nothing move in rigid bearings; give 'elastic'")
     run = run or RunSettings(settling=0.2, duration=1.0)
     records: dict[tuple[str, str], xr.Dataset] = {}
     for load, pressure in PRESSURES.items():
@@ -155,7 +159,9 @@ def run_bench(
     )  # fmt: skip
     beside = None
     if pair:
-        base = Case(operation={"duration": run.duration, "speed": settings.speed}, fault={"backlash": settings.backlash})
+        base = Case(
+            operation={"duration": run.duration, "speed": settings.speed}, fault={"backlash": settings.backlash}
+        )
         beside = run_paper(base, workers=workers, progress=progress)
     return BenchStudy(table, records, settings, beside)
 
@@ -178,4 +184,3 @@ def levels(record: xr.Dataset, sensor: str, harmonics: int = 3) -> np.ndarray:
     frequency = float(record["mesh_rms"].mesh_frequency.sel(mesh="pair 1"))
     orders = np.arange(1, harmonics + 1)
     return np.abs(harmonic_amplitudes(signal.values, rate, frequency, orders))[:, 0] / np.sqrt(2.0)
-

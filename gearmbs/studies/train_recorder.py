@@ -138,7 +138,7 @@ class TrainRecorder:
         shape = self._modal_shape(housing, bearing.name)
         if shape is not None:
             # in the floating frame: a_f + 2 w x v_f
-            q, v, qa = part.evaluated.modal(part.system.body_names.index(housing) + 1)
+            _, v, qa = part.evaluated.modal(part.system.body_names.index(housing) + 1)
             moved = turned @ body.orientation.T
             rate, second = (np.einsum("tij,tj->ti", moved, x @ shape) for x in (v, qa))
             a = a + second + 2.0 * np.cross(w, rate)

@@ -36,8 +36,8 @@ def _frequencies(train: Drivetrain, record: xr.Dataset) -> list[str]:
 
 def _meshes(train: Drivetrain, record: xr.Dataset) -> list[str]:
     lines = ["## Meshes", "",
-             "| mesh | torque on the driven wheel, N m | torque over base radius, N | mean normal force, N | both flanks, % of "
-             "time | no contact, % | transmission error p-p, um |", "|---|---|---|---|---|---|---|"]  # fmt: skip
+             "| mesh | torque on the driven wheel, N m | torque over base radius, N | mean normal force, N | both "
+             "flanks, % of time | no contact, % | transmission error p-p, um |", _rule(6)]  # fmt: skip
     for mesh in train.meshes:
         one = record.sel(mesh=mesh.name)
         drive, back = one["pairs_drive"].values > 0, one["pairs_back"].values > 0
@@ -52,7 +52,12 @@ def _meshes(train: Drivetrain, record: xr.Dataset) -> list[str]:
 
 
 def _bearings(train: Drivetrain, record: xr.Dataset) -> list[str]:
-    lines = ["## Bearings", "", "| bearing | mean x, y, z, N | RMS about the mean x, y, z, N | largest, N |", "|---|---|---|---|"]
+    lines = [
+        "## Bearings",
+        "",
+        "| bearing | mean x, y, z, N | RMS about the mean x, y, z, N | largest, N |",
+        "|---|---|---|---|",
+    ]
     for bearing in train.bearings:
         force = record["bearing_force"].sel(bearing=bearing.name).values
         mean = ", ".join(f"{v:.4g}" for v in force.mean(axis=0))
@@ -79,12 +84,16 @@ def _levels(train: Drivetrain, record: xr.Dataset) -> list[str]:
     for mesh in train.meshes:
         levels = record["mesh_rms"].sel(mesh=mesh.name)
         lines += [f"### {mesh.name}, {float(levels.mesh_frequency):.6g} Hz", "",
-                  "| signal | " + " | ".join(f"{h} x" for h in harmonics) + " |", "|---|" + "---|" * harmonics.size]  # fmt: skip
+                  "| signal | " + " | ".join(f"{h} x" for h in harmonics) + " |", _rule(harmonics.size)]  # fmt: skip
         for signal in record.signal.values:
             row = levels.sel(signal=signal).values
             lines.append(f"| {signal} | " + " | ".join(f"{v:.4g}" for v in row) + " |")
         lines.append("")
     return lines
+
+
+def _rule(columns: int) -> str:
+    return "|---|" + "---|" * columns
 
 
 def _cost(train: Drivetrain, record: xr.Dataset) -> list[str]:

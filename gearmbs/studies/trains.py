@@ -61,9 +61,10 @@ def run_train(
     -------
     Dataset
         Over ``time``, evenly sampled behind an anti-alias filter: by ``mesh`` normal force, penetrations, numbers of
-        tooth pairs on drive and coast flanks and transmission error; by ``bearing`` the force of the seat on the shaft; by
-        ``sensor`` what it measures; by ``shaft`` its speed. ``mesh_rms``: RMS of the mesh harmonics by ``signal`` (the
-        normal force of each mesh, the bearings' forces, the sensors), mesh and harmonic, at the mean speed of the record.
+        tooth pairs on drive and coast flanks and transmission error; by ``bearing`` the force of the seat on the shaft;
+        by ``sensor`` what it measures; by ``shaft`` its speed. ``mesh_rms``: RMS of the mesh harmonics by ``signal``
+        (the normal force of each mesh, the bearings' forces, the sensors), mesh and harmonic, at the record's mean
+        speed.
 
     Raises
     ------
@@ -106,14 +107,14 @@ def check_record(train: Drivetrain, run: RunSettings) -> None:
         if run.harmonics * frequency * 1.05 >= rate / 2:
             raise DrivetrainError(
                 f"run.rate is {rate:g} Hz: {run.harmonics} harmonics of {mesh.label} reach "
-                f"{run.harmonics * frequency:.6g} Hz; give more than {2.1 * run.harmonics * frequency:.6g} Hz, or fewer "
-                "harmonics"
+                f"{run.harmonics * frequency:.6g} Hz; give more than {2.1 * run.harmonics * frequency:.6g} Hz, or "
+                "fewer harmonics"
             )
         least = (MIN_PERIODS + 1) / frequency
         if run.duration < least:
             raise DrivetrainError(
-                f"run.duration is {run.duration:g} s: {mesh.label} has {frequency:.4g} mesh cycles a second; give at least "
-                f"{least:.3g} s"
+                f"run.duration is {run.duration:g} s: {mesh.label} has {frequency:.4g} mesh cycles a second; give at "
+                f"least {least:.3g} s"
             )
 
 
@@ -152,7 +153,8 @@ def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution
     channels = [str(k) for k in range(forces.shape[1])]
     even = even_signal(known.t, forces, rate, start=start, stop=stop, channels=channels)
     # compiled code takes no arrays that are read only
-    t, values = even["time"].values.copy(), even.values
+    inside = even["time"].values < stop - 0.5 / rate
+    t, values = even["time"].values[inside], even.values[inside]
     meshes, bearings = len(train.meshes), len(train.bearings)
     contact = np.empty((t.size, meshes, len(CONTACT)))
     latest = np.clip(np.searchsorted(known.t, t, side="right") - 1, 0, m - 1)
@@ -242,6 +244,9 @@ def attributes(train: Drivetrain, run: RunSettings | None, solution: Solution) -
         "train_json": json.dumps(plain({name: part for name, part in train.parts.items()})),
         "gearmbs_version": gearmbs.__version__,
     }
+    if train.meshes:
+        given = train.kinematics.for_analysis(train.meshes[0])
+        out |= {"mesh_speed": given["speed"], "mesh_speed_units": "rad/s", "mesh_teeth": list(given["teeth"])}  # type: ignore[call-overload]
     if run is not None:
         out |= {f"run_{f.name}": v for f in fields(run) if (v := getattr(run, f.name)) is not None}
         out["run_rate"] = run.output_rate(train)
@@ -266,43 +271,47 @@ def plain(value: Any) -> Any:
     return value if isinstance(value, str | int | float | bool) or value is None else repr(value)
 
 
-def train_signal(record: xr.Dataset, sensor: str, mesh: str | None = None) -> xr.DataArray:
-    """Return one sensor of a drivetrain's record as a signal with speed and teeth, for `analyse` and its like.
+def train_signal(record: xr.Dataset, channel: str, mesh: str | None = None) -> xr.DataArray:
+    """Return one channel of a drivetrain's record as a signal with speed and teeth, for `analyse` and its like.
 
     Parameters
     ----------
     record : Dataset
         From `run_train`, or its file.
-    sensor : str
-        A sensor; or "bearing x", "bearing y", "bearing z" of a bearing's force.
+    channel : str
+        A sensor; "force of <mesh>"; or "<bearing> x", "<bearing> y", "<bearing> z".
     mesh : str, optional
         Whose driver and teeth the signal names; default the first.
 
     Raises
     ------
     DrivetrainError
-        For an unknown sensor or mesh.
+        For an unknown channel or mesh.
     """
     names = [str(s) for s in record.sensor.values]
     bearings = {f"{b} {axis}": (str(b), axis) for b in record.bearing.values for axis in "xyz"}
-    if sensor in names:
-        values = record["measured"].sel(sensor=sensor)
-        unit = str(record.sensor_units.sel(sensor=sensor).item())
-    elif sensor in bearings:
-        bearing, axis = bearings[sensor]
-        values, unit = record["bearing_force"].sel(bearing=bearing, xyz=axis), "N"
-    else:
-        raise DrivetrainError(f"record: there is no sensor '{sensor}'; known are {', '.join([*names, *bearings])}")
     meshes = [str(m) for m in record.mesh.values]
+    forces = {f"force of {m}": m for m in meshes}
+    unit = "N"
+    if channel in names:
+        values = record["measured"].sel(sensor=channel)
+        unit = str(record.sensor_units.sel(sensor=channel).item())
+    elif channel in forces:
+        values = record["normal_force"].sel(mesh=forces[channel])
+    elif channel in bearings:
+        bearing, axis = bearings[channel]
+        values = record["bearing_force"].sel(bearing=bearing, xyz=axis)
+    else:
+        known = ", ".join([*names, *forces, *bearings])
+        raise DrivetrainError(f"record: there is no channel '{channel}'; known are {known}")
     mesh = mesh or (meshes[0] if meshes else None)
     if mesh not in meshes:
         raise DrivetrainError(f"record: there is no mesh '{mesh}'; known are {', '.join(meshes)}")
     parts = json.loads(record.attrs["train_json"])
     wheels = [parts[parts[mesh][side]] for side in ("driver", "driven")]
-    teeth = [int(wheel["gear"]["teeth"]) for wheel in wheels]
     speed = float(np.abs(record["speed"].sel(shaft=wheels[0]["shaft"]).mean()))
     return make_signal(
-        values.values[:, None], float(record.attrs["run_rate"]), units=unit, channels=[sensor],
-        t0=float(record.time.values[0]), speed=speed, teeth=tuple(abs(z) for z in teeth),
+        values.values[:, None], float(record.attrs["run_rate"]), units=unit, channels=[channel],
+        t0=float(record.time.values[0]), speed=speed, teeth=tuple(abs(int(w["gear"]["teeth"])) for w in wheels),
         attrs={"source": record.attrs["title"]},
     )  # fmt: skip

@@ -1,0 +1,155 @@
+"""Records of drivetrains: what they hold, what they are checked against, the command line, the report and the view."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from gearmbs.cli import app
+from gearmbs.drivetrain import (
+    Accelerometer,
+    DrivetrainError,
+    ElasticBearing,
+    Housing,
+    IdealBearing,
+    Laser,
+    Mount,
+    RunSettings,
+    SpeedSensor,
+    TorqueSensor,
+)
+from gearmbs.signals.simulated import read_any
+from gearmbs.studies import run_train, train_report, train_scene, train_signal
+from gearmbs.studies.trains import check_record, load_train
+from tests.drivetrain.support import stage
+from tests.drivetrain.test_description import TEXT
+
+
+def measured_stage():
+    """A stage on a housing, with one sensor of each kind."""
+    mounts = [Mount(name=f"m{k}", at=at, stiffness=(2e7,) * 3, damping=(2e3,) * 3) for k, at in
+              enumerate(((-0.2, -0.1, 0.0), (0.2, -0.1, 0.0), (0.0, -0.1, 0.2)))]  # fmt: skip
+    bearing = ElasticBearing(name="b", shaft="out", stiffness=(1e8, 1e8, 1e8), tilting=(1e5, 1e5))
+    return stage(
+        bearings=[IdealBearing(name="a", shaft="in", on="ground"), bearing],
+        housings=[Housing(name="box", mass=50.0, inertia=(1.0, 1.0, 1.0), mounts=mounts)],
+        sensors=[
+            Accelerometer(name="seat", bearing="b", direction=(0, 1, 0)),
+            Laser(name="laser", shaft="out", direction=(0, 1, 0)),
+            Laser(name="rim", shaft="out", direction=(0, 1, 0), offset=0.01),
+            SpeedSensor(name="speed", shaft="out"),
+            TorqueSensor(name="torque", of="brake"),
+        ],
+        running=True,
+    )
+
+
+@pytest.fixture(scope="module")
+def train():
+    return measured_stage()
+
+
+@pytest.fixture(scope="module")
+def record(train):
+    return run_train(train, RunSettings(duration=0.12, settling=0.05, tolerance=1e-6))
+
+
+def test_record_holds_the_mean_loads(train, record):
+    """Torque over base radius is the mean force, the bearing carries it against the mounts, and speeds are right."""
+    force = 300.0 / train.pairs["mesh"].geometry.driven.base_radius
+    assert float(record.normal_force.mean()) == pytest.approx(force, rel=0.03)
+    mean = record.bearing_force.sel(bearing="b").mean("time").values
+    assert np.linalg.norm(mean) == pytest.approx(force, rel=0.03)
+    assert np.abs(mean[2]) < 0.01 * force
+    assert float(record.speed.sel(shaft="out").mean()) == pytest.approx(train.speeds["out"], rel=1e-4)
+    assert record.measured.sel(sensor="torque").values == pytest.approx(300.0)
+    assert record.time.values[0] == pytest.approx(0.1)
+    assert record.sizes["time"] == round(0.12 * 12800)
+    # the bearing, the housing and its mounts give way, too
+    assert np.abs(record.transmission_error).max() < 3e-4
+
+
+def test_sensors_agree_with_each_other(record):
+    """A laser beside the axis sees the spin; the seat's acceleration is that of a body that does not drift."""
+    laser, rim, speed = (record.measured.sel(sensor=name).values for name in ("laser", "rim", "speed"))
+    np.testing.assert_allclose(rim - laser, np.abs(0.01 * speed), rtol=1e-3)
+    assert np.abs(laser).max() < 0.1
+    seat = record.measured.sel(sensor="seat").values
+    assert 0.01 < seat.std() < 100.0
+    assert np.abs(seat.mean()) < 0.1 * seat.std()
+
+
+def test_harmonics_of_the_mesh(train, record):
+    levels = record.mesh_rms.sel(mesh="mesh")
+    assert float(levels.mesh_frequency) == pytest.approx(500.0, rel=1e-4)
+    force = record.normal_force.sel(mesh="mesh").values
+    whole = force - force.mean()
+    line = np.sqrt(2.0) * np.abs(np.mean(whole * np.exp(-2j * np.pi * 500.0 * record.time.values)))
+    assert float(levels.sel(signal="force of mesh", harmonic=1)) == pytest.approx(line, rel=0.05)
+
+
+def test_signals_go_on_to_the_analysis(tmp_path, record):
+    one = train_signal(record, "seat")
+    assert one.attrs["teeth"] == (20, 60)
+    path = tmp_path / "record.nc"
+    record.to_netcdf(path, engine="h5netcdf")
+    signal = read_any(path)
+    assert list(signal.channel.values) == ["seat", "laser", "rim", "speed", "torque"]
+    assert "m/s^2" in str(signal.attrs) + str(signal.coords)
+    with pytest.raises(DrivetrainError, match="no channel 'moon'; known are seat"):
+        train_signal(record, "moon")
+    assert train_signal(record, "b y").sizes["time"] == record.sizes["time"]
+    with xr.open_dataset(path, engine="h5netcdf") as again:
+        assert json.loads(again.attrs["train_json"])["pinion"]["gear"]["teeth"] == 20
+
+
+def test_report_and_view(train, record):
+    text = train_report(train, record)
+    for words in ("## Speeds and frequencies", "| mesh | mesh | GMF | 500 |", "## Bearings", "| laser | m/s |",
+                  "### mesh, 500"):  # fmt: skip
+        assert words in text
+    scene = train_scene(train)
+    assert {"in", "out", "box"} <= {part.name for part in scene.parts}
+
+
+def test_command_line(tmp_path):
+    path = tmp_path / "train.toml"
+    quick = TEXT.replace('duration = "0.2 s"', 'duration = "0.02 s"\nsettling = 0.0\ntolerance = 1e-6')
+    mounts = "\n".join(
+        f"[housings.box.mounts.m{k}]\nat = {at}\nstiffness = [1e7, 1e7, 1e7]"
+        for k, at in enumerate(([0.1, 0, 0], [0, 0.1, 0.1]))
+    )
+    path.write_text("run_up = 0.01\nrunning = true\n" + quick.replace("[sensors.seat]", mounts + "\n[sensors.seat]"))
+    result = CliRunner().invoke(app, ["run", str(path)])
+    assert result.exit_code == 0, result.output
+    assert "mesh                     500 Hz" in result.output
+    for suffix in (".nc", ".md", ".html"):
+        assert path.with_suffix(suffix).exists()
+
+
+def test_faults_in_files_and_wrong_files(tmp_path):
+    path = tmp_path / "train.toml"
+    path.write_text(
+        TEXT.replace("[bearings.a]", '[[meshes.mesh.faults]]\nkind = "broken tooth"\nlost = 0.5\n[bearings.a]')
+    )
+    found = load_train(path)
+    assert found.train.pairs["mesh"].faults[0].severity == 0.5
+    path.write_text(path.read_text().replace("lost = 0.5", "lost = 1.5"))
+    result = CliRunner().invoke(app, ["run", str(path)])
+    assert result.exit_code == 1
+    assert "lost is 1.5" in result.output
+    path.write_text(TEXT.replace("teeth = 60", "teeth = 61.5"))
+    result = CliRunner().invoke(app, ["run", str(path)])
+    assert result.exit_code == 1
+    assert "wheels.gear" in result.output
+
+
+@pytest.mark.parametrize(("settings", "words"), [
+    ({"rate": 2500.0}, "run.rate is 2500 Hz: 3 harmonics of mesh 'mesh' reach 1500 Hz"),
+    ({"duration": 0.005}, "run.duration is 0.005 s: mesh 'mesh' has 500 mesh cycles a second"),
+])  # fmt: skip
+def test_records_that_cannot_be_are_refused(settings, words):
+    with pytest.raises(DrivetrainError, match=words):
+        check_record(stage(), RunSettings(**settings))
