@@ -321,10 +321,9 @@ def bench(
 ) -> None:
     """Judge the paper's claims on its test bench: motor, clutch, two pairs, pump; six runs, figures, report."""
     with guarded():
-        from gearmbs.drivetrain import RunSettings
         from gearmbs.studies.bench import PRESSURES, STATES, BenchSettings, bench_train
         from gearmbs.studies.store import check_place
-        from gearmbs.studies.trains import check_record
+        from gearmbs.studies.trains import RunSettings, check_record
 
         settings = BenchSettings(
             speed=speed, bearing_stiffness=stiffness, motor=motor, phase=phase, pump_teeth=pump_teeth
