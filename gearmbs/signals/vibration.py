@@ -26,6 +26,8 @@ VELOCITY_BAND = (10.0, 1000.0)
 """Band of the RMS velocity in Hz, as in ISO 20816 for machines above 600 rpm."""
 EDGE = 0.05
 LEAST_FALL = 16.0
+LEAST_BAND = 16
+"""Envelopes are taken in bands of at least this part of half the sampling rate: a narrow one holds only slow lines."""
 """A band ends at least this part of its width above zero and below half the sampling rate."""
 NO_SPEED = "the speed is not known; give speed='1500 rpm' (--speed), a curve or a tacho"
 Progress = Callable[[float, str], None]
@@ -168,9 +170,10 @@ def _orders(signal: xr.DataArray, found: Shaft | float | None, speed: float | No
 def _envelope(signal: xr.DataArray, impulsive: xr.Dataset) -> xr.DataArray:
     """RMS spectrum of each channel's envelope in its most impulsive band, over segments of 2 s."""
     rate = rate_of(signal)
-    parts = []
+    parts: list[xr.DataArray] = []
+    bands: list[tuple[float, float]] = []
     for i in range(signal.sizes["channel"]):
-        centre, width = (float(impulsive[key].values[i]) for key in ("best_centre", "best_bandwidth"))
+        centre, width = _wide_band(impulsive, i, rate)
         low = max(centre - 0.5 * width, EDGE * width)
         high = min(centre + 0.5 * width, rate / 2 - EDGE * width)
         room = min(low, rate / 2 - high)
@@ -178,5 +181,17 @@ def _envelope(signal: xr.DataArray, impulsive: xr.Dataset) -> xr.DataArray:
         fall = min(max(0.1 * (high - low), LEAST_FALL * rate / signal.sizes["time"]), 1.9 * room)
         cut = envelope(signal.isel(channel=[i]), (low, high), transition=fall)
         parts.append(spectrum(cut, scaling="rms", segment=2.0))
-    joined = xr.concat(parts, "channel", join="override", combine_attrs="override")
-    return joined.transpose("frequency", "channel")
+        bands.append((low, high))
+    joined = xr.concat(parts, "channel", join="override", combine_attrs="override").transpose("frequency", "channel")
+    return joined.assign_coords(
+        low=("channel", [low for low, _ in bands], {"units": "Hz"}),
+        high=("channel", [high for _, high in bands], {"units": "Hz"}),
+    )
+
+
+def _wide_band(impulsive: xr.Dataset, channel: int, rate: float) -> tuple[float, float]:
+    """Centre and width in Hz of the band of highest kurtosis that is wide enough for an envelope of many lines."""
+    wide = impulsive["bandwidth"].values >= 0.99 * rate / 2 / LEAST_BAND
+    kurtosis = np.where(wide, impulsive["kurtosis"].values[:, channel], -np.inf)
+    best = int(np.nanargmax(kurtosis))
+    return float(impulsive["centre"].values[best]), float(impulsive["bandwidth"].values[best])

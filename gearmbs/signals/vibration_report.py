@@ -37,7 +37,8 @@ class VibrationReport:
     impulsive : xarray.Dataset or None
         Kurtogram with the band of highest kurtosis by channel (`best_centre`, `best_bandwidth`, `best_kurtosis`).
     envelope : xarray.DataArray or None
-        RMS spectrum of the envelope in that band, dimensions (frequency, channel).
+        RMS spectrum of the envelope in the band of highest kurtosis that is wide enough for one (1/16 of half the
+        sampling rate or more), dimensions (frequency, channel); coordinates `low` and `high` (Hz) along channel.
     envelope_lines : pandas.DataFrame or None
         Its strongest lines by channel, columns as of `lines`.
     orders : pandas.DataFrame or None
@@ -137,8 +138,14 @@ class VibrationReport:
         if self.impulsive is not None:
             parts += ["## Most impulsive band", "", transposed(self.impulsive, channels, IMPULSIVE), ""]
         if self.envelope_lines is not None:
-            parts += ["## Strongest lines of the envelope in that band", "", self._line_table(self.envelope_lines), ""]
+            parts += ["## Strongest lines of the envelope", "", *self._band_words(), ""]
+            parts += [self._line_table(self.envelope_lines), ""]
         return "\n".join(parts + missing_list(self.missing))
+
+    def _band_words(self) -> list[str]:
+        assert self.envelope is not None
+        ends = zip(self.channels, self.envelope["low"].values, self.envelope["high"].values)
+        return ["; ".join(f"{name} in {low:.0f} to {high:.0f} Hz" for name, low, high in ends) + "."]
 
     def _speed_words(self) -> str:
         if self.speed is None:
