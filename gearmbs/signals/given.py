@@ -39,6 +39,8 @@ def with_speed(signal: xr.DataArray, speed: Any) -> xr.DataArray:
     """The signal with a known speed: a number or text as attribute, a curve as coordinate `speed` over time."""
     times = np.asarray(signal["time"].values, dtype=float)
     curve = speed_curve(speed, span=(float(times[0]), float(times[-1])))
+    # what the signal says of its own angle would contradict
+    signal = signal.drop_vars([name for name in ("speed", "angle") if name in signal.coords])
     if curve.constant is not None:
         return with_metadata(signal, speed=curve.constant)
     result = signal.assign_coords(speed=("time", curve.at(times), {"units": "rad/s"}))

@@ -15,7 +15,7 @@ from .envelope import envelope
 from .errors import SignalError
 from .order_tracking import order_track
 from .orders import harmonic_amplitudes
-from .report_parts import FULL_LEVELS, impulsive_band, levels, line_spectrum, strongest_lines
+from .report_parts import FULL_LEVELS, LINE_SECONDS, impulsive_band, levels, line_spectrum, strongest_lines
 from .shaft_finding import Known, Shaft, known_shaft, refined_speed, remark_plausibility
 from .signal import rate_of, units_of
 from .spectra import spectrum
@@ -170,7 +170,7 @@ def _orders(signal: xr.DataArray, found: Shaft | float | None, speed: float | No
 def _envelope(signal: xr.DataArray, impulsive: xr.Dataset) -> xr.DataArray:
     """RMS spectrum of each channel's envelope in its most impulsive band, over segments of 2 s."""
     rate = rate_of(signal)
-    parts: list[xr.DataArray] = []
+    cuts: list[xr.DataArray] = []
     bands: list[tuple[float, float]] = []
     for i in range(signal.sizes["channel"]):
         centre, width = _wide_band(impulsive, i, rate)
@@ -180,8 +180,11 @@ def _envelope(signal: xr.DataArray, impulsive: xr.Dataset) -> xr.DataArray:
         # a short record has no room for a steep filter
         fall = min(max(0.1 * (high - low), LEAST_FALL * rate / signal.sizes["time"]), 1.9 * room)
         cut = envelope(signal.isel(channel=[i]), (low, high), transition=fall)
-        parts.append(spectrum(cut, scaling="rms", segment=2.0))
+        cuts.append(cut)
         bands.append((low, high))
+    # filters of different bands leave different lengths; one resolution for all
+    length = min(round(LINE_SECONDS * rate), *(cut.sizes["time"] for cut in cuts))
+    parts = [spectrum(cut, scaling="rms", segment=length) for cut in cuts]
     joined = xr.concat(parts, "channel", join="override", combine_attrs="override").transpose("frequency", "channel")
     return joined.assign_coords(
         low=("channel", [low for low, _ in bands], {"units": "Hz"}),

@@ -153,6 +153,14 @@ def test_the_same_from_a_tacho_a_channel_of_speed_and_an_angle():
         order_track(both, orders=29, speed_channel="pulse")
 
 
+def test_a_speed_that_is_given_wins_over_the_signals_own():
+    signal, angle = run_up(0.0)
+    own = signal.assign_coords(angle=("time", 2.0 * angle))
+    half = order_track(to_signal(own, speed=RUN_UP), orders=29)
+    assert np.abs(half.values - 1.0).max() < 0.01
+    assert np.abs(order_track(own, RUN_UP, 29).values - 1.0).max() < 0.01
+
+
 def test_spectrogram_and_waterfall_of_a_run_up():
     signal, _ = run_up()
     slices = spectrogram(signal, segment=0.1)

@@ -109,3 +109,43 @@ def test_a_record_without_teeth_has_a_report(tmp_path):
     assert "| 1 | 30.00 |" in result.output
     assert (tmp_path / "f" / "envelope.png").stat().st_size > 10_000
     assert (tmp_path / "t" / "spectrum.csv").exists()
+
+
+def test_a_folder_is_one_series(tmp_path):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    for k in (1, 2, 10):
+        write(folder, f"s{k}.csv")
+    options = ("--channel", "housing", "--speed", "1800 rpm", "--out", tmp_path / "t.csv")
+    result = run("trend", folder, *options)
+    assert result.exit_code == 0, result.output
+    table = pd.read_csv(tmp_path / "t.csv")
+    assert table["file"].tolist() == ["s1.csv", "s2.csv", "s10.csv"]
+    assert table["housing.rms"].nunique() == 1
+    # a second call finds everything done
+    assert run("trend", folder, *options).exit_code == 0
+    listed = run("trend", folder / "s1.csv", folder / "s2.csv", "--teeth", TEETH, "--channel", "housing")
+    assert listed.exit_code == 0, listed.output
+    assert "housing.fm4" in listed.output
+
+
+def test_the_command_line_answers_what_is_asked(tmp_path):
+    t = np.arange(25600) / RATE
+    x = np.cos(2 * np.pi * 960 * t)
+    text = "\n".join(f"{v:.6f}" if k != 500 else "" for k, v in enumerate(x))
+    path = tmp_path / "x.csv"
+    path.write_text(f"fs,12800\nSampFreq,6400\na,b\n{text.replace(chr(10), ',1' + chr(10))},1\n")
+    asked = run("analyse", path, "--gaps", "longest")
+    assert asked.exit_code == 1
+    assert "fs = 12800 Hz and SampFreq = 6400 Hz; say which: rate=... (--rate)" in " ".join(asked.output.split())
+    gap = run("analyse", path, "--rate", "12.8 kHz")
+    assert "line 504 holds nothing in column 'a'; pass gaps='interpolate'" in " ".join(gap.output.split())
+    done = run("analyse", path, "--rate", "12.8 kHz", "--gaps", "interpolate", "--channel", "a")
+    assert done.exit_code == 0, done.output
+    assert "had gaps, filled by straight lines" in done.output
+    curve = tmp_path / "speed.csv"
+    curve.write_text("time,temperature,speed [rpm]\n0,20,1800\n1,21,1800\n2,22,1800\n")
+    followed = run("analyse", path, "--rate", 12800, "--gaps", "interpolate", "--channel", "a", "--speed", curve)
+    assert followed.exit_code == 0, followed.output
+    assert "1800.0 rpm" in followed.output
+    assert "'mmm' is not a unit; did you mean 'mm'" in run("analyse", path, "--units", "mmm").output

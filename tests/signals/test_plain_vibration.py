@@ -57,6 +57,15 @@ def test_nothing_is_missing_without_a_reason():
     assert len(report.to_frame(by="channel")) == 1
 
 
+def test_short_records_of_channels_with_different_bands():
+    rng = np.random.default_rng(4)
+    x = rng.standard_normal((3000, 3))
+    x[::200, 1] += 20.0
+    report = analyse(x, rate=2000.0)
+    assert report.envelope.sizes["channel"] == 3
+    assert np.all(report.envelope["high"].values > report.envelope["low"].values)
+
+
 def pair(rate=RATE, shaft=SHAFT, teeth=32):
     t = np.arange(round(6 * rate)) / rate
     turn = 2 * np.pi * shaft * t

@@ -45,6 +45,11 @@ def test_case_file_with_units(tmp_path):
     assert again == case
 
 
+def test_case_file_with_a_byte_order_mark(tmp_path):
+    (tmp_path / "a.toml").write_text('[operation]\nspeed = "600 rpm"\n', encoding="utf-8-sig")
+    assert load_case(tmp_path / "a.toml").operation.speed == pytest.approx(62.83185307179586)
+
+
 def test_name_defaults_to_the_file(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text("[operation]\ntorque = 50.0\n")
