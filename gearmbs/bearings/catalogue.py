@@ -72,6 +72,15 @@ ALIASES = {
     "LDKUER204": "XJTU", "CWRUDRIVEEND": "CWRU drive end", "CWRUFANEND": "CWRU fan end", "MFPT": "MFPT",
     "PHM09": "PHM09", "IMS": "IMS", "XJTU": "XJTU", "SPECTRAQUEST": "SpectraQuest", "REXNORDZA2115": "IMS",
 }  # fmt: skip
+CLASSES = re.compile(r"[/\s-](CN|C[2345])(?![0-9])")
+"""Class of radial clearance in a designation."""
+CLEARANCES = (
+    (10, (0, 7), (2, 13), (8, 23), (14, 29), (20, 37)), (18, (0, 9), (3, 18), (11, 25), (18, 33), (25, 45)),
+    (24, (0, 10), (5, 20), (13, 28), (20, 36), (28, 48)), (30, (1, 11), (5, 20), (13, 28), (23, 41), (30, 53)),
+    (40, (1, 11), (6, 20), (15, 33), (28, 46), (40, 64)), (50, (1, 11), (6, 23), (18, 36), (30, 51), (45, 73)),
+    (65, (1, 15), (8, 28), (23, 43), (38, 61), (55, 90)), (80, (1, 15), (10, 30), (25, 51), (46, 71), (65, 105)),
+)  # fmt: skip
+"""Up to a bore, mm: least and largest radial clearance of the classes C2, CN, C3, C4, C5 by ISO 5753-1, um."""
 SMALL_BORES = {0: 10, 1: 12, 2: 15, 3: 17}
 
 
@@ -94,12 +103,14 @@ def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
     if series in ELEMENTS:
         z, d, pitch = ELEMENTS[series]
         found = {"elements": z, "element_diameter": 1e-3 * d, "pitch_diameter": 1e-3 * pitch}
+        found |= _clearance(designation, _boundary(series))
         return Bearing(**{**found, **_boundary(series), "designation": designation.strip(), **changes})
     boundary = _boundary(series)
     if boundary:
         if {"elements", "element_diameter"} <= changes.keys():
             middle = 0.5 * (boundary["bore"] + boundary["outside_diameter"])
             own = {"pitch_diameter": middle, **boundary, "designation": designation.strip()}
+            own |= _clearance(designation, boundary)
             return Bearing(**{**own, **changes})
         sizes = ", ".join(f"{key.replace('_', ' ')} {1e3 * value:g} mm" for key, value in boundary.items())
         raise BearingError(
@@ -112,6 +123,19 @@ def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
         f"designation {designation!r} is not in the catalogue ({', '.join(known())}); give elements=, element_diameter="
         " and pitch_diameter=, and contact_angle= if it is not 0"
     )
+
+
+def _clearance(designation: str, boundary: dict[str, float]) -> dict[str, float]:
+    """Return the mean clearance of the class that a designation names; empty without one."""
+    named = CLASSES.search(designation.upper())
+    if named is None or not boundary:
+        return {}
+    bore = 1e3 * boundary["bore"]
+    for top, *limits in CLEARANCES:
+        if bore <= top + 1e-6:
+            low, high = limits[("C2", "CN", "C3", "C4", "C5").index(named[1])]
+            return {"clearance": 0.5e-6 * (low + high)}
+    return {}
 
 
 def _boundary(series: str) -> dict[str, float]:

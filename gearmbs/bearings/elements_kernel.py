@@ -61,8 +61,48 @@ def element_sums(ints, reals, states, want, work):
             reach = reals[B.DISTANCE] - reals[at + B.ELEMENT_OVERSIZE] - reals[B.SMOOTH]
             if x * x + y * y <= reach * reach:
                 continue
+            if want == 0 and reals[B.SMOOTH] == 0.0:
+                plain_ball(reals, work, p, c, s, x, y, reach)
+                continue
         for path in range(ints[B.PATHS]):
             one_path(ints, reals, states, want, work, j, path, c, s, load)
+
+
+@njit(cache=True, error_model="numpy")
+def plain_ball(reals, work, p, c, s, x, y, reach):
+    """Add the forces of a loaded ball without profile, centrifugal load and smooth transition: what `one_path` adds.
+
+    Parameters
+    ----------
+    reals, work : ndarray
+        As in `element_sums`.
+    p : int
+        Place of the path among the reals.
+    c, s : float
+        Cosine and sine of the element's angle.
+    x, y : float
+        From the groove centre of the outer to that of the inner ring, m.
+    reach : float
+        Their distance at which the ball begins to carry, m.
+    """
+    length = np.sqrt(x * x + y * y)
+    delta, nx, ny = length - reach, x / length, y / length
+    lever = nx * reals[p + B.PATH_HEIGHT] - ny * reals[p + B.PATH_RADIUS]
+    along = nx * (work[1] * c - work[0] * s) + lever * (work[B.S_TILT + 1] * c - work[B.S_TILT] * s)
+    rate = nx * (work[B.S_V] * c + work[B.S_V + 1] * s) + ny * work[B.S_V + 2]
+    rate += lever * (work[B.S_TILT + 2] * c + work[B.S_TILT + 3] * s) + along * reals[B.CAGE] * work[B.S_W + 2]
+    factor = 1.0 + reals[B.DAMPING] * rate
+    if factor <= 0.0:
+        return
+    f = reals[B.STIFFNESS] * delta * np.sqrt(delta) * factor
+    across, turning = f * nx, f * lever
+    work[B.S_LOCAL] -= across * c
+    work[B.S_LOCAL + 1] -= across * s
+    work[B.S_LOCAL + 2] -= f * ny
+    work[B.S_LOCAL + 3] -= turning * c
+    work[B.S_LOCAL + 4] -= turning * s
+    work[B.S_LOCAL + B.PSI] -= f * along
+    work[B.S_SUMS] += f
 
 
 @njit(cache=True, error_model="numpy")

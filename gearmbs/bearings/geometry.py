@@ -149,7 +149,8 @@ class Bearing:
         Parameters
         ----------
         designation : str
-            Suffixes for seals, cages and clearance classes are understood: "6205-2RS/C3".
+            Suffixes are understood, "6205-2RS/C3"; a class of clearance, CN or C2 to C5, sets the clearance to the
+            middle of its range, without one it is 0.
         **changes
             Fields that differ, or that the catalogue does not know.
 

@@ -14,7 +14,7 @@ from gearmbs.bearings.geometry import Bearing
 from gearmbs.bearings.profiles import spline_coefficients
 from gearmbs.bearings.settings import BearingSettings
 
-TYPICAL_LOAD = 0.1
+TYPICAL_LOAD = 0.025
 """Share of the dynamic rating at which damping is given."""
 
 

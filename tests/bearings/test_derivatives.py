@@ -125,3 +125,15 @@ def test_turning_the_whole_changes_nothing():
     scale = abs(before[:3]).max()
     np.testing.assert_allclose(after[:3], turn @ before[:3], atol=1e-7 * scale)
     np.testing.assert_allclose(after[3:6], turn @ before[3:6], atol=1e-7 * abs(before[3:6]).max())
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_values_alone_are_the_same(name):
+    """Without derivatives or diagnostics a shorter way through the kernel is taken."""
+    bearing, settings = CASES[name]
+    probe = Probe(bearing, **settings)
+    rng = np.random.default_rng(11)
+    for _ in range(5):
+        probe.shaken(rng, 2e-5, 3e-4, 300.0)
+        full = probe()[0]
+        np.testing.assert_allclose(probe(want=0)[0], full, rtol=1e-12, atol=1e-12 * abs(full[:3]).max())

@@ -104,6 +104,13 @@ def test_suffixes(text):
     assert (bearing.bore, bearing.outside_diameter, bearing.width) == pytest.approx((0.025, 0.052, 0.015))
 
 
+@pytest.mark.parametrize(
+    ("text", "clearance"), [("6205", 0.0), ("6205/CN", 12.5e-6), ("6205-2RS C3", 20.5e-6), ("6310/C4", 40.5e-6)]
+)
+def test_class_of_clearance(text, clearance):
+    assert Bearing.from_designation(text).clearance == pytest.approx(clearance)
+
+
 def test_an_uncertain_bearing_asks():
     with pytest.raises(BearingError, match=r"bore 25 mm, outside diameter 62 mm, width 17 mm, but how many balls"):
         Bearing.from_designation("6305")
