@@ -6,6 +6,7 @@ from gearmbs._lazy import late
 
 if TYPE_CHECKING:
     from gearmbs.signals.simulated import record_signal
+    from gearmbs.studies.bearing_rig import bearing_rig, housing_signal, rolling_rig
     from gearmbs.studies.bench import BenchSettings, bench_choices, bench_train
     from gearmbs.studies.bench_study import BenchStudy, run_bench
     from gearmbs.studies.case import Case, CaseError, CaseWarning, load_case, make_case
@@ -31,15 +32,18 @@ __all__ = [
     "SimulationFailed",
     "SimulationInterrupted",
     "Sweep",
+    "bearing_rig",
     "bench_choices",
     "bench_train",
     "flexible_rig",
     "gear_rig",
+    "housing_signal",
     "load_case",
     "load_train",
     "make_case",
     "paper_cases",
     "record_signal",
+    "rolling_rig",
     "run_bench",
     "run_case",
     "run_cases",
@@ -73,12 +77,15 @@ late(
         "SimulationFailed": ".simulation",
         "SimulationInterrupted": ".simulation",
         "Sweep": ".sweep",
+        "bearing_rig": ".bearing_rig",
         "flexible_rig": ".flexible_rig",
         "gear_rig": ".rig",
+        "housing_signal": ".bearing_rig",
         "load_case": ".case",
         "make_case": ".case",
         "paper_cases": ".preset",
         "record_signal": "gearmbs.signals.simulated",
+        "rolling_rig": ".bearing_rig",
         "run_case": ".simulation",
         "run_cases": ".parallel",
         "run_paper": ".paper",
