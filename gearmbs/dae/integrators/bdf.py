@@ -154,7 +154,7 @@ def step_for_error(h, nodes, k, difference, target):
     trial = h
     for _ in range(STEP_SEARCH_SWEEPS):
         e = local_error(trial, nodes, k, difference)
-        if e <= target * MAX_STEP_RATIO ** -(k + 1.0):
+        if e * MAX_STEP_RATIO ** (k + 1) <= target:
             trial *= MAX_STEP_RATIO
         else:
             power = k + 1.0

@@ -22,6 +22,9 @@ MOST_RECORDS = 8192
 EVENT_BUFFER = 64
 RATE_ALLOWED = 0.12
 RATE_ALLOWED_IF_DEAR = 0.2
+DRIFT_ALLOWED = 0.2
+DRIFT_ALLOWED_AT_KINKS = 0.3
+"""Larger where steps change so often that factors serve but a few of them."""
 DEAR = 12
 """Residuals from which on a matrix is dear, and worth its price only at slower rates of the corrector."""
 
@@ -70,6 +73,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.rtol = options.rtol
     st.newton_tolerance = NEWTON_TOLERANCE
     st.rate_allowed = RATE_ALLOWED_IF_DEAR if problem.jacobian_residuals >= DEAR else RATE_ALLOWED
+    st.drift_allowed = DRIFT_ALLOWED_AT_KINKS if problem.kinks else DRIFT_ALLOWED
     st.max_order = options.highest_order if options.max_order is None else options.max_order
     st.max_iterations = MAX_ITERATIONS if options.max_iterations is None else options.max_iterations
     st.max_steps = options.max_steps or 0

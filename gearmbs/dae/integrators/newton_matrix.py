@@ -6,7 +6,6 @@ from gearmbs._jit import njit
 from gearmbs.dae.integrators.run_state import REPIVOT, RUNNING
 from gearmbs.dae.linalg.sparse_lu import factor
 
-GAMMA_DRIFT = 0.2
 MATRIX_MAX_AGE = 50
 SLOPE_MAX_AGE = 20
 RATE_OF_FRESH = 0.1
@@ -55,7 +54,7 @@ def form_matrix(functions, st, plan, factors):
     drift = st.gamma / st.gamma_factored
     whole_again = st.drop_level > 0 and st.drop_age >= DROPPED_STEPS
     wanted = st.matrix_wanted or st.matrix_age >= MATRIX_MAX_AGE or whole_again
-    if not (wanted or drift > 1.0 + GAMMA_DRIFT or drift < 1.0 / (1.0 + GAMMA_DRIFT)):
+    if not (wanted or drift > 1.0 + st.drift_allowed or drift < 1.0 / (1.0 + st.drift_allowed)):
         return RUNNING
     if wanted:
         st.matrix_wanted = True

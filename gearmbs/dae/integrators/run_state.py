@@ -132,6 +132,7 @@ class RunState(Struct):
     growth_limit: float  # growth of its factors beyond which pivots are chosen anew
     rate: float  # of convergence of the corrector, as last seen
     rate_allowed: float  # beyond which the matrix is evaluated anew for the next step
+    drift_allowed: float  # of gamma, relative to the one it was factored for, beyond which it is factored anew
     drop_level: int  # how large pivots may be to be left out near a singular position
     drop_age: int
     drop_rounds: int
