@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -108,6 +109,14 @@ class Model:
     frame_body: tuple[int, ...] = ()
     shape_at: tuple[int, ...] = ()
     names: Names = field(default_factory=Names)
+
+    @cached_property
+    def rows_of_joint(self) -> dict[str, list[int]]:
+        """Numbers of the constraint rows of each joint, by its name."""
+        found: dict[str, list[int]] = {}
+        for k, name in enumerate(self.names.rows):
+            found.setdefault(name.rsplit(": ", 1)[0], []).append(k)
+        return found
 
     @property
     def counts(self) -> Counts:

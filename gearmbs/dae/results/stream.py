@@ -49,7 +49,7 @@ class Stream:
         nothing = np.empty((0, problem.n))
         result = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "")
         self.whole = Solution(system, problem, result, members)
-        self.whole.share(PART_SIZE)
+        self.whole.share(2 * PART_SIZE)
         self.consumer = consumer
         self.conflict: str | None = None
         self.interval = (t_end - problem.t0) / CONFLICT_SAMPLES
@@ -57,8 +57,10 @@ class Stream:
 
     def __call__(self, t: np.ndarray, y: np.ndarray, idata: np.ndarray) -> None:
         """Hand on accepted steps and the integer table that is valid for them."""
-        for k in range(0, t.size, PART_SIZE):
-            part = self.whole.over(t[k : k + PART_SIZE], y[k : k + PART_SIZE], [(0, idata)])
+        # in equal parts: a small rest would cost as much beside its evaluation as a full part
+        size = -(-t.size // max(1, round(t.size / PART_SIZE)))
+        for k in range(0, t.size, size):
+            part = self.whole.over(t[k : k + size], y[k : k + size], [(0, idata)])
             if self.conflict is None and part.t[-1] >= self.next_look:
                 self.next_look = float(part.t[-1]) + self.interval
                 self.conflict = part.find_conflict(np.array([part.t.size - 1]))
