@@ -13,6 +13,7 @@ from gearmbs.dae.analyses import quasi_static as _sequence
 from gearmbs.dae.analyses import statics as _statics
 from gearmbs.dae.analyses.modes import Modes
 from gearmbs.dae.analyses.statics import StaticResult
+from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.modal import ModalBody
 
@@ -82,14 +83,14 @@ def place(mechanism: Mechanism, equilibrium: StaticResult) -> None:
     if list(mechanism.bodies) != list(equilibrium.body_names):
         raise ModelError(f"the equilibrium is not one of mechanism '{mechanism.name}': its bodies differ")
     for row, body in zip(equilibrium.pose, mechanism.bodies.values()):
-        axes = row[3:12].reshape(3, 3).copy()
+        axes = row[POSE_A:POSE_V].reshape(3, 3).copy()
         body.orientation = axes
         arm = body.com
         if isinstance(body, ModalBody):
             body.start = equilibrium.solution.modal_coordinates(body.name)[0].copy()
             body.rate = np.zeros_like(body.start)
             arm = arm + body.start @ body.mean
-        body.position = row[0:3] - axes @ arm
+        body.position = row[POSE_R:POSE_A] - axes @ arm
         body.velocity, body.angular_velocity = np.zeros(3), np.zeros(3)
     states = equilibrium.solution.result.y[0]
     own = mechanism.every_state

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.adams.builders.model import AdamsModel, BodyState
+from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.mechanism.functions import polynomial
 
 
@@ -29,9 +30,9 @@ def part_states(model: AdamsModel, pose: np.ndarray) -> dict[int, BodyState]:
     """Return the parts' states from R, A, v, omega of their centres of mass."""
     found = {}
     for row, (name, body) in zip(pose, model.mechanism.bodies.items()):
-        axes = row[3:12].reshape(3, 3)
+        axes = row[POSE_A:POSE_V].reshape(3, 3)
         arm = axes @ body.com
-        spin = row[15:18].copy()
+        spin = row[POSE_W:POSE_COLUMNS].copy()
         number = model.sources[name].id
-        found[number] = BodyState(row[0:3] - arm, axes.copy(), row[12:15] - np.cross(spin, arm), spin)
+        found[number] = BodyState(row[POSE_R:POSE_A] - arm, axes.copy(), row[POSE_V:POSE_W] - np.cross(spin, arm), spin)
     return found

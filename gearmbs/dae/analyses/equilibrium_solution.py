@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearmbs.dae.analyses.linearised import Instant
-from gearmbs.dae.equations import accelerations
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations import output_records
 from gearmbs.dae.equations.counted_angles import AXES
 from gearmbs.dae.model.evaluator import Records
 from gearmbs.dae.model.system import System
@@ -97,7 +97,7 @@ class EquilibriumSolution(Solution):
             records.multipliers[k] = y[lam : lam + rows]
             records.phi[k] = 0.0
             records.by_row[k, :, 0] = out[lam : lam + rows]
-            accelerations.joint_loads(y, idata, row.rdata, work, multipliers, records.force[k], records.moment[k])
+            output_records.joint_loads(y, idata, row.rdata, work, multipliers, records.force[k], records.moment[k])
             table = idata[int(idata[T.H_I_FORCE]) : int(idata[T.H_I_FUNCTION])].reshape(-1, T.FORCE_COLUMNS)
             for f, force in enumerate(table):
                 for column, first in ((T.FORCE_F, 0), (T.FORCE_N, 3)):

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.linalg import qr, solve_triangular
 from scipy.sparse import csc_array
 
-from gearmbs.dae.equations import accelerations
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations import output_records
 from gearmbs.dae.equations.rotation import KIN_AXES, POSE_COLUMNS
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.model.configuration import Configuration
@@ -94,7 +94,7 @@ class Instant:
         """Return the positions and velocities of y."""
         counts = self.system.model.counts
         out = np.zeros(POSE_COLUMNS * counts.bodies + 2 * sum(counts.modes))
-        accelerations.pose_record(self.y, self.idata, self.rdata, self.work, out)
+        output_records.pose_record(self.y, self.idata, self.rdata, self.work, out)
         return Configuration.of(out, counts.bodies)
 
     def axes(self) -> np.ndarray:

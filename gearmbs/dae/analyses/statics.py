@@ -24,6 +24,7 @@ from gearmbs.dae.analyses.eigenvalues import free_motions
 from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution, Snapshot
 from gearmbs.dae.analyses.linearised import Instant, reduce
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
 
 if TYPE_CHECKING:
@@ -78,13 +79,13 @@ class StaticResult:
 
     def com_position(self, body: str) -> np.ndarray:
         """Return the position of the centre of mass of a body, shape (3,), m, global."""
-        return self.pose[self._index(body), 0:3]
+        return self.pose[self._index(body), POSE_R:POSE_A]
 
     position = former_name("position", com_position, "it is the centre of mass; write com_position")
 
     def orientation(self, body: str) -> np.ndarray:
         """Return the rotation matrix of a body, shape (3, 3)."""
-        return self.pose[self._index(body), 3:12].reshape(3, 3)
+        return self.pose[self._index(body), POSE_A:POSE_V].reshape(3, 3)
 
     def table(self) -> str:
         """Return the equilibrium as text: how good and stable it is, where the bodies are, what joints carry."""
@@ -348,7 +349,7 @@ def _result(instant: Instant, iterations: int, size: float) -> StaticResult:
     solution = EquilibriumSolution.of(
         [Snapshot.of(instant)], f"static equilibrium found in {iterations} iterations", iterations
     )
-    joints = dict.fromkeys(name.rsplit(": ", 1)[0] for name in system.row_names)
+    joints = system.model.rows_of_joint
     reactions = {joint: (solution.reaction(joint)[0][0], solution.reaction(joint)[1][0]) for joint in joints}
     loads = {name: (solution.load(name)[0][0], solution.load(name)[1][0]) for name in system.force_names}
     neutral: list[str] = []

@@ -25,7 +25,7 @@ from gearmbs.dae.equations.elastic import (
     touches_elastic,
     wrench_at,
 )
-from gearmbs.dae.equations.entries import NUMBERS, put, put_pair
+from gearmbs.dae.equations.entries import NUMBERS, add_number, put, put_pair
 from gearmbs.dae.equations.force_elements import DIAGNOSTICS
 from gearmbs.dae.equations.forces import evaluate_element
 from gearmbs.dae.equations.modal_inertia import modal_acceleration_terms
@@ -34,16 +34,8 @@ from gearmbs.dae.equations.rotation import (
     KIN_A,
     KIN_ADOT,
     KIN_H,
-    KIN_R,
     KIN_V,
     KIN_W,
-    POSE_A,
-    POSE_COLUMNS,
-    POSE_R,
-    POSE_V,
-    POSE_W,
-    axes_and_velocity,
-    euler_rates,
     momentum_from_conjugate,
 )
 from gearmbs.dae.equations.simple_terms import (
@@ -56,10 +48,13 @@ from gearmbs.dae.equations.simple_terms import (
     put_point,
     relative_motion,
 )
-from gearmbs.dae.equations.update import update_bodies
 
 FORCE_RECORD = 6
 """Per force element: F, N, then its diagnostics."""
+
+ROW_PHI, ROW_RATE, ROW_PARTIAL = range(3)
+ROW_RECORD = 3
+"""Per constraint row: Phi, Phi_q v + Phi_t, Phi_t."""
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -135,42 +130,50 @@ def tape_row_rates(k, t, y, tab, room):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
+def packed(c, d):
+    """Return the place of element (c, d) of a symmetric matrix stored as xx, yy, zz, xy, xz, yz."""
+    return c if c == d else c + d + 2
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def world_inertia(kin_row, body_row, out):
-    """Write the inertia about the centre of mass in global components, symmetric: xx, yy, zz, xy, xz, yz."""
+    """Write the inertia about the centre of mass, global components, to six places, `packed`; nine more are scratch."""
+    half = 6
     for c in range(3):
         for d in range(3):
             total = 0.0
             for e in range(3):
                 total += kin_row[KIN_A + 3 * c + e] * body_row[T.BODY_INERTIA + 3 * e + d]
-            out[6 + 3 * c + d] = total
+            out[half + 3 * c + d] = total
     for c in range(3):
-        d = c + 1 if c < 2 else 0
-        own, mixed = 0.0, 0.0
-        for e in range(3):
-            own += out[6 + 3 * c + e] * kin_row[KIN_A + 3 * c + e]
-            mixed += out[6 + 3 * c + e] * kin_row[KIN_A + 3 * d + e]
-        out[c] = own
-        # xy, yz, zx
-        out[3 if c == 0 else 5 if c == 1 else 4] = mixed
+        for d in range(c, 3):
+            total = 0.0
+            for e in range(3):
+                total += out[half + 3 * c + e] * kin_row[KIN_A + 3 * d + e]
+            out[packed(c, d)] = total
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def put_inertia(mode, slot, vals, k, i, mass, j):
-    """Hand over the mass matrix of a body whose coordinates begin at i; return the number of the next entry."""
-    if mode == NUMBERS:
-        for c in range(3):
-            vals[slot[k + 4 * c]] += mass
-        vals[slot[k + 1]] += j[0]
-        vals[slot[k + 2]] += j[3]
-        vals[slot[k + 3]] += j[4]
-        vals[slot[k + 5]] += j[3]
-        vals[slot[k + 6]] += j[1]
-        vals[slot[k + 7]] += j[5]
-        vals[slot[k + 9]] += j[4]
-        vals[slot[k + 10]] += j[5]
-        vals[slot[k + 11]] += j[2]
-        return k + 12
+    """Hand over the mass matrix of a body whose coordinates begin at i; return the number of the next entry.
+
+    Parameters
+    ----------
+    mode, slot, vals, k
+        As of `gearmbs.dae.equations.entries.put`.
+    i : int
+        Place of the body's first coordinate.
+    mass : float
+        kg.
+    j : ndarray
+        Inertia of `world_inertia`, kg m^2.
+    """
     for c in range(3):
+        if mode == NUMBERS:
+            k = add_number(slot, vals, k, mass)
+            for d in range(3):
+                k = add_number(slot, vals, k, j[packed(min(c, d), max(c, d))])
+            continue
         k = put(mode, slot, vals, k, i + c, i + c, mass)
         for d in range(3):
             k = put(mode, slot, vals, k, i + 3 + d, i + 3 + c, mass)
@@ -203,6 +206,194 @@ def put_modal_body(mode, slot, vals, k, y, at, modal, partial, kin_row, rhs):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
+def put_bodies(slot, vals, y, rhs, idata, tab):
+    """Hand over the mass matrices, and write weights and gyroscopic moments to ``rhs``; return the next entry's number.
+
+    Parameters are those of `saddle`.
+    """
+    s = vector_at(tab.scratch, S_TERM, 100)
+    k = np.int64(0)
+    for b in range(1, idata[T.H_BODIES]):
+        kin = tab.kin[b]
+        i = tab.at[b, T.AT_V]
+        mass = tab.body[b, T.BODY_MASS]
+        for c in range(3):
+            rhs[i + c] = mass * tab.gravity[c]
+        world_inertia(kin, tab.body[b], s)
+        k = put_inertia(idata[T.H_MODE], slot, vals, k, i, mass, s)
+        terms.cross3(kin, KIN_H, kin, KIN_W, rhs, i + 3)
+        if tab.at[b, T.AT_MODES] > 0:
+            k = put_modal_body(idata[T.H_MODE], slot, vals, k, y, tab.at[b], tab.modal, tab.partial, kin, rhs)
+    return k
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def put_term(slot, vals, k, row, j, idata, tab):
+    """Hand over the gradient of a term of any type.
+
+    Parameters
+    ----------
+    slot, vals, k
+        As of `gearmbs.dae.equations.entries.put`, with the mode from the header.
+    row : int
+        Row of the matrix.
+    j : int
+        The term.
+    idata, tab : ndarray of int, Tables
+
+    Returns
+    -------
+    k : int
+        Number of the next entry.
+    value, rate, partial, gamma : float
+        Phi, its rate, its partial time derivative and its second rate without the terms in accelerations, times the
+        term's coefficient.
+    """
+    g = vector_at(tab.scratch, S_GRADIENT, 12)
+    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
+    s = vector_at(tab.scratch, S_TERM, 100)
+    mode, coef = idata[T.H_MODE], tab.coef[j]
+    phi, partial = terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
+    rate = partial
+    gamma = terms.quadratic_part(j, tab.term, tab.fval, tab.marker_body, tab.kin, tab.frame, s)
+    for side in range(2):
+        b = tab.marker_body[tab.term[j, T.TERM_I + side]]
+        if b == 0:
+            continue
+        h, q = 6 * side, tab.at[b, T.AT_V]
+        kin = tab.kin[b]
+        rate += terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W)
+        if is_elastic(b, tab.at):
+            gamma += bias_rate(b, g, h, tab.at, tab.partial)
+            k = put_spatial(mode, slot, vals, k, row, b, g, h, coef, tab.at, tab.kin, tab.partial)
+            continue
+        for c in range(6):
+            k = put_pair(mode, slot, vals, k, row, q + c, coef * g[h + c])
+    return k, coef * phi, coef * rate, coef * partial, coef * gamma
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def put_tape_row(slot, vals, k, row, number, t, y, idata, tab):
+    """Hand over the gradient of the expression of a constraint row; parameters and results as of `put_term`.
+
+    Parameters
+    ----------
+    slot, vals, k, row
+        As of `put_term`.
+    number : int
+        Number of the expression's tape.
+    t, y : float, ndarray
+        Time, s, and the unknowns.
+    idata, tab : ndarray of int, Tables
+    """
+    tape = tab.tape[number]
+    n = 6 * tape[T.TAPE_N_BODIES] + 1
+    room = expression_loads.tail(tab, n * (n + 1))
+    value, rate, partial, gamma = tape_row_rates(number, t, y, tab, room)
+    mode = idata[T.H_MODE]
+    for b in range(tape[T.TAPE_N_BODIES]):
+        f = tab.extra_i[tape[T.TAPE_BODIES] + b]
+        if is_elastic(f, tab.at):
+            k = put_spatial(mode, slot, vals, k, row, f, room, 6 * b, 1.0, tab.at, tab.kin, tab.partial)
+            continue
+        q = tab.at[f, T.AT_V]
+        for c in range(6):
+            k = put_pair(mode, slot, vals, k, row, q + c, room[6 * b + c])
+    return k, value, rate, partial, gamma
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def put_rows(slot, vals, k, t, y, rhs, phi, idata, tab):
+    """Hand over the gradients of the constraint rows, fill ``phi``, and write -gamma to ``rhs``.
+
+    Returns the number of the next entry.
+
+    Parameters
+    ----------
+    slot, vals, k
+        As of `gearmbs.dae.equations.entries.put`, with the mode from the header.
+    t, y, rhs, phi, idata, tab
+        As of `saddle`.
+    """
+    mode, base, bodies = idata[T.H_MODE], idata[T.H_COORDINATES], idata[T.H_BODIES]
+    frames_are_elastic = idata[T.H_FRAMES] > bodies
+    s = vector_at(tab.scratch, S_TERM, 100)
+    apart = vector_at(tab.scratch, S_VECTOR, RELATIVE)
+    last_i = last_j = np.int64(-1)
+    for r in range(idata[T.H_ROWS]):
+        value, rate, partial, gamma = 0.0, 0.0, 0.0, 0.0
+        if tab.row[r, T.ROW_FUNCTION] >= 0:
+            fun = tab.row[r, T.ROW_FUNCTION]
+            f, f1, f2 = tab.fval[fun, 0], tab.fval[fun, 1], tab.fval[fun, 2]
+            value, rate, partial, gamma = -f, -f1, -f1, -f2
+        for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
+            coef = tab.coef[j]
+            kind = tab.term[j, T.TERM_TYPE]
+            elastic = frames_are_elastic and touches_elastic(tab.term[j], tab.marker_body, bodies)
+            if elastic or (kind != terms.POINT and kind != terms.DOT1):
+                k, p, d, p_t, q2 = put_term(slot, vals, k, base + r, j, idata, tab)
+                value, rate, partial, gamma = value + p, rate + d, partial + p_t, gamma + q2
+                continue
+            if kind == terms.POINT:
+                # the rows of a joint share their markers
+                if tab.term[j, T.TERM_I] != last_i or tab.term[j, T.TERM_J] != last_j:
+                    last_i, last_j = tab.term[j, T.TERM_I], tab.term[j, T.TERM_J]
+                    relative_motion(last_i, last_j, tab.marker_body, tab.kin, tab.frame, apart)
+                c = tab.term[j, T.TERM_AXES]
+                p, d, q2 = apart[OFFSET + c], apart[RATE + c], apart[QUADRATIC + c]
+                k = put_point(mode, slot, vals, k, base + r, coef, tab.term[j], tab.at, tab.marker_body, tab.frame)
+            else:
+                p, d, q2 = dot_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame, s)
+                k = put_dot(mode, slot, vals, k, base + r, coef, tab.term[j], tab.at, tab.marker_body, s)
+            value += coef * p
+            rate += coef * d
+            gamma += coef * q2
+        if tab.row[r, T.ROW_TAPE] >= 0:
+            k, p, d, p_t, q2 = put_tape_row(slot, vals, k, base + r, tab.row[r, T.ROW_TAPE], t, y, idata, tab)
+            value, rate, partial, gamma = value + p, rate + d, partial + p_t, gamma + q2
+        rhs[base + r] = -gamma
+        phi[ROW_RECORD * r + ROW_PHI] = value
+        phi[ROW_RECORD * r + ROW_RATE] = rate
+        phi[ROW_RECORD * r + ROW_PARTIAL] = partial
+    return k
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def apply_loads(t, y, rhs, loads, idata, tab):
+    """Evaluate all force elements, record them in ``loads`` and add them to ``rhs``; parameters as of `saddle`."""
+    for f in range(idata[T.H_FORCES]):
+        row = tab.force[f]
+        wrench = vector_at(tab.scratch, S_WRENCH, 6)
+        if row[T.FORCE_KIND] == T.REACTION:
+            # it follows from the multipliers that this system is solved for; the integrator's is at hand
+            for c in range(3):
+                loads[f, c], loads[f, 3 + c] = y[row[T.FORCE_F] + c], y[row[T.FORCE_N] + c]
+            continue
+        if row[T.FORCE_KIND] == T.COMPILED:
+            if row[T.FORCE_PART] == 0:
+                evaluate_element(row, t, y, tab, np.int64(DIAGNOSTICS))
+                first = row[T.FORCE_WORK] + 6 * row[T.FORCE_WRENCHES] + row[T.FORCE_STATES]
+                for c in range(row[T.FORCE_DIAGNOSTICS]):
+                    loads[f, FORCE_RECORD + c] = tab.scratch[first + c]
+            wrench = vector_at(tab.scratch, row[T.FORCE_WORK] + 6 * row[T.FORCE_PART], 6)
+            for c in range(3):
+                # what the kernel wrote for unknowns that it does not have
+                wrench[c] = wrench[c] if row[T.FORCE_F] >= 0 else 0.0
+                wrench[3 + c] = wrench[3 + c] if row[T.FORCE_N] >= 0 else 0.0
+        else:
+            jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, row[T.FORCE_WIDTH])
+            expression_loads.load(row, t, y, tab, wrench, jac, np.int64(0))
+        for c in range(6):
+            loads[f, c] = wrench[c]
+        for side in range(2):
+            b = tab.marker_body[row[T.FORCE_I + side]]
+            apply_load(
+                b, 1.0 - 2.0 * side, row, wrench, tab.at, tab.marker_body, tab.kin, tab.frame, tab.partial,
+                tab.scratch, rhs,
+            )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
     """Assemble the saddle-point matrix (by slots) and right-hand side; return the number of entries.
 
@@ -217,7 +408,7 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
         As in `gearmbs.dae.equations.entries.put`, with the mode from the header of ``idata``; numbers are added up.
     rhs : ndarray, shape (coordinates + rows,)
         Written: generalised forces, then -gamma of each row.
-    phi : ndarray, shape (3 rows,)
+    phi : ndarray, shape (ROW_RECORD rows,)
         Written: Phi, Phi_q v + Phi_t and Phi_t of each row in turn.
     loads : ndarray, shape (elements, FORCE_RECORD + diagnostics)
         Written if the loads are wanted: F, N and diagnostics of each force element; need not be cleared.
@@ -227,123 +418,12 @@ def saddle(t, y, slot, vals, rhs, phi, loads, idata, tab, with_loads):
     with_loads : bool
         Whether the right-hand side includes the applied forces, which a projection does not need.
     """
-    mode = idata[T.H_MODE]
-    bodies, rows = idata[T.H_BODIES], idata[T.H_ROWS]
-    base = idata[T.H_COORDINATES]
-    frames_are_elastic = idata[T.H_FRAMES] > bodies
-    s = vector_at(tab.scratch, S_TERM, 100)
     for c in range(rhs.size):
         rhs[c] = 0.0
-    k = np.int64(0)
-    for b in range(1, bodies):
-        kin = tab.kin[b]
-        i = tab.at[b, T.AT_V]
-        mass = tab.body[b, T.BODY_MASS]
-        for c in range(3):
-            rhs[i + c] = mass * tab.gravity[c]
-        world_inertia(kin, tab.body[b], s)
-        k = put_inertia(mode, slot, vals, k, i, mass, s)
-        terms.cross3(kin, KIN_H, kin, KIN_W, rhs, i + 3)
-        if tab.at[b, T.AT_MODES] > 0:
-            k = put_modal_body(mode, slot, vals, k, y, tab.at[b], tab.modal, tab.partial, kin, rhs)
-    g = vector_at(tab.scratch, S_GRADIENT, 12)
-    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
-    apart = vector_at(tab.scratch, S_VECTOR, RELATIVE)
-    last_i = last_j = np.int64(-1)
-    for r in range(rows):
-        value, rate, partial, gamma = 0.0, 0.0, 0.0, 0.0
-        if tab.row[r, T.ROW_FUNCTION] >= 0:
-            fun = tab.row[r, T.ROW_FUNCTION]
-            f, f1, f2 = tab.fval[fun, 0], tab.fval[fun, 1], tab.fval[fun, 2]
-            value, rate, partial, gamma = -f, -f1, -f1, -f2
-        for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
-            coef = tab.coef[j]
-            kind = tab.term[j, T.TERM_TYPE]
-            elastic = frames_are_elastic and touches_elastic(tab.term[j], tab.marker_body, bodies)
-            if (kind == terms.POINT or kind == terms.DOT1) and not elastic:
-                if kind == terms.POINT:
-                    # the rows of a joint share their markers
-                    if tab.term[j, T.TERM_I] != last_i or tab.term[j, T.TERM_J] != last_j:
-                        last_i, last_j = tab.term[j, T.TERM_I], tab.term[j, T.TERM_J]
-                        relative_motion(last_i, last_j, tab.marker_body, tab.kin, tab.frame, apart)
-                    c = tab.term[j, T.TERM_AXES]
-                    p, d, q2 = apart[OFFSET + c], apart[RATE + c], apart[QUADRATIC + c]
-                    k = put_point(mode, slot, vals, k, base + r, coef, tab.term[j], tab.at, tab.marker_body, tab.frame)
-                else:
-                    p, d, q2 = dot_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame, s)
-                    k = put_dot(mode, slot, vals, k, base + r, coef, tab.term[j], tab.at, tab.marker_body, s)
-                value += coef * p
-                rate += coef * d
-                gamma += coef * q2
-                continue
-            p, p_t = terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
-            value += coef * p
-            rate += coef * p_t
-            partial += coef * p_t
-            gamma += coef * terms.quadratic_part(j, tab.term, tab.fval, tab.marker_body, tab.kin, tab.frame, s)
-            for side in range(2):
-                b = tab.marker_body[tab.term[j, T.TERM_I + side]]
-                if b == 0:
-                    continue
-                h, q = 6 * side, tab.at[b, T.AT_V]
-                kin = tab.kin[b]
-                rate += coef * (terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W))
-                if is_elastic(b, tab.at):
-                    gamma += coef * bias_rate(b, g, h, tab.at, tab.partial)
-                    k = put_spatial(mode, slot, vals, k, base + r, b, g, h, coef, tab.at, tab.kin, tab.partial)
-                    continue
-                for c in range(6):
-                    k = put_pair(mode, slot, vals, k, base + r, q + c, coef * g[h + c])
-        if tab.row[r, T.ROW_TAPE] >= 0:
-            tape = tab.tape[tab.row[r, T.ROW_TAPE]]
-            n = 6 * tape[T.TAPE_N_BODIES] + 1
-            room = expression_loads.tail(tab, n * (n + 1))
-            v, d, p, q2 = tape_row_rates(tab.row[r, T.ROW_TAPE], t, y, tab, room)
-            value += v
-            rate += d
-            partial += p
-            gamma += q2
-            for b in range(tape[T.TAPE_N_BODIES]):
-                f = tab.extra_i[tape[T.TAPE_BODIES] + b]
-                if is_elastic(f, tab.at):
-                    k = put_spatial(mode, slot, vals, k, base + r, f, room, 6 * b, 1.0, tab.at, tab.kin, tab.partial)
-                    continue
-                q = tab.at[f, T.AT_V]
-                for c in range(6):
-                    k = put_pair(mode, slot, vals, k, base + r, q + c, room[6 * b + c])
-        rhs[base + r] = -gamma
-        phi[3 * r], phi[3 * r + 1], phi[3 * r + 2] = value, rate, partial
-    if mode == NUMBERS and with_loads:
-        for f in range(idata[T.H_FORCES]):
-            row = tab.force[f]
-            wrench = vector_at(tab.scratch, S_WRENCH, 6)
-            if row[T.FORCE_KIND] == T.REACTION:
-                # it follows from the multipliers that this system is solved for; the integrator's is at hand
-                for c in range(3):
-                    loads[f, c], loads[f, 3 + c] = y[row[T.FORCE_F] + c], y[row[T.FORCE_N] + c]
-                continue
-            if row[T.FORCE_KIND] == T.COMPILED:
-                if row[T.FORCE_PART] == 0:
-                    evaluate_element(row, t, y, tab, np.int64(DIAGNOSTICS))
-                    first = row[T.FORCE_WORK] + 6 * row[T.FORCE_WRENCHES] + row[T.FORCE_STATES]
-                    for c in range(row[T.FORCE_DIAGNOSTICS]):
-                        loads[f, FORCE_RECORD + c] = tab.scratch[first + c]
-                wrench = vector_at(tab.scratch, row[T.FORCE_WORK] + 6 * row[T.FORCE_PART], 6)
-                for c in range(3):
-                    # what the kernel wrote for unknowns that it does not have
-                    wrench[c] = wrench[c] if row[T.FORCE_F] >= 0 else 0.0
-                    wrench[3 + c] = wrench[3 + c] if row[T.FORCE_N] >= 0 else 0.0
-            else:
-                jac = matrix_at(tab.scratch, T.SCRATCH_FIXED, 6, row[T.FORCE_WIDTH])
-                expression_loads.load(row, t, y, tab, wrench, jac, np.int64(0))
-            for c in range(6):
-                loads[f, c] = wrench[c]
-            for side in range(2):
-                b = tab.marker_body[row[T.FORCE_I + side]]
-                apply_load(
-                    b, 1.0 - 2.0 * side, row, wrench, tab.at, tab.marker_body, tab.kin, tab.frame, tab.partial,
-                    tab.scratch, rhs,
-                )  # fmt: skip
+    k = put_bodies(slot, vals, y, rhs, idata, tab)
+    k = put_rows(slot, vals, k, t, y, rhs, phi, idata, tab)
+    if idata[T.H_MODE] == NUMBERS and with_loads:
+        apply_loads(t, y, rhs, loads, idata, tab)
     return k
 
 
@@ -354,160 +434,3 @@ def has_reactions(tab):
     for f in range(tab.force.shape[0]):
         found |= tab.force[f, T.FORCE_KIND] == T.REACTION
     return found
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def loads_of_rows(multipliers, idata, tab, force, moment):
-    """Write the reaction of each constraint row on I's body: force, and moment about the origin of marker I, global.
-
-    The kinematics tables must be up to date. Of a row that couples several joints, the part that acts through the
-    first one's marker I.
-    """
-    g = vector_at(tab.scratch, S_GRADIENT, 12)
-    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
-    s = vector_at(tab.scratch, S_TERM, 100)
-    for r in range(idata[T.H_ROWS]):
-        for c in range(3):
-            force[r, c] = 0.0
-            moment[r, c] = 0.0
-        lam = multipliers[r]
-        first, last = tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]
-        for j in range(first, last):
-            if tab.term[j, T.TERM_I] != tab.term[first, T.TERM_I]:
-                continue
-            factor = -lam * tab.coef[j]
-            kind = tab.term[j, T.TERM_TYPE]
-            if kind == terms.POINT:
-                force[r, tab.term[j, T.TERM_AXES]] += factor
-                continue
-            if kind == terms.DOT1:
-                a, b = tab.term[j, T.TERM_AXES] // 3, tab.term[j, T.TERM_AXES] % 3
-                i_row, j_row = tab.frame[tab.term[j, T.TERM_I]], tab.frame[tab.term[j, T.TERM_J]]
-                terms.cross3(i_row, T.MK_AXES + 3 * a, j_row, T.MK_AXES + 3 * b, s, 0)
-                for c in range(3):
-                    moment[r, c] += factor * s[c]
-                continue
-            terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
-            for c in range(3):
-                s[c] = factor * g[c]
-                force[r, c] += s[c]
-            terms.cross3(tab.frame[tab.term[j, T.TERM_I]], T.MK_ARM, s, 0, s, 3)
-            for c in range(3):
-                moment[r, c] += factor * g[3 + c] - s[3 + c]
-
-
-@njit(
-    "void(float64[::1], int64[::1], float64[::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])",
-    cache=True,
-    error_model="numpy",
-)
-def joint_loads(y, idata, rdata, work, multipliers, force, moment):
-    """Write the loads of `loads_of_rows`; ``multipliers[0]`` holds lambda."""
-    loads_of_rows(multipliers[0], idata, T.unpack(idata, rdata, work), force, moment)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def poses(y, at, code, kin, out):
-    """Write R, A (row-major), v, omega of each body (18 values, the ground left out) from an up-to-date table.
-
-    The modal coordinates and their velocities come last.
-    """
-    bodies = code.size
-    for b in range(1, bodies):
-        modes, first = at[b, T.AT_MODES], at[b, T.AT_V_MODES] - 6 * (bodies - 1)
-        half = (out.size - POSE_COLUMNS * (bodies - 1)) // 2
-        for m in range(modes):
-            place = POSE_COLUMNS * (bodies - 1) + first + m
-            out[place] = y[at[b, T.AT_QF] + m]
-            out[place + half] = y[at[b, T.AT_VF] + m]
-        k = POSE_COLUMNS * (b - 1)
-        for c in range(3):
-            out[k + POSE_R + c] = kin[b, KIN_R + c]
-            out[k + POSE_V + c] = kin[b, KIN_V + c]
-            out[k + POSE_W + c] = kin[b, KIN_W + c]
-        for c in range(9):
-            out[k + POSE_A + c] = kin[b, KIN_A + c]
-
-
-@njit("void(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy")
-def pose_record(y, idata, rdata, work, out):
-    """Write the record of `poses` for y."""
-    tab = T.unpack(idata, rdata, work)
-    update_bodies(y, tab.at, tab.code, tab.body, tab.modal, tab.kin, tab.partial, tab.scratch, False)
-    poses(y, tab.at, tab.code, tab.kin, out)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def violations(t, y, phi, idata, tab):
-    """Write Phi and Phi_q v + Phi_t of each row to ``phi`` (three places a row); return the fastest body's |omega|.
-
-    The kinematics, marker and function tables must be up to date.
-    """
-    g = vector_at(tab.scratch, S_GRADIENT, 12)
-    gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
-    s = vector_at(tab.scratch, S_TERM, 100)
-    apart = vector_at(tab.scratch, S_VECTOR, RELATIVE)
-    last_i = last_j = np.int64(-1)
-    for r in range(idata[T.H_ROWS]):
-        value, rate = 0.0, 0.0
-        if tab.row[r, T.ROW_FUNCTION] >= 0:
-            fun = tab.row[r, T.ROW_FUNCTION]
-            value, rate = -tab.fval[fun, 0], -tab.fval[fun, 1]
-        for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
-            coef = tab.coef[j]
-            kind = tab.term[j, T.TERM_TYPE]
-            if kind == terms.POINT or kind == terms.DOT1:
-                if kind == terms.POINT:
-                    if tab.term[j, T.TERM_I] != last_i or tab.term[j, T.TERM_J] != last_j:
-                        last_i, last_j = tab.term[j, T.TERM_I], tab.term[j, T.TERM_J]
-                        relative_motion(last_i, last_j, tab.marker_body, tab.kin, tab.frame, apart)
-                    c = tab.term[j, T.TERM_AXES]
-                    p, d = apart[OFFSET + c], apart[RATE + c]
-                else:
-                    p, d, _ = dot_motion(j, tab.term, tab.marker_body, tab.kin, tab.frame, s)
-                value += coef * p
-                rate += coef * d
-                continue
-            p, p_t = terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
-            value += coef * p
-            rate += coef * p_t
-            for side in range(2):
-                kin = tab.kin[tab.marker_body[tab.term[j, T.TERM_I + side]]]
-                rate += coef * (terms.dot3(g, 6 * side, kin, KIN_V) + terms.dot3(g, 6 * side + 3, kin, KIN_W))
-        if tab.row[r, T.ROW_TAPE] >= 0:
-            k = tab.row[r, T.ROW_TAPE]
-            n = 6 * tab.tape[k, T.TAPE_N_BODIES] + 1
-            v, d, _, _ = tape_row_rates(k, t, y, tab, expression_loads.tail(tab, n * (n + 1)))
-            value += v
-            rate += d
-        phi[3 * r], phi[3 * r + 1] = value, rate
-    spin = 0.0
-    for b in range(1, idata[T.H_BODIES]):
-        spin = max(spin, terms.dot3(tab.kin[b], KIN_W, tab.kin[b], KIN_W))
-    return np.sqrt(spin)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def displace(y, d, w, idata, tab):
-    """Move the bodies of y by the spatial displacements ``d`` and change their spatial velocities by ``w``.
-
-    The kinematics table must be up to date; conjugate momenta are left alone.
-    """
-    s = tab.scratch
-    for b in range(1, idata[T.H_BODIES]):
-        at = tab.at[b]
-        i, e, th = at[T.AT_V], at[T.AT_EPS], at[T.AT_THETA]
-        for c in range(3):
-            y[at[T.AT_R] + c] += d[i + c]
-            y[at[T.AT_U] + c] += w[i + c]
-            s[c] = d[i + 3 + c]
-            s[3 + c] = tab.kin[b, KIN_W + c] + w[i + 3 + c]
-        euler_rates(tab.kin, b, s, 0, s, 6)
-        for c in range(3):
-            y[th + c] += s[6 + c]
-        for m in range(at[T.AT_MODES]):
-            y[at[T.AT_QF] + m] += d[at[T.AT_V_MODES] + m]
-            y[at[T.AT_VF] + m] += w[at[T.AT_V_MODES] + m]
-        # the new rates give the corrected velocity about the displaced axes
-        axes_and_velocity(y[th], y[th + 1], 0.0, 0.0, 0.0, tab.kin, b)
-        euler_rates(tab.kin, b, s, 3, y, e)

@@ -37,6 +37,19 @@ def put_pair(mode, slot, vals, k, row, col, value):
     return put(mode, slot, vals, k, col, row, value)
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_number(slot, vals, k, value):
+    """Add the number of entry k to its place, as `put` in the mode NUMBERS; return the number of the next entry."""
+    vals[slot[k]] += value
+    return k + 1
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_pair(slot, vals, k, value):
+    """Add the number of an entry of Phi_q and of its mirror image to their places; return the number of the next."""
+    return add_number(slot, vals, add_number(slot, vals, k, value), value)
+
+
 def compressed(places: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the CSC pattern of a list of (row, column) places and the slot of each place in it."""
     unique, slots = np.unique(places[:, 1] * n + places[:, 0], return_inverse=True)

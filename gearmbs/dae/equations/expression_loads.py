@@ -26,9 +26,9 @@ value_at, gradient_at, second_at, time_at, angles_at, angle_rates_at = (caller(s
 
 def addresses() -> list[int]:
     """Return the addresses of the kernels in this process, which loads them."""
-    from gearmbs.dae.equations.expressions import evaluate
+    from gearmbs.dae.equations import expressions
 
-    return [address(getattr(evaluate, name), signature) for name, signature in KERNELS.items()]
+    return [address(getattr(expressions, name), signature) for name, signature in KERNELS.items()]
 
 
 LINE = 0

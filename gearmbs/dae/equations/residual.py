@@ -32,10 +32,22 @@ from gearmbs.dae.equations.elastic import add_frame_load, add_row_forces, is_ela
 from gearmbs.dae.equations.forces import evaluate_element
 from gearmbs.dae.equations.modal_inertia import modal_residual
 from gearmbs.dae.equations.reactions import reaction_wrench
-from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, KIN_H, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.rotation import (
+    KIN_ADOT,
+    KIN_AXES,
+    KIN_COLUMNS,
+    KIN_FORCE,
+    KIN_H,
+    KIN_MOMENT,
+    KIN_R,
+    KIN_SHIFT,
+    KIN_TURN,
+    KIN_V,
+    KIN_W,
+)
 from gearmbs.dae.equations.simple_terms import add_dot_term, add_point_term
 from gearmbs.dae.equations.unknowns import SI1, has_rate_rows, multipliers_of_row
-from gearmbs.dae.equations.update import euler_component, update_tables
+from gearmbs.dae.equations.update import update_tables
 from gearmbs.dae.problem import RESIDUAL_SIG
 
 S_GRADIENT = 0
@@ -90,21 +102,39 @@ def add_load(b, sign, row, y, at, marker_body, kin, frame, partial, scratch, out
         load_at(b, sign, row, y, marker_body, kin, frame, room)
         add_frame_load(b, room, at, partial, out)
         return
-    s = scratch[S_VECTOR : S_VECTOR + 12]
-    for c in range(6):
-        s[3 + c] = 0.0
-    u, p = at[b, T.AT_U], at[b, T.AT_P]
+    s, body = vector_at(scratch, S_VECTOR, 9), kin[b]
     if row[T.FORCE_F] >= 0:
         arm_to(b, row[T.FORCE_I], marker_body, kin, frame, s, 0)
         for c in range(3):
             s[3 + c] = sign * y[row[T.FORCE_F] + c]
-            out[u + c] -= s[3 + c]
+            body[KIN_FORCE + c] -= s[3 + c]
         terms.cross3(s, 0, s, 3, s, 6)
+        for c in range(3):
+            body[KIN_MOMENT + c] -= s[6 + c]
     if row[T.FORCE_N] >= 0:
         for c in range(3):
-            s[6 + c] += sign * y[row[T.FORCE_N] + c]
-    for m in range(3):
-        out[p + m] -= euler_component(kin[b], m, s, 6)
+            body[KIN_MOMENT + c] -= sign * y[row[T.FORCE_N] + c]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def begin_wrenches(kin):
+    """Clear the columns in which the forces on rigid bodies are added up."""
+    for b in range(kin.shape[0]):
+        for c in range(KIN_FORCE, KIN_COLUMNS):
+            kin[b, c] = 0.0
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_wrenches(bodies, at, kin, out):
+    """Bring the forces added up for each rigid body to its coordinates: eq. (5), and mu in eq. (6)."""
+    for b in range(1, bodies):
+        row, place = kin[b], at[b]
+        u, p, r, th = place[T.AT_U], place[T.AT_P], place[T.AT_R], place[T.AT_THETA]
+        for c in range(3):
+            out[u + c] += row[KIN_FORCE + c]
+            out[r + c] -= row[KIN_SHIFT + c]
+            out[p + c] += terms.dot3(row, KIN_AXES + 3 * c, row, KIN_MOMENT)
+            out[th + c] -= terms.dot3(row, KIN_AXES + 3 * c, row, KIN_TURN)
 
 
 @njit(cache=True, error_model="numpy")
@@ -156,12 +186,12 @@ def add_constraints(t, y, yp, idata, tab, out):
             kind = tab.term[k, T.TERM_TYPE]
             elastic = frames_are_elastic and touches_elastic(tab.term[k], tab.marker_body, tab.code.size)
             if kind == terms.POINT and not elastic:
-                v, d = add_point_term(k, coef, lam, mu, tab.at, tab.term, tab.marker_body, tab.kin, tab.frame, out)
+                v, d = add_point_term(k, coef, lam, mu, tab.term, tab.marker_body, tab.kin, tab.frame)
                 value += v
                 rate += d
                 continue
             if kind == terms.DOT1 and not elastic:
-                v, d = add_dot_term(k, coef, lam, mu, tab.at, tab.term, tab.marker_body, tab.kin, tab.frame, s, out)
+                v, d = add_dot_term(k, coef, lam, mu, tab.term, tab.marker_body, tab.kin, tab.frame, s)
                 value += v
                 rate += d
                 continue
@@ -183,19 +213,17 @@ def add_constraints(t, y, yp, idata, tab, out):
                 b = tab.marker_body[tab.term[k, T.TERM_I + side]]
                 if b == 0:
                     continue
-                kin, at = tab.kin[b], tab.at[b]
-                h = 6 * side
+                kin, h = tab.kin[b], 6 * side
                 rate += coef * (terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W))
                 if is_elastic(b, tab.at):
                     own = vector_at(g, h, 6)
                     add_row_forces(np.array([b]), 1, own, coef * lam, coef * mu, tab.at, tab.partial, out)
                     continue
                 for c in range(3):
-                    angle = coef * euler_component(kin, c, g, h + 3)
-                    out[at[T.AT_U] + c] += coef * lam * g[h + c]
-                    out[at[T.AT_P] + c] += lam * angle
-                    out[at[T.AT_R] + c] -= coef * mu * g[h + c]
-                    out[at[T.AT_THETA] + c] -= mu * angle
+                    kin[KIN_FORCE + c] += coef * lam * g[h + c]
+                    kin[KIN_MOMENT + c] += coef * lam * g[h + 3 + c]
+                    kin[KIN_SHIFT + c] += coef * mu * g[h + c]
+                    kin[KIN_TURN + c] += coef * mu * g[h + 3 + c]
         if tab.row[r, T.ROW_TAPE] >= 0:
             v, d = add_tape_row(tab.row[r, T.ROW_TAPE], t, lam, mu, y, tab, out)
             value += v
@@ -221,6 +249,7 @@ def residual(t, y, yp, out, idata, rdata, work):
     y, yp, out, idata = uncounted(y), uncounted(yp), uncounted(out), uncounted(idata)
     tab = T.unpack(idata, rdata, work)
     update_tables(t, y, tab, False)
+    begin_wrenches(tab.kin)
     for b in range(1, idata[T.H_BODIES]):
         kin, at = tab.kin[b], tab.at[b]
         u, p, e, r, th = at[T.AT_U], at[T.AT_P], at[T.AT_EPS], at[T.AT_R], at[T.AT_THETA]
@@ -264,6 +293,7 @@ def residual(t, y, yp, out, idata, rdata, work):
                     b, 1.0 - 2.0 * side, row, y, tab.at, tab.marker_body, tab.kin, tab.frame, tab.partial, tab.scratch,
                     out,
                 )  # fmt: skip
+    add_wrenches(idata[T.H_BODIES], tab.at, tab.kin, out)
     for k in range(idata[T.H_STATES]):
         z = idata[T.H_Z] + k
         if tab.state[k, T.STATE_TAPE] < 0:

@@ -29,7 +29,14 @@ KIN_ADOT = 36
 """Columns with the time derivatives of the three Euler axes."""
 KIN_H = 45
 """Columns with the angular momentum about the centre of mass."""
-KIN_COLUMNS = 48
+KIN_FORCE = 48
+"""Columns in which the residual adds up what constraints and loads exert on a body: the force that enters M u' and the
+moment about the centre of mass, less those applied; global components."""
+KIN_MOMENT = 51
+KIN_SHIFT = 54
+"""Columns in which it adds up the displacements Phi_R^T mu and, as a spatial rotation, Phi_pi^T mu of eq. (6)."""
+KIN_TURN = 57
+KIN_COLUMNS = 60
 
 POSE_R = 0
 """Columns of a record of a body's pose: position of the centre of mass, orientation (row-major), velocities."""
@@ -184,8 +191,12 @@ __all__ = [
     "KIN_AXES",
     "KIN_COLUMNS",
     "KIN_DW",
+    "KIN_FORCE",
     "KIN_H",
+    "KIN_MOMENT",
     "KIN_R",
+    "KIN_SHIFT",
+    "KIN_TURN",
     "KIN_V",
     "KIN_W",
     "POSE_A",

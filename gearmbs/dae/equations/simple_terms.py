@@ -10,8 +10,8 @@ from __future__ import annotations
 from gearmbs._jit import njit
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3, dot3
-from gearmbs.dae.equations.entries import NUMBERS, put_pair
-from gearmbs.dae.equations.rotation import KIN_AXES, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.entries import NUMBERS, add_pair, put_pair
+from gearmbs.dae.equations.rotation import KIN_FORCE, KIN_MOMENT, KIN_R, KIN_SHIFT, KIN_TURN, KIN_V, KIN_W
 
 OFFSET, RATE, QUADRATIC = 0, 3, 6
 RELATIVE = 9
@@ -74,8 +74,8 @@ def dot_motion(k, term, marker_body, kin, frame, s):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def add_point_term(k, coef, lam, mu, at, term, marker_body, kin, frame, out):
-    """As the general path of `add_constraints` for a POINT term, whose gradient is a unit vector.
+def add_point_term(k, coef, lam, mu, term, marker_body, kin, frame):
+    """As the general path of `add_constraints` for a POINT term, whose gradient is a unit vector; return Phi and Phi'.
 
     Parameters
     ----------
@@ -85,10 +85,8 @@ def add_point_term(k, coef, lam, mu, at, term, marker_body, kin, frame, out):
         Multipliers of its row.
     term : ndarray of int
         Table of terms.
-    at, marker_body, kin, frame
-        Tables of places, of the markers' frames, of kinematics and of markers.
-    out : ndarray
-        G.
+    marker_body, kin, frame
+        Tables of the markers' frames, of kinematics and of markers.
     """
     c = term[k, T.TERM_AXES]
     c1 = c + 1 if c < 2 else 0
@@ -104,20 +102,19 @@ def add_point_term(k, coef, lam, mu, at, term, marker_body, kin, frame, out):
         if b == 0:
             continue
         rate += sign * (row[KIN_V + c] + row[KIN_W + c1] * x2 - row[KIN_W + c2] * x1)
-        p, th = at[b, T.AT_P], at[b, T.AT_THETA]
-        out[at[b, T.AT_U] + c] += sign * lam
-        out[at[b, T.AT_R] + c] -= sign * mu
-        for m in range(3):
-            a = KIN_AXES + 3 * m
-            angle = sign * (row[a + c1] * x2 - row[a + c2] * x1)
-            out[p + m] += lam * angle
-            out[th + m] -= mu * angle
+        force, shift = sign * lam, sign * mu
+        row[KIN_FORCE + c] += force
+        row[KIN_MOMENT + c1] += force * x2
+        row[KIN_MOMENT + c2] -= force * x1
+        row[KIN_SHIFT + c] += shift
+        row[KIN_TURN + c1] += shift * x2
+        row[KIN_TURN + c2] -= shift * x1
     return value, rate
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def add_dot_term(k, coef, lam, mu, at, term, marker_body, kin, frame, s, out):
-    """As the general path of `add_constraints` for a DOT1 term, which has no translations.
+def add_dot_term(k, coef, lam, mu, term, marker_body, kin, frame, s):
+    """As the general path of `add_constraints` for a DOT1 term, which has no translations; return Phi and Phi'.
 
     Parameters
     ----------
@@ -127,10 +124,10 @@ def add_dot_term(k, coef, lam, mu, at, term, marker_body, kin, frame, s, out):
         Multipliers of its row.
     term : ndarray of int
         Table of terms.
-    at, marker_body, kin, frame
-        Tables of places, of the markers' frames, of kinematics and of markers.
-    s, out : ndarray
-        Scratch of 3 places, and G.
+    marker_body, kin, frame
+        Tables of the markers' frames, of kinematics and of markers.
+    s : ndarray
+        Scratch of 3 places.
     """
     i, j = term[k, T.TERM_I], term[k, T.TERM_J]
     a = T.MK_AXES + 3 * (term[k, T.TERM_AXES] // 3)
@@ -144,11 +141,9 @@ def add_dot_term(k, coef, lam, mu, at, term, marker_body, kin, frame, s, out):
         sign = coef if side == 0 else -coef
         row = kin[body]
         rate += sign * dot3(s, 0, row, KIN_W)
-        p, th = at[body, T.AT_P], at[body, T.AT_THETA]
-        for m in range(3):
-            angle = sign * dot3(row, KIN_AXES + 3 * m, s, 0)
-            out[p + m] += lam * angle
-            out[th + m] -= mu * angle
+        for c in range(3):
+            row[KIN_MOMENT + c] += sign * lam * s[c]
+            row[KIN_TURN + c] += sign * mu * s[c]
     return coef * dot3(frame[i], a, frame[j], b), rate
 
 
@@ -178,14 +173,9 @@ def put_point(mode, slot, vals, k, row, coef, term, at, marker_body, frame):
             continue
         sign = coef if side == 0 else -coef
         if mode == NUMBERS:
-            arm_2, arm_1 = sign * frame[marker, T.MK_ARM + c2], -sign * frame[marker, T.MK_ARM + c1]
-            vals[slot[k]] += sign
-            vals[slot[k + 1]] += sign
-            vals[slot[k + 2]] += arm_2
-            vals[slot[k + 3]] += arm_2
-            vals[slot[k + 4]] += arm_1
-            vals[slot[k + 5]] += arm_1
-            k += 6
+            k = add_pair(slot, vals, k, sign)
+            k = add_pair(slot, vals, k, sign * frame[marker, T.MK_ARM + c2])
+            k = add_pair(slot, vals, k, -sign * frame[marker, T.MK_ARM + c1])
             continue
         q = at[marker_body[marker], T.AT_V]
         k = put_pair(mode, slot, vals, k, row, q + c, sign)
@@ -220,9 +210,7 @@ def put_dot(mode, slot, vals, k, row, coef, term, at, marker_body, cross):
         sign = coef if side == 0 else -coef
         if mode == NUMBERS:
             for c in range(3):
-                vals[slot[k]] += sign * cross[c]
-                vals[slot[k + 1]] += sign * cross[c]
-                k += 2
+                k = add_pair(slot, vals, k, sign * cross[c])
             continue
         for c in range(3):
             k = put_pair(mode, slot, vals, k, row, at[body, T.AT_V] + 3 + c, sign * cross[c])

@@ -13,8 +13,11 @@ from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
 from gearmbs.dae.equations import accelerations as index1
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.accelerations import ROW_PHI, ROW_RATE, ROW_RECORD
 from gearmbs.dae.equations.entries import COUNT, NUMBERS, PLACES, compressed
 from gearmbs.dae.equations.euler_switch import track, turns_are_counted
+from gearmbs.dae.equations.output_records import joint_loads, loads_of_rows, pose_record, poses
+from gearmbs.dae.equations.projection import are_satisfied, displace, largest_violation, violations
 from gearmbs.dae.equations.reactions import renew_reactions
 from gearmbs.dae.equations.residual import update
 from gearmbs.dae.equations.rotation import POSE_COLUMNS
@@ -184,13 +187,31 @@ def project(t, at, phi, plan, factors, pair, idata, tab):
     for c in range(base):
         pair[0, c] = pair[1, c] = 0.0
     for r in range(rows):
-        strayed = max(strayed, abs(phi[3 * r]))
-        pair[0, base + r] = 0.0 if abs(phi[3 * r]) > FARTHEST else -phi[3 * r]
-        pair[1, base + r] = -phi[3 * r + 1]
+        off, rate = phi[ROW_RECORD * r + ROW_PHI], phi[ROW_RECORD * r + ROW_RATE]
+        strayed = max(strayed, abs(off))
+        pair[0, base + r] = 0.0 if abs(off) > FARTHEST else -off
+        pair[1, base + r] = -rate
     solve_pair(plan, factors, pair)
-    index1.displace(at, pair[0], pair[1], idata, tab)
+    displace(at, pair[0], pair[1], idata, tab)
     update_tables(t, at, tab, True)
     return strayed
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def allow_rounding(plan, allowed):
+    """Write by how much each entry of the matrix may change and still count as unchanged."""
+    for p in range(plan.a_src.size):
+        allowed[plan.a_src[p]] = ROUNDED / plan.a_scale[p]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def write_row(k, at, multipliers, records, idata, tab):
+    """Write reactions and poses of row k of the records, from its unknowns ``at`` and up-to-date tables."""
+    rows = records.force.shape[1]
+    force = matrix_at(records.force, 3 * rows * k, rows, 3)
+    moment = matrix_at(records.moment, 3 * rows * k, rows, 3)
+    loads_of_rows(multipliers, idata, tab, force, moment)
+    poses(at, tab.at, tab.code, tab.kin, vector_at(records.pose, records.pose.shape[1] * k, records.pose.shape[1]))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -218,26 +239,28 @@ def _evaluate(
     tab = T.unpack(idata, rdata, work)
     only_assemble = last < first or idata[T.H_MODE] != NUMBERS
     if not only_assemble:
-        for p in range(plan.a_src.size):
-            allowed[plan.a_src[p]] = ROUNDED / plan.a_scale[p]
+        allow_rounding(plan, allowed)
     # a call that is handed all tables costs a tenth of a microsecond
     counts_turns, has_reactions = turns_are_counted(tab), index1.has_reactions(tab)
+    trusted = not only_assemble
     for k in range(first, first + 1 if only_assemble else last):
         for c in range(at.size):
             at[c] = y[k, c]
-        phi = vector_at(records.phi, 3 * rows * k, 3 * rows)
+        phi = vector_at(records.phi, ROW_RECORD * rows * k, ROW_RECORD * rows)
         loads = matrix_at(records.loads, elements * columns * k, elements, columns)
         solution = vector_at(records.solution, size * k, size)
         update_tables(t[k], at, tab, True)
         if counts_turns and not only_assemble:
             track(t[k], at, tab, False)
-        projected = rows == 0 or only_assemble
+        # steps of an integrator that keeps both positions and velocities on the constraints need no projection
+        projected = rows == 0 or only_assemble or trusted
         passes = 0
         while True:
             if not projected:
                 # the factors of the row before serve while the bodies have hardly turned since
-                spin = index1.violations(t[k], at, phi, idata, tab)
-                if k > first and spin * (t[k] - t[k - 1]) <= SAME_POSITION:
+                spin = violations(t[k], at, phi, idata, tab)
+                trusted = projected = are_satisfied(phi)
+                if not projected and k > first and spin * (t[k] - t[k - 1]) <= SAME_POSITION:
                     records.strayed[k] = project(t[k], at, phi, plan, factors, pair, idata, tab)
                     projected = True
             if idata[T.H_MODE] == NUMBERS:
@@ -248,6 +271,11 @@ def _evaluate(
                 if idata[T.H_MODE] == COUNT:
                     vals[0] = count
                 return last
+            if passes == 0 and trusted:
+                records.strayed[k] = largest_violation(phi)
+                if not are_satisfied(phi):
+                    trusted = projected = False
+                    continue
             if passes == 0 and not unchanged(vals, factored, allowed):
                 if not factor(plan, factors, vals) <= growth:
                     return k
@@ -263,11 +291,7 @@ def _evaluate(
                 break
             if renew_reactions(at, vector_at(solution, base, rows), idata, tab) <= 1e-12:
                 break
-        force = matrix_at(records.force, 3 * rows * k, rows, 3)
-        moment = matrix_at(records.moment, 3 * rows * k, rows, 3)
-        index1.loads_of_rows(vector_at(solution, base, rows), idata, tab, force, moment)
-        pose = vector_at(records.pose, records.pose.shape[1] * k, records.pose.shape[1])
-        index1.poses(at, tab.at, tab.code, tab.kin, pose)
+        write_row(k, at, vector_at(solution, base, rows), records, idata, tab)
     return last
 
 
@@ -406,12 +430,12 @@ def _least_squares_row(k: int, t, y, matrix_pattern, idata, rdata, work_size, re
     records.loads[k], records.phi[k] = one.loads[0], one.phi[0]
     work = np.zeros(work_size)
     update(t[0], y[0], y[0], idata, rdata, work)
-    index1.pose_record(y[0], idata, rdata, work, records.pose[k])
+    pose_record(y[0], idata, rdata, work, records.pose[k])
     rows = records.force.shape[1]
     multipliers = np.zeros((2, max(rows, 1)))
     multipliers[0, :rows] = records.solution[k, n - rows :]
     multipliers[1, 0] = t[0]
-    index1.joint_loads(y[0], idata, rdata, work, multipliers, records.force[k], records.moment[k])
+    joint_loads(y[0], idata, rdata, work, multipliers, records.force[k], records.moment[k])
 
 
 def _turned(y: np.ndarray, idata: np.ndarray, angle: float) -> np.ndarray:

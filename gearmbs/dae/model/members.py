@@ -16,6 +16,7 @@ from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.accelerations import ROW_RECORD
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM
 from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W, POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.equations.update import update_functions, update_markers
@@ -276,7 +277,8 @@ def _internal_reactions(members, tab, wrench, multipliers, phi, force, moment, s
             s[6 + c] = sign * (wrench[child, 3 + c] - s[3 + c])
         for c in range(6):
             row = edge[EDGE_ROWS + c]
-            phi[3 * row] = phi[3 * row + 1] = phi[3 * row + 2] = 0.0
+            for d in range(ROW_RECORD):
+                phi[ROW_RECORD * row + d] = 0.0
             for d in range(3):
                 force[row, d] = moment[row, d] = 0.0
         for c in range(3):
@@ -340,8 +342,9 @@ def expand(first, count, t, idata, rdata, work, members, narrow, wide):
         for r in range(members.row.size):
             row = members.row[r]
             wide.solution[to, base + row] = narrow.solution[k, groups + r]
+            for c in range(ROW_RECORD):
+                wide.phi[to, ROW_RECORD * row + c] = narrow.phi[k, ROW_RECORD * r + c]
             for c in range(3):
-                wide.phi[to, 3 * row + c] = narrow.phi[k, 3 * r + c]
                 wide.force[to, row, c] = narrow.force[k, r, c]
                 wide.moment[to, row, c] = narrow.moment[k, r, c]
 

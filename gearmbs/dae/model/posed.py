@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_array
 
-from gearmbs.dae.equations.rotation import POSE_COLUMNS
+from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R
 from gearmbs.dae.model.acceleration_system import AccelerationSystem
 from gearmbs.dae.model.configuration import Configuration
 from gearmbs.dae.model.model import Model
@@ -102,7 +102,7 @@ class PosedModel:
         if self.typical_length is not None:
             return self.typical_length
         arms = np.abs(self.model.marker_places())
-        spread = np.ptp(self.pose[:, :3], axis=0).max(initial=0.0)
+        spread = np.ptp(self.pose[:, POSE_R:POSE_A], axis=0).max(initial=0.0)
         return float(max(arms.max(initial=0.0), spread, SHORTEST))
 
     def coordinate_weights(self) -> np.ndarray:

@@ -10,11 +10,11 @@ if TYPE_CHECKING:
         angle_rates,
         eval_gradient,
         eval_request,
-        eval_second,
-        eval_time,
         eval_value,
         update_angles,
     )
+    from gearmbs.dae.equations.expressions.evaluate_second import eval_second
+    from gearmbs.dae.equations.expressions.evaluate_time import eval_time
     from gearmbs.dae.equations.expressions.spline_data import SplineData
     from gearmbs.dae.equations.expressions.tape import Tape, TapeBuilder
 
@@ -42,8 +42,8 @@ late(
         "angle_rates": ".evaluate",
         "eval_gradient": ".evaluate",
         "eval_request": ".evaluate",
-        "eval_second": ".evaluate",
-        "eval_time": ".evaluate",
+        "eval_second": ".evaluate_second",
+        "eval_time": ".evaluate_time",
         "eval_value": ".evaluate",
         "update_angles": ".evaluate",
     },

@@ -10,7 +10,7 @@ import numpy as np
 
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.errors import ExpressionError
-from gearmbs.dae.equations.expressions.evaluate import JACOBIAN_AT
+from gearmbs.dae.equations.expressions.evaluate_second import JACOBIAN_AT
 from gearmbs.dae.equations.expressions.integrals import integral_table, time_value
 from gearmbs.dae.equations.expressions.measures import LEAF_WORK
 from gearmbs.dae.equations.expressions.scalar import binary, unary

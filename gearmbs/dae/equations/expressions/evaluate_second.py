@@ -1,0 +1,154 @@
+"""Value, gradient and Hessian of an expression of positions and time, for constraint rows.
+
+The Hessian adds, for every instruction, its second partials times the gradients of its operands, weighted with its
+adjoint:  H = sum_k adj_k sum_jl f_jl grad_j grad_l^T.
+"""
+
+from __future__ import annotations
+
+import math
+
+from gearmbs._jit import njit
+from gearmbs.dae.equations.expressions import opcodes as op
+from gearmbs.dae.equations.expressions.evaluate import STATE, TABLES, backward, forward, selected
+from gearmbs.dae.equations.expressions.measure_hessians import leaf_gradient, leaf_hessian, leaf_jacobians
+from gearmbs.dae.equations.expressions.measures import LEAF_WORK
+
+JACOBIAN_AT = LEAF_WORK + 6
+"""Where a leaf's Jacobian blocks stand in its scratch."""
+
+
+@njit(
+    "void(int64[::1], int64, int64, int64, float64[::1], float64[:, ::1])",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def _combine_rows(ints, at, k, n, work, rows):
+    """Write the forward gradient of a scalar instruction from those of its operands."""
+    columns = rows.shape[1]
+    count = ints[op.HEAD_COUNT]
+    if ints[at] == op.SELECT:
+        s = selected(ints, at, work)
+        for q in range(columns):
+            rows[k, q] = rows[s, q]
+        return
+    a = ints[at + 1]
+    if ints[at] == op.INTEGRAL:
+        for q in range(columns):
+            rows[k, q] = 0.0
+        rows[k, columns - 1] = work[a]
+        return
+    pa = work[count + k]
+    for q in range(columns):
+        rows[k, q] = pa * rows[a, q] if rows[a, q] != 0.0 else 0.0
+    if ints[at] >= op.FIRST_BINARY:
+        b = ints[at + 2]
+        pb = work[2 * count + k]
+        for q in range(columns):
+            if rows[b, q] != 0.0:
+                rows[k, q] += pb * rows[b, q]
+
+
+@njit("void(int64[::1], int64, int64, float64, float64[::1], float64[:, ::1], float64[:, ::1])", cache=True, nogil=True)
+def _curvature(ints, at, k, weight, work, rows, hess):
+    """Add the second partials of a scalar instruction, times its operands' gradients, to the Hessian."""
+    count = ints[op.HEAD_COUNT]
+    aa, ab, bb = work[3 * count + k], work[4 * count + k], work[5 * count + k]
+    if ints[at] == op.INTEGRAL:
+        last = rows.shape[1] - 1
+        hess[last, last] += weight * rows[ints[at + 1], last]
+        return
+    if ints[at] == op.SELECT or (aa == 0.0 and ab == 0.0 and bb == 0.0):
+        return
+    a = ints[at + 1]
+    b = ints[at + 2] if ints[at] >= op.FIRST_BINARY else a
+    for p in range(rows.shape[1]):
+        ap, bp = rows[a, p], rows[b, p]
+        if ap == 0.0 and bp == 0.0:
+            continue
+        for q in range(rows.shape[1]):
+            aq, bq = rows[a, q], rows[b, q]
+            s = 0.0
+            if ap != 0.0 and aq != 0.0:
+                s += aa * ap * aq
+            if bp != 0.0 and bq != 0.0:
+                s += bb * bp * bq
+            if ab != 0.0:
+                s += ab * (ap * bq + bp * aq)
+            hess[p, q] += weight * s
+
+
+@njit(f"float64({TABLES}, float64, {STATE}, float64[::1], float64[::1], float64[::1])", cache=True, nogil=True)
+def eval_second(ints, floats, t, kin, marker_body, marker_frame, y, ref, grad, hess, work):
+    """Return the value with gradient and Hessian in generalized coordinates and time.
+
+    With n = 6 n_bodies + 1, ``grad[0:n]`` and ``hess[0:n*n]`` (row-major) are ordered
+    [R(3), theta(3)] body by body, then t.  ``kin`` must hold the Euler axes (``KIN_AXES``).  Only
+    position-level leaves are allowed; the parser checks that (``Tape.level``).
+
+    Parameters
+    ----------
+    ints : ndarray of int
+        Integer table of the expression (`Tape.ints`).
+    floats : ndarray
+        Real table of the expression (`Tape.floats`).
+    t : float
+        Time, s.
+    kin : ndarray, shape (bodies, KIN_COLUMNS)
+        Positions, orientations and velocities of the bodies.
+    marker_body : ndarray of int
+        Body of each marker.
+    marker_frame : ndarray, shape (markers, 12)
+        Origin and orientation of each marker in its body.
+    y : ndarray
+        Unknowns, for states and for loads asked for by name.
+    ref : ndarray
+        References of the counted angles.
+    grad : ndarray
+        Receives the gradient over R and theta of the bodies of the tape, and time.
+    hess : ndarray
+        Receives the Hessian over R and theta of the bodies of the tape, and time, row by row.
+    work : ndarray
+        Scratch, `Tape.work_size` entries.
+    """
+    count = ints[op.HEAD_COUNT]
+    columns = 6 * ints[op.HEAD_BODIES] + 1
+    forward(ints, floats, t, kin, kin, marker_body, marker_frame, y, ref, work, 2)
+    adjoint = 6 * count
+    backward(ints, work, adjoint, ints[op.HEAD_RESULT])
+    rows = work[7 * count : 7 * count + count * columns].reshape((count, columns))
+    leaf = work[7 * count + count * columns :]
+    h = hess[: columns * columns].reshape((columns, columns))
+    h[:, :] = 0.0
+    at = ints[op.HEAD_CODE]
+    for k in range(count):
+        code = ints[at]
+        if code == op.DISPLACEMENT or code == op.COSINE:
+            leaf_jacobians(ints, at, kin, marker_body, marker_frame, leaf, JACOBIAN_AT, columns)
+            leaf_gradient(ints, at, kin, marker_body, marker_frame, leaf, JACOBIAN_AT, columns, rows, k)
+        elif code <= op.LAST_LEAF:
+            for q in range(columns):
+                rows[k, q] = 0.0
+            if code == op.TIME:
+                rows[k, columns - 1] = 1.0
+            elif code != op.CONST:
+                for q in range(columns):
+                    rows[k, q] = math.nan
+        else:
+            _combine_rows(ints, at, k, count, work, rows)
+        at += op.WIDTH
+    at = ints[op.HEAD_CODE]
+    for k in range(count):
+        weight = work[adjoint + k]
+        if weight != 0.0:
+            code = ints[at]
+            if code == op.DISPLACEMENT or code == op.COSINE:
+                leaf_hessian(ints, at, weight, kin, marker_body, marker_frame, leaf, JACOBIAN_AT, columns, rows, k, h)
+            elif code > op.LAST_LEAF:
+                _curvature(ints, at, k, weight, work, rows, h)
+        at += op.WIDTH
+    r = ints[op.HEAD_RESULT]
+    for q in range(columns):
+        grad[q] = rows[r, q]
+    return work[r]
