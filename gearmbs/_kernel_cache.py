@@ -20,6 +20,7 @@ import os
 import pickle
 import platform
 import sys
+import threading
 import types as python
 import uuid
 import zlib
@@ -60,17 +61,37 @@ def setting() -> str:
 _identities: dict[Any, str] = {}
 
 
+class _UnderWay(threading.local):
+    """Functions whose description is under way, and how deep among them those stand that others call in turn."""
+
+    def __init__(self) -> None:
+        self.functions: list[Any] = []
+        self.called_back: list[int] = []
+
+
+_under_way = _UnderWay()
+
+
 def identity(function: Any) -> str:
-    """Return a digest of a function, or kernel, and of all below it."""
+    """Return a digest of a function, or kernel, and of all below it; of those that call each other as of any others."""
     known = _identities.get(function)
-    if known is None:
-        _identities[function] = "recursion"
-        try:
-            known = _identities[function] = hashlib.sha256(_described(function).encode()).hexdigest()
-        except BaseException:
-            del _identities[function]
-            raise
-    return known
+    if known is not None:
+        return known
+    outer, called_back = _under_way.functions, _under_way.called_back
+    depth = len(outer)
+    if function in outer:
+        called_back.append(outer.index(function))
+        return f"the caller {called_back[-1] - depth} above"
+    outer.append(function)
+    try:
+        digest = hashlib.sha256(_described(function).encode()).hexdigest()
+        if not called_back:
+            # digests inside a circle of calls hold for the place from which it was entered
+            _identities[function] = digest
+    finally:
+        del outer[depth:]
+        called_back[:] = [place for place in called_back if place < depth]
+    return digest
 
 
 def _described(function: Any) -> str:

@@ -8,6 +8,7 @@ meets missing kernels does the same for those that it has imported.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import subprocess
@@ -27,6 +28,11 @@ HELPER = "GEARMBS_COMPILING"
 
 INTRODUCE = "introduce"
 """What a helper process is asked first; see `_introduction`."""
+
+KEPT_FILES = {".entry", ".part", ".lock", ".tmp"}
+"""What is in a folder of kernels: machine code, LLVM code, and what processes that were killed may have left."""
+
+PRUNED_AFTER = 30.0
 
 SILENT = 5.0
 """Seconds of compiling in a program before it tells how far it is, and between two such lines."""
@@ -133,6 +139,47 @@ def compile_entries(wanted: list[Kernel], report: Report | None = None, workers:
         raise RuntimeError(tasks.errors[0])
     if tasks.waiting:
         raise RuntimeError(f"kernels wait for each other: {', '.join(sorted(tasks.waiting))}")
+
+
+def prune(days: float, package: str = "gearmbs") -> tuple[int, int]:
+    """Delete kernels on disk that no process has loaded for some time; whoever needs one compiles it again.
+
+    Every edit of a kernel leaves the former one behind, for other checkouts may share the folder.
+
+    Parameters
+    ----------
+    days : float
+        How long a kernel must not have been read. Many systems note that once a day only: one day at least.
+    package : str
+        Whose kernels.
+
+    Returns
+    -------
+    files : int
+        Number of files deleted.
+    size : int
+        Their bytes.
+
+    Raises
+    ------
+    ValueError
+        If less than a day is asked for.
+    """
+    from gearmbs import _kernel_cache as cache
+
+    if not days >= 1.0:
+        raise ValueError(f"days = {days:g}: when a file was read is known to the day; give 1 or more")
+    oldest = time.time() - 86400.0 * days
+    files = size = 0
+    for folder in cache.folders(package):
+        for path in sorted(folder.glob("*")) if folder.is_dir() else ():
+            # another process may delete it first
+            with contextlib.suppress(OSError):
+                told = path.stat()
+                if path.suffix in KEPT_FILES and max(told.st_atime, told.st_mtime) < oldest:
+                    path.unlink()
+                    files, size = files + 1, size + told.st_size
+    return files, size
 
 
 def _check_folders(packages: set[str]) -> None:
@@ -309,9 +356,24 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--helper", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--workers", type=int, help="processes at a time; default: the cores")
     parser.add_argument("--quiet", action="store_true", help="print the last line only")
+    parser.add_argument(
+        "--prune",
+        type=float,
+        metavar="DAYS",
+        nargs="?",
+        const=PRUNED_AFTER,
+        help=f"compile nothing; delete kernels that nobody has used for so many days ({PRUNED_AFTER:g})",
+    )
     given = parser.parse_args(arguments)
     if given.helper:
         _help()
+        return
+    if given.prune is not None:
+        try:
+            files, size = prune(given.prune)
+        except ValueError as error:
+            sys.exit(str(error))
+        print(f"{files} files deleted, {size / 1e6:.1f} MB")
         return
     try:
         seconds = compile_all(None if given.quiet else print, workers=given.workers)

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -168,3 +169,20 @@ def test_kernels_that_cannot_be_kept(missing, monkeypatch):
     monkeypatch.setattr(compiling, "compile_all", lambda *rest, **options: compile_entries([missing]))
     with pytest.raises(SystemExit, match=re.escape(str(_kernel_cache.folders("gearmbs")[-1]))):
         compiling.main(["--quiet"])
+
+
+def test_pruning(tmp_path, monkeypatch, capsys):
+    """Kernels that nobody has read for some time go, and what killed processes left; other files stay."""
+    monkeypatch.setattr(_kernel_cache, "folders", lambda package: (tmp_path / "none", tmp_path))
+    now = time.time()
+    for name, days in (("a.entry", 40), ("b.part", 40), ("b.part.lock", 40), ("c.entry", 20), ("notes.txt", 40)):
+        (tmp_path / name).write_bytes(b"12345")
+        os.utime(tmp_path / name, (now - 86400 * days,) * 2)
+    # written long ago and read lately
+    (tmp_path / "d.entry").write_bytes(b"12345")
+    os.utime(tmp_path / "d.entry", (now, now - 86400 * 40))
+    compiling.main(["--prune"])
+    assert capsys.readouterr().out == "3 files deleted, 0.0 MB\n"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c.entry", "d.entry", "notes.txt"]
+    with pytest.raises(SystemExit, match=r"days = 0\.1"):
+        compiling.main(["--prune", "0.1"])

@@ -10,6 +10,7 @@ import sys
 import textwrap
 import threading
 import time
+import types
 import zlib
 from pathlib import Path
 
@@ -255,6 +256,31 @@ def test_interrupted_description(monkeypatch):
         with pytest.raises(KeyboardInterrupt):
             _kernel_cache.identity(function)
     assert len(_kernel_cache.identity(function)) == 64
+
+
+EACH_OTHER = """
+def first(n):
+    return 1.0 if n == 0 else 2.0 * second(n - 1)
+
+def second(n):
+    return {last} if n == 0 else first(n - 1)
+"""
+
+
+def test_functions_that_call_each_other():
+    """The digest of each covers the other, whichever is asked for first."""
+
+    def digests(last, *order):
+        module = types.ModuleType("own.module")
+        exec(EACH_OTHER.format(last=last), module.__dict__)
+        _kernel_cache._identities.clear()
+        return {name: _kernel_cache.identity(getattr(module, name)) for name in order}
+
+    known = digests(1.0, "first", "second")
+    assert digests(1.0, "second", "first") == known
+    edited = digests(3.0, "first", "second")
+    assert edited["first"] != known["first"]
+    assert edited["second"] != known["second"]
 
 
 def test_lock_after_it_was_removed(tmp_path):

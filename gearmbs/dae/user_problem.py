@@ -179,6 +179,22 @@ def _factors_at_start(problem: DAEProblem, gamma: float, tables: tuple) -> tuple
     return plan, factors
 
 
+def _compiled(
+    functions: _UserFunctions, fun: Callable, jac: Callable | None, jac_sparsity: Any, events: Sequence[Callable]
+) -> dict[str, Any]:
+    """Return the fields of a `DAEProblem` with its functions and the pattern of its matrix; see `as_problem`."""
+    indptr, indices = _pattern(jac_sparsity, functions.n)
+    residual = functions.residual(fun)
+    return {
+        "residual": residual,
+        "jacobian": functions.jacobian(jac, residual, len(indices), jac_sparsity is None),
+        "events": functions.events(events) if len(events) else None,
+        "n_events": len(events),
+        "indptr": indptr,
+        "indices": indices,
+    }
+
+
 def as_problem(
     fun: Callable,
     t0: float,
@@ -241,27 +257,24 @@ def as_problem(
     atols = _vector(atol, n, "atol")
     if not (atols > 0).all():
         raise ValueError(f"atol must be positive, is {atols.min():g} for unknown {int(np.argmin(atols))}")
-    indptr, indices = _pattern(jac_sparsity, n)
     functions = _UserFunctions(n, parameters)
-    residual = functions.residual(fun)
-    jacobian = functions.jacobian(jac, residual, len(indices), jac_sparsity is None)
-    compiled_events = functions.events(events) if len(events) else None
+    compiled = _compiled(functions, fun, jac, jac_sparsity, events)
     least = np.minimum(scales, atols / differences.INCREMENT)
-    idata, rdata, work_size = differences.pack_tables(indptr, indices, least, scales, parameters)
+    idata, rdata, work_size = differences.pack_tables(
+        compiled["indptr"], compiled["indices"], least, scales, parameters
+    )
     for slot, address in functions.addresses.items():
         idata[slot] = address
     rates = np.zeros(n) if yp0 is None else _vector(yp0, n, "yp0")
     if differential is None:
         differential = np.empty(n, dtype=np.bool_)
-        differences.find_differential(residual, float(t0), y0, rates, differential, idata, rdata, np.zeros(work_size))
+        work = np.zeros(work_size)
+        differences.find_differential(compiled["residual"], float(t0), y0, rates, differential, idata, rdata, work)
     else:
         differential = _mask(differential, n, "differential")
     problem = DAEProblem(
         n=n,
-        residual=residual,
-        jacobian=jacobian,
-        indptr=indptr,
-        indices=indices,
+        **compiled,
         idata=idata,
         rdata=rdata,
         work_size=work_size,
@@ -273,8 +286,6 @@ def as_problem(
         differential=differential,
         t0=float(t0),
         names=list(names),
-        events=compiled_events,
-        n_events=len(events),
         jacobian_residuals=1 + int(idata[differences.N_COLOURS]) if jac is None else 0,
     )
     if not problem.error_mask.any():

@@ -11,7 +11,8 @@ import numpy as np
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.integrators.ida import solve_ida
 from gearmbs.dae.integrators.options import Options
-from gearmbs.dae.result import Status
+from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.results.stream import Stream
 from gearmbs.mechanism.locked import locking_remark
@@ -119,16 +120,8 @@ def simulate(
         raise ModelError("every_step: outputs are at the integrator's own steps; leave rate and t_eval away")
     if consumer is not None and not every_step:
         raise ModelError("consumer: it takes the integrator's own steps; give every_step=True, too")
-    t_end, t_start = quantity(t_end, "time", "t_end"), quantity(t_start, "time", "t_start")
-    if t_eval is None:
-        if not np.isfinite(t_end) or t_end <= t_start:
-            raise ModelError(f"t_end = {t_end} s; it must be later than the start {t_start} s")
-        rate = None if rate is None else quantity(rate, "frequency", "rate")
-        if rate is not None and not rate > 0.0:
-            raise ModelError(f"rate = {rate} 1/s; it must be positive")
-        t_eval = np.linspace(t_start, t_end, 501) if rate is None else _sampled(t_start, t_end, rate)
-    # a column of a table is taken apart from it, for the kernels
-    t_eval = np.ascontiguousarray(t_eval, dtype=float)
+    t_start = quantity(t_start, "time", "t_start")
+    t_eval = _output_times(t_start, quantity(t_end, "time", "t_end"), rate, t_eval)
     if not np.isfinite(tol) or tol <= 0.0:
         raise ModelError(f"tol = {tol}; it must be a positive number")
     name = integrator.upper()
@@ -144,17 +137,7 @@ def simulate(
     times = None if every_step else t_eval
     stream = None if consumer is None else Stream(system, problem, last, consumer, members)
     with time_bar(progress, mechanism.name, first, last) as report:
-        if name == "IDA":
-            result = solve_ida(problem, times, t_end=last, tol=tol, progress=report, **options)
-        else:
-            from gearmbs.dae.integrators.wstiff import solve_wstiff
-
-            # errors are controlled on positions and velocities, and so is the corrector
-            options.setdefault("corrector", "modified")
-            options.setdefault("slopes", not every_step)
-            result = solve_wstiff(
-                problem, times, t_end=last, tol=tol, method=name, progress=report, consumer=stream, **options
-            )
+        result = _integrated(name, problem, times, stream, t_end=last, tol=tol, progress=report, **options)
     remarks = [locking_remark(mechanism, system), why_not_lumped(mechanism) if lump and one is None else ""]
     remark = " ".join(text for text in remarks if text)
     solution = Solution(system, problem, result, members, remark)
@@ -164,6 +147,35 @@ def simulate(
         for part in solution.parts():
             consumer(part)
     return stream.close(solution)
+
+
+def _output_times(start: float, end: float, rate: float | None, given: np.ndarray | None) -> np.ndarray:
+    """Return the output times; see `simulate`."""
+    if given is not None:
+        # a column of a table is taken apart from it, for the kernels
+        return np.ascontiguousarray(given, dtype=float)
+    if not np.isfinite(end) or end <= start:
+        raise ModelError(f"t_end = {end} s; it must be later than the start {start} s")
+    if rate is None:
+        return np.linspace(start, end, 501)
+    rate = quantity(rate, "frequency", "rate")
+    if not rate > 0.0:
+        raise ModelError(f"rate = {rate} 1/s; it must be positive")
+    return _sampled(start, end, rate)
+
+
+def _integrated(
+    name: str, problem: DAEProblem, times: np.ndarray | None, stream: Stream | None, **options
+) -> DAEResult:
+    """Run an integrator, with outputs at ``times`` or, if they are None, at its own steps."""
+    if name == "IDA":
+        return solve_ida(problem, times, **options)
+    from gearmbs.dae.integrators.wstiff import solve_wstiff
+
+    # errors are controlled on positions and velocities, and so is the corrector
+    options.setdefault("corrector", "modified")
+    options.setdefault("slopes", times is not None)
+    return solve_wstiff(problem, times, method=name, consumer=stream, **options)
 
 
 def _sampled(start: float, end: float, rate: float) -> np.ndarray:

@@ -315,6 +315,10 @@ def column_too_far(t, frames, states, parameters, jac):
     jac[0, 24] = 1.0
 
 
+def adds_text(t, frames, states, parameters, wrench, rates, diagnostics):
+    wrench[0, 0] = "1" + parameters[0]
+
+
 def answers(t, frames, states, parameters, wrench, rates, diagnostics):
     return 3.0
 
@@ -336,7 +340,8 @@ def rate_not_finite(t, frames, states, parameters, wrench, rates, diagnostics):
     [
         (no_frames, {}, r"kernel has to take the arguments \(t, frames, states, parameters, wrench"),
         (3.0, {}, "kernel = 3.0 is not a function"),
-        (too_far, {}, r"its kernel fails with: index 1.*wrench \(1, 6\)"),
+        (too_far, {}, r"its kernel fails with IndexError: index 1.*wrench \(1, 6\)"),
+        (adds_text, {"parameters": [1.0]}, "its kernel fails with (UFunc|Type)"),
         (answers, {}, "its kernel returns 3.0; let it write"),
         (uses_objects, {}, "numba cannot compile kernel.*hand over what else it needs"),
         (nothing, {"parameters": {"stiffness": np.nan}}, "parameter stiffness = nan; give a finite number"),
@@ -349,7 +354,7 @@ def rate_not_finite(t, frames, states, parameters, wrench, rates, diagnostics):
         (nothing, {"diagnostics": [("heat", "W", "lost")]}, "'heat' has the role 'lost'; choose one of stored"),
         (nothing, {"diagnostics": [3]}, "diagnostic 3; give a name"),
         (nothing, {"derivatives": no_frames}, r"derivatives has to take the arguments \(t, frames, states, param"),
-        (nothing, {"derivatives": column_too_far}, r"its derivatives fails with: index 24.*jac \(6, 24\)"),
+        (nothing, {"derivatives": column_too_far}, r"its derivatives fails with IndexError: index 24.*jac \(6, 24\)"),
         (nothing, {"steps": {"way": 1.0}}, "steps has no 'way'; there are length, angle"),
         (nothing, {"steps": {"length": 0.0}}, r"steps: length = 0\.0; it must be positive"),
     ],

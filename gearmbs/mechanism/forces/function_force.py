@@ -216,11 +216,13 @@ def _try_one(
     try:
         with np.errstate(all="ignore"):
             answer = python(0.0, *(part.copy() for part in given.values()), *results.values())
-    except (IndexError, ValueError) as error:
-        shapes = ", ".join(f"{name} {part.shape}" for name, part in {**given, **results}.items())
-        raise ModelError(f"{label}: its {what} fails with: {error}; the shapes are {shapes}") from error
     except ZeroDivisionError:
+        # compiled it gives no number and raises nothing; at the start that may be, for instance of a distance
         return
+    except Exception as error:
+        shapes = ", ".join(f"{name} {part.shape}" for name, part in {**given, **results}.items())
+        reason = f"{type(error).__name__}: {error}"
+        raise ModelError(f"{label}: its {what} fails with {reason}; the shapes are {shapes}") from error
     if answer is not None:
         written = ", ".join(results)
         raise ModelError(f"{label}: its {what} returns {answer!r}; let it write to {written} and return nothing")
