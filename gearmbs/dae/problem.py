@@ -64,9 +64,6 @@ class DAEProblem:
         call it after each step.
     restart_rates : callable, optional
         ``restart_rates(t, y, yp, idata, rdata)`` returns y' consistent with y after ``hook`` has rewritten y.
-    kinks : bool
-        Whether derivatives of the solution may jump at places nobody announces, as at contacts: the order then falls as
-        soon as the next lower one allows the same step; elsewhere two lower orders have to agree.
     jacobian_residuals : int
         Calls of ``residual`` that one of ``jacobian`` takes, if that takes differences.
     advice : mapping of Status to str
@@ -94,6 +91,5 @@ class DAEProblem:
     n_events: int = 0
     hook_interval: Callable[[np.ndarray], float] | None = None
     restart_rates: Callable | None = None
-    kinks: bool = False
     jacobian_residuals: int = 0
     advice: Mapping[Any, str] = field(default_factory=dict)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from gearmbs._jit import njit
 from gearmbs.dae.integrators.bdf import HISTORY, divided_difference_norm, local_error, step_for_error
 from gearmbs.dae.integrators.history import rows_from, times_from
+from gearmbs.dae.integrators.run_state import KINK_MEMORY
 
 TARGET = 0.2
 RAISE_GAIN = 1.15
@@ -13,6 +14,17 @@ GROW_AT_MOST = 2.0
 SHRINK_FROM = 0.9
 SHRINK_AT_MOST = 0.5
 FAIL_SHRINK = (0.1, 0.8)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def meets_kinks(st):
+    """Return whether derivatives of the solution seem to jump, as at contacts: steps have been refused lately.
+
+    Where they are continuous, the differences foretell the error of the next step, and hardly one in a thousand is
+    refused; where they jump, no difference knows of it before, and the step that meets the jump is refused. Jumps come
+    in groups, and few steps lie between them.
+    """
+    return st.since_refused < KINK_MEMORY
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -82,7 +94,7 @@ def after_success(st):
     if k > 1:
         h_low = step_reaching(st, k - 1, h_best, h, nodes)
         # see `step_below`
-        if h_low >= h_best and (k == 2 or st.kinks or step_reaching(st, k - 2, h_best, h, nodes) >= h_best):
+        if h_low >= h_best and (k == 2 or meets_kinks(st) or step_reaching(st, k - 2, h_best, h, nodes) >= h_best):
             best = k - 1
             h_best = h_low
     if best == k and k < st.max_order and n_past >= k + 3 and unchanged and st.caution == 0:

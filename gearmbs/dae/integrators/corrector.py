@@ -7,6 +7,7 @@ from numba import int64
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
+from gearmbs.dae.integrators.controller import meets_kinks
 from gearmbs.dae.integrators.weights import weighted_max
 from gearmbs.dae.linalg.sparse_lu import solve
 
@@ -22,6 +23,7 @@ RATE_UNKNOWN = 0.1
 ROUNDING_LEVEL = 0.1
 ROUNDING_LEVEL_FRESH = 0.5
 LOOSEST = 0.03
+LOOSEST_AT_KINKS = 0.1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -70,13 +72,13 @@ def _verdict(st, rate):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def amount_left(order, kinks):
+def amount_left(st):
     """Return what the corrector may leave, in tolerances.
 
-    Differences of order k + 1, which steer order and step, amplify it by 2^k. Of a smooth solution the corrector's
-    error would also be what is left to see at tight tolerances; where derivatives jump, the error test's is larger.
+    Differences of order k + 1, which steer order and step, amplify it by 2^k. Where derivatives jump, the differences
+    are larger anyway, and a stricter corrector buys nothing.
     """
-    return 0.5**order if kinks else min(LOOSEST, 0.5**order)
+    return min(LOOSEST_AT_KINKS if meets_kinks(st) else LOOSEST, 0.5**st.order)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -95,7 +97,7 @@ def correct(functions, st, plan, factors):
     y, yp, res, delta = st.y, st.yp, st.res, st.delta
     t, gamma = st.t_new, st.gamma
     damp = 2.0 / (1.0 + gamma / st.gamma_factored) - 1.0
-    limit = st.newton_tolerance * amount_left(st.order, st.kinks)
+    limit = st.newton_tolerance * amount_left(st)
     previous = 0.0
     iterations = st.max_iterations
     for m in range(iterations):

@@ -8,7 +8,7 @@ from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.history import newest_point
 from gearmbs.dae.integrators.newton_matrix import SLOPE_MAX_AGE
 from gearmbs.dae.integrators.options import Options, event_rules
-from gearmbs.dae.integrators.run_state import RunState, new_state
+from gearmbs.dae.integrators.run_state import KINK_MEMORY, RunState, new_state
 from gearmbs.dae.integrators.weights import set_weights
 from gearmbs.dae.problem import DAEProblem
 
@@ -22,9 +22,6 @@ MOST_RECORDS = 8192
 EVENT_BUFFER = 64
 RATE_ALLOWED = 0.12
 RATE_ALLOWED_IF_DEAR = 0.2
-DRIFT_ALLOWED = 0.2
-DRIFT_ALLOWED_AT_KINKS = 0.3
-"""Larger where steps change so often that factors serve but a few of them."""
 DEAR = 12
 """Residuals from which on a matrix is dear, and worth its price only at slower rates of the corrector."""
 
@@ -73,19 +70,18 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.rtol = options.rtol
     st.newton_tolerance = NEWTON_TOLERANCE
     st.rate_allowed = RATE_ALLOWED_IF_DEAR if problem.jacobian_residuals >= DEAR else RATE_ALLOWED
-    st.drift_allowed = DRIFT_ALLOWED_AT_KINKS if problem.kinks else DRIFT_ALLOWED
     st.max_order = options.highest_order if options.max_order is None else options.max_order
     st.max_iterations = MAX_ITERATIONS if options.max_iterations is None else options.max_iterations
     st.max_steps = options.max_steps or 0
     st.n_events = n_events
     st.fixed_leading = options.method == "GSTIFF"
-    st.kinks = problem.kinks
     st.interpolate = options.interpolate
     st.has_hook = problem.hook is not None
     st.keep_rows = keep
     st.step_in_weights = bool((st.tested > st.coupled).any())
     st.t = t0
     st.order = 1
+    st.since_refused = KINK_MEMORY
     st.n_past = 1
     st.gamma_factored = 1.0
     st.matrix_wanted = True

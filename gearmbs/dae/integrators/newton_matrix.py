@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from gearmbs._jit import njit
+from gearmbs.dae.integrators.controller import meets_kinks
 from gearmbs.dae.integrators.run_state import REPIVOT, RUNNING
 from gearmbs.dae.linalg.sparse_lu import factor
 
+GAMMA_DRIFT = 0.2
+GAMMA_DRIFT_AT_KINKS = 0.3
+"""Larger where steps change so often that factors serve but a few of them."""
 MATRIX_MAX_AGE = 50
 SLOPE_MAX_AGE = 20
 RATE_OF_FRESH = 0.1
@@ -52,9 +56,10 @@ def form_matrix(functions, st, plan, factors):
         RUNNING, or REPIVOT where pivots have to be chosen anew.
     """
     drift = st.gamma / st.gamma_factored
+    allowed = 1.0 + (GAMMA_DRIFT_AT_KINKS if meets_kinks(st) else GAMMA_DRIFT)
     whole_again = st.drop_level > 0 and st.drop_age >= DROPPED_STEPS
     wanted = st.matrix_wanted or st.matrix_age >= MATRIX_MAX_AGE or whole_again
-    if not (wanted or drift > 1.0 + st.drift_allowed or drift < 1.0 / (1.0 + st.drift_allowed)):
+    if not (wanted or drift > allowed or drift < 1.0 / allowed):
         return RUNNING
     if wanted:
         st.matrix_wanted = True

@@ -26,6 +26,9 @@ FAIL_NEWTON = -9
 WINDOW = 4 * HISTORY
 """Rows of the window that slides over the history; the longer, the more seldom it is moved back."""
 
+KINK_MEMORY = 64
+"""Steps after a refused one for which derivatives of the solution count as jumping; see `controller.meets_kinks`."""
+
 MAX_NODES = 2 * HISTORY
 """Length of the vectors that hold coefficients of a step."""
 
@@ -92,7 +95,6 @@ class RunState(Struct):
     max_steps: int  # 0: no limit
     n_events: int
     fixed_leading: bool  # GSTIFF
-    kinks: bool  # the problem's
     interpolate: bool  # outputs by interpolation, or by steps that land on them
     has_hook: bool
     keep_rows: bool  # whether y of every step is recorded
@@ -105,6 +107,7 @@ class RunState(Struct):
     n_past: int  # points accepted and not forgotten, at most HISTORY
     since_change: int  # steps since order or size last changed
     caution: int  # steps without growth still to come after a failure
+    since_refused: int  # steps since the error test refused one
     # the open step
     open: bool  # its row is taken
     t_old: float
@@ -132,7 +135,6 @@ class RunState(Struct):
     growth_limit: float  # growth of its factors beyond which pivots are chosen anew
     rate: float  # of convergence of the corrector, as last seen
     rate_allowed: float  # beyond which the matrix is evaluated anew for the next step
-    drift_allowed: float  # of gamma, relative to the one it was factored for, beyond which it is factored anew
     drop_level: int  # how large pivots may be to be left out near a singular position
     drop_age: int
     drop_rounds: int

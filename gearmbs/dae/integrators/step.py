@@ -253,6 +253,7 @@ def refuse_by_error(st):
     """Choose order and size of the next attempt after the error test failed."""
     forget_noise(st)
     st.error_rejections += 1
+    st.since_refused = 0
     st.error_fails += 1
     st.worst = weighted_argmax(st.delta, st.w_error)
     st.worst_error = st.worst
@@ -274,6 +275,7 @@ def accept(st):
             if st.differential[i] == 0.0:
                 start[i] = st.y[i]
     st.steps += 1
+    st.since_refused += 1
     st.open = False
     st.matrix_fresh = False
     st.matrix_age += 1

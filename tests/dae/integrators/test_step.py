@@ -7,7 +7,7 @@ from gearmbs.dae.integrators import bdf, run_state, step
 from gearmbs.dae.integrators.controller import after_success
 from gearmbs.dae.integrators.corrector import CONVERGED, NOT_FINITE, SLOW, apply_correction
 from gearmbs.dae.integrators.history import forget, newest_point, open_row, rows_from, times_from
-from gearmbs.dae.integrators.newton_matrix import form_matrix
+from gearmbs.dae.integrators.newton_matrix import GAMMA_DRIFT, form_matrix
 from gearmbs.dae.integrators.rounding import count_noise
 from gearmbs.dae.integrators.run_state import REPIVOT, RUNNING, WINDOW
 from gearmbs.dae.integrators.weights import renew_weights, set_weights, weighted_argmax, weighted_max
@@ -126,10 +126,10 @@ def test_the_matrix_is_kept_until_the_leading_coefficient_has_drifted():
     assert st.jacobians > jacobians
     assert st.matrix_fresh
     jacobians, factorizations = st.jacobians, st.factorizations
-    st.gamma *= 1.0 + 0.5 * st.drift_allowed
+    st.gamma *= 1.0 + 0.5 * GAMMA_DRIFT
     assert form_matrix(*parts) == RUNNING
     assert (st.jacobians, st.factorizations) == (jacobians, factorizations)
-    st.gamma *= 1.0 + st.drift_allowed
+    st.gamma *= 1.0 + GAMMA_DRIFT
     assert form_matrix(*parts) == RUNNING
     assert (st.jacobians, st.factorizations) == (jacobians, factorizations + 1)
     exact = np.zeros_like(st.matrix)
