@@ -54,11 +54,11 @@ class ChippedCorner(Fault):
             0 < self.length <= gear.face_width,
             f"ChippedCorner.length is {self.length} m; give more than 0 up to the face width, {gear.face_width:.6g} m",
         )
-        most = gear.tip_radius - gear.root_radius
+        most = abs(gear.tip_radius - gear.root_radius)
         require(0 < self.height <= most, f"ChippedCorner.height is {self.height} m; the tooth is {most:.6f} m high")
         from_end = 0.5 * gear.face_width - self.end * deviations.section
         cut = self.height * np.maximum(0.0, 1 - from_end / self.length)
-        deviations.shorten(self.tooth % gear.teeth, gear.tip_radius - cut)
+        deviations.shorten(self.tooth % gear.teeth, gear.tip_radius - gear.sign * cut)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,6 +194,9 @@ class Wear(Fault):
         start = pair.first_roll_lengths[self.wheel == "driven"]
         # specific sliding: way slid per way rolled over, finite from the start of the active profile on
         roll_length = np.maximum(deviations.roll_length, start)
+        if gear.internal:
+            # its active profile begins outwards, at the largest length of roll
+            roll_length = np.minimum(deviations.roll_length, start)
         sliding = np.abs(roll_length - pitch_point) / roll_length
         worn = self.depth * sliding / max(abs(start - pitch_point) / start, sliding[-1])
         for flank in deviations.flanks(self.flank):
@@ -332,7 +335,7 @@ class Waviness(Fault):
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         gear = deviations.gear
-        step = (deviations.roll_length[1] - deviations.roll_length[0]) / gear.base_radius
+        step = abs(deviations.roll_length[1] - deviations.roll_length[0]) / gear.base_radius
         most = int(2 * math.pi / (POINTS_A_WAVE * step))
         require(self.amount >= 0, f"Waviness.amount is {self.amount} m; it must not be negative")
         require(
@@ -430,7 +433,7 @@ class TipRelief(Fault):
             deviations.shape[flank, deviations.tooth_list(self.teeth)] += relief
 
     def _distance(self, deviations: ToothDeviations, pair: PairGeometry) -> np.ndarray:
-        return deviations.gear.tip_roll_length - deviations.roll_length
+        return deviations.gear.sign * (deviations.gear.tip_roll_length - deviations.roll_length)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -441,7 +444,7 @@ class RootRelief(TipRelief):
 
     def _distance(self, deviations: ToothDeviations, pair: PairGeometry) -> np.ndarray:
         start = pair.first_roll_lengths[self.wheel == "driven"]
-        return np.maximum(deviations.roll_length - start, 0.0)
+        return np.maximum(deviations.gear.sign * (deviations.roll_length - start), 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)

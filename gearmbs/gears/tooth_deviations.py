@@ -71,21 +71,25 @@ class ToothDeviations:
         """Direction of the outward normal in the wheel's frame, rad, shape (z, ns)."""
         side = 1 - 2 * flank
         middle = 2 * math.pi * np.arange(self.gear.teeth)[:, None] / self.gear.teeth
-        tangent = middle + side * (self.gear.base_half_angle - self.roll_length / self.gear.base_radius)
+        turned = self.gear.sign * self.roll_length / self.gear.base_radius
+        tangent = middle + side * (self.gear.base_half_angle - turned)
         return tangent + side * 0.5 * math.pi
 
     def shift(self, x: np.ndarray | float, y: np.ndarray | float) -> None:
         """Displace the whole toothing by (x, y) in the wheel's frame, m; arrays run along the face."""
         x = np.broadcast_to(np.asarray(x, dtype=float), self.section.shape)
         y = np.broadcast_to(np.asarray(y, dtype=float), self.section.shape)
+        lead = (self.gear.twist_tangent / self.gear.base_radius * self.section)[None, :, None]
         for flank in (0, 1):
-            angle = self.normal_angle(flank)[:, None, :]
+            angle = self.normal_angle(flank)[:, None, :] + lead
             self.shape[flank] -= x[:, None] * np.cos(angle) + y[:, None] * np.sin(angle)
 
     def shorten(self, tooth: int, radius: np.ndarray) -> None:
         """Cut both flanks of a tooth at these radii along the face, m."""
         roll_length = np.sqrt(np.maximum(radius**2 - self.gear.base_radius**2, 0.0))
-        self.tip[:, tooth] = np.minimum(self.tip[:, tooth], roll_length)
+        # a shorter tooth ends at a larger radius where teeth point inwards
+        shorter = np.maximum if self.gear.internal else np.minimum
+        self.tip[:, tooth] = shorter(self.tip[:, tooth], roll_length)
 
     def tooth_list(self, teeth: object) -> list[int]:
         """Tooth numbers from ``"all"``, one number or several; numbers wrap around the wheel."""

@@ -49,6 +49,14 @@ if TYPE_CHECKING:
     from gearmbs.signals.orders import harmonic_amplitudes
     from gearmbs.signals.ordinal import level_distance, ordinal_agreement
     from gearmbs.signals.phase import instantaneous_speed, phase_from_line, phase_from_speed, phase_from_tacho
+    from gearmbs.signals.planetary import (
+        PlanetaryModel,
+        carrier_lines,
+        fixed_sensor,
+        mesh_bands,
+        path_weight,
+        planetary_average,
+    )
     from gearmbs.signals.scaling import dynamic_rms, remove_mean, rms_factor, scale, scale_states
     from gearmbs.signals.sections import sections, trend, trend_table
     from gearmbs.signals.sensors import (
@@ -101,6 +109,7 @@ __all__ = [
     "ModalPath",
     "Mode",
     "PartFinding",
+    "PlanetaryModel",
     "SignalError",
     "SignalFileError",
     "SpeedCurve",
@@ -116,6 +125,7 @@ __all__ = [
     "bandpass",
     "bearing_lines",
     "campbell",
+    "carrier_lines",
     "common_unit",
     "compare",
     "compare_files",
@@ -135,6 +145,7 @@ __all__ = [
     "estimate_speed",
     "even_signal",
     "features",
+    "fixed_sensor",
     "fm0",
     "fm4",
     "force_components",
@@ -151,6 +162,7 @@ __all__ = [
     "m8a",
     "make_signal",
     "measure",
+    "mesh_bands",
     "mesh_envelope",
     "mesh_frequency",
     "na4",
@@ -160,10 +172,12 @@ __all__ = [
     "order_spectrum",
     "order_track",
     "ordinal_agreement",
+    "path_weight",
     "peak_to_peak",
     "phase_from_line",
     "phase_from_speed",
     "phase_from_tacho",
+    "planetary_average",
     "power_cepstrum",
     "prewhiten",
     "quantise",
@@ -205,6 +219,12 @@ __all__ = [
 late(
     __name__,
     {
+        "planetary_average": ".planetary",
+        "path_weight": ".planetary",
+        "mesh_bands": ".planetary",
+        "fixed_sensor": ".planetary",
+        "carrier_lines": ".planetary",
+        "PlanetaryModel": ".planetary",
         "BearingLines": ".bearing_lines",
         "BearingReport": ".bearing_report",
         "PartFinding": ".bearing_report",

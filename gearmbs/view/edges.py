@@ -108,10 +108,11 @@ def profile_edges(gear: GearSpec) -> list[Edge]:
 
 
 def bore_edges(gear: GearSpec) -> list[Edge]:
-    """Return the bore as two half circles run clockwise; empty for a wheel without one."""
-    if gear.bore_radius == 0.0:
+    """Return the bore (of an internal wheel the rim) as two half circles run clockwise; empty without one."""
+    radius = gear.outer_radius if gear.internal else gear.bore_radius
+    if radius == 0.0:
         return []
-    east, west = polar(gear.bore_radius, 0.0), polar(-gear.bore_radius, 0.0)
+    east, west = polar(radius, 0.0), polar(-radius, 0.0)
     return [Arc(east, west, np.zeros(2), -1), Arc(west, east, np.zeros(2), -1)]
 
 
@@ -121,21 +122,24 @@ def _flank_edges(gear: GearSpec) -> list[Edge]:
     centre = polar(gear.fillet_centre_radius, -gear.fillet_half_angle)
     foot = polar(gear.root_radius, -gear.fillet_half_angle)
     form = polar(gear.form_radius, -gear.half_angle(begin))
-    edges: list[Edge] = [Arc(foot, form, centre, -1)]
+    edges: list[Edge] = [Arc(foot, form, centre, -gear.sign)]
     if gear.form_radius < gear.base_radius * (1.0 - 1e-12):
         edges.append(Line(form, polar(gear.base_radius, -gear.base_half_angle)))
     roll_length = np.linspace(gear.form_roll_length, gear.tip_roll_length, SPLINE_POINTS)
     radius = np.hypot(gear.base_radius, roll_length)
-    angle = np.array([involute(math.atan2(s, gear.base_radius)) - gear.base_half_angle for s in roll_length])
+    angle = (
+        np.array([gear.sign * involute(math.atan2(s, gear.base_radius)) for s in roll_length]) - gear.base_half_angle
+    )
     points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
     points[0] = edges[-1].stop
-    spline = make_interp_spline(roll_length / roll_length[-1], points, k=DEGREE)
+    places = np.linspace(0.0, 1.0, SPLINE_POINTS) if gear.internal else roll_length / roll_length[-1]
+    spline = make_interp_spline(places, points, k=DEGREE)
     control = spline.c.copy()
     control[0], control[-1] = points[0], points[-1]
     edges.append(Spline(control, spline.t))
     if gear.tip_rounding > 0.0:
         corner = polar(gear.corner_radius, -gear.corner_half_angle)
-        edges.append(Arc(points[-1], polar(gear.tip_radius, -gear.corner_half_angle), corner, 1))
+        edges.append(Arc(points[-1], polar(gear.tip_radius, -gear.corner_half_angle), corner, gear.sign))
     return edges
 
 

@@ -80,7 +80,11 @@ def _wheel(gear: GearSpec, centre: np.ndarray, angle: float, tolerance: float) -
     for edge in profile_edges(gear):
         out += _vertices(edge.turned(angle), centre, tolerance)
     out += ["0", "SEQEND", "8", "PROFILE"]
-    circles = [("PITCH", gear.pitch_radius), ("BASE", gear.base_radius), ("BORE", gear.bore_radius)]
+    circles = [
+        ("PITCH", gear.pitch_radius),
+        ("BASE", gear.base_radius),
+        ("BORE", gear.outer_radius if gear.internal else gear.bore_radius),
+    ]
     for layer, radius in circles:
         if radius > 0.0:
             out += ["0", "CIRCLE", "8", layer, *_point(centre), "40", _number(radius)]

@@ -41,6 +41,7 @@ def write_step(gears: GearSpec | GearPair, path: str | Path, *, driver_angle: fl
     ------
     ValueError
         If the pair has faults of single teeth: those are tabulated, not curves; write them with `write_stl`.
+        For internal and helical wheels.
     """
     writer = _Writer()
     if isinstance(gears, GearPair):
@@ -105,8 +106,18 @@ def _refs(numbers: Sequence[int]) -> str:
     return "(" + ",".join(f"#{n}" for n in numbers) + ")"
 
 
+def _check(gear: GearSpec) -> None:
+    if gear.internal or gear.helix_angle:
+        kind = "internal" if gear.internal else "helical"
+        raise ValueError(
+            f"{gear.name} is {kind}: STEP files hold external spur wheels; write_stl writes its solid, write_dxf its "
+            "transverse section"
+        )
+
+
 def _solid(writer: _Writer, gear: GearSpec, origin: np.ndarray, axes: np.ndarray) -> int:
     """Write the prism over profile and bore in a frame; return the number of the solid."""
+    _check(gear)
     half = 0.5 * gear.face_width
     frame = _Frame(writer, origin, axes)
     faces: list[int] = []

@@ -27,7 +27,7 @@ class HalfTooth:
     Attributes
     ----------
     radius : ndarray, shape (n,)
-        Rising, m; the first on the root circle, the last on the tip circle.
+        Rising (falling for an internal wheel), m; the first on the root circle, the last on the tip circle.
     half_angle : ndarray, shape (n,)
         Angle from the tooth's middle, rad.
     """
@@ -52,8 +52,6 @@ def half_tooth(gear: GearSpec, tolerance: float = TOLERANCE) -> HalfTooth:
     """
     if not (math.isfinite(tolerance) and tolerance > 0.0):
         raise ValueError(f"tolerance is {tolerance} m; give a positive length such as 1e-6")
-    if gear.internal:
-        raise ValueError(f"{gear.name} is an internal wheel, which has no outline of its own here; see ring_outline")
     pieces = [_root_arc(gear, tolerance), _flank(gear, tolerance)]
     if gear.tip_rounding > 0.0:
         pieces.append(_tip_arc(gear, tolerance))
@@ -117,11 +115,16 @@ def arc_chords(radius: float, angle: float, tolerance: float, fewest: int = FEWE
 
 
 def profile_area(gear: GearSpec) -> float:
-    """Return the area of the transverse profile in closed form, bore removed, m^2.
+    """Return the area of the transverse profile in closed form, bore removed, m^2; of an internal wheel by its outline.
 
     Half of the closed integral of r^2 d(angle) over root circle, root arc, involute, tip rounding and tip circle. The
     mass of the simulated wheel is that of a disc of the pitch radius (`GearSpec.mass`); this is the true profile's.
     """
+    if gear.internal:
+        outline = gear_outline(gear)
+        x, y = outline[:, 0], outline[:, 1]
+        inside = 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+        return math.pi * gear.outer_radius**2 - inside
     start = max(gear.form_radius, gear.base_radius)
     tip_form = math.hypot(gear.base_radius, gear.tip_roll_length)
     root = gear.root_radius**2 * (math.pi / gear.teeth - gear.fillet_half_angle)
@@ -138,6 +141,8 @@ def profile_area(gear: GearSpec) -> float:
 
 def _root_arc_span(gear: GearSpec) -> tuple[float, float]:
     """Directions from the arc's centre, against the radial direction, of its ends on root circle and flank, rad."""
+    if gear.internal:
+        return 0.0, math.acos(gear.fillet_radius / gear.fillet_centre_radius) - math.pi
     return math.pi, math.pi + math.acos(gear.fillet_radius / gear.fillet_centre_radius)
 
 
@@ -155,11 +160,12 @@ def _flank(gear: GearSpec, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
     """Involute from where it begins to the tip (or its rounding), by equal steps of the root of the length of roll."""
     low, high = gear.form_roll_length, gear.tip_roll_length
     # a chord of roll angle du on an involute at length of roll s departs by s du^2 r_b / (8 r_b) = s du^2 / 8
-    roll = (high - low) / gear.base_radius
-    count = max(FEWEST, math.ceil(roll * math.sqrt(high / (8.0 * tolerance))))
+    roll = abs(high - low) / gear.base_radius
+    count = max(FEWEST, math.ceil(roll * math.sqrt(max(low, high) / (8.0 * tolerance))))
     roll_length = np.linspace(low, high, count + 1)
     radius = np.hypot(gear.base_radius, roll_length)
-    angle = np.array([gear.base_half_angle - involute(math.atan2(s, gear.base_radius)) for s in roll_length])
+    turns = [gear.sign * involute(math.atan2(s, gear.base_radius)) for s in roll_length]
+    angle = gear.base_half_angle - np.array(turns)
     if gear.tip_rounding == 0.0:
         radius[-1] = gear.tip_radius
     if gear.form_radius < gear.base_radius * (1.0 - 1e-12):
@@ -171,9 +177,10 @@ def _flank(gear: GearSpec, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
 def _tip_arc_span(gear: GearSpec) -> tuple[float, float]:
     """Directions from the rounding's centre, against the radial direction, of its ends on flank and tip circle, rad."""
     form = math.hypot(gear.base_radius, gear.tip_roll_length)
-    polar = gear.base_half_angle - involute(math.acos(gear.base_radius / form)) - gear.corner_half_angle
+    polar = gear.half_angle(form) - gear.corner_half_angle
     along, across = form * math.cos(polar) - gear.corner_radius, form * math.sin(polar)
-    return (math.atan2(across, along) if gear.tip_rounding > 0.0 else 0.0), 0.0
+    end = math.pi if gear.internal else 0.0
+    return (math.atan2(across, along) if gear.tip_rounding > 0.0 else end), end
 
 
 def _tip_arc(gear: GearSpec, tolerance: float) -> tuple[np.ndarray, np.ndarray]:

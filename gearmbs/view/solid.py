@@ -102,19 +102,43 @@ def gear_solid(
         rims.append(rim)
         grids.append(grid)
     for low, high in pairwise(rims):
-        builder.wall(low, high)
+        # the teeth of an internal wheel face its axis
+        builder.wall(*((high, low) if gear.internal else (low, high)))
     inner = []
     for j, up in ((0, False), (last, True)):
         rows, ring = grids[j]
         for tooth in rows:
-            builder.patch(tooth, up)
+            builder.patch(tooth, up != gear.internal)
         inner.append(_hub(builder, ring, gear, float(teeth.section[j]), up))
-    if gear.bore_radius > 0.0:
+    if gear.internal:
+        builder.wall(inner[0], inner[1])
+    elif gear.bore_radius > 0.0:
         builder.wall(inner[1], inner[0])
     return builder.mesh()
 
 
 def _teeth(gear: GearSpec, tolerance: float, deviations: Deviations | None, exaggeration: float) -> _Teeth:
+    teeth = _straight_teeth(gear, tolerance, deviations, exaggeration)
+    if gear.helix_angle == 0:
+        return teeth
+    # enough sections that a chord of the tip's helix stays within the tolerance
+    lead = gear.twist_tangent / gear.base_radius
+    count = arc_chords(gear.outer_radius, lead * gear.face_width, tolerance, 2)
+    section = np.linspace(teeth.section[0], teeth.section[-1], max(count + 1, teeth.section.size))
+    place = np.interp(section, teeth.section, np.arange(teeth.section.size))
+    low = np.minimum(place.astype(int), teeth.section.size - 2)
+    share = (place - low)[:, None, None]
+
+    def along(values: np.ndarray) -> np.ndarray:
+        return values[low] + share * (values[low + 1] - values[low])
+
+    turn = (lead * section)[:, None, None]
+    one, two = along(teeth.angle[0]), along(teeth.angle[1])
+    return _Teeth(section, along(teeth.radius), (one + turn, two - turn))
+
+
+def _straight_teeth(gear: GearSpec, tolerance: float, deviations: Deviations | None, exaggeration: float) -> _Teeth:
+    """Return the teeth without the turn of a helix."""
     half = half_tooth(gear, tolerance)
     n, rb = half.radius.size, gear.base_radius
     if deviations is None:
@@ -125,18 +149,23 @@ def _teeth(gear: GearSpec, tolerance: float, deviations: Deviations | None, exag
     section = np.asarray(deviations.section)
     radius = np.empty((section.size, gear.teeth, n))
     angles = (np.empty_like(radius), np.empty_like(radius))
-    tips = np.hypot(rb, np.minimum(deviations.tip[0], deviations.tip[1]))
-    whole = math.hypot(rb, gear.tip_roll_length) * (1.0 - 1e-9)
+    shorter = np.maximum if gear.internal else np.minimum
+    tips = np.hypot(rb, shorter(deviations.tip[0], deviations.tip[1]))
+    whole = math.hypot(rb, gear.tip_roll_length) * (1.0 - gear.sign * 1e-9)
+    # tables along the profile are looked up from the smaller radius on
+    order = slice(None, None, gear.sign)
     rise = (half.radius - gear.root_radius) / (gear.tip_radius - gear.root_radius)
     for j in range(section.size):
         for tooth in range(gear.teeth):
             top = tips[tooth, j]
-            here = half.radius if top >= whole else gear.root_radius + rise * (top - gear.root_radius)
-            plain = half.half_angle if top >= whole else np.interp(here, half.radius, half.half_angle)
+            entire = gear.sign * (top - whole) >= 0
+            here = half.radius if entire else gear.root_radius + rise * (top - gear.root_radius)
+            plain = half.half_angle if entire else np.interp(here, half.radius[order], half.half_angle[order])
             roll_length = np.sqrt(np.maximum(here**2 - rb**2, 0.0))
             radius[j, tooth] = here
             for side in (0, 1):
-                removed = np.interp(roll_length, deviations.roll_length, deviations.shape[side, tooth, j])
+                shape = deviations.shape[side, tooth, j]
+                removed = np.interp(roll_length, deviations.roll_length[order], shape[order])
                 removed = exaggeration * (removed + deviations.offset[side, tooth])
                 angles[side][j, tooth] = plain - removed / rb
     if ((angles[0] + angles[1]) <= 0.0).any():
@@ -221,6 +250,11 @@ def _section(
 
 def _hub(builder: _Builder, ring: np.ndarray, gear: GearSpec, z: float, up: bool) -> np.ndarray:
     """Fill an end between root circle and bore (or centre); return the chain round the bore."""
+    if gear.internal:
+        points = np.concatenate(builder.points)[ring]
+        rim = builder.add(_polar(np.full(ring.size, gear.outer_radius), np.arctan2(points[:, 1], points[:, 0]), z))
+        builder.patch(np.stack([np.append(ring, ring[0]), np.append(rim, rim[0])]), up)
+        return rim
     if gear.bore_radius == 0.0:
         centre = builder.add(np.array([[0.0, 0.0, z]]))
         builder.fan(ring, int(centre[0]), up)
