@@ -6,6 +6,7 @@ True at once, False never; a callable is told instead. ``GEARMBS_PROGRESS=0`` in
 
 from __future__ import annotations
 
+import functools
 import html
 import os
 import sys
@@ -13,13 +14,15 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar, cast
 
 PATIENCE = 2.0
 """Seconds before bars appear."""
 
 INTERVAL = 0.2
 """Shortest time between two pictures, s."""
+
+F = TypeVar("F", bound=Callable)
 
 SHOWN_ROWS = 8
 """Bars shown at most in a notebook; of more cases those at work."""
@@ -33,6 +36,9 @@ def watched() -> str | None:
     if shell is not None and hasattr(shell, "kernel"):
         return "notebook"
     return "terminal" if sys.stderr is not None and sys.stderr.isatty() else None
+
+
+_open = False
 
 
 class Bars:
@@ -137,20 +143,41 @@ def bars(progress: bool | Callable[[str, float], None] | None, names: Sequence[s
     names : sequence of str
         Of all jobs.
     """
+    global _open
     if callable(progress):
         yield progress
         return
     where = watched()
     if progress is True and where is None:
         where = "terminal"
-    if progress is False or where is None:
+    # work inside other work is part of its bar
+    if progress is False or where is None or _open:
         yield None
         return
     shown = Bars(names, where, 0.0 if progress is True else PATIENCE)
+    _open = True
     try:
         yield shown.move
     finally:
+        _open = False
         shown.close()
+
+
+def staged(title: str) -> Callable[[F], F]:
+    """Give a function that tells ``progress(fraction, stage)`` a bar of this title where it is called without one."""
+
+    def with_bar(function: F) -> F:
+        @functools.wraps(function)
+        def called(*args: Any, progress: Any = None, **settings: Any) -> Any:
+            if callable(progress):
+                return function(*args, progress=progress, **settings)
+            with bars(progress, [title]) as move:
+                report = None if move is None else lambda fraction, stage: move(title, fraction)
+                return function(*args, progress=report, **settings)
+
+        return cast(F, called)
+
+    return with_bar
 
 
 @contextmanager

@@ -4,10 +4,12 @@ import io
 import sys
 from types import ModuleType, SimpleNamespace
 
+import numpy as np
 import pytest
 
 from gearmbs import progress
 from gearmbs.mechanism import Mechanism
+from gearmbs.signals import analyse, make_signal
 from gearmbs.studies import Case, run_cases
 
 
@@ -95,6 +97,26 @@ def test_runs_show_them(notebook, monkeypatch):
     run_cases([Case(name="the case", operation={"run_up": 0.02, "settling": 0.0, "duration": 0.07})])
     assert "the case" in notebook[0]
     assert notebook[-1] == ""
+
+
+def test_analyses_show_them_and_work_inside_other_work_does_not(notebook, monkeypatch):
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    monkeypatch.setattr(progress, "INTERVAL", 0.0)
+    t = np.arange(20000) / 5000.0
+    signal = make_signal(np.sin(2 * np.pi * 300.0 * t), 5000.0, units="m/s^2", speed=20 * np.pi, teeth=30)
+    analyse(signal)
+    assert "analysing" in notebook[0]
+    assert notebook[-1] == ""
+    told = []
+    analyse(signal, progress=lambda fraction, stage: told.append((fraction, stage)))
+    assert told
+    notebook.clear()
+    with progress.bars(True, ["outer"]) as move:
+        analyse(signal)
+        move("outer", 0.5)
+    assert not any("analysing" in page for page in notebook)
+    with pytest.raises(TypeError):
+        analyse(signal, progres=None)
 
 
 def test_a_terminal_has_them_on_the_error_stream(monkeypatch, clock):

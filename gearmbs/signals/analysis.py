@@ -12,6 +12,8 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
+from gearmbs.progress import staged
+
 from .analysis_report import AnalysisReport
 from .angular import angular_resample, samples_per_revolution, time_synchronous_average
 from .bands import HALF_WIDTH, TRANSITION, band_rms
@@ -58,6 +60,7 @@ class AnalysisOptions:
 SETTINGS = tuple(f.name for f in fields(AnalysisOptions))
 
 
+@staged("analysing")
 def analyse(
     signal: Any,
     teeth: int | Sequence[int] | None = None,
@@ -82,7 +85,7 @@ def analyse(
     rate, units, channels, gaps : optional
         As for `to_signal`.
     progress : callable, optional
-        Called as progress(fraction, stage).
+        Called as progress(fraction, stage); without it a bar is shown where somebody watches, see `gearmbs.progress`.
     options : AnalysisOptions, optional
         The settings below in one object, instead of keywords.
     speed : float, str or curve, optional

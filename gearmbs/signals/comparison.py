@@ -9,6 +9,8 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
+from gearmbs.progress import staged
+
 from .analysis import analyse
 from .analysis_report import AnalysisReport
 from .bands import HALF_WIDTH
@@ -23,6 +25,7 @@ Scope = Literal["load", "all", "each"]
 FEATURES = ("kurtosis", "fm4", "energy_ratio", "sideband_level")
 
 
+@staged("comparing")
 def compare(
     experiment: States | Mapping[str, Any],
     model: States | Mapping[str, Any] | None = None,
@@ -72,7 +75,7 @@ def compare(
     wheel : int
         Whose shaft the indicators follow (`analyse`).
     progress : callable, optional
-        Called as progress(fraction, stage).
+        Called as progress(fraction, stage); without it a bar is shown where somebody watches, see `gearmbs.progress`.
 
     Returns
     -------

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from gearmbs.progress import staged
 from gearmbs.units import to_si
 
 from .analysis import analyse
@@ -150,6 +151,7 @@ def _of_file(
         progress(1.0, "reading")
 
 
+@staged("following")
 def trend(
     path: Any,
     seconds: float | str,
@@ -171,7 +173,7 @@ def trend(
     teeth, speed, speed_range, speed_channel, harmonics
         As for `analyse`. Without teeth the features are those of plain vibration.
     progress : callable, optional
-        Called as progress(fraction, stage).
+        Called as progress(fraction, stage); without it a bar is shown where somebody watches, see `gearmbs.progress`.
     **reading
         `rate`, `units`, `channels`, `gaps`, `format` as for `read_signal`.
 

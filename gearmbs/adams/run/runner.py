@@ -53,7 +53,7 @@ def run_deck(
     dtout: float | None = None,
     tol: float | None = None,
     allow_unsupported: bool = False,
-    progress: bool | Callable[[float], None] = False,
+    progress: bool | Callable[[float], None] | None = None,
 ) -> AdamsResult:
     """Run an ADAMS deck.
 
@@ -123,7 +123,7 @@ def _carry_out(
     result: AdamsResult,
     tol: float | None,
     allow_unsupported: bool,
-    progress: bool | Callable[[float], None],
+    progress: bool | Callable[[float], None] | None,
 ) -> bool:
     """Carry out one command of a script; return whether the next may follow."""
     result.log.append((command, None))
@@ -202,7 +202,7 @@ def _simulate(
     command: Simulate,
     tol: float | None,
     allow_unsupported: bool,
-    progress: bool | Callable[[float], None],
+    progress: bool | Callable[[float], None] | None,
 ) -> Segment:
     """Carry out one SIMULATE."""
     kind = command.kind or "DYNAMICS"
@@ -247,7 +247,7 @@ def _solve(
     model: AdamsModel,
     times: np.ndarray,
     options: dict[str, Any],
-    progress: bool | Callable[[float], None],
+    progress: bool | Callable[[float], None] | None,
 ) -> tuple[Solution, StaticResult | None]:
     """Solve one analysis at the output times, given in the deck's unit; of a single equilibrium return it, too."""
     scale = session.deck.units.time
