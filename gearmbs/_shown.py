@@ -19,6 +19,9 @@ PLOTS = {
     "Solution": "gearmbs.view:solution_plot",
     "Case": "gearmbs.studies.show:case_plot",
     "Sweep": "gearmbs.studies.show:sweep_plot",
+    "AnalysisReport": "gearmbs.view:report_plot",
+    "VibrationReport": "gearmbs.view:report_plot",
+    "ComparisonReport": "gearmbs.view:report_plot",
     "PaperStudy": "gearmbs.studies.show:study_plot",
 }
 """What draws an object, by the name of its class."""
@@ -41,7 +44,8 @@ class Shown:
         Parameters
         ----------
         **options
-            Of the function that draws it: `gearmbs.view.wheel_plot`, `mesh_view`, `mechanism_plot` or `solution_plot`.
+            Of the function that draws it: `gearmbs.view.wheel_plot`, `mesh_view`, `mechanism_plot`, `solution_plot` or
+            `report_plot`.
 
         Returns
         -------
@@ -49,9 +53,10 @@ class Shown:
         """
         return draw(self, **options)
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:
         maker = _found(self, TABLES)
-        return f"<pre>{html.escape(repr(self))}</pre>" if maker is None else maker(self)
+        # None leaves it to what the object has besides, such as Markdown
+        return None if maker is None else maker(self)
 
     def save(self, path: str | Path) -> Path | list[Path]:
         """Write the object; the ending of the path says as what. See `gearmbs.save`."""

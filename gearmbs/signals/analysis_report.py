@@ -10,6 +10,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from gearmbs._shown import Shown
+
 from .features import By, feature_rows, rows_to_frame
 from .indicators import INDICATORS
 from .report import markdown_table, significant
@@ -18,7 +20,7 @@ from .speed import SpeedEstimate
 
 
 @dataclass
-class AnalysisReport:
+class AnalysisReport(Shown):
     """What was found in one record.
 
     Attributes

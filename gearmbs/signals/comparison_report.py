@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from gearmbs._shown import Shown
+
 from .comparison_summary import summary
 from .expectations import EXPECTED
 from .ordinal import level_distance, ordinal_agreement
@@ -22,7 +24,7 @@ CONTRADICTION_DB = 3.0
 
 
 @dataclass
-class ComparisonReport:
+class ComparisonReport(Shown):
     """Gear mesh harmonics of states and loads.
 
     Attributes

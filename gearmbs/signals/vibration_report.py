@@ -9,13 +9,15 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from gearmbs._shown import Shown
+
 from .features import By, feature_rows, rows_to_frame
 from .report import markdown_table, significant
 from .report_parts import BAND_FEATURES, IMPULSIVE, channel_table, missing_list, transposed
 
 
 @dataclass
-class VibrationReport:
+class VibrationReport(Shown):
     """What was found in one record of plain vibration.
 
     Attributes

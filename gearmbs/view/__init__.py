@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from gearmbs.view.motion import PairMotion, solution_motion, static_motion
     from gearmbs.view.outline import gear_outline, profile_area
     from gearmbs.view.page import Page
-    from gearmbs.view.reports import analysis_figures, comparison_figures
+    from gearmbs.view.reports import analysis_figures, comparison_figures, report_plot
     from gearmbs.view.revolution import average_plot
     from gearmbs.view.scene import Part, Scene
     from gearmbs.view.scenes import gear_scene, mechanism_scene, solution_scene
@@ -72,6 +72,7 @@ __all__ = [
     "pair_solids",
     "profile_area",
     "read_stl",
+    "report_plot",
     "save_figure",
     "sensitivity_map",
     "solution_motion",
@@ -123,6 +124,7 @@ late(
         "pair_solids": ".solid",
         "profile_area": ".outline",
         "read_stl": ".export_stl",
+        "report_plot": ".reports",
         "save_figure": ".figure_style",
         "sensitivity_map": ".maps",
         "solution_plot": ".solution_figures",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from gearmbs.signals import AnalysisReport, ComparisonReport, VibrationReport, spectrum
 from gearmbs.view.bars import comparison_bars
+from gearmbs.view.figure_style import COLOURS, label, legend_below, look, new_figure
 from gearmbs.view.revolution import average_plot
 from gearmbs.view.signals import spectrum_plot
 
@@ -58,14 +60,72 @@ def analysis_figures(report: AnalysisReport | VibrationReport, signal: xr.DataAr
         )
     }
     if report.average is not None:
-        names = [str(c) for c in report.average["channel"].values]
-        own = None if report.indicators is None else int(report.indicators.attrs["teeth"])
-        figures["average"] = average_plot(
-            {name: report.average[:, [i]] for i, name in enumerate(names)},
-            teeth=own,
-            title=f"{report.source}: average over {report.average.attrs.get('averages', 1)} revolutions",
-        )
+        figures["average"] = _average(report)
     return figures
+
+
+def _average(report: AnalysisReport) -> Figure:
+    """The average over a revolution, a panel a channel."""
+    average = report.average
+    assert average is not None
+    names = [str(c) for c in average["channel"].values]
+    return average_plot(
+        {name: average[:, [i]] for i, name in enumerate(names)},
+        teeth=None if report.indicators is None else int(report.indicators.attrs["teeth"]),
+        title=f"{report.source}: average over {average.attrs.get('averages', 1)} revolutions",
+    )
+
+
+def report_plot(
+    report: AnalysisReport | VibrationReport | ComparisonReport,
+    signal: xr.DataArray | None = None,
+    *,
+    title: str | None = None,
+) -> Figure:
+    """Draw the one figure that says most about a report.
+
+    Parameters
+    ----------
+    report : AnalysisReport, VibrationReport or ComparisonReport
+    signal : xarray.DataArray, optional
+        The record that an `AnalysisReport` was made of: its spectrum is drawn then, else the average over a revolution,
+        or the levels of the mesh harmonics.
+    title : str, optional
+    """
+    if isinstance(report, ComparisonReport):
+        figure = next(iter(comparison_figures(report).values()))
+    elif isinstance(report, VibrationReport) or signal is not None:
+        figures = analysis_figures(report, signal)
+        figure = figures.get("envelope", figures["spectrum"]) if signal is None else figures["spectrum"]
+    elif report.average is not None:
+        figure = _average(report)
+    else:
+        figure = _levels(report)
+    if title is not None and len(figure.axes) == 1:
+        figure.axes[0].set_title(title, loc="left", wrap=True)
+    elif title is not None:
+        figure.suptitle(title)
+    return figure
+
+
+def _levels(report: AnalysisReport) -> Figure:
+    """The RMS of the mesh harmonics of each channel as bars."""
+    bands = report.harmonics["band"]
+    names = [str(c) for c in bands["channel"].values]
+    with look():
+        figure = new_figure(6.4, 3.6)
+        ax = figure.subplots()
+        places = np.arange(bands.sizes["harmonic"])
+        for k, (name, colour) in enumerate(zip(names, COLOURS)):
+            width = 0.8 / min(len(names), len(COLOURS))
+            values = bands.sel(channel=name).values
+            ax.bar(places - 0.4 + (k + 0.5) * width, values, width, color=colour, label=name.replace("_", " "))
+        ax.set_xticks(places, [f"{int(h)} × GMF" for h in bands["harmonic"].values])
+        ax.set_ylabel(label("RMS", bands.attrs.get("units", "")))
+        ax.set_title(f"{report.source}: mesh harmonics, GMF {report.gmf:.2f} Hz")
+        if len(names) > 1:
+            legend_below(ax)
+    return figure
 
 
 def _vibration_figures(report: VibrationReport) -> dict[str, Figure]:

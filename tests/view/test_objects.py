@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+import gearmbs as gm
 from gearmbs.gears import GearPair, GearSpec
 from gearmbs.mechanism import Mechanism
 from gearmbs.studies import Case, gear_rig
@@ -91,6 +92,24 @@ def test_a_solution_shows_what_moves():
     still = Mechanism("still")
     still.fixed("hold", still.body("b", 1.0, (1, 1, 1)), still.ground)
     assert solution_plot(still.simulate(0.01)).axes
+
+
+def test_reports_draw_and_save_themselves(tmp_path):
+    t = np.arange(51200) / 12800.0
+    teeth, shaft = 30, 10.0
+    wave = np.sin(2 * np.pi * teeth * shaft * t) + 0.1 * np.random.default_rng(1).normal(size=t.size)
+    signal = gm.make_signal(wave, 12800.0, units="m/s^2", speed=2 * np.pi * shaft)
+    geared, plain = gm.analyse(signal, teeth=teeth), gm.analyse(signal)
+    for figure in (geared.plot(), geared.plot(signal=signal), plain.plot(title="plain")):
+        assert_readable(figure, overlap=0.4)
+    geared.average = None
+    assert geared.plot().axes[0].get_ylabel() == "RMS, m/s²"
+    both = gm.compare({"low": {"healthy": signal, "worn": 2.0 * signal}}, teeth=teeth)
+    assert_readable(both.plot(), overlap=0.4)
+    for k, report in enumerate((geared, plain, both)):
+        assert report._repr_html_() is None
+        assert report._repr_markdown_()
+        assert report.save(tmp_path / f"{k}.md").read_text() == report.to_markdown()
 
 
 def test_tables_tell_what_the_user_gave():
