@@ -59,6 +59,7 @@ EXCEPTIONS = {
     ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
     ("adams", "gears"): "pairs are written as the contact forces of a deck",
     ("studies", "gearmbs"): "a result says which version made it",
+    ("campaigns", "gearmbs"): "the card of a data set says which version made it",
     ("cli", "gearmbs"): "the version",
 }
 """Further arrows, and why."""

@@ -21,6 +21,7 @@ PACKAGES = {
     "gearmbs.signals": "Signals: files, features, comparison, sensors",
     "gearmbs.studies": "Studies: cases and the paper's study",
     "gearmbs.campaigns": "Campaigns: many cases",
+    "gearmbs.campaigns.datasets": "Data sets: labelled signals",
     "gearmbs.identify": "Identification: parameters from measurements",
     "gearmbs.adams": "ADAMS: decks in, results out",
     "gearmbs.view": "View: figures",

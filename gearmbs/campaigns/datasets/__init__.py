@@ -1,0 +1,49 @@
+"""Labelled data sets from campaigns: signals, sensors, splits without leaks, cards, a baseline."""
+
+from typing import TYPE_CHECKING
+
+from gearmbs._lazy import late
+
+if TYPE_CHECKING:
+    from gearmbs.campaigns.datasets.baseline import Score, classifier, leak_and_no_leak, macro_auroc, score
+    from gearmbs.campaigns.datasets.features import features
+    from gearmbs.campaigns.datasets.layers import SensorLayers
+    from gearmbs.campaigns.datasets.make import data_set_plan, feature_table, write_data_set
+    from gearmbs.campaigns.datasets.splits import random_split, shared_groups, split_by_group, withhold
+
+__all__ = [
+    "Score",
+    "SensorLayers",
+    "classifier",
+    "data_set_plan",
+    "feature_table",
+    "features",
+    "leak_and_no_leak",
+    "macro_auroc",
+    "random_split",
+    "score",
+    "shared_groups",
+    "split_by_group",
+    "withhold",
+    "write_data_set",
+]
+
+late(
+    __name__,
+    {
+        "Score": ".baseline",
+        "SensorLayers": ".layers",
+        "classifier": ".baseline",
+        "data_set_plan": ".make",
+        "feature_table": ".make",
+        "features": ".features:features",
+        "leak_and_no_leak": ".baseline",
+        "macro_auroc": ".baseline",
+        "random_split": ".splits",
+        "score": ".baseline",
+        "shared_groups": ".splits",
+        "split_by_group": ".splits",
+        "withhold": ".splits",
+        "write_data_set": ".make",
+    },
+)

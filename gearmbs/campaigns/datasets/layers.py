@@ -1,0 +1,104 @@
+"""What lies between the force at a gear's seat and a stored sample, as layers of their own, so that the clean signal
+stays.
+
+Transfer path, noise, clipping and quantisation use `gearmbs.signals`. What varies from specimen to specimen (modes of
+the housing) is drawn
+from the specimen's number, what varies from record to record (noise) from the record's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from gearmbs.signals import ModalPath, Mode, add_noise, make_signal, quantise
+
+
+@dataclass(frozen=True)
+class SensorLayers:
+    """How clean signals become measured ones.
+
+    Attributes
+    ----------
+    modes : int
+        Modes of the housing between seat and sensor.
+    lowest, highest : float
+        Range of their frequencies, Hz, drawn evenly in the logarithm.
+    damping : tuple of float
+        Range of their damping ratios.
+    noise : tuple of float
+        Range of the noise's RMS as a part of the signal's.
+    wander : float
+        Standard deviation of the speed within a record as a part of it, slow against a revolution.
+    bits : int
+        Of the converter, whose range is four times the RMS of a healthy record; beyond it clips.
+    seed : int
+    """
+
+    modes: int = 6
+    lowest: float = 400.0
+    highest: float = 5500.0
+    damping: tuple[float, float] = (0.02, 0.08)
+    noise: tuple[float, float] = (0.02, 0.2)
+    wander: float = 0.002
+    bits: int = 16
+    seed: int = 0
+
+    def path(self, specimen: int) -> ModalPath:
+        """Return the transfer path of a specimen: modes with random frequencies, dampings, signs and weights."""
+        generator = np.random.default_rng([self.seed, 1, specimen])
+        u = generator.random((self.modes, 2))
+        modes = []
+        for k in range(self.modes):
+            frequency = self.lowest * (self.highest / self.lowest) ** ((k + u[k, 0]) / self.modes)
+            damping = self.damping[0] + u[k, 1] * (self.damping[1] - self.damping[0])
+            weight = float(generator.choice([-1.0, 1.0]) * generator.uniform(0.3, 1.0))
+            modes.append(Mode(float(frequency), float(damping), 1.0 / weight))
+        return ModalPath(tuple(modes))
+
+    def measured(self, clean: np.ndarray, rate: float, specimen: int, record: int, full_scale: float) -> np.ndarray:
+        """Return the measured samples of a clean signal, shape (n,).
+
+        Parameters
+        ----------
+        clean : ndarray, shape (n,)
+            Force over the gear's mass, m/s^2.
+        rate : float
+            Hz.
+        specimen, record : int
+            Whose housing, and whose noise.
+        full_scale : float
+            Of the converter, in the unit of the measured signal.
+        """
+        generator = np.random.default_rng([self.seed, 2, record])
+        x = self._wandering(clean, generator)
+        x = self.through(x, rate, specimen)
+        level = float(generator.uniform(*self.noise)) * float(np.std(x))
+        signal = make_signal(x[:, None], rate, units="m/s^2", channels=["sensor"])
+        noisy = add_noise(signal, seed=int(generator.integers(1 << 31)), rms=level)
+        return quantise(noisy, bits=self.bits, full_scale=full_scale).values[:, 0]
+
+    def through(self, x: np.ndarray, rate: float, specimen: int) -> np.ndarray:
+        """Return a signal behind the transfer path, as it is when it has settled: by its spectrum over the record.
+
+        The path is scaled so that white noise keeps its RMS.
+        """
+        frequency = np.fft.rfftfreq(x.size, 1.0 / rate)
+        response = self.path(specimen).accelerance(frequency)
+        response = response / np.sqrt(np.mean(np.abs(response) ** 2))
+        return np.fft.irfft(np.fft.rfft(x - x.mean()) * response, x.size)
+
+    def _wandering(self, x: np.ndarray, generator: np.random.Generator) -> np.ndarray:
+        """Return the signal of a machine whose speed drifts a little: time runs unevenly, its ends stay."""
+        u = np.linspace(0.0, 1.0, x.size)
+        shift = np.zeros(x.size)
+        for k in (1, 2, 3):
+            # a sine of the record's order k: its derivative is the part by which the speed differs
+            shift += generator.standard_normal() * self.wander / (np.pi * k) * np.sin(np.pi * k * u) / np.sqrt(1.5)
+        return np.interp(u + shift, u, x)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the settings for a data card."""
+        return asdict(self)
