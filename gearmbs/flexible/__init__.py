@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from gearmbs.flexible.errors import FlexibleError
     from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
     from gearmbs.flexible.interfaces import Interface
+    from gearmbs.flexible.large_beam import BeamChain, LargeBeam, add_beam
     from gearmbs.flexible.material import ElasticMaterial
     from gearmbs.flexible.matrices import from_matrices, read_abaqus, read_calculix, read_nodes, read_op4
     from gearmbs.flexible.mnf import ModalNeutralFile, mnf_of, read_mnf, write_mnf
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from gearmbs.flexible.solid import block_mesh, nodes_where, ring_mesh, solid_model
 
 __all__ = [
+    "BeamChain",
     "BeamSection",
     "Campbell",
     "Disc",
@@ -28,6 +30,7 @@ __all__ = [
     "FiniteElementModel",
     "FlexibleError",
     "Interface",
+    "LargeBeam",
     "MassProperties",
     "ModalModel",
     "ModalNeutralFile",
@@ -40,6 +43,7 @@ __all__ = [
     "Support",
     "UnbalanceResponse",
     "WhirlModes",
+    "add_beam",
     "block_mesh",
     "check_model",
     "check_reduction",
@@ -62,6 +66,7 @@ __all__ = [
 late(
     __name__,
     {
+        "BeamChain": ".large_beam",
         "BeamSection": ".beam",
         "Campbell": ".rotor",
         "Disc": ".shaft",
@@ -69,6 +74,7 @@ late(
         "FiniteElementModel": ".fe_model",
         "FlexibleError": ".errors",
         "Interface": ".interfaces",
+        "LargeBeam": ".large_beam",
         "MassProperties": ".fe_model",
         "ModalModel": ".modal_model",
         "ModalNeutralFile": ".mnf",
@@ -81,6 +87,7 @@ late(
         "Support": ".rotor",
         "UnbalanceResponse": ".rotor",
         "WhirlModes": ".rotor",
+        "add_beam": ".large_beam",
         "block_mesh": ".solid",
         "check_model": ".check",
         "check_reduction": ".check",

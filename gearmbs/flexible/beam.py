@@ -96,6 +96,18 @@ def bending_shapes(x: np.ndarray, length: float, phi: float) -> tuple[np.ndarray
     return w, turn
 
 
+def bending_slopes(x: np.ndarray, length: float, phi: float) -> np.ndarray:
+    """Return the slopes of the deflections of `bending_shapes` along z, (points, 4)."""
+    d = 1.0 / (1.0 + phi)
+    columns = [
+        (6 * (x**2 - x) - phi) / length,
+        1 - 4 * x + 3 * x**2 + 0.5 * phi * (1 - 2 * x),
+        (6 * (x - x**2) + phi) / length,
+        3 * x**2 - 2 * x + 0.5 * phi * (2 * x - 1),
+    ]
+    return d * np.column_stack(columns)
+
+
 # the plane xz: (ux, ry); the plane yz: (uy, -rx), of the first node and of the second
 _XZ, _YZ = np.array([0, 4, 6, 10]), np.array([1, 3, 7, 9])
 _SIGN = np.array([1.0, -1.0, 1.0, -1.0])
@@ -143,6 +155,16 @@ def element_stiffness(length: float, section: BeamSection) -> np.ndarray:
     for at, value in ((2, section.axial / length), (5, section.torsion / length)):
         k[np.ix_([at, 6 + at], [at, 6 + at])] += value * np.array([[1, -1], [-1, 1]])
     return k
+
+
+def geometric_stiffness(length: float, section: BeamSection, x: np.ndarray, tensions: np.ndarray) -> np.ndarray:
+    """Return the matrix of 1/2 integral of N (ux'^2 + uy'^2) dz for tensions N, times weight, at points x, (12, 12)."""
+    out = np.zeros((12, 12))
+    for plane, (places, sign) in enumerate(((_XZ, np.ones(4)), (_YZ, _SIGN))):
+        phi = 12 * section.bending[plane] / (section.shear[plane] * length**2)
+        slope = bending_slopes(x, length, phi) * sign
+        out[np.ix_(places, places)] += length * slope.T @ (tensions[:, None] * slope)
+    return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,15 @@ REACH = 1e-4
 """How far a marker may be from a node, as a share of the body's size."""
 
 
+SLENDER = 0.2
+"""A body whose least moment of inertia is a smaller share of the next has a long axis."""
+
+SPIN_SHARE = 0.3 * 0.157
+"""Spin across the long axis, as a share of the first frequency of the free body, above which stiffening is missed.
+
+That is 0.3 of the first frequency of the same bar held at one end, which is 0.157 of its free one."""
+
+
 @dataclass(frozen=True, eq=False)
 class Seat:
     """A named place of a modal body.
@@ -61,6 +70,8 @@ class ModalModel:
         Whether the nodes are those of a beam along z, between which shapes are interpolated.
     masses, inertias : ndarray, shapes (N,), (N, 3, 3), optional
         Lumped at the nodes, kg and kg m^2.
+    stiffened : bool
+        Whether the integrals have the stiffening by a spin across the long axis.
     """
 
     name: str
@@ -76,6 +87,7 @@ class ModalModel:
     line: bool = False
     masses: np.ndarray | None = None
     inertias: np.ndarray | None = None
+    stiffened: bool = False
 
     @property
     def modes(self) -> int:
@@ -250,9 +262,14 @@ class ModalModel:
             Mode(frequency=float(f), mass=float(m), damping_ratio=float(z), start=float(q))
             for f, m, z, q in zip(self.frequencies, mass, ratios, values)
         ]
-        return mechanism.modal_body(
+        body = mechanism.modal_body(
             label, p.mass, p.inertia, modes, self.shapes, integrals=self.integrals.coupled(coupling), com=p.com, **where
         )
+        values, axes = np.linalg.eigh(p.inertia)
+        if values[0] < SLENDER * values[1] and not (self.stiffened and coupling == "full"):
+            body.long_axis = axes[:, 0].copy()
+            body.spin_limit = SPIN_SHARE * 2 * np.pi * float(self.frequencies.min())
+        return body
 
     def displaced(self, coordinates: np.ndarray, factor: float = 1.0) -> np.ndarray:
         """Return the nodes moved by modal coordinates of shape (n,), ``factor`` times as far, shape (N, 3), m."""

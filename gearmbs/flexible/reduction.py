@@ -9,6 +9,8 @@ relief. In both cases rigid motions are taken out, since the frame carries them,
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -44,6 +46,9 @@ def reduce_model(
     internal: int | None = None,
     method: str = "craig-bampton",
     name: str | None = None,
+    preload: Any = None,
+    spin_stiffness: Any = None,
+    long_axis: int = 2,
 ) -> ModalModel:
     """Return a modal body made of a finite-element model.
 
@@ -63,6 +68,12 @@ def reduce_model(
     method : {"craig-bampton", "free"}
     name : str, optional
         Default: that of the model.
+    preload : matrix, shape (d, d), optional
+        Geometric stiffness of a constant preload, N/m; it acts on deformations, not on rigid motions.
+    spin_stiffness : matrix, shape (d, d), optional
+        Geometric stiffness by a spin of 1 rad/s across the long axis, N s^2/m; see :meth:`Shaft.spin_stiffness`.
+    long_axis : int
+        Which axis that is: 0, 1 or 2.
 
     Raises
     ------
@@ -88,8 +99,15 @@ def reduce_model(
         held = held[:, : _whole(held_values, count) or count]
         basis = np.hstack([constraint_modes(k, parts.constraints), held])
     values, shapes = orthonormal(k, m, basis, rigid)
+    if preload is not None:
+        full = parts.expand @ shapes
+        values, turn = np.linalg.eigh(np.diag(values) + full.T @ (preload @ full))
+        if values[0] <= 0.0:
+            raise FlexibleError(f"{model.name}: the preload makes it buckle; reduce it")
+        shapes = shapes @ turn
     if model.slices is not None:
         shapes = _in_planes(model, parts, values, shapes)
+    shapes = _signed(parts, shapes)
     keep = np.arange(values.size)
     if limit is not None:
         keep = keep[np.sqrt(values) <= 2 * np.pi * limit]
@@ -104,9 +122,32 @@ def reduce_model(
             f"{model.name}: no mode is below max_frequency = {limit} Hz; "
             f"the first has {np.sqrt(values[0]) / 2 / np.pi:.6g} Hz"
         )
-    return as_modal_model(
-        model, parts, properties, np.sqrt(values[keep]) / (2 * np.pi), shapes[:, keep], name or model.name
+    frequencies = np.sqrt(values[keep]) / (2 * np.pi)
+    found = as_modal_model(model, parts, properties, frequencies, shapes[:, keep], name or model.name)
+    return (
+        found
+        if spin_stiffness is None
+        else _stiffened(found, parts.expand @ shapes[:, keep], spin_stiffness, long_axis)
     )
+
+
+def _stiffened(found: ModalModel, full: np.ndarray, spin_stiffness: Any, axis: int) -> ModalModel:
+    """Return a body whose inertia against spin across an axis falls with its deformation: centrifugal stiffening.
+
+    The Lagrangian has -1/2 w^2 q . G q, and 1/4 w . (J2 q q) w from the second derivative of the inertia.
+    """
+    geometric = full.T @ (spin_stiffness @ full)
+    second = found.integrals.second.copy()
+    for across in {0, 1, 2} - {axis}:
+        second[:, :, across, across] -= 2.0 * geometric
+    return replace(found, integrals=replace(found.integrals, second=second), stiffened=True)
+
+
+def _signed(parts: Resolved, shapes: np.ndarray) -> np.ndarray:
+    """Return shapes whose largest displacement is positive, so that equal models give equal shapes."""
+    full = parts.expand @ shapes
+    largest = np.argmax(np.abs(full) > 0.999 * np.abs(full).max(axis=0), axis=0)
+    return shapes * np.sign(full[largest, np.arange(full.shape[1])])
 
 
 def _whole(values: np.ndarray, count: int) -> int:
@@ -136,9 +177,6 @@ def as_modal_model(
 ) -> ModalModel:  # fmt: skip
     """Return the modal body of orthonormal shapes of the degrees of freedom that the interfaces leave."""
     full = parts.expand @ shapes
-    # signs by the largest entry, so that equal models give equal shapes
-    sign = np.sign(full[np.argmax(np.abs(full) > 0.999 * np.abs(full).max(axis=0), axis=0), np.arange(full.shape[1])])
-    full, shapes = full * sign, shapes * sign
     moved, turned = model.field(full)
     held = parts.constraints @ shapes
     seats = {}

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.flexible.beam import DOFS, GAUSS_W, GAUSS_X, BeamSection, Slices, element_stiffness, section_shapes
+from gearmbs.flexible.beam import (
+    DOFS,
+    GAUSS_W,
+    GAUSS_X,
+    BeamSection,
+    Slices,
+    element_stiffness,
+    geometric_stiffness,
+    section_shapes,
+)
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import FiniteElementModel
 from gearmbs.flexible.material import STEEL, ElasticMaterial
@@ -223,8 +232,36 @@ class Shaft:
             np.arange(1, z.size + 1), positions, dofs, stiffness, slices.mass_matrix(), self.name, seats, slices
         )
 
+    def spin_stiffness(self, about: str | Quantity) -> np.ndarray:
+        """Return the geometric stiffness by a spin of 1 rad/s across the shaft, about an axis through a place of it.
+
+        What is farther out pulls with its centrifugal force, which stiffens the shaft against bending.
+
+        Parameters
+        ----------
+        about : str or float
+            Seat, or position along the shaft, m, that the spin's axis goes through.
+        """
+        centre = self.seats[about] if about in self.seats else quantity(about, "length", f"shaft '{self.name}': spin")
+        slices, z = self.model().slices, self.stations()
+        assert slices is not None
+        place, pull = slices.position[:, 2], slices.mass * (slices.position[:, 2] - centre)
+        out = np.zeros((DOFS * z.size,) * 2)
+        for k, (a, b) in enumerate(pairwise(z)):
+            at = a + GAUSS_X * (b - a)
+            tension = np.array([abs(np.sum(pull[(place > p) if p > centre else (place < p)])) for p in at])
+            places = slice(DOFS * k, DOFS * (k + 2))
+            section = self.element_section(a, b)
+            out[places, places] += geometric_stiffness(b - a, section, GAUSS_X, GAUSS_W * tension)
+        return out
+
     def modal_model(
-        self, modes: int | None = None, *, max_frequency: Quantity = None, seats: Sequence[str] | None = None
+        self,
+        modes: int | None = None,
+        *,
+        max_frequency: Quantity = None,
+        seats: Sequence[str] | None = None,
+        spin: str | Quantity | None = None,
     ) -> ModalModel:
         """Return the shaft as a modal body: Craig-Bampton with its seats as interface, orthonormalised.
 
@@ -236,11 +273,18 @@ class Shaft:
             Modes above are left out, Hz.
         seats : sequence of str, optional
             Which seats are interfaces; default: all.
+        spin : str or float, optional
+            Seat or place (m) on the axis of a spin across the shaft, as of a rotor blade or a crank: adds
+            `spin_stiffness`.
         """
         from gearmbs.flexible.reduction import reduce_model
 
         return reduce_model(
-            self.model(), self.seats if seats is None else seats, modes=modes, max_frequency=max_frequency
+            self.model(),
+            self.seats if seats is None else seats,
+            modes=modes,
+            max_frequency=max_frequency,
+            spin_stiffness=None if spin is None else self.spin_stiffness(spin),
         )
 
 

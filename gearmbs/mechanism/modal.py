@@ -237,6 +237,10 @@ class ModalBody(Body):
         Mean displacement by one unit of each mode, m.
     start, rate : ndarray, shape (n,)
         Modal coordinates and their rates at the start.
+    long_axis : ndarray, shape (3,), optional
+        Direction in the body's axes of a slender body.
+    spin_limit : float
+        Angular speed across it, rad/s, from which :func:`simulate` warns that geometric stiffening is missing.
     """
 
     modal: ModalInertia = None  # type: ignore[assignment]
@@ -244,6 +248,8 @@ class ModalBody(Body):
     mean: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     start: np.ndarray = field(default_factory=lambda: np.zeros(0))
     rate: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    long_axis: np.ndarray | None = None
+    spin_limit: float = float("inf")
 
     def shape_at(self, marker: Marker) -> tuple[np.ndarray, np.ndarray]:
         """Return displacements, less the mean, and rotations at a marker by one unit of each mode, each (n, 3).

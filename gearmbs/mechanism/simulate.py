@@ -19,6 +19,7 @@ from gearmbs.mechanism.locked import locking_remark
 from gearmbs.mechanism.lumping import lumped, why_not_lumped
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
+from gearmbs.mechanism.spin_check import warn_of_spin
 from gearmbs.progress import time_bar
 
 INTEGRATORS = ("WSTIFF", "GSTIFF", "IDA")
@@ -142,6 +143,7 @@ def simulate(
     remark = " ".join(text for text in remarks if text)
     solution = Solution(system, problem, result, members, remark)
     if stream is None or consumer is None:
+        warn_of_spin(mechanism, solution)
         return solution
     if name == "IDA":
         for part in solution.parts():

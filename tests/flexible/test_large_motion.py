@@ -1,0 +1,192 @@
+"""Beams of large motion and geometric stiffening: derivatives, published large deflections, the spin-up of a beam."""
+
+import warnings
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gearmbs.flexible import (
+    BeamSection,
+    ElasticMaterial,
+    FlexibleError,
+    LargeBeam,
+    Shaft,
+    ShaftSection,
+    add_beam,
+    reduce_model,
+)
+from gearmbs.mechanism import Mechanism
+
+SPEED, TIME = 6.0, 15.0
+DRIVE = f"{SPEED / TIME}*(TIME**2/2+{(TIME / (2 * np.pi)) ** 2}*(COS({2 * np.pi / TIME}*TIME)-1))"
+"""Spin-up of Kane, Ryan and Banerjee (1987); Simo and Vu-Quoc (1986)."""
+
+
+@pytest.mark.parametrize("turn", [1.3, 0.05, 1e-6])
+def test_derivatives_of_the_element(turn):
+    from gearmbs.flexible.beam_kernel import WORK, large_beam
+
+    section = BeamSection(3e4, 20.0, (7.0, 11.0), (2e3, 3e3), 1.0, (1e-3, 1e-3, 2e-3))
+    reals = np.array(LargeBeam("e", None, None, 0.4, section, 0.03).compiled().reals)
+    rng = np.random.default_rng(0)
+    first = Rotation.random(random_state=3)
+    second = first * Rotation.from_rotvec(turn * np.array([0.5, -0.7, 0.5]))
+    frames = rng.standard_normal((2, 18))
+    frames[1, :3] = frames[0, :3] + first.apply([0.02, 0.01, 0.42])
+    for k, a in enumerate((first, second)):
+        frames[k, 3:12] = a.as_matrix().ravel()
+
+    def call(given, want=0):
+        wrench, jac, told = np.zeros((1, 6)), np.zeros((6, 24)), np.zeros(2)
+        large_beam(np.zeros(0, dtype=np.int64), reals, 0.0, given, np.zeros(0), np.zeros(0), want, np.zeros(WORK),
+        wrench,
+                   np.zeros(0), jac, told)  # fmt: skip
+        return wrench[0], jac, told
+
+    _, exact, _ = call(frames, 1)
+    h, found = 1e-4, np.zeros((6, 24))
+
+    def moved(column, step):
+        out, k, q = frames.copy(), column // 12, column % 12
+        if 3 <= q < 6:
+            change = Rotation.from_rotvec(step * np.eye(3)[q - 3]).as_matrix()
+            out[k, 3:12] = (change @ frames[k, 3:12].reshape(3, 3)).ravel()
+        else:
+            out[k, q if q < 3 else 12 + q - 6] += step
+        return call(out)[0]
+
+    for c in range(24):
+        found[:, c] = (8 * (moved(c, h) - moved(c, -h)) - (moved(c, 2 * h) - moved(c, -2 * h))) / (12 * h)
+    np.testing.assert_allclose(exact, found, atol=1e-10 * np.abs(exact).max())
+
+
+def princeton(force, angle, elements=16):
+    """Displacements of the tip along the section's stiff and soft axis, m."""
+    length, h, t, e, nu = 0.508, 12.3777e-3, 3.2024e-3, 71.7e9, 0.31
+    area, g = h * t, e / (2 * (1 + nu))
+    torsion = h * t**3 * (1 / 3 - 0.21 * t / h * (1 - (t / h) ** 4 / 12))
+    soft, stiff = h * t**3 / 12, t * h**3 / 12
+    section = BeamSection(
+        e * area, g * torsion, (e * stiff, e * soft), (5 / 6 * g * area,) * 2, 2700 * area,
+        (2700 * soft, 2700 * stiff, 2700 * (soft + stiff)),
+    )  # fmt: skip
+    c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    m = Mechanism("princeton")
+    beam = add_beam(m, "b", section, (0, 0, 0), (length, 0, 0), elements, x_axis=(0, s, c), damping_time=0.02)
+    m.fixed("clamp", beam.bodies[0], m.ground, at=(0, 0, 0))
+    m.load("tip", beam.last, m.ground.marker((length, 0, 0)), rm=m.ground.marker(), fz=f"-{force}*STEP(TIME,0,0,0.5,1)")
+    found = m.simulate(2.0, rate=10, tol=1e-6)
+    assert found.success
+    moved = found.marker_position(beam.last)[-1] - np.array([length, 0, 0])
+    return abs(moved @ [0, s, c]), abs(moved @ [0, c, -s])
+
+
+@pytest.mark.parametrize(
+    ("force", "angle", "stiff", "soft", "tolerance"),
+    [
+        # elastica with shear, and linear theory
+        (13.345, 90, 0.0, 0.2006840, 3e-4),
+        (8.896, 90, 0.0, 0.1462524, 3e-4),
+        (4.448, 90, 0.0, 0.0780773, 3e-4),
+        (13.345, 0, 0.0160642, 0.0, 3e-4),
+        # shell-free ANSYS values; the small one hangs on the torsion constant of the rectangle
+        (13.345, 45, 0.0151862, 0.1564672, 0.011),
+        (13.345, 15, 0.0164583, 0.0643581, 0.004),
+    ],
+)
+def test_princeton_beam(force, angle, stiff, soft, tolerance):
+    found = princeton(force, angle)
+    np.testing.assert_allclose(found, (stiff, soft), rtol=tolerance, atol=1e-9)
+
+
+def beam_section():
+    return BeamSection(2.8e7, 2.8e4, (1.4e4, 1.4e4), (1e7, 1e7), 1.2, (6e-4, 6e-4, 1.2e-3))
+
+
+def lag_of(solution, marker):
+    place, angle = solution.marker_position(marker), solution.joint_angle("pin")
+    return -np.sin(angle) * place[:, 0] + np.cos(angle) * place[:, 1]
+
+
+def spun_beam(elements):
+    m = Mechanism("spin-up")
+    beam = add_beam(m, "b", beam_section(), (0, 0, 0), (10, 0, 0), elements, x_axis=(0, 1, 0), damping_time=1e-3)
+    m.rotation("drive", m.revolute("pin", beam.bodies[0], m.ground, at=(0, 0, 0), axis=(0, 0, 1)), DRIVE)
+    solution = m.simulate(9.0, rate=200, tol=1e-5)
+    assert solution.success
+    return lag_of(solution, beam.last), solution.t
+
+
+def test_spin_up_of_nodal_beams_converges_to_the_published_lag():
+    """-0.5737 m at 6.765 s; errors fall with the square of the element's length."""
+    coarse, fine = (spun_beam(n) for n in (8, 16))
+    deepest = [lag.min() for lag, _ in (coarse, fine)]
+    assert abs(fine[1][np.argmin(fine[0])] - 6.765) < 0.02
+    np.testing.assert_allclose(deepest[1] + (deepest[1] - deepest[0]) / 3, -0.5737, atol=5e-4)
+
+
+def spun_modes(spin, coupling="full"):
+    """The same beam as a round modal body of equal stiffness and mass."""
+    diameter = 4 * np.sqrt(1.4e4 / 2.8e7)
+    area = np.pi / 4 * diameter**2
+    material = ElasticMaterial(2.8e7 / area, 0.0, 1.2 / area)
+    shaft = Shaft([ShaftSection(10.0, diameter)], seats={"root": 0.0, "tip": 10.0}, material=material, elements=12)
+    stiffening = None if spin is None else shaft.spin_stiffness(spin)
+    model = reduce_model(shaft.model(), internal=4, spin_stiffness=stiffening)
+    m = Mechanism("spin-up")
+    body = model.add_to(m, "b", orientation=[[0, 0, 1], [1, 0, 0], [0, 1, 0]], damping=0.05, coupling=coupling)
+    root = body.marker(model.place("root"), [[0, 1, 0], [0, 0, 1], [1, 0, 0]], name="root")
+    tip = body.marker(model.place("tip"), name="tip")
+    place, axes = root.global_position(), root.global_orientation()
+    m.rotation("drive", m.revolute("pin", root, m.ground.marker(place, axes, name="ground")), DRIVE)
+    return m, tip
+
+
+def test_spin_up_of_a_modal_body_needs_its_stiffening():
+    m, tip = spun_modes("root")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        solution = m.simulate(9.0, rate=100, tol=1e-6)
+    assert solution.success
+    axes = m.bodies["b"].markers[0].global_orientation()
+    np.testing.assert_allclose(np.abs(axes[2, 2]), 1.0, atol=1e-12)
+    lag = lag_of(solution, tip)
+    np.testing.assert_allclose(lag.min(), -0.5737, atol=1e-3)
+    m, tip = spun_modes(None)
+    with pytest.warns(UserWarning, match="lack the stiffening by centrifugal force"):
+        soft = m.simulate(9.0, rate=20, tol=1e-6)
+    assert np.abs(lag_of(soft, tip)).max() > 1.15 * np.abs(lag).max()
+
+
+def test_a_preload_raises_the_frequencies_as_a_string():
+    """Tension N on a bar: w^2 = w_0^2 (1 + N l^2 / (pi^2 E I)) between pins; here against the free bar's integral."""
+    from gearmbs.flexible.beam import GAUSS_W, GAUSS_X, geometric_stiffness
+
+    shaft = Shaft([ShaftSection(1.0, 0.02)], seats={"A": 0.0, "B": 1.0}, elements=10)
+    model, z = shaft.model(), shaft.stations()
+    tension, matrix = 2e4, np.zeros((66, 66))
+    for k in range(10):
+        part = geometric_stiffness(z[k + 1] - z[k], shaft.element_section(z[k], z[k + 1]), GAUSS_X, tension * GAUSS_W)
+        matrix[6 * k : 6 * k + 12, 6 * k : 6 * k + 12] += part
+    plain, pulled = (reduce_model(model, internal=8, preload=p) for p in (None, matrix))
+    bending = plain.moved[0]
+    slope = np.gradient(np.linalg.norm(bending, axis=1) * np.sign(bending.sum(axis=1)), z)
+    shift = tension * np.trapezoid(slope**2, z)
+    change = (2 * np.pi) ** 2 * (pulled.frequencies[0] ** 2 - plain.frequencies[0] ** 2)
+    np.testing.assert_allclose(change, shift, rtol=0.1)
+    with pytest.raises(FlexibleError, match="buckle"):
+        reduce_model(model, internal=8, preload=-100 * matrix)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (dict(start=(0, 0, 0), end=(0, 0, 0)), "length 0.0 m"),
+        (dict(start=(0, 0, 0), end=(1, 0, 0), elements=0), "0 elements"),
+        (dict(start=(0, 0, 0), end=(1, 0, 0), spin=3.0), "spin is no setting"),
+    ],
+)
+def test_wrong_beams_are_named(arguments, message):
+    with pytest.raises(FlexibleError, match=message):
+        add_beam(Mechanism("m"), "b", beam_section(), **arguments)
