@@ -143,7 +143,7 @@ def simulate(
     remark = " ".join(text for text in remarks if text)
     solution = Solution(system, problem, result, members, remark)
     if stream is None or consumer is None:
-        warn_of_spin(mechanism, solution)
+        warn_of_spin(mechanism.bodies, solution)
         return solution
     if name == "IDA":
         for part in solution.parts():
