@@ -9,8 +9,8 @@ export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: paper test quick wheel lint types bench docs clean
 
+# it compiles the kernels that it uses, half of all
 paper: $(VENV)/.installed
-	$(BIN)/python -m gearmbs.compile
 	$(BIN)/gearmbs paper --out $(OUT)/paper
 
 test: $(VENV)/.installed-dev

@@ -4,12 +4,20 @@ import numpy as np
 import pytest
 
 from gearmbs.dae.integrators import bdf, run_state, step
-from gearmbs.dae.integrators.controller import after_success
-from gearmbs.dae.integrators.corrector import CONVERGED, NOT_FINITE, SLOW, apply_correction
+from gearmbs.dae.integrators.controller import after_success, meets_kinks
+from gearmbs.dae.integrators.corrector import (
+    CONVERGED,
+    LOOSEST,
+    LOOSEST_AT_KINKS,
+    NOT_FINITE,
+    SLOW,
+    amount_left,
+    apply_correction,
+)
 from gearmbs.dae.integrators.history import forget, newest_point, open_row, rows_from, times_from
 from gearmbs.dae.integrators.newton_matrix import GAMMA_DRIFT, form_matrix
 from gearmbs.dae.integrators.rounding import count_noise
-from gearmbs.dae.integrators.run_state import REPIVOT, RUNNING, WINDOW
+from gearmbs.dae.integrators.run_state import KINK_MEMORY, REPIVOT, RUNNING, WINDOW
 from gearmbs.dae.integrators.weights import renew_weights, set_weights, weighted_argmax, weighted_max
 from tests.dae.integrators.problems import pendulum
 from tests.dae.integrators.stepping import started, take_step
@@ -276,3 +284,21 @@ def test_weights_that_depend_on_nothing_are_left_alone():
     st.w_error[:] = 7.0
     renew_weights(st, st.y, 1e-3)
     assert (st.w_error == 7.0).all()
+
+
+def test_a_refused_step_counts_as_a_kink_for_some_steps():
+    run = warm()
+    st = opened(run)
+    st.order = 2
+    assert not meets_kinks(st)
+    assert amount_left(st) == LOOSEST
+    step.refuse_by_error(st)
+    assert meets_kinks(st)
+    st.order = 2
+    assert amount_left(st) == LOOSEST_AT_KINKS
+    st.order = 5
+    assert amount_left(st) == 0.5**5
+    for _ in range(KINK_MEMORY):
+        assert meets_kinks(st)
+        assert take_step(run) == RUNNING
+    assert not meets_kinks(st)
