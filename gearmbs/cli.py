@@ -207,7 +207,10 @@ def run(
         typer.Option("--lump", help="Integrate gear and shaft as one body, as [solver] lump = true does."),
     ] = False,
 ) -> None:
-    """Simulate a case, or a whole drivetrain, and write its record as NetCDF."""
+    """Simulate a case, a planetary set or a whole drivetrain, and write its record as NetCDF."""
+    if holds_planetary(case_file):
+        run_planetary_set(case_file, out)
+        return
     if holds_drivetrain(case_file):
         run_drivetrain(case_file, out)
         return
@@ -251,6 +254,38 @@ def holds_drivetrain(path: Path) -> bool:
         return False
     # the shafts of a case are two, with one size
     return "meshes" in data or "wheels" in data
+
+
+def holds_planetary(path: Path) -> bool:
+    """Return whether a file describes a planetary set."""
+    import tomllib
+
+    try:
+        return "planetary" in tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError):
+        return False
+
+
+def run_planetary_set(file: Path, out: Path | None) -> None:
+    """Simulate a planetary set; write its record and say how the load is shared."""
+    with guarded():
+        from gearmbs.studies.planetary import load_planetary, run_planetary
+        from gearmbs.studies.store import check_place, keep_dataset
+
+        found = load_planetary(file)
+        target = out or file.with_suffix(".nc")
+        check_place(target.parent, 0, "its record")
+        span = found.run_up + found.settling + found.duration
+        with case_bars([found.gears.name]) as move:
+            data = run_planetary(found, lambda t: move(found.gears.name, min(t / span, 1.0)))
+        keep_dataset(target, data)
+        for planet in data.planet.values:
+            one = data.sel(planet=planet)
+            loads = "".join(f"{float(one['force'].sel(mesh=m).mean()):12.5g} N ({m})" for m in ("sun", "ring"))
+            typer.echo(f"planet {planet}: {loads}, share {float(one['share'].mean()):.4f}")
+        names = ("mesh", "sun_fault", "planet_fault", "ring_fault", "planet_pass")
+        typer.echo("Hz: " + ", ".join(f"{n.replace('_', ' ')} {data.attrs['frequency_' + n]:.5g}" for n in names))
+        typer.echo(f"wrote {target}")
 
 
 def run_drivetrain(file: Path, out: Path | None) -> None:

@@ -1,0 +1,256 @@
+"""Planetary sets from files: a set, how it runs, its faults; simulated to a record of meshes, speeds, a ring sensor."""
+
+from __future__ import annotations
+
+import inspect
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from gearmbs.dae import Status
+from gearmbs.gears import ContactLaw, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
+from gearmbs.signals import fixed_sensor
+from gearmbs.studies.section import CaseError
+from gearmbs.studies.tooth_faults import tooth_fault
+from gearmbs.units import to_si
+
+MEMBERS = ("sun", "carrier", "ring")
+SECTIONS = ("planetary", "contact", "friction", "operation", "support", "pins", "fault")
+
+
+@dataclass(frozen=True)
+class PlanetaryRun:
+    """A planetary set and how it runs.
+
+    Attributes
+    ----------
+    gears : PlanetarySet
+    speeds, torques : dict of str to str or float
+        Of the members, as for `planetary_mechanism`.
+    held : str or None
+    run_up, settling, duration : float
+        s; the record begins when the set has settled.
+    rate : float
+        Hz.
+    tolerance : float
+    supports : dict of str to Support
+    pins : Support, optional
+    """
+
+    gears: PlanetarySet
+    speeds: Mapping[str, Any] = field(default_factory=dict)
+    torques: Mapping[str, Any] = field(default_factory=dict)
+    held: str | None = "ring"
+    run_up: float = 0.02
+    settling: float = 0.03
+    duration: float = 0.2
+    rate: float = 12_800.0
+    tolerance: float = 1e-6
+    supports: Mapping[str, Support] = field(default_factory=dict)
+    pins: Support | None = None
+
+
+def load_planetary(path: str | Path) -> PlanetaryRun:
+    """Read a planetary set and its run from a TOML file.
+
+    Raises
+    ------
+    CaseError
+        For whatever is wrong with it; the message names the file's section and key, the value and the remedy.
+    """
+    try:
+        data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError) as error:
+        raise CaseError(f"{path}: {error}") from None
+    try:
+        return planetary_run(data)
+    except (ValueError, TypeError) as error:
+        raise CaseError(f"{Path(path).name}: {error}") from None
+
+
+def planetary_run(data: Mapping[str, Any]) -> PlanetaryRun:
+    """Return the set and its run that tables as of a TOML file describe.
+
+    Raises
+    ------
+    ValueError
+        For unknown sections and keys, and values that do not make a set.
+    """
+    unknown = set(data) - set(SECTIONS)
+    if unknown:
+        raise ValueError(f"unknown section {', '.join(sorted(unknown))}; there are {', '.join(SECTIONS)}")
+    if "planetary" not in data:
+        raise ValueError("section [planetary] is missing; give teeth and module")
+    table = dict(data["planetary"])
+    simple = list(inspect.signature(planetary).parameters)[:-1]
+    others = [item.name for item in fields(PlanetarySet) if item.name not in ("sun", "planet", "ring", "faults")]
+    _check_keys("planetary", table, {*simple, *others} - {"contact", "friction", "pin_errors"} | {"pin_errors"})
+    for name in ("teeth", "module"):
+        if name not in table:
+            raise ValueError(f"planetary.{name} is missing")
+    if "pin_errors" in table:
+        # a planet's number, from 1, and how far its pin is off
+        table["pin_errors"] = {
+            int(k) - 1: tuple(to_si(v, "length", f"planetary.pin_errors.{k}") for v in pair)
+            for k, pair in table["pin_errors"].items()
+        }
+    for name in ("ideal", "teeth", "profile_shifts"):
+        if name in table:
+            table[name] = tuple(table[name])
+    if "contact" in data:
+        table["contact"] = _law(dict(data["contact"]))
+    if "friction" in data:
+        table["friction"] = FlankFriction(**data["friction"])
+    places = []
+    for one in data.get("fault", []):
+        one = dict(one)
+        where = str(one.pop("at", ""))
+        places.append((where, tooth_fault(one)))
+    gears = planetary(faults=places, **table)
+    operation = dict(data.get("operation", {}))
+    allowed = {"speeds", "torques", "held", "run_up", "settling", "duration", "rate", "tolerance"}
+    _check_keys("operation", operation, allowed)
+    if operation.get("held") in ("none", ""):
+        operation["held"] = None
+    for name, kind in (("run_up", "time"), ("settling", "time"), ("duration", "time"), ("rate", "frequency")):
+        if name in operation:
+            operation[name] = to_si(operation[name], kind, f"operation.{name}")
+    supports = {name: Support(**values) for name, values in data.get("support", {}).items()}
+    pins = Support(**data["pins"]) if "pins" in data else None
+    return PlanetaryRun(gears, supports=supports, pins=pins, **operation)
+
+
+def _check_keys(section: str, table: Mapping[str, Any], known: set[str]) -> None:
+    for key in table:
+        if key not in known:
+            raise ValueError(f"unknown key {section}.{key}; known ones are {', '.join(sorted(known))}")
+
+
+def _law(table: dict[str, Any]) -> ContactLaw:
+    kind = str(table.pop("law", "impact")).replace("-", "_")
+    makers: dict[str, Callable[..., ContactLaw]] = {
+        "impact": ContactLaw.impact,
+        "hunt_crossley": ContactLaw.hunt_crossley,
+        "linear": ContactLaw.linear,
+    }
+    if kind not in makers:
+        raise ValueError(f"contact.law is {kind!r}; choose {', '.join(makers)}")
+    return makers[kind](**table)
+
+
+def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = None) -> xr.Dataset:
+    """Simulate a planetary set and return its record.
+
+    Parameters
+    ----------
+    run : PlanetaryRun
+    progress : callable, optional
+        Called with the simulated time, s.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``time``: ``speed`` (member), ``force`` of the meshes with the sun and the ring (mesh, planet), ``share``
+        of the load, ``ring_sensor``, the forces on the ring weighted by the planets' path past a sensor at angle 0, and
+        ``carrier_angle``. Attributes hold the frequencies of `PlanetarySet.frequencies`.
+
+    Raises
+    ------
+    RuntimeError
+        If the integration does not reach its end.
+    """
+    gears = run.gears
+    mechanism = planetary_mechanism(
+        gears,
+        speeds=run.speeds,
+        torques=run.torques,
+        held=run.held,
+        run_up=run.run_up,
+        supports=run.supports,
+        pins=run.pins,
+    )
+    begin = run.run_up + run.settling
+    options: dict[str, Any] = {"rate": run.rate, "tol": run.tolerance}
+    if progress is not None:
+        options["progress"] = progress
+    solution = mechanism.simulate(begin + run.duration, **options)
+    if solution.status is not Status.SUCCESS:
+        raise RuntimeError(f"{gears.name}: {solution.message}")
+    kept = solution.t >= begin - 0.5 / run.rate
+    planets = range(1, gears.planets + 1)
+
+    def forces(form: str) -> np.ndarray:
+        columns = [solution.diagnostics(form.format(k))["normal_force"][kept] for k in planets]
+        return np.column_stack(columns)
+
+    both = {"sun": forces("sun-planet {}"), "ring": forces("planet {}-ring")}
+    spin = {m: solution.angular_velocity(m)[kept, 2] for m in MEMBERS}
+    angle = np.unwrap(_angle(solution, "carrier")[kept])
+    heard = fixed_sensor(both["ring"], angle, [float(a) for a in gears.angles or ()])
+    total = both["sun"].sum(axis=1, keepdims=True)
+    share = np.divide(both["sun"], total, out=np.zeros_like(both["sun"]), where=total != 0)
+    mean = {m: float(w.mean()) for m, w in spin.items()}
+    rates = gears.frequencies(sun=mean["sun"], carrier=mean["carrier"])
+    time = solution.t[kept] - begin
+    return xr.Dataset(
+        {
+            "speed": (("time", "member"), np.column_stack([spin[m] for m in MEMBERS]), {"units": "rad/s"}),
+            "force": (("time", "mesh", "planet"), np.stack([both["sun"], both["ring"]], axis=1), {"units": "N"}),
+            "share": (("time", "planet"), share, {"units": "1"}),
+            "ring_sensor": ("time", heard, {"units": "N", "long_name": "ring forces past the sensor"}),
+            "carrier_angle": ("time", angle, {"units": "rad"}),
+        },
+        coords={
+            "time": ("time", time, {"units": "s"}),
+            "member": list(MEMBERS),
+            "mesh": ["sun", "ring"],
+            "planet": list(planets),
+        },
+        attrs={
+            "title": gears.name,
+            "sampling_rate": run.rate,
+            "teeth": [gears.sun.teeth, gears.planet.teeth, gears.ring.teeth],
+            **{f"frequency_{name}": value for name, value in rates.items()},
+        },
+    )
+
+
+def _angle(solution: Any, body: str) -> np.ndarray:
+    axes = solution.orientation(body)
+    return np.arctan2(axes[:, 1, 0], axes[:, 0, 0])
+
+
+def interaction(run: PlanetaryRun, backlash: Any, progress: Callable[[float], None] | None = None) -> xr.Dataset:
+    """Simulate a set sound and faulty, without and with backlash: what a defect and backlash do together.
+
+    Parameters
+    ----------
+    run : PlanetaryRun
+        With its faults.
+    backlash : float or str
+        Normal backlash of all meshes, m, of the two runs that have it.
+    progress : callable, optional
+
+    Returns
+    -------
+    xarray.Dataset
+        ``deviation``, the standard deviation of the ring sensor in N, over ``fault`` and ``backlash`` (no, yes), and
+        ``excess``: by how much both together exceed the sum of what each does alone.
+    """
+    levels = np.zeros((2, 2))
+    for i, faults in enumerate(((), run.gears.faults)):
+        for j, play in enumerate((0.0, backlash)):
+            gears = replace(run.gears, faults=faults, backlash_sun=play, backlash_ring=play)
+            levels[i, j] = float(run_planetary(replace(run, gears=gears), progress)["ring_sensor"].std())
+    base = levels[0, 0]
+    excess = (levels[1, 1] - base) - (levels[1, 0] - base) - (levels[0, 1] - base)
+    return xr.Dataset(
+        {"deviation": (("fault", "backlash"), levels, {"units": "N"}), "excess": ((), excess, {"units": "N"})},
+        coords={"fault": ["no", "yes"], "backlash": ["no", "yes"]},
+        attrs={"backlash_m": float(to_si(backlash, "length", "backlash"))},
+    )

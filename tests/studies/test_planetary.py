@@ -1,0 +1,109 @@
+"""Planetary sets from files, on the command line, and what backlash and a defect do together."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from gearmbs.cli import app
+from gearmbs.studies import CaseError
+from gearmbs.studies.planetary import interaction, load_planetary, planetary_run, run_planetary
+
+FILE = """
+[planetary]
+teeth = [24, 30, 84]
+module = "1.5 mm"
+planets = 3
+backlash_sun = "0.05 mm"
+backlash_ring = "0.05 mm"
+pin_errors = { 2 = ["0 um", "1 um"] }
+
+[operation]
+speeds = { sun = "600 rpm" }
+torques = { carrier = "-50 N m" }
+run_up = "5 ms"
+settling = "5 ms"
+duration = "20 ms"
+
+[[fault]]
+at = "planet 1 sun side"
+kind = "broken tooth"
+tooth = 3
+"""
+
+
+def test_run_on_the_command_line(tmp_path):
+    place = tmp_path / "set.toml"
+    place.write_text(FILE)
+    result = CliRunner().invoke(app, ["run", str(place)])
+    assert result.exit_code == 0, result.output
+    assert "planet 3" in result.output
+    with xr.open_dataset(tmp_path / "set.nc") as data:
+        assert data["force"].shape == (data.sizes["time"], 2, 3)
+        assert data.attrs["frequency_mesh"] == pytest.approx(186.67, rel=1e-3)
+        speeds = data["speed"].mean("time")
+        assert float(speeds.sel(member="carrier")) == pytest.approx(float(speeds.sel(member="sun")) / 4.5, rel=0.01)
+        assert np.isfinite(data["ring_sensor"]).all()
+
+
+def test_a_file_holds_a_set(tmp_path):
+    place = tmp_path / "set.toml"
+    place.write_text(FILE + '\n[support.sun]\nradial = "1e8 N/m"\n\n[pins]\nradial = "2e8 N/m"\n')
+    run = load_planetary(place)
+    assert run.gears.pin_errors == {1: (0.0, 1e-6)}
+    assert [where for where, _ in run.gears.faults] == ["planet 1 sun side"]
+    assert run.supports["sun"].radial == 1e8
+    assert run.pins.radial == 2e8
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('planets = 3', 'planets = 5'), "cannot be assembled"),
+        (('module', 'modul'), "unknown key planetary.modul"),
+        (('"broken tooth"', '"broken tooht"'), "did you mean broken tooth"),
+        (('planet 1 sun side', 'planet 9'), "no place of a fault"),
+        (('run_up', 'runup'), "unknown key operation.runup"),
+        (('[[fault]]', '[[faults]]'), "unknown section faults"),
+    ],
+)  # fmt: skip
+def test_bad_files_are_one_line(tmp_path, change, words):
+    place = tmp_path / "set.toml"
+    place.write_text(FILE.replace(*change))
+    with pytest.raises(CaseError, match=words) as caught:
+        load_planetary(place)
+    assert "\n" not in str(caught.value)
+
+
+def differential():
+    """A set with no member held: sun and ring driven, the carrier loaded; a broken tooth of the sun."""
+    return planetary_run(
+        {
+            "planetary": {"teeth": [24, 30, 84], "module": "1.5 mm", "planets": 3, "name": "differential"},
+            "contact": {"law": "linear", "stiffness": "2e8 N/m", "damping": "3000 N*s/m"},
+            "operation": {
+                "held": "none",
+                "speeds": {"sun": "1200 rpm"},
+                "torques": {"carrier": "-20 N m", "ring": "15.5556 N m"},
+                "run_up": "5 ms",
+                "settling": "5 ms",
+                "duration": "25 ms",
+                "rate": 8000.0,
+            },
+            "fault": [{"at": "sun", "kind": "broken tooth", "lost": 0.9, "tooth": 20}],
+        }
+    )
+
+
+def test_a_differential_set_turns_freely():
+    data = run_planetary(differential())
+    speeds = data["speed"].isel(time=-1)
+    sun, carrier, ring = (float(speeds.sel(member=m)) for m in ("sun", "carrier", "ring"))
+    assert (sun - carrier) * 24 == pytest.approx(-(ring - carrier) * 84, rel=0.05)
+
+
+@pytest.mark.slow
+def test_backlash_and_a_defect_do_more_together():
+    data = interaction(differential(), "0.2 mm")
+    level = data["deviation"]
+    assert float(level.sel(fault="yes", backlash="yes")) > float(level.sel(fault="no", backlash="no"))
