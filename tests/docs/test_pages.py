@@ -12,6 +12,7 @@ import typer
 
 from gearmbs.cli import app
 from gearmbs.studies import load_case
+from gearmbs.studies.planetary import load_planetary
 from tests.docs.support import DOCS, ROOT, blocks, links, notebooks, pages, run_blocks
 
 ALL = [ROOT / "README.md", *pages()]
@@ -102,7 +103,8 @@ def _examples(path, folder):
     # the first is the one that the page works with
     for code in reversed(cases):
         (folder / "case.toml").write_text(code, encoding="utf-8")
-        load_case(folder / "case.toml")
+        read = load_planetary if "[planetary]" in code else load_case
+        read(folder / "case.toml")
     run_blocks(path, "python")
 
 
