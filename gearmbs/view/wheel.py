@@ -16,7 +16,7 @@ MM = 1e3
 
 
 def wheel_plot(gear: GearSpec, *, title: str | None = None, ax: Axes | None = None) -> Figure:
-    """Draw a wheel across its axis, with its bore and its pitch, base and root circles; an internal one by its circles.
+    """Draw a wheel across its axis, with its bore and its pitch, base and root circles.
 
     Parameters
     ----------
@@ -33,14 +33,13 @@ def wheel_plot(gear: GearSpec, *, title: str | None = None, ax: Axes | None = No
     with look():
         figure, ax = drawn_on(ax, 5.2, 5.6)
         turn = np.linspace(0.0, 2.0 * np.pi, 361)
+        outline = gear_outline(gear) * MM
+        body, empty = "#DCE8F3", "white"
         if gear.internal:
-            # its circles alone: the rim, and the tips inside
-            for radius, face in ((gear.outer_radius, "#DCE8F3"), (gear.tip_radius, "white")):
-                edge = radius * MM
-                ax.fill(edge * np.cos(turn), edge * np.sin(turn), facecolor=face, edgecolor=BLUE, linewidth=1.1)
-        else:
-            outline = gear_outline(gear) * MM
-            ax.fill(*np.vstack([outline, outline[:1]]).T, facecolor="#DCE8F3", edgecolor=BLUE, linewidth=1.1)
+            rim = gear.outer_radius * MM
+            ax.fill(rim * np.cos(turn), rim * np.sin(turn), facecolor=body, edgecolor=BLUE, linewidth=1.1)
+        inside = empty if gear.internal else body
+        ax.fill(*np.vstack([outline, outline[:1]]).T, facecolor=inside, edgecolor=BLUE, linewidth=1.1)
         circles = (
             ("pitch circle", gear.pitch_radius, VERMILLION, (0, (8, 3, 2, 3))),
             ("base circle", gear.base_radius, GREEN, (0, (4, 3))),
