@@ -39,6 +39,8 @@ class SignalFileError(SignalError):
     """
 
     def __init__(self, path: str | Path, fault: str) -> None:
+        # other packages' messages that are quoted may have several lines
+        fault = " ".join(line.strip() for line in str(fault).splitlines() if line.strip())
         self.path = Path(path)
         self.fault = fault
         super().__init__(f"{path}: {fault}")

@@ -24,8 +24,9 @@ def read_npy(path: Path, channels: Sequence[str] | None, rate: float | None = No
         If the file is damaged, holds Python objects, or no record.
     """
     try:
-        loaded = np.load(path, allow_pickle=False)
-        arrays = {name: loaded[name] for name in loaded.files} if hasattr(loaded, "files") else {path.stem: loaded}
+        with open(path, "rb") as file:
+            loaded = np.load(file, allow_pickle=False)
+            arrays = {name: loaded[name] for name in loaded.files} if hasattr(loaded, "files") else {path.stem: loaded}
     except Exception as exc:
         raise SignalFileError(
             path, f"cannot be read as an array of numpy: it is damaged, cut short or holds Python objects ({exc})"

@@ -46,7 +46,7 @@ def _read(
     nptdms = _library(path)
     _check_segments(path)
     try:
-        with nptdms.TdmsFile.open(path) as file:
+        with open(path, "rb") as raw, nptdms.TdmsFile.open(raw) as file:
             kept, names = _chosen(path, file, channels)
             count = len(kept[0])
             for start in range(0, count, block or count):
@@ -172,5 +172,7 @@ def _library(path: Path) -> Any:
     except ImportError as exc:
         raise SignalFileError(path, "TDMS files need npTDMS; install it with: pip install 'gearmbs[formats]'") from exc
     # it prints the bytes of damaged texts, pages of them; what is wrong is said by the errors here
-    logging.getLogger("nptdms").setLevel(logging.ERROR)
+    for name in list(logging.root.manager.loggerDict):
+        if name.partition(".")[0] == "nptdms":
+            logging.getLogger(name).setLevel(logging.CRITICAL)
     return nptdms

@@ -14,7 +14,7 @@ from .phase import phase_from_line, phase_from_speed
 from .shaft import shaft_phase
 from .signal import rate_of
 from .spectra import periodograms
-from .speed import MIN_QUALITY, MIN_SCORE_DB, SpeedEstimate, estimate_speed, prominence
+from .speed import MIN_QUALITY, MIN_SCORE_DB, SpeedEstimate, estimate_speed, find_comb, prominence
 from .speed_curve import is_curve, speed_curve
 
 SPEED_TOLERANCE = 0.02
@@ -183,8 +183,11 @@ def _remark_other(
     signal: xr.DataArray, counts: tuple[int, ...], nominal: float, found: SpeedEstimate | None, notes: list[str]
 ) -> None:
     """Say so where the record, left to itself, shows another mesh frequency more clearly than near the given speed."""
-    blind = _estimate(signal, counts, None)
-    if blind is None or abs(blind.speed / nominal - 1.0) < OTHER_COMB:
+    try:
+        blind = find_comb(signal, counts, speed_range=None)
+    except SignalError:
+        return
+    if abs(blind.speed / nominal - 1.0) < OTHER_COMB:
         return
     if found is not None and blind.score < found.score + STRONGER_DB:
         return

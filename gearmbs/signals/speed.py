@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -103,6 +104,33 @@ def estimate_speed(
     SignalError
         If the range is empty, the record is too short, or no comb stands out.
     """
+    comb = find_comb(signal, teeth, speed_range=speed_range)
+    count, gmf = comb.teeth, comb.gmf
+    phase, spread = _follow(signal, gmf, count)
+    if phase is not None:
+        gmf = float(phase.attrs["mean_speed"]) * count / (2.0 * math.pi)
+    resolution = rate_of(signal) / signal.sizes["time"]
+    return SpeedEstimate(2.0 * math.pi * gmf / count, gmf, resolution, spread, comb.prominence, phase, comb.score)
+
+
+class Comb(NamedTuple):
+    """A mesh line found in the averaged spectrum: gear mesh frequency in Hz, heights in dB as of `SpeedEstimate`."""
+
+    teeth: int
+    gmf: float
+    prominence: float
+    score: float
+
+    @property
+    def speed(self) -> float:
+        """Speed of the wheel, rad/s."""
+        return 2.0 * math.pi * self.gmf / self.teeth
+
+
+def find_comb(
+    signal: xr.DataArray, teeth: int | Sequence[int] | None, *, speed_range: tuple[float, float] | None
+) -> Comb:
+    """Steps 1 and 2 of `estimate_speed`: the mesh line of the averaged spectrum, not followed over the record."""
     count = require(signal, "teeth", teeth, needed_for="finding the speed from the mesh line")[0]
     rate = rate_of(signal)
     n = signal.sizes["time"]
@@ -133,13 +161,7 @@ def estimate_speed(
             "give the speed, a tacho, or a narrower speed_range"
         )
     gmf = _peak(power, candidates[best], bin_width)
-    phase, spread = _follow(signal, gmf, count)
-    if phase is not None:
-        gmf = phase.attrs["mean_speed"] * count / (2.0 * math.pi)
-    gmf = float(gmf)
-    return SpeedEstimate(
-        2.0 * math.pi * gmf / count, gmf, rate / n, spread, float(direct[best]), phase, float(score[best])
-    )
+    return Comb(count, float(gmf), float(direct[best]), float(score[best]))
 
 
 def prominence(power: np.ndarray) -> np.ndarray:

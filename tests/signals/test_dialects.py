@@ -499,3 +499,46 @@ def test_every_format_refuses_noise_in_one_line(tmp_path):
             with pytest.raises(SignalError) as caught:
                 read_signal(path, rate=1.0, format=format)
             assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["a.npy", "a.npz", "a.lvm", "a.uff", "a.parquet", "a.feather", "a.tdms"])
+def test_damaged_files_give_a_signal_or_one_line(tmp_path, name, capfd):
+    """Bytes changed, cut out or cut off, from a fixed seed."""
+    needed = {"uff": "pyuff", "parquet": "pyarrow", "feather": "pyarrow", "tdms": "nptdms"}.get(name[2:])
+    if needed:
+        pytest.importorskip(needed)
+    path, other = tmp_path / name, tmp_path / f"other_{name}"
+    frame = pd.DataFrame({"time": np.arange(COUNT) / RATE, "a": X})
+    {
+        "npy": lambda: np.save(path, np.stack([X, Y])),
+        "npz": lambda: np.savez(path, acc=X, fs=RATE),
+        "lvm": lambda: path.write_text(
+            LVM.format(decimal=".", columns="No")
+            + SEGMENT.format(count=COUNT, step="7.8125E-5")
+            + rows([""] * COUNT, X.tolist(), Y.tolist(), sign="\t")
+        ),
+        "uff": lambda: path.write_text(uff_text(X, width=40)),
+        "parquet": lambda: frame.to_parquet(path),
+        "feather": lambda: frame.to_feather(path),
+        "tdms": lambda: write_signal(make_signal({"a": X, "b": Y}, RATE, units="g", speed=100.0), path),
+    }[name[2:]]()
+    data, rng, lines = path.read_bytes(), np.random.default_rng(11), {0}
+    for turn in range(40):
+        changed = bytearray(data)
+        low, high = sorted(int(k) for k in rng.integers(0, len(data), 2))
+        if turn % 4 == 0:
+            del changed[max(1, low) :]
+        elif turn % 4 == 1:
+            del changed[low:high]
+        else:
+            for place in rng.integers(0, min(len(data), 400 if turn % 4 == 2 else len(data)), 4):
+                changed[place] = rng.integers(256)
+        other.write_bytes(bytes(changed))
+        try:
+            signal = read_signal(other, rate=RATE)
+        except SignalError as error:
+            lines.add(str(error).count("\n"))
+        else:
+            assert np.isfinite(signal.values).all()
+    assert lines == {0}
+    assert capfd.readouterr().err == ""
