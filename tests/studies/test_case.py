@@ -54,6 +54,8 @@ def test_name_defaults_to_the_file(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text("[operation]\ntorque = 50.0\n")
     assert load_case(path).name == "mine"
+    path.write_text("[operation]\ntorque = 60.0\n", encoding="utf-8-sig")
+    assert load_case(path).operation.torque == 60.0
 
 
 @pytest.mark.parametrize(
