@@ -11,7 +11,7 @@ import scipy.sparse.linalg as spl
 from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
 from gearmbs.flexible.interfaces import resolve
 from gearmbs.flexible.modal_model import ModalModel
-from gearmbs.flexible.reduction import GROUNDED, constraint_modes, free_modes
+from gearmbs.flexible.reduction import GROUNDED, attachment_modes, free_modes
 
 MOTIONS = ("x", "y", "z", "rot x", "rot y", "rot z")
 
@@ -73,7 +73,7 @@ class ReductionReport:
     similarity : ndarray, shape (n,)
         Modal assurance criterion of each reduced mode with the best of the exact ones, 0 to 1.
     flexibility : dict of str to float
-        Of each seat, the share of the static flexibility between the seats that the reduction has lost.
+        Of each seat, the share of the flexibility of the free body there, under forces, that the reduction has lost.
     """
 
     frequencies: np.ndarray
@@ -176,34 +176,25 @@ def check_reduction(model: FiniteElementModel, reduced: ModalModel, interfaces=N
     same = np.abs(frequencies[:, None] - frequencies) < 1e-4 * frequencies
     grouped = np.array([(mac[:, same[:, j]]).sum(axis=1) for j in range(frequencies.size)]).T
     return ReductionReport(
-        reduced.frequencies, frequencies, np.minimum(grouped.max(axis=1), 1.0), _lost(sp.csc_array(k), parts, reduced)
+        reduced.frequencies,
+        frequencies,
+        np.minimum(grouped.max(axis=1), 1.0),
+        _lost(sp.csc_array(k), sp.csc_array(m), parts, rigid, reduced),
     )
 
 
-def _lost(k, parts, reduced: ModalModel) -> dict[str, float]:
-    """Return how much of the static flexibility of each seat, the others held, a reduction lacks."""
-    if not parts.places or parts.constraints.shape[0] <= 6:
+def _lost(k, m, parts, rigid: np.ndarray, reduced: ModalModel) -> dict[str, float]:
+    """Return how much of the flexibility of the free body at each seat, under forces in x, y and z, is lacking."""
+    if not parts.places:
         return {}
-    shapes = constraint_modes(k, parts.constraints)
-    condensed = shapes.T @ (k @ shapes)
-    coordinates = np.zeros((parts.constraints.shape[0], reduced.modes))
-    for key, (_, rows) in parts.places.items():
-        seat = reduced.seats[key]
-        six = np.vstack([seat.moved.T, seat.turned.T])
-        coordinates[rows[rows >= 0]] = six[rows >= 0]
+    shapes = attachment_modes(k, m, rigid, parts.constraints)
+    inertial = m @ rigid
+    shapes = shapes - rigid @ np.linalg.solve(rigid.T @ inertial, inertial.T @ shapes)
+    exact = np.diag(parts.constraints @ shapes)
     stiff = (2 * np.pi * reduced.frequencies) ** 2
     out = {}
     for key, (_, rows) in parts.places.items():
-        own = rows[rows >= 0]
-        others = np.setdiff1d(np.arange(condensed.shape[0]), own)
-        load = np.zeros((condensed.shape[0], own.size))
-        load[own] = np.eye(own.size)
-        # balance the load by the others' reactions, as rigid motions allow: compare strain energies of both
-        free = np.linalg.pinv(condensed, rcond=1e-10)
-        balanced = condensed @ free @ load
-        energy = np.einsum("bi,bi->i", balanced, free @ balanced)
-        modal = coordinates.T @ balanced
-        has = np.einsum("ni,ni->i", modal, modal / stiff[:, None])
-        good = energy > 1e-12 * energy.max()
-        out[key] = float(np.max(1.0 - has[good] / energy[good])) if others.size else 0.0
+        own = rows[:3][rows[:3] >= 0]
+        has = (reduced.seats[key].moved[:, rows[:3] >= 0] ** 2 / stiff[:, None]).sum()
+        out[key] = float(1.0 - has / exact[own].sum())
     return out

@@ -93,7 +93,7 @@ def reduce_model(
     count = internal if internal is not None else modes if modes is not None else 20
     rigid = _rigid_of(model, parts)
     if method == "free":
-        basis = np.hstack([free_modes(k, m, rigid, count)[1], _attachment(k, m, rigid, parts.constraints)])
+        basis = np.hstack([free_modes(k, m, rigid, count)[1], attachment_modes(k, m, rigid, parts.constraints)])
     else:
         held_values, held = held_modes(k, m, parts.constraints, count + 1)
         held = held[:, : _whole(held_values, count) or count]
@@ -300,7 +300,7 @@ def free_modes(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, count: int) 
     return np.maximum(values[order], 0.0), vectors[:, order]
 
 
-def _attachment(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, constraints: sp.csr_array) -> np.ndarray:
+def attachment_modes(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, constraints: sp.csr_array) -> np.ndarray:
     """Return static shapes of unit loads at the interfaces, balanced by the inertia of the rigid body."""
     b = constraints.shape[0]
     if b == 0:
