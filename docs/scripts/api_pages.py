@@ -130,6 +130,8 @@ MORE = {
         "gearmbs.campaigns.designs": EVERYTHING,
         "gearmbs.campaigns.runners": EXPORTED,
         "gearmbs.campaigns.exports": ["export"],
+        "gearmbs.campaigns.given_data": EVERYTHING,
+        "gearmbs.campaigns.subjects.claims": EVERYTHING,
         "gearmbs.campaigns.response": ["response_surface"],
         "gearmbs.campaigns.sensitivity": ["sensitivity"],
         "gearmbs.campaigns.subjects.pair": ["canonical_case", "harmonics", "contact_numbers", "indicators"],

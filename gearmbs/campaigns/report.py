@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.given_data import first_indices, probability
 from gearmbs.campaigns.results import factor_names, result_names
 from gearmbs.campaigns.sensitivity import SobolIndices, sensitivity
 from gearmbs.view.files import write_whole
@@ -104,11 +105,23 @@ def _decides(campaign: Campaign, result: str) -> str:
     try:
         found = sensitivity(campaign, result)
     except CampaignError:
-        return _surface(campaign, result)
+        return _at_hand(campaign, result) + _surface(campaign, result)
     if isinstance(found, SobolIndices):
         note = f"<p><small>{found.base_points} base points, {found.left_out} left out for want of results.</small></p>"
         return "<h3>Sobol' indices</h3>" + _table(found.table()) + note
     return "<h3>Effects</h3>" + _table(found.head(20))
+
+
+def _at_hand(campaign: Campaign, result: str) -> str:
+    """Return first indices from the points at hand, and for a condition how probable it is."""
+    table = campaign.table
+    values = table[result].to_numpy(dtype=float)
+    text = ""
+    if set(np.unique(values[np.isfinite(values)])) <= {0.0, 1.0}:
+        p, low, high = probability(values)
+        text = f"<p>Holds in {p:.1%} of the points (95 % interval {low:.1%} to {high:.1%}).</p>"
+    found = first_indices({name: table[name].to_numpy() for name in factor_names(campaign.folder)}, values)
+    return f"{text}<h3>First Sobol' indices from the points at hand</h3>" + _table(found)
 
 
 def _surface(campaign: Campaign, result: str) -> str:

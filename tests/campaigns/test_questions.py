@@ -127,6 +127,9 @@ def test_condition_map(tmp_path):
     with pytest.raises(CampaignError, match="has none of its own"):
         campaign.sensitivity("y")
     assert campaign.response_surface("y").q_squared < 0.9
+    page = campaign.report(tmp_path / "r.html").read_text()
+    assert "indices from the points at hand" in page
+    assert "Response surface of degree 2" in page
 
 
 def test_exports(tmp_path):

@@ -21,6 +21,7 @@ KINDS = {
     "pair": "gearmbs.campaigns.subjects.pair:PairSubject",
     "function": "gearmbs.campaigns.subjects.function:FunctionSubject",
     "deck": "gearmbs.campaigns.subjects.deck:DeckSubject",
+    "paper claims": "gearmbs.campaigns.subjects.claims:ClaimsSubject",
 }
 """Subjects that come with the package; a plan may also name one as ``"module:Class"``."""
 
