@@ -18,6 +18,7 @@ from gearmbs.drivetrain.errors import require
 
 if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain
+    from gearmbs.gears.contact_model import ContactModel
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class TorsionalSpring:
         Of a mesh along the line of action, or of a clutch its dead band, m or rad.
     preload : float
         Force or torque at the operating point.
+    sense : int
+        Of a mesh: the sign of g . theta for which the drive flanks close.
     """
 
     name: str
@@ -45,6 +48,7 @@ class TorsionalSpring:
     damping: float = 0.0
     backlash: float = 0.0
     preload: float = 0.0
+    sense: int = 1
 
     def row(self, size: int) -> np.ndarray:
         """Return g, shape (shafts,)."""
@@ -131,6 +135,77 @@ class TorsionalModel:
             out[row, free] = np.linalg.solve(dynamic[np.ix_(free, free)], load)
         return out
 
+    def simulate(
+        self,
+        duration: float,
+        torques: dict[str, float],
+        motion: dict[str, tuple[float, float, float]],
+        *,
+        samples: float = 2000.0,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Integrate the chain in time, with the backlash of its springs, by Runge-Kutta steps of fixed length.
+
+        Parameters
+        ----------
+        duration : float
+            s.
+        torques : dict of str to float
+            Constant torques on free shafts, N m.
+        motion : dict of str to (float, float, float)
+            Of every prescribed shaft w (rad/s), A (rad) and f (Hz) of its angle w t - A sin(2 pi f t).
+        samples : float
+            Rows a second; at least.
+
+        Returns
+        -------
+        t : ndarray, shape (m,)
+        angles, speeds : ndarray, shape (m, n)
+
+        Raises
+        ------
+        DrivetrainError
+            If a prescribed shaft has no motion.
+        """
+        from gearmbs.drivetrain.torsional_kernel import STEPS_PER_PERIOD, integrate
+
+        n = len(self.names)
+        prescribed = np.zeros((n, 4))
+        for i in self.held:
+            require(self.names[i] in motion, f"simulate: shaft '{self.names[i]}' is prescribed; give its motion")
+            w, a, f = motion[self.names[i]]
+            prescribed[i] = (1.0, w, a, 2.0 * np.pi * f)
+        load = np.array([torques.get(name, 0.0) for name in self.names])
+        rows = np.array([spring.row(n) for spring in self.springs]).reshape(-1, n)
+        numbers = np.zeros((len(self.springs), 5))
+        for k, spring in enumerate(self.springs):
+            # a clutch is free on both sides, a mesh on one
+            share = 0.5 if spring.levers[1] == -1.0 else 0.0
+            high, low = share * spring.backlash, (share - 1.0) * spring.backlash
+            numbers[k] = (spring.stiffness, spring.damping, spring.sense, high, low)
+        fastest = max(1.0, *self.frequencies())
+        every = max(1, int(np.ceil(STEPS_PER_PERIOD * fastest / samples)))
+        step = 1.0 / (max(samples, STEPS_PER_PERIOD * fastest / every) * every)
+        count = int(np.ceil(duration / (step * every) - 1e-9))
+        out = np.empty((count + 1, 2 * n))
+        state = np.zeros(2 * n)
+        held = {i: motion[self.names[i]][0] - motion[self.names[i]][1] * prescribed[i, 3] for i in self.held}
+        state[n:] = [self._rolling(i, held) for i in range(n)]
+        out[0] = state
+        integrate(state, self.inertias, self.ground, load, rows, numbers, prescribed, step, every, out)
+        return np.arange(count + 1) * step * every, out[:, :n], out[:, n:]
+
+    def _rolling(self, shaft: int, known: dict[int, float]) -> float:
+        """Return the speed of a shaft with which no spring between it and the prescribed shafts is stretched."""
+        speeds = dict(known)
+        for _ in self.springs:
+            for spring in self.springs:
+                one, two = spring.shafts
+                if (one in speeds) != (two in speeds):
+                    a, b = spring.levers
+                    here, there = (one, two) if one in speeds else (two, one)
+                    speeds[there] = -speeds[here] * (a / b if here == one else b / a)
+        return speeds.get(shaft, 0.0)
+
     def __repr__(self) -> str:
         shown = ", ".join(f"{f:.5g}" for f in self.frequencies())
         return f"TorsionalModel({len(self.names)} inertias, {len(self.springs)} springs: {shown} Hz)"
@@ -182,7 +257,17 @@ def _mesh_spring(train: Drivetrain, mesh: str, names: tuple[str, ...]) -> Torsio
         (names.index(driver.shaft), names.index(driven.shaft)),
         (geometry.driver.base_radius, geometry.sign * geometry.driven.base_radius),
         one * geometry.contact_ratio,
-        0.0,
+        _mesh_damping(law, force / share) * geometry.contact_ratio,
         max(0.0, geometry.normal_backlash),
         force,
+        int(pair.rotation),
     )
+
+
+def _mesh_damping(model: ContactModel, force: float) -> float:
+    """Return the damping of one tooth pair at its mean penetration, N s/m; without load that of half the depth."""
+    law = model.law
+    if law.kind == "hunt-crossley":
+        return law.damping * force
+    x = min(1.0, (model.penetration(force) if force > 0.0 else 0.5 * law.depth) / law.depth)
+    return law.damping * x * x * (3.0 - 2.0 * x)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from gearmbs.studies.paper import PaperStudy, run_paper
     from gearmbs.studies.parallel import run_cases
     from gearmbs.studies.preset import paper_cases
+    from gearmbs.studies.rattle import RattleSettings, rattle, rattle_map, rattle_table, rattle_train
     from gearmbs.studies.rig import gear_rig
     from gearmbs.studies.simulation import SimulationFailed, SimulationInterrupted, run_case, simulate_case
     from gearmbs.studies.sweep import Sweep, sweep
@@ -29,6 +30,7 @@ __all__ = [
     "CaseWarning",
     "Claim",
     "PaperStudy",
+    "RattleSettings",
     "SimulationFailed",
     "SimulationInterrupted",
     "Sweep",
@@ -42,6 +44,10 @@ __all__ = [
     "load_train",
     "make_case",
     "paper_cases",
+    "rattle",
+    "rattle_map",
+    "rattle_table",
+    "rattle_train",
     "record_signal",
     "rolling_rig",
     "run_bench",
@@ -59,6 +65,11 @@ __all__ = [
 late(
     __name__,
     {
+        "RattleSettings": ".rattle",
+        "rattle": ".rattle",
+        "rattle_map": ".rattle",
+        "rattle_table": ".rattle",
+        "rattle_train": ".rattle",
         "run_train": ".trains",
         "load_train": ".trains",
         "train_signal": ".trains",
