@@ -19,6 +19,7 @@ import numpy as np
 import scipy.io
 
 from .errors import SignalFileError
+from .mat5_check import LARGEST, check_mat5
 from .record import Record, assemble, plain
 from .signal import check_teeth
 
@@ -73,6 +74,10 @@ def _units(scalars: Mapping[str, Any], arrays: Mapping[str, Any]) -> dict[str, s
 
 def _load(path: Path, notes: list[str]) -> dict[str, Any]:
     """The variables of a file of version 4 to 7; several of one name as name, name_2 ..."""
+    if path.stat().st_size <= LARGEST:
+        data = path.read_bytes()
+        if data.startswith(b"MATLAB 5.0"):
+            check_mat5(data)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         names = [name for name, _, _ in scipy.io.whosmat(path)]

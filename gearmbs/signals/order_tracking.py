@@ -111,7 +111,7 @@ def order_map(
     signal, speed, overlap, **shaft
         As for `order_track`.
     revolutions : float, optional
-        Length of a window: its lines lie 1 / revolutions apart. Default: a twentieth of the record, 8 to 64.
+        Length of a window: its lines lie 1 / revolutions apart. Default: a twentieth of the record, 4 to 64.
     maximum : float, optional
         Highest order; default as far as the record holds it at its highest speed.
     scaling, window
@@ -179,7 +179,7 @@ class _Windows:
         self.per_rev = per_rev
         total = self.angular.sizes["angle"] / per_rev
         if revolutions is None:
-            revolutions = float(min(64.0, max(8.0, total / 20.0)))
+            revolutions = float(min(64.0, max(LEAST_TURNS, total / 20.0)))
         if not (math.isfinite(revolutions) and revolutions > 0.0):
             raise SignalError(f"revolutions: must be positive, got {revolutions!r}")
         self.length = max(8, round(revolutions * per_rev))

@@ -501,7 +501,7 @@ def test_every_format_refuses_noise_in_one_line(tmp_path):
             assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["a.npy", "a.npz", "a.lvm", "a.uff", "a.parquet", "a.feather", "a.tdms"])
+@pytest.mark.parametrize("name", ["a.mat", "a.npy", "a.npz", "a.lvm", "a.uff", "a.parquet", "a.feather", "a.tdms"])
 def test_damaged_files_give_a_signal_or_one_line(tmp_path, name, capfd):
     """Bytes changed, cut out or cut off, from a fixed seed."""
     needed = {"uff": "pyuff", "parquet": "pyarrow", "feather": "pyarrow", "tdms": "nptdms"}.get(name[2:])
@@ -510,6 +510,7 @@ def test_damaged_files_give_a_signal_or_one_line(tmp_path, name, capfd):
     path, other = tmp_path / name, tmp_path / f"other_{name}"
     frame = pd.DataFrame({"time": np.arange(COUNT) / RATE, "a": X})
     {
+        "mat": lambda: scipy.io.savemat(path, {"run": {"acc": X, "sr": RATE, "at": "x", "more": [1, "a"]}, "b": Y}),
         "npy": lambda: np.save(path, np.stack([X, Y])),
         "npz": lambda: np.savez(path, acc=X, fs=RATE),
         "lvm": lambda: path.write_text(
