@@ -94,8 +94,8 @@ class BearingStatics:
     --------
     >>> statics = BearingStatics(Bearing.from_designation("6205"))
     >>> state = statics.under([1000.0, 0.0, 0.0])
-    >>> round(1e6 * state.displacement[0], 2), state.loaded
-    (13.75, 5)
+    >>> round(float(1e6 * state.displacement[0]), 2), state.loaded
+    (13.93, 5)
     """
 
     def __init__(self, bearing: Bearing, *, speed: Quantity = 0.0, **settings: Any) -> None:
