@@ -71,7 +71,7 @@ if TYPE_CHECKING:
         quantise,
         sample,
     )
-    from gearmbs.signals.separation import discrete_random, edit_cepstrum, prewhiten, remove_average
+    from gearmbs.signals.separation import discrete_random, edit_cepstrum, level_lines, prewhiten, remove_average
     from gearmbs.signals.series import series
     from gearmbs.signals.shaft import shaft_phase
     from gearmbs.signals.shaft_force import COMPONENTS, force_components, force_to_acceleration
@@ -158,6 +158,7 @@ __all__ = [
     "kurtosis",
     "laser_vibrometer",
     "level_distance",
+    "level_lines",
     "m6a",
     "m8a",
     "make_signal",
@@ -287,6 +288,7 @@ late(
         "kurtosis": ".indicators",
         "laser_vibrometer": ".sensors",
         "level_distance": ".ordinal",
+        "level_lines": ".separation",
         "m6a": ".indicators",
         "m8a": ".indicators",
         "make_signal": ".signal",

@@ -15,12 +15,12 @@ from gearmbs.units import to_si
 
 from .angular import angular_resample
 from .bearing_evidence import HARMONICS, SLIP, Evidence, find_lines, power_of, squared_envelope_power
-from .bearing_lines import CAGE, ELEMENT, BearingLines, bearing_lines
+from .bearing_lines import BearingLines, bearing_lines
 from .bearing_report import BearingReport, PartFinding
 from .envelope import kurtogram
 from .errors import SignalError
 from .phase import analytic
-from .separation import prewhiten
+from .separation import level_lines, prewhiten
 from .signal import like, rate_of, require, units_of
 
 CLEAR, SIGNS, NONE = "clear", "signs", "none"
@@ -32,6 +32,8 @@ EDGE = 0.95
 LEAST_LINES = 3.0
 """A band is at least so many times as wide as the highest fundamental."""
 LEAST_TURNS = 20
+NEIGHBOURHOOD = 4.0
+"""Width over which lines are levelled, in shaft turns."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class _Channel:
     name: str
     band: tuple[float, float]
     spectra: tuple[tuple[np.ndarray, np.ndarray], ...]
+    levelled: tuple[np.ndarray, np.ndarray]
 
 
 def diagnose_bearing(
@@ -162,16 +165,17 @@ def _channel(
     chosen = choose_band(one, highest) if band is None else (float(band[0]), float(band[1]))
     if not 0.0 <= chosen[0] < chosen[1] <= rate / 2:
         raise SignalError(f"band: must lie inside 0 to {rate / 2:g} Hz, got {band}")
+
+    def power(of: xr.DataArray, part: tuple[float, float] | None) -> tuple[np.ndarray, np.ndarray]:
+        if phase is None:
+            return squared_envelope_power(of.values[:, 0], rate, part)
+        orders, found = _angular_power(of, part, phase)
+        return orders * shaft, found
+
     white = prewhiten(one)
     bands = (chosen,) if band is not None else (None, chosen)
-    spectra = []
-    for part in bands:
-        if phase is None:
-            spectra.append(squared_envelope_power(white.values[:, 0], rate, part))
-        else:
-            frequency, power = _angular_power(white, part, phase)
-            spectra.append((frequency * shaft, power))
-    return _Channel(str(one["channel"].values[0]), chosen, tuple(spectra))
+    levelled = power(level_lines(one, NEIGHBOURHOOD * shaft), bands[0])
+    return _Channel(str(one["channel"].values[0]), chosen, tuple(power(white, part) for part in bands), levelled)
 
 
 def _angular_power(
@@ -219,16 +223,25 @@ def _finding(
         find_lines(f, power, order * turns, turns, slip=slip, harmonics=harmonics) for f, power in channel.spectra
     ]
     best = min(range(len(found)), key=lambda k: found[k].log_chance)
-    evidence = found[best]
+    evidence, (frequency, power) = found[best], channel.spectra[best]
+    if not _stands_out(evidence, SIGNS_CHANCE, SIGNS_RATIO):
+        # blows at perfectly even times make single lines, which prewhitening lowers to the noise; but so do gears:
+        # only what is clear counts
+        other = find_lines(*channel.levelled, order * turns, turns, slip=slip, harmonics=harmonics)
+        if _stands_out(other, CLEAR_CHANCE, CLEAR_RATIO):
+            evidence, (frequency, power), best = other, channel.levelled, 0
     # of several spectra the best was taken
-    chance = min(evidence.log_chance + math.log10(len(found)), 0.0)
-    frequency, power = channel.spectra[best]
+    chance = min(evidence.log_chance + math.log10(len(found) + 1), 0.0)
     sides = _sidebands(frequency, power, evidence.found, lines.sidebands[part] * turns)
     whole = len(found) > 1 and best == 0
     return PartFinding(
         lines.name, part, channel.name, evidence.kinematic, evidence.found, evidence.ratios, chance, sides,
         "whole record" if whole else f"{channel.band[0]:.0f} to {channel.band[1]:.0f} Hz", evidence.score,
     )  # fmt: skip
+
+
+def _stands_out(evidence: Evidence, chance: float, ratio: float) -> bool:
+    return bool(evidence.ratios) and evidence.log_chance <= chance and evidence.ratios[0] >= ratio
 
 
 def _sidebands(frequency: np.ndarray, power: np.ndarray, line: float, spacing: float) -> float:
@@ -251,10 +264,7 @@ def _judged(findings: list[PartFinding]) -> list[PartFinding]:
         first = finding.ratios[0] if finding.ratios else 0.0
         grade = NONE
         if finding.log_chance <= SIGNS_CHANCE and first >= SIGNS_RATIO:
-            strong = finding.log_chance <= CLEAR_CHANCE and first >= CLEAR_RATIO
-            grade = CLEAR if strong and finding.part not in (CAGE, ELEMENT) else SIGNS
-            if strong and finding.part in (CAGE, ELEMENT):
-                grade = CLEAR
+            grade = CLEAR if finding.log_chance <= CLEAR_CHANCE and first >= CLEAR_RATIO else SIGNS
         graded.append(finding.graded(grade))
     for k, finding in enumerate(graded):
         rivals = [

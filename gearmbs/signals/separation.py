@@ -20,6 +20,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import scipy.fft
@@ -134,6 +135,39 @@ def prewhiten(signal: xr.DataArray) -> xr.DataArray:
         if size.max() == 0.0:
             raise SignalError("signal: a channel that is zero cannot be prewhitened; leave it out with channels=...")
         flat = scipy.fft.irfft(line / np.maximum(size, FLOOR * size.max()), column.size)
+        columns.append(flat * (np.std(column) / np.std(flat)))
+    return like(signal, np.stack(columns, axis=1))
+
+
+def level_lines(signal: xr.DataArray, width: float, most: float = 10.0) -> xr.DataArray:
+    """Flatten a spectrum over neighbourhoods, and cut its lines to a multiple of what is round them.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel).
+    width : float
+        Of a neighbourhood, Hz.
+    most : float
+        Magnitude of a line by the median of its neighbourhood, at most. With 1 this is nearly `prewhiten`; blows at
+        perfectly even times, as simulated ones are, need more to be seen.
+    """
+    rate, n = rate_of(signal), signal.sizes["time"]
+    if not (rate / n < width < rate / 2 and most >= 1.0):
+        raise SignalError(
+            f"width: must lie between {rate / n:.3g} and {rate / 2:g} Hz, most be 1 or more, got {width!r}, {most!r}"
+        )
+    columns = []
+    for column in signal.values.T:
+        line = scipy.fft.rfft(column - column.mean())
+        size = np.abs(line)
+        if size.max() == 0.0:
+            raise SignalError("signal: a channel that is zero has no lines; leave it out with channels=...")
+        edges = np.linspace(0, size.size, max(round(rate / 2 / width), 2) + 1).astype(int)
+        medians = [max(float(np.median(size[a:b])), FLOOR * size.max()) for a, b in pairwise(edges)]
+        around = np.interp(np.arange(size.size), 0.5 * (edges[1:] + edges[:-1]), medians)
+        gain = np.minimum(1.0, most * around / np.maximum(size, FLOOR * size.max())) / around
+        flat = scipy.fft.irfft(line * gain, n)
         columns.append(flat * (np.std(column) / np.std(flat)))
     return like(signal, np.stack(columns, axis=1))
 

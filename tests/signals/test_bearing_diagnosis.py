@@ -13,6 +13,7 @@ from gearmbs.signals import (
     diagnose_bearing,
     discrete_random,
     edit_cepstrum,
+    level_lines,
     make_signal,
     phase_from_speed,
     prewhiten,
@@ -69,6 +70,13 @@ def test_names_the_part(part, order, slip):
     if part == "inner race":
         assert "sidebands at the shaft's turns" in report.verdict
     assert report.accused == [f for f in report.accused if f.part == part]
+
+
+def test_finds_blows_at_perfectly_even_times():
+    """As a simulation without random slip makes them: single lines, which prewhitening alone would hide in noise."""
+    report = diagnose_bearing(record(3.0 * pulses(LINES.bpfo * SHAFT, jitter=0.0), MESH), "6205", f"{SHAFT} Hz")
+    assert report.fault == "outer race"
+    assert report.clear
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -197,6 +205,14 @@ def test_cepstrum_editing_levels_a_family_only():
     assert float(quiet[1].sum()) == pytest.approx(float(quiet[0].sum()), rel=0.3)
     with pytest.raises(SignalError, match="frequencies: must be above"):
         edit_cepstrum(data, 0.0)
+
+
+def test_levelled_lines_are_so_much_above_their_neighbourhood():
+    level = level_lines(record(MESH), 4 * SHAFT, most=5.0)
+    lines = np.abs(np.fft.rfft(level.values[:, 0]))[100:-100]
+    assert lines.max() == pytest.approx(5.0 * np.median(lines), rel=0.3)
+    with pytest.raises(SignalError, match="width: must lie"):
+        level_lines(record(MESH), 0.0)
 
 
 def test_prewhitened_spectrum_is_flat():
