@@ -31,6 +31,9 @@ DENSE = 900
 PAIR = 1e-7
 """Relative distance below which squared frequencies count as a pair."""
 
+MULTIPLE = 8
+"""Most equal modes: two planes of bending times equal spans between seats."""
+
 METHODS = ("craig-bampton", "free")
 
 GROUNDED = 1e-6
@@ -95,8 +98,10 @@ def reduce_model(
     if method == "free":
         basis = np.hstack([free_modes(k, m, rigid, count)[1], attachment_modes(k, m, rigid, parts.constraints)])
     else:
-        held_values, held = held_modes(k, m, parts.constraints, count + 1)
-        held = held[:, : _whole(held_values, count) or count]
+        held_values, held = held_modes(k, m, parts.constraints, count + MULTIPLE)
+        while count < held_values.size and _same(held_values, count):
+            count += 1
+        held = held[:, :count]
         basis = np.hstack([constraint_modes(k, parts.constraints), held])
     values, shapes = orthonormal(k, m, basis, rigid)
     if preload is not None:
@@ -151,10 +156,16 @@ def _signed(parts: Resolved, shapes: np.ndarray) -> np.ndarray:
 
 
 def _whole(values: np.ndarray, count: int) -> int:
-    """Return how many values, ``count`` at most, can be kept without parting a pair of equal ones."""
-    if 0 < count < values.size and values[count] - values[count - 1] < PAIR * values[count]:
-        return count - 1
-    return min(count, values.size)
+    """Return how many values, ``count`` at most, can be kept without parting equal ones."""
+    kept = min(count, values.size)
+    while 0 < kept < values.size and _same(values, kept):
+        kept -= 1
+    return kept or count
+
+
+def _same(values: np.ndarray, k: int) -> bool:
+    """Return whether value k is that before it."""
+    return bool(values[k] - values[k - 1] < PAIR * values[k])
 
 
 def _in_planes(model: FiniteElementModel, parts: Resolved, values: np.ndarray, shapes: np.ndarray) -> np.ndarray:

@@ -48,6 +48,15 @@ def test_bending_pairs_stay_whole():
         assert frequencies.size - len(lateral) <= 3
 
 
+def test_equal_spans_do_not_part_pairs_either():
+    """Held modes of two equal spans come in fours."""
+    even = Shaft([ShaftSection(0.2, 0.03)], [Disc(0.1, outer=0.1, width=0.02)], {"A": 0.0, "W": 0.1, "B": 0.2})
+    for count in (5, 6, 7, 8):
+        frequencies = even.modal_model(count).frequencies
+        single = [f for f in frequencies if np.sum(np.abs(frequencies / f - 1) < 1e-7) != 2]
+        assert len(single) <= 2
+
+
 @pytest.mark.parametrize("speed", [0.0, 4000 * np.pi / 30])
 def test_integrals_of_the_turning_frame_give_the_whirl_seen_from_rest(speed):
     """In a frame that turns with the shaft w -+ speed, by Coriolis and centrifugal terms of the integrals only."""
