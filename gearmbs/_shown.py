@@ -60,9 +60,7 @@ class Shown:
 
     def save(self, path: str | Path) -> Path | list[Path]:
         """Write the object; the ending of the path says as what. See `gearmbs.save`."""
-        from gearmbs import save
-
-        return save(self, path)
+        return importlib.import_module("gearmbs").save(self, path)
 
 
 def draw(thing: Any, **options: Any) -> Any:

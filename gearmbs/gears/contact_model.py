@@ -63,7 +63,8 @@ class ContactModel:
     stiffness_curve: Literal["constant", "potential-energy"] = "constant"
     owner: InitVar[str] = "ContactModel"
 
-    def __post_init__(self, owner: str) -> None:
+    # mypy may lose InitVar among modules that import each other for types
+    def __post_init__(self, owner: str) -> None:  # type: ignore[override]
         require(self.load in ("slices", "adams"), f"{owner}.load is {self.load!r}; choose 'slices' or 'adams'")
         require(
             self.stiffness_curve in ("constant", "potential-energy"),

@@ -39,7 +39,8 @@ class OperatingPoint:
     rotation: Literal[1, -1] = 1
     owner: InitVar[str] = "OperatingPoint"
 
-    def __post_init__(self, owner: str) -> None:
+    # mypy may lose InitVar among modules that import each other for types
+    def __post_init__(self, owner: str) -> None:  # type: ignore[override]
         object.__setattr__(self, "torque", to_si(self.torque, "torque", f"{owner}.torque"))
         require(math.isfinite(self.torque), f"{owner}.torque is {self.torque}; give a finite number")
         require(self.rotation in (1, -1), f"{owner}.rotation is {self.rotation!r}; give 1 or -1")

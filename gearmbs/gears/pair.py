@@ -111,14 +111,14 @@ class GearPair(PairGeometry, Shown):
     @cached_property
     def contact_model(self) -> ContactModel:
         """How the wheels touch."""
-        return ContactModel(
+        return ContactModel(  # type: ignore[call-arg]
             self.contact, self.friction, self.slices, self.load, self.root_contact, self.stiffness_curve, "GearPair"
         )
 
     @cached_property
     def operating_point(self) -> OperatingPoint:
         """How they are driven and loaded."""
-        return OperatingPoint(self.torque, self.rotation, "GearPair")
+        return OperatingPoint(self.torque, self.rotation, "GearPair")  # type: ignore[call-arg]
 
     @classmethod
     def paper(cls, **changes: Any) -> GearPair:
