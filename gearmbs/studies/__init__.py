@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from gearmbs.studies.bench_study import BenchStudy, run_bench
     from gearmbs.studies.case import Case, CaseError, CaseWarning, load_case, make_case
     from gearmbs.studies.claims import Claim
+    from gearmbs.studies.crank_slider import CrankSlider
     from gearmbs.studies.flexible_rig import flexible_rig
     from gearmbs.studies.paper import PaperStudy, run_paper
     from gearmbs.studies.parallel import run_cases
@@ -29,6 +30,7 @@ __all__ = [
     "CaseError",
     "CaseWarning",
     "Claim",
+    "CrankSlider",
     "PaperStudy",
     "RattleSettings",
     "SimulationFailed",
@@ -65,6 +67,7 @@ __all__ = [
 late(
     __name__,
     {
+        "CrankSlider": ".crank_slider",
         "RattleSettings": ".rattle",
         "rattle": ".rattle",
         "rattle_map": ".rattle",
