@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 from gearmbs._shown import html_table
+from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
 
 if TYPE_CHECKING:
@@ -55,12 +56,21 @@ def pair_table(pair: Mesh) -> Table:
         ("face width mm", "face_width"),
     ):
         both(label, ".4f", attribute)
+    if any(w.profile_shift for w in geometry.wheels):
+        both("profile shift x (ISO 21771)", "+.4f", "profile_shift", 1)
+    if two.internal:
+        both("profile shift outwards", "+.4f", "outward_shift", 1)
+        both("outer radius mm", ".4f", "outer_radius")
+    if one.helix_angle:
+        both("helix angle deg", ".4f", "helix_angle", math.degrees(1))
+        table.add_row("hand", *(w.hand for w in geometry.wheels))
     both("mass kg", ".4f", "mass", 1)
     table.add_section()
     for label, value in (
         ("centre distance mm", f"{geometry.centre_distance * mm:.4f}"),
         ("working pressure angle deg", f"{math.degrees(geometry.working_pressure_angle):.3f}"),
         ("contact ratio", f"{geometry.contact_ratio:.4f}"),
+        *_overlap(geometry),
         ("path of contact mm", f"{geometry.path_of_contact * mm:.3f}"),
         ("normal backlash mm", f"{geometry.normal_backlash * mm:.4f}"),
         (
@@ -79,6 +89,16 @@ def pair_table(pair: Mesh) -> Table:
             "",
         )
     return table
+
+
+def _overlap(geometry: PairGeometry) -> list[tuple[str, str]]:
+    """Rows of helical wheels."""
+    if geometry.driver.helix_angle == 0:
+        return []
+    return [
+        ("overlap ratio", f"{geometry.overlap_ratio:.4f}"),
+        ("total contact ratio", f"{geometry.total_contact_ratio:.4f}"),
+    ]
 
 
 def pair_html(pair: Mesh) -> str:

@@ -166,3 +166,14 @@ def test_radial_assembly_needs_a_difference_of_teeth():
     assert PairGeometry(GearSpec(20, "2 mm"), GearSpec(-70, "2 mm")).radial_assembly
     near = PairGeometry(GearSpec(40, "2 mm"), GearSpec(-52, "2 mm", addendum="1.4 mm"))
     assert not near.radial_assembly
+
+
+def test_tables_print_both_conventions_of_the_shift():
+    pair = GearPair(
+        GearSpec(23, "3 mm", profile_shift=0.1, helix_angle="15 deg"),
+        GearSpec.ring(70, "3 mm", outward_shift=0.1, helix_angle="15 deg"),
+        backlash="0.1 mm",
+    )
+    page = pair._repr_html_()
+    for words in ("ISO 21771", "outwards", "+0.1000", "-0.1000", "helix angle", "overlap ratio", "right"):
+        assert words in page
