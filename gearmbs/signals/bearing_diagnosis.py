@@ -15,7 +15,7 @@ from gearmbs.units import to_si
 
 from .angular import angular_resample
 from .bearing_evidence import HARMONICS, SLIP, Evidence, find_lines, power_of, squared_envelope_power
-from .bearing_lines import BearingLines, bearing_lines
+from .bearing_lines import CAGE, BearingLines, bearing_lines
 from .bearing_report import BearingReport, PartFinding
 from .envelope import kurtogram
 from .errors import SignalError
@@ -264,7 +264,9 @@ def _judged(findings: list[PartFinding]) -> list[PartFinding]:
         first = finding.ratios[0] if finding.ratios else 0.0
         grade = NONE
         if finding.log_chance <= SIGNS_CHANCE and first >= SIGNS_RATIO:
-            grade = CLEAR if finding.log_chance <= CLEAR_CHANCE and first >= CLEAR_RATIO else SIGNS
+            # another shaft may turn as fast as a cage
+            sure = finding.part != CAGE and finding.log_chance <= CLEAR_CHANCE and first >= CLEAR_RATIO
+            grade = CLEAR if sure else SIGNS
         graded.append(finding.graded(grade))
     for k, finding in enumerate(graded):
         rivals = [

@@ -150,7 +150,7 @@ class BearingReport:
         parts = [finding.sentence() for finding in self.accused]
         if self.accused[0].part == CAGE:
             parts.append(
-                "Modulation at the cage's turns comes from elements that differ more often than from the cage."
+                "Modulation at the cage's turns comes from the cage, elements that differ, or a shaft as fast."
             )
         return " ".join(parts)
 
