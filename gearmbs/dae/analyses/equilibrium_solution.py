@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearmbs.dae.analyses.linearised import Instant
+from gearmbs.dae.analyses.instant import Instant
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations import output_records
 from gearmbs.dae.equations.counted_angles import AXES

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-from gearmbs.dae.analyses.linearised import Instant
+from gearmbs.dae.analyses.instant import Instant
 from gearmbs.dae.errors import AssemblyError, ModelError
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 from gearmbs.dae.results.solution import Solution

@@ -9,13 +9,16 @@ with as many x as degrees of freedom; its eigenvalues are the finite ones of the
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gearmbs.dae.analyses.eigenvalues import spectrum
-from gearmbs.dae.analyses.linearised import Instant, reduce
+from gearmbs.dae.analyses.instant import Instant
+from gearmbs.dae.analyses.linearised import reduce
+from gearmbs.dae.analyses.turning import angular_velocities
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.system import System
@@ -89,8 +92,9 @@ def linear_modes(system: System) -> Modes:
     """Return the linear modes of a system at its present pose and velocity, time functions frozen at ``system.t0``.
 
     At a position of equilibrium they are the small vibrations. Elsewhere they are the instantaneous eigenvalues
-    with the loads' own changes; of a moving point the coefficients are frozen. Without degrees of freedom and states
-    there are none.
+    with the loads' own changes. What spins is described in axes that do not turn with it (see
+    `gearmbs.dae.analyses.turning`): of rotors alike about their axis the modes are those of the whirl, with gyroscopic
+    couples; of other moving points the coefficients are frozen. Without degrees of freedom and states there are none.
 
     Raises
     ------
@@ -98,9 +102,15 @@ def linear_modes(system: System) -> Modes:
         If a motion left free by the constraints has no inertia.
     ModelError
         If the model cannot be made consistent.
+
+    Warns
+    -----
+    UserWarning
+        If a body with modal coordinates spins: they turn with it, so that its own modes are not those of its whirl.
     """
     instant = Instant(system, "I3")
     instant.y = instant.settle(instant.y)
+    _warn_of_turning_modes(instant)
     reduced = reduce(instant)
     found = spectrum(reduced)
     values, vectors = found.values, found.vectors
@@ -121,6 +131,21 @@ def linear_modes(system: System) -> Modes:
         _unit(instant.spatial(reduced.basis @ motions)),
         system.body_names,
     )
+
+
+def _warn_of_turning_modes(instant: Instant) -> None:
+    speeds = np.linalg.norm(angular_velocities(instant), axis=1)
+    names = [
+        n
+        for n, speed, modes in zip(instant.system.body_names, speeds, instant.system.model.counts.modes, strict=True)
+        if modes and speed > 0.0
+    ]
+    if names:
+        message = (
+            f"{', '.join(names)} spins and has modal coordinates, which turn with it: frequencies of its own modes are "
+            "those seen from the body; whirl and critical speeds of a shaft are found by gearmbs.flexible.Rotor"
+        )
+        warnings.warn(message, stacklevel=3)
 
 
 def _unit(shapes: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution, Snapshot
-from gearmbs.dae.analyses.linearised import Instant
+from gearmbs.dae.analyses.instant import Instant
 from gearmbs.dae.analyses.statics import Relaxation, static_equilibrium
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.results.solution import Solution

@@ -22,7 +22,8 @@ from scipy.sparse.linalg import splu
 from gearmbs._deprecation import former_name
 from gearmbs.dae.analyses.eigenvalues import free_motions
 from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution, Snapshot
-from gearmbs.dae.analyses.linearised import Instant, reduce
+from gearmbs.dae.analyses.instant import Instant
+from gearmbs.dae.analyses.linearised import reduce
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError

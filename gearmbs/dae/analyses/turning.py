@@ -1,0 +1,140 @@
+"""Small rotations in axes that do not turn with the bodies, for the modes of what spins.
+
+Changes of Euler angles, delta theta, have coefficients that change while a body turns, also where the motion is
+steady. Small rotations delta phi in global axes do not: with omega = B zeta, the axes of the angles as columns of B,
+
+    delta theta = T delta phi,  T = B^-1,      delta zeta = T delta phi' + T' delta phi,
+
+and the changes of the momenta are delta p = M delta zeta + N delta theta = A1 delta phi' + A0 delta phi with
+
+    A1 = M T,   A0 = M T' + N T.
+
+Virtual work of small rotations puts T^T before the equations, which become
+
+    T^T A1 delta phi'' + T^T (A1' + A0 + D T) delta phi' + T^T (A0' + D T' + S T) delta phi = 0,
+
+D and S the derivatives of the loads and constraint forces with respect to the velocities and the coordinates. The
+rates T', A1' and A0' are taken along a steady rotation, each body about its present angular velocity. Where all that
+turns is alike about its axis the coefficients are constant, and the eigenvalues are those of the whirl.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearmbs.dae.analyses.instant import Instant
+
+TURN = 2e-3
+"""Angle, rad, between the places at which rates of the coefficients are differenced, to fourth order."""
+DIFFERENCED = 1000.0
+"""Error of a rate of rates against that of rounding: the weight of such terms where rounding is judged."""
+WEIGHTS = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12.0
+REACH = 4
+
+
+@dataclass
+class Turning:
+    """The transformation and its rates at one instant.
+
+    Attributes
+    ----------
+    transform, transform_rate : ndarray, shape (n, n)
+        T and T', for all coordinates (R, theta, q_f).
+    momentum_rate, momentum_place : ndarray, shape (n, n)
+        A1 and A0.
+    momentum_rate_change, momentum_place_change : ndarray, shape (n, n)
+        A1' and A0'.
+    """
+
+    transform: np.ndarray
+    transform_rate: np.ndarray
+    momentum_rate: np.ndarray
+    momentum_place: np.ndarray
+    momentum_rate_change: np.ndarray
+    momentum_place_change: np.ndarray
+
+
+def turning(instant: Instant) -> Turning | None:
+    """Return the transformation at an instant, None where no body turns."""
+    y = instant.y.copy()
+    velocities = angular_velocities(instant)
+    fastest = float(np.abs(velocities).max(initial=0.0))
+    if not fastest > 0.0:
+        return None
+    step = TURN / fastest
+    places = [_moved(instant, y, velocities, k * step) for k in range(-REACH, REACH + 1)]
+    transforms = np.array([_transform(instant, place) for place in places])
+    middle = range(REACH - 2, REACH + 3)
+    rates = np.array([_rate(transforms[k - 2 : k + 3], step) for k in middle])
+    momenta = [_momenta(instant, places[k]) for k in middle]
+    first = np.array([mass @ transforms[k] for k, (mass, _) in zip(middle, momenta, strict=True)])
+    zeroth = np.array(
+        [mass @ rate + moved @ transforms[k] for k, rate, (mass, moved) in zip(middle, rates, momenta, strict=True)]
+    )
+    instant.y = y
+    return Turning(transforms[REACH], rates[2], first[2], zeroth[2], _rate(first, step), _rate(zeroth, step))
+
+
+def _rate(values: np.ndarray, step: float) -> np.ndarray:
+    """Return the rate in the middle of five values."""
+    return np.tensordot(WEIGHTS, values, 1) / step
+
+
+def _axes(instant: Instant, y: np.ndarray) -> np.ndarray:
+    """Return B of each body, shape (bodies, 3, 3): its columns are the axes of the angles."""
+    instant.y = y
+    return np.swapaxes(instant.axes(), 1, 2)
+
+
+def angular_velocities(instant: Instant) -> np.ndarray:
+    """Return the global angular velocities, rad/s, shape (bodies, 3)."""
+    bodies, y = len(instant.system.body_names), instant.y
+    zeta = y[instant.at["eps"] : instant.at["eps"] + 3 * bodies].reshape(bodies, 3)
+    return np.einsum("bck,bk->bc", _axes(instant, y), zeta)
+
+
+def _moved(instant: Instant, y: np.ndarray, velocities: np.ndarray, time: float) -> np.ndarray:
+    """Return y after every body has turned for a time about its angular velocity, by a Runge-Kutta step."""
+    bodies = velocities.shape[0]
+    angles = slice(instant.at["theta"], instant.at["theta"] + 3 * bodies)
+    rates = slice(instant.at["eps"], instant.at["eps"] + 3 * bodies)
+    start = y[angles].copy()
+
+    def rate(theta: np.ndarray) -> np.ndarray:
+        place = y.copy()
+        place[angles] = theta
+        return np.linalg.solve(_axes(instant, place), velocities[:, :, None])[:, :, 0].ravel()
+
+    k1 = rate(start)
+    k2 = rate(start + 0.5 * time * k1)
+    k3 = rate(start + 0.5 * time * k2)
+    k4 = rate(start + time * k3)
+    out = y.copy()
+    out[angles] = start + time / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    out[rates] = rate(out[angles])
+    return out
+
+
+def _transform(instant: Instant, y: np.ndarray) -> np.ndarray:
+    """Return T for all coordinates."""
+    first = instant.at["R"]
+    n = instant.at["lambda"] - first
+    out = np.eye(n)
+    inverses = np.linalg.inv(_axes(instant, y))
+    for k, inverse in enumerate(inverses):
+        at = instant.at["theta"] - first + 3 * k
+        out[at : at + 3, at : at + 3] = inverse
+    return out
+
+
+def _momenta(instant: Instant, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return M and N of delta p = M delta v + N delta q at y."""
+    matrix = instant.matrix(y)
+    mass = instant.mass_matrix(matrix).toarray()
+    place = np.zeros_like(mass)
+    eps = instant.block("eps", "R")
+    half = mass.shape[0] - eps.size
+    place[half:, half:] = -matrix[eps][:, instant.block("theta", "lambda")].toarray()
+    return mass, place
