@@ -240,7 +240,9 @@ def read_op4(
         If pyyeti is not installed, the file cannot be read, or has no such matrices.
     """
     try:
-        from pyyeti.nastran import op4
+        # it sets numpy's legacy print mode, in which text files lose digits
+        with np.printoptions():
+            from pyyeti.nastran import op4
     except ImportError:
         raise FlexibleError("OP4 files are read by pyyeti; install it with 'pip install gearmbs[fem]'") from None
     file = Path(path)

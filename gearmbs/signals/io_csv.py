@@ -261,7 +261,9 @@ def write_csv(record: Record, path: Path, packed: bool, progress: Progress | Non
             count = record.values.shape[0]
             for start in range(0, count, CHUNK_ROWS):
                 block = pd.DataFrame(record.values[start : start + CHUNK_ROWS])
-                block.to_csv(text, header=False, index=False, lineterminator="\n")
+                # in numpy's legacy print mode, which other packages set, numbers would lose digits
+                with np.printoptions(legacy=False):
+                    block.to_csv(text, header=False, index=False, lineterminator="\n")
                 if progress is not None:
                     progress(min(1.0, (start + CHUNK_ROWS) / count), "writing")
 

@@ -45,6 +45,12 @@ def record(seconds=25.0, rate=RATE, channels=2, seed=5):
     return make_signal(data, rate, units="m/s^2", teeth=TEETH, t0=2.0)
 
 
+def test_texts_keep_all_digits_in_the_legacy_print_mode(tmp_path):
+    with np.printoptions(legacy="1.13"):
+        path = write_signal(record(1.0), tmp_path / "x.csv")
+    np.testing.assert_array_equal(read_signal(path).values, record(1.0).values)
+
+
 @pytest.mark.parametrize("format", NAMES)
 def test_sections_put_together_are_the_record(tmp_path, format):
     whole = record()
