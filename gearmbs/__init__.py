@@ -36,8 +36,9 @@ Views
 Units and files
     `to_si`, `save`
 
-The subpackages hold the rest: `gearmbs.studies`, `gearmbs.gears`, `gearmbs.drivetrain`, `gearmbs.flexible`,
-`gearmbs.bearings`, `gearmbs.mechanism`, `gearmbs.dae`, `gearmbs.signals`, `gearmbs.adams`, `gearmbs.view`.
+The subpackages hold the rest, as ``gm.signals.cepstrum``: `gearmbs.studies`, `gearmbs.gears`, `gearmbs.drivetrain`,
+`gearmbs.flexible`, `gearmbs.bearings`, `gearmbs.mechanism`, `gearmbs.dae`, `gearmbs.signals`, `gearmbs.adams`,
+`gearmbs.campaigns`, `gearmbs.identify`, `gearmbs.view`.
 """
 
 from typing import TYPE_CHECKING
@@ -255,5 +256,12 @@ late(
         "waterfall_plot": ".view",
         "write_deck": ".adams",
         "write_signal": ".signals",
+    }
+    | {
+        package: f".{package}:"
+        for package in (
+            "adams bearings campaigns contact dae drivetrain flexible gears identify mechanism signals studies units "
+            "view"
+        ).split()
     },
 )

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import typer
+
+UNWRITABLE = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
+"""What is wrong with the place and not with the file."""
 
 
 def fail(message: str) -> None:
@@ -30,4 +34,8 @@ def guarded() -> Iterator[None]:
     except (ValueError, RuntimeError, OSError) as error:
         # what a function asks for by keyword is asked for here by the option of that name
         asked = getattr(error, "name", None) if type(error).__name__ == "MissingMetadataError" else None
-        fail(f"{error} (on the command line: --{asked} ...)" if asked else str(error))
+        text = str(error)
+        if isinstance(error, OSError) and error.filename and error.strerror:
+            text = f"{error.filename}: {error.strerror}"
+            text += "; choose another place or make room" if error.errno in UNWRITABLE else ""
+        fail(f"{text} (on the command line: --{asked} ...)" if asked else text)

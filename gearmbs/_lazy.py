@@ -31,7 +31,7 @@ class _LatePackage(ModuleType):
 
     def __setattr__(self, name: str, value: Any) -> None:
         # the import system binds each submodule to its name
-        if not (isinstance(value, ModuleType) and name in self._homes):
+        if not (isinstance(value, ModuleType) and not self._homes.get(name, ":").endswith(":")):
             ModuleType.__setattr__(self, name, value)
 
     def __dir__(self) -> list[str]:

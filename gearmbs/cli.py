@@ -447,11 +447,15 @@ def analyse(
             bearings = diagnose_bearing(one, bearing_list(bearing), turns, band=None if band is None else pair_of(band))
             found |= bearings.tables()
             text = f"{bearings.to_markdown()}\n\n{text}"
-        files = _save_tables(found, tables)
-        if figures is not None:
-            from gearmbs.view import analysis_figures
+        try:
+            files = _save_tables(found, tables)
+            if figures is not None:
+                from gearmbs.view import analysis_figures
 
-            files += _save_figures(analysis_figures(report, signal), figures)
+                files += _save_figures(analysis_figures(report, signal), figures)
+        except OSError:
+            typer.echo(text)
+            raise
     _hand_over(text, out, files)
 
 
@@ -619,14 +623,18 @@ def _save_figures(figures: dict[str, Any], folder: Path) -> list[Path]:
 
 
 def _hand_over(report: str, out: Path | None, files: list[Path]) -> None:
-    """Print a report or write it, and name the files written."""
+    """Print a report or write it, and name the files written; print it, too, where it cannot be written."""
     if out is None:
         typer.echo(report)
     else:
         from gearmbs.view.files import write_whole
 
         with guarded():
-            write_whole(out, report)
+            try:
+                write_whole(out, report)
+            except OSError:
+                typer.echo(report)
+                raise
         files = [out, *files]
     if files:
         typer.echo("\n".join(f"wrote {path}" for path in files), err=out is None)

@@ -68,6 +68,16 @@ def test_every_name():
         gm.nothing  # noqa: B018
 
 
+def test_packages_are_found_without_importing_them():
+    names = (
+        "adams bearings campaigns contact dae drivetrain flexible gears identify mechanism signals studies units view"
+    )
+    code = f"import gearmbs as gm; print(*(getattr(gm, name).__name__ for name in {names.split()}))"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    found = subprocess.check_output([sys.executable, "-c", code], env=environment, text=True, cwd="/").split()
+    assert found == [f"gearmbs.{name}" for name in names.split()]
+
+
 def test_modules_do_not_take_the_place_of_functions():
     """`gearmbs.signals.envelope` is a function and the module it lives in; importing the module changes nothing."""
     function = gm.signals.envelope if "signals" in vars(gm) else importlib.import_module("gearmbs.signals").envelope

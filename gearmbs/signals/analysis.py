@@ -129,7 +129,8 @@ def analyse(
     if options is None:
         unknown = [name for name in settings if name not in SETTINGS]
         if unknown:
-            raise TypeError(f"analyse: there is no setting {unknown[0]!r}; settings are {', '.join(SETTINGS)}")
+            hint = "; of bearings see diagnose_bearing" if unknown[0].startswith("bearing") else ""
+            raise TypeError(f"analyse: there is no setting {unknown[0]!r}; settings are {', '.join(SETTINGS)}{hint}")
         options = AnalysisOptions(teeth=teeth, **settings)
     elif settings or teeth is not None:
         raise TypeError(f"analyse: give options or {', '.join(['teeth'] * (teeth is not None) + list(settings))}")

@@ -17,6 +17,7 @@ from .angular import angular_resample
 from .bearing_evidence import HARMONICS, SLIP, Evidence, find_lines, power_of, squared_envelope_power
 from .bearing_lines import CAGE, BearingLines, bearing_lines
 from .bearing_report import BearingReport, PartFinding
+from .door import to_signal
 from .envelope import kurtogram
 from .errors import SignalError
 from .phase import analytic
@@ -47,7 +48,7 @@ class _Channel:
 
 
 def diagnose_bearing(
-    signal: xr.DataArray,
+    signal: Any,
     bearing: Any,
     speed: float | str | None = None,
     *,
@@ -65,7 +66,7 @@ def diagnose_bearing(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel).
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of by itself.
     bearing : Bearing, str, mapping, BearingLines, or a sequence of these
         See `bearing_lines`; a mapping from names to (bearing, ratio) gives bearings on shafts of other speeds.
     speed : float or str, optional
@@ -90,6 +91,7 @@ def diagnose_bearing(
     SignalError
         If a bearing cannot be read, or the record is too short for its lines.
     """
+    signal = to_signal(signal)
     known = _all_lines(bearing)
     if not 0.0 < slip < 0.2:
         raise SignalError(f"slip: must lie between 0 and 0.2, got {slip!r}")
@@ -154,7 +156,7 @@ def _shaft(signal: xr.DataArray, speed: Any, phase: xr.DataArray | None) -> tupl
         given = None if speed is None else to_si(speed, "angular speed", "speed")
     except (TypeError, ValueError) as error:
         raise SignalError(str(error)) from None
-    return float(require(signal, "speed", given, needed_for="the lines of a bearing")) / math.tau, []
+    return float(require(signal, "speed", given, needed_for="the diagnosis of a bearing")) / math.tau, []
 
 
 def _channel(

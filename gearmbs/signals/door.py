@@ -134,7 +134,11 @@ def _of_array(
     else:
         names = channels
         try:
+            if np.iscomplexobj(data):
+                raise SignalError("data: the samples are complex; give real ones, such as their real part or magnitude")
             values = np.asarray(data, dtype=float)
+        except SignalError:
+            raise
         except (TypeError, ValueError):
             raise SignalError(
                 f"data: {type(data).__name__} is no array of numbers; give samples, a DataFrame, a signal or a file"
@@ -145,7 +149,11 @@ def _of_array(
     if values.ndim != 2 or 0 in values.shape:
         raise SignalError(f"data: must have shape (samples,) or (samples, channels) and hold some, got {values.shape}")
     if rate is None:
-        raise MissingMetadataError("rate", "an array of samples", "pass rate=... in Hz, or text such as '12.8 kHz'")
+        raise MissingMetadataError(
+            "rate",
+            "an array of samples",
+            "pass rate=... in Hz, or text such as '12.8 kHz'; where that is no setting, pass to_signal(data, rate=...)",
+        )
     values, first, notes = without_gaps(values, gaps, rate)
     if notes:
         attrs["notes"] = notes

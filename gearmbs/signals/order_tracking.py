@@ -24,7 +24,7 @@ LEAST_TURNS = 4.0
 
 
 def order_track(
-    signal: xr.DataArray,
+    signal: Any,
     speed: Any = None,
     orders: Sequence[float] | float = (1.0,),
     *,
@@ -45,7 +45,7 @@ def order_track(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel), measured or simulated.
+        Dimensions (time, channel), measured or simulated, or whatever `to_signal` makes a signal of by itself.
     speed : optional
         Speed of the shaft in any shape that `speed_curve` reads; default what the signal knows of it.
     orders : float or sequence of float
@@ -94,7 +94,7 @@ def order_track(
 
 
 def order_map(
-    signal: xr.DataArray,
+    signal: Any,
     speed: Any = None,
     *,
     revolutions: float | None = None,
@@ -152,7 +152,7 @@ class _Windows:
 
     def __init__(
         self,
-        signal: xr.DataArray,
+        signal: Any,
         speed: Any,
         revolutions: float | None,
         overlap: float,
@@ -162,6 +162,11 @@ class _Windows:
     ) -> None:
         if not 0.0 <= overlap < 1.0:
             raise SignalError(f"overlap: must lie in [0, 1), got {overlap!r}")
+        if not isinstance(signal, xr.DataArray):
+            # readers of files are not loaded for a simulated record
+            from .door import to_signal
+
+            signal = to_signal(signal)
         phase = shaft_phase(signal, speed, **shaft)
         turns = (phase.values - phase.values[0]) / TURN
         fastest = float(np.percentile(np.gradient(turns, phase["time"].values), 99.0)) if phase.size > 1 else 0.0

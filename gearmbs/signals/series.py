@@ -247,7 +247,13 @@ def _files(files: Files) -> tuple[list[Path], list[Any] | None]:
         else:
             paths = [folder]
     else:
-        paths = [Path(path) for path in files]
+        try:
+            paths = [Path(path) for path in files]
+        except TypeError:
+            raise SignalError(
+                "files: must be paths, a folder or a pattern; samples in memory go into analyse one by one, "
+                "and their reports into features"
+            ) from None
     if not paths:
         raise SignalError(f"files: {files} names no file")
     if len(paths) == 1 and not paths[0].exists():

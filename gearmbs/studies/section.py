@@ -138,7 +138,13 @@ def _remark(field: str, value: Any, measure: Measure) -> None:
 
 def explained(error: ValidationError, kind: Any, source: str) -> str:
     """Return what is wrong, each fault in a line of its own that begins with ``source``."""
-    return "\n".join(_line(item, kind, source) for item in error.errors(include_url=False))
+    items: dict[Any, Any] = {}
+    for item in error.errors(include_url=False):
+        loc = item["loc"]
+        # one value given for both wheels is one fault
+        of_both = (loc[:-1], item["type"], repr(item["input"])) if loc and isinstance(loc[-1], int) else len(items)
+        items[of_both] = {**item, "loc": loc[:-1]} if of_both in items else item
+    return "\n".join(_line(item, kind, source) for item in items.values())
 
 
 def _line(item: Any, kind: Any, source: str) -> str:
@@ -146,6 +152,8 @@ def _line(item: Any, kind: Any, source: str) -> str:
     parts = [str(part) for part in loc if not str(part).startswith(("function-", "tuple[", "float", "constrained"))]
     field = ".".join([*([kind.section] if kind.section else []), *parts])
     message = item["msg"].removeprefix("Value error, ")
+    if item["type"] in ("int_type", "int_from_float", "int_parsing"):
+        message = "give a whole number"
     if item["type"] == "extra_forbidden":
         return f"{source}: {field}: {_unknown(loc, kind)}"
     if item["type"] in ("model_type", "model_attributes_type", "dataclass_type"):

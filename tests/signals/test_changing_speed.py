@@ -122,6 +122,13 @@ def test_tracked_orders_are_constant_from_rest_to_full_speed():
     np.testing.assert_allclose(rms.values, 1 / math.sqrt(2), rtol=0.01)
 
 
+def test_samples_without_a_rate_are_asked_for_it():
+    samples = np.sin(np.arange(12800) / 10.0)
+    for track in (order_track, order_map, spectrogram):
+        with pytest.raises(SignalError, match=r"rate is missing: .*pass to_signal\(data, rate=\.\.\.\)"):
+            track(samples, speed="1000 rpm")
+
+
 def test_order_map_keeps_orders_in_their_columns():
     signal, _ = run_up()
     found = order_map(signal, maximum=70.0)

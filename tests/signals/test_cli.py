@@ -1,5 +1,7 @@
 """The commands that go from files to reports."""
 
+import errno
+import os
 import subprocess
 import sys
 
@@ -94,6 +96,23 @@ def test_commands_for_measurements_need_no_kernels(tmp_path):
     done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True)
     assert done.stdout.strip().endswith("[]"), done.stdout
     assert (tmp_path / "x.md").exists()
+
+
+@pytest.mark.parametrize("option", ["--out", "--tables"])
+def test_a_report_that_cannot_be_written_is_printed(tmp_path, monkeypatch, option):
+    path = write(tmp_path, "x.csv")
+
+    def full(*_args):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("gearmbs.view.files.os.replace", full)
+    result = run("analyse", path, option, tmp_path / "here")
+    assert result.exit_code == 1
+    assert "# Vibration of x.csv" in result.output
+    said = " ".join(result.output.split())
+    assert "No space left on device; choose another place or make room" in said
+    assert "Errno" not in said
+    assert not [left for left in tmp_path.rglob("*") if left.is_file() and left != path]
 
 
 def test_tooth_counts():

@@ -429,6 +429,7 @@ def test_data_of_any_shape(data, settings):
         (np.r_[X, np.nan], {"rate": 1.0}, "gaps='interpolate'"),
         (np.ones((2, 3, 4)), {"rate": 1.0}, "must have shape"),
         (np.array([]), {"rate": 1.0}, "must have shape"),
+        (X + 1j, {"rate": 1.0}, "samples are complex"),
         (pd.Series(X, name="a"), {"rate": 1.0, "channels": ["b"]}, "has no channel"),
     ],
 )

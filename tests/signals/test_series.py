@@ -142,6 +142,7 @@ def test_features_of_reports_and_reasons_for_what_is_not_there():
     ("files", "settings", "said"),
     [
         ([], {}, "names no file"),
+        ([np.zeros(9)], {}, "samples in memory go into analyse"),
         ("none/*.csv", {}, "names no file"),
         ("none.csv", {}, "cannot be opened"),
         ("x", {"errors": "drop"}, "errors: must be"),

@@ -155,6 +155,7 @@ WRONG = [
     ({"gears": {"modul": "3 mm"}}, r"gears.modul: unknown key; .*; did you mean module\?"),
     ({"speed": "1000 rpm"}, r"speed: unknown key; .*; did you mean operation.speed\?"),
     ({"operation": "1000 rpm"}, "operation = '1000 rpm': give its keys, speed, torque"),
+    ({"gears": {"teeth": 20.5}}, r"^\S+: gears.teeth = 20.5: give a whole number$"),
     ({"gears": {"teeth": [20, 21, 22]}}, "gears.teeth = .*3 values; give one for both wheels"),
     ({"contact": {"depth": 0.01}}, r"contact.depth is 10 mm, more than the module .*\(a plain number is in m\)"),
     ({"fault": {"teeth": {"kind": "broken tooth", "lost": 1.5}}}, r"fault.teeth\[0\].lost is 1.5; give a share"),
