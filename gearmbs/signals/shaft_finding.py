@@ -14,7 +14,7 @@ from .phase import phase_from_line, phase_from_speed
 from .shaft import shaft_phase
 from .signal import rate_of
 from .spectra import periodograms
-from .speed import MIN_QUALITY, MIN_SCORE_DB, SpeedEstimate, estimate_speed, find_comb, prominence
+from .speed import MIN_QUALITY, MIN_SCORE_DB, SpeedEstimate, estimate_speed, find_comb, own_lines_missing, prominence
 from .speed_curve import is_curve, speed_curve
 
 SPEED_TOLERANCE = 0.02
@@ -142,7 +142,7 @@ def remark_plausibility(signal: xr.DataArray, speed: float | None, estimated: bo
     if speed is None:
         return
     rpm = speed * 30.0 / math.pi
-    if not USUAL_RPM[0] <= rpm <= USUAL_RPM[1]:
+    if not USUAL_RPM[0] * (1.0 - 1e-6) <= rpm <= USUAL_RPM[1] * (1.0 + 1e-6):
         cause = "the sampling rate, the tooth count or the mesh line may be wrong" if estimated else "check its unit"
         notes.append(
             f"CHECK THE SPEED: {rpm:.0f} rpm is outside {USUAL_RPM[0]:g} to {USUAL_RPM[1]:g} rpm; {cause}. "
@@ -189,10 +189,18 @@ def _remark_other(
         return
     if abs(blind.speed / nominal - 1.0) < OTHER_COMB:
         return
-    if found is not None and blind.score < found.score + STRONGER_DB:
-        return
-    here = "no mesh line" if found is None else f"only a comb of {found.score:.0f} dB"
     ratio = blind.speed / nominal
+    here = "no mesh line" if found is None else f"only a comb of {found.score:.0f} dB"
+    if found is not None and blind.score < found.score + STRONGER_DB:
+        # half the speed has every line of the whole one among its own, and nearly its score
+        whole = round(ratio)
+        if (
+            whole < 2
+            or abs(ratio / whole - 1.0) > SPEED_TOLERANCE
+            or not own_lines_missing(signal, found.gmf, blind.gmf)
+        ):
+            return
+        here = "hardly a line at the mesh frequency itself"
     notes.append(
         f"CHECK THE SPEED: near the given {nominal * 30 / math.pi:.1f} rpm there is {here}, but the record shows one "
         f"of {blind.score:.0f} dB at {blind.gmf:.2f} Hz, which with {counts[0]} teeth is "

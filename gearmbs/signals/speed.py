@@ -113,6 +113,10 @@ def estimate_speed(
     return SpeedEstimate(2.0 * math.pi * gmf / count, gmf, resolution, spread, comb.prominence, phase, comb.score)
 
 
+HOLLOW_POWER, HOLLOW_HEIGHT = 1.0 / 64.0, 0.5
+"""Power and height in dB, as parts of the other comb's, below which a comb has no lines of its own."""
+
+
 class Comb(NamedTuple):
     """A mesh line found in the averaged spectrum: gear mesh frequency in Hz, heights in dB as of `SpeedEstimate`."""
 
@@ -162,6 +166,39 @@ def find_comb(
         )
     gmf = _peak(power, candidates[best], bin_width)
     return Comb(count, float(gmf), float(direct[best]), float(score[best]))
+
+
+def own_lines_missing(signal: xr.DataArray, gmf: float, stronger: float) -> bool:
+    """Whether a comb lives on the lines of another one, whose frequency is a multiple of its own.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel).
+    gmf : float
+        Frequency of the comb, Hz.
+    stronger : float
+        Frequency of the other one, Hz.
+
+    Returns
+    -------
+    bool
+        True if no harmonic that the other comb has not reaches an eighth of that one's first line, or half of its
+        height in dB.
+    """
+    rate = rate_of(signal)
+    length = min(signal.sizes["time"], round(SEGMENT_SECONDS * rate))
+    power, _ = periodograms(signal.values, rate, length, "hann", 0.5, True, "power")
+    times = round(stronger / gmf)
+    own = np.array([h * gmf for h in range(1, 2 * times) if h % times])
+    first = np.array([stronger])
+    share = (power / np.maximum(power.sum(axis=0), 1e-300)).sum(axis=1)
+    height = prominence(power).mean(axis=1)
+    bin_width = rate / length
+    return bool(
+        _at(share, own, bin_width).max() < HOLLOW_POWER * _at(share, first, bin_width)[0]
+        or _at(height, own, bin_width).max() < HOLLOW_HEIGHT * _at(height, first, bin_width)[0]
+    )
 
 
 def prominence(power: np.ndarray) -> np.ndarray:

@@ -86,6 +86,23 @@ def test_half_or_double_the_speed_is_remarked():
         assert said[0] in analyse(pair(), 32, rate=RATE, speed=wrong).to_markdown()
 
 
+@pytest.mark.parametrize("sidebands", [0.0, 0.3])
+@pytest.mark.parametrize("second", [0.0, 0.2])
+def test_half_the_speed_is_remarked_where_it_scores_nearly_as_well(sidebands, second):
+    """400 Hz and its second harmonic are every second line of 200 Hz; lines at 200 and 600 Hz make that right."""
+    t = np.arange(4 * 12800) / 12800
+    x = (1 + sidebands * np.cos(2 * np.pi * 20 * t)) * np.sin(2 * np.pi * 400 * t) + second * np.sin(
+        2 * np.pi * 800 * t
+    )
+    x += 0.05 * np.random.default_rng(0).standard_normal(t.size)
+    said = checks(analyse(x, 20, rate=12800, speed="600 rpm"))
+    assert len(said) == 1
+    assert "2.000 times the given speed" in said[0]
+    assert checks(analyse(x, 20, rate=12800, speed="1200 rpm")) == []
+    x += 0.3 * np.sin(2 * np.pi * 200 * t) + 0.3 * np.sin(2 * np.pi * 600 * t)
+    assert checks(analyse(x, 20, rate=12800, speed="600 rpm")) == []
+
+
 def test_rates_and_speeds_that_no_machine_has_are_remarked():
     said = checks(analyse(pair(), 32, rate=10 * RATE))
     assert any("15000" in note and "sampling rate" in note for note in said)
