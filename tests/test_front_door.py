@@ -55,6 +55,13 @@ def test_loads_what_is_used(code, without):
     assert not loaded(code) & set(without)
 
 
+def test_a_case_loads_no_signal_processing_of_others():
+    """`scipy.signal` takes longer to load than many a case to run."""
+    code = "from gearmbs.studies import Case, run_case; import sys; print('scipy.signal' in sys.modules)"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    assert subprocess.check_output([sys.executable, "-c", code], env=environment, text=True, cwd="/") == "False\n"
+
+
 def test_every_name():
     """Each name is what its package says it is, listed, and found by `dir`."""
     assert sorted(gm.__all__) == gm.__all__

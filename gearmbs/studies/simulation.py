@@ -23,7 +23,6 @@ from gearmbs.signals import (
     force_to_acceleration,
     gmf_rms,
     make_signal,
-    order_track,
     trim,
 )
 from gearmbs.signals.monotone_cubic import monotone_cubic
@@ -271,6 +270,9 @@ def _mesh_levels(acceleration: xr.DataArray) -> xr.DataArray:
 
 def _tracked_levels(case: Case, acceleration: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray:
     """Return the RMS of the mesh orders along a run-up, by order tracking over four revolutions at a time."""
+    # what only run-ups need takes longer to load than many a simulation
+    from gearmbs.signals import order_track
+
     turning = {name: ("time", dataset[name].values, dataset[name].attrs) for name in ("speed", "angle")}
     orders = [float(case.gears.teeth[0] * k) for k in range(1, HARMONICS + 1)]
     tracks = order_track(acceleration.assign_coords(turning), orders=orders, scaling="rms")
