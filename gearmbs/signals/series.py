@@ -50,7 +50,7 @@ def series(
     ----------
     files : path, sequence of paths, or mapping
         A folder (all files in it whose names end as those of known formats do, or all if none does), a pattern such as
-        "run/*.csv", a list, or a mapping of labels (a load, a date) to files. Names are sorted as people count: 2
+        ``"run/*.csv"``, a list, or a mapping of labels (a load, a date) to files. Names are sorted as people count: 2
         before 10.
     teeth : int or sequence, optional
         As for `analyse`.
