@@ -14,6 +14,7 @@ import xarray as xr
 
 from gearmbs.dae import Status
 from gearmbs.gears import ContactLaw, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
+from gearmbs.mechanism import Mechanism
 from gearmbs.signals import fixed_sensor
 from gearmbs.studies.section import CaseError
 from gearmbs.studies.tooth_faults import tooth_fault
@@ -53,6 +54,18 @@ class PlanetaryRun:
     tolerance: float = 1e-6
     supports: Mapping[str, Support] = field(default_factory=dict)
     pins: Support | None = None
+
+    def mechanism(self) -> Mechanism:
+        """Return the mechanism that is simulated."""
+        return planetary_mechanism(
+            self.gears,
+            speeds=self.speeds,
+            torques=self.torques,
+            held=self.held,
+            run_up=self.run_up,
+            supports=self.supports,
+            pins=self.pins,
+        )
 
 
 def load_planetary(path: str | Path) -> PlanetaryRun:
@@ -165,15 +178,7 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
         If the integration does not reach its end.
     """
     gears = run.gears
-    mechanism = planetary_mechanism(
-        gears,
-        speeds=run.speeds,
-        torques=run.torques,
-        held=run.held,
-        run_up=run.run_up,
-        supports=run.supports,
-        pins=run.pins,
-    )
+    mechanism = run.mechanism()
     begin = run.run_up + run.settling
     options: dict[str, Any] = {"rate": run.rate, "tol": run.tolerance}
     if progress is not None:

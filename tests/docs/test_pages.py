@@ -103,8 +103,10 @@ def _examples(path, folder):
     # the first is the one that the page works with
     for code in reversed(cases):
         (folder / "case.toml").write_text(code, encoding="utf-8")
-        read = load_planetary if "[planetary]" in code else load_case
-        read(folder / "case.toml")
+        if "[planetary]" in code:
+            load_planetary(folder / "case.toml").mechanism()
+        else:
+            load_case(folder / "case.toml")
     run_blocks(path, "python")
 
 
