@@ -31,6 +31,9 @@ def guarded() -> Iterator[None]:
     except KeyboardInterrupt:
         typer.secho("gearmbs: interrupted; finished cases are kept, nothing is half-written", err=True)
         raise typer.Exit(130) from None
+    except BrokenPipeError:
+        # whoever read the output has enough of it; typer ends quietly
+        raise
     except (ValueError, RuntimeError, OSError) as error:
         # what a function asks for by keyword is asked for here by the option of that name
         asked = getattr(error, "name", None) if type(error).__name__ == "MissingMetadataError" else None

@@ -461,8 +461,10 @@ def analyse(
 
 @app.command()
 def trend(
-    files: Annotated[list[Path], typer.Argument(help="A long record, or a folder or many files as one series.")],
-    section: Annotated[str | None, typer.Option(help='Length of the pieces [default: "10 s" of one record].')] = None,
+    files: Annotated[
+        list[Path], typer.Argument(help="A long record, or a folder, a pattern or many files as one series.")
+    ],
+    section: Annotated[str | None, typer.Option(help='Length of the pieces; default: "10 s" of one record.')] = None,
     teeth: Annotated[str | None, typer.Option(help='Teeth of the wheel on the reference shaft; or "32,80".')] = None,
     rate: Rate = None,
     speed: Speed = None,
@@ -489,7 +491,8 @@ def trend(
             "harmonics": harmonics,
             "gaps": gaps,
         }
-        if len(files) > 1 or files[0].is_dir():
+        pattern = any(sign in str(files[0]) for sign in "*?[") and not files[0].exists()
+        if len(files) > 1 or files[0].is_dir() or pattern:
             known["speed_channel"] = speed_channel
             table = series(
                 files[0] if len(files) == 1 else files,
@@ -645,12 +648,12 @@ def adams(
     model: Annotated[Path, typer.Argument(help="ADAMS/Solver deck (.adm).")],
     script: Annotated[Path | None, typer.Argument(help="Commands (.acf).")] = None,
     end: Annotated[float | None, typer.Option(help="End time, when there is no script.")] = None,
-    steps: Annotated[int | None, typer.Option(help="Output steps, when there is no script [default: 100].")] = None,
+    steps: Annotated[int | None, typer.Option(help="Output steps, when there is no script; default: 100.")] = None,
     tolerance: Annotated[float | None, typer.Option(help="Local error instead of INTEGRATOR/ERROR.")] = None,
     skip_unsupported: Annotated[bool, typer.Option(help="Leave out what is not supported.")] = False,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="Prefix of the files written [default: the script's, or the model's name]."),
+        typer.Option("--out", "-o", help="Prefix of the files written; default: the script's, or the model's name."),
     ] = None,
 ) -> None:
     """Run an ADAMS deck; write .req, .res, .msg and NetCDF."""

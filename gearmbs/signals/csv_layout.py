@@ -170,6 +170,8 @@ def _find_numbers(head: list[str], path: Path) -> tuple[int, str | None, str, li
     if fallback is not None and (len(fallback[3]) > 1 or fallback[0] == (rows[0][0] if rows else 0)):
         return fallback
     sample = next((line.strip() for line in head if line.strip()), "")
+    if not sample:
+        raise SignalFileError(path, "holds nothing but empty lines")
     raise SignalFileError(
         path, f"holds no row of numbers in its first {len(head)} lines; it begins with {sample[:60]!r}"
     )

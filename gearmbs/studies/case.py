@@ -504,7 +504,11 @@ def load_case(path: str | Path) -> Case:
         data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise CaseError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise CaseError(
+            f"{path}: not a text file, so no case in TOML; records are read by `gearmbs analyse`"
+        ) from error
+    except tomllib.TOMLDecodeError as error:
         raise CaseError(f"{path}: not a valid TOML file ({error})") from error
     data.setdefault("name", path.stem)
     return make_case(data, str(path))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 import warnings
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -150,7 +151,7 @@ def explained(error: ValidationError, kind: Any, source: str) -> str:
 def _line(item: Any, kind: Any, source: str) -> str:
     loc = item["loc"]
     parts = [str(part) for part in loc if not str(part).startswith(("function-", "tuple[", "float", "constrained"))]
-    field = ".".join([*([kind.section] if kind.section else []), *parts])
+    field = re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", ".".join([*([kind.section] if kind.section else []), *parts]))
     message = item["msg"].removeprefix("Value error, ")
     if item["type"] in ("int_type", "int_from_float", "int_parsing"):
         message = "give a whole number"

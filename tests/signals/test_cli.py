@@ -37,6 +37,16 @@ def test_one_command_from_csv_to_a_gmf_table(tmp_path):
     assert "| 1 x GMF |" in result.output
 
 
+def test_a_report_that_cannot_be_written_names_its_own_path(tmp_path):
+    path = write(tmp_path, "x.csv")
+    (tmp_path / "report.md").mkdir()
+    result = run("analyse", path, "--teeth", TEETH, "--channel", "housing", "--out", tmp_path / "report.md")
+    assert result.exit_code == 1
+    words = result.output.replace("\n", "")
+    assert "Errno" not in words
+    assert f"{tmp_path / 'report.md'}: " in words
+
+
 def test_report_tables_and_figures_go_where_they_are_told(tmp_path):
     path = write(tmp_path, "x.mat")
     options = ("--tacho", "pulse", "--tables", tmp_path / "tables", "--figures", tmp_path / "figures")
@@ -143,6 +153,10 @@ def test_a_folder_is_one_series(tmp_path):
     assert table["housing.rms"].nunique() == 1
     # a second call finds everything done
     assert run("trend", folder, *options).exit_code == 0
+    matched = run("trend", folder / "s1*.csv", "--speed", "1800 rpm", "--channel", "housing")
+    assert matched.exit_code == 0, matched.output
+    assert "s10.csv" in matched.output
+    assert "s2.csv" not in matched.output
     listed = run("trend", folder / "s1.csv", folder / "s2.csv", "--teeth", TEETH, "--channel", "housing")
     assert listed.exit_code == 0, listed.output
     assert "housing.fm4" in listed.output
