@@ -91,9 +91,10 @@ class WhirlModes:
     shapes: np.ndarray
 
     def __repr__(self) -> str:
+        damping = np.round(self.damping_ratios, 5) + 0.0  # never minus zero
         rows = "\n".join(
             f"{k + 1:3d} {w / (2 * np.pi):14.4f} Hz {w * 30 / np.pi:14.2f} rpm  {z:9.5f}  {d}"
-            for k, (w, z, d) in enumerate(zip(self.frequencies, self.damping_ratios, self.directions))
+            for k, (w, z, d) in enumerate(zip(self.frequencies, damping, self.directions))
         )
         return f"modes at {self.speed * 30 / np.pi:.6g} rpm: frequency, damping ratio, whirl\n{rows}"
 

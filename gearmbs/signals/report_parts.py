@@ -106,8 +106,14 @@ def channel_table(data: xr.Dataset) -> pd.DataFrame:
 
 
 def transposed(data: xr.Dataset, channels: Sequence[str], names: Mapping[str, str] | None = None) -> str:
-    """Variables of dimension (channel,) as a Markdown table, one column a channel."""
-    wanted = names or {str(k): str(k).replace("_", " ") for k in data.data_vars}
+    """Variables of dimension (channel,) as a Markdown table, one column a channel.
+
+    A variable with units of its own has them beside its name.
+    """
+    wanted = names or {
+        str(k): str(k).replace("_", " ") + (f", {v.attrs['units']}" if "units" in v.attrs else "")
+        for k, v in data.data_vars.items()
+    }
     rows = [[label, *(significant(v) for v in data[key].values)] for key, label in wanted.items()]
     return markdown_table(["", *channels], rows)
 
