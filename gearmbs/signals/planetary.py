@@ -176,7 +176,7 @@ def planetary_average(
     """Average over turns of a planet or the sun against the carrier, from windows about the planets' passing.
 
     Whenever a planet passes the sensor, a piece of two teeth's length is cut out with a Hann window and put where the
-    tooth in mesh stands on the wheel; neighbouring windows add up to one [2]_, [3]_. Each tooth has been seen after as
+    tooth in mesh stands on the wheel; neighbouring windows add up to one (McFadden, Howard). Each tooth has been seen after as
     many turns of the carrier as the wheel has teeth. Where its number has a common factor with the ring's, only every
     so-manieth tooth passes the sensor with the planet, and the pieces are as many times longer.
 
@@ -255,7 +255,7 @@ def planetary_average(
 class PlanetaryModel:
     """Phenomenological signal of a planetary set with its ring at rest, at a sensor on the ring.
 
-    The meshes of each planet are amplitude and phase modulated by a fault, and weighted by the path [4]_:
+    The meshes of each planet are amplitude and phase modulated by a fault, and weighted by the path (Feng, Zuo):
 
         x = sum_k w(theta + psi_k) [1 + A cos(phi_k)] sum_h a_h cos(h (z_r (theta + psi_k) + B sin(phi_k)) + alpha_h)
 
