@@ -19,7 +19,7 @@ from .bearing_lines import CAGE, BearingLines, bearing_lines
 from .bearing_report import BearingReport, PartFinding
 from .door import to_signal
 from .envelope import kurtogram
-from .errors import SignalError
+from .errors import MissingMetadataError, SignalError
 from .phase import analytic
 from .separation import level_lines, prewhiten
 from .signal import like, rate_of, require, units_of
@@ -156,6 +156,12 @@ def _shaft(signal: xr.DataArray, speed: Any, phase: xr.DataArray | None) -> tupl
         given = None if speed is None else to_si(speed, "angular speed", "speed")
     except (TypeError, ValueError) as error:
         raise SignalError(str(error)) from None
+    if given is None and signal.attrs.get("speed") is None:
+        # a file may hold a number that looks like the speed
+        told = [str(note) for note in signal.attrs.get("notes", ()) if "--speed" in str(note)]
+        hint = " ".join(told).rstrip(".")
+        remedy = hint[0].lower() + hint[1:] if hint else "pass speed='1500 rpm', say"
+        raise MissingMetadataError("speed", "the diagnosis of a bearing", remedy)
     return float(require(signal, "speed", given, needed_for="the diagnosis of a bearing")) / math.tau, []
 
 

@@ -15,6 +15,7 @@ from gearmbs.signals import (
     MissingMetadataError,
     SignalError,
     SignalFileError,
+    diagnose_bearing,
     make_signal,
     read_signal,
     sections,
@@ -92,6 +93,14 @@ def test_shaft_rate_beside_a_sampling_rate(tmp_path):
     assert read_signal(path, rate=48828.0).attrs["sampling_rate"] == 48828.0
     scipy.io.savemat(path, {"bearing": {"gs": X, "load": 270.0, "rate": 25.0}})
     assert read_signal(path, rate="48.828 kHz").attrs["sampling_rate"] == 48828.0
+
+
+def test_a_bearing_asks_for_the_speed_with_what_the_file_holds(tmp_path):
+    path = tmp_path / "shaft.mat"
+    scipy.io.savemat(path, {"bearing": {"sr": 48828.0, "gs": X[:, None], "rate": 25.0}})
+    with pytest.raises(SignalError, match=r"speed is missing: .*bearing\.rate = 25 .*speed='25 Hz'") as caught:
+        diagnose_bearing(path, "6205")
+    assert len(str(caught.value).splitlines()) == 1
 
 
 def test_two_rates_that_disagree_are_asked_about_in_one_line(tmp_path):
