@@ -74,8 +74,7 @@ def sobol_indices(values: np.ndarray, names: list[str], *, resamples: int = RESA
     """Return first and total Sobol' indices of results on a Saltelli design.
 
     With A, B and AB_i, A with coordinate i of B, standardised together: first index the mean of f_B (f_AB - f_A)
-    (Saltelli 2010), total index
-    half the mean of (f_A - f_AB)^2 (Jansen 1999), over the variance of f_A and f_B.
+    (Saltelli 2010), total index half the mean of (f_A - f_AB)^2 (Jansen 1999), over the variance of f_A and f_B.
 
     Parameters
     ----------
@@ -128,9 +127,8 @@ def morris_effects(values: np.ndarray, points: np.ndarray, names: list[str], *, 
     Returns
     -------
     DataFrame
-        ``mu``, ``mu_star`` (Campolongo 2007), ``sigma`` and ``confidence`` (half width of the 95 % interval of mu_star) by factor.
-        An effect is the
-        change of the result over the whole range of the factor.
+        ``mu``, ``mu_star`` (Campolongo 2007), ``sigma`` and ``confidence`` (half width of the 95 % interval of mu_star)
+        by factor. An effect is the change of the result over the whole range of the factor.
     """
     import pandas as pd
     from scipy.stats import norm

@@ -176,9 +176,9 @@ def planetary_average(
     """Average over turns of a planet or the sun against the carrier, from windows about the planets' passing.
 
     Whenever a planet passes the sensor, a piece of two teeth's length is cut out with a Hann window and put where the
-    tooth in mesh stands on the wheel; neighbouring windows add up to one (McFadden, Howard). Each tooth has been seen after as
-    many turns of the carrier as the wheel has teeth. Where its number has a common factor with the ring's, only every
-    so-manieth tooth passes the sensor with the planet, and the pieces are as many times longer.
+    tooth in mesh stands on the wheel; neighbouring windows add up to one (McFadden, Howard). Each tooth has been seen
+    after as many turns of the carrier as the wheel has teeth. Where that has a common factor with the teeth of the
+    ring, only every so-manieth tooth passes the sensor with the planet, and the pieces are as many times longer.
 
     Parameters
     ----------
