@@ -79,8 +79,8 @@ def fit(
     Examples
     --------
     >>> x = np.linspace(0.0, 1.0, 20)
-    >>> found = fit(lambda p: p[0] * np.exp(p[1] * x), 2.0 * np.exp(-0.5 * x), [Free("a", 1.0), Free("b", -1.0,
-    log=False)])
+    >>> free = [Free("a", 1.0), Free("b", -1.0, log=False)]
+    >>> found = fit(lambda p: p[0] * np.exp(p[1] * x), 2.0 * np.exp(-0.5 * x), free)
     >>> found.values.round(6).tolist()
     [2.0, -0.5]
     """
