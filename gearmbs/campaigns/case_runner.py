@@ -69,7 +69,7 @@ class CaseRunner:
         plan = self.plan
         try:
             with limited(plan.time_limit, plan.memory_limit) as check:
-                record = self.subject.run(thing, check)
+                record = self.subject.run(thing, check, plan.keep)
                 result.kept = self.subject.reduce(thing, record, plan.keep)
             if "record" in plan.keep:
                 self._write("records", row, record)

@@ -117,7 +117,8 @@ class CaseProblem:
 
         name, p = key
         try:
-            levels = run_case(self.case(name, p), False)["gmf_rms"].sel(way=self.way)
+            record = run_case(self.case(name, p), False, variables=["gmf_rms"])
+            levels = record["gmf_rms"].sel(way=self.way)
         except (SimulationFailed, ValueError):
             return {}
         return {

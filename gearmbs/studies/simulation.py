@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from importlib.metadata import version
 from typing import Any
 
@@ -16,21 +16,12 @@ import gearmbs
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.simulate import simulate
-from gearmbs.signals import (
-    decimate,
-    even_signal,
-    force_components,
-    force_to_acceleration,
-    gmf_rms,
-    make_signal,
-    trim,
-)
-from gearmbs.signals.monotone_cubic import monotone_cubic
 from gearmbs.studies import rig
 from gearmbs.studies.case import Case, units_of_fields
 from gearmbs.studies.drive import drive_angle
-from gearmbs.studies.limits import HARMONICS, check_record, edge, remarks, slip
-from gearmbs.studies.measured import COUNTS, SMOOTH, Measured, Recorder, measure, rows_of_record
+from gearmbs.studies.evaluation import check_variables, evaluate, time_series
+from gearmbs.studies.limits import check_record, edge, remarks, slip
+from gearmbs.studies.measured import Measured, Recorder, measure, rows_of_record
 
 ADVICE = {
     Status.STEP_TOO_SMALL: "Loosen solver.tolerance, raise contact.depth, or try another solver.integrator.",
@@ -125,8 +116,21 @@ def case_mechanism(case: Case):
     )
 
 
-def run_case(case: Case, progress: bool | Callable[[float], None] | None = None) -> xr.Dataset:
+def run_case(
+    case: Case,
+    progress: bool | Callable[[float], None] | None = None,
+    *,
+    variables: Collection[str] | None = None,
+) -> xr.Dataset:
     """Simulate a case and return its record: a pure function of the case.
+
+    Parameters
+    ----------
+    case : Case
+    progress : bool or callable, optional
+        Show a bar, or ``progress(t)`` with the time reached, s.
+    variables : collection of str, optional
+        Evaluate only these of the variables below, with the same values; default all.
 
     Returns
     -------
@@ -146,13 +150,14 @@ def run_case(case: Case, progress: bool | Callable[[float], None] | None = None)
         If the integrator stops early or teeth slip past each other; the exception carries the solution so far.
     """
     check_record(case)
+    check_variables(variables)
     recorder = Recorder(case)
     solution = simulate_case(case, progress, every_step=True, consumer=recorder.take)
     if not solution.success:
         kind = SimulationInterrupted if solution.status is Status.INTERRUPTED else SimulationFailed
         raise kind(f"case '{case.name}': {solution.message}", solution, case, _partial(case, solution, recorder))
     try:
-        return _evaluated(case, solution, recorder.measured(), even=False)
+        return _evaluated(case, solution, recorder.measured(), even=False, variables=variables)
     except SimulationFailed as failure:
         raise SimulationFailed(str(failure), solution, case, _partial(case, solution, recorder)) from None
 
@@ -173,26 +178,11 @@ def partial_record(case: Case, solution: Solution) -> xr.Dataset:
 
 
 def _partial_dataset(case: Case, solution: Solution, known: Measured) -> xr.Dataset:
-    dataset = _time_series(known.t, known.forces, known.error, known.contact)
+    forces = {"force_1": known.forces[:, :3], "force_2": known.forces[:, 3:]}
+    dataset = time_series(known.t, {**forces, "transmission_error": known.error, **known.contact})
     attributes = attributes_of(case, solution)
     dataset.attrs = {**attributes, "status": solution.status.name, "message": solution.message}
     return dataset
-
-
-def _time_series(t, forces, error, contact) -> xr.Dataset:
-    """Return the dataset of forces, transmission error and contact over time."""
-    data = {
-        "force_1": (("time", "xyz"), forces[:, :3], {"units": "N", "long_name": "force of shaft 1 on gear 1"}),
-        "force_2": (("time", "xyz"), forces[:, 3:], {"units": "N", "long_name": "force of shaft 2 on gear 2"}),
-        "transmission_error": (
-            "time",
-            error,
-            {"units": "m", "long_name": "lag of the driven wheel at its base circle"},
-        ),
-    }
-    for name, unit in {**SMOOTH, **COUNTS}.items():
-        data[name] = ("time", contact[name], {"units": unit, "long_name": name.replace("_", " ")})
-    return xr.Dataset(data, coords={"time": ("time", t, {"units": "s"}), "xyz": ["x", "y", "z"]})
 
 
 def record(case: Case, solution: Solution) -> xr.Dataset:
@@ -209,91 +199,16 @@ def record(case: Case, solution: Solution) -> xr.Dataset:
     return _evaluated(case, solution, known, even=_is_even(solution.t, case.output_rate))
 
 
-def _evaluated(case: Case, solution: Solution, known: Measured, *, even: bool) -> xr.Dataset:
+def _evaluated(
+    case: Case, solution: Solution, known: Measured, *, even: bool, variables: Collection[str] | None = None
+) -> xr.Dataset:
     """Return the record of what was measured, at even times or not; see `record`."""
     slipped = slip(case, known.t, known.error)
     if slipped is not None:
         raise SimulationFailed(f"case '{case.name}': {slipped}", solution, case)
-    pair = case.pair()
-    operation = case.operation
-    start = operation.run_up + operation.settling
-    stop = start + operation.duration
-    rate, ahead = case.output_rate, edge(case)
-    labels: dict[str, Any] = {"units": "N", "speed": operation.top_speed, "teeth": case.gears.teeth}
-    names = [f"{k}{axis}" for k in (1, 2) for axis in "xyz"]
-    if even:
-        keep = known.t >= start - ahead - 0.5 / rate
-        forces = make_signal(known.forces[keep], rate, channels=names, t0=float(known.t[keep][0]), **labels)
-    else:
-        forces = even_signal(
-            known.t, known.forces, rate, start=start - ahead, stop=stop + ahead, channels=names, **labels
-        )
-    t = forces["time"].values
-    signal = forces.isel(channel=slice(3, 6)).assign_coords(channel=["x", "y", "z"])
-    components = force_components(signal, pressure_angle=pair.working_pressure_angle, sense=pair.rotation)
-    acceleration = force_to_acceleration(components, pair.wheels[1].mass)
-    if case.signal_rate < rate:
-        acceleration = decimate(acceleration, case.signal_rate)
-    acceleration = trim(acceleration, start, stop)
-    inside = (t >= start - 0.5 / rate) & (t < stop - 0.5 / rate)
-    t = t[inside]
-    between = {name: np.interp(t, known.t, known.contact[name]) for name in SMOOTH}
-    latest = np.clip(np.searchsorted(known.t, t, side="right") - 1, 0, known.t.size - 1)
-    dataset = _time_series(
-        t,
-        forces.values[inside],
-        monotone_cubic(known.t, known.error, t),
-        {**between, **{name: known.contact[name][latest] for name in COUNTS}},
-    )
-    plain = acceleration.drop_vars(["channel_units", "units"], errors="ignore")
-    dataset["acceleration"] = plain.rename(time="signal_time", channel="component")
-    dataset["acceleration"].attrs.update(
-        units="m/s^2", long_name="force on the driven gear over its mass (Newton's second law)"
-    )
-    if operation.speed_curve is None:
-        dataset["gmf_rms"] = _mesh_levels(acceleration)
-    else:
-        dataset = dataset.assign_coords(_turning(case, dataset["signal_time"].values))
-        dataset["order_rms"] = _tracked_levels(case, acceleration, dataset)
+    dataset = evaluate(case, known, even=even, variables=variables)
     dataset.attrs = attributes_of(case, solution)
     return dataset
-
-
-def _mesh_levels(acceleration: xr.DataArray) -> xr.DataArray:
-    """Return the RMS of the mesh harmonics by both ways."""
-    levels = gmf_rms(acceleration)
-    ways = xr.concat([levels["band"], levels["orders"]], dim="way").assign_coords(way=["band", "orders"])
-    found = ways.drop_vars(["channel_units", "units"], errors="ignore").rename(channel="component")
-    found.attrs = {"units": "m/s^2", "long_name": "RMS of the gear mesh frequency harmonics"}
-    return found
-
-
-def _tracked_levels(case: Case, acceleration: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray:
-    """Return the RMS of the mesh orders along a run-up, by order tracking over four revolutions at a time."""
-    # what only run-ups need takes longer to load than many a simulation
-    from gearmbs.signals import order_track
-
-    turning = {name: ("time", dataset[name].values, dataset[name].attrs) for name in ("speed", "angle")}
-    orders = [float(case.gears.teeth[0] * k) for k in range(1, HARMONICS + 1)]
-    tracks = order_track(acceleration.assign_coords(turning), orders=orders, scaling="rms")
-    found = tracks.rename(time="track_time", speed="track_speed", angle="track_angle", order="harmonic")
-    found = found.rename(channel="component").drop_vars(["units", "channel_units"], errors="ignore")
-    found = found.assign_coords(harmonic=np.arange(1, HARMONICS + 1))
-    found.attrs = {"units": "m/s^2", "long_name": "RMS of the mesh orders along the run-up"}
-    return found
-
-
-def _turning(case: Case, t: np.ndarray) -> dict[str, Any]:
-    """Return speed and angle of the driver over the times of a signal, as prescribed."""
-    operation = case.operation
-    start = operation.run_up + operation.settling
-    function = drive_angle(operation.speed, operation.run_up, start)
-    begin = function(start)
-    angle, speed, _ = np.array([function.derivatives(at) for at in t]).T
-    return {
-        "speed": ("signal_time", speed, {"units": "rad/s", "long_name": "speed of the driver"}),
-        "angle": ("signal_time", angle - begin, {"units": "rad", "long_name": "angle of the driver"}),
-    }
 
 
 def _is_even(t: np.ndarray, rate: float) -> bool:

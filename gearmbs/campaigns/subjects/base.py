@@ -124,8 +124,11 @@ class Subject(ABC):
         """Return its content in SI with defaults filled in and without names; see `gearmbs.campaigns.canonical`."""
 
     @abstractmethod
-    def run(self, thing: Any, progress: Callable[[float], None]) -> Any:
-        """Simulate and return a record; ``progress`` is called often and may raise to stop the run."""
+    def run(self, thing: Any, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
+        """Simulate and return a record; ``progress`` is called often and may raise to stop the run.
+
+        What `reduce` does not need for ``keep`` may be left out of the record.
+        """
 
     @abstractmethod
     def reduce(self, thing: Any, record: Any, keep: Sequence[str]) -> Kept:

@@ -123,7 +123,7 @@ class ClaimsSubject(Subject):
         """Return the contents of the six cases."""
         return [canonical_case(case) for case in thing]
 
-    def run(self, thing: list[Case], progress: Callable[[float], None]) -> Any:
+    def run(self, thing: list[Case], progress: Callable[[float], None], keep: Sequence[str]) -> Any:
         """Return the harmonics of the six cases: dims (load, state, harmonic), by component."""
         import xarray as xr
 
@@ -131,7 +131,11 @@ class ClaimsSubject(Subject):
 
         levels = []
         for k, case in enumerate(thing):
-            record = self._pairs.run(case, lambda fraction, k=k: progress((k + fraction) / len(thing)))  # type: ignore[misc]
+            record = self._pairs.run(
+                case,
+                lambda fraction, k=k: progress((k + fraction) / len(thing)),  # type: ignore[misc]
+                ("harmonics",),
+            )
             levels.append(record["gmf_rms"].sel(way="orders").transpose("component", "harmonic"))
         shape = (len(LOAD_NAMES), len(STATES), *levels[0].shape)
         return xr.DataArray(

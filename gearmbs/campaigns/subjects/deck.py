@@ -86,7 +86,7 @@ class DeckSubject(Subject):
         digest = hashlib.sha256(self.text.encode()).hexdigest()
         return {"deck": digest, "values": thing["values"], "end": self.end, "steps": self.steps}
 
-    def run(self, thing: dict[str, Any], progress: Callable[[float], None]) -> Any:
+    def run(self, thing: dict[str, Any], progress: Callable[[float], None], keep: Sequence[str]) -> Any:
         """Run the deck and return its requests: arrays by name and column."""
         from gearmbs.adams import run_deck
 

@@ -87,7 +87,7 @@ class FunctionSubject(Subject):
         """Return the function's name and version and the parameters."""
         return {"function": self.function, "version": self.version, "parameters": thing}
 
-    def run(self, thing: dict[str, Any], progress: Callable[[float], None]) -> Any:
+    def run(self, thing: dict[str, Any], progress: Callable[[float], None], keep: Sequence[str]) -> Any:
         """Return what the function returns."""
         return imported(self.function, "function")(**thing)
 

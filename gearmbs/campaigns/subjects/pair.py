@@ -17,11 +17,18 @@ from gearmbs.campaigns.subjects.base import (
     Subject,
     kept_by_functions,
 )
+from gearmbs.signals import COMPONENTS
 from gearmbs.studies.case import Case, make_case, units_of_fields
 from gearmbs.units import DIMENSIONS, to_si
 
 FIRST_ORDERS = 3
 PLAIN = {"name", "title"}
+NEEDED = {
+    "harmonics": ("gmf_rms",),
+    "indicators": ("acceleration",),
+    "contact": ("normal_force", "transmission_error", "penetration_drive", "pairs_back"),
+}
+"""Variables of a record from which the numbers that are kept are made."""
 
 
 class PairSubject(Subject):
@@ -91,13 +98,13 @@ class PairSubject(Subject):
         """Return the content of a case; see `canonical_case`."""
         return canonical_case(thing)
 
-    def run(self, thing: Case, progress: Callable[[float], None]) -> Any:
+    def run(self, thing: Case, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
         """Return the record of a case."""
         from gearmbs.studies.simulation import run_case
 
         operation = thing.operation
         span = operation.run_up + operation.settling + operation.duration
-        return run_case(thing, lambda t: progress(t / span))
+        return run_case(thing, lambda t: progress(t / span), variables=variables_for(keep))
 
     def reduce(self, thing: Case, record: Any, keep: Sequence[str]) -> Kept:
         """Return of a record what is kept."""
@@ -116,13 +123,11 @@ class PairSubject(Subject):
 
     def signals(self, keep: Sequence[str], things: Sequence[Case]) -> list[SignalSpec]:
         """Return the arrays of the signals, as long as the longest corner's."""
-        from gearmbs.signals import COMPONENTS
-
         specs = []
         for item in keep:
             if not item.startswith("signal:"):
                 continue
-            name, channels = _chosen(item, tuple(COMPONENTS))
+            name, channels = _chosen(item, COMPONENTS)
             slow = name == "acceleration"
             rates = {float(thing.signal_rate if slow else thing.output_rate) for thing in things}
             if len(rates) > 1:
@@ -157,6 +162,14 @@ class PairSubject(Subject):
         """Return the case with a tenth of its tolerance."""
         tolerance = 0.1 * thing.solver.used_tolerance
         return thing.changed(solver={"tolerance": tolerance}) if tolerance >= 1e-12 else None
+
+
+def variables_for(keep: Sequence[str]) -> set[str] | None:
+    """Return the variables of a record that are needed for what is kept; None if it may be any."""
+    if any(item == "record" or (item not in NEEDED and not item.startswith("signal:")) for item in keep):
+        return None
+    wanted = {name for item in keep if item in NEEDED for name in NEEDED[item]}
+    return wanted | {_chosen(item, COMPONENTS)[0] for item in keep if item.startswith("signal:")}
 
 
 def canonical_case(case: Case) -> dict[str, Any]:
