@@ -13,7 +13,7 @@ Studies
     `gear_rig`
 Gears
     `GearPair`, `GearSpec`, `Material`, `ContactLaw`, `FlankFriction`, `faults`, `IdealMesh`, `planetary`,
-    `planetary_mechanism`
+    `planetary_mechanism`, `diagnose_planetary`
 Drivetrains
     `Drivetrain`, `DrivetrainError`; the parts are in `gearmbs.drivetrain`
 Flexible bodies
@@ -70,6 +70,7 @@ if TYPE_CHECKING:
         campbell,
         compare,
         diagnose_bearing,
+        diagnose_planetary,
         envelope_spectrum,
         features,
         make_signal,
@@ -140,6 +141,7 @@ __all__ = [
     "campbell_plot",
     "compare",
     "diagnose_bearing",
+    "diagnose_planetary",
     "envelope_spectrum",
     "faults",
     "features",
@@ -214,6 +216,7 @@ late(
         "campbell_plot": ".view",
         "compare": ".signals",
         "diagnose_bearing": ".signals",
+        "diagnose_planetary": ".signals",
         "envelope_spectrum": ".signals",
         "faults": ".gears",
         "features": ".signals",

@@ -22,6 +22,7 @@ PLOTS = {
     "AnalysisReport": "gearmbs.view:report_plot",
     "VibrationReport": "gearmbs.view:report_plot",
     "ComparisonReport": "gearmbs.view:report_plot",
+    "PlanetaryReport": "gearmbs.view:planetary_plot",
     "PaperStudy": "gearmbs.studies.show:study_plot",
 }
 """What draws an object, by the name of its class."""

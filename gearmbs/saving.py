@@ -23,7 +23,7 @@ WRITERS: dict[str, dict[str, str]] = {
     "AnalysisReport": {".md": "gearmbs.saving:_report"},
 }
 WRITERS["GearPair"] = WRITERS["GearSpec"]
-WRITERS["ComparisonReport"] = WRITERS["VibrationReport"] = WRITERS["AnalysisReport"]
+WRITERS["ComparisonReport"] = WRITERS["VibrationReport"] = WRITERS["PlanetaryReport"] = WRITERS["AnalysisReport"]
 SIGNAL_ENDINGS = (".csv", ".gz", ".mat", ".uff", ".unv", ".wav", ".nc", ".h5", ".hdf5", ".tdms")
 FIGURE_ENDINGS = (".png", ".svg", ".pdf")
 

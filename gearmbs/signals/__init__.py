@@ -57,6 +57,9 @@ if TYPE_CHECKING:
         path_weight,
         planetary_average,
     )
+    from gearmbs.signals.planetary_diagnosis import diagnose_planetary
+    from gearmbs.signals.planetary_lines import PlanetaryLines, planetary_lines
+    from gearmbs.signals.planetary_report import PlanetaryFinding, PlanetaryReport
     from gearmbs.signals.scaling import dynamic_rms, remove_mean, rms_factor, scale, scale_states
     from gearmbs.signals.sections import sections, trend, trend_table
     from gearmbs.signals.sensors import (
@@ -109,7 +112,10 @@ __all__ = [
     "ModalPath",
     "Mode",
     "PartFinding",
+    "PlanetaryFinding",
+    "PlanetaryLines",
     "PlanetaryModel",
+    "PlanetaryReport",
     "SignalError",
     "SignalFileError",
     "SpeedCurve",
@@ -135,6 +141,7 @@ __all__ = [
     "critical_speeds",
     "decimate",
     "diagnose_bearing",
+    "diagnose_planetary",
     "difference_signal",
     "discrete_random",
     "dynamic_rms",
@@ -179,6 +186,7 @@ __all__ = [
     "phase_from_speed",
     "phase_from_tacho",
     "planetary_average",
+    "planetary_lines",
     "power_cepstrum",
     "prewhiten",
     "quantise",
@@ -226,6 +234,11 @@ late(
         "fixed_sensor": ".planetary",
         "carrier_lines": ".planetary",
         "PlanetaryModel": ".planetary",
+        "PlanetaryFinding": ".planetary_report",
+        "PlanetaryLines": ".planetary_lines",
+        "PlanetaryReport": ".planetary_report",
+        "diagnose_planetary": ".planetary_diagnosis",
+        "planetary_lines": ".planetary_lines",
         "BearingLines": ".bearing_lines",
         "BearingReport": ".bearing_report",
         "PartFinding": ".bearing_report",

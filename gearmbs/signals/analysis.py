@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 import scipy.fft
@@ -21,8 +21,11 @@ from .door import Given, Units, to_signal
 from .errors import SignalError
 from .given import given_rate
 from .indicators import condition_indicators
+from .planetary_diagnosis import diagnose_planetary
+from .planetary_lines import planetary_lines
+from .planetary_report import PlanetaryReport
 from .report_parts import impulsive_band, levels, line_spectrum, strongest_lines
-from .shaft_finding import Known, Shaft, mesh_shaft
+from .shaft_finding import Known, Shaft, known_shaft, mesh_shaft
 from .signal import check_teeth, common_unit, make_signal, rate_of, units_of
 from .simulated import read_any
 from .spectra import spectrum
@@ -50,6 +53,9 @@ class AnalysisOptions:
     harmonics: int = 3
     half_width: float = HALF_WIDTH
     lines: int = 5
+    planetary: Any = None
+    planets: int | Sequence[float] = 3
+    member: str = "carrier"
 
     @property
     def known(self) -> Known:
@@ -58,6 +64,25 @@ class AnalysisOptions:
 
 
 SETTINGS = tuple(f.name for f in fields(AnalysisOptions))
+
+
+@overload
+def analyse(signal: Any, *, planetary: Any, **settings: Any) -> PlanetaryReport: ...
+
+
+@overload
+def analyse(
+    signal: Any,
+    teeth: int | Sequence[int] | None = None,
+    *,
+    rate: Given | None = None,
+    units: Units | None = None,
+    channels: Sequence[str] | None = None,
+    gaps: str | None = None,
+    progress: Progress | None = None,
+    options: AnalysisOptions | None = None,
+    **settings: Any,
+) -> AnalysisReport | VibrationReport: ...
 
 
 @staged("analysing")
@@ -72,8 +97,8 @@ def analyse(
     progress: Progress | None = None,
     options: AnalysisOptions | None = None,
     **settings: Any,
-) -> AnalysisReport | VibrationReport:
-    """Analyse a record: of a running gear pair if teeth are known, of plain vibration otherwise.
+) -> AnalysisReport | VibrationReport | PlanetaryReport:
+    """Analyse a record: of a running gear pair if teeth are known, of a planetary set, or of plain vibration.
 
     Parameters
     ----------
@@ -112,10 +137,17 @@ def analyse(
         Half width of the harmonics' bands, as a fraction of GMF, default 0.25.
     lines : int
         How many of the strongest spectral lines to list per channel, default 5.
+    planetary : PlanetarySet or (int, int, int), optional
+        A planetary set, or the teeth of its sun, planets and ring; default what a simulated record holds. The speed is
+        then that of the carrier, and the report a `PlanetaryReport` (`diagnose_planetary`).
+    planets : int or sequence of float
+        How many planets, or their angles, default 3.
+    member : {"carrier", "sun"}
+        Whose speed is given, of a planetary set.
 
     Returns
     -------
-    AnalysisReport or VibrationReport
+    AnalysisReport, VibrationReport or PlanetaryReport
 
     Raises
     ------
@@ -138,6 +170,8 @@ def analyse(
     kept = None if channels is None else [*channels, *(name for name in helpers if name not in channels)]
     data = to_signal(signal, rate=rate, units=units, channels=kept, gaps=gaps)
     counts = options.teeth if options.teeth is not None else data.attrs.get("teeth")
+    if options.planetary is not None or (counts is None and "planetary" in data.attrs):
+        return _planetary(data, options)
     if counts is None:
         return vibration_report(data, options.known, lines=options.lines, progress=progress)
     return _report(data, check_teeth(counts), options, _Stages(progress))
@@ -155,6 +189,7 @@ def analyse_file(path: str | Path, **settings: Any) -> AnalysisReport | Vibratio
     Returns
     -------
     AnalysisReport or VibrationReport
+        Or a `PlanetaryReport`, as `analyse`.
 
     Raises
     ------
@@ -166,6 +201,21 @@ def analyse_file(path: str | Path, **settings: Any) -> AnalysisReport | Vibratio
         return analyse(path, **settings)
     reading = {name: settings.pop(name) for name in ("rate", "units", "gaps", "format") if name in settings}
     return analyse(read_any(path, **{**reading, "rate": given_rate(reading.get("rate"))}), **settings)
+
+
+def _planetary(signal: xr.DataArray, options: AnalysisOptions) -> PlanetaryReport:
+    """Carry out the analysis of a planetary set, with the carrier's angle from whatever gives it."""
+    given, planets = options.planetary, options.planets
+    if given is None:
+        given, planets = signal.attrs["planetary"], signal.attrs["planet_angles"]
+    if options.known == Known():
+        return diagnose_planetary(signal, given, planets=planets)
+    found, kept = known_shaft(signal, options.known)
+    if isinstance(found, Shaft):
+        lines = planetary_lines(given, planets)
+        phase = found.phase * lines.carrier(1.0, options.member)
+        return diagnose_planetary(kept, lines, phase=phase)
+    return diagnose_planetary(kept, given, found, planets=planets, member=options.member)
 
 
 def _report(signal: xr.DataArray, counts: tuple[int, ...], options: AnalysisOptions, tell: _Stages) -> AnalysisReport:

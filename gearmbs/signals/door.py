@@ -13,7 +13,7 @@ from .errors import MissingMetadataError, SignalError
 from .gaps import without_gaps
 from .given import given_rate, given_speed, with_speed
 from .signal import as_signal, make_signal, with_metadata
-from .simulated import read_any, record_signal
+from .simulated import holds_ring, read_any, record_signal, ring_signal
 from .speed_curve import is_curve
 from .unit_names import check_units
 
@@ -87,6 +87,8 @@ def _of_xarray(
 ) -> xr.DataArray:
     if isinstance(data, xr.Dataset) and "acceleration" in data and "operation_speed" in data.attrs:
         signal = record_signal(data)
+    elif isinstance(data, xr.Dataset) and holds_ring(data):
+        signal = ring_signal(data)
     elif isinstance(data, xr.DataArray) and data.dims == ("time", "channel") and "units" in data.coords:
         own = data.attrs.get("sampling_rate")
         if rate is not None and own is not None and abs(rate / own - 1.0) > 1e-3:

@@ -116,6 +116,41 @@ def sensor_signals(record: xr.Dataset, sensor: str | None = None, **settings: An
     )
 
 
+def ring_signal(record: xr.Dataset) -> xr.DataArray:
+    """Return what the sensor on the ring of a planetary set's record heard as a signal, with the carrier's angle.
+
+    Parameters
+    ----------
+    record : Dataset
+        From `run_planetary`, or its file.
+
+    Returns
+    -------
+    DataArray
+        Dimensions (time, channel), N; coordinate ``angle``, rad, of the carrier; attributes ``planetary`` and
+        ``planet_angles`` tell the set to `analyse`.
+    """
+    attributes = record.attrs
+    signal = make_signal(
+        record["ring_sensor"].values,
+        float(attributes["sampling_rate"]),
+        units=str(record["ring_sensor"].attrs["units"]),
+        channels=["ring_sensor"],
+        t0=float(record.time.values[0]),
+        attrs={
+            "source": str(attributes.get("title", "simulation")),
+            "planetary": tuple(int(z) for z in attributes["teeth"]),
+            "planet_angles": tuple(float(a) for a in np.ravel(attributes["planet_angles"])),
+        },
+    )
+    return signal.assign_coords(angle=("time", record["carrier_angle"].values, {"units": "rad"}))
+
+
+def holds_ring(record: xr.Dataset) -> bool:
+    """Return whether this is the record of a planetary set with its ring at rest and plain planets."""
+    return {"ring_sensor", "carrier_angle"} <= set(record) and "planet_angles" in record.attrs
+
+
 def read_any(path: str | Path, component: str | None = None, **settings: Any) -> xr.DataArray:
     """Return a measured file, or the record that ``gearmbs run`` wrote, as a signal.
 
@@ -132,6 +167,8 @@ def read_any(path: str | Path, component: str | None = None, **settings: Any) ->
         with contextlib.suppress(OSError, ValueError), xr.open_dataset(path, engine="h5netcdf") as data:
             if "acceleration" in data and "case_json" in data.attrs and "load" not in data.dims:
                 return record_signal(data[["acceleration"]].load(), component)
+            if holds_ring(data):
+                return ring_signal(data[["ring_sensor", "carrier_angle"]].load())
             if "measured" in data and "train_json" in data.attrs:
                 return sensor_signals(data[["measured"]].load(), component, **settings)
     return read_signal(path, **settings)
