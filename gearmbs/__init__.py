@@ -9,8 +9,7 @@
 
 Studies
     `Case`, `CaseError`, `load_case`, `make_case`, `run_case`, `run_cases`, `run_paper`, `sweep`, `record_signal`,
-    `run_train`, `run_bench`,
-    `gear_rig`
+    `run_train`, `run_bench`, `run_resonance`, `gear_rig`
 Gears
     `GearPair`, `GearSpec`, `Material`, `ContactLaw`, `FlankFriction`, `faults`, `IdealMesh`, `planetary`,
     `planetary_mechanism`, `diagnose_planetary`
@@ -94,6 +93,7 @@ if TYPE_CHECKING:
         run_case,
         run_cases,
         run_paper,
+        run_resonance,
         run_train,
         sweep,
     )
@@ -168,6 +168,7 @@ __all__ = [
     "run_cases",
     "run_deck",
     "run_paper",
+    "run_resonance",
     "run_train",
     "save",
     "simulate",
@@ -243,6 +244,7 @@ late(
         "run_deck": ".adams",
         "run_bench": ".studies",
         "run_paper": ".studies",
+        "run_resonance": ".studies",
         "run_train": ".studies",
         "save": ".saving",
         "simulate": ".mechanism",

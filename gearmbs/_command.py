@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import typer
@@ -42,3 +42,16 @@ def guarded() -> Iterator[None]:
             text = f"{error.filename}: {error.strerror}"
             text += "; choose another place or make room" if error.errno in UNWRITABLE else ""
         fail(f"{text} (on the command line: --{asked} ...)" if asked else text)
+
+
+@contextmanager
+def case_bars(names: list[str]) -> Iterator[Callable[[str, float], None]]:
+    """Show a progress bar a case; yield the function that moves them."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description:>24}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
+    console = Console(stderr=True)
+    with Progress(*columns, TimeElapsedColumn(), console=console, refresh_per_second=4) as progress:
+        tasks = {name: progress.add_task(name, total=1.0) for name in names}
+        yield lambda name, fraction: progress.update(tasks[name], completed=fraction)

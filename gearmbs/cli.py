@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from gearmbs._command import fail, guarded
+from gearmbs._command import case_bars, fail, guarded
 from gearmbs.campaigns.commands import app as campaign_app
 from gearmbs.identify.commands import identify as identify_command
+from gearmbs.studies.commands import bench as bench_command
+from gearmbs.studies.commands import resonance as resonance_command
 
 if TYPE_CHECKING:
     from gearmbs.studies.simulation import SimulationFailed
@@ -31,6 +33,8 @@ app = typer.Typer(
 
 app.add_typer(campaign_app)
 app.command("identify")(identify_command)
+app.command("bench")(bench_command)
+app.command("resonance")(resonance_command)
 
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")]
 Rate = Annotated[str | None, typer.Option(help='Sampling rate, Hz or "12.8 kHz", if the file does not name it.')]
@@ -40,19 +44,6 @@ Speed = Annotated[
 ]
 Gaps = Annotated[str | None, typer.Option(help='Missing samples: "refuse", "interpolate" or "longest" stretch.')]
 ReportFile = Annotated[Path | None, typer.Option("--out", "-o", help="Write the report here instead of printing it.")]
-
-
-@contextmanager
-def case_bars(names: list[str]) -> Iterator[Callable[[str, float], None]]:
-    """Show a progress bar a case; yield the function that moves them."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description:>24}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
-    console = Console(stderr=True)
-    with Progress(*columns, TimeElapsedColumn(), console=console, refresh_per_second=4) as progress:
-        tasks = {name: progress.add_task(name, total=1.0) for name in names}
-        yield lambda name, fraction: progress.update(tasks[name], completed=fraction)
 
 
 @contextmanager
@@ -340,47 +331,6 @@ def _level_table(data: Any) -> str:
         best = [int(v.argmax()) for v in row]
         lines.append(f"{component!s:<18}" + "".join(f"{v[k]:14.4g}{float(at[k]):9.4g}" for v, k in zip(row, best)))
     return "\n".join(lines)
-
-
-@app.command()
-def bench(
-    out: Out = Path("out/bench"),
-    speed: Annotated[str, typer.Option(help='Speed of the motor, e.g. "1000 rpm".')] = "1000 rpm",
-    duration: Annotated[str, typer.Option(help='Length of the record, e.g. "1 s".')] = "1 s",
-    stiffness: Annotated[float, typer.Option(help="Radial, of each bearing, N/m.")] = 2e8,
-    motor: Annotated[str, typer.Option(help="induction, or speed for a prescribed one.")] = "induction",
-    phase: Annotated[float, typer.Option(help="Phase of the second mesh, pitches.")] = 0.0,
-    pump_teeth: Annotated[int, typer.Option(help="Teeth of the pump; 0: no ripple.")] = 12,
-    pair: Annotated[bool, typer.Option(help="Run the pair's study beside it.")] = True,
-    workers: Annotated[int | None, typer.Option(help="Cases of the pair at a time; default: the cores.")] = None,
-) -> None:
-    """Judge the paper's claims on its test bench: motor, clutch, two pairs, pump; six runs, figures, report."""
-    with guarded():
-        from gearmbs.studies.bench import PRESSURES, STATES, BenchSettings, bench_train
-        from gearmbs.studies.store import check_place
-        from gearmbs.studies.trains import RunSettings, check_record
-
-        settings = BenchSettings(
-            speed=speed, bearing_stiffness=stiffness, motor=motor, phase=phase, pump_teeth=pump_teeth
-        )
-        run = RunSettings(settling=0.2, duration=duration)
-        check_record(bench_train(settings=settings), run)
-        check_place(out, 0)
-
-        from gearmbs.studies.bench_study import run_bench
-        from gearmbs.studies.preset import paper_cases
-
-        names = [f"bench, {state}, {load} load" for load in PRESSURES for state in STATES]
-        if pair:
-            names += [case.name for case in paper_cases()]
-        with case_bars(names) as move:
-            study = run_bench(settings, run, pair=pair, workers=workers, progress=move)
-        paths = study.save(out)
-        for sensor in ("laser", "support"):
-            for claim in study.claims(sensor):
-                mark = "held    " if claim.held else "NOT HELD"
-                typer.echo(f"{mark}  {sensor}: {claim.name}\n          {claim.numbers}")
-        typer.echo("\n".join(f"wrote {path}" for path in paths))
 
 
 @app.command()

@@ -3,10 +3,12 @@
 With x the approach of the flanks along the line of action (penetration of the drive flank), m the mass that both wheels
 are at their base circles, and the load F_0,
 
-    m x'' + c g'(x) x' + k(phi) g(x) = F_0 + m a(t),    a(t) = a_0 + a_1 sin(theta), theta' = w(t),
+    m x'' + [c_0 + c g'(y)] x' + k(phi) g(y) = F_0 + m a(t),    y = x - e(phi),
+    a(t) = a_0 + a_1 sin(theta),    theta' = w(t),
 
-g(x) = x for x > 0 (drive flank), 0 for -b <= x <= 0 (free), x + b for x < -b (coast flank). The stiffness k is a table
-over the mesh phase phi, which turns with theta. Steps are the classical Runge-Kutta method's, of fixed length.
+g(y) = y for y > 0 (drive flank), 0 for -b <= y <= 0 (free), y + b for y < -b (coast flank). The stiffness k and the
+error e are tables over the mesh phase phi, which turns with theta; c_0 damps the free motion, too. Steps are the
+classical Runge-Kutta method's, of fixed length.
 """
 
 from __future__ import annotations
@@ -22,41 +24,48 @@ STEPS_PER_PERIOD = 60
 """Steps in a period of the natural vibration, or of the excitation where that is faster."""
 
 
-@njit(
-    "UniTuple(float64, 2)(float64, float64, float64, float64, float64[::1], float64[::1])",
-    cache=True, nogil=True, error_model="numpy",
-)  # fmt: skip
-def _force(x, v, phase, backlash, stiffness, numbers):
-    """Return force and damping force of the flanks; ``numbers``: m, c, F_0, a_0, a_1."""
-    g = 0.0
-    if x > 0.0:
-        g = x
-    elif x < -backlash:
-        g = x + backlash
-    if g == 0.0:
-        return 0.0, 0.0
-    place = (phase - np.floor(phase)) * stiffness.size
+@njit("float64(float64, float64[::1])", cache=True, nogil=True, error_model="numpy")
+def _at_phase(phase, table):
+    """Return a periodic table's value at a phase (1 is a period), linearly between its entries."""
+    place = (phase - np.floor(phase)) * table.size
     k = int(place)
     share = place - k
-    here = stiffness[k % stiffness.size] * (1.0 - share) + stiffness[(k + 1) % stiffness.size] * share
-    return here * g, numbers[1] * v
+    return table[k % table.size] * (1.0 - share) + table[(k + 1) % table.size] * share
 
 
 @njit(
-    "void(float64[::1], float64[::1], float64[::1], float64, float64, float64, float64, float64[:, ::1], int64)",
+    "UniTuple(float64, 2)(float64, float64, float64, float64, float64[::1], float64[::1], float64[::1])",
     cache=True, nogil=True, error_model="numpy",
 )  # fmt: skip
-def oscillate(state, numbers, stiffness, backlash, step, start_speed, end_speed, out, every):
+def _force(x, v, phase, backlash, stiffness, error, numbers):
+    """Return force and damping force of the flanks; ``numbers``: m, c, F_0, a_0, a_1, c_0."""
+    y = x - _at_phase(phase, error)
+    g = 0.0
+    if y > 0.0:
+        g = y
+    elif y < -backlash:
+        g = y + backlash
+    if g == 0.0:
+        return 0.0, numbers[5] * v
+    return _at_phase(phase, stiffness) * g, (numbers[1] + numbers[5]) * v
+
+
+@njit(
+    "void(float64[::1], float64[::1], float64[::1], float64[::1], float64, float64, float64, float64, float64[:, ::1], "
+    "int64)",
+    cache=True, nogil=True, error_model="numpy",
+)  # fmt: skip
+def oscillate(state, numbers, stiffness, error, backlash, step, start_speed, end_speed, out, every):
     """Integrate the model of one degree of freedom.
 
     Parameters
     ----------
     state : ndarray, shape (3,)
         x (m), x' (m/s), theta (rad); in and out.
-    numbers : ndarray, shape (5,)
-        m (kg), c (N s/m), F_0 (N), a_0, a_1 (m/s^2).
-    stiffness : ndarray
-        k over one turn of theta, N/m, evenly spaced.
+    numbers : ndarray, shape (6,)
+        m (kg), c (N s/m), F_0 (N), a_0, a_1 (m/s^2), c_0 (N s/m).
+    stiffness, error : ndarray
+        k (N/m) and e (m) over one turn of theta, evenly spaced.
     backlash : float
         m.
     step : float
@@ -78,7 +87,7 @@ def oscillate(state, numbers, stiffness, backlash, step, start_speed, end_speed,
                 x += part * step * k[stage - 1]
                 v += part * step * k[4 + stage - 1]
             theta = state[2] + part * step * speed
-            elastic, damping = _force(x, v, theta / (2.0 * np.pi), backlash, stiffness, numbers)
+            elastic, damping = _force(x, v, theta / (2.0 * np.pi), backlash, stiffness, error, numbers)
             k[stage] = v
             pushed = numbers[2] - elastic - damping
             k[4 + stage] = pushed / numbers[0] + numbers[3] + numbers[4] * np.sin(theta)
@@ -87,7 +96,7 @@ def oscillate(state, numbers, stiffness, backlash, step, start_speed, end_speed,
         state[2] += step * speed
         if (n + 1) % every == 0:
             row = (n + 1) // every - 1
-            elastic, damping = _force(state[0], state[1], state[2] / (2.0 * np.pi), backlash, stiffness, numbers)
+            elastic, damping = _force(state[0], state[1], state[2] / (2.0 * np.pi), backlash, stiffness, error, numbers)
             out[row, 0], out[row, 1], out[row, 2], out[row, 3] = state[2], state[0], state[1], elastic + damping
 
 
@@ -109,6 +118,10 @@ class BacklashOscillator:
         c, N s/m.
     acceleration : tuple of float
         a_0 and a_1, m/s^2.
+    error : ndarray or float
+        e over one turn of theta, m.
+    film : float
+        c_0, N s/m.
     """
 
     mass: float
@@ -117,6 +130,8 @@ class BacklashOscillator:
     load: float = 0.0
     damping: float = 0.0
     acceleration: tuple[float, float] = (0.0, 0.0)
+    error: np.ndarray | float = 0.0
+    film: float = 0.0
 
     @property
     def mean_stiffness(self) -> float:
@@ -160,11 +175,14 @@ class BacklashOscillator:
             still = (self.load + self.mass * self.acceleration[0]) / self.mean_stiffness
             start = np.array([still, 0.0, 0.0])
         state = np.array(start, dtype=float)
-        numbers = np.array([self.mass, self.damping, self.load, *self.acceleration])
-        table = np.ascontiguousarray(np.atleast_1d(np.asarray(self.stiffness, dtype=float)))
+        numbers = np.array([self.mass, self.damping, self.load, *self.acceleration, self.film])
+        table, error = (
+            np.ascontiguousarray(np.atleast_1d(np.asarray(given, dtype=float)))
+            for given in (self.stiffness, self.error)
+        )
         rows = np.empty((count, 4))
         first, last = (2.0 * np.pi * f for f in frequencies)
-        oscillate(state, numbers, table, self.backlash, step, first, last, rows, every)
+        oscillate(state, numbers, table, error, self.backlash, step, first, last, rows, every)
         return rows, state
 
     def changed(self, **fields: object) -> BacklashOscillator:

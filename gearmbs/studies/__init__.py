@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from gearmbs.studies.parallel import run_cases
     from gearmbs.studies.preset import paper_cases
     from gearmbs.studies.rattle import RattleSettings, rattle, rattle_map, rattle_table, rattle_train
+    from gearmbs.studies.resonance import ResonanceSettings, resonance_rig, sweep_resonance
+    from gearmbs.studies.resonance_study import ResonanceStudy, run_resonance, separation_load
     from gearmbs.studies.rig import gear_rig
     from gearmbs.studies.simulation import SimulationFailed, SimulationInterrupted, run_case, simulate_case
     from gearmbs.studies.sweep import Sweep, sweep
@@ -33,6 +35,8 @@ __all__ = [
     "CrankSlider",
     "PaperStudy",
     "RattleSettings",
+    "ResonanceSettings",
+    "ResonanceStudy",
     "SimulationFailed",
     "SimulationInterrupted",
     "Sweep",
@@ -51,14 +55,18 @@ __all__ = [
     "rattle_table",
     "rattle_train",
     "record_signal",
+    "resonance_rig",
     "rolling_rig",
     "run_bench",
     "run_case",
     "run_cases",
     "run_paper",
+    "run_resonance",
     "run_train",
+    "separation_load",
     "simulate_case",
     "sweep",
+    "sweep_resonance",
     "train_report",
     "train_scene",
     "train_signal",
@@ -69,6 +77,12 @@ late(
     {
         "CrankSlider": ".crank_slider",
         "RattleSettings": ".rattle",
+        "ResonanceSettings": ".resonance",
+        "ResonanceStudy": ".resonance_study",
+        "resonance_rig": ".resonance",
+        "run_resonance": ".resonance_study",
+        "separation_load": ".resonance_study",
+        "sweep_resonance": ".resonance",
         "rattle": ".rattle",
         "rattle_map": ".rattle",
         "rattle_table": ".rattle",

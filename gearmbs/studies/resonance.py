@@ -1,0 +1,307 @@
+"""Near resonance: a spur pair swept slowly through its mesh resonance, with tooth separation, jumps and hysteresis.
+
+The rig is one in which only the motion along the line of action matters: the driver's rotation is prescribed, the
+driven wheel turns in an ideal bearing under a constant torque, and an oil film resists the relative motion of the base
+circles, apart or not. With x the lag of the driven wheel along the line of action, m = J_2/r_b2^2 and F = T/r_b2, the
+classical model of one degree of freedom is
+
+    m x'' + c x' + k(phi) g(x - e(phi)) = F,    c = 2 zeta sqrt(k_m m),
+
+k the tangent stiffness of the loaded pair at rest over the mesh phase phi, k_m its mean, and e its transmission error
+less F/k, so that both models rest in the same place at every phase.
+
+References
+----------
+A. Kahraman, G. W. Blankenship, Experiments on nonlinear dynamic behavior of an oscillator with clearance and
+periodically time-varying parameters, J. Appl. Mech. 64 (1997) 217-226.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from gearmbs.drivetrain import Drivetrain, GearMesh, IdealBearing, Shaft, SpeedDrive, TorqueLoad, Wheel
+from gearmbs.drivetrain.backlash import BacklashOscillator
+from gearmbs.gears import GearPair, GearSpec
+from gearmbs.gears.transmission import TransmissionError, loaded_transmission_error
+from gearmbs.mechanism import Mechanism
+from gearmbs.units import Quantity, to_si
+
+Direction = Literal["up", "down"]
+DIRECTIONS: tuple[Direction, ...] = ("up", "down")
+MODELS = ("multibody", "one degree")
+POINTS = 256
+"""Phases of the mesh cycle at which the loaded pair is looked at."""
+SAMPLES = 64
+"""Samples of the lag in a mesh cycle."""
+STEPS = 20
+"""Steps of the multibody model in a mesh cycle, at least: a tooth that passes unseen excites nothing."""
+SETTLING = 100
+"""Mesh cycles at the first frequency that are left out."""
+
+
+@dataclass(frozen=True)
+class ResonanceSettings:
+    """Two equal spur wheels, their load and damping, and how the mesh frequency is swept.
+
+    Parameters
+    ----------
+    teeth : int
+    module, face_width : float or str
+        m.
+    addendum : float
+        In modules; it sets the contact ratio.
+    torque : float or str
+        On the driven wheel, N m.
+    damping_ratio : float
+        zeta of the film, with the mean stiffness under the load.
+    backlash : float or str
+        m.
+    stiffness : float or str, optional
+        Of a tooth pair, N/m; default that of ISO 6336-1.
+    span : tuple of float
+        Lowest and highest mesh frequency over the natural frequency.
+    cycles : int
+        Mesh cycles of a sweep.
+    window : int
+        Mesh cycles over which amplitudes are taken.
+    tolerance : float
+        Local error allowed a step of the multibody model.
+    """
+
+    teeth: int = 50
+    module: Quantity = 3e-3
+    face_width: Quantity = 20e-3
+    addendum: float = 0.85
+    torque: Quantity = 30.0
+    damping_ratio: float = 0.11
+    backlash: Quantity = 1e-4
+    stiffness: Quantity = None
+    span: tuple[float, float] = (0.68, 0.88)
+    cycles: int = 4000
+    window: int = 20
+    tolerance: float = 1e-8
+
+    def __post_init__(self) -> None:
+        units = {"module": "length", "face_width": "length", "torque": "torque", "backlash": "length",
+                 "stiffness": "stiffness"}  # fmt: skip
+        for name, unit in units.items():
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, to_si(value, unit, name))
+                if not getattr(self, name) > 0.0:
+                    raise ValueError(f"{name} is {value}; it must be positive")
+        if not 0.0 < self.span[0] < self.span[1]:
+            raise ValueError(f"span is {self.span}; give a lower and a higher ratio, both positive")
+        if not self.damping_ratio > 0.0:
+            raise ValueError(f"damping_ratio is {self.damping_ratio:g}; it must be positive")
+        if not (self.window >= 1 and self.cycles >= SETTLING + 10 * self.window):
+            raise ValueError(f"cycles is {self.cycles}; give {SETTLING + 10 * self.window} or more")
+
+    @cached_property
+    def pair(self) -> GearPair:
+        """The wheels, with a linear contact law without damping and without friction."""
+        from gearmbs.gears import ContactLaw, FlankFriction
+
+        gear = GearSpec(self.teeth, self.module, face_width=self.face_width, addendum=self.addendum * self.module,
+                        dedendum=(max(self.addendum, 1.0) + 0.25) * self.module)  # fmt: skip
+        bare = GearPair(gear, gear, backlash=self.backlash, torque=self.torque, friction=FlankFriction.none())
+        if self.stiffness is None:
+            return bare.with_iso_stiffness()
+        return bare.with_changes(contact=ContactLaw.linear(self.stiffness))
+
+    @cached_property
+    def rest(self) -> TransmissionError:
+        """The loaded pair at rest over a mesh cycle: lag and tangent stiffness."""
+        return loaded_transmission_error(self.pair, points=POINTS)
+
+    @property
+    def force(self) -> float:
+        """F, N."""
+        return float(self.torque) / self.pair.driven.base_radius
+
+    @property
+    def mass(self) -> float:
+        """m, kg."""
+        return self.pair.driven.inertia[2] / self.pair.driven.base_radius**2
+
+    @property
+    def film(self) -> float:
+        """c, N s/m."""
+        return 2.0 * self.damping_ratio * math.sqrt(float(np.mean(self.rest.stiffness)) * self.mass)
+
+    @property
+    def frequency(self) -> float:
+        """Natural frequency with the mean stiffness, without separation, Hz."""
+        return math.sqrt(float(np.mean(self.rest.stiffness)) / self.mass) / (2.0 * math.pi)
+
+
+class Chirp(NamedTuple):
+    """A mesh frequency that changes evenly: f(t) = first + rate t, after ``settling`` seconds at ``first``."""
+
+    first: float
+    rate: float
+    duration: float
+    settling: float
+
+    def cycles(self, t: np.ndarray) -> np.ndarray:
+        """Return the mesh cycles from the start to a time."""
+        swept = np.maximum(t - self.settling, 0.0)
+        return self.first * t + 0.5 * self.rate * swept**2
+
+    def frequency(self, t: np.ndarray) -> np.ndarray:
+        """Return the mesh frequency at a time, Hz."""
+        return self.first + self.rate * np.maximum(t - self.settling, 0.0)
+
+
+def chirp(s: ResonanceSettings, direction: Direction) -> Chirp:
+    """Return how the mesh frequency goes in one direction."""
+    if direction not in DIRECTIONS:
+        raise ValueError(f"direction is {direction!r}; choose 'up' or 'down'")
+    first, last = (s.frequency * r for r in (s.span if direction == "up" else s.span[::-1]))
+    settling = SETTLING / first
+    swept = s.cycles / (0.5 * (first + last))
+    return Chirp(first, (last - first) / swept, swept + settling, settling)
+
+
+def resonance_train(settings: ResonanceSettings | None = None, direction: Direction = "up") -> Drivetrain:
+    """Return the rig as a drivetrain, without its film; `resonance_rig` adds that."""
+    s = settings or ResonanceSettings()
+    law = chirp(s, direction)
+    turn = 2.0 * math.pi / s.teeth
+    # massless shafts: all inertia is that of the wheels
+    light: dict[str, Any] = {"length": 0.1, "radius": 0.01, "density": 1e-3}
+    swept = f"MAX(TIME - {law.settling!r}, 0)"
+    turned = f"{turn * law.first!r}*TIME + {0.5 * turn * law.rate!r}*{swept}**2"
+    pair = s.pair
+    return Drivetrain(
+        "mesh resonance",
+        shafts=[Shaft(name="in", **light), Shaft(name="out", **light)],
+        wheels=[Wheel(name="driver", shaft="in", gear=pair.driver),
+                Wheel(name="driven", shaft="out", gear=pair.driven)],
+        meshes=[GearMesh(name="mesh", driver="driver", driven="driven",
+                         settings={"backlash": s.backlash, "contact": pair.contact, "friction": False})],
+        bearings=[IdealBearing(name="left", shaft="in"), IdealBearing(name="right", shaft="out")],
+        drives=[SpeedDrive(name="drive", shaft="in", speed=turn * law.first, function=turned)],
+        loads=[TorqueLoad(name="load", shaft="out", torque=s.torque)],
+        running=True,
+        run_up=10.0 / law.first,
+    )  # fmt: skip
+
+
+def resonance_rig(settings: ResonanceSettings | None = None, direction: Direction = "up") -> Mechanism:
+    """Return the rig: two wheels in ideal bearings, the driver swept, the driven one loaded, a film between them."""
+    s = settings or ResonanceSettings()
+    m = resonance_train(s, direction).build()
+    r = s.pair.driven.base_radius
+    speeds = [f"WZ({j}.I, {j}.J, {j}.J)" for j in ("left", "right")]
+    for joint in ("left", "right"):
+        ends = m.joints[joint]
+        m.axis_torque(f"film {joint}", ends.i, ends.j, f"-{s.film * r * r!r}*({speeds[0]} + {speeds[1]})")
+    return m
+
+
+def one_degree(settings: ResonanceSettings | None = None) -> BacklashOscillator:
+    """Return the classical model of one degree of freedom, with stiffness and error of the loaded pair at rest."""
+    s = settings or ResonanceSettings()
+    k = s.rest.stiffness
+    return BacklashOscillator(s.mass, k, s.pair.normal_backlash, s.force, error=s.rest.error - s.force / k, film=s.film)
+
+
+def _lag_of_rig(s: ResonanceSettings, direction: Direction, progress: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    train = resonance_train(s, direction)
+    law = chirp(s, direction)
+    axes = train.layout.seats["out"].axes
+    taken: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def take(part: Any) -> None:
+        x = part.orientation("out")[:, :, 0] @ axes[:, :2]
+        taken.append((part.t.copy(), np.arctan2(x[:, 1], x[:, 0])))
+
+    solution = resonance_rig(s, direction).simulate(
+        law.duration, every_step=True, tol=s.tolerance, rate_scale=2.0 * math.pi * s.frequency, consumer=take,
+        progress=progress, max_step=1.0 / (STEPS * s.span[1] * s.frequency),
+    )  # fmt: skip
+    if not solution.success:
+        raise RuntimeError(f"sweep {direction} at {s.torque:g} N m: {solution.message}")
+    t, angle = (np.concatenate(column) for column in zip(*taken, strict=True))
+    cycles = law.cycles(t)
+    angle = np.unwrap(angle)
+    # equal wheels: the driven one turns back as far as the driver turns
+    lag = s.pair.driven.base_radius * (angle - angle[0] + 2.0 * math.pi / s.teeth * cycles)
+    return t, cycles, lag
+
+
+def _lag_of_oscillator(s: ResonanceSettings, direction: Direction) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    law = chirp(s, direction)
+    model = one_degree(s)
+    _, state = model.run((law.first, law.first), law.settling, samples=SAMPLES)
+    last = float(law.frequency(np.array(law.duration)))
+    rows, _ = model.run((law.first, last), law.duration - law.settling, state, samples=SAMPLES)
+    cycles = rows[:, 0] / (2.0 * math.pi)
+    # from the cycles of the law back to its time
+    swept = cycles - law.first * law.settling
+    root = np.sqrt(law.first**2 + 2.0 * law.rate * swept)
+    return law.settling + 2.0 * swept / (law.first + root), cycles, rows[:, 1]
+
+
+def sweep_resonance(
+    settings: ResonanceSettings | None = None,
+    direction: Direction = "up",
+    model: str = "multibody",
+    *,
+    progress: bool | Callable[[float], None] = False,
+) -> xr.Dataset:
+    """Sweep the mesh frequency through the resonance in one direction.
+
+    Parameters
+    ----------
+    settings : ResonanceSettings, optional
+    direction : {"up", "down"}
+    model : {"multibody", "one degree"}
+    progress : bool or callable
+        Of the multibody model, see `gearmbs.mechanism.simulate`.
+
+    Returns
+    -------
+    Dataset
+        Over ``window``: ``frequency`` (mean mesh frequency, Hz), ``rms`` (of the lag about its mean, m), ``lowest`` lag
+        (m; below zero the teeth part).
+
+    Raises
+    ------
+    ValueError
+        For an unknown direction or model.
+    """
+    s = settings or ResonanceSettings()
+    law = chirp(s, direction)
+    if model not in MODELS:
+        raise ValueError(f"model is {model!r}; choose one of {', '.join(MODELS)}")
+    ways = {"multibody": lambda: _lag_of_rig(s, direction, progress),
+            "one degree": lambda: _lag_of_oscillator(s, direction)}  # fmt: skip
+    t, cycles, lag = ways[model]()
+    first = math.ceil(SETTLING / s.window)
+    count = s.cycles // s.window - 1
+    even = (first + np.arange(count * s.window * SAMPLES) / (s.window * SAMPLES)) * s.window
+    values = np.interp(even, cycles, lag).reshape(count, -1)
+    middle = np.interp((first + 0.5 + np.arange(count)) * s.window, cycles, t)
+    data: dict[str, Any] = {
+        "frequency": ("window", law.frequency(middle), {"units": "Hz", "long_name": "mesh frequency"}),
+        "rms": ("window", values.std(axis=1), {"units": "m", "long_name": "RMS of the dynamic transmission error"}),
+        "lowest": ("window", values.min(axis=1), {"units": "m", "long_name": "lowest lag"}),
+    }
+    return xr.Dataset(data, attrs={"direction": direction, "model": model, "natural_frequency": s.frequency})
+
+
+def jump_frequency(sweep: xr.Dataset) -> float:
+    """Return the mesh frequency at which a sweep's amplitude changes by the largest factor between two windows, Hz."""
+    a, f = sweep["rms"].values, sweep["frequency"].values
+    k = int(np.argmax(np.abs(np.diff(np.log(a)))))
+    return float(0.5 * (f[k] + f[k + 1]))
