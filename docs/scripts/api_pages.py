@@ -133,7 +133,7 @@ MORE = {
         "gearmbs.campaigns.given_data": EVERYTHING,
         "gearmbs.campaigns.subjects.claims": EVERYTHING,
         "gearmbs.campaigns.response": ["response_surface"],
-        "gearmbs.campaigns.sensitivity": ["sensitivity"],
+        "gearmbs.campaigns.sensitivity": ["sensitivity", "campaign_chaos", "one_factor_studies"],
         "gearmbs.campaigns.subjects.pair": ["canonical_case", "harmonics", "contact_numbers", "indicators"],
     },
     "gearmbs.identify": {

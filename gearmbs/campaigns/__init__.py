@@ -19,6 +19,7 @@ from gearmbs._lazy import late
 if TYPE_CHECKING:
     from gearmbs.campaigns.campaign import Campaign
     from gearmbs.campaigns.canonical import canonical, content_key
+    from gearmbs.campaigns.chaos import PolynomialChaos, fit_chaos
     from gearmbs.campaigns.errors import CampaignError
     from gearmbs.campaigns.factors import Choice, Factor, Specimens, choose
     from gearmbs.campaigns.plan import Plan, load_plan, make_plan
@@ -49,6 +50,7 @@ __all__ = [
     "Outcome",
     "PairSubject",
     "Plan",
+    "PolynomialChaos",
     "ResponseSurface",
     "SobolIndices",
     "Specimens",
@@ -58,6 +60,7 @@ __all__ = [
     "condition_map",
     "content_key",
     "dask_client",
+    "fit_chaos",
     "fit_surface",
     "load_plan",
     "main_effects",
@@ -75,6 +78,8 @@ late(
         "morris_effects": ".sensitivity",
         "main_effects": ".sensitivity",
         "SobolIndices": ".sensitivity",
+        "PolynomialChaos": ".chaos",
+        "fit_chaos": ".chaos",
         "fit_surface": ".response",
         "condition_map": ".response",
         "ResponseSurface": ".response",

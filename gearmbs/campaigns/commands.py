@@ -185,6 +185,8 @@ def sensitivity(folder: Place, result: Annotated[str, typer.Argument(help="Colum
 
         found = Campaign(folder).sensitivity(result)
         typer.echo((found.table() if hasattr(found, "table") else found).to_string(float_format="%.4g"))
+        if hasattr(found, "q_squared"):
+            typer.echo(f"from a polynomial that explains {found.q_squared:.1%} of the variance of points left out")
 
 
 @app.command()

@@ -81,4 +81,4 @@ def probability(held: np.ndarray, level: float = 0.95) -> tuple[float, float, fl
     n, p, q = y.size, float(y.mean()), float(norm.ppf(0.5 + 0.5 * level))
     middle = (p + q * q / (2 * n)) / (1 + q * q / n)
     half = q / (1 + q * q / n) * float(np.sqrt(p * (1 - p) / n + q * q / (4 * n * n)))
-    return p, middle - half, middle + half
+    return p, max(0.0, middle - half), min(1.0, middle + half)

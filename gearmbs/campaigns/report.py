@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearmbs.campaigns.chaos import PolynomialChaos
 from gearmbs.campaigns.errors import CampaignError
 from gearmbs.campaigns.given_data import first_indices, probability
 from gearmbs.campaigns.results import factor_names, result_names
@@ -106,9 +107,18 @@ def _decides(campaign: Campaign, result: str) -> str:
         found = sensitivity(campaign, result)
     except CampaignError:
         return _at_hand(campaign, result) + _surface(campaign, result)
+    if isinstance(found, PolynomialChaos):
+        note = (
+            f"<p><small>A sum of polynomials of degree {found.degrees.sum(axis=1).max()}; of points left out it "
+            f"explains {found.q_squared:.1%} of the variance.</small></p>"
+        )
+        heading = "<h3>Sobol' indices from a polynomial chaos</h3>"
+        return _at_hand(campaign, result) + heading + _table(found.table()) + note + _surface(campaign, result)
     if isinstance(found, SobolIndices):
         note = f"<p><small>{found.base_points} base points, {found.left_out} left out for want of results.</small></p>"
         return "<h3>Sobol' indices</h3>" + _table(found.table()) + note
+    if campaign.plan.design == "one at a time":
+        return "<h3>One factor after the other</h3>" + _table(found)
     return "<h3>Effects</h3>" + _table(found.head(20))
 
 
@@ -152,12 +162,18 @@ def _failures(campaign: Campaign) -> str:
 
 
 def _table(table: pd.DataFrame) -> str:
-    heads = "".join(f"<th>{html.escape(str(c))}</th>" for c in (table.index.name, *table.columns))
+    index = ", ".join(str(name) for name in table.index.names)
+    heads = "".join(f"<th>{html.escape(str(c))}</th>" for c in (index, *table.columns))
     rows = "".join(
-        f"<tr><td>{html.escape(str(name))}</td>" + "".join(f"<td>{v:.4g}</td>" for v in row) + "</tr>"
+        f"<tr><td>{html.escape(_label(name))}</td>" + "".join(f"<td>{v:.4g}</td>" for v in row) + "</tr>"
         for name, row in zip(table.index, np.asarray(table, dtype=float))
     )
     return f"<table><tr>{heads}</tr>{rows}</table>"
+
+
+def _label(name: Any) -> str:
+    parts = name if isinstance(name, tuple) else (name,)
+    return ", ".join(f"{part:.5g}" if isinstance(part, float) else str(part) for part in parts)
 
 
 def _picture(figure: Any, text: str) -> str:

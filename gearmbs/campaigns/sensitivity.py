@@ -16,12 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearmbs.campaigns.designs import SEQUENCES
 from gearmbs.campaigns.errors import CampaignError
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from gearmbs.campaigns.campaign import Campaign
+    from gearmbs.campaigns.chaos import PolynomialChaos
 
 RESAMPLES = 200
 CONFIDENCE = 0.95
@@ -186,6 +188,35 @@ def main_effects(coded: np.ndarray, values: np.ndarray, names: list[str], *, int
     return table.reindex(table.effect.abs().sort_values(ascending=False).index)
 
 
+def one_factor_studies(campaign: Campaign, result: str) -> pd.DataFrame:
+    """Return a result over the values of each factor alone, the others at the base, of a one-at-a-time design.
+
+    Returns
+    -------
+    DataFrame
+        By factor and value: ``result``; ``change``, its difference from the base; and ``sensitivity``, the mean of the
+        slopes to the neighbouring values, in the result's unit over the factor's in SI, NaN for factors without order.
+    """
+    import pandas as pd
+
+    plan = campaign.plan
+    points = plan.points()
+    y, columns = results_in_order(campaign, result), plan.columns(points)
+    rows, first = [], 1
+    for factor in plan.factors:
+        stop = first + factor.count
+        values, found = columns[factor.name][first:stop], y[first:stop]
+        slope = np.full(found.size, np.nan)
+        if values.dtype.kind in "fiu" and found.size > 1:
+            slopes = np.diff(found) / np.diff(values.astype(float))
+            slope = 0.5 * (np.r_[slopes[:1], slopes] + np.r_[slopes, slopes[-1:]])
+        rows += [(factor.name, v, r, r - y[0], k) for v, r, k in zip(values, found, slope)]
+        # further coordinates of a factor have one value each, which is not a study
+        first = stop + factor.width - 1
+    table = pd.DataFrame(rows, columns=["factor", "value", "result", "change", "sensitivity"])
+    return table.set_index(["factor", "value"])
+
+
 def coordinates(campaign: Campaign) -> tuple[list[str], np.ndarray]:
     """Return the names of the coordinates of a campaign's plan and its points in the unit cube."""
     plan = campaign.plan
@@ -208,8 +239,29 @@ def results_in_order(campaign: Campaign, result: str) -> np.ndarray:
     return values
 
 
+def campaign_chaos(campaign: Campaign, result: str, degree: int | None = None) -> PolynomialChaos:
+    """Return the polynomial chaos of a campaign's result over the coordinates of its plan."""
+    from gearmbs.campaigns.chaos import fit_chaos
+    from gearmbs.campaigns.factors import Choice, Factor
+
+    plan = campaign.plan
+    if plan.variants > 1 or plan.constraints:
+        raise CampaignError(
+            "polynomial chaos: not of crossed choices or constraints; fit the table's columns by fit_chaos"
+        )
+    names, points = coordinates(campaign)
+    levels: list[int] = []
+    for factor in plan.factors:
+        few = len(factor.values) if isinstance(factor, Factor) else factor.count if isinstance(factor, Choice) else 0
+        levels += [few] + [0] * (factor.width - 1)
+    return fit_chaos(points, results_in_order(campaign, result), names, levels=levels, degree=degree)
+
+
 def sensitivity(campaign: Campaign, result: str) -> Any:
-    """Return what decides a result, by the campaign's design: `SobolIndices`, or a table of effects.
+    """Return what decides a result, by the campaign's design.
+
+    `SobolIndices` of a Saltelli design, a table of effects of a Morris or factorial one, and a `PolynomialChaos`, whose
+    coefficients are Sobol' indices, of points that fill the space; `one_factor_studies` of a one-at-a-time design.
 
     Raises
     ------
@@ -229,7 +281,11 @@ def sensitivity(campaign: Campaign, result: str) -> Any:
         return morris_effects(values, points, names)
     if plan.design in ("factorial", "plackett burman"):
         return main_effects(2.0 * points - 1.0, values, names, interactions=plan.design == "factorial")
+    if plan.design == "one at a time":
+        return one_factor_studies(campaign, result)
+    if plan.design in (*SEQUENCES, "latin hypercube"):
+        return campaign_chaos(campaign, result)
     raise CampaignError(
-        f"sensitivity: a {plan.design} design has none of its own; take saltelli, morris or factorial, or "
+        f"sensitivity: a {plan.design} design has none of its own; take saltelli, morris, sobol or factorial, or "
         f"response_surface"
     )

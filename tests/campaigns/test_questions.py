@@ -12,7 +12,9 @@ from scipy.stats import qmc
 from gearmbs.campaigns import (
     Campaign,
     CampaignError,
+    Factor,
     condition_map,
+    fit_chaos,
     fit_surface,
     main_effects,
     make_plan,
@@ -124,8 +126,9 @@ def test_condition_map(tmp_path):
     np.testing.assert_allclose(share[:2], 0.0)
     np.testing.assert_allclose(share[2:], 1.0)
     assert abs(edges[2]) < 0.05
-    with pytest.raises(CampaignError, match="has none of its own"):
-        campaign.sensitivity("y")
+    found = campaign.sensitivity("y")
+    assert found.q_squared > 0.9
+    np.testing.assert_allclose(found.indices, [FIRST, TOTAL], atol=0.05)
     assert campaign.response_surface("y").q_squared < 0.9
     page = campaign.report(tmp_path / "r.html").read_text()
     assert "indices from the points at hand" in page
@@ -149,3 +152,31 @@ def test_exports(tmp_path):
     np.testing.assert_array_equal(rows["signal.wave"][3], campaign.open().wave.values[3, 0])
     with pytest.raises(CampaignError, match="choose one of csv"):
         campaign.export(tmp_path / "x", "xml")
+
+
+def test_chaos_of_a_polynomial_is_exact():
+    """x + 2 y z with z of two values: the parts of the variance are known."""
+    u = np.random.default_rng(2).random((300, 3))
+    x, y, z = 2 * u[:, 0] - 1, 2 * u[:, 1] - 1, np.where(u[:, 2] < 0.5, -1.0, 1.0)
+    found = fit_chaos(u, x + 2 * y * z, ["x", "y", "z"], levels=(0, 0, 2))
+    np.testing.assert_allclose(found.indices, [[0.2, 0, 0], [0.2, 0.8, 0.8]], atol=1e-12)
+    assert found.interaction("y", "z") == pytest.approx(0.8)
+    assert found.q_squared == pytest.approx(1.0)
+    np.testing.assert_allclose(found.predict(u), x + 2 * y * z, atol=1e-12)
+    with pytest.raises(CampaignError, match="the same everywhere"):
+        fit_chaos(u, np.ones(300), ["x", "y", "z"])
+    with pytest.raises(CampaignError, match="draw more points"):
+        fit_chaos(u[:3], x[:3], ["x", "y", "z"])
+
+
+def test_one_factor_studies(tmp_path):
+    factors = [Factor(name, -1.0, 1.0, levels=5) for name in ("x1", "x2")]
+    campaign = Campaign(tmp_path / "c", make_plan(function(), factors, "one at a time", unit=16))
+    campaign.run(workers=0)
+    table = campaign.sensitivity("y")
+    assert list(table.index.get_level_values(0)) == ["x1"] * 5 + ["x2"] * 5
+    at = np.linspace(-1.0, 1.0, 5)
+    np.testing.assert_allclose(table.result["x1"], np.sin(at), atol=1e-12)
+    np.testing.assert_allclose(table.sensitivity["x1"].iloc[2], np.sin(0.5) / 0.5)
+    np.testing.assert_allclose(table.change["x2"], 7 * np.sin(at) ** 2, atol=1e-12)
+    assert "One factor after the other" in campaign.report(tmp_path / "r.html", ["y"]).read_text()

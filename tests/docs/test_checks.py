@@ -8,6 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gearmbs.campaigns import load_plan
+from gearmbs.campaigns.factors import plain
+from gearmbs.campaigns.subjects.claims import ratios
 from tests.docs.support import DOCS
 
 
@@ -27,43 +30,38 @@ def test_rows_agree(scripts, group, bound):
         assert found == pytest.approx(expected, rel=bound, abs=1e-9), what
 
 
-def test_sensitivity_data_are_those_of_the_grid(scripts):
-    import sensitivity
+def test_data_of_the_claims_are_those_of_the_plan(scripts):
+    import claims
 
-    data = sensitivity.load()
-    points = {tuple(point.values()) for point in sensitivity.grid()}
-    assert set(data[list(sensitivity.SETTINGS)].drop_duplicates().itertuples(index=False, name=None)) == points
-    assert len(data) == len(points) * 8 * 4
-    assert np.isfinite(data[["h1", "h2", "h3"]].to_numpy()).all()
-
-
-def test_claim_ratios_of_a_made_up_table(scripts):
-    """One point: the second harmonic rises threefold in the skew plane, everything doubles with the load."""
-    import sensitivity
-
-    base = dict.fromkeys(("h1", "h2", "h3"), 1.0)
-    states = {
-        "healthy": base,
-        "skew": base | {"h2": 3.0},
-        "inclination": base | {"h2": 0.5},
-        "distance": base | {"h3": 0.8},
-    }
-    rows = [
-        {**sensitivity.PRESET, "state": state, "load": load, "component": "line_of_action"}
-        | {h: factor * value for h, value in levels.items()}
-        for state, levels in states.items()
-        for load, factor in (("low", 1.0), ("high", 2.0))
-    ]
-    ratios = sensitivity.claim_ratios(pd.DataFrame(rows))
-    np.testing.assert_allclose(ratios.to_numpy()[0], [3.0, 0.5, 0.8, 2.0, 2.0])
+    data = claims.load()
+    plan = load_plan(claims.PLAN)
+    columns = plan.columns(claims.points(data))
+    for name in claims.SETTINGS:
+        if columns[name].dtype.kind == "f":
+            np.testing.assert_allclose(data[name], columns[name], rtol=3e-4, atol=1e-9)
+        else:
+            assert list(data[name]) == list(columns[name])
+    # all of the sequence up to some point, so that the points fill the space evenly
+    assert list(data["index"]) == list(range(len(data)))
+    assert claims.facts()["done"] == len(data) + claims.facts()["failed"]
+    assert np.isfinite(data[[c for c in data if "." in c]].to_numpy()).all()
 
 
-def test_maps_show_themselves_in_a_notebook(scripts):
+def test_claims_of_a_made_up_table(scripts):
+    """Of four points the first claim holds at three, the second at two, the third at one."""
+    import claims
+
+    ratios = {"misaligned": [2.0, 2.0, 2.0, 0.5], "distance": [3.0, 3.0, 0.5, 0.5], "load": [1.6, 1.4, 1.6, 1.0]}
+    data = pd.DataFrame({f"{name}.resultant": values for name, values in ratios.items()})
+    verdicts = claims.held(data, "resultant")
+    assert verdicts.sum().to_dict() == {"misaligned": 3, "distance": 2, "load": 2, "all": 1}
+
+
+def test_figures_show_themselves_in_a_notebook(scripts):
     """Figures carry their picture with them, also where nothing has set up matplotlib."""
-    import sensitivity
+    import claims
 
-    figure = sensitivity.claim_maps(sensitivity.claim_ratios(sensitivity.load()), "speed_rpm", "speed, rpm")
-    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert claims.maps(claims.load())._repr_png_().startswith(b"\x89PNG")
 
 
 @pytest.mark.slow
@@ -79,19 +77,14 @@ def test_speed_search_is_right_or_refuses(scripts):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("changes", [{}, {"depth_mm": 1.0}, {"speed_rpm": 3000}])
-def test_sensitivity_data_are_those_of_this_code(scripts, changes):
-    """Points simulated again: the preset, the least damped contact, the highest speed."""
-    import sensitivity
+@pytest.mark.parametrize("point", [0, 5])
+def test_data_of_the_claims_are_those_of_this_code(scripts, point):
+    """Points simulated again."""
+    import claims
 
-    point = sensitivity.PRESET | changes
-    settings = list(sensitivity.SETTINGS)
-    stored = sensitivity.load()
-    stored = stored[(stored[settings] == pd.Series(point)[settings]).all(axis=1)]
-    again = pd.DataFrame(sensitivity.simulate_point(point, workers=1))
-    keys = ["state", "load", "component"]
-    one, two = (t.set_index(keys).sort_index()[["h1", "h2", "h3"]].astype(float) for t in (stored, again))
-    assert len(one) == 32
-    # against the largest harmonic: small ones may be differences of large ones
-    scale = one.max(axis=1).to_numpy()[:, None]
-    np.testing.assert_allclose(two.to_numpy() / scale, one.to_numpy() / scale, atol=0.02)
+    data, plan = claims.load(), load_plan(claims.PLAN)
+    row = {name: plain(values[0]) for name, values in plan.columns(plan.points()[point : point + 1]).items()}
+    thing = plan.subject.check(plan.data(row), "point")
+    again = ratios(plan.subject.run(thing, lambda _: None, plan.keep))
+    for name in [c for c in data if "." in c]:
+        assert again[name] == pytest.approx(float(data[name][point]), rel=0.02), name

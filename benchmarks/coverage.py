@@ -1,0 +1,81 @@
+"""How often intervals of an identification on the gear pair hold the truth: ``python -m benchmarks.coverage FOLDER``.
+
+A table is the mesh harmonics of a pair of known penetration, stiffness and friction at two loads, two components of the
+force and three harmonics, each with 2 % of noise of its own. The fit knows nothing of the truth but begins there, which
+saves simulations: where the search ends does not depend on it.
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+NOISE = 0.02
+SHORT = {"duration": 0.06, "run_up": 0.02, "settling": 0.02}
+TORQUES = {"low": 100.0, "high": 200.0}
+COMPONENTS = ("line_of_action", "line_of_centres")
+"""The other two components are combinations of these, and would not be independent."""
+
+TRUTH = {"contact.depth": 1e-4, "contact.stiffness": 2.9852e5 * 1000.0**1.3, "friction.dynamic": 0.05}
+
+
+@cache
+def _problem():
+    """Return the problem with exact values, which keeps the simulations that all tables share."""
+    import pandas as pd
+
+    from gearmbs.identify import CaseProblem, Free
+    from gearmbs.studies import Case
+
+    cases = {name: Case(operation={**SHORT, "torque": torque}) for name, torque in TORQUES.items()}
+    free = [Free(name, value) for name, value in TRUTH.items()]
+    free[2] = Free("friction.dynamic", 0.05, also={"friction.static": 2.0})
+    rows = [(case, c, k, 1.0, NOISE) for case in cases for c in COMPONENTS for k in (1, 2, 3)]
+    table = pd.DataFrame(rows, columns=["case", "channel", "harmonic", "value", "sigma"])
+    return CaseProblem(table, cases, free, way="orders")
+
+
+def recovered(seed: int) -> dict[str, float]:
+    """Return whether the 95 % intervals of a noisy table hold the truth, and how far off the values are."""
+    problem = _problem()
+    exact = problem.predictions([np.array(list(TRUTH.values()))])[0]
+    shared = dict(problem._known)
+    noise = np.random.default_rng([17, int(seed)]).standard_normal(exact.size)
+    problem.table = problem.table.assign(value=np.exp(exact + NOISE * noise))
+    before = problem.simulations
+    fit = problem.fit()
+    found: dict[str, float] = {"simulations": float(problem.simulations - before)}
+    for name, value in TRUTH.items():
+        low, high = fit.interval(name)
+        found[f"held.{name}"] = float(low <= value <= high)
+        found[f"off.{name}"] = float(np.log(fit[name] / value) / (fit.errors[fit.names.index(name)] / fit[name]))
+    # what the next table needs as well is about the truth: the rest would only grow
+    about = {key: v for key, v in problem._known.items() if np.allclose(key[1], list(TRUTH.values()), rtol=0.0101)}
+    problem._known = about if len(about) < 64 else shared
+    return found
+
+
+def main(folder: str, tables: int = 200, workers: int = 2) -> None:
+    """Run the fits as a campaign and print the shares."""
+    from gearmbs.campaigns import Campaign, FunctionSubject, make_plan
+    from gearmbs.campaigns.given_data import probability
+
+    subject = FunctionSubject("benchmarks.coverage:recovered", {"seed": 0})
+    rows = [{"seed": k} for k in range(tables)]
+    campaign = Campaign(folder, make_plan(subject, (), "list", options={"rows": rows}, unit=10))
+    print(campaign.run(workers))
+    table = campaign.table
+    for name in TRUTH:
+        share, low, high = probability(table[f"held.{name}"].to_numpy())
+        spread = table[f"off.{name}"].std()
+        print(f"{name}: {share:.1%} of the intervals hold the truth ({low:.1%} to {high:.1%}), deviation {spread:.3f}")
+    held = table[[f"held.{name}" for name in TRUTH]].to_numpy()
+    print(f"all: {held.mean():.1%}; {table.simulations.mean():.0f} new simulations a table")
+    print(f"{campaign.status().processor_seconds:.0f} s of processor time")
+
+
+if __name__ == "__main__":
+    main(str(Path(sys.argv[1])), *(int(a) for a in sys.argv[2:]))
