@@ -59,6 +59,57 @@ def test_natural_frequencies(count):
         assert (np.abs(found - value) < 0.1).sum() == count - 3
 
 
+def frequencies_from_springs(angles, stiffness_sun, stiffness_ring):
+    """Lin and Parker's lumped model written anew, from the strain of each spring (x, y, turn of each body)."""
+    gears = published_set(3)
+    alpha = math.radians(24.6)
+    sun, planet, ring, arm = (
+        gears.sun.base_radius, gears.planet.base_radius, gears.ring.base_radius, gears.carrier_radius,
+    )  # fmt: skip
+    bodies = [(5.43, 6.29 * arm**2), (2.35, 3.00 * ring**2), (0.40, 0.39 * sun**2)]
+    bodies += [(0.66, 0.61 * planet**2)] * len(angles)
+    weight = np.array([value for mass, inertia in bodies for value in (mass, mass, inertia)])
+    total = np.zeros((weight.size, weight.size))
+
+    def spring(stiffness, *parts):
+        strain = np.zeros(weight.size)
+        for body, values in parts:
+            strain[3 * body : 3 * body + 3] += values
+        total[:] += stiffness * np.outer(strain, strain)
+
+    for body in range(3):
+        spring(1e8, (body, (1, 0, 0)))
+        spring(1e8, (body, (0, 1, 0)))
+    spring(1e9 * ring**2, (1, (0, 0, 1)))
+    for k, psi in enumerate(angles):
+        outwards, onwards = np.array([math.cos(psi), math.sin(psi)]), np.array([-math.sin(psi), math.cos(psi)])
+        to_planet = math.cos(alpha) * onwards + math.sin(alpha) * outwards
+        to_ring = math.cos(alpha) * onwards - math.sin(alpha) * outwards
+        spring(stiffness_sun, (2, (*to_planet, sun)), (3 + k, (*-to_planet, planet)))
+        spring(stiffness_ring, (3 + k, (*to_ring, planet)), (1, (*-to_ring, -ring)))
+        for axis in np.eye(2):
+            spring(1e8, (3 + k, (*axis, 0)), (0, (*-axis, -arm * (onwards @ axis))))
+    squares = np.linalg.eigvalsh(total / np.sqrt(np.outer(weight, weight)))
+    return np.sqrt(np.maximum(squares, 0)) / (2 * math.pi)
+
+
+@pytest.mark.parametrize(
+    ("places", "stiffness"),
+    [
+        ([0, 45, 90, 135], (5e8, 5e8)),
+        ([0, 30, 60, 90, 120, 150], (5e8, 5e8)),
+        ([0, 44, 90, 134], (5e8, 5e8)),
+        ([0, 29, 61, 92, 119, 150], (3e8, 7e8)),
+    ],
+)
+def test_natural_frequencies_against_a_model_written_anew(places, stiffness):
+    # 60 + 120 teeth: planets fit at multiples of 2 degrees
+    angles = [2 * math.pi * place / 180 for place in places]
+    gears = published_set(len(angles), angles=angles, ideal=stiffness)
+    found = np.sort(linear_modes(published_mechanism(gears)).frequencies)
+    np.testing.assert_allclose(found, frequencies_from_springs(angles, *stiffness), atol=1e-6)
+
+
 def test_planet_modes_do_not_know_the_central_members():
     gears = published_set(5)
     expected = [1808.181, 5963.760, 6981.705]
@@ -157,14 +208,37 @@ def test_a_pin_error_shifts_load_by_the_linear_value():
 
 
 def test_willis_in_a_simulation_with_tooth_contact():
-    gears = small_set(backlash_sun="0.05 mm", backlash_ring="0.05 mm")
+    # in the steady state all repeats with the mesh: the mean over whole mesh cycles is exact
+    damped = ContactLaw.linear("3e8 N/m", "20000 N*s/m", "10 um")
+    gears = planetary(
+        (24, 30, 84),
+        "1.5 mm",
+        contact=damped,
+        friction=FlankFriction.none(),
+        backlash_sun="0.05 mm",
+        backlash_ring="0.05 mm",
+    )
     m = mechanism_of(gears, speeds={"sun": "300 rpm"}, torques={"carrier": "-60 N m"}, run_up="0.01 s")
-    solution = m.simulate(0.06, rate=2000)
+    mesh = (5 - 5 / 4.5) * 24
+    solution = m.simulate(20 / mesh, rate=8 * mesh, tol=1e-8)
     turned = solution.joint_angle("carrier seat"), solution.joint_angle("sun seat")
-    ratio = (turned[0][-1] - turned[0][60]) / (turned[1][-1] - turned[1][60])
-    assert ratio == pytest.approx(1 / 4.5, rel=2e-4)
-    force = np.mean([solution.diagnostics(f"sun-planet {k}")["normal_force"][60:].mean() for k in (1, 2, 3)])
-    assert 3 * force * gears.sun.base_radius == pytest.approx(60 / 4.5, rel=0.02)
+    ratio = (turned[0][160] - turned[0][128]) / (turned[1][160] - turned[1][128])
+    assert ratio == pytest.approx(1 / 4.5, rel=1e-9)
+    force = np.mean([solution.diagnostics(f"sun-planet {k}")["normal_force"][128:160].mean() for k in (1, 2, 3)])
+    assert 3 * force * gears.sun.base_radius == pytest.approx(60 / 4.5, rel=0.01)
+
+
+def test_willis_and_torques_with_ideal_meshes():
+    gears = planetary((24, 30, 84), "1.5 mm", ideal=(3e8, 4e8), ideal_damping=3000.0)
+    m = mechanism_of(gears, speeds={"sun": "300 rpm"}, torques={"carrier": "-60 N m"}, run_up="0.02 s")
+    solution = m.simulate(0.2, rate=1000, tol=1e-9)
+    turned = solution.joint_angle("carrier seat"), solution.joint_angle("sun seat")
+    assert (turned[0][-1] - turned[0][100]) / (turned[1][-1] - turned[1][100]) == pytest.approx(1 / 4.5, rel=1e-9)
+    forces = {mesh: sum(solution.diagnostics(mesh.format(k))["normal_force"][-1] for k in (1, 2, 3))
+              for mesh in ("sun-planet {}", "planet {}-ring")}  # fmt: skip
+    # T_s : T_r : T_c = z_s : z_r : -(z_s + z_r)
+    assert forces["sun-planet {}"] * gears.sun.base_radius == pytest.approx(60 * 24 / 108, rel=1e-6)
+    assert forces["planet {}-ring"] * gears.ring.base_radius == pytest.approx(60 * 84 / 108, rel=1e-6)
 
 
 def test_torques_of_ideal_meshes_are_exact():
