@@ -36,11 +36,12 @@ ELEMENT_FORCES = {
     "JOINT": "joint", "JPRIM": "jprim", "MOTION": "motion", "SFORCE": "sforce", "VFORCE": "vforce",
     "VTORQ": "vtorque", "GFORCE": "gforce", "BUSH": "bushing", "FIELD": "field", "SPDP": "springdamper",
     "GCON": "gcon", "COUPLER": "coupler", "GEAR": "gear", "BEAM": "beam", "FRICTION": "friction",
+    "CONTACT": "contact",
 }  # fmt: skip
 EULER_SEQUENCES = ("123", "231", "312", "132", "213", "321", "121", "131", "212", "232", "313", "323")
 """Body-fixed sequences of ORIENT's systems 1 to 12."""
 UNSUPPORTED = frozenset(
-    "NFORCE CONTACT CVCV PTCV CURVE INTERP INVPSD DELAY USER SENVAL MODE FXFREQ FXMODE "
+    "NFORCE CVCV PTCV CURVE INTERP INVPSD DELAY USER SENVAL MODE FXFREQ FXMODE "
     "UVX UVY UVZ DXYZ VXYZ WXYZ FXYZ TXYZ TRANS ARYSUM RANDOM".split()
 )
 """Functions of ADAMS that exist but are not evaluated here."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -17,6 +17,8 @@ from gearmbs.mechanism.parts import Marker
 from gearmbs.mechanism.quantities import expression_text, quantity
 
 if TYPE_CHECKING:
+    from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson, SolidContact
+    from gearmbs.mechanism.contacts.shapes import Shape
     from gearmbs.mechanism.expression_syntax import Units
 
 Expression = str | float | None
@@ -286,6 +288,42 @@ class LoadMethods:
             "damping_ratio": damping_ratio,
         }
         return self.matrix_force(Beam, name, i, j, k, damping_ratio * k, made, free)
+
+    def contact(
+        self, name: str, i: Marker, solids_i: Shape | Sequence[Shape], j: Marker, solids_j: Shape | Sequence[Shape],
+        law: Impact | Poisson, friction: Coulomb | None = None,
+    ) -> SolidContact:  # fmt: skip
+        """Let solids of two bodies touch; ADAMS's CONTACT.
+
+        Parameters
+        ----------
+        i, j : Marker
+            In whose frames the solids are given.
+        solids_i, solids_j : Shape or sequence of Shape
+            From :mod:`gearmbs.mechanism.contacts`; each of the first may touch each of the second.
+        law : Impact or Poisson
+            From :mod:`gearmbs.mechanism.contacts`, SI.
+        friction : Coulomb, optional
+
+        Raises
+        ------
+        ModelError
+            If a size or a constant makes no sense, or both sides are on one body.
+
+        Examples
+        --------
+        >>> from gearmbs.mechanism import Mechanism
+        >>> from gearmbs.mechanism.contacts import HalfSpace, Impact, Sphere
+        >>> m = Mechanism("drop", gravity=(0, 0, -9.81))
+        >>> ball = m.body("ball", 1.0, (4e-4, 4e-4, 4e-4), position=(0, 0, 0.5))
+        >>> m.contact("floor", ball.marker(), Sphere("20 mm"), m.ground.marker(), HalfSpace(), Impact(1e7, 1.5, 500.0))
+        SolidContact('floor', sphere and plane, I='ball.marker1', J='ground.marker1')
+        """
+        from gearmbs.mechanism.contacts.element import SolidContact
+        from gearmbs.mechanism.contacts.shapes import Shape
+
+        first, second = ((s,) if isinstance(s, Shape) else tuple(s) for s in (solids_i, solids_j))
+        return self.add(SolidContact(name, i, j, first, second, law, friction))
 
 
 def beam_stiffness(

@@ -127,6 +127,9 @@ class Builder:
             return joint.i or 0, joint.j
         if isinstance(s, st.Gcon):
             return self.gcon_pair(s)
+        if isinstance(s, st.Contact):
+            i, j = (self.deck.of(st.Graphics)[refs[0]].marker for refs in (s.igeom, s.jgeom))
+            return i or 0, j
         if isinstance(s, (st.Vforce, st.Vtorque, st.Gforce)):
             return s.i or 0, s.jfloat
         if isinstance(s, st.Sforce) and s.action_only:

@@ -7,6 +7,7 @@ from functools import partial
 
 from gearmbs.adams.builders.builder import Builder
 from gearmbs.adams.builders.constraints import CONSTRAINTS
+from gearmbs.adams.builders.contacts import CONTACTS
 from gearmbs.adams.builders.forces import FORCES
 from gearmbs.adams.builders.initial import with_initial_motions
 from gearmbs.adams.builders.model import AdamsModel, BodyState
@@ -69,7 +70,7 @@ def build_model(
     if builder.add_bodies():
         builder.name_elements()
         builder.add_data()
-        for kind, make in (CONSTRAINTS | FORCES).items():
+        for kind, make in (CONSTRAINTS | FORCES | CONTACTS).items():
             for statement in builder.active(kind):
                 builder.attempt(statement, partial(make, builder))
     model = builder.model

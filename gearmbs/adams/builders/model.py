@@ -19,7 +19,7 @@ KINDS: dict[type, str] = {
     st.Joint: "joint", st.Jprim: "jprim", st.Motion: "motion", st.Sforce: "sforce", st.Vforce: "vforce",
     st.Vtorque: "vtorque", st.Gforce: "gforce", st.Bushing: "bushing", st.Field: "field",
     st.SpringDamper: "springdamper", st.Gcon: "gcon", st.Coupler: "coupler", st.Gear: "gear",
-    st.Beam: "beam", st.Friction: "friction",
+    st.Beam: "beam", st.Friction: "friction", st.Contact: "contact",
 }  # fmt: skip
 """Kinds under which functions such as JOINT and SFORCE ask for an element's force."""
 

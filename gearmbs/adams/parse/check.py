@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields
 
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
+from gearmbs.adams.parse.grammar import CHOICE, EXPRESSION, specs_of
 from gearmbs.mechanism.expression_syntax import Call, Number, parse, walk
 
 REQUIRED: dict[type, tuple[str, ...]] = {
@@ -31,13 +30,15 @@ REQUIRED: dict[type, tuple[str, ...]] = {
     st.Diff: ("function",),
     st.Beam: ("i", "j", "length", "ixx", "iyy", "izz", "area", "emodulus", "gmodulus"),
     st.Friction: ("joint", "mu_static", "mu_dynamic"),
+    st.Contact: ("igeom", "jgeom", "law"),
+    st.Graphics: ("type",),
 }
 MEASURES = frozenset(
     """DX DY DZ DM AX AY AZ INCANG PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
     WDTX WDTY WDTZ WDTM""".split()
 )
 """Functions of the places and motions of markers."""
-MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv")
+MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv", "corner")
 TWO_PARTS = (st.Joint, st.Jprim)
 UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
     st.Marker: ("flex_body", "point_mass", "node_id", "curve"),
@@ -47,6 +48,7 @@ UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
     st.Spline: ("data_file",),
     st.Request: ("function",),
     st.Part: ("planar",),
+    st.Contact: ("normal_function", "friction_function", "iflex", "jflex"),
 }
 
 WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
@@ -59,6 +61,8 @@ WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
     st.Part: ("exact",),
     st.Friction: ("formulation",),
     st.Variable: ("ic",),
+    st.Contact: ("augmented", "max_deformation", "flip_i", "flip_j"),
+    st.Graphics: ("xmin", "xmax", "ymin", "ymax"),
 }
 """Arguments that are read and change nothing: each is remarked on."""
 WHY = {
@@ -67,6 +71,8 @@ WHY = {
     st.Part: "the parts are moved as little as the joints allow",
     st.Friction: "friction follows one law, see the documentation",
     st.Variable: "variables need no starting value",
+    st.Contact: "solids press by depth and rub by speed alone",
+    st.Graphics: "a plane touches everywhere",
 }
 
 
@@ -96,7 +102,7 @@ def check(deck: Deck) -> list[Diagnostic]:
             required = ()
         for name in required:
             if getattr(statement, name) in (None, ()):
-                keyword = name.upper() if name != "type" else _choices(cls)
+                keyword = _choices(cls, name) if specs_of(cls)[name].kind == CHOICE else name.upper()
                 fail(statement, f"{keyword} is missing")
         for name in UNSUPPORTED_ARGUMENTS.get(cls, ()):
             if name in statement.given:
@@ -111,6 +117,7 @@ def check(deck: Deck) -> list[Diagnostic]:
             fail(marker, f"there is no PART/{marker.part}", "part")
     _check_constraints(deck, fail)
     _check_forces(deck, fail)
+    _check_contacts(deck, fail)
     _check_data(deck, fail)
     _check_floating(deck, fail)
     return errors
@@ -149,9 +156,8 @@ def _labels(group: Sequence[st.Statement]) -> str:
     return f"{shown} and {more} more" if more > 0 else shown
 
 
-def _choices(cls: type) -> str:
-    choices = next(f.metadata["spec"].choices for f in fields(cls) if f.name == "type")
-    return "its type (" + ", ".join(choices) + ")"
+def _choices(cls: type, name: str) -> str:
+    return f"its {name} (" + ", ".join(specs_of(cls)[name].choices) + ")"
 
 
 def _check_units(deck: Deck, errors: list[Diagnostic]) -> None:
@@ -245,6 +251,26 @@ def _check_forces(deck: Deck, fail: Fail) -> None:
     for field in deck.of(st.Field).values():
         if field.kmatrix is None and field.cmatrix is None and field.function is None:
             fail(field, "give KMATRIX or CMATRIX")
+
+
+def _check_contacts(deck: Deck, fail: Fail) -> None:
+    graphics = deck.of(st.Graphics)
+    for solid in graphics.values():
+        if solid.marker is None:
+            fail(solid, "CM, RM or CORNER is missing: a solid that touches needs a marker")
+    for contact in deck.of(st.Contact).values():
+        for name, refs in (("igeom", contact.igeom), ("jgeom", contact.jgeom)):
+            for ref in refs:
+                if ref not in graphics:
+                    fail(contact, f"there is no GRAPHICS/{ref} for {name.upper()}", name)
+        law = {"IMPACT": ("stiffness", "dmax"), "POISSON": ("penalty", "restitution")}.get(contact.law or "", ())
+        for name in law:
+            if getattr(contact, name) is None:
+                fail(contact, f"{specs_of(st.Contact)[name].keyword} is missing for {contact.law}")
+        rubs = contact.coulomb != "OFF" and not contact.no_friction
+        for name in ("stiction", "transition") if contact.coulomb == "ON" else ("transition",):
+            if rubs and not (getattr(contact, name) or 0.0) > 0.0:
+                fail(contact, f"{specs_of(st.Contact)[name].keyword} is missing or not positive")
 
 
 def _check_data(deck: Deck, fail: Fail) -> None:

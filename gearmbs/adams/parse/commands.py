@@ -107,9 +107,9 @@ COMMANDS: dict[str, type[Command]] = {
     "LINEAR": Linear,
     "STOP": Stop,
 }
-CHANGEABLE = tuple(n for n in st.STATEMENTS if n not in ("UNITS", "COUPLER", "GEAR", "PINPUT", "POUTPUT"))
+CHANGEABLE = tuple(n for n in st.STATEMENTS if n not in ("UNITS", "COUPLER", "GEAR", "GRAPHICS", "PINPUT", "POUTPUT"))
 IGNORED_COMMANDS = ("PREFERENCES", "HELP", "INFO", "MENU", "SHOW", "TIME", "DEBUG", "ENVIRONMENT", "LSOLVER")
-UNSUPPORTED_COMMANDS = ("SAVE", "RELOAD", "CONTROL", "SENSOR", "FLEX_BODY", "STRING", "CONTACT")
+UNSUPPORTED_COMMANDS = ("SAVE", "RELOAD", "CONTROL", "SENSOR", "FLEX_BODY", "STRING")
 _NAMES = (*COMMANDS, *CHANGEABLE, *IGNORED_COMMANDS, *UNSUPPORTED_COMMANDS)
 _GRAMMARS = {cls: Grammar(cls) for cls in {Simulate, Switch, FileCommand, Linear}}
 

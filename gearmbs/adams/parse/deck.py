@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from gearmbs.adams.errors import UNSUPPORTED, Diagnostic
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.source import RawStatement
 from gearmbs.adams.parse.units import deck_units
 from gearmbs.mechanism.expression_syntax import Units
 
@@ -30,12 +31,15 @@ class Deck:
         Statement class -> id -> statement, in the order of the deck.
     diagnostics : list of Diagnostic
         Warnings, ignored and unsupported statements; errors raise.
+    unread : dict
+        (name, id) -> text of statements that are read only as far as others name them.
     """
 
     title: str = ""
     file: str = "<deck>"
     items: dict[type, dict[int, Any]] = field(default_factory=dict)
     diagnostics: list[Diagnostic] = field(default_factory=list)
+    unread: dict[tuple[str, int], RawStatement] = field(default_factory=dict)
 
     def of(self, kind: type[S]) -> dict[int, S]:
         """Return the statements of one class by id."""

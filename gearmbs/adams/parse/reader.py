@@ -65,6 +65,7 @@ def parse_deck(text: str, file: str = "<deck>") -> Deck:
             break
     if not ended:
         deck.diagnostics.append(Diagnostic(WARNING, "END is missing; the deck may have been cut off", file, 0))
+    _read_named(deck, errors)
     if not errors:
         errors += check(deck)
     if errors:
@@ -112,6 +113,9 @@ def _take(deck: Deck, raw: RawStatement, errors: list[Diagnostic]) -> bool:
         message = f"{name}/{number} is not supported; it changes the motion"
         deck.diagnostics.append(Diagnostic(UNSUPPORTED, message, deck.file, raw.line))
         return False
+    if name in st.ON_DEMAND:
+        deck.unread[name, number] = raw
+        return False
     if name in st.IGNORED:
         deck.diagnostics.append(Diagnostic(IGNORED, name, deck.file, raw.line))
         return False
@@ -127,6 +131,23 @@ def _take(deck: Deck, raw: RawStatement, errors: list[Diagnostic]) -> bool:
         return False
     group[number] = statement
     return False
+
+
+def _read_named(deck: Deck, errors: list[Diagnostic]) -> None:
+    """Read the GRAPHICS that contacts name; the others are for show."""
+    named = {ref for contact in deck.of(st.Contact).values() for ref in (*contact.igeom, *contact.jgeom)}
+    for (name, number), raw in deck.unread.items():
+        if number not in named:
+            deck.diagnostics.append(Diagnostic(IGNORED, name, deck.file, raw.line))
+            continue
+        match = _HEAD.match(raw.text)
+        try:
+            statement = read_statement(name, number, raw, match.end() if match else 0, deck.file)
+        except StatementError as error:
+            line = raw.line_at(error.offset)
+            errors.append(Diagnostic(ERROR, f"{name}/{number}, which a CONTACT names: {error}", deck.file, line))
+            continue
+        deck.items.setdefault(type(statement), {})[number] = statement
 
 
 def read_statement(name: str, number: int, raw: RawStatement, start: int, file: str) -> st.Statement:

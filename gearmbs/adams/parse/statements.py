@@ -7,6 +7,7 @@ radians).  ``given`` says which arguments stood in the deck.
 from __future__ import annotations
 
 from gearmbs.adams.parse.statement import Statement
+from gearmbs.adams.parse.statements_contact import Contact, Graphics
 from gearmbs.adams.parse.statements_data import (
     Array,
     Diff,
@@ -52,6 +53,7 @@ STATEMENTS: dict[str, type[Statement]] = {
     "ARRAY": Array,
     "BEAM": Beam,
     "BUSHING": Bushing,
+    "CONTACT": Contact,
     "COUPLER": Coupler,
     "DIFF": Diff,
     "EQUILIBRIUM": Equilibrium,
@@ -60,6 +62,7 @@ STATEMENTS: dict[str, type[Statement]] = {
     "GCON": Gcon,
     "GEAR": Gear,
     "GFORCE": Gforce,
+    "GRAPHICS": Graphics,
     "IC": InitialConditions,
     "INTEGRATOR": Integrator,
     "JOINT": Joint,
@@ -86,11 +89,14 @@ KEYWORD_OF = {cls: keyword for keyword, cls in STATEMENTS.items()}
 WITHOUT_ID = frozenset("ACCGRAV EQUILIBRIUM IC INTEGRATOR KINEMATICS OUTPUT RESULTS UNITS".split())
 """Statements that stand once and have no id."""
 
-IGNORED = frozenset("GRAPHICS MATERIAL PREFERENCES DEBUG LSOLVER STRING".split())
+ON_DEMAND = frozenset(["GRAPHICS"])
+"""Statements that are read only as far as others name them."""
+
+IGNORED = frozenset("MATERIAL PREFERENCES DEBUG LSOLVER STRING".split())
 """Statements without effect on the numbers computed here."""
 
 UNSUPPORTED = frozenset(
-    """CLEARANCE CONTACT CURVE CVCV EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART FLEX_BODY GSE LSE MATRIX MFORCE MREQUEST
+    """CLEARANCE CURVE CVCV EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART FLEX_BODY GSE LSE MATRIX MFORCE MREQUEST
     NFORCE NODE NORMAL_MODE_ANALYSIS POINT_MASS PSTATE PTCV SECTION SENSOR SURFACE TFSISO TIRE UCON""".split()
 )
 """Statements of ADAMS that change the motion and are not modelled here."""
@@ -98,6 +104,7 @@ UNSUPPORTED = frozenset(
 __all__ = [
     "IGNORED",
     "KEYWORD_OF",
+    "ON_DEMAND",
     "STATEMENTS",
     "UNSUPPORTED",
     "WITHOUT_ID",
@@ -105,6 +112,7 @@ __all__ = [
     "Array",
     "Beam",
     "Bushing",
+    "Contact",
     "Coupler",
     "Diff",
     "Equilibrium",
@@ -113,6 +121,7 @@ __all__ = [
     "Gcon",
     "Gear",
     "Gforce",
+    "Graphics",
     "InitialConditions",
     "Integrator",
     "Joint",

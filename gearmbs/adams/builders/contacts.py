@@ -1,0 +1,156 @@
+"""CONTACT: the solids of GRAPHICS in the frames of their markers, and the laws in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearmbs.adams.builders.builder import Builder
+from gearmbs.adams.parse import statements as st
+from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson
+from gearmbs.mechanism.contacts.mesh_files import READERS, read_mesh
+from gearmbs.mechanism.contacts.shapes import (
+    Box,
+    Cylinder,
+    Ellipsoid,
+    Frustum,
+    HalfSpace,
+    Shape,
+    Sphere,
+    Torus,
+)
+from gearmbs.mechanism.parts import Marker
+
+ROUND = 1e-9
+"""Relative difference of scales up to which an ellipsoid is a sphere."""
+
+
+def add_contact(b: Builder, s: st.Contact) -> None:
+    """CONTACT between the solids of two parts."""
+    sides: list[tuple[Marker, list[Shape]]] = []
+    for refs in (s.igeom, s.jgeom):
+        graphics = [b.deck.of(st.Graphics)[ref] for ref in refs]
+        first = b.markers[graphics[0].marker or 0]
+        solids = []
+        for g in graphics:
+            if g.type == "EXTERNAL" and Path(g.data_file or "").suffix.lower() not in READERS:
+                what = f"{g.label()} in {g.data_file}: save the solid as {', '.join(READERS)}; other files"
+                b.unsupported(s, what)
+                return
+            marker = b.markers[g.marker or 0]
+            if marker.body is not first.body:
+                raise ValueError(f"{g.label()} is on another part than {graphics[0].label()}; give each a CONTACT")
+            solids.append(_placed(solid_of(b, g), first, marker))
+        sides.append((first, solids))
+    (i, solids_i), (j, solids_j) = sides
+    b.mechanism.contact(b.model.names["contact", s.id], i, solids_i, j, solids_j, law_of(b, s), friction_of(b, s))
+
+
+def law_of(b: Builder, s: st.Contact) -> Impact | Poisson:
+    """Return the normal law, in SI: a stiffness is a force over a length to the power of the exponent."""
+    units = b.units
+    if s.law == "POISSON":
+        return Poisson((s.penalty or 0.0) * units.factor("stiffness"), s.restitution or 0.0)
+    stiffness = (s.stiffness or 0.0) * units.force / units.length**s.exponent
+    return Impact(stiffness, s.exponent, s.damping * units.factor("damping"), (s.dmax or 0.0) * units.length)
+
+
+def friction_of(b: Builder, s: st.Contact) -> Coulomb | None:
+    """Return the friction; without static friction that of slip rises from rest."""
+    if s.coulomb == "OFF" or s.no_friction:
+        return None
+    speed = b.units.factor("velocity")
+    stick, slip = (s.stiction or 0.0) * speed, (s.transition or 0.0) * speed
+    if s.coulomb == "ON":
+        return Coulomb(s.mu_static, s.mu_dynamic, stick, slip)
+    return Coulomb(s.mu_dynamic, s.mu_dynamic, slip, slip)
+
+
+def _placed(shape: Shape, first: Marker, marker: Marker) -> Shape:
+    """Return a shape given in one marker's frame in that of another of the same body."""
+    if marker is first:
+        return shape
+    turn = first.orientation.T @ marker.orientation
+    offset = first.orientation.T @ (marker.position - first.position) + turn @ shape.offset
+    return replace(shape, axes=turn @ shape.axes, offset=offset)
+
+
+def solid_of(b: Builder, g: st.Graphics) -> Shape:
+    """Return the solid of a GRAPHICS in its marker's frame, SI.
+
+    Raises
+    ------
+    ValueError
+        For what is missing, or a part of a full turn.
+    """
+    if g.rangle is not None and abs(g.rangle - 2.0 * np.pi) > 1e-6:
+        raise ValueError(
+            f"{g.label()}: RANGLE = {np.degrees(g.rangle):.6g}D; only whole solids of revolution can touch"
+        )
+    return MAKERS[g.type or ""](b, g)
+
+
+def _size(b: Builder, g: st.Graphics, name: str) -> float:
+    value = getattr(g, name)
+    if value is None:
+        raise ValueError(f"{g.label()}: {name.upper()} is missing for its {g.type}")
+    return float(value) * b.units.length
+
+
+def _box(b: Builder, g: st.Graphics) -> Shape:
+    """From its corner along the axes, forwards or backwards."""
+    edges = np.array([_size(b, g, name) for name in ("x", "y", "z")])
+    return Box(np.abs(edges), offset=0.5 * edges)
+
+
+def _cylinder(b: Builder, g: st.Graphics) -> Shape:
+    length = _size(b, g, "length")
+    return Cylinder(_size(b, g, "radius"), abs(length), offset=(0.0, 0.0, 0.5 * length))
+
+
+def _frustum(b: Builder, g: st.Graphics) -> Shape:
+    """From the bottom in its marker's origin along z."""
+    length, bottom, top = (_size(b, g, name) for name in ("length", "bottom", "top"))
+    if length < 0.0:
+        bottom, top = top, bottom
+    return Frustum(bottom, top, abs(length), offset=(0.0, 0.0, 0.5 * length))
+
+
+def _ellipsoid(b: Builder, g: st.Graphics) -> Shape:
+    """The scales are diameters."""
+    axes = 0.5 * np.array([_size(b, g, name) for name in ("xscale", "yscale", "zscale")])
+    return Sphere(float(axes[0])) if np.ptp(axes) <= ROUND * axes.max() else Ellipsoid(axes)
+
+
+def _torus(b: Builder, g: st.Graphics) -> Shape:
+    return Torus(_size(b, g, "radius" if g.major is None else "major"), _size(b, g, "minor"))
+
+
+def _plane(b: Builder, g: st.Graphics) -> Shape:
+    return HalfSpace()
+
+
+def _point(b: Builder, g: st.Graphics) -> Shape:
+    return Sphere(0.0)
+
+
+def _external(b: Builder, g: st.Graphics) -> Shape:
+    name = Path(g.data_file or "")
+    return read_mesh(name if name.is_absolute() else Path(b.deck.file).parent / name, b.units.length)
+
+
+MAKERS: dict[str, Callable[[Builder, st.Graphics], Shape]] = {
+    "BOX": _box,
+    "CYLINDER": _cylinder,
+    "ELLIPSOID": _ellipsoid,
+    "EXTERNAL": _external,
+    "FRUSTUM": _frustum,
+    "PLANE": _plane,
+    "POINT": _point,
+    "TORUS": _torus,
+}
+CONTACTS: dict[type, Callable[[Builder, Any], None]] = {st.Contact: add_contact}

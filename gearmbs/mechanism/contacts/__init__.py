@@ -1,0 +1,53 @@
+"""Contact between solids: shapes, where they touch, what presses them apart and what rubs."""
+
+from typing import TYPE_CHECKING
+
+from gearmbs._lazy import late
+
+if TYPE_CHECKING:
+    from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson, SolidContact
+    from gearmbs.mechanism.contacts.mesh_files import read_mesh
+    from gearmbs.mechanism.contacts.shapes import (
+        Box,
+        Cylinder,
+        Ellipsoid,
+        Frustum,
+        HalfSpace,
+        Mesh,
+        Shape,
+        Sphere,
+        Torus,
+        extruded,
+        revolved,
+    )
+
+__all__ = [
+    "Box",
+    "Coulomb",
+    "Cylinder",
+    "Ellipsoid",
+    "Frustum",
+    "HalfSpace",
+    "Impact",
+    "Mesh",
+    "Poisson",
+    "Shape",
+    "SolidContact",
+    "Sphere",
+    "Torus",
+    "extruded",
+    "read_mesh",
+    "revolved",
+]
+
+late(
+    __name__,
+    {
+        **dict.fromkeys(("Coulomb", "Impact", "Poisson", "SolidContact"), ".element"),
+        "read_mesh": ".mesh_files",
+        **dict.fromkeys(
+            ("Box", "Cylinder", "Ellipsoid", "Frustum", "HalfSpace", "Mesh", "Shape", "Sphere", "Torus"), ".shapes"
+        ),
+        **dict.fromkeys(("extruded", "revolved"), ".shapes"),
+    },
+)

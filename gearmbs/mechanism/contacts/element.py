@@ -1,0 +1,279 @@
+"""Contact between solids of two bodies as a force element."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from gearmbs.dae.equations.force_elements import Diagnostic
+from gearmbs.dae.errors import ModelError
+from gearmbs.mechanism.contacts import fields, kernel
+from gearmbs.mechanism.contacts.boxes import MOST
+from gearmbs.mechanism.contacts.loads import IMPACT, LAW_REALS, POISSON
+from gearmbs.mechanism.contacts.points import COLUMNS
+from gearmbs.mechanism.contacts.shapes import (
+    Box,
+    Cylinder,
+    Ellipsoid,
+    Frustum,
+    HalfSpace,
+    Mesh,
+    Shape,
+    Sphere,
+    Torus,
+)
+from gearmbs.mechanism.contacts.supports import reduced
+from gearmbs.mechanism.elements import Compiled, ForceElement
+from gearmbs.mechanism.quantities import quantity
+
+REVERSAL = 1e-3
+"""Speed, m/s, about which the penalty goes over from compression to restitution."""
+CONVEX = (Ellipsoid, Box, Cylinder, Frustum, Torus)
+ANALYTIC = (Sphere, Ellipsoid, Box, Cylinder, Frustum, Torus, HalfSpace)
+
+
+@dataclass(frozen=True)
+class Impact:
+    """f = k d^e + c STEP(d, 0, 0, d_max, 1) d', never negative: ADAMS's IMPACT.
+
+    Attributes
+    ----------
+    stiffness, exponent : float
+        k, N/m^e, and e, at least 1.
+    damping : float
+        c, N s/m.
+    full_depth : float
+        d_max, m, from which on damping acts in full.
+    """
+
+    stiffness: float
+    exponent: float = 1.5
+    damping: float = 0.0
+    full_depth: float = 1e-4
+
+    def reals(self) -> list[float]:
+        """Return the law's part of the table."""
+        if not self.stiffness > 0.0 or not self.exponent >= 1.0 or not self.damping >= 0.0 or not self.full_depth > 0.0:
+            raise ModelError(
+                f"impact: stiffness {self.stiffness} and full_depth {self.full_depth} must be positive, damping "
+                f"{self.damping} not negative, exponent {self.exponent} at least 1"
+            )
+        return [float(IMPACT), self.stiffness, self.exponent, self.damping, self.full_depth, 0.0, 0.0, 1.0]
+
+
+@dataclass(frozen=True)
+class Poisson:
+    """f = p d in compression and r^2 p d in restitution: POISSON, with r of the impulse given back.
+
+    Attributes
+    ----------
+    penalty : float
+        p, N/m.
+    restitution : float
+        r, from 0 to 1.
+    """
+
+    penalty: float
+    restitution: float
+
+    def reals(self) -> list[float]:
+        """Return the law's part of the table."""
+        if not self.penalty > 0.0 or not 0.0 <= self.restitution <= 1.0:
+            raise ModelError(
+                f"poisson: penalty {self.penalty} must be positive and restitution {self.restitution} from 0 to 1"
+            )
+        return [float(POISSON), 0.0, 1.0, 0.0, 1.0, self.penalty, self.restitution, REVERSAL]
+
+
+@dataclass(frozen=True)
+class Coulomb:
+    """mu(v): rises by STEP to ``static`` at ``stiction``, falls to ``dynamic`` at ``transition``: ADAMS's contacts.
+
+    Attributes
+    ----------
+    static, dynamic : float
+    stiction, transition : float
+        Slip speeds, m/s.
+    """
+
+    static: float
+    dynamic: float
+    stiction: Any = 0.1
+    transition: Any = 1.0
+
+    def reals(self) -> list[float]:
+        """Return the law's part of the table."""
+        stick = quantity(self.stiction, "velocity", "coulomb: stiction")
+        slip = quantity(self.transition, "velocity", "coulomb: transition")
+        if not (self.static >= 0.0 and self.dynamic >= 0.0 and 0.0 < stick <= slip):
+            raise ModelError(
+                f"coulomb: static {self.static} and dynamic {self.dynamic} must not be negative, stiction {stick} m/s "
+                f"positive and no larger than transition {slip} m/s"
+            )
+        return [self.static, self.dynamic, stick, max(slip, stick * (1.0 + 1e-9))]
+
+
+@dataclass(eq=False, repr=False)
+class SolidContact(ForceElement):
+    """Solids of I's body touch solids of J's body.
+
+    Attributes
+    ----------
+    solids_i, solids_j : tuple of Shape
+        In the frames of markers I and J; every one of the first may touch every one of the second.
+    law : Impact or Poisson
+    friction : Coulomb, optional
+    """
+
+    solids_i: tuple[Shape, ...]
+    solids_j: tuple[Shape, ...]
+    law: Impact | Poisson
+    friction: Coulomb | None = None
+
+    kind = "contact"
+    diagnostics = (
+        Diagnostic("elastic_energy", "J", "stored"),
+        Diagnostic("damping_power", "W", "dissipated"),
+        Diagnostic("friction_power", "W", "dissipated"),
+        Diagnostic("patches", "1", "count"),
+        Diagnostic("penetration", "m"),
+        Diagnostic("normal_force", "N"),
+    )
+
+    def __post_init__(self) -> None:
+        for side in (self.solids_i, self.solids_j):
+            for shape in side:
+                if not isinstance(shape, Shape):
+                    raise ModelError(f"contact '{self.name}': {shape!r} is not a shape such as Sphere(0.1)")
+        if not self.solids_i or not self.solids_j:
+            raise ModelError(f"contact '{self.name}': give a shape on either side")
+        if self.i.body is self.j.body:
+            raise ModelError(f"contact '{self.name}': both sides are on body '{self.i.body.name}'")
+        for a, b in product(self.solids_i, self.solids_j):
+            pair_family(self.name, a, b)
+        self.law.reals()
+
+    def compiled(self) -> Compiled:
+        friction = [0.0, 0.0, 1.0, 2.0] if self.friction is None else self.friction.reals()
+        table = _Tables([*self.law.reals(), *friction])
+        for a, b in product(self.solids_i, self.solids_j):
+            table.add_pair(self.name, a, b)
+        integers, reals, most = table.finished()
+        return Compiled(kernel.contact_of_solids, integers, reals, scratch=kernel.ROWS + most * COLUMNS)
+
+    def exact(self) -> bool:
+        """Whether the geometry of all pairs is exact; else one is faceted."""
+        pairs = product(self.solids_i, self.solids_j)
+        return all(pair_family(self.name, a, b)[0] != kernel.FACETS for a, b in pairs)
+
+    def __repr__(self) -> str:
+        kinds = " and ".join(", ".join(s.kind for s in side) for side in (self.solids_i, self.solids_j))
+        return f"SolidContact({self.name!r}, {kinds}, I={self.i.name!r}, J={self.j.name!r})"
+
+
+def pair_family(name: str, a: Shape, b: Shape) -> tuple[int, bool]:
+    """Return how two solids touch, and whether their roles are exchanged.
+
+    Raises
+    ------
+    ModelError
+        For two planes.
+    """
+    if isinstance(a, Sphere) and isinstance(b, ANALYTIC):
+        return kernel.BALL_SOLID, False
+    if isinstance(b, Sphere) and isinstance(a, ANALYTIC):
+        return kernel.BALL_SOLID, True
+    if isinstance(a, HalfSpace) and isinstance(b, HalfSpace):
+        raise ModelError(f"contact '{name}': two planes cannot touch; give one side a solid")
+    if isinstance(b, HalfSpace) and isinstance(a, CONVEX):
+        return kernel.CONVEX_PLANE, False
+    if isinstance(a, HalfSpace) and isinstance(b, CONVEX):
+        return kernel.CONVEX_PLANE, True
+    if isinstance(a, Box) and isinstance(b, Box):
+        return kernel.BOXES, False
+    return kernel.FACETS, False
+
+
+def table_sizes(shape: Shape) -> tuple[int, np.ndarray]:
+    """Return the kind and the sizes, shape (4,), of a solid in the tables."""
+    if isinstance(shape, Sphere):
+        return fields.BALL, np.array([shape.radius, 0.0, 0.0, 0.0])
+    if isinstance(shape, Ellipsoid):
+        return fields.ELLIPSOID, np.r_[shape.semi_axes, 0.0]
+    if isinstance(shape, Box):
+        return fields.BOX, np.r_[0.5 * shape.edges, 0.0]
+    if isinstance(shape, Cylinder):
+        return fields.FRUSTUM, np.array([shape.radius, shape.radius, 0.5 * shape.length, 0.0])
+    if isinstance(shape, Frustum):
+        return fields.FRUSTUM, np.array([shape.bottom, shape.top, 0.5 * shape.length, 0.0])
+    if isinstance(shape, Torus):
+        return fields.TORUS, np.array([shape.radius, shape.tube, 0.0, 0.0])
+    if isinstance(shape, HalfSpace):
+        return fields.HALF_SPACE, np.zeros(4)
+    assert isinstance(shape, Mesh)
+    return fields.MESH, np.r_[0.5 * np.ptp(shape.vertices, axis=0), 0.0]
+
+
+class _Tables:
+    """The tables of a contact as they grow."""
+
+    def __init__(self, law: Sequence[float]) -> None:
+        assert len(law) == LAW_REALS
+        self.pairs: list[list[int]] = []
+        self.triangles: list[np.ndarray] = []
+        self.n_triangles = 0
+        self.reals: list[np.ndarray] = [np.array(law)]
+        self.n_reals = LAW_REALS
+        self.most = 1
+
+    def add_pair(self, name: str, a: Shape, b: Shape) -> None:
+        family, exchanged = pair_family(name, a, b)
+        if exchanged:
+            a, b = b, a
+        faceted = family == kernel.FACETS
+        first = self._solid(a, faceted, family == kernel.CONVEX_PLANE)
+        second = self._solid(b, faceted, False)
+        self.pairs.append([family, int(exchanged), *first, *second])
+        self.most = max(self.most, first[2] + second[2], MOST if family == kernel.BOXES else 1)
+
+    def _solid(self, shape: Shape, faceted: bool, supported: bool) -> list[int]:
+        kind, sizes = table_sizes(shape)
+        if supported:
+            sizes = reduced(kind, sizes)
+        vertices, triangles = shape.facets() if faceted else (np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+        offset = shape.offset
+        if kind == fields.MESH:
+            # the origin goes to the middle of the box that holds it
+            middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+            offset, vertices = offset + shape.axes @ middle, vertices - middle
+        weights = np.zeros(len(vertices))
+        if len(triangles):
+            a, b, c = (vertices[triangles[:, k]] for k in range(3))
+            areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+            for k in range(3):
+                np.add.at(weights, triangles[:, k], areas)
+        at, points, faces = self.n_reals, self.n_reals + kernel.SOLID_REALS, self.n_triangles
+        self._append(np.concatenate([shape.axes.ravel(), offset, sizes, vertices.ravel(), weights]))
+        self.triangles.append(triangles.ravel())
+        self.n_triangles += triangles.size
+        return [kind, at, len(vertices), points, len(triangles), faces]
+
+    def _append(self, values: np.ndarray) -> None:
+        self.reals.append(values)
+        self.n_reals += values.size
+
+    def finished(self) -> tuple[np.ndarray, np.ndarray, int]:
+        """Return integers, reals and the largest number of points of a pair."""
+        head = 1 + kernel.PAIR * len(self.pairs)
+        table = np.array(self.pairs, dtype=np.int64)
+        for solid in (2, 2 + kernel.SOLID):
+            table[:, solid + 5] += head
+        return (
+            np.concatenate([[len(self.pairs)], table.ravel(), *self.triangles]),
+            np.concatenate(self.reals),
+            self.most,
+        )

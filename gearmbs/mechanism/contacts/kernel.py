@@ -1,0 +1,124 @@
+"""The kernel of contact between solids: which points touch, and what acts there.
+
+Integers: the number of pairs, then `PAIR` for each: family, whether the first solid is J's, and both solids. A solid is
+its kind, its place in the reals (axes, origin, sizes), number of vertices, their place (coordinates, then weights),
+number of triangles, their place in the integers. Reals begin with the law.
+"""
+
+from __future__ import annotations
+
+from gearmbs._jit import njit
+from gearmbs.dae.compiled.views import matrix_at, vector_at
+from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P
+from gearmbs.mechanism.contacts import points as pt
+from gearmbs.mechanism.contacts.boxes import SCRATCH, two_boxes
+from gearmbs.mechanism.contacts.facets import join_patches, vertices_below
+from gearmbs.mechanism.contacts.loads import LAW_REALS, press, share_out
+from gearmbs.mechanism.contacts.smooth_pairs import ball_and_solid, convex_and_plane
+
+BALL_SOLID, CONVEX_PLANE, BOXES, FACETS = 0, 1, 2, 3
+"""Families of pairs."""
+SOLID = 6
+PAIR = 2 + 2 * SOLID
+SOLID_REALS = 16
+POSES = 24
+"""Scratch: poses of both solids, then origins of both markers, then that of the geometry, then the points."""
+GEOMETRY = POSES + 6
+ROWS = GEOMETRY + SCRATCH
+
+
+@njit(cache=True, error_model="numpy")
+def pose_of(frame, solid, out):
+    """Write a solid's global axes and origin from its marker's frame and its own in it."""
+    for r in range(3):
+        out[9 + r] = frame[FRAME_P + r]
+        for c in range(3):
+            out[9 + r] += frame[FRAME_A + 3 * r + c] * solid[9 + c]
+            total = 0.0
+            for q in range(3):
+                total += frame[FRAME_A + 3 * r + q] * solid[3 * q + c]
+            out[3 * r + c] = total
+
+
+@njit(cache=True, error_model="numpy")
+def points_of(ints, reals, at, frames, rows, derivatives, work):
+    """Write the points at which one pair touches; return how many rows may hold one.
+
+    Parameters
+    ----------
+    ints, reals : ndarray
+        Tables of the element.
+    at : int
+        Where the pair stands in ``ints``.
+    frames : ndarray, shape (2, 18)
+    rows : ndarray, shape (points, COLUMNS)
+        Out.
+    derivatives : bool
+    work : ndarray
+    """
+    family, first = ints[at], ints[at + 1]
+    second = 1 - first
+    a, b = at + 2, at + 2 + SOLID
+    pose_a, pose_b = vector_at(work, 0, 12), vector_at(work, 12, 12)
+    solid_a, solid_b = vector_at(reals, ints[a + 1], SOLID_REALS), vector_at(reals, ints[b + 1], SOLID_REALS)
+    pose_of(frames[first], solid_a, pose_a)
+    pose_of(frames[second], solid_b, pose_b)
+    origins = matrix_at(work, POSES, 2, 3)
+    for q in range(3):
+        origins[0, q] = frames[0, FRAME_P + q]
+        origins[1, q] = frames[1, FRAME_P + q]
+    scratch = vector_at(work, GEOMETRY, SCRATCH)
+    sizes_a, sizes_b = solid_a[12:16], solid_b[12:16]
+    if family == BOXES:
+        return two_boxes(rows, pose_a, sizes_a, pose_b, sizes_b, origins, derivatives, scratch)
+    if family == FACETS:
+        na, nb = ints[a + 2], ints[b + 2]
+        of_a = (
+            ints[a], sizes_a, pose_a, vector_at(reals, ints[a + 3], 3 * na),
+            vector_at(reals, ints[a + 3] + 3 * na, na), vector_at(ints, ints[a + 5], 3 * ints[a + 4]),
+        )  # fmt: skip
+        of_b = (
+            ints[b], sizes_b, pose_b, vector_at(reals, ints[b + 3], 3 * nb),
+            vector_at(reals, ints[b + 3] + 3 * nb, nb), vector_at(ints, ints[b + 5], 3 * ints[b + 4]),
+        )  # fmt: skip
+        vertices_below(rows, 0, 0, of_a, of_b, origins[0], origins[1], derivatives, scratch)
+        vertices_below(rows, na, 1, of_b, of_a, origins[1], origins[0], derivatives, scratch)
+        join_patches(rows, na, na + nb)
+        return _compacted(rows, na + nb)
+    row = rows[0]
+    row[pt.WEIGHT], row[pt.POOL], row[pt.SWAPPED] = 1.0, 0.0, first
+    if family == BALL_SOLID:
+        ball_and_solid(
+            row, pose_a, sizes_a[0], ints[b], sizes_b, pose_b, origins[first], origins[second], derivatives, scratch
+        )
+    else:
+        convex_and_plane(row, ints[a], sizes_a, pose_a, pose_b, origins[first], origins[second], derivatives, scratch)
+    return 1 if row[pt.DEPTH] > 0.0 else 0
+
+
+@njit(cache=True, error_model="numpy")
+def _compacted(rows, count):
+    """Move the vertices in contact to the first rows; return how many there are."""
+    kept = 0
+    for k in range(count):
+        if rows[k, pt.POOL] >= 0.0:
+            for q in range(pt.COLUMNS):
+                rows[kept, q] = rows[k, q]
+            kept += 1
+    return kept
+
+
+@njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
+def contact_of_solids(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
+    """Write the wrench of all pairs on I's body; see `gearmbs.dae.equations.force_elements`.
+
+    Diagnostics: energy stored, powers lost by damping and friction, patches, largest depth, sum of normal forces.
+    """
+    law = vector_at(reals, 0, LAW_REALS)
+    derivatives = (want & DERIVATIVES) != 0
+    rows = matrix_at(work, ROWS, (work.size - ROWS) // pt.COLUMNS, pt.COLUMNS)
+    for pair in range(ints[0]):
+        count = points_of(ints, reals, 1 + PAIR * pair, frames, rows, derivatives, work)
+        diagnostics[3] += share_out(rows, count)
+        for k in range(count):
+            press(rows, count, k, law, frames, wrench, diagnostics, jac, derivatives, vector_at(work, GEOMETRY, 36))

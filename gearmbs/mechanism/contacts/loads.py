@@ -1,0 +1,222 @@
+"""What acts at points of contact: normal laws, Coulomb friction, and the wrench with its derivatives.
+
+With n from J to I, depth d, u the velocity of I's against J's material point, d' = -n . u, u_t = u + d' n, v = |u_t|:
+
+    IMPACT     f = k d^e + c STEP(d, 0, 0, d_max, 1) d', not negative
+    POISSON    f = p d s(d'),  s = STEP(d', -v_0, r^2, v_0, 1)
+    friction   F = f n - f m(v) u_t,  m(v) = mu(v) / v
+
+mu(v) rises by STEP from -mu_s at -v_s to mu_s at v_s, and goes over to mu_d at v_d. Of several points in one patch each
+has the share w d / sum(w d) of its load. A spring that presses with p and expands with r^2 p gives back r^2 of its
+energy and r of the impulse: r is the coefficient of restitution.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearmbs._jit import njit
+from gearmbs.dae.equations.force_elements import FRAME_P, FRAME_V, FRAME_W
+from gearmbs.dae.equations.time_functions import smooth_step
+from gearmbs.mechanism.contacts import points as pt
+from gearmbs.mechanism.contacts.points import dot, turned
+
+IMPACT, POISSON = 0, 1
+LAW, STIFFNESS, EXPONENT, DAMPING, FULL_DEPTH, PENALTY, RESTITUTION, REVERSAL = 0, 1, 2, 3, 4, 5, 6, 7
+MU_STATIC, MU_DYNAMIC, STICTION, FRICTION = 8, 9, 10, 11
+"""Coefficients, and the speeds at which they are reached, m/s."""
+LAW_REALS = 12
+
+
+@njit(cache=True, error_model="numpy")
+def rise(x, width):
+    """Return STEP(x, 0, 0, width, 1) and its slope."""
+    _, value, slope, _ = smooth_step(x / width, 0)
+    return value, slope / width
+
+
+@njit(cache=True, error_model="numpy")
+def normal_force(law, depth, rate):
+    """Return the force, its slopes by depth and rate, the energy stored and the power dissipated."""
+    if law[LAW] == POISSON:
+        back = law[RESTITUTION] ** 2
+        s, slope = rise(rate + law[REVERSAL], 2.0 * law[REVERSAL])
+        gain, slope = back + (1.0 - back) * s, (1.0 - back) * slope
+        p = law[PENALTY]
+        return (
+            p * depth * gain,
+            p * gain,
+            p * depth * slope,
+            0.5 * p * back * depth**2,
+            p * depth * (gain - back) * rate,
+        )
+    spring = law[STIFFNESS] * depth ** law[EXPONENT]
+    stiff = law[STIFFNESS] * law[EXPONENT] * depth ** (law[EXPONENT] - 1.0)
+    full, slope = rise(depth, law[FULL_DEPTH])
+    stored = spring * depth / (law[EXPONENT] + 1.0)
+    force = spring + law[DAMPING] * full * rate
+    if force <= 0.0:
+        return 0.0, 0.0, 0.0, stored, -spring * rate
+    return force, stiff + law[DAMPING] * slope * rate, law[DAMPING] * full, stored, (force - spring) * rate
+
+
+@njit(cache=True, error_model="numpy")
+def friction_factor(law, speed):
+    """Return m = mu(v)/v and (dm/dv)/v."""
+    static, dynamic, stick, slip = law[MU_STATIC], law[MU_DYNAMIC], law[STICTION], law[FRICTION]
+    if static == 0.0 and dynamic == 0.0:
+        return 0.0, 0.0
+    if speed < stick:
+        return static / stick * (1.5 - 0.5 * (speed / stick) ** 2), -static / stick**3
+    s, slope = rise(speed - stick, slip - stick)
+    mu, slope = static + (dynamic - static) * s, (dynamic - static) * slope
+    return mu / speed, (slope - mu / speed) / speed**2
+
+
+@njit(cache=True, error_model="numpy")
+def share_out(rows, count):
+    """Write the share of each point in the load of its patch; return how many patches there are."""
+    patches = 0
+    for k in range(count):
+        rows[k, pt.SHARE] = 0.0
+        if rows[k, pt.POOL] < 0.0:
+            continue
+        total, first = 0.0, True
+        for m in range(count):
+            if rows[m, pt.POOL] == rows[k, pt.POOL]:
+                total += rows[m, pt.WEIGHT] * rows[m, pt.DEPTH]
+                first = first and m >= k
+        patches += first
+        rows[k, pt.SHARE] = rows[k, pt.WEIGHT] * rows[k, pt.DEPTH] / total
+    return patches
+
+
+@njit(cache=True, error_model="numpy")
+def share_slope(rows, count, k, column):
+    """Return the derivative of a point's share by one of the twelve variations of bodies I and J."""
+    total = slopes = 0.0
+    for m in range(count):
+        if rows[m, pt.POOL] == rows[k, pt.POOL]:
+            total += rows[m, pt.WEIGHT] * rows[m, pt.DEPTH]
+            slopes += rows[m, pt.WEIGHT] * rows[m, pt.D_DEPTH + (column + 6 * int(rows[m, pt.SWAPPED])) % 12]
+    own = rows[k, pt.D_DEPTH + (column + 6 * int(rows[k, pt.SWAPPED])) % 12]
+    return (rows[k, pt.WEIGHT] * own - rows[k, pt.SHARE] * slopes) / total
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_cross(a, b, out):
+    """Add a x b."""
+    out[0] += a[1] * b[2] - a[2] * b[1]
+    out[1] += a[2] * b[0] - a[0] * b[2]
+    out[2] += a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True, error_model="numpy")
+def slip(frames, place, out, work):
+    """Write the velocity of I's material point at ``place`` against that of J's."""
+    arm, spin = work[0:3], work[3:6]
+    for q in range(3):
+        out[q] = frames[0, FRAME_V + q] - frames[1, FRAME_V + q]
+    for k in range(2):
+        for q in range(3):
+            arm[q] = place[q] - frames[k, FRAME_P + q]
+            spin[q] = frames[k, FRAME_W + q] if k == 0 else -frames[k, FRAME_W + q]
+        add_cross(spin, arm, out)
+
+
+@njit(cache=True, error_model="numpy")
+def press(rows, count, k, law, frames, wrench, diagnostics, jac, derivatives, work):
+    """Add the load of one point of contact to the wrench on I's body about marker I.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (points, COLUMNS)
+    count, k : int
+        How many there are, and which one.
+    law : ndarray, shape (LAW_REALS,)
+    frames : ndarray, shape (2, 18)
+        Of markers I and J.
+    wrench, diagnostics : ndarray, shape (1, 6), (6,)
+        Added to.
+    jac : ndarray, shape (6, 24)
+        Added to, if ``derivatives``.
+    derivatives : bool
+    work : ndarray, shape (36,)
+        Scratch.
+    """
+    row = rows[k]
+    share, depth = row[pt.SHARE], row[pt.DEPTH]
+    place, n, u, arm, force = row[0:3], work[6:9], work[9:12], work[12:15], work[15:18]
+    sign = -1.0 if row[pt.SWAPPED] != 0.0 else 1.0
+    for q in range(3):
+        n[q] = sign * row[pt.NORMAL + q]
+        arm[q] = place[q] - frames[0, FRAME_P + q]
+    slip(frames, place, u, work)
+    rate = -dot(n, u)
+    for q in range(3):
+        u[q] += rate * n[q]
+    speed = np.sqrt(dot(u, u))
+    f, f_depth, f_rate, stored, lost = normal_force(law, depth, rate)
+    m, m_square = friction_factor(law, speed)
+    for q in range(3):
+        force[q] = share * f * (n[q] - m * u[q])
+        wrench[0, q] += force[q]
+    add_cross(arm, force, wrench[0, 3:6])
+    diagnostics[0] += share * stored
+    diagnostics[1] += share * lost
+    diagnostics[2] += share * f * m * speed**2
+    diagnostics[4] = max(diagnostics[4], depth)
+    diagnostics[5] += share * f
+    if not derivatives:
+        return
+    dp, dn, du, df, moment = work[18:21], work[21:24], work[24:27], work[27:30], work[30:33]
+    for c in range(24):
+        body, part = c // 12, c % 12
+        d_depth = d_share = 0.0
+        dp[0] = dp[1] = dp[2] = dn[0] = dn[1] = dn[2] = du[0] = du[1] = du[2] = 0.0
+        if part < 6:
+            column = (part + 6 * body + (6 if sign < 0.0 else 0)) % 12
+            d_depth = row[pt.D_DEPTH + column]
+            d_share = share_slope(rows, count, k, part + 6 * body) if share < 1.0 else 0.0
+            for q in range(3):
+                dp[q] = row[pt.D_PLACE + 12 * q + column]
+                dn[q] = sign * row[pt.D_NORMAL + 12 * q + column]
+            _slip_by_place(frames, dp, du, body, part, work)
+        elif part < 9:
+            du[part - 6] = 1.0 if body == 0 else -1.0
+        else:
+            for q in range(3):
+                moment[q] = place[q] - frames[body, FRAME_P + q]
+            turned(part - 9, moment, du)
+            if body == 1:
+                for q in range(3):
+                    du[q] = -du[q]
+        # u in full is u_t - rate n
+        d_rate = -dot(n, du) - dot(u, dn) + rate * dot(n, dn)
+        for q in range(3):
+            du[q] += d_rate * n[q] + rate * dn[q]
+        d_force = d_share * f + share * (f_depth * d_depth + f_rate * d_rate)
+        d_m = m_square * dot(u, du)
+        for q in range(3):
+            df[q] = d_force * (n[q] - m * u[q]) + share * f * (dn[q] - d_m * u[q] - m * du[q])
+            jac[q, c] += df[q]
+        if c < 3:
+            dp[c] -= 1.0
+        moment[0] = moment[1] = moment[2] = 0.0
+        add_cross(dp, force, moment)
+        add_cross(arm, df, moment)
+        for q in range(3):
+            jac[3 + q, c] += moment[q]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _slip_by_place(frames, dp, du, body, part, work):
+    """Write the change of the slip with the place of the point and the origin of a marker."""
+    arm, spin = work[0:3], work[3:6]
+    for k in range(2):
+        for q in range(3):
+            arm[q] = dp[q]
+            spin[q] = frames[k, FRAME_W + q] if k == 0 else -frames[k, FRAME_W + q]
+        if k == body and part < 3:
+            arm[part] -= 1.0
+        add_cross(spin, arm, du)

@@ -1,0 +1,297 @@
+"""Solids that touch: their sizes, and where they sit in a marker's frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gearmbs.dae.errors import ModelError
+from gearmbs.mechanism.quantities import quantity
+
+SEGMENTS = 48
+"""Around a solid of revolution that is cut into triangles."""
+LEVELS = 24
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Shape:
+    """A solid in the frame of a marker.
+
+    Attributes
+    ----------
+    offset : array_like, shape (3,)
+        Its origin in the marker's frame, m.
+    axes : array_like, shape (3, 3)
+        Its axes there, as columns.
+    """
+
+    kind: ClassVar[str] = ""
+    lengths: ClassVar[tuple[str, ...]] = ()
+    """Fields that are lengths: numbers in m or texts with a unit."""
+    may_vanish: ClassVar[tuple[str, ...]] = ()
+    offset: Any = (0.0, 0.0, 0.0)
+    axes: Any = field(default_factory=lambda: np.eye(3))
+
+    def __post_init__(self) -> None:
+        for name in self.lengths:
+            value = quantity(getattr(self, name), "length", f"{self.kind}: {name}")
+            if not value > 0.0 and not (value == 0.0 and name in self.may_vanish):
+                raise ModelError(f"{self.kind}: {name} = {value} m; it must be positive")
+            object.__setattr__(self, name, value)
+        axes = np.asarray(self.axes, dtype=float)
+        if axes.shape != (3, 3) or not np.allclose(axes.T @ axes, np.eye(3), atol=1e-9) or np.linalg.det(axes) < 0.0:
+            raise ModelError(f"{self.kind}: axes must be a rotation matrix")
+        object.__setattr__(self, "axes", axes)
+        object.__setattr__(self, "offset", np.asarray(self.offset, dtype=float).reshape(3))
+
+    def facets(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return vertices, shape (n, 3), m, and triangles, shape (m, 3), anticlockwise seen from outside."""
+        return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere(Shape):
+    """A ball about the origin; a point if the radius is 0."""
+
+    kind: ClassVar[str] = "sphere"
+    lengths: ClassVar[tuple[str, ...]] = ("radius",)
+    may_vanish: ClassVar[tuple[str, ...]] = ("radius",)
+    radius: Any
+
+    def facets(self) -> tuple[np.ndarray, np.ndarray]:
+        angles = np.linspace(-np.pi / 2, np.pi / 2, LEVELS + 1)
+        return revolved(self.radius * np.cos(angles), self.radius * np.sin(angles))
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipsoid(Shape):
+    """An ellipsoid about the origin with semi-axes along x, y and z, m."""
+
+    kind: ClassVar[str] = "ellipsoid"
+    semi_axes: Any
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "semi_axes", positive_lengths("ellipsoid: semi_axes", self.semi_axes))
+
+    def facets(self) -> tuple[np.ndarray, np.ndarray]:
+        vertices, triangles = Sphere(1.0).facets()
+        return vertices * self.semi_axes, triangles
+
+
+@dataclass(frozen=True, eq=False)
+class Box(Shape):
+    """A box about the origin with edges along x, y and z, m."""
+
+    kind: ClassVar[str] = "box"
+    edges: Any
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "edges", positive_lengths("box: edges", self.edges))
+
+    def facets(self) -> tuple[np.ndarray, np.ndarray]:
+        signs = np.array([[x, y, z] for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)], dtype=float)
+        quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+        return 0.5 * signs * self.edges, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
+
+
+@dataclass(frozen=True, eq=False)
+class Frustum(Shape):
+    """A cone cut off, about z: radius ``bottom`` at z = -length/2, ``top`` at z = length/2, m; one may be 0."""
+
+    kind: ClassVar[str] = "frustum"
+    lengths: ClassVar[tuple[str, ...]] = ("bottom", "top", "length")
+    may_vanish: ClassVar[tuple[str, ...]] = ("bottom", "top")
+    bottom: Any
+    top: Any
+    length: Any
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.bottom == 0.0 and self.top == 0.0:
+            raise ModelError(f"{self.kind}: both radii are zero; one must be positive")
+
+    def facets(self) -> tuple[np.ndarray, np.ndarray]:
+        z = np.linspace(-0.5, 0.5, LEVELS + 1)
+        r = self.bottom + (self.top - self.bottom) * (z + 0.5)
+        return revolved(np.r_[0.0, r, 0.0], self.length * np.r_[-0.5, z, 0.5])
+
+
+@dataclass(frozen=True, eq=False)
+class Cylinder(Shape):
+    """A cylinder about z, from z = -length/2 to length/2, m."""
+
+    kind: ClassVar[str] = "cylinder"
+    lengths: ClassVar[tuple[str, ...]] = ("radius", "length")
+    radius: Any
+    length: Any
+
+    def facets(self) -> tuple[np.ndarray, np.ndarray]:
+        return Frustum(self.radius, self.radius, self.length).facets()
+
+
+@dataclass(frozen=True, eq=False)
+class Torus(Shape):
+    """A torus about z: a tube of radius ``tube`` around a circle of ``radius``, m."""
+
+    kind: ClassVar[str] = "torus"
+    lengths: ClassVar[tuple[str, ...]] = ("radius", "tube")
+    radius: Any
+    tube: Any
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.tube >= self.radius:
+            raise ModelError(f"torus: tube = {self.tube} m; it must be thinner than the radius, {self.radius} m")
+
+    def facets(self) -> tuple[np.ndarray, np.ndarray]:
+        angles = np.linspace(-np.pi, np.pi, LEVELS, endpoint=False)
+        return revolved(self.radius + self.tube * np.cos(angles), self.tube * np.sin(angles), closed=True)
+
+
+@dataclass(frozen=True, eq=False)
+class HalfSpace(Shape):
+    """All below z = 0."""
+
+    kind: ClassVar[str] = "plane"
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh(Shape):
+    """A closed surface of triangles, whose vertices are seen anticlockwise from outside.
+
+    Attributes
+    ----------
+    vertices : array_like, shape (n, 3)
+        m.
+    triangles : array_like of int, shape (m, 3)
+    """
+
+    kind: ClassVar[str] = "mesh"
+    vertices: Any
+    triangles: Any
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        vertices = np.asarray(self.vertices, dtype=float).reshape(-1, 3)
+        triangles = np.asarray(self.triangles, dtype=np.int64).reshape(-1, 3)
+        if len(triangles) < 4:
+            raise ModelError(f"mesh: {len(triangles)} triangles; a solid has at least four")
+        if triangles.min() < 0 or triangles.max() >= len(vertices) or not np.isfinite(vertices).all():
+            raise ModelError("mesh: triangles must name vertices by their number, from 0 on, and vertices be finite")
+        vertices, triangles = merged(vertices, triangles)
+        edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+        _, uses = np.unique(edges, axis=0, return_counts=True)
+        if np.any(uses % 2):
+            raise ModelError(f"mesh: {np.sum(uses % 2)} edges belong to one triangle only; a solid's surface is closed")
+        if volume(vertices, triangles) < 0.0:
+            triangles = triangles[:, ::-1].copy()
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "triangles", triangles)
+
+    def facets(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.vertices, self.triangles
+
+
+def positive_lengths(label: str, values: Any) -> np.ndarray:
+    """Return three lengths, m, given as numbers or texts with units.
+
+    Raises
+    ------
+    ModelError
+    """
+    if isinstance(values, str) or not isinstance(values, (Sequence, np.ndarray)) or len(values) != 3:
+        raise ModelError(f"{label} = {values!r}; give three lengths, along x, y and z")
+    found = np.array([quantity(v, "length", label) for v in values])
+    if not np.all(found > 0.0):
+        raise ModelError(f"{label} = {tuple(values)}; all must be positive")
+    return found
+
+
+def volume(vertices: np.ndarray, triangles: np.ndarray) -> float:
+    """Return the volume a surface encloses, negative if its triangles are seen clockwise."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
+
+def merged(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return a mesh whose coincident vertices are one and whose triangles have an area."""
+    size = float(np.ptp(vertices, axis=0).max())
+    _, first, back = np.unique(np.round(vertices / (1e-9 * size)), axis=0, return_index=True, return_inverse=True)
+    triangles = back.reshape(-1)[triangles]
+    a, b, c = triangles.T
+    return vertices[first], triangles[(a != b) & (b != c) & (c != a)]
+
+
+def revolved(radii: np.ndarray, z: np.ndarray, closed: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Return the facets of a profile, from below to above, turned about z; ``closed`` joins its end to its start."""
+    phi = 2.0 * np.pi * np.arange(SEGMENTS) / SEGMENTS
+    n = len(radii)
+    vertices = np.stack([np.outer(radii, np.cos(phi)), np.outer(radii, np.sin(phi)), np.outer(z, np.ones(SEGMENTS))])
+    triangles = []
+    for k in range(n if closed else n - 1):
+        for m in range(SEGMENTS):
+            a, b = k * SEGMENTS + m, k * SEGMENTS + (m + 1) % SEGMENTS
+            c, d = (k + 1) % n * SEGMENTS + m, (k + 1) % n * SEGMENTS + (m + 1) % SEGMENTS
+            triangles += [(a, b, d), (a, d, c)]
+    return merged(vertices.transpose(1, 2, 0).reshape(-1, 3), np.array(triangles))
+
+
+def extruded(profile: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the facets of a closed profile in the xy plane, shape (n, 2), drawn out along z.
+
+    Raises
+    ------
+    ModelError
+        If the profile crosses itself.
+    """
+    if np.allclose(profile[0], profile[-1]):
+        profile = profile[:-1]
+    x, y = profile.T
+    if np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) < 0.0:
+        profile = profile[::-1]
+    n = len(profile)
+    low = np.column_stack([profile, np.zeros(n)])
+    vertices = np.concatenate([low, low + (0.0, 0.0, length)])
+    caps = ears(profile)
+    triangles = [(c, b, a) for a, b, c in caps] + [(a + n, b + n, c + n) for a, b, c in caps]
+    for k in range(n):
+        m = (k + 1) % n
+        triangles += [(k, m, m + n), (k, m + n, k + n)]
+    return vertices, np.array(triangles)
+
+
+def ears(profile: np.ndarray) -> list[tuple[int, int, int]]:
+    """Cut a simple polygon, anticlockwise, into triangles, one ear after the other.
+
+    Raises
+    ------
+    ModelError
+        If no ear is left, as where the polygon crosses itself.
+    """
+    left, found = list(range(len(profile))), []
+
+    def area(a: int, b: int, c: int) -> float:
+        (ax, ay), (bx, by), (cx, cy) = profile[a], profile[b], profile[c]
+        return float((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
+
+    def is_ear(a: int, b: int, c: int) -> bool:
+        if area(a, b, c) <= 0.0:
+            return False
+        others = (p for p in left if p not in (a, b, c))
+        return not any(area(a, b, p) >= 0.0 and area(b, c, p) >= 0.0 and area(c, a, p) >= 0.0 for p in others)
+
+    while len(left) > 2:
+        for k in range(len(left)):
+            corner = (left[k - 1], left[k], left[(k + 1) % len(left)])
+            if is_ear(*corner):
+                found.append(corner)
+                del left[k]
+                break
+        else:
+            raise ModelError("extrusion: its profile crosses itself or holds points twice")
+    return found
