@@ -121,10 +121,10 @@ def test_what_a_script_cannot_do_is_named_with_its_line(commands, line, message)
 
 
 def test_unsupported_parts_stop_the_run_unless_allowed():
-    deck = parse_deck(PENDULUM.replace("OUTPUT/", "CONTACT/1, IGEOM=1, JGEOM=2\nSENSOR/1, VALUE=1\nOUTPUT/"))
-    with pytest.raises(DeckError, match="CONTACT/1 is not supported") as caught:
+    deck = parse_deck(PENDULUM.replace("OUTPUT/", "TIRE/1, J=1\nCLEARANCE/1, I=1\nOUTPUT/"))
+    with pytest.raises(DeckError, match="TIRE/1 is not supported") as caught:
         run_deck(deck, end=0.1)
     assert len(caught.value.diagnostics) == 2
     result = run_deck(deck, end=0.1, steps=2, allow_unsupported=True)
     assert result.success
-    assert "CONTACT/1 is not supported" in message_text(result)
+    assert "TIRE/1 is not supported" in message_text(result)
