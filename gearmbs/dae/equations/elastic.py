@@ -24,19 +24,33 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.views import matrix_at
+from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3, dot3
 from gearmbs.dae.equations.entries import put, put_pair
-from gearmbs.dae.equations.modal_inertia import to_global
-from gearmbs.dae.equations.rotation import KIN_A, KIN_ADOT, KIN_AXES, KIN_DW, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.modal_inertia import to_body, to_global
+from gearmbs.dae.equations.rotation import (
+    KIN_A,
+    KIN_ADOT,
+    KIN_AXES,
+    KIN_DW,
+    KIN_FORCE,
+    KIN_MOMENT,
+    KIN_R,
+    KIN_SHIFT,
+    KIN_TURN,
+    KIN_V,
+    KIN_W,
+)
 
 DP = 0
 """Columns of the table of partial derivatives, a row for each angle and mode: P_c, X_c, then those of V and W."""
 DX = 3
 DV = 6
 DW = 9
-PARTIALS = 12
+DB = 12
+"""X_c of a mode in body components."""
+PARTIALS = 15
 BIAS = 6
 """After the rows: the accelerations of P and of the rotation without those of the coordinates."""
 
@@ -77,31 +91,78 @@ def partials(f, at, partial):
     return matrix_at(partial, at[f, T.AT_PARTIAL], 3 + at[f, T.AT_MODES], PARTIALS)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def turn_about(a, k, axis, i, angle):
-    """Turn the columns of the row-major matrix ``a[k:k+9]`` by the global vector ``axis[i:i+3]`` times ``angle``."""
-    x, y, z = axis[i] * angle, axis[i + 1] * angle, axis[i + 2] * angle
-    square = x * x + y * y + z * z
-    if square == 0.0:
-        return
-    if square < SMALL_TURN**2:
-        # sin t / t and (1 - cos t) / t^2
-        first = 1.0 - square * (1.0 / 6.0 - square / 120.0)
-        second = 0.5 - square * (1.0 / 24.0 - square / 720.0)
-    else:
-        turn = np.sqrt(square)
-        first, second = np.sin(turn) / turn, (1.0 - np.cos(turn)) / square
-    for j in range(k, k + 3):
-        vx, vy, vz = a[j], a[j + 3], a[j + 6]
-        along = second * (x * vx + y * vy + z * vz)
-        rest = 1.0 - second * square
-        a[j] = rest * vx + first * (y * vz - z * vy) + along * x
-        a[j + 3] = rest * vy + first * (z * vx - x * vz) + along * y
-        a[j + 6] = rest * vz + first * (x * vy - y * vx) + along * z
+@njit(cache=True, error_model="numpy")
+def deform(n, q, v, y, shape, modal, axes, partial, s):
+    """Write where a marker has moved in its body, and the modes' axes of rotation X_k in body components.
+
+    The turns E_1 E_2 .. E_n are composed as Euler parameters.
+
+    Parameters
+    ----------
+    n, q, v : int
+        Number of modes, and where the coordinates and their rates are in y.
+    y
+        Unknowns.
+    shape, modal : int, ndarray
+        Place of the marker's shapes, and the table they are in.
+    axes, partial : int, ndarray
+        Place of the first mode's ``DB``, and the table of partial derivatives.
+    s : ndarray
+        Written: arm in ``s[0:3]``, its rate in ``s[3:6]``, the modes' angular velocity in ``s[6:9]``, E_1 E_2 .. E_n by
+        rows in ``s[9:18]``; body components.
+    """
+    x, y_, z = modal[shape], modal[shape + 1], modal[shape + 2]
+    vx = vy = vz = wx = wy = wz = 0.0
+    e0, e1, e2, e3 = 1.0, 0.0, 0.0, 0.0
+    for k in range(n):
+        amount, rate, p, b = y[q + k], y[v + k], shape + 3 + 3 * k, axes + PARTIALS * k
+        x += modal[p] * amount
+        y_ += modal[p + 1] * amount
+        z += modal[p + 2] * amount
+        vx += modal[p] * rate
+        vy += modal[p + 1] * rate
+        vz += modal[p + 2] * rate
+        p += 3 * n
+        px, py, pz = modal[p], modal[p + 1], modal[p + 2]
+        if px == 0.0 and py == 0.0 and pz == 0.0:
+            partial[b] = partial[b + 1] = partial[b + 2] = 0.0
+            continue
+        cx, cy, cz = 2.0 * (e2 * pz - e3 * py), 2.0 * (e3 * px - e1 * pz), 2.0 * (e1 * py - e2 * px)
+        bx = px + e0 * cx + e2 * cz - e3 * cy
+        by = py + e0 * cy + e3 * cx - e1 * cz
+        bz = pz + e0 * cz + e1 * cy - e2 * cx
+        partial[b], partial[b + 1], partial[b + 2] = bx, by, bz
+        wx += bx * rate
+        wy += by * rate
+        wz += bz * rate
+        half = 0.5 * amount
+        square = half * half * (px * px + py * py + pz * pz)
+        if square < SMALL_TURN**2:
+            sine, cosine = 1.0 - square * (1.0 / 6.0 - square / 120.0), 1.0 - square * (0.5 - square / 24.0)
+        else:
+            turn = np.sqrt(square)
+            sine, cosine = np.sin(turn) / turn, np.cos(turn)
+        half *= sine
+        px, py, pz = half * px, half * py, half * pz
+        e0, e1, e2, e3 = (
+            e0 * cosine - e1 * px - e2 * py - e3 * pz,
+            e0 * px + e1 * cosine + e2 * pz - e3 * py,
+            e0 * py - e1 * pz + e2 * cosine + e3 * px,
+            e0 * pz + e1 * py - e2 * px + e3 * cosine,
+        )
+    s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8] = x, y_, z, vx, vy, vz, wx, wy, wz
+    s[9], s[13], s[17] = (
+        1.0 - 2.0 * (e2 * e2 + e3 * e3),
+        1.0 - 2.0 * (e1 * e1 + e3 * e3),
+        1.0 - 2.0 * (e1 * e1 + e2 * e2),
+    )
+    s[10], s[12] = 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e2 + e0 * e3)
+    s[11], s[15] = 2.0 * (e1 * e3 + e0 * e2), 2.0 * (e1 * e3 - e0 * e2)
+    s[14], s[16] = 2.0 * (e2 * e3 - e0 * e1), 2.0 * (e2 * e3 + e0 * e1)
 
 
 @njit(cache=True, error_model="numpy")
-def update_frame(f, y, at, modal, kin, partial, derivatives):
+def update_frame(f, y, at, modal, kin, partial, scratch, derivatives):
     """Fill the row of elastic frame f in the kinematics table and its partial derivatives.
 
     Parameters
@@ -112,40 +173,37 @@ def update_frame(f, y, at, modal, kin, partial, derivatives):
         Places of the unknowns; shapes: s0, then phi_k, then psi_k.
     kin, partial : ndarray
         Kinematics table, in which the body's row is up to date; table of partial derivatives.
+    scratch : ndarray
+        36 places.
     derivatives : bool
-        Whether the derivatives of the velocities and the accelerations are wanted: the residual needs neither.
+        Whether the partial derivatives are wanted: the residual needs none but ``DB``.
     """
-    n, shape, q, v = at[f, T.AT_MODES], at[f, T.AT_SHAPE], at[f, T.AT_QF], at[f, T.AT_VF]
-    body, row = kin[at[f, T.AT_BODY]], kin[f]
-    d = partials(f, at, partial)
-    s = np.zeros(18)
-    # s[0:3] arm, s[3:6] its elastic rate, s[6:9] the modes' angular velocity
+    n, q, v = at[f, T.AT_MODES], at[f, T.AT_QF], at[f, T.AT_VF]
+    body, row, s, own = kin[at[f, T.AT_BODY]], kin[f], vector_at(scratch, 0, 18), vector_at(scratch, 18, 18)
+    deform(n, q, v, y, at[f, T.AT_SHAPE], modal, at[f, T.AT_PARTIAL] + 3 * PARTIALS + DB, partial, own)
     for c in range(3):
-        s[9 + c] = modal[shape + c]
-        for k in range(n):
-            s[9 + c] += modal[shape + 3 + 3 * k + c] * y[q + k]
-    to_global(body, s, 9, s, 0)
-    for c in range(9):
-        row[KIN_A + c] = body[KIN_A + c]
-    for k in range(n):
-        to_global(body, modal, shape + 3 + 3 * k, d[3 + k], DP)
-        to_global(row, modal, shape + 3 + 3 * n + 3 * k, d[3 + k], DX)
-        turn_about(row, KIN_A, d[3 + k], DX, y[q + k])
-        for c in range(3):
-            s[3 + c] += d[3 + k, DP + c] * y[v + k]
-            s[6 + c] += d[3 + k, DX + c] * y[v + k]
+        a = KIN_A + 3 * c
+        x, y_, z = body[a], body[a + 1], body[a + 2]
+        for j in range(3):
+            row[a + j] = x * own[9 + j] + y_ * own[12 + j] + z * own[15 + j]
+            s[3 * j + c] = x * own[3 * j] + y_ * own[3 * j + 1] + z * own[3 * j + 2]
+    # s[0:3] arm, s[3:6] its elastic rate, s[6:9] the modes' angular velocity
     cross3(body, KIN_W, s, 0, s, 9)
     for c in range(3):
         row[KIN_R + c] = body[KIN_R + c] + s[c]
         row[KIN_V + c] = body[KIN_V + c] + s[9 + c] + s[3 + c]
         row[KIN_W + c] = body[KIN_W + c] + s[6 + c]
-    for c in range(3):
-        a = KIN_AXES + 3 * c
-        cross3(body, a, s, 0, d[c], DP)
-        for m in range(3):
-            d[c, DX + m] = body[a + m]
     own_axes(row)
     if derivatives:
+        d = partials(f, at, partial)
+        for k in range(n):
+            to_global(body, modal, at[f, T.AT_SHAPE] + 3 + 3 * k, d[3 + k], DP)
+            to_global(body, d[3 + k], DB, d[3 + k], DX)
+        for c in range(3):
+            a = KIN_AXES + 3 * c
+            cross3(body, a, s, 0, d[c], DP)
+            for m in range(3):
+                d[c, DX + m] = body[a + m]
         update_rates(n, v, y, body, d, s)
         bias(f, n, v, y, at, body, partial, d, s)
 
@@ -308,29 +366,6 @@ def curvature(b, i, j, g, k, at, partial, s):
 
 
 # --- constraint rows ----------------------------------------------------------------------------------
-
-
-@njit(cache=True, error_model="numpy")
-def add_row_forces(frames, n_frames, g, lam, mu, at, partial, out):
-    """Add lambda Phi_q to the force rows and subtract mu Phi_q from the kinematic ones.
-
-    Parameters
-    ----------
-    frames, n_frames : ndarray of int, int
-        The frames the row depends on.
-    g : ndarray
-        Gradient by their own coordinates, six each.
-    """
-    t = np.empty(6)
-    for a in range(n_frames):
-        b = frames[a]
-        for i in range(coordinates(b, at)):
-            direction(b, i, at, partial, t, 0)
-            slope = 0.0
-            for c in range(6):
-                slope += g[6 * a + c] * t[c]
-            out[place(b, i, FORCE, at)] += lam * slope
-            out[place(b, i, POSITION, at)] -= mu * slope
 
 
 @njit(cache=True, error_model="numpy")
@@ -505,13 +540,29 @@ def load_at(f, sign, row, y, marker_body, kin, frame, s):
 
 
 @njit(cache=True, error_model="numpy")
-def add_frame_load(f, s, at, partial, out):
-    """Subtract the generalised forces of force ``s[3:6]`` and moment ``s[6:9]`` at elastic frame f."""
-    for c in range(3):
-        out[at[f, T.AT_U] + c] -= s[3 + c]
-    d = partials(f, at, partial)
-    for i in range(3, coordinates(f, at)):
-        out[place(f, i, FORCE, at)] -= dot3(d[i - 3], DP, s, 3) + dot3(d[i - 3], DX, s, 6)
+def bring_to_body(f, at, modal, kin, partial, scratch, out):
+    """Bring the forces added up for elastic frame f to its body and to the modes: eq. (5), and mu in eq. (6)."""
+    row, body, n = kin[f], kin[at[f, T.AT_BODY]], at[f, T.AT_MODES]
+    x, y, z = row[KIN_R] - body[KIN_R], row[KIN_R + 1] - body[KIN_R + 1], row[KIN_R + 2] - body[KIN_R + 2]
+    shape, axes = at[f, T.AT_SHAPE] + 3, at[f, T.AT_PARTIAL] + 3 * PARTIALS + DB
+    s = vector_at(scratch, 0, 6)
+    for pair in range(2):
+        # forces with moments, then mu's displacements with its rotations
+        along, about = (KIN_FORCE, KIN_MOMENT) if pair == 0 else (KIN_SHIFT, KIN_TURN)
+        first, sign = (at[f, T.AT_PF], 1.0) if pair == 0 else (at[f, T.AT_QF], -1.0)
+        for c in range(3):
+            body[along + c] += row[along + c]
+            body[about + c] += row[about + c]
+        body[about] += y * row[along + 2] - z * row[along + 1]
+        body[about + 1] += z * row[along] - x * row[along + 2]
+        body[about + 2] += x * row[along + 1] - y * row[along]
+        to_body(body, row, along, s, 0)
+        to_body(body, row, about, s, 3)
+        fx, fy, fz, tx, ty, tz = sign * s[0], sign * s[1], sign * s[2], sign * s[3], sign * s[4], sign * s[5]
+        for k in range(n):
+            p, b = shape + 3 * k, axes + PARTIALS * k
+            push = modal[p] * fx + modal[p + 1] * fy + modal[p + 2] * fz
+            out[first + k] += push + partial[b] * tx + partial[b + 1] * ty + partial[b + 2] * tz
 
 
 @njit(cache=True, error_model="numpy")

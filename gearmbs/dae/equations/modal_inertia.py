@@ -80,6 +80,8 @@ class ModalInertia:
         """Return the numbers as the kernels read them, see `integrals`; ``inertia`` is that of the undeformed body.
 
         What is summed over modes l stands in one row for each, the other mode last, so that the sums are of whole rows.
+        Where most integrals vanish by symmetry, those that do not are listed as well: their places in the present
+        state, the modes l, their values; first those of J2 and C1_lk, then those of C1_kl.
         """
         n = self.modes
         rows, columns = np.array(SYMMETRIC).T
@@ -89,11 +91,26 @@ class ModalInertia:
         turned = np.moveaxis(self.c1, (0, 1, 2), (2, 0, 1)).reshape(n, -1)
         parts = (self.mass, self.stiffness, self.damping)
         apart = all(np.array_equal(part, np.diag(np.diag(part))) for part in parts)
-        head = np.concatenate([inertia.ravel(), [float(apart)], first.ravel(), self.c0.T.ravel()])
-        return np.concatenate(
-            [head, np.hstack([second, coupling]).ravel(), turned.ravel(), *(np.ravel(x) for x in parts)]
-        )
+        rows = np.hstack([second, coupling])
+        lists = [_listed(rows, 0), _listed(turned, 9 * n)]
+        if sum(len(part) for part in lists) > LISTED * (rows.size + turned.size):
+            lists = [np.empty((0, 3))] * 2
+        head = [float(apart), *(float(len(part)) for part in lists)]
+        pieces = (inertia, head, first, self.c0.T, rows, turned, *parts, *lists)
+        return np.concatenate([np.ravel(piece) for piece in pieces])
 
+
+def _listed(rows: np.ndarray, first: int) -> np.ndarray:
+    """Return place, row and value of each entry that is not zero; the places begin with ``first``."""
+    l, k = np.nonzero(rows)
+    return np.column_stack([first + k, l, rows[l, k]])
+
+
+LISTED = 0.25
+"""Share of integrals that do not vanish up to which they are taken one by one."""
+
+HEAD = 12
+"""Numbers before the integrals: J0, whether M, K and D are diagonal, the lengths of both lists."""
 
 SYMMETRIC = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 """Entries of a symmetric matrix in the order in which they are stored."""
@@ -113,8 +130,8 @@ def integrals(modal, at, n):
 
     Returns
     -------
-    j0 : ndarray, shape (10,)
-        J0, and 1 if M, K and D are diagonal.
+    j0 : ndarray, shape (HEAD,)
+        J0, 1 if M, K and D are diagonal, and the lengths of the lists.
     first : ndarray, shape (9 n,)
         J1 (entries of `SYMMETRIC`, then modes) and C0.
     second : ndarray, shape (n, 9 n)
@@ -123,12 +140,12 @@ def integrals(modal, at, n):
         C1_kl, a row for each l.
     mass, stiffness, damping : ndarray, shape (n, n)
     """
-    first = at + 10
+    first = at + HEAD
     second = first + 9 * n
     turned = second + 9 * n * n
     m = turned + 3 * n * n
     return (
-        vector_at(modal, at, 10),
+        vector_at(modal, at, HEAD),
         vector_at(modal, first, 9 * n),
         matrix_at(modal, second, n, 9 * n),
         matrix_at(modal, turned, n, 3 * n),
@@ -152,6 +169,17 @@ def to_body(kin_row, v, i, out, k):
         out[k + c] = kin_row[KIN_A + c] * x + kin_row[KIN_A + 3 + c] * y + kin_row[KIN_A + 6 + c] * z
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def spin_in_body(kin_row):
+    """Return the body components of the angular velocity."""
+    x, y, z = kin_row[KIN_W], kin_row[KIN_W + 1], kin_row[KIN_W + 2]
+    return (
+        kin_row[KIN_A] * x + kin_row[KIN_A + 3] * y + kin_row[KIN_A + 6] * z,
+        kin_row[KIN_A + 1] * x + kin_row[KIN_A + 4] * y + kin_row[KIN_A + 7] * z,
+        kin_row[KIN_A + 2] * x + kin_row[KIN_A + 5] * y + kin_row[KIN_A + 8] * z,
+    )
+
+
 @njit(cache=True, error_model="numpy")
 def to_global(kin_row, v, i, out, k):
     """Write the global components of the vector ``v[i:i+3]`` given in body components to ``out[k:k+3]``."""
@@ -159,6 +187,28 @@ def to_global(kin_row, v, i, out, k):
     for c in range(3):
         a = KIN_A + 3 * c
         out[k + c] = kin_row[a] * x + kin_row[a + 1] * y + kin_row[a + 2] * z
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_listed(y, q, v, listed, turns, entries, state):
+    """Add what the integrals that are listed one by one give to the present state of a body.
+
+    Parameters
+    ----------
+    y
+        Unknowns.
+    q, v : int
+        Places of the modal coordinates and velocities.
+    listed, turns : int
+        Numbers of entries to be multiplied by the coordinates, then by the velocities.
+    entries : ndarray, shape (listed + turns, 3)
+        See `ModalInertia.table`.
+    state : ndarray
+        Of `present`, as one vector.
+    """
+    for e in range(listed + turns):
+        first = q if e < listed else v
+        state[int(entries[e, 0])] += y[first + int(entries[e, 1])] * entries[e, 2]
 
 
 @njit(cache=True, error_model="numpy")
@@ -171,13 +221,18 @@ def update_inertia(y, at, modal, partial, body_row):
         both[k] = first[k]
     for k in range(3 * n):
         gyro[k] = 0.0
-    for l in range(n):
-        amount, rate = y[q + l], y[v + l]
-        row, other = second[l], turned[l]
-        for k in range(9 * n):
-            both[k] += amount * row[k]
-        for k in range(3 * n):
-            gyro[k] += rate * other[k]
+    listed, turns = int(j0[10]), int(j0[11])
+    if listed + turns > 0:
+        entries = matrix_at(modal, at[T.AT_MODAL] + HEAD + 9 * n + 15 * n * n, listed + turns, 3)
+        add_listed(y, q, v, listed, turns, entries, vector_at(partial, place, 12 * n))
+    else:
+        for l in range(n):
+            amount, rate = y[q + l], y[v + l]
+            row, other = second[l], turned[l]
+            for k in range(9 * n):
+                both[k] += amount * row[k]
+            for k in range(3 * n):
+                gyro[k] += rate * other[k]
     i = 0
     for r in range(3):
         for c in range(r, 3):
@@ -204,13 +259,15 @@ def add_momentum(y, at, partial, kin_row):
     """Add sum_k H_k v_k to the angular momentum h of the body's row."""
     n, v = at[T.AT_MODES], at[T.AT_VF]
     _, h, _ = present(partial, at[T.AT_PARTIAL], n)
-    s = np.zeros(6)
+    x = y_ = z = 0.0
+    for k in range(n):
+        rate = y[v + k]
+        x += h[0, k] * rate
+        y_ += h[1, k] * rate
+        z += h[2, k] * rate
     for c in range(3):
-        for k in range(n):
-            s[c] += h[c, k] * y[v + k]
-    to_global(kin_row, s, 0, s, 3)
-    for c in range(3):
-        kin_row[KIN_H + c] += s[3 + c]
+        a = KIN_A + 3 * c
+        kin_row[KIN_H + c] += kin_row[a] * x + kin_row[a + 1] * y_ + kin_row[a + 2] * z
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -230,10 +287,9 @@ def set_modal_momenta(y, at, modal, partial, kin_row):
     n = at[T.AT_MODES]
     j0, _, _, _, mass, _, _ = integrals(modal, at[T.AT_MODAL], n)
     _, h, _ = present(partial, at[T.AT_PARTIAL], n)
-    s = np.empty(3)
-    to_body(kin_row, kin_row, KIN_W, s, 0)
+    wx, wy, wz = spin_in_body(kin_row)
     for k in range(n):
-        turning = h[0, k] * s[0] + h[1, k] * s[1] + h[2, k] * s[2]
+        turning = h[0, k] * wx + h[1, k] * wy + h[2, k] * wz
         y[at[T.AT_PF] + k] = turning + row_product(mass, j0[9] > 0.0, k, y, at[T.AT_VF])
 
 
@@ -254,9 +310,7 @@ def modal_residual(y, yp, at, modal, partial, kin_row, out):
     j0, _, _, _, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
     change, h, gyro = present(partial, at[T.AT_PARTIAL], n)
     apart = j0[9] > 0.0
-    s = np.empty(3)
-    to_body(kin_row, kin_row, KIN_W, s, 0)
-    wx, wy, wz = s[0], s[1], s[2]
+    wx, wy, wz = spin_in_body(kin_row)
     for k in range(n):
         inertial = 0.5 * (change[0, k] * wx * wx + change[3, k] * wy * wy + change[5, k] * wz * wz)
         inertial += change[1, k] * wx * wy + change[2, k] * wx * wz + change[4, k] * wy * wz

@@ -28,7 +28,7 @@ from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.elastic import add_frame_load, add_row_forces, is_elastic, load_at, own_rate, touches_elastic
+from gearmbs.dae.equations.elastic import bring_to_body, is_elastic, own_rate
 from gearmbs.dae.equations.forces import evaluate_element
 from gearmbs.dae.equations.modal_inertia import modal_residual
 from gearmbs.dae.equations.reactions import reaction_wrench
@@ -77,8 +77,8 @@ def arm_to(b, point_marker, marker_body, kin, frame, out, k):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def add_load(b, sign, row, y, at, marker_body, kin, frame, partial, scratch, out):
-    """Subtract the generalised loads of one force element on body b (eq. (5), H_F^T F and H_N^T N).
+def add_load(b, sign, row, y, marker_body, kin, frame, scratch):
+    """Add the loads of one force element to what is collected for frame b (eq. (5), H_F^T F and H_N^T N).
 
     Parameters
     ----------
@@ -88,19 +88,12 @@ def add_load(b, sign, row, y, at, marker_body, kin, frame, partial, scratch, out
         Row of the force element.
     y
         Unknowns.
-    at, marker_body, kin, frame
-        Tables of places, of the markers' frames, of kinematics and of markers.
-    partial, scratch : ndarray
-        Partial derivatives of elastic frames, and the work array's scratch.
-    out : ndarray
-        G.
+    marker_body, kin, frame
+        Tables of the markers' frames, of kinematics and of markers.
+    scratch : ndarray
+        The work array's scratch.
     """
     if b == 0:
-        return
-    if is_elastic(b, at):
-        room = scratch[S_VECTOR : S_VECTOR + 18]
-        load_at(b, sign, row, y, marker_body, kin, frame, room)
-        add_frame_load(b, room, at, partial, out)
         return
     s, body = vector_at(scratch, S_VECTOR, 9), kin[b]
     if row[T.FORCE_F] >= 0:
@@ -118,15 +111,17 @@ def add_load(b, sign, row, y, at, marker_body, kin, frame, partial, scratch, out
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def begin_wrenches(kin):
-    """Clear the columns in which the forces on rigid bodies are added up."""
+    """Clear the columns in which the forces on frames are added up."""
     for b in range(kin.shape[0]):
         for c in range(KIN_FORCE, KIN_COLUMNS):
             kin[b, c] = 0.0
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def add_wrenches(bodies, at, kin, out):
-    """Bring the forces added up for each rigid body to its coordinates: eq. (5), and mu in eq. (6)."""
+def add_wrenches(bodies, at, modal, kin, partial, scratch, out):
+    """Bring the forces added up for each frame to the coordinates: eq. (5), and mu in eq. (6)."""
+    for f in range(bodies, at.shape[0]):
+        bring_to_body(f, at, modal, kin, partial, scratch, out)
     for b in range(1, bodies):
         row, place = kin[b], at[b]
         u, p, r, th = place[T.AT_U], place[T.AT_P], place[T.AT_R], place[T.AT_THETA]
@@ -146,22 +141,20 @@ def add_tape_row(k, t, lam, mu, y, tab, out):
     grad, hess = room[0:n], room[n:]
     value = expression_loads.second(k, t, y, tab, grad, hess)
     rate = grad[n - 1]
-    if tab.at.shape[0] > tab.code.size:
-        # elastic frames may be among the bodies
-        frames = vector_at(tab.extra_i, row[T.TAPE_BODIES], row[T.TAPE_N_BODIES])
-        add_row_forces(frames, frames.size, grad, lam, mu, tab.at, tab.partial, out)
-        for i in range(n - 1):
-            rate += grad[i] * own_rate(frames[i // 6], i % 6, y, tab.at, tab.kin)
-        return value, rate
     for p in range(row[T.TAPE_N_BODIES]):
-        at = tab.at[tab.extra_i[row[T.TAPE_BODIES] + p]]
+        b = tab.extra_i[row[T.TAPE_BODIES] + p]
+        at, kin = tab.at[b], tab.kin[b]
         for c in range(3):
             along, about = grad[6 * p + c], grad[6 * p + 3 + c]
-            rate += along * y[at[T.AT_U] + c] + about * y[at[T.AT_EPS] + c]
-            out[at[T.AT_U] + c] += lam * along
-            out[at[T.AT_P] + c] += lam * about
-            out[at[T.AT_R] + c] -= mu * along
-            out[at[T.AT_THETA] + c] -= mu * about
+            rate += along * own_rate(b, c, y, tab.at, tab.kin) + about * own_rate(b, 3 + c, y, tab.at, tab.kin)
+            kin[KIN_FORCE + c] += lam * along
+            kin[KIN_SHIFT + c] += mu * along
+            if is_elastic(b, tab.at):
+                kin[KIN_MOMENT + c] += lam * about
+                kin[KIN_TURN + c] += mu * about
+            else:
+                out[at[T.AT_P] + c] += lam * about
+                out[at[T.AT_THETA] + c] -= mu * about
     return value, rate
 
 
@@ -170,7 +163,6 @@ def add_constraints(t, y, yp, idata, tab, out):
     """Constraint rows, their derivatives, and the constraint forces of lambda and mu."""
     rate_rows = has_rate_rows(idata[T.H_FORMULATION])
     lam0, mu0 = idata[T.H_LAMBDA], idata[T.H_MU]
-    frames_are_elastic = idata[T.H_FRAMES] > idata[T.H_BODIES]
     g = vector_at(tab.scratch, S_GRADIENT, 12)
     gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
     s = vector_at(tab.scratch, S_TERM, 100)
@@ -184,13 +176,12 @@ def add_constraints(t, y, yp, idata, tab, out):
         for k in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
             coef = tab.coef[k]
             kind = tab.term[k, T.TERM_TYPE]
-            elastic = frames_are_elastic and touches_elastic(tab.term[k], tab.marker_body, tab.code.size)
-            if kind == terms.POINT and not elastic:
+            if kind == terms.POINT:
                 v, d = add_point_term(k, coef, lam, mu, tab.term, tab.marker_body, tab.kin, tab.frame)
                 value += v
                 rate += d
                 continue
-            if kind == terms.DOT1 and not elastic:
+            if kind == terms.DOT1:
                 v, d = add_dot_term(k, coef, lam, mu, tab.term, tab.marker_body, tab.kin, tab.frame, s)
                 value += v
                 rate += d
@@ -215,10 +206,6 @@ def add_constraints(t, y, yp, idata, tab, out):
                     continue
                 kin, h = tab.kin[b], 6 * side
                 rate += coef * (terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W))
-                if is_elastic(b, tab.at):
-                    own = vector_at(g, h, 6)
-                    add_row_forces(np.array([b]), 1, own, coef * lam, coef * mu, tab.at, tab.partial, out)
-                    continue
                 for c in range(3):
                     kin[KIN_FORCE + c] += coef * lam * g[h + c]
                     kin[KIN_MOMENT + c] += coef * lam * g[h + 3 + c]
@@ -289,11 +276,8 @@ def residual(t, y, yp, out, idata, rdata, work):
         if row[T.FORCE_KIND] != T.REACTION:
             for side in range(2):
                 b = tab.marker_body[row[T.FORCE_I + side]]
-                add_load(
-                    b, 1.0 - 2.0 * side, row, y, tab.at, tab.marker_body, tab.kin, tab.frame, tab.partial, tab.scratch,
-                    out,
-                )  # fmt: skip
-    add_wrenches(idata[T.H_BODIES], tab.at, tab.kin, out)
+                add_load(b, 1.0 - 2.0 * side, row, y, tab.marker_body, tab.kin, tab.frame, tab.scratch)
+    add_wrenches(idata[T.H_BODIES], tab.at, tab.modal, tab.kin, tab.partial, tab.scratch, out)
     for k in range(idata[T.H_STATES]):
         z = idata[T.H_Z] + k
         if tab.state[k, T.STATE_TAPE] < 0:

@@ -65,7 +65,7 @@ def update_bodies(y, at, code, body, modal, kin, partial, scratch, derivatives):
     kin : ndarray
         Kinematics table.
     scratch : ndarray
-        3 places.
+        36 places.
     derivatives : bool
         Whether the velocities' derivatives and the accelerations of elastic frames are wanted.
     """
@@ -85,7 +85,7 @@ def update_bodies(y, at, code, body, modal, kin, partial, scratch, derivatives):
         if at[b, T.AT_MODES] > 0:
             add_momentum(y, at[b], partial, row)
     for f in range(code.size, at.shape[0]):
-        update_frame(f, y, at, modal, kin, partial, derivatives)
+        update_frame(f, y, at, modal, kin, partial, scratch, derivatives)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
