@@ -23,7 +23,7 @@ COUPLING = ("full", "partial", "constant")
 
 
 ROUNDING = 1e-12
-"""Share of their bounds below which integrals are rounding errors."""
+"""Share of their bounds below which integrals, and of the largest below which shapes, are rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -267,7 +267,7 @@ class ModalBody(Body):
                     f"body '{self.name}': its shapes give {what} of shape {part.shape} at {marker!r}; "
                     f"they must be {n} finite vectors of 3"
                 )
-        return moved - self.mean, turned
+        return _rounded(moved - self.mean), _rounded(turned)
 
     def centre_of_mass(self) -> tuple[np.ndarray, np.ndarray]:
         """Return position and velocity of the centre of mass at the start, deformation included, global components."""
@@ -277,6 +277,11 @@ class ModalBody(Body):
 
     def __repr__(self) -> str:
         return f"ModalBody({self.name!r}, mass={self.mass:g} kg, {self.modal.modes} modes, {len(self.markers)} markers)"
+
+
+def _rounded(shape: np.ndarray) -> np.ndarray:
+    """Return shapes at a marker with zeros in place of their rounding errors: entries that vanish need no equations."""
+    return np.where(np.abs(shape) > ROUNDING * np.abs(shape).max(initial=0.0), shape, 0.0)
 
 
 def make_modal_body(

@@ -368,6 +368,38 @@ def curvature(b, i, j, g, k, at, partial, s):
 # --- constraint rows ----------------------------------------------------------------------------------
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def turns(d):
+    """Return whether a mode turns a frame, given its row of the partial derivatives."""
+    return d[DX] != 0.0 or d[DX + 1] != 0.0 or d[DX + 2] != 0.0
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def is_idle(b, i, blind, at, partial):
+    """Return whether coordinate i of a frame's body is a mode that does not move the frame, and if not blind turns it.
+
+    Shapes that are zero stay so in all positions.
+    """
+    if i < 6:
+        return False
+    d = partials(b, at, partial)[i - 3]
+    if d[DP] != 0.0 or d[DP + 1] != 0.0 or d[DP + 2] != 0.0:
+        return False
+    return blind or not turns(d)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def has_second(i, j, same, linear, side):
+    """Return whether a row may have a second derivative by coordinates i, j of its sides; see `put_row`.
+
+    Of a side that is linear in the displacement only angles, with angles or modes, have some. A row whose sides are all
+    linear is their sum.
+    """
+    if same and (linear >> side) & 1:
+        return i >= 3 and j >= 3 and (i < 6 or j < 6)
+    return same or linear != 3
+
+
 @njit(cache=True, error_model="numpy")
 def put_row(
     mode,
@@ -420,7 +452,11 @@ def put_row(
     left = np.empty(6 * n_frames)
     for a in range(n_frames):
         b = frames[a]
+        blind = (linear >> a) & 1 == 1
         for i in range(coordinates(b, at)):
+            # the gradient of a sum of linear sides is a unit vector for good
+            if is_idle(b, i, blind, at, partial) or (linear == 3 and i < 3 and g[6 * a + i] == 0.0):
+                continue
             direction(b, i, at, partial, t, 0)
             slope, rate = 0.0, 0.0
             for c in range(6):
@@ -436,7 +472,7 @@ def put_row(
             for a2 in range(n_frames):
                 b2 = frames[a2]
                 for j in range(coordinates(b2, at)):
-                    if a == a2 and i >= 6 and j >= 6 and (linear >> a) & 1:
+                    if not has_second(i, j, a == a2, linear, a) or is_idle(b2, j, (linear >> a2) & 1 == 1, at, partial):
                         continue
                     direction(b2, j, at, partial, t, 6)
                     value = 0.0
@@ -600,6 +636,8 @@ def put_load(mode, slot, vals, k, f, sign, force, torque, point, s, at, marker_b
     owner = marker_body[point]
     for i in range(coordinates(f, at)):
         row = place(f, i, FORCE, at)
+        if is_idle(f, i, False, at, partial):
+            continue
         if i < 3:
             if force >= 0:
                 k = put(mode, slot, vals, k, row, force + i, -sign)
@@ -614,8 +652,10 @@ def put_load(mode, slot, vals, k, f, sign, force, torque, point, s, at, marker_b
                 k = put(mode, slot, vals, k, row, torque + m, -sign * d[c, DX + m])
         for j in range(3, coordinates(f, at)):
             e = j - 3
-            if e >= c >= 3:
+            if e >= c >= 3 or is_idle(f, j, False, at, partial):
                 # two modes turn one after the other; displacements are linear
+                continue
+            if c > e >= 3 and not (turns(d[c]) and turns(d[e])):
                 continue
             value = 0.0
             if min(c, e) < 3:
@@ -652,6 +692,8 @@ def put_arm(mode, slot, vals, k, row, b, point, s, sign, at, marker_body, kin, f
     for i in range(coordinates(b, at)):
         if i < 3:
             value = s[9 + i]
+        elif is_idle(b, i, True, at, partial):
+            continue
         elif is_elastic(b, at):
             # markers of a modal body are at the origins of their frames
             value = dot3(s, 9, partials(b, at, partial)[i - 3], DP)
@@ -682,6 +724,8 @@ def put_chain(mode, slot, vals, k, row, f, d, col, sign, at, kin, partial):
         k = put(mode, slot, vals, k, row, at[f, T.AT_U] + c, sign * d[col + 6 + c])
     rows = partials(f, at, partial)
     for i in range(3, coordinates(f, at)):
+        if is_idle(f, i, False, at, partial):
+            continue
         p = rows[i - 3]
         moved = dot3(d, col, p, DP) + dot3(d, col + 3, p, DX)
         pushed = dot3(d, col + 6, p, DP) + dot3(d, col + 9, p, DX)
