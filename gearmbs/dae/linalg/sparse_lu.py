@@ -23,6 +23,8 @@ from gearmbs.dae.linalg.pivoting import (
 )
 
 GROWTH_LIMIT = 1e5
+SMALLEST_NODE = 4
+"""Columns that are worth to be taken together: as many as `_through_node` takes at once."""
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
@@ -44,6 +46,8 @@ class LUPlan(Struct):
         For each column the earlier pivots that act on it, ascending.
     l_ptr, l_pos : ndarray
         For each column the rows below the pivot.
+    node_end : ndarray
+        For each column the end of its node: columns in a row whose rows below the node are the same.
     row_from, col_to : ndarray
         Original row and column of each pivot.
     row_scale, col_scale : ndarray
@@ -60,6 +64,7 @@ class LUPlan(Struct):
     u_pos: IndexVector
     l_ptr: IntVector
     l_pos: IndexVector
+    node_end: IntVector
     row_from: IndexVector
     col_to: IndexVector
     row_scale: Vector
@@ -74,6 +79,7 @@ class LUFactors(Struct):
     u_vals: Vector
     pivot_inv: Vector
     x: Vector
+    w: Vector
 
 
 PLAN_TYPE = LUPlan.numba_type
@@ -162,6 +168,34 @@ def _upper_by_columns(u_ptr, u_cols, col_place):
     return by_col, places
 
 
+@njit(_IVEC(_IVEC, _UVEC), cache=True, nogil=True, error_model="numpy")
+def _nodes(l_ptr, l_pos):
+    """Return the end of each column's node, see `LUPlan`."""
+    n = l_ptr.shape[0] - 1
+    ends = np.arange(1, n + 1)
+    first = 0
+    while first < n:
+        end = first + 1
+        while end < n and _follows(l_ptr, l_pos, end):
+            end += 1
+        if end - first >= SMALLEST_NODE:
+            ends[first:end] = end
+        first = end
+    return ends
+
+
+@njit(types.boolean(_IVEC, _UVEC, int64), cache=True, nogil=True, error_model="numpy")
+def _follows(l_ptr, l_pos, k):
+    """Return whether the rows below the pivot of column k are those of the column before it, less its own."""
+    before, first, end = l_ptr[k - 1], l_ptr[k], l_ptr[k + 1]
+    if end - first != first - before - 1 or l_pos[before] != k:
+        return False
+    for p in range(end - first):
+        if l_pos[first + p] != l_pos[before + 1 + p]:
+            return False
+    return True
+
+
 @njit(types.Tuple((_VEC, _VEC, _VEC))(_IVEC, _IVEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def _scaled(indptr, indices, vals, scale):
     """Return the scales of rows and columns, and the values with them."""
@@ -177,7 +211,7 @@ def _scaled(indptr, indices, vals, scale):
 
 
 @njit(
-    types.Tuple((int64, _IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _VEC, _VEC, _VEC))(
+    types.Tuple((int64, _IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _VEC, _VEC, _VEC))(
         _IVEC, _IVEC, _VEC, _VEC, float64, LINES_TYPE, LINES_TYPE
     ),
     cache=True,
@@ -229,6 +263,7 @@ def _plan(indptr, indices, vals, scale, drop, columns, rows_left):
         u_pos,
         l_ptr,
         l_pos,
+        _nodes(l_ptr, l_pos),
         row_from,
         col_to,
         row_scale[rows],
@@ -273,7 +308,7 @@ def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np
         rank, *plan = _plan(indptr, indices, vals, np.asarray(scale, dtype=float), max(drop, CANCELLED), *lines)
         size *= 2
     if rank < len(indptr) - 1 and drop == 0.0:
-        rows, cols = (np.asarray(plan[i], dtype=np.int64)[rank:] for i in (8, 9))
+        rows, cols = (np.asarray(plan[i], dtype=np.int64)[rank:] for i in (9, 10))
         raise SingularMatrixError(rows, cols)
     return LUPlan(**dict(zip(LUPlan.array_members, plan, strict=True)))
 
@@ -282,8 +317,50 @@ def new_factors(plan: LUPlan) -> LUFactors:
     """Return empty factors for a plan."""
     n = len(plan.row_from)
     return LUFactors(
-        l_vals=np.zeros(len(plan.l_pos)), u_vals=np.zeros(len(plan.u_pos)), pivot_inv=np.zeros(n), x=np.zeros(n)
+        l_vals=np.zeros(len(plan.l_pos)),
+        u_vals=np.zeros(len(plan.u_pos)),
+        pivot_inv=np.zeros(n),
+        x=np.zeros(n),
+        w=np.zeros(n),
     )
+
+
+@njit(types.void(int64, int64, int64, _IVEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
+def _through_node(first, stop, size, l_ptr, l_vals, w):
+    """Eliminate with columns ``first`` to ``stop`` of one node, four at once: w = L^-1 w.
+
+    Parameters
+    ----------
+    first, stop, size : int
+        The columns, and the number of rows from the first on: the node's, then those below it.
+    l_ptr, l_vals : ndarray
+        Of `LUPlan` and `LUFactors`.
+    w : ndarray
+        These rows, one after the other; changed.
+    """
+    at = np.uint64(0)
+    rows, columns = np.uint64(size), np.uint64(stop - first)
+    while at + np.uint64(4) <= columns:
+        j = np.uint64(first) + at
+        # where column j has the row after it
+        a, b = np.uint64(l_ptr[j]), np.uint64(l_ptr[j + np.uint64(1)])
+        c, d = np.uint64(l_ptr[j + np.uint64(2)]), np.uint64(l_ptr[j + np.uint64(3)])
+        one, two, three, four = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
+        u = w[at]
+        v = w[at + one] - l_vals[a] * u
+        x = w[at + two] - l_vals[a + one] * u - l_vals[b] * v
+        y = w[at + three] - l_vals[a + two] * u - l_vals[b + one] * v - l_vals[c] * x
+        w[at + one], w[at + two], w[at + three] = v, x, y
+        a, b, c = a + three, b + two, c + one
+        at += four
+        for i in range(rows - at):
+            w[at + i] -= l_vals[a + i] * u + l_vals[b + i] * v + l_vals[c + i] * x + l_vals[d + i] * y
+    while at < columns:
+        a = np.uint64(l_ptr[np.uint64(first) + at])
+        u = w[at]
+        at += np.uint64(1)
+        for i in range(rows - at):
+            w[at + i] -= l_vals[a + i] * u
 
 
 @njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
@@ -303,25 +380,47 @@ def factor(plan, factors, vals):
     growth : float
         Largest multiplier in L. Above `GROWTH_LIMIT`, infinite or NaN the pivots no longer fit: analyse again.
     """
-    x = factors.x
+    x, w = factors.x, factors.w
     l_vals = factors.l_vals
     u_vals = factors.u_vals
     l_pos = plan.l_pos
-    l_ptr = plan.l_ptr
+    l_ptr, node_end = plan.l_ptr, plan.node_end
     u_pos = plan.u_pos
     growth = 0.0
     n = x.shape[0]
     for k in range(n):
         for p in range(np.uint64(plan.a_ptr[k]), np.uint64(plan.a_ptr[k + 1])):
             x[plan.a_pos[p]] = vals[plan.a_src[p]] * plan.a_scale[p]
-        for p in range(np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])):
+        p, last = np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])
+        while p < last:
             j = np.uint64(u_pos[p])
-            u = x[j]
-            x[j] = 0.0
-            u_vals[p] = u
-            if u != 0.0:
-                for q in range(np.uint64(l_ptr[j]), np.uint64(l_ptr[j + np.uint64(1)])):
-                    x[l_pos[q]] -= l_vals[q] * u
+            end = node_end[j]
+            if end - np.int64(j) == 1:
+                u = x[j]
+                x[j] = 0.0
+                u_vals[p] = u
+                p += np.uint64(1)
+                if u != 0.0:
+                    for q in range(np.uint64(l_ptr[j]), np.uint64(l_ptr[j + np.uint64(1)])):
+                        x[l_pos[q]] -= l_vals[q] * u
+                continue
+            # the column has all rows of the node from this one on
+            stop, rows = np.uint64(min(end, k)), np.uint64(end) - j
+            below = np.uint64(l_ptr[end - 1])
+            size = rows + np.uint64(l_ptr[end]) - below
+            for i in range(rows):
+                w[i] = x[j + i]
+                x[j + i] = 0.0
+            for i in range(rows, size):
+                w[i] = 0.0
+            _through_node(np.int64(j), np.int64(stop), np.int64(size), l_ptr, l_vals, w)
+            for i in range(stop - j):
+                u_vals[p + i] = w[i]
+            for i in range(stop - j, rows):
+                x[j + i] = w[i]
+            for i in range(size - rows):
+                x[l_pos[below + i]] += w[rows + i]
+            p += stop - j
         pivot = x[k]
         x[k] = 0.0
         if plan.kept[k] == 0.0:
@@ -353,19 +452,35 @@ def solve(plan, factors, b, out):
         From `factor`.
     b, out : ndarray, shape (n,)
     """
-    x = factors.x
+    x, w = factors.x, factors.w
     l_vals = factors.l_vals
     u_vals = factors.u_vals
-    l_pos = plan.l_pos
+    l_pos, l_ptr, node_end = plan.l_pos, plan.l_ptr, plan.node_end
     u_pos = plan.u_pos
     n = x.shape[0]
     for k in range(n):
         x[k] = b[plan.row_from[k]] * plan.row_scale[k]
-    for k in range(n):
-        v = x[k]
-        if v != 0.0:
-            for q in range(np.uint64(plan.l_ptr[k]), np.uint64(plan.l_ptr[k + 1])):
-                x[l_pos[q]] -= l_vals[q] * v
+    k = 0
+    while k < n:
+        end = node_end[k]
+        if end - k == 1:
+            v = x[k]
+            if v != 0.0:
+                for q in range(np.uint64(l_ptr[k]), np.uint64(l_ptr[k + 1])):
+                    x[l_pos[q]] -= l_vals[q] * v
+        else:
+            first, rows, below = np.uint64(k), np.uint64(end - k), np.uint64(l_ptr[end - 1])
+            size = rows + np.uint64(l_ptr[end]) - below
+            for i in range(rows):
+                w[i] = x[first + i]
+            for i in range(rows, size):
+                w[i] = 0.0
+            _through_node(k, end, np.int64(size), l_ptr, l_vals, w)
+            for i in range(rows):
+                x[first + i] = w[i]
+            for i in range(size - rows):
+                x[l_pos[below + i]] += w[rows + i]
+        k = end
     for m in range(n):
         k = n - 1 - m
         v = x[k] * factors.pivot_inv[k]
