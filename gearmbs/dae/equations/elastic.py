@@ -462,7 +462,9 @@ def put_row(
             for c in range(6):
                 slope += coef * g[6 * a + c] * t[c]
                 rate += coef * g_t[6 * a + c] * t[c]
-            for c in range(6 * n_frames):
+            # a side that is linear has no Hessian by the coordinates of its frame, a sum of such sides none at all
+            curved = linear != 3 or not is_elastic(b, at)
+            for c in range(6 * n_frames if curved else 0):
                 left[c] = 0.0
                 for m in range(6):
                     left[c] += t[m] * hess[width * (6 * a + m) + c]
@@ -474,10 +476,11 @@ def put_row(
                 for j in range(coordinates(b2, at)):
                     if not has_second(i, j, a == a2, linear, a) or is_idle(b2, j, (linear >> a2) & 1 == 1, at, partial):
                         continue
-                    direction(b2, j, at, partial, t, 6)
                     value = 0.0
-                    for c in range(6):
-                        value += left[6 * a2 + c] * t[6 + c]
+                    if curved:
+                        direction(b2, j, at, partial, t, 6)
+                        for c in range(6):
+                            value += left[6 * a2 + c] * t[6 + c]
                     if a == a2 and is_elastic(b, at):
                         value += curvature(b, i, j, g, 6 * a, at, partial, s)
                     value *= coef

@@ -96,7 +96,10 @@ class ModalInertia:
         if sum(len(part) for part in lists) > LISTED * (rows.size + turned.size):
             lists = [np.empty((0, 3))] * 2
         head = [float(apart), *(float(len(part)) for part in lists)]
-        pieces = (inertia, head, first, self.c0.T, rows, turned, *parts, *lists)
+        pairs = STIFF * (self.stiffness.astype(bool) | self.j2.any(axis=(2, 3)))
+        pairs += TURNED * (self.damping.astype(bool) | self.c1.any(axis=2)) + SPUN * self.c1.any(axis=2).T
+        pairs += HEAVY * self.mass.astype(bool)
+        pieces = (inertia, head, first, self.c0.T, rows, turned, *parts, pairs, *lists)
         return np.concatenate([np.ravel(piece) for piece in pieces])
 
 
@@ -108,6 +111,9 @@ def _listed(rows: np.ndarray, first: int) -> np.ndarray:
 
 LISTED = 0.25
 """Share of integrals that do not vanish up to which they are taken one by one."""
+
+STIFF, TURNED, SPUN, HEAVY = 1, 2, 4, 8
+"""What two modes have in common: entries of p_f by q_f, p_f by v_f, v_f by q_f, and v_f by v_f."""
 
 HEAD = 12
 """Numbers before the integrals: J0, whether M, K and D are diagonal, the lengths of both lists."""
@@ -139,6 +145,8 @@ def integrals(modal, at, n):
     turned : ndarray, shape (n, 3 n)
         C1_kl, a row for each l.
     mass, stiffness, damping : ndarray, shape (n, n)
+    pairs : ndarray, shape (n, n)
+        What modes have in common, a sum of `STIFF` and the others.
     """
     first = at + HEAD
     second = first + 9 * n
@@ -152,6 +160,7 @@ def integrals(modal, at, n):
         matrix_at(modal, m, n, n),
         matrix_at(modal, m + n * n, n, n),
         matrix_at(modal, m + 2 * n * n, n, n),
+        matrix_at(modal, m + 3 * n * n, n, n),
     )
 
 
@@ -215,7 +224,7 @@ def add_listed(y, q, v, listed, turns, entries, state):
 def update_inertia(y, at, modal, partial, body_row):
     """Write J(q) to the body's row and dJ/dq, H and sum_l C1_kl v_l to its place in ``partial``."""
     n, q, v, place = at[T.AT_MODES], at[T.AT_QF], at[T.AT_VF], at[T.AT_PARTIAL]
-    j0, first, second, turned, _, _, _ = integrals(modal, at[T.AT_MODAL], n)
+    j0, first, second, turned, _, _, _, _ = integrals(modal, at[T.AT_MODAL], n)
     both, gyro = vector_at(partial, place, 9 * n), vector_at(partial, place + 9 * n, 3 * n)
     for k in range(9 * n):
         both[k] = first[k]
@@ -223,7 +232,7 @@ def update_inertia(y, at, modal, partial, body_row):
         gyro[k] = 0.0
     listed, turns = int(j0[10]), int(j0[11])
     if listed + turns > 0:
-        entries = matrix_at(modal, at[T.AT_MODAL] + HEAD + 9 * n + 15 * n * n, listed + turns, 3)
+        entries = matrix_at(modal, at[T.AT_MODAL] + HEAD + 9 * n + 16 * n * n, listed + turns, 3)
         add_listed(y, q, v, listed, turns, entries, vector_at(partial, place, 12 * n))
     else:
         for l in range(n):
@@ -285,7 +294,7 @@ def row_product(matrix, apart, k, y, i):
 def set_modal_momenta(y, at, modal, partial, kin_row):
     """Write p_f = dT/dv_f to y."""
     n = at[T.AT_MODES]
-    j0, _, _, _, mass, _, _ = integrals(modal, at[T.AT_MODAL], n)
+    j0, _, _, _, mass, _, _, _ = integrals(modal, at[T.AT_MODAL], n)
     _, h, _ = present(partial, at[T.AT_PARTIAL], n)
     wx, wy, wz = spin_in_body(kin_row)
     for k in range(n):
@@ -307,7 +316,7 @@ def modal_residual(y, yp, at, modal, partial, kin_row, out):
         The body's row of the kinematics table; the residual.
     """
     n, pf, vf, qf = at[T.AT_MODES], at[T.AT_PF], at[T.AT_VF], at[T.AT_QF]
-    j0, _, _, _, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
+    j0, _, _, _, mass, stiffness, damping, _ = integrals(modal, at[T.AT_MODAL], n)
     change, h, gyro = present(partial, at[T.AT_PARTIAL], n)
     apart = j0[9] > 0.0
     wx, wy, wz = spin_in_body(kin_row)
@@ -342,7 +351,7 @@ def modal_acceleration_terms(y, at, modal, partial, kin_row, mass_out, coupling_
         -sum_k v_k (dJ/dq_k w + sum_l C1_kl v_l), global components.
     """
     n, vf, qf = at[T.AT_MODES], at[T.AT_VF], at[T.AT_QF]
-    j0, _, second, _, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
+    j0, _, second, _, mass, stiffness, damping, _ = integrals(modal, at[T.AT_MODAL], n)
     change, h, gyro = present(partial, at[T.AT_PARTIAL], n)
     apart = j0[9] > 0.0
     s = np.zeros(12)
@@ -363,15 +372,6 @@ def modal_acceleration_terms(y, at, modal, partial, kin_row, mass_out, coupling_
         for c in range(3):
             coupling_out[k, c] = s[3 + c]
     to_global(kin_row, s, 9, rhs_rotation, 0)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def any_of(row, first, last, step):
-    """Return whether one of ``row[first:last:step]`` is not zero: numbers that never change."""
-    for i in range(first, last, step):
-        if row[i] != 0.0:
-            return True
-    return False
 
 
 @njit(cache=True, error_model="numpy")
@@ -439,21 +439,23 @@ def pair_entries(mode, i, at, modal, s, slot, vals, k):
         Angular velocity in body components in ``s[0:3]``.
     """
     n, pf, vf, qf = at[T.AT_MODES], at[T.AT_PF], at[T.AT_VF], at[T.AT_QF]
-    _, _, second, turned, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
+    _, _, second, turned, mass, stiffness, damping, pairs = integrals(modal, at[T.AT_MODAL], n)
     x, y, z = s[0], s[1], s[2]
     for l in range(n):
+        common = int(pairs[i, l])
+        if common == 0:
+            continue
         row, other = second[l], turned[l]
-        spins, turns = any_of(row, 6 * n + i, 9 * n, n), any_of(other, i, 3 * n, n)
-        if stiffness[i, l] != 0.0 or any_of(row, i, 6 * n, n):
+        if common & STIFF:
             centrifugal = 0.5 * (row[i] * x * x + row[3 * n + i] * y * y + row[5 * n + i] * z * z)
             centrifugal += row[n + i] * x * y + row[2 * n + i] * x * z + row[4 * n + i] * y * z
             k = put(mode, slot, vals, k, pf + i, qf + l, stiffness[i, l] - centrifugal)
-        if damping[i, l] != 0.0 or turns:
+        if common & TURNED:
             gyro = x * other[i] + y * other[n + i] + z * other[2 * n + i]
             k = put(mode, slot, vals, k, pf + i, vf + l, damping[i, l] - gyro)
-        if spins:
+        if common & SPUN:
             mixed = x * row[6 * n + i] + y * row[7 * n + i] + z * row[8 * n + i]
             k = put(mode, slot, vals, k, vf + i, qf + l, -mixed)
-        if mass[i, l] != 0.0:
+        if common & HEAVY:
             k = put(mode, slot, vals, k, vf + i, vf + l, -mass[i, l])
     return k
