@@ -73,6 +73,31 @@ class BeamSection:
             (rho * second, rho * second, 2 * rho * second),
         )  # fmt: skip
 
+    @classmethod
+    def rectangle(cls, material, width: float, height: float, shear: float | None = None) -> BeamSection:
+        """Return the section of a bar, ``width`` along x and ``height`` along y, m.
+
+        The torsion constant is Saint-Venant's series; ``shear`` replaces Cowper's coefficient
+        10 (1 + nu) / (12 + 11 nu).
+        """
+        nu = material.poisson_ratio
+        kappa = 10 * (1 + nu) / (12 + 11 * nu) if shear is None else shear
+        area = width * height
+        about_y, about_x = height * width**3 / 12, width * height**3 / 12
+        e, g, rho = material.youngs_modulus, material.shear_modulus, material.density
+        return cls(
+            e * area, g * torsion_constant(width, height), (e * about_y, e * about_x), (kappa * g * area,) * 2,
+            rho * area, (rho * about_x, rho * about_y, rho * (about_x + about_y)),
+        )  # fmt: skip
+
+
+def torsion_constant(width: float, height: float) -> float:
+    """Return the torsion constant of a rectangle by Saint-Venant's series, m^4 (Timoshenko and Goodier, art. 109)."""
+    thin, wide = sorted((width, height))
+    n = np.arange(1, 30, 2)
+    series = np.sum(np.tanh(n * np.pi * wide / (2 * thin)) / n**5)
+    return wide * thin**3 * (1 / 3 - 64 / np.pi**5 * thin / wide * float(series))
+
 
 def bending_shapes(x: np.ndarray, length: float, phi: float) -> tuple[np.ndarray, np.ndarray]:
     """Return deflections and rotations at x = z/l by (w1, w1', w2, w2') of the ends, each (points, 4)."""

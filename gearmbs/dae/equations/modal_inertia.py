@@ -99,7 +99,7 @@ class ModalInertia:
         pairs = STIFF * (self.stiffness.astype(bool) | self.j2.any(axis=(2, 3)))
         pairs += TURNED * (self.damping.astype(bool) | self.c1.any(axis=2)) + SPUN * self.c1.any(axis=2).T
         pairs += HEAVY * self.mass.astype(bool)
-        pieces = (inertia, head, first, self.c0.T, rows, turned, *parts, pairs, *lists)
+        pieces: tuple = (inertia, head, first, self.c0.T, rows, turned, *parts, pairs, *lists)
         return np.concatenate([np.ravel(piece) for piece in pieces])
 
 
