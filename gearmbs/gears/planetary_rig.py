@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,9 +12,12 @@ import numpy as np
 from gearmbs.gears.planetary_set import MEMBERS, PlanetarySet
 from gearmbs.gears.spec import require
 from gearmbs.mechanism import Mechanism, ramp, step
+from gearmbs.mechanism.elements import ForceElement
+from gearmbs.mechanism.parts import Marker
 from gearmbs.units import Quantity, to_si
 
 Z = (0.0, 0.0, 1.0)
+PinBearing = Callable[[str, Marker, Marker], ForceElement]
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ def planetary_mechanism(
     held: str | None = "ring",
     run_up: Quantity = 0.05,
     supports: Mapping[str, Support] | None = None,
-    pins: Support | None = None,
+    pins: Support | PinBearing | None = None,
     masses: Mapping[str, tuple[float, Any]] | None = None,
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Mechanism:
@@ -72,8 +75,10 @@ def planetary_mechanism(
         Duration of the STEP of speeds and torques, s; 0 starts at speed, with all bodies turning as they must.
     supports : mapping of str to Support, optional
         Members that are not guided rigidly on the axis. One without any stiffness floats in its plane.
-    pins : Support, optional
-        Springs between planets and carrier; by default planets turn in revolute joints.
+    pins : Support or callable, optional
+        Springs between planets and carrier, or a function that makes the force element of a pin's bearing from its name
+        and two markers, of the pin and of the planet's bore, z along the axis; `gearmbs.studies.planetary.rolling_pins`
+        makes one for rolling bearings. By default planets turn in revolute joints.
     masses : mapping, optional
         Mass, kg, and moments of inertia (or that about z), kg m^2, of "sun", "planet", "carrier", "ring".
     gravity : (float, float, float)
@@ -200,7 +205,12 @@ def _support(m: Mechanism, name: str, i: Any, j: Any, support: Support, at: np.n
 
 
 def _planets(
-    m: Mechanism, gears: PlanetarySet, start: dict, weight: tuple, turning: dict[str, float], pins: Support | None
+    m: Mechanism,
+    gears: PlanetarySet,
+    start: dict,
+    weight: tuple,
+    turning: dict[str, float],
+    pins: Support | PinBearing | None,
 ) -> None:
     """Add planets, their pins and their meshes."""
     carrier, spin = m.bodies["carrier"], turning["carrier"]
@@ -221,8 +231,14 @@ def _planets(
         )
         if pins is None:
             m.revolute(f"{name} pin", planet, carrier, at=place, axis=Z)
-        else:
+        elif isinstance(pins, Support):
             _support(m, f"{name} pin", planet, carrier, pins, place)
+        else:
+            # the bearing's rings keep their plane as a spring without axial stiffness does
+            pin = carrier.marker_at(place, np.eye(3), name=f"{name} pin.I")
+            bore = planet.marker_at(place, np.eye(3), name=f"{name} pin.J")
+            m.joint("planar", f"{name} pin plane", bore, pin)
+            m.add(pins(f"{name} pin", pin, bore))
         m.gear_contact(f"sun-{name}", m.bodies["sun"], planet, to_sun[k])
         wheel: Any = planet
         if gears.planet_at_ring is not None:

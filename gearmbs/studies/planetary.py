@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from gearmbs.bearings import Bearing, RollingBearing
 from gearmbs.dae import Status
 from gearmbs.gears import ContactLaw, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
+from gearmbs.gears.planetary_rig import PinBearing
 from gearmbs.mechanism import Mechanism
 from gearmbs.signals import fixed_sensor
 from gearmbs.studies.section import CaseError
@@ -41,7 +43,8 @@ class PlanetaryRun:
         Hz.
     tolerance : float
     supports : dict of str to Support
-    pins : Support, optional
+    pins : Support or callable, optional
+        See `planetary_mechanism` and `rolling_pins`.
     """
 
     gears: PlanetarySet
@@ -54,7 +57,7 @@ class PlanetaryRun:
     rate: float = 12_800.0
     tolerance: float = 1e-6
     supports: Mapping[str, Support] = field(default_factory=dict)
-    pins: Support | None = None
+    pins: Support | PinBearing | None = None
 
     def mechanism(self) -> Mechanism:
         """Return the mechanism that is simulated."""
@@ -135,8 +138,36 @@ def planetary_run(data: Mapping[str, Any]) -> PlanetaryRun:
         if name in operation:
             operation[name] = to_si(operation[name], kind, f"operation.{name}")
     supports = {name: Support(**values) for name, values in data.get("support", {}).items()}
-    pins = Support(**data["pins"]) if "pins" in data else None
+    pins = _pins(dict(data["pins"])) if "pins" in data else None
     return PlanetaryRun(gears, supports=supports, pins=pins, **operation)
+
+
+def rolling_pins(bearing: Any, **settings: Any) -> PinBearing:
+    """Return what puts rolling bearings between pins and planets, for `planetary_mechanism` and `PlanetaryRun`.
+
+    Parameters
+    ----------
+    bearing : Bearing or str
+        A `gearmbs.bearings.Bearing` or its designation. The inner ring is on the pin.
+    **settings
+        Of `gearmbs.bearings.RollingBearing`: defects, damping, ...
+
+    Raises
+    ------
+    BearingError
+        If the designation is unknown.
+    """
+    kind = Bearing.from_designation(bearing) if isinstance(bearing, str) else bearing
+
+    def make(name: str, pin: Any, bore: Any) -> RollingBearing:
+        return RollingBearing(name, pin, bore, bearing=kind, **settings)
+
+    return make
+
+
+def _pins(table: dict[str, Any]) -> Support | PinBearing:
+    rolling = table.pop("rolling", None)
+    return Support(**table) if rolling is None else rolling_pins(rolling, **table)
 
 
 def _check_keys(section: str, table: Mapping[str, Any], known: set[str]) -> None:
