@@ -11,11 +11,15 @@ from numba import njit
 from benchmarks.gear_pair import call_costs
 from benchmarks.markdown import number, table
 from gearmbs.contact import GAP_COLUMNS, gear_contact, layout
-from gearmbs.gears import FlankFriction, GearPair
+from gearmbs.gears import FlankFriction, GearPair, GearSpec
 from gearmbs.gears.faults import GradedFlanks
 from gearmbs.gears.transmission import StaticMesh
 from gearmbs.studies import Case, simulate_case
 
+HELICAL = {
+    name: GearSpec(29, 95e-3 / 31, helix_angle="15 deg", hand=hand)
+    for name, hand in (("driver", "right"), ("driven", "left"))
+}
 CASES = {
     "healthy": ({}, 1),
     "healthy, no friction": ({"friction": FlankFriction.none()}, 1),
@@ -24,6 +28,7 @@ CASES = {
     "skew 1 deg, jammed, 41 slices": ({"misalignment": "1 deg"}, 41),
     "skew 1 deg, 0.4 mm backlash, 41 slices": ({"misalignment": "1 deg", "backlash": "0.4 mm"}, 41),
     "graded flanks, 41 slices": ({"faults": (GradedFlanks(),)}, 41),
+    "helix 15 deg, 20 slices": (HELICAL, 20),
 }
 WHOLE = {
     "healthy": (None, None),

@@ -14,10 +14,7 @@ from gearmbs.contact.sections import NEAR_BASE, normal_turns
 
 @kernel
 def set_corner(wheel, corner, j, f, roll):
-    """Make a tip corner the one at work in section ``j``: at the wheel's own tip, or sharp at a shorter ``roll``.
-
-    Returns the corner's polar angle at the wheel's middle.
-    """
+    """Make a tip corner the one at work in section ``j``: at the wheel's own tip, or sharp at a shorter ``roll``."""
     if roll >= wheel.tip_roll:
         psi = wheel.corner_angle
         corner.radius[j] = wheel.corner_radius
@@ -32,7 +29,6 @@ def set_corner(wheel, corner, j, f, roll):
         corner.roll[j] = roll
     corner.sin[j] = np.sin(f + psi)
     corner.cos[j] = np.cos(f + psi)
-    return f + psi
 
 
 @kernel

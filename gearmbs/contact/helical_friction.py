@@ -48,7 +48,9 @@ def flank_points(side, strip, loads, n, f, want):
         sa, ca, Z = strip.sin[j], strip.cos[j], strip.zeta[j] + half
         screw = screw_of(sa, ca, t, tilt)
         s = rb * (f + strip.alpha[j] + helical_turn(screw.A, screw.B, screw.kap2, t, tilt))
-        put_point(strip, loads, j, helicoid_slopes(screw, s, Z, rb, t, sa, ca, tilt))
+        slopes = helicoid_slopes(screw, s, Z, rb, t, sa, ca, tilt)
+        loads.normal[j] = slopes.h + 0.5 * strip.gap[j]
+        loads.tangent[j] = slopes.alpha
     if want == 0:
         return
     for j in range(n):
@@ -66,6 +68,17 @@ def edge_points(side, corner, strip, loads, n, want):
     half, t = 0.5 * side.x[L.H], side.twist_1
     k = t / side.base_1
     for j in range(n):
+        sa, ca, Z = strip.sin[j], strip.cos[j], strip.zeta[j] + half
+        ce, se, r, rt = corner.cos[j], corner.sin[j], corner.radius[j], corner.rounding[j]
+        screw = screw_of(sa, ca, t, tilt)
+        sn, cs = sa * ce + ca * se, ca * ce - sa * se
+        slopes = edge_slopes(screw, edge_of(ce, se, r, k, Z, tilt), sn, cs, r, rt, Z, sa, ca, tilt)
+        bears = strip.kind[j] == 1.0
+        loads.normal[j] = slopes.h + 0.5 * strip.gap[j] if bears else loads.normal[j]
+        loads.tangent[j] = slopes.alpha if bears else loads.tangent[j]
+    if want == 0:
+        return
+    for j in range(n):
         if strip.kind[j] != 1.0:
             continue
         sa, ca, Z = strip.sin[j], strip.cos[j], strip.zeta[j] + half
@@ -74,17 +87,8 @@ def edge_points(side, corner, strip, loads, n, want):
         sn, cs = sa * ce + ca * se, ca * ce - sa * se
         edge = edge_of(ce, se, r, k, Z, tilt)
         slopes = edge_slopes(screw, edge, sn, cs, r, rt, Z, sa, ca, tilt)
-        put_point(strip, loads, j, slopes)
-        if want != 0:
-            curvatures = edge_curvatures(screw, edge, sn, cs, ce, se, r, rt, k, Z, sa, ca, tilt)
-            put_point_slopes(strip, loads, j, slopes, curvatures)
-
-
-@inlined
-def put_point(strip, loads, j, slopes):
-    """Fill a contact point along normal and tangent."""
-    loads.normal[j] = slopes.h + 0.5 * strip.gap[j]
-    loads.tangent[j] = slopes.alpha
+        curvatures = edge_curvatures(screw, edge, sn, cs, ce, se, r, rt, k, Z, sa, ca, tilt)
+        put_point_slopes(strip, loads, j, slopes, curvatures)
 
 
 @inlined

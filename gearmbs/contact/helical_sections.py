@@ -15,6 +15,7 @@ from gearmbs.contact.helicoid import (
     edge_of,
     edge_slopes,
     helical_turn,
+    helical_turns,
     helicoid_curvatures,
     helicoid_normal,
     helicoid_roll,
@@ -35,24 +36,32 @@ from gearmbs.contact.sections import (
 from gearmbs.contact.support import tilt_of
 
 EDGE_STEPS = 6  # of Newton's method for the place of a tip edge in a section
+EDGE_END = 1e-9  # rad; a further step would turn the edge by about the square of it
 
 
 @kernel
 def helical_normals(side, strip, n):
-    """Turn the normals of a strip onto the common normals of two helicoids; as `sections.flank_normals`."""
+    """Turn the normals of a strip onto the common normals of two helicoids; as `sections.flank_normals`.
+
+    Those of parallel axes are known.
+    """
     tilt = tilt_of(side)
     a, half = side.x[L.A], 0.5 * side.x[L.H]
     rb1, rb2, t1 = side.base_1, side.base_2, side.twist_1
     s1_0, s2_0 = rb1 * side.start_1, rb2 * side.start_2
     for j in range(n):
         strip.good[j] = 1.0
+    if side.spread == 0.0:
+        strip.step[0] = 0.0
+        return
     for _ in range(NEWTON_STEPS):
         for j in range(n):
             sa, ca, zeta = strip.sin[j], strip.cos[j], strip.zeta[j]
             one = screw_of(sa, ca, t1, tilt)
             two = mate_of(one, t1, tilt.w)
-            s1 = s1_0 + rb1 * (strip.alpha[j] + helical_turn(one.A, one.B, one.kap2, t1, tilt))
-            s2 = s2_0 + rb2 * (strip.alpha[j] + helical_turn(one.A, one.B, one.kap2, -t1, tilt))
+            turn_1, turn_2 = helical_turns(one.A, one.B, one.kap2, t1, tilt)
+            s1 = s1_0 + rb1 * (strip.alpha[j] + turn_1)
+            s2 = s2_0 + rb2 * (strip.alpha[j] + turn_2)
             first_1, second_1 = helicoid_normal(one, s1, zeta + half, rb1)
             first_2, second_2 = helicoid_normal(two, s2, zeta - half, rb2)
             g1 = a * ca - first_1 - first_2
@@ -81,8 +90,9 @@ def helical_flanks(side, strip, n, want):
         sa, ca, zeta = strip.sin[j], strip.cos[j], strip.zeta[j]
         one = screw_of(sa, ca, t1, tilt)
         two = mate_of(one, t1, tilt.w)
-        s1 = rb1 * (start_1 + strip.alpha[j] + helical_turn(one.A, one.B, one.kap2, t1, tilt))
-        s2 = rb2 * (start_2 + strip.alpha[j] + helical_turn(one.A, one.B, one.kap2, -t1, tilt))
+        turn_1, turn_2 = helical_turns(one.A, one.B, one.kap2, t1, tilt)
+        s1 = rb1 * (start_1 + strip.alpha[j] + turn_1)
+        s2 = rb2 * (start_2 + strip.alpha[j] + turn_2)
         h1 = helicoid_slopes(one, s1, zeta + half, rb1, t1, sa, ca, tilt)
         h2 = helicoid_slopes(two, s2, zeta - half, rb2, -t1, sa, ca, tilt)
         strip.roll_1[j] = helicoid_roll(one, s1, zeta + half, rb1, t1, tilt.w)
@@ -95,46 +105,73 @@ def helical_flanks(side, strip, n, want):
         sa, ca, zeta = strip.sin[j], strip.cos[j], strip.zeta[j]
         one = screw_of(sa, ca, t1, tilt)
         two = mate_of(one, t1, tilt.w)
-        s1 = rb1 * (start_1 + strip.alpha[j] + helical_turn(one.A, one.B, one.kap2, t1, tilt))
-        s2 = rb2 * (start_2 + strip.alpha[j] + helical_turn(one.A, one.B, one.kap2, -t1, tilt))
+        turn_1, turn_2 = helical_turns(one.A, one.B, one.kap2, t1, tilt)
+        s1 = rb1 * (start_1 + strip.alpha[j] + turn_1)
+        s2 = rb2 * (start_2 + strip.alpha[j] + turn_2)
         c1 = helicoid_curvatures(one, s1, zeta + half, rb1, t1, sa, ca, tilt)
         c2 = helicoid_curvatures(two, s2, zeta - half, rb2, -t1, sa, ca, tilt)
         put_helical_curvatures(strip, j, a, sa, ca, c1, c2)
 
 
 @kernel
-def set_edge(side, corner, j, first, eta_0, zeta):
-    """Place the helical tip edge of a wheel in section ``j``; its radius is in ``corner``.
+def set_edges(side, corner, strip, n, first):
+    """Turn tip corners at a wheel's middle, in ``corner``, to where their helical edges pass the sections of a strip.
 
     Parameters
     ----------
-    side, corner : record
-    j : int
-        Section.
+    side : record
+    corner : record
+        In: sine and cosine of the polar angle at the wheel's middle; out: in the sections.
+    strip : record
+        Its sections are placed; ``strip.step`` and ``strip.turn`` are used on the way.
+    n : int
+        Sections.
     first : bool
-        Whether the edge is wheel 1's.
-    eta_0 : float
-        Its polar angle at the wheel's middle.
-    zeta : float
-        Place of the section along the mean axis.
+        Whether the edges are wheel 1's.
     """
     tilt = tilt_of(side)
-    half = 0.5 * side.x[L.H]
-    Z = zeta + half if first else zeta - half
+    p, q, w, i_w = tilt.p, tilt.q, tilt.w, tilt.i_w
+    half = (0.5 if first else -0.5) * side.x[L.H]
     k = side.twist_1 / side.base_1 if first else side.twist_2 / side.base_2
-    p, q, r = tilt.p, tilt.q, corner.radius[j]
-    eta = eta_0 - k * Z
+    turn_edges(corner, strip, n, -k * i_w, half)
+    for j in range(n):
+        strip.good[j] = 1.0
     for _ in range(EDGE_STEPS):
-        ce, se = np.cos(eta), np.sin(eta)
-        slope = tilt.w + k * r * (q * ce - p * se)
-        eta -= (tilt.w * (eta - eta_0) + k * (Z + r * (p * ce + q * se))) / slope
-    corner.sin[j] = np.sin(eta)
-    corner.cos[j] = np.cos(eta)
+        for j in range(n):
+            se, ce, r = corner.sin[j], corner.cos[j], corner.radius[j]
+            behind = w * strip.turn[j] + k * (strip.zeta[j] + half + r * (p * ce + q * se))
+            step = -behind / (w + k * r * (q * ce - p * se))
+            strip.turn[j] += step
+            corner.sin[j], corner.cos[j] = turned(se, ce, step)
+            strip.step[j] = step
+        if steps_squared(strip, n) < EDGE_END * EDGE_END:
+            return
+
+
+@kernel
+def turn_edges(corner, strip, n, per, half):
+    """Turn the corners by ``per`` times the place of their section from the wheel's middle; fills ``strip.turn``."""
+    start = strip.zeta[0]
+    turn = per * (start + half)
+    sin, cos = np.sin(turn), np.cos(turn)
+    for j in range(n):
+        strip.turn[j] = per * (strip.zeta[j] + half)
+        strip.step[j] = per * (strip.zeta[j] - start)
+    if steps_over(strip, n, LARGEST_TURN) > 0.0:
+        for j in range(n):
+            st, ct, se, ce = np.sin(strip.turn[j]), np.cos(strip.turn[j]), corner.sin[j], corner.cos[j]
+            corner.sin[j], corner.cos[j] = se * ct + ce * st, ce * ct - se * st
+        return
+    for j in range(n):
+        se, ce = corner.sin[j], corner.cos[j]
+        corner.sin[j], corner.cos[j] = turned(se * cos + ce * sin, ce * cos - se * sin, strip.step[j])
 
 
 @kernel
 def edge_normals(side, corner, strip, n, first, s0, rb):
     """Turn the normals onto those where the tip edges at work bear on the mate's helicoid; as `corner_normals`.
+
+    They start from those of parallel axes.
 
     Parameters
     ----------
@@ -146,6 +183,8 @@ def edge_normals(side, corner, strip, n, first, s0, rb):
     s0, rb : float
         The mate's ``rb (phi + psi)``, and its base radius.
     """
+    if side.spread == 0.0:
+        return
     tilt = tilt_of(side)
     i_w, m = tilt.i_w, tilt.m
     a, half = side.x[L.A], (0.5 if first else -0.5) * side.x[L.H]

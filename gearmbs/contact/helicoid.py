@@ -72,15 +72,23 @@ class HelicalCurvatures(NamedTuple):
 
 
 @inlined
-def helical_turn(A, B, kap2, t, tilt):
-    """Turn of the normal seen from the helical wheel's own plane: E - arcsin(t B / kappa), by series."""
+def helical_turns(A, B, kap2, t, tilt):
+    """Turns of the normal seen from the planes of a helical wheel and its mate, E -+ arcsin(t B / kappa), by series."""
     arg = A * B / (tilt.w * (1.0 + tilt.w) + A * A)
     u = arg * arg
     turn = arg * (1.0 - u * (1.0 / 3.0 - u * (0.2 - u * (1.0 / 7.0 - u / 9.0))))
     x = t * B / np.sqrt(kap2)
     v = x * x
     high = 35.0 / 1152.0 + v * (63.0 / 2816.0 + v * (231.0 / 13312.0 + v * (143.0 / 10240.0 + v * 6435.0 / 557056.0)))
-    return turn - x * (1.0 + v * (1.0 / 6.0 + v * (3.0 / 40.0 + v * (5.0 / 112.0 + v * high))))
+    lean = x * (1.0 + v * (1.0 / 6.0 + v * (3.0 / 40.0 + v * (5.0 / 112.0 + v * high))))
+    return turn - lean, turn + lean
+
+
+@inlined
+def helical_turn(A, B, kap2, t, tilt):
+    """Turn of the normal seen from the helical wheel's own plane."""
+    turn, _ = helical_turns(A, B, kap2, t, tilt)
+    return turn
 
 
 @inlined

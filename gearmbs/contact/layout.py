@@ -201,6 +201,7 @@ SIDE = record(
     "last",
     "low",  # where the slices begin, m; 0 for a single plane
     "step",  # width of a slice, m
+    "slices",  # along the face
     "overhang",  # how far the common face may reach beyond the slices, m
     "curve",  # lower bound of the corner gap's growth beyond the path of contact, 1/m
     "sign",  # +1 or -1, for the tables that name flanks
@@ -335,6 +336,7 @@ SCRATCH = record(
     ("loads", LOADS),
     ("middle", STRIP),  # mid-face
     ("corners", STRIP),  # sections in which a corner bears
+    ("divided", STRIP),  # flank on flank in slices that are divided
 )
 
 

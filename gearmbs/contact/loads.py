@@ -20,12 +20,12 @@ from gearmbs.contact.slices import (
 
 
 @kernel
-def strip_forces(options, wheels, scratch, law, strip, node, low, high, share, totals, want):
+def strip_forces(wheels, scratch, law, strip, node, low, high, share, totals, want):
     """Integrate the pressure over the slices of a strip, to nodal forces in ``scratch.loads``.
 
     Parameters
     ----------
-    options, wheels, scratch : record
+    wheels, scratch : record
         The face's limits are those of ``scratch.pair``.
     law : Law
     strip : record
@@ -46,15 +46,15 @@ def strip_forces(options, wheels, scratch, law, strip, node, low, high, share, t
     float
         Largest penetration; 0 if nothing touches.
     """
-    pair, loads, width = scratch.pair, scratch.loads, scratch.side.step
-    cut = Cut(pair.low - node, pair.high - node, low, high, -node, options.slices - 1.0 - node)
+    side, pair, loads = scratch.side, scratch.pair, scratch.loads
+    cut = Cut(pair.low - node, pair.high - node, low, high, -node, side.slices - 1.0 - node)
     touching_parts(strip, loads, L.LANES, cut)
     touching = False
     for i in range(L.LANES):
         touching = touching or loads.depth[i] > 0.0
     if not touching:
         return 0.0
-    slice_forces(law, strip, loads, L.LANES, share * width, want)
+    slice_forces(law, strip, loads, L.LANES, share * side.step, want)
     depth = node_forces(loads, L.LANES, totals)
     if want != 0:
         slice_slopes(strip, loads, L.LANES)

@@ -5,10 +5,13 @@ from __future__ import annotations
 from gearmbs.contact import layout as L
 from gearmbs.contact.corners import copy_corner, corner_gaps, set_corner
 from gearmbs.contact.deviations import add_deviations, tip_roll
-from gearmbs.contact.helical_sections import set_edge
-from gearmbs.contact.jit import kernel
+from gearmbs.contact.helical_sections import set_edges
+from gearmbs.contact.jit import inlined, kernel
 from gearmbs.contact.records import rows_of
 from gearmbs.contact.sections import gap_rates
+
+PARTS = 4
+"""Parts into which a slice is divided where a helical tip edge bears."""
 
 
 @kernel
@@ -140,18 +143,18 @@ def pair_corners(wheels, scratch, flanks, own, n, kind, whole, want):
         if loads.kind[j] != kind:
             continue
         roll = corner.roll[j]
-        if reference >= 0 and roll == corner.roll[reference] and not helical:
+        if reference >= 0 and roll == corner.roll[reference]:
             copy_corner(corner, reference, j)
         else:
-            eta = set_corner(wheel, corner, j, f, roll)
-            if helical:
-                set_edge(scratch.side, corner, j, first, eta, flanks.zeta[j])
+            set_corner(wheel, corner, j, f, roll)
             reference = j
     for j in range(n):
         source = j if loads.kind[j] == kind else reference
         if source != j:
             copy_corner(corner, source, j)
         strip.zeta[j] = flanks.zeta[source]
+    if helical:
+        set_edges(scratch.side, corner, strip, n, first)
     corner_gaps(scratch.side, wheels, corner, strip, n, kind, f_mate, scratch.middle, want)
     if whole:
         return
@@ -160,3 +163,52 @@ def pair_corners(wheels, scratch, flanks, own, n, kind, whole, want):
     for r in range(a.shape[0] if want != 0 else L.VALUE_ROWS):
         for j in range(n):
             b[r, j] = a[r, j] if loads.kind[j] == mark else b[r, j]
+
+
+@inlined
+def between(row, j):
+    """Value of a row of the undivided slices at node ``j`` of the divided ones, on the straight line between nodes."""
+    i = min(j // PARTS, L.LANES - 2)
+    u = j / PARTS - i
+    return (1.0 - u) * row[i] + u * row[i + 1]
+
+
+@kernel
+def bending(coarse, fine, n, start):
+    """Return how much the straight lines between the nodes of undivided slices run below the gaps of divided ones.
+
+    ``start`` is the number of the first node of ``fine``, counted from the first one of ``coarse``.
+    """
+    most = 0.0
+    for j in range(n):
+        most = max(most, fine.gap[j] - between(coarse.gap, min(start + j, PARTS * (L.LANES - 1))))
+    return most
+
+
+@kernel
+def straighten(coarse, fine, strip, n, start, want):
+    """Take from a strip of divided slices by how much their flanks' gap is bent between the undivided nodes.
+
+    With this, dividing changes nothing where flanks bear on flanks, so that forces do not jump when it begins.
+
+    Parameters
+    ----------
+    coarse, fine : record
+        Flanks' gaps at the nodes of the undivided and of the divided slices.
+    strip : record
+        In, out; may be ``fine``.
+    n : int
+        Sections.
+    start : int
+        Number of the first node of ``fine``, counted from the first one of ``coarse``.
+    want : int
+        Nonzero to correct second derivatives, too.
+    """
+    for j in range(n):
+        at = min(start + j, PARTS * (L.LANES - 1))
+        strip.gap[j] += between(coarse.gap, at) - fine.gap[j]
+        for k in range(6):
+            strip.grad[k, j] += between(coarse.grad[k], at) - fine.grad[k, j]
+            if want != 0:
+                for i in range(k, 6):
+                    strip.hess[k, i, j] += between(coarse.hess[k, i], at) - fine.hess[k, i, j]

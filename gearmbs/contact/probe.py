@@ -7,7 +7,7 @@ from gearmbs.contact.corners import corner_gaps, set_corner
 from gearmbs.contact.deviations import add_deviations, pair_softness, tip_roll
 from gearmbs.contact.face import end_roll, limit_value, roll_difference
 from gearmbs.contact.helical_friction import helical_points
-from gearmbs.contact.helical_sections import helical_flanks, helical_normals, set_edge
+from gearmbs.contact.helical_sections import helical_flanks, helical_normals, set_edges
 from gearmbs.contact.jit import kernel
 from gearmbs.contact.pair import set_pair
 from gearmbs.contact.points import contact_points
@@ -160,14 +160,14 @@ def section_of_pair(options, wheels, scratch, zeta):
     elif over_2 > 0.0:
         kind = L.CORNER_2
     if kind == L.CORNER_1:
-        eta = set_corner(wheels.wheel_1, scratch.corner_1, 0, pair.f_1, tip_1)
+        set_corner(wheels.wheel_1, scratch.corner_1, 0, pair.f_1, tip_1)
         if side.twist_1 != 0.0:
-            set_edge(side, scratch.corner_1, 0, True, eta, zeta)
+            set_edges(side, scratch.corner_1, strip, 1, True)
         corner_gaps(side, wheels, scratch.corner_1, strip, 1, kind, pair.f_2, strip, 0)
     elif kind == L.CORNER_2:
-        eta = set_corner(wheels.wheel_2, scratch.corner_2, 0, pair.f_2, tip_2)
+        set_corner(wheels.wheel_2, scratch.corner_2, 0, pair.f_2, tip_2)
         if side.twist_1 != 0.0:
-            set_edge(side, scratch.corner_2, 0, False, eta, zeta)
+            set_edges(side, scratch.corner_2, strip, 1, False)
         corner_gaps(side, wheels, scratch.corner_2, strip, 1, kind, pair.f_1, strip, 0)
     if teeth:
         add_deviations(options, wheels, scratch, strip, 0, 0)

@@ -170,7 +170,7 @@ def root_part(options, wheels, scratch, part, tip, f_tip, f_root, totals, want):
         strip = strip_at(scratch, count + k)
         node = k * (L.LANES - 1)
         high = float(min(slices - node, L.LANES - 1))
-        deepest = strip_forces(options, wheels, scratch, law, strip, float(node), 0.0, high, share, totals, want)
+        deepest = strip_forces(wheels, scratch, law, strip, float(node), 0.0, high, share, totals, want)
         if deepest > 0.0:
             depth = max(depth, deepest)
             totals.normal_force += total_force(loads, L.LANES)
@@ -186,6 +186,7 @@ def root_contacts(options, wheels, scratch, sign, totals, want):
         return
     facing_teeth(options, wheels, side)
     side.step = (wheels.face_high - wheels.face_low) / options.slices
+    side.slices = float(options.slices)
     for tip in range(2):
         own = wheels.wheel_1 if tip == 1 else wheels.wheel_2
         corner = scratch.corner_1 if tip == 1 else scratch.corner_2

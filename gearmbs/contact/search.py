@@ -134,6 +134,7 @@ def reach_of_face(options, wheels, side, middle):
         slope *= c * side.w * side.w / (1.0 - c * (p * p + q * q))
     side.low = low
     side.step = (high - low) / slices
+    side.slices = float(slices)
     # where a leaning or shifted wheel's end face goes beyond the slices, gaps are extrapolated
     shift = 0.5 * abs(x[L.H] - wheels.axial_shift)
     side.overhang = abs(p * x[L.A]) + abs(q) * max(side.base_1, abs(side.base_2)) + shift + wheels.end_blend
@@ -255,10 +256,11 @@ def pair_reach(wheels, scratch, slices):
             if strip.gap[j] + path_excess(wheels, side, strip, j, shift) < margin:
                 first = min(first, start + j)
                 last = max(last, start + j)
-        if k == 0 and low == 0 and end_in_reach(wheels, side, strip, 0, 1, shift):
+        if k == 0 and low == 0 and end_in_reach(wheels, side, strip, 0, 1, shift, margin):
             first = 0
             last = max(last, 0)
-        if k == count - 1 and high == slices and end_in_reach(wheels, side, strip, nodes - 1, nodes - 2, shift):
+        at_end = k == count - 1 and high == slices
+        if at_end and end_in_reach(wheels, side, strip, nodes - 1, nodes - 2, shift, margin):
             first = min(first, slices)
             last = slices
     pair.first, pair.last = float(max(first - 1, low)), float(min(last + 1, high))
@@ -266,9 +268,38 @@ def pair_reach(wheels, scratch, slices):
 
 
 @kernel
-def end_in_reach(wheels, side, strip, end, inward, shift):
-    """Whether a pair may touch where the face goes on beyond its end node; ``inward`` is the section next to it."""
-    grown = path_excess(wheels, side, strip, inward, shift) - path_excess(wheels, side, strip, end, shift)
+def end_in_reach(wheels, side, strip, end, inward, shift, margin):
+    """Whether a pair may touch where the face goes on beyond its end node.
+
+    Parameters
+    ----------
+    wheels, side, strip : record
+    end, inward : int
+        The section at the end, and the one next to it.
+    shift : float
+        Length of roll on wheel 1 beyond that of the strip's tooth.
+    margin : float
+        Gap below which teeth may touch.
+    """
+    excess = path_excess(wheels, side, strip, end, shift)
+    grown = path_excess(wheels, side, strip, inward, shift) - excess
     share = STEEPEST * side.overhang / side.step
-    bound = beyond_end(side, strip.gap[end], strip.gap[inward]) - max(0.0, grown) * share
-    return bound < wheels.added_material
+    bound = beyond_end(side, strip.gap[end], strip.gap[inward]) + excess - max(0.0, grown) * share
+    return bound < margin
+
+
+@kernel
+def strip_in_reach(wheels, side, pair, strip, node, nodes, bent):
+    """Whether a tooth pair may touch in the first ``nodes`` sections of a strip that begins at ``node``.
+
+    ``bent`` is how much smaller gaps may be than those of the strip.
+    """
+    shift, margin = pair.shift, wheels.added_material + bent
+    if node == 0.0 and end_in_reach(wheels, side, strip, 0, 1, shift, margin):
+        return True
+    if node + nodes - 1.0 == side.slices and end_in_reach(wheels, side, strip, nodes - 1, nodes - 2, shift, margin):
+        return True
+    for j in range(nodes):
+        if strip.gap[j] + path_excess(wheels, side, strip, j, shift) < margin:
+            return True
+    return False

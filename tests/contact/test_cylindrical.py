@@ -118,20 +118,26 @@ def test_section_gap_against_search(name):
     assert worst < 1e-8
 
 
+def column_errors(contact, state):
+    """Largest error of each of the 24 columns of the derivatives, relative to the column's largest number.
+
+    A quotient across a change of contact is no derivative, since the gap bends there: of several steps the best counts.
+    """
+    contact(state, 1)
+    exact = contact.jac.copy()
+    scale = abs(exact).max(axis=0)
+    shares = (0.5, 0.1, 0.02, 0.005)
+    return np.min([abs(differences(contact, state, share) - exact).max(axis=0) / scale for share in shares], axis=0)
+
+
 @pytest.mark.parametrize("name", PAIRS)
-def test_derivatives(name):
+def test_derivatives_of_each_column(name):
     rng = np.random.default_rng(3)
     contact = Contact(PAIRS[name])
-    worst = 0.0
     for _ in range(3):
         state = shaken(contact.state(rng.uniform(0, 6), rng.uniform(5e-5, 9e-5), 50.0), rng)
-        wrench = contact(state, 1)
-        assert np.linalg.norm(wrench[:3]) > 1
-        exact = contact.jac.copy()
-        scale = np.repeat(abs(exact).max(axis=0).reshape(8, 3).max(axis=1), 3)  # of the kinds of variation
-        found = differences(contact, state, 0.5)
-        worst = max(worst, float((abs(found - exact) / scale).max()))
-    assert worst < 1e-6
+        assert np.linalg.norm(contact(state, 1)[:3]) > 1
+        assert column_errors(contact, state).max() < 1e-6
 
 
 FRICTIONLESS = FlankFriction.none()
@@ -189,13 +195,11 @@ def test_transmission_error_is_constant_at_whole_overlap_ratios(ring):
     assert ripple < 0.01 * most
 
 
-@pytest.mark.parametrize("name", ["ring skew", "helical left, skew", "helical ring skew", "helical inclination"])
+@pytest.mark.parametrize("name", ["ring", "ring skew", "helical", "helical left, skew", "helical ring skew"])
 def test_closed_cycle_does_no_work(name):
-    contact = Contact(PAIRS[name].with_changes(friction=FRICTIONLESS, contact=LINEAR, slices=40))
+    contact = Contact(PAIRS[name].with_changes(friction=FRICTIONLESS, contact=LINEAR, slices=20))
     rng = np.random.default_rng(5)
     start = contact.state(0.4, 60e-6)
-    energy = contact.energy(start)
-    assert energy > 0
     shift, turn = rng.normal(size=(2, 2, 3)) * 3e-6, rng.normal(size=(2, 2, 3)) * 6e-5
 
     def at(angle):
@@ -205,16 +209,20 @@ def test_closed_cycle_does_no_work(name):
         state[1] = rotation(c * turn[0, 0] + s * turn[0, 1]) @ state[1]
         return state
 
-    work, count = 0.0, 400
+    work, count, step = 0.0, 400, 1e-4
+    energies = []
     for k in range(count):
         angle = 2 * math.pi * (k + 0.5) / count
-        before, after = at(angle - 1e-6), at(angle + 1e-6)
-        wrench = contact(at(angle))
-        moved = (after[0] - before[0]) / 2e-6
-        spun = (after[1] - before[1]) @ at(angle)[1].T / 2e-6
+        near = [at(angle + m * step) for m in (1, -1, 2, -2)]
+        state = at(angle)
+        wrench = contact(state)
+        energies.append(contact.diag[0])
+        moved, spun = ((8 * (near[0][i] - near[1][i]) - (near[2][i] - near[3][i])) / (12 * step) for i in (0, 1))
+        spun = spun @ state[1].T
         spin = 0.5 * np.array([spun[2, 1] - spun[1, 2], spun[0, 2] - spun[2, 0], spun[1, 0] - spun[0, 1]])
         work += (wrench[:3] @ moved + wrench[3:] @ spin) * 2 * math.pi / count
-    assert abs(work) < 2e-6 * energy
+    assert np.ptp(energies) > 0.1 * max(energies)
+    assert abs(work) < 1e-8 * max(energies)
 
 
 @pytest.mark.parametrize("name", PAIRS)

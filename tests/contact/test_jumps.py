@@ -103,7 +103,7 @@ def paths(pair, count, rng, lean):
     starts[:, 4] += rng.normal(size=(count, 3)) * [3e-4, 3e-4, 3e-3]
     roll = rng.normal(size=count) * 0.05
     ways[:, 1, 2] += roll
-    ways[:, 5] -= (roll / pair.ratio)[:, None] * axes[1][:, :, 2]
+    ways[:, 5] -= (pair.sign * roll / pair.ratio)[:, None] * axes[1][:, :, 2]
     return starts, axes[0], axes[1], ways
 
 
@@ -148,6 +148,33 @@ PERFECT = {
     "broken teeth": (GearPair.paper(faults=[BrokenTooth(tooth=k, lost=0.4) for k in range(0, 29, 3)], **ELASTIC), 1),
     "chipped teeth": (GearPair.paper(faults=[ChippedCorner(tooth=k) for k in range(0, 29, 3)], **ELASTIC), 11),
 }
+
+
+def cylindrical(internal=False, helix=0.0, **changes):
+    kind = {"helix_angle": helix, "tip_rounding": changes.pop("tip_rounding", 0.0)}
+    mate = {"hand": "right" if internal else "left", "internal": internal}
+    one, two = GearSpec(23, "3 mm", **kind), GearSpec(70 if internal else 37, "3 mm", **mate, **kind)
+    return GearPair(one, two, backlash="0.3 mm", **changes)
+
+
+CYLINDRICAL = {
+    "ring": (cylindrical(True, **ELASTIC), 1, 0.01),
+    "ring, sliced": (cylindrical(True, **ELASTIC), 11, 0.01),
+    "ring, rounded tips, damped, with friction": (cylindrical(True, tip_rounding="0.2 mm"), 5, 0.01),
+    "helical, nearly parallel": (cylindrical(False, 0.26, **ELASTIC), 20, 2e-4),
+    "helical, leaning": (cylindrical(False, 0.26, **ELASTIC), 9, 0.01),
+    "helical, damped, with friction": (cylindrical(False, 0.26), 9, 2e-3),
+    "helical ring": (cylindrical(True, 0.26, **ELASTIC), 9, 2e-3),
+}
+"""Pairs, slices, and how much their axes lean."""
+
+
+@pytest.mark.parametrize("name", CYLINDRICAL)
+def test_no_jumps_of_internal_and_helical_wheels(name):
+    pair, slices, lean = CYLINDRICAL[name]
+    jump, touched = worst_jump(pair, slices, 200, lean)
+    assert touched >= 10
+    assert jump < 1e-5
 
 
 @pytest.mark.parametrize("name", PERFECT)
