@@ -9,8 +9,11 @@ from __future__ import annotations
 import html
 import importlib
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import Any
+
+from gearmbs.units import Given
 
 PLOTS = {
     "GearSpec": "gearmbs.view:wheel_plot",
@@ -34,6 +37,68 @@ TABLES = {
     "Case": "gearmbs.studies.show:case_html",
 }
 """What makes a table of an object for notebooks, where its class does not do so itself."""
+
+
+class Written:
+    """What dataclasses share that show themselves as they were written: fields at their defaults left out, quantities
+    with the units that the user gave."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        # a method of the class itself is left alone by the decorator of dataclasses
+        if "__repr__" not in cls.__dict__:
+            cls.__repr__ = written  # type: ignore[assignment]
+
+
+def written(thing: Any) -> str:
+    """Return how a dataclass is built: its name and the fields that differ from their defaults.
+
+    Examples
+    --------
+    >>> from gearmbs.gears import OperatingPoint
+    >>> OperatingPoint("60 N m", rotation=-1)
+    OperatingPoint(torque='60 N m', rotation=-1)
+    """
+    return f"{type(thing).__name__}({', '.join(f'{name}={_code(value)}' for name, value in settings_of(thing))})"
+
+
+def settings_of(thing: Any) -> list[tuple[str, Any]]:
+    """Return name and value of the fields of a dataclass that differ from their defaults."""
+    found = []
+    for item in fields(thing):
+        value = getattr(thing, item.name)
+        default = item.default if item.default_factory is MISSING else item.default_factory()
+        if isinstance(value, Given):
+            same = value.text == default
+        else:
+            plain = is_dataclass(default) or isinstance(default, (str, float, int, tuple))
+            same = value is default or (plain and isinstance(value, type(default)) and value == default)
+        if item.repr and not same:
+            found.append((item.name, value))
+    return found
+
+
+def readable(value: Any) -> str:
+    """Return a setting as a table shows it: a quantity as it was given, vectors with commas."""
+    if isinstance(value, Given):
+        return value.text
+    if isinstance(value, str):
+        return value.strip()
+    if isinstance(value, (list, tuple)):
+        return ", ".join(map(readable, value))
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _code(value: Any) -> str:
+    """Return a value as it stands in a program, a quantity as it was given."""
+    if isinstance(value, Given):
+        return repr(value.text)
+    if type(value) in (tuple, list):
+        inner = ", ".join(map(_code, value))
+        if isinstance(value, list):
+            return f"[{inner}]"
+        return f"({inner},)" if len(value) == 1 else f"({inner})"
+    return repr(value)
 
 
 class Shown:
@@ -99,6 +164,8 @@ def html_table(caption: str, header: Sequence[str], rows: Iterable[Sequence[Any]
 
 
 def _cell(value: Any) -> str:
+    if isinstance(value, Given):
+        value = value.text
     if isinstance(value, float):
         return f'<td style="text-align:right">{value:.6g}</td>'
     side = "right" if isinstance(value, int) else "left"

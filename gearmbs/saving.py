@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,10 +21,18 @@ WRITERS: dict[str, dict[str, str]] = {
     "Solution": {".nc": "gearmbs.saving:_solution"},
     "Dataset": {".nc": "gearmbs.saving:_dataset"},
     "DataFrame": {".csv": "gearmbs.saving:_table"},
-    "AnalysisReport": {".md": "gearmbs.saving:_report"},
+    "AnalysisReport": {
+        ".md": "gearmbs.saving:_report",
+        ".html": "gearmbs.view.report_page:write_report_page",
+        ".csv": "gearmbs.saving:_report_tables",
+        ".json": "gearmbs.saving:_report_data",
+    },
 }
 WRITERS["GearPair"] = WRITERS["GearSpec"]
-WRITERS["ComparisonReport"] = WRITERS["VibrationReport"] = WRITERS["PlanetaryReport"] = WRITERS["AnalysisReport"]
+for _report_kind in ("VibrationReport", "ComparisonReport", "BearingReport", "PlanetaryReport"):
+    WRITERS[_report_kind] = WRITERS["AnalysisReport"]
+REPORT_FACTS = ("source", "rate", "duration", "teeth", "speed", "speed_origin", "gmf", "missing", "notes")
+"""Attributes of reports that go into JSON beside their tables; speeds in rad/s."""
 SIGNAL_ENDINGS = (".csv", ".gz", ".mat", ".uff", ".unv", ".wav", ".nc", ".h5", ".hdf5", ".tdms")
 FIGURE_ENDINGS = (".png", ".svg", ".pdf")
 
@@ -36,7 +45,9 @@ def save(thing: Any, path: str | Path) -> Path | list[Path]:
     thing : object
         A case (``.toml``), a wheel or pair (``.dxf``, ``.step``, ``.stl``), a mechanism (``.adm``), a solution or data
         set (``.nc``), a signal (any format of `gearmbs.write_signal`), a figure (``.png``, ``.svg``, ``.pdf``), a table
-        (``.csv``), a report (``.md``), or anything with a ``save`` of its own, such as scenes, animations and studies.
+        (``.csv``), a report (``.md``, ``.html`` with its figure, ``.json`` with all tables, ``.csv`` for one file a
+        table: ``worn.csv`` gives ``worn_levels.csv`` and others), or anything with a ``save`` of its own, such
+        as scenes, animations and studies.
     path : path
         Folders are made.
 
@@ -109,6 +120,27 @@ def _report(report: Any, path: Path) -> Path:
     from gearmbs.view.files import write_whole
 
     return write_whole(path, report.to_markdown())
+
+
+def _report_tables(report: Any, path: Path) -> list[Path]:
+    from gearmbs.view.files import write_whole
+
+    return [
+        write_whole(path.with_name(f"{path.stem}_{name}.csv"), table.to_csv(index=False))
+        for name, table in report.tables().items()
+    ]
+
+
+def _report_data(report: Any, path: Path) -> Path:
+    from gearmbs.view.files import write_whole
+
+    data = {name: getattr(report, name) for name in REPORT_FACTS if hasattr(report, name)}
+    # numbers that are not known are null, as JSON has it
+    tables = {
+        name: json.loads(table.to_json(orient="records", double_precision=15))
+        for name, table in report.tables().items()
+    }
+    return write_whole(path, json.dumps({"kind": type(report).__name__, **data, "tables": tables}, indent=1) + "\n")
 
 
 def _figure(figure: Any, path: Path) -> Path:

@@ -6,6 +6,7 @@ wrong with it, is left to pint, whose registry of units takes a quarter of a sec
 
 from __future__ import annotations
 
+import difflib
 import functools
 import math
 import re
@@ -79,6 +80,40 @@ NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 FACTOR = re.compile(r"\s*([*/]?)\s*([A-Za-z]+)(?:(?:\^|\*\*)(-?\d+(?:\.\d+)?))?\s*")
 
 
+class Given(float):
+    """A number in SI that was given as a text with a unit and keeps that text for showing; a float in all else.
+
+    Whatever is computed from it is a plain float.
+
+    Examples
+    --------
+    >>> module = to_si("2 mm", "length")
+    >>> module, shown(module, "mm"), shown(2.0 * module, "mm")
+    (0.002, '2 mm', '4 mm')
+    """
+
+    __slots__ = ("text",)
+    text: str
+
+    def __new__(cls, value: float, text: str) -> Given:
+        made = super().__new__(cls, value)
+        made.text = text
+        return made
+
+    def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]
+        return float(self), self.text
+
+
+def shown(value: float, unit: str, form: str = ".6g") -> str:
+    """Return a quantity as a user reads it: as it was given, else in a unit of `COMMON` or a product of these."""
+    if isinstance(value, Given):
+        return value.text
+    known = _common(unit)
+    if known is None:
+        raise ValueError(f"unit is {unit!r}; give one made of {', '.join(COMMON)}")
+    return f"{value / known[0]:{form}} {unit}"
+
+
 @functools.lru_cache(maxsize=256)
 def _common(unit: str) -> tuple[float, tuple] | None:
     """Return factor and powers of a product of common units; None for anything else."""
@@ -129,6 +164,7 @@ def to_si(value: Any, unit: str, field: str = "value") -> float:
     Returns
     -------
     float
+        From a text a `Given`, which keeps the text.
 
     Raises
     ------
@@ -150,9 +186,9 @@ def to_si(value: Any, unit: str, field: str = "value") -> float:
     if isinstance(value, bool):
         raise TypeError(f"{field}: got {value!r}; give a number in {target} or text with a unit")
     if isinstance(value, Real):
-        number = float(value)
+        number = value if isinstance(value, Given) else float(value)
     elif isinstance(value, str):
-        number = _parse(value, target, field)
+        number = Given(_parse(value, target, field), value.strip())
     elif hasattr(value, "to") and hasattr(value, "magnitude"):
         number = _parse(f"{float(value.magnitude)!r} {value.units!s}", target, field)
     else:
@@ -178,8 +214,7 @@ def _parse(text: str, target: str, field: str) -> float:
         quantity = registry.Quantity(clean)
     except Exception as error:
         raise ValueError(
-            f"{field}: cannot read {text!r} as a number with a unit ({error}); write for example "
-            f"'1 {USUAL.get(target, target)}'"
+            f"{field}: cannot read {text!r} as a number with a unit ({error}); {_remedy(clean, target)}"
         ) from None
     example = USUAL.get(target, target)
     if not isinstance(quantity, registry.Quantity):
@@ -200,6 +235,17 @@ def _parse(text: str, target: str, field: str) -> float:
         raise ValueError(
             f"{field}: {text!r} is in {quantity.units:~} where a quantity in {target} is expected"
         ) from None
+
+
+def _remedy(text: str, target: str) -> str:
+    """Return what may have been meant by a text that cannot be read."""
+    number = NUMBER.match(text)
+    unit = "" if number is None else text[number.end() :].strip()
+    known = [name for name in (*COMMON, target) if _common(name) and _common(name)[1] == _common(target)[1]]  # type: ignore[index]
+    near = difflib.get_close_matches(unit, known, 1, 0.5) if unit and _common(target) else []
+    if number is not None and near:
+        return f"did you mean '{number[0]} {near[0]}'?"
+    return f"write for example '1 {USUAL.get(target, target)}'"
 
 
 def _turns(quantity: Any, registry: Any, text: str, target: str, field: str) -> float | None:

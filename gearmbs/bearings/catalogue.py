@@ -81,6 +81,11 @@ CLEARANCES = (
     (65, (1, 15), (8, 28), (23, 43), (38, 61), (55, 90)), (80, (1, 15), (10, 30), (25, 51), (46, 71), (65, 105)),
 )  # fmt: skip
 """Up to a bore, mm: least and largest radial clearance of the classes C2, CN, C3, C4, C5 by ISO 5753-1, um."""
+SUFFIX = re.compile(
+    r"(?:N|E|ET|A|B|K|M|MA|J|T|TN9|ETN9|TVH|TVP2?|2?Z|ZZ|2?RS[1HLR]?|2?RSR|2?RZ|LL[BUH]|L[BUH]|DDU?|DU|VV|EE|NR|ZNR|2?ZNR"
+    r"|CM|CN|C[2345]|P[456])+"
+)
+"""Suffixes that makers write onto the digits: seals and shields, cages, snap rings, clearance, precision."""
 SMALL_BORES = {0: 10, 1: 12, 2: 15, 3: 17}
 
 
@@ -100,6 +105,8 @@ def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
         return Bearing(**{**RECORDINGS[ALIASES[plain]], **changes})
     digits = re.match(r"^\s*(?:SKF|FAG|NSK|NTN|INA|KOYO)?\s*(\d{4,5})", designation.upper())
     series = digits[1] if digits else ""
+    if digits and plain not in ALIASES:
+        _check_suffix(designation, designation.upper()[digits.end() :])
     if series in ELEMENTS:
         z, d, pitch = ELEMENTS[series]
         found = {"elements": z, "element_diameter": 1e-3 * d, "pitch_diameter": 1e-3 * pitch}
@@ -123,6 +130,17 @@ def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
         f"designation {designation!r} is not in the catalogue ({', '.join(known())}); give elements=, element_diameter="
         " and pitch_diameter=, and contact_angle= if it is not 0"
     )
+
+
+def _check_suffix(designation: str, rest: str) -> None:
+    """Refuse letters written onto the digits that no maker uses: they are a slip, or mean another bearing."""
+    found = re.match(r"[A-Z0-9]*", rest)
+    letters = found[0] if found else ""
+    if letters and SUFFIX.fullmatch(letters) is None:
+        raise BearingError(
+            f"designation {designation!r}: {letters!r} right after the digits is no suffix that is known; leave it "
+            f"out, or write it apart, '{designation.strip()[: -len(rest.rstrip())]}-{letters}', if your maker uses it"
+        )
 
 
 def _clearance(designation: str, boundary: dict[str, float]) -> dict[str, float]:

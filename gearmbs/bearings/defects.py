@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from gearmbs._shown import Written
 from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.profiles import angles, drop, node_count, rounded
 from gearmbs.units import Quantity, to_si
@@ -25,7 +26,7 @@ PARTS = (OUTER, INNER, ELEMENT)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Defect:
+class Defect(Written):
     """What all defects share: a label, a severity, checked settings in SI."""
 
     label: ClassVar[str] = "defect"

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
+from gearmbs._shown import Written
 from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.hertz import (
     BALL_EXPONENT,
@@ -30,7 +31,7 @@ UNITS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bearing:
+class Bearing(Written):
     """A rolling bearing.
 
     Parameters

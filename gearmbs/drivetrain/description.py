@@ -54,6 +54,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from gearmbs._shown import Written
 from gearmbs.drivetrain.bearings import BEARINGS
 from gearmbs.drivetrain.couplings import COUPLINGS
 from gearmbs.drivetrain.drives import DRIVES
@@ -86,7 +87,7 @@ GEAR_KEYS = tuple(f.name for f in fields(GearSpec) if f.init and f.name != "name
 
 
 @dataclass(frozen=True)
-class RunSettings:
+class RunSettings(Written):
     """How a drivetrain is simulated and recorded.
 
     Parameters

@@ -17,6 +17,7 @@ from gearmbs.drivetrain.loads import Load
 from gearmbs.drivetrain.part import Part
 from gearmbs.drivetrain.parts import GearMesh, Housing, Shaft, Wheel
 from gearmbs.drivetrain.sensors import Sensor
+from gearmbs.drivetrain.show import parts_html
 
 if TYPE_CHECKING:
     from gearmbs.drivetrain.kinematics import KinematicTable
@@ -248,7 +249,8 @@ class Drivetrain:
         return max([1.0, *(fastest or map(abs, self.speeds.values()))])
 
     def _repr_html_(self) -> str:
-        return self.kinematics.to_html()
+        parts = (part for group in GROUPS for part in getattr(self, group))
+        return parts_html(self.name, parts) + self.kinematics.to_html()
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(getattr(self, g))} {g}" for g in GROUPS if getattr(self, g))

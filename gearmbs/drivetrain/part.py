@@ -7,12 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
+from gearmbs._shown import Written
 from gearmbs.drivetrain.errors import DrivetrainError, require
 from gearmbs.units import to_si
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part:
+class Part(Written):
     """A named part.
 
     Parameters

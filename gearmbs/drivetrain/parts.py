@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -131,6 +131,9 @@ class Wheel(Part):
     def __post_init__(self) -> None:
         super().__post_init__()
         require(isinstance(self.gear, GearSpec), f"{self.label}: gear is {self.gear!r}; give a GearSpec")
+        if self.gear.name == GearSpec.name:
+            # messages about the pair then tell its wheels apart
+            object.__setattr__(self, "gear", replace(self.gear, name=self.name))
 
 
 @dataclass(frozen=True, kw_only=True)

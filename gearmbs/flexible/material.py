@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gearmbs._shown import Written
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.mechanism.quantities import quantity
 from gearmbs.units import Quantity
 
 
 @dataclass(frozen=True)
-class ElasticMaterial:
+class ElasticMaterial(Written):
     """An isotropic elastic material.
 
     Parameters

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.linalg
 
+from gearmbs._shown import Written
 from gearmbs.flexible.beam import DOFS
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.shaft import Shaft
@@ -26,7 +27,7 @@ DIRECTIONS = {"lateral": (0, 1, 3, 4), "torsional": (5,), "axial": (2,), "all": 
 
 
 @dataclass(frozen=True)
-class Support:
+class Support(Written):
     """A linear bearing at a seat of a shaft.
 
     Parameters
@@ -48,6 +49,9 @@ class Support:
     axial: Quantity = 0.0
     torsional: Quantity = 0.0
     rotational: Quantity = 0.0
+
+    def __post_init__(self) -> None:
+        self.matrices()
 
     def matrices(self) -> tuple[np.ndarray, np.ndarray]:
         """Return stiffness and damping of the six degrees of freedom of the node."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearmbs._shown import Written
 from gearmbs.flexible.beam import (
     DOFS,
     GAUSS_W,
@@ -33,7 +34,7 @@ ELEMENTS = 24
 
 
 @dataclass(frozen=True)
-class ShaftSection:
+class ShaftSection(Written):
     """A length of shaft, a cylinder or a cone.
 
     Parameters
@@ -69,7 +70,7 @@ class ShaftSection:
 
 
 @dataclass(frozen=True)
-class Disc:
+class Disc(Written):
     """A rigid disc on a shaft: a wheel, a coupling half, a rotor.
 
     Give ``outer`` and ``width``, or ``mass``, ``polar`` and ``diametral``.
@@ -121,7 +122,7 @@ class Disc:
 
 
 @dataclass(frozen=True)
-class Shaft:
+class Shaft(Written):
     """A shaft along z, from z = 0 on, of sections, with discs on it and named seats.
 
     Parameters

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import InitVar, dataclass, field
 from typing import Literal
 
+from gearmbs._shown import Written
 from gearmbs.gears.fault import Fault
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.laws import ContactLaw, FlankFriction
@@ -29,7 +30,7 @@ BOTTOMING_CLEARANCE = 0.1
 
 
 @dataclass(frozen=True)
-class ContactModel:
+class ContactModel(Written):
     """Contact of two toothed wheels.
 
     Parameters

@@ -6,6 +6,7 @@ import math
 from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar, Literal
 
+from gearmbs._shown import Written
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.settings import choice, real, switch, tooth_numbers, whole
 from gearmbs.gears.spec import convert_fields, require
@@ -24,7 +25,7 @@ COAST_ALIASES = {"back": "coast"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fault:
+class Fault(Written):
     """What all faults share.
 
     Parameters

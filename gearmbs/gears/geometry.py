@@ -13,6 +13,7 @@ from typing import Literal, overload
 
 import numpy as np
 
+from gearmbs._shown import Written
 from gearmbs.gears.spec import GearSpec, convert_fields, involute, require
 from gearmbs.units import Quantity
 
@@ -57,7 +58,7 @@ def _turn_z(angle: float) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class PairGeometry:
+class PairGeometry(Written):
     """A driver and a driven wheel, placed in space.
 
     The driver is at the global origin with its axis along global z; the driven wheel is at +x, the working centre

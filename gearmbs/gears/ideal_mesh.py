@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearmbs._shown import Written
 from gearmbs.dae.equations.force_elements import DISSIPATED, STORED, Diagnostic
 from gearmbs.gears.geometry import PairGeometry, Placement
 from gearmbs.gears.pair import GearPair
@@ -25,7 +26,7 @@ POINTS = 64
 
 
 @dataclass(frozen=True)
-class IdealMesh:
+class IdealMesh(Written):
     """A gear pair that meshes through one spring and damper along its line of action.
 
     It takes the place of a `GearPair` in ``Mechanism.gear_contact`` and in planetary sets.

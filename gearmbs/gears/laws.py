@@ -6,13 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from gearmbs._shown import Written
 from gearmbs.units import Quantity, to_si
 
 LawKind = Literal["impact", "hunt-crossley", "linear", "hertz"]
 
 
 @dataclass(frozen=True)
-class ContactLaw:
+class ContactLaw(Written):
     """Normal force of one tooth pair over its face, against penetration and its rate.
 
     Use the class methods; each states its own formula. ``stiffness`` and ``damping`` refer to the whole face of a
@@ -21,22 +22,25 @@ class ContactLaw:
     Attributes
     ----------
     kind : {"impact", "hunt-crossley", "linear", "hertz"}
-    stiffness : float
+    stiffness : float or str
         K, N/m^exponent.
     exponent : float
-    damping : float
+    damping : float or str
         C, N s/m; for Hunt-Crossley the factor on the penetration rate, s/m.
-    depth : float
+    depth : float or str
         Penetration at which the damping is fully on, m.
     """
 
     kind: LawKind
-    stiffness: float
+    stiffness: Quantity
     exponent: float
-    damping: float
-    depth: float
+    damping: Quantity
+    depth: Quantity
 
     def __post_init__(self) -> None:
+        rate = "s/m" if self.kind == "hunt-crossley" else "N*s/m"
+        for name, unit in (("stiffness", f"N/m^{self.exponent!r}"), ("damping", rate), ("depth", "length")):
+            object.__setattr__(self, name, to_si(getattr(self, name), unit, f"ContactLaw.{name}"))
         for name, low in (("stiffness", 0.0), ("exponent", 0.0), ("depth", 0.0)):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > low):
@@ -112,7 +116,7 @@ class ContactLaw:
 
 
 @dataclass(frozen=True)
-class FlankFriction:
+class FlankFriction(Written):
     """Coulomb friction between flanks, regularised in the sliding speed.
 
     Parameters

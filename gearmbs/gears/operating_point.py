@@ -6,13 +6,14 @@ import math
 from dataclasses import InitVar, dataclass
 from typing import Literal
 
+from gearmbs._shown import Written
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.spec import require
 from gearmbs.units import Quantity, to_si
 
 
 @dataclass(frozen=True)
-class OperatingPoint:
+class OperatingPoint(Written):
     """Load and sense of rotation of a pair.
 
     Parameters

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -19,7 +18,7 @@ from gearmbs.gears.show import pair_html, pair_table
 from gearmbs.gears.spec import GearSpec, require
 from gearmbs.gears.stiffness import compliance_roll_lengths, iso_mesh_stiffness, iso_single_stiffness, pair_stiffness
 from gearmbs.gears.tables import pack
-from gearmbs.units import Quantity
+from gearmbs.units import Quantity, shown
 
 if TYPE_CHECKING:
     from gearmbs.gears.contact_element import GearContact
@@ -260,16 +259,21 @@ class GearPair(PairGeometry, Shown):
 
         return touching_angle(self, driver_angle)
 
+    def _backlash_shown(self) -> str:
+        """The backlash as it was given where nothing else has changed it."""
+        same = abs(self.normal_backlash - self.backlash) < 1e-9
+        return shown(self.backlash if same else self.normal_backlash, "mm", ".4g")
+
     def __repr__(self) -> str:
         one, two = self.driver, self.driven
         parts = [
             f"{one.teeth}/{two.teeth} teeth",
-            f"module {1e3 * one.module:.4g} mm",
+            f"module {shown(one.module, 'mm', '.4g')}",
             f"centre distance {1e3 * self.centre_distance:.4f} mm",
-            f"backlash {1e3 * self.normal_backlash:.4g} mm",
+            f"backlash {self._backlash_shown()}",
         ]
         if self.misalignment:
-            parts.append(f"{self.plane} {math.degrees(self.misalignment):.4g} deg")
+            parts.append(f"{self.plane} {shown(self.misalignment, 'deg', '.4g')}")
         parts += [fault.label for fault in self.faults]
         return f"GearPair({', '.join(parts)})"
 

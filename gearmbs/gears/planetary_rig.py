@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gearmbs._shown import Written
 from gearmbs.gears.planetary_set import MEMBERS, PlanetarySet
 from gearmbs.gears.spec import require
 from gearmbs.mechanism import Mechanism, ramp, step
@@ -21,7 +22,7 @@ PinBearing = Callable[[str, Marker, Marker], ForceElement]
 
 
 @dataclass(frozen=True)
-class Support:
+class Support(Written):
     """Springs that carry a member against the ground, or a planet against the carrier.
 
     Parameters

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from gearmbs._shown import Written
 from gearmbs.gears.fault import Fault
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.ideal_mesh import IdealMesh
@@ -28,7 +29,7 @@ FITTING = 1e-6
 
 
 @dataclass(frozen=True)
-class PlanetarySet:
+class PlanetarySet(Written):
     """A sun, planets on a carrier and a ring.
 
     Parameters

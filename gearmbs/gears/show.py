@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import html
-import math
 from typing import TYPE_CHECKING
 
 from gearmbs._shown import html_table
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
+from gearmbs.units import Given, shown
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -33,7 +33,6 @@ def pair_table(pair: Mesh) -> Table:
     """Table of a gear pair for a terminal or a notebook."""
     from rich.table import Table
 
-    mm = 1e3
     geometry, point = pair.geometry, pair.operating_point
     force = point.normal_force(geometry)
     one, two = geometry.driver, geometry.driven
@@ -42,53 +41,54 @@ def pair_table(pair: Mesh) -> Table:
     for column in ("", one.name, two.name):
         table.add_column(column, justify="left" if not column else "right")
 
-    def both(label: str, form: str, attribute: str, factor: float = mm) -> None:
-        table.add_row(label, *(format(getattr(w, attribute) * factor, form) for w in geometry.wheels))
+    def both(label: str, form: str, attribute: str) -> None:
+        table.add_row(label, *(format(getattr(w, attribute), form) for w in geometry.wheels))
 
-    both("teeth", "d", "teeth", 1)
-    for label, attribute in (
-        ("module mm", "module"),
-        ("pitch radius mm", "pitch_radius"),
-        ("tip radius mm", "tip_radius"),
-        ("base radius mm", "base_radius"),
-        ("root radius mm", "root_radius"),
-        ("root arc mm", "fillet_radius"),
-        ("face width mm", "face_width"),
-    ):
-        both(label, ".4f", attribute)
+    def measures(label: str, attribute: str, unit: str = "mm") -> None:
+        table.add_row(label, *(shown(getattr(w, attribute), unit, ".4f") for w in geometry.wheels))
+
+    both("teeth", "d", "teeth")
+    for label, attribute in SIZES:
+        if attribute != "bore_radius" or any(w.bore_radius for w in geometry.wheels):
+            measures(label, attribute)
     if any(w.profile_shift for w in geometry.wheels):
-        both("profile shift x (ISO 21771)", "+.4f", "profile_shift", 1)
+        both("profile shift x (ISO 21771)", "+.4f", "profile_shift")
     if two.internal:
-        both("profile shift outwards", "+.4f", "outward_shift", 1)
-        both("outer radius mm", ".4f", "outer_radius")
+        both("profile shift outwards", "+.4f", "outward_shift")
+        measures("outer radius", "outer_radius")
     if one.helix_angle:
-        both("helix angle deg", ".4f", "helix_angle", math.degrees(1))
+        measures("helix angle", "helix_angle", "deg")
         table.add_row("hand", *(w.hand for w in geometry.wheels))
-    both("mass kg", ".4f", "mass", 1)
+    measures("mass", "mass", "kg")
     table.add_section()
     for label, value in (
-        ("centre distance mm", f"{geometry.centre_distance * mm:.4f}"),
-        ("working pressure angle deg", f"{math.degrees(geometry.working_pressure_angle):.3f}"),
+        ("centre distance", shown(geometry.centre_distance, "mm", ".4f")),
+        ("working pressure angle", shown(geometry.working_pressure_angle, "deg", ".3f")),
         ("contact ratio", f"{geometry.contact_ratio:.4f}"),
         *_overlap(geometry),
-        ("path of contact mm", f"{geometry.path_of_contact * mm:.3f}"),
-        ("normal backlash mm", f"{geometry.normal_backlash * mm:.4f}"),
-        (
-            "misalignment deg",
-            f"{math.degrees(geometry.misalignment):.3f} {tilt}",
-        ),
-        ("load torque N m", f"{point.torque:.1f}"),
-        ("normal force N", f"{force:.1f}"),
-        ("penetration, one pair um", f"{pair.contact_model.penetration(force) * 1e6:.2f}"),
+        ("path of contact", shown(geometry.path_of_contact, "mm", ".3f")),
+        ("normal backlash", shown(geometry.normal_backlash, "mm", ".4f")),
+        *((f"{name.replace('_', ' ')}", shown(getattr(geometry, name), unit)) for name, unit in _given(geometry)),
+        ("misalignment", f"{shown(geometry.misalignment, 'deg', '.3f')} {tilt}".strip()),
+        ("load torque", shown(point.torque, "N m", ".1f")),
+        ("normal force", shown(force, "N", ".1f")),
+        ("penetration, one pair", shown(pair.contact_model.penetration(force), "um", ".2f")),
     ):
         table.add_row(label, value, "")
     if geometry.jams:
         table.add_row(
             "jams",
-            f"needs {geometry.jam_backlash * mm:.4f} mm of normal backlash, has {geometry.normal_backlash * mm:.4f}",
+            f"needs {shown(geometry.jam_backlash, 'mm', '.4f')} of normal backlash, has "
+            f"{shown(geometry.normal_backlash, 'mm', '.4f')}",
             "",
         )
     return table
+
+
+def _given(geometry: PairGeometry) -> list[tuple[str, str]]:
+    """Settings of the placement that stand beside what follows from them, where they were given."""
+    fields = ("centre_distance_error", "axial_shift", "backlash")
+    return [(name, "mm") for name in fields if isinstance(getattr(geometry, name), Given)]
 
 
 def _overlap(geometry: PairGeometry) -> list[tuple[str, str]]:
@@ -115,13 +115,14 @@ def pair_html(pair: Mesh) -> str:
 
 def wheel_html(gear: GearSpec) -> str:
     """Return a wheel as a table for a notebook."""
-    mm = 1e3
+    material = gear.material
     rows = [
         ("teeth", str(gear.teeth)),
-        *((label, f"{getattr(gear, name) * mm:.4f} mm") for label, name in SIZES),
-        ("pressure angle", f"{math.degrees(gear.pressure_angle):.6g} deg"),
+        *((label, shown(getattr(gear, name), "mm", ".4f")) for label, name in SIZES),
+        ("pressure angle", shown(gear.pressure_angle, "deg")),
+        *([("helix angle", f"{shown(gear.helix_angle, 'deg')}, {gear.hand} hand")] if gear.helix_angle else []),
         ("profile shift", f"{gear.profile_shift:.6g}"),
-        ("mass", f"{gear.mass:.4f} kg"),
-        ("material", f"E = {gear.material.youngs_modulus * 1e-9:.6g} GPa, {gear.material.density:.6g} kg/m^3"),
+        ("mass", shown(gear.mass, "kg", ".4f")),
+        ("material", f"E = {shown(material.youngs_modulus, 'GPa')}, {shown(material.density, 'kg/m^3')}"),
     ]
     return html_table(f"Wheel {gear.name}", ("", ""), rows)

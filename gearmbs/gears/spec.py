@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
-from gearmbs._shown import Shown
+from gearmbs._shown import Shown, Written
 from gearmbs.units import Quantity, to_si
 
 UNDERCUT_TOLERANCE = 0.8  # share of the cutter height that must clear the base circle's normal (14 teeth at 20 deg)
@@ -41,7 +41,7 @@ def require(condition: bool, message: str) -> None:
 
 
 @dataclass(frozen=True)
-class Material:
+class Material(Written):
     """Elastic material of a wheel.
 
     Parameters
@@ -65,7 +65,7 @@ class Material:
 
 
 @dataclass(frozen=True)
-class GearSpec(Shown):
+class GearSpec(Shown, Written):
     """A cylindrical involute wheel: external or internal, spur or helical.
 
     Parameters

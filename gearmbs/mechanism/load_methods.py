@@ -13,6 +13,7 @@ from gearmbs.mechanism import elements as el
 from gearmbs.mechanism.elements import Load
 from gearmbs.mechanism.forces.springs import AxisSpring, Beam, Bushing, Field, LineSpring, MatrixForce, in_si
 from gearmbs.mechanism.geometry import Vector, vector
+from gearmbs.mechanism.given import keeps_given
 from gearmbs.mechanism.parts import Marker
 from gearmbs.mechanism.quantities import expression_text, quantity
 
@@ -39,6 +40,7 @@ class LoadMethods:
 
     units: Units
     reads_units: bool
+    given: dict[str, dict[str, Any]]
     add: Callable[[Any], Any]
     _add_load: Callable[[Load], Load]
 
@@ -55,8 +57,10 @@ class LoadMethods:
 
     def _in_si(self, *values: tuple[float, str]) -> list[float]:
         """Return numbers in the mechanism's units, each with its dimension, in SI."""
-        return [value * self.units.factor(dimension) for value, dimension in values]
+        factors = [self.units.factor(dimension) for _, dimension in values]
+        return [value if factor == 1.0 else value * factor for (value, _), factor in zip(values, factors)]
 
+    @keeps_given
     def load(
         self,
         name: str,
@@ -87,21 +91,25 @@ class LoadMethods:
             raise ModelError(f"load '{name}': give at least one of fx, fy, fz, tx, ty, tz")
         return self._add_load(Load(name, kind, i, j, rm or j, el.COMPONENTS, expressions))
 
+    @keeps_given
     def line_force(self, name: str, i: Marker, j: Marker, expression: Expression, kind: str = "sforce") -> Load:
         """Apply a force along the line between two markers; positive values push I and J apart."""
         text = self._text(f"{kind} '{name}'", expression, "force")
         return self._add_load(Load(name, kind, i, j, j, el.LINE, (text,)))
 
+    @keeps_given
     def axis_force(self, name: str, i: Marker, j: Marker, expression: Expression, rm: Marker | None = None) -> Load:
         """Apply a force on I along z of ``rm`` (default: J), the reaction on J's body at the same point."""
         text = self._text(f"sforce '{name}'", expression, "force")
         return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_FORCE, (text,)))
 
+    @keeps_given
     def axis_torque(self, name: str, i: Marker, j: Marker, expression: Expression, rm: Marker | None = None) -> Load:
         """Apply a torque on I about z of ``rm`` (default: J), the reaction on J's body."""
         text = self._text(f"sforce '{name}'", expression, "torque")
         return self._add_load(Load(name, "sforce", i, j, rm or j, el.AXIS_TORQUE, (text,)))
 
+    @keeps_given
     def spring_damper(
         self,
         name: str,
@@ -126,6 +134,7 @@ class LoadMethods:
         k, c, free, start = self._in_si((k, "stiffness"), (c, "damping"), (free, "length"), (start, "force"))
         return self.add(LineSpring(name, i, j, k, c, free, start, made))
 
+    @keeps_given
     def torsion_spring(
         self,
         name: str,
@@ -147,6 +156,7 @@ class LoadMethods:
         k, c, free, start = self._in_si(*zip((k, c, free, start), dimensions))
         return self.add(AxisSpring(name, i, j, k, c, free, start, made))
 
+    @keeps_given
     def bushing(
         self,
         name: str,
@@ -227,6 +237,7 @@ class LoadMethods:
         made = {"stiffness": k, "damping": c, "free": rest, "preload": start}
         return self.matrix_force(Field, name, i, j, k, c, made, rest, start)
 
+    @keeps_given
     def beam(
         self,
         name: str,

@@ -22,6 +22,7 @@ from gearmbs.mechanism.friction import add_friction, friction_of
 from gearmbs.mechanism.function_text import integrated
 from gearmbs.mechanism.functions import TimeFunction, as_function, constant
 from gearmbs.mechanism.geometry import Vector, frame_along, vector
+from gearmbs.mechanism.given import keeps_given
 from gearmbs.mechanism.load_methods import Expression, LoadMethods
 from gearmbs.mechanism.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
 from gearmbs.mechanism.parts import Body, Marker, make_body
@@ -61,6 +62,8 @@ class Mechanism(LoadMethods, Shown):
     turns : dict of (str, str, str) to float
         About which angle, in rad, AX, AY and AZ start to count, by function and names of the markers:
         ``m.turns["AZ", "shaft.I", "shaft.J"] = 4 * np.pi`` winds a torsion spring twice. Default: 0.
+    given : dict of str to dict
+        Settings that were written with units, by the names of bodies, joints and forces.
     """
 
     def __init__(self, name: str = "mechanism", gravity: Vector = (0.0, 0.0, 0.0)) -> None:
@@ -79,9 +82,11 @@ class Mechanism(LoadMethods, Shown):
         self.units = Units()
         self.reads_units = True
         self.turns: dict[tuple[str, str, str], float] = {}
+        self.given: dict[str, dict[str, Any]] = {}
 
     # --- bodies -----------------------------------------------------------------------------------
 
+    @keeps_given
     def body(
         self,
         name: str,
@@ -122,6 +127,7 @@ class Mechanism(LoadMethods, Shown):
         self.bodies[name] = body
         return body
 
+    @keeps_given
     def modal_body(
         self,
         name: str,
@@ -164,6 +170,7 @@ class Mechanism(LoadMethods, Shown):
 
     # --- joints -----------------------------------------------------------------------------------
 
+    @keeps_given
     def joint(
         self,
         kind: str,
@@ -217,40 +224,49 @@ class Mechanism(LoadMethods, Shown):
                 raise
         return self._add_joint(jt.Joint(name, kind, mi, mj, jt.JOINTS[kind].rows(mi, mj)))
 
+    @keeps_given
     def fixed(self, name, i, j, **where) -> jt.Joint:
         """Add a fixed joint: no relative motion. See :meth:`joint`."""
         return self.joint("fixed", name, i, j, **where)
 
+    @keeps_given
     def revolute(self, name, i, j, **where) -> jt.Joint:
         """Add a revolute joint: rotation about the common z axis. See :meth:`joint`."""
         return self.joint("revolute", name, i, j, **where)
 
+    @keeps_given
     def spherical(self, name, i, j, **where) -> jt.Joint:
         """Add a spherical joint: a common point. See :meth:`joint`."""
         return self.joint("spherical", name, i, j, **where)
 
+    @keeps_given
     def cylindrical(self, name, i, j, **where) -> jt.Joint:
         """Add a cylindrical joint: rotation about and translation along z_J. See :meth:`joint`."""
         return self.joint("cylindrical", name, i, j, **where)
 
+    @keeps_given
     def translational(self, name, i, j, **where) -> jt.Joint:
         """Add a translational joint along z_J. See :meth:`joint`."""
         return self.joint("translational", name, i, j, **where)
 
+    @keeps_given
     def universal(self, name, i, j, **where) -> jt.Joint:
         """Add a universal joint whose cross arms are z_I and z_J: ``axis`` and ``axis_j``. See :meth:`joint`."""
         return self.joint("universal", name, i, j, **where)
 
+    @keeps_given
     def planar(self, name, i, j, **where) -> jt.Joint:
         """Add a planar joint: motion in the xy plane of J. See :meth:`joint`."""
         return self.joint("planar", name, i, j, **where)
 
+    @keeps_given
     def screw(self, name, i, j, *, pitch: float, at: Vector | None = None, axis: Vector | None = None) -> jt.Joint:
         """Add a screw joint: I advances ``pitch`` metres along z_J a turn."""
         pitch = quantity(pitch, "length", f"joint '{name}': pitch")
         mi, mj = self._markers(f"joint '{name}'", name, i, j, at, axis)
         return self._add_joint(jt.Joint(name, "screw", mi, mj, jt.screw_rows(mi, mj, pitch)))
 
+    @keeps_given
     def distance(self, name: str, i: Marker, j: Marker, length: float | None = None) -> jt.Joint:
         """Keep the origins of two markers ``length`` metres apart (default: as they are)."""
         self._check_name(name)
@@ -291,6 +307,7 @@ class Mechanism(LoadMethods, Shown):
         """
         return self.coupler(name, [(first, quantity(ratio, "dimensionless", f"gear '{name}': ratio")), (second, -1.0)])
 
+    @keeps_given
     def rack_pinion(self, name: str, pinion: jt.Joint, rack: jt.Joint, radius: float) -> jt.Joint:
         """Let the rack's joint move ``radius`` metres along its z_J for each radian of the pinion's.
 
@@ -301,6 +318,7 @@ class Mechanism(LoadMethods, Shown):
         size = quantity(radius, "length", f"rack and pinion '{name}': radius")
         return self.coupler(name, [(pinion, size), (rack, -1.0)])
 
+    @keeps_given
     def rotation(
         self, name: str, joint: jt.Joint, function: float | str | TimeFunction, *, level: str = "displacement",
         start: float | None = None, rate: float = 0.0,
@@ -324,6 +342,7 @@ class Mechanism(LoadMethods, Shown):
         row = jt.Row("angle", (jt.Term(terms.ROTATION, joint.i, joint.j),), None, moved)
         return self._add_joint(jt.Joint(name, "rotation", joint.i, joint.j, [row], given))
 
+    @keeps_given
     def translation(
         self, name: str, joint: jt.Joint, function: float | str | TimeFunction, *, level: str = "displacement",
         start: float | None = None, rate: float = 0.0,
@@ -337,6 +356,7 @@ class Mechanism(LoadMethods, Shown):
 
     # --- forces -----------------------------------------------------------------------------------
 
+    @keeps_given
     def torque(
         self, name: str, on: Body | Marker, function: float | TimeFunction, *, axis: Vector = (0, 0, 1), reaction=None
     ) -> Torque:
@@ -478,6 +498,7 @@ class Mechanism(LoadMethods, Shown):
         )  # fmt: skip
         return self.add(made)
 
+    @keeps_given
     def friction(
         self, name: str, joint: jt.Joint, mu_static: float, mu_dynamic: float, **parameters
     ) -> list[FrictionForce]:

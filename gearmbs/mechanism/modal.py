@@ -13,6 +13,7 @@ from gearmbs.dae.equations.modal_inertia import ModalInertia
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.geometry import Vector
 from gearmbs.mechanism.parts import Body, Marker
+from gearmbs.units import shown
 
 Shapes = Callable[[np.ndarray], tuple[npt.ArrayLike, npt.ArrayLike]]
 """From a point of the body's frame, m, to displacements and rotations there by one unit of each mode, each (n, 3)."""
@@ -276,7 +277,8 @@ class ModalBody(Body):
         return self.position + arm, self.velocity + np.cross(self.angular_velocity, arm) + push
 
     def __repr__(self) -> str:
-        return f"ModalBody({self.name!r}, mass={self.mass:g} kg, {self.modal.modes} modes, {len(self.markers)} markers)"
+        mass = shown(self.mass, "kg", "g")
+        return f"ModalBody({self.name!r}, mass={mass}, {self.modal.modes} modes, {len(self.markers)} markers)"
 
 
 def _rounded(shape: np.ndarray) -> np.ndarray:

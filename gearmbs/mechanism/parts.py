@@ -11,6 +11,7 @@ import numpy.typing as npt
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.geometry import Vector, frame_along, inertia_matrix, orientation, vector
 from gearmbs.mechanism.quantities import quantity
+from gearmbs.units import shown
 
 
 @dataclass(eq=False)
@@ -122,7 +123,8 @@ class Body:
         if self.is_ground:
             return "Body('ground')"
         moments = np.array2string(np.diag(self.inertia), precision=4)
-        return f"Body({self.name!r}, mass={self.mass:g} kg, inertia={moments} kg m^2, {len(self.markers)} markers)"
+        mass = shown(self.mass, "kg", "g")
+        return f"Body({self.name!r}, mass={mass}, inertia={moments} kg m^2, {len(self.markers)} markers)"
 
 
 def _orientation(value: npt.ArrayLike | None, label: str) -> np.ndarray:

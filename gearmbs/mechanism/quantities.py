@@ -42,7 +42,7 @@ def quantity(value: Any, unit: str, field: str, factor: float = 1.0) -> float:
         number = to_si(value, unit, field)
     except (TypeError, ValueError) as error:
         raise ModelError(str(error)) from None
-    return number / factor if isinstance(value, str) else number
+    return number / factor if isinstance(value, str) and factor != 1.0 else number
 
 
 def quantities(value: Any, unit: str, field: str, factor: float = 1.0) -> np.ndarray:

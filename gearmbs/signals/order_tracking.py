@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from numbers import Real
 from typing import Any, Literal
 
 import numpy as np
@@ -71,6 +72,8 @@ def order_track(
     SignalError
         If the record holds fewer revolutions than a window, or an order lies beyond half the sampling rate throughout.
     """
+    if isinstance(speed, Sequence) and not isinstance(speed, str) and all(isinstance(v, Real) for v in speed):
+        raise SignalError(f"speed: {speed} are plain numbers; orders are given by name, orders={list(speed)}")
     wanted = np.atleast_1d(np.asarray(orders, dtype=float))
     if wanted.ndim != 1 or not wanted.size or not (np.isfinite(wanted).all() and wanted.min() > 0.0):
         raise SignalError(f"orders: must be positive numbers, got {orders!r}")

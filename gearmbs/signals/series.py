@@ -7,7 +7,9 @@ import json
 import math
 import os
 import re
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,6 +17,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from gearmbs._kept import keep
 from gearmbs.progress import bars
 
 from .analysis import AnalysisOptions, analyse
@@ -109,6 +112,10 @@ def series(
     return table
 
 
+class StoreWarning(UserWarning):
+    """The journal of a series cannot be written any more; the series itself goes on."""
+
+
 class Journal:
     """What is finished of a series, one line a file, so that it outlives the process.
 
@@ -127,6 +134,7 @@ class Journal:
 
     def __init__(self, store: Path, digest: str) -> None:
         self.path = store.with_name(f"{store.stem}.rows.jsonl")
+        self.broken = False
         self.done: dict[str, list[dict[str, Any]]] = {}
         try:
             store.parent.mkdir(parents=True, exist_ok=True)
@@ -154,9 +162,21 @@ class Journal:
 
     def add(self, path: Path, rows: list[dict[str, Any]]) -> None:
         """Note the rows of a finished file."""
+        if self.broken:
+            return
         line = json.dumps({"key": _key(path), "rows": rows}) + "\n"
-        with open(self.path, "a", encoding="utf-8") as file:
-            file.write(line)
+        try:
+            with open(self.path, "a", encoding="utf-8") as file:
+                file.write(line)
+        except OSError as error:
+            # the work goes on; what is half written of the line is left out by the next call
+            self.broken = True
+            warnings.warn(
+                f"store: {self.path} cannot be written ({error.strerror or error}); files after {path.name} would have "
+                "to be analysed again if this is interrupted",
+                StoreWarning,
+                stacklevel=3,
+            )
 
 
 def _channels(rows: list[dict[str, Any]]) -> list[str]:
@@ -293,18 +313,32 @@ def _digest(value: Any) -> str:
 
 
 def _write(table: pd.DataFrame, store: Path) -> None:
+    """Write the table, and if that is impossible somewhere else where it is possible.
+
+    Raises
+    ------
+    SignalError
+        If it could not be written where it was wanted; the message says where it is instead, if anywhere.
+    """
+    try:
+        keep(lambda place: _write_whole(table, place), store)
+    except (OSError, ImportError) as exc:
+        raise SignalError(f"store: {exc}") from exc
+
+
+def _write_whole(table: pd.DataFrame, store: Path) -> None:
     """Write the table; it appears under its name when it is whole."""
     part = store.with_name(f".{store.name}.part")
+    store.parent.mkdir(parents=True, exist_ok=True)
     try:
         if store.suffix.lower() in (".parquet", ".pq"):
             table.to_parquet(part)
         else:
             table.to_csv(part, index=False, float_format=_shortest)
         os.replace(part, store)
-    except (OSError, ImportError) as exc:
-        raise SignalError(f"store: {store} cannot be written ({exc})") from exc
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
 
 
 def _shortest(value: float) -> str:

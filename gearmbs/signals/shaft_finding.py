@@ -14,7 +14,17 @@ from .phase import phase_from_line, phase_from_speed
 from .shaft import shaft_phase
 from .signal import rate_of
 from .spectra import periodograms
-from .speed import MIN_QUALITY, MIN_SCORE_DB, SpeedEstimate, estimate_speed, find_comb, own_lines_missing, prominence
+from .speed import (
+    MIN_QUALITY,
+    MIN_SCORE_DB,
+    SIDEBANDS,
+    Comb,
+    SpeedEstimate,
+    estimate_speed,
+    find_comb,
+    own_lines_missing,
+    prominence,
+)
 from .speed_curve import is_curve, speed_curve
 
 SPEED_TOLERANCE = 0.02
@@ -26,6 +36,8 @@ STRONGER_DB = 3.0
 USUAL_RPM = (20.0, 12_000.0)
 USUAL_RATE = (100.0, 2e6)
 SHAFT_HARMONICS = 5
+FOLLOWED_TURNS = 30.0
+"""Revolutions that the filter of `phase_from_line` with its default width takes, 26, and some more to follow."""
 
 
 class Shaft(NamedTuple):
@@ -127,7 +139,7 @@ def mesh_shaft(
     else:
         estimate = estimate_speed(signal, teeth, speed_range=known.speed_range)
         if estimate.phase is None:
-            notes.append("The mesh line is too weak to follow in phase; the speed is taken as constant.")
+            notes.append(_why_constant(signal, estimate.speed, "The mesh line is too weak to follow in phase"))
         phase = phase_from_speed(signal, estimate.speed) if estimate.phase is None else estimate.phase
         shaft = Shaft(phase, estimate.speed, "estimated from the mesh line", estimate)
     remark_plausibility(signal, shaft.speed, found is None, notes)
@@ -166,8 +178,19 @@ def _near_speed(signal: xr.DataArray, counts: tuple[int, ...], nominal: float, n
         followed = float(phase.attrs["mean_speed"])
         if abs(followed / nominal - 1) < SPEED_TOLERANCE:
             return Shaft(phase, followed, "from the given speed, followed by the mesh line")
-    notes.append("No mesh line could be followed near the given speed; it is taken as constant.")
+    notes.append(_why_constant(signal, nominal, "No mesh line could be followed near the given speed"))
     return Shaft(phase_from_speed(signal, nominal), nominal, "as given")
+
+
+def _why_constant(signal: xr.DataArray, speed: float, otherwise: str) -> str:
+    """Say why the speed is taken as constant: short records have nothing to follow it by, whatever their lines."""
+    turns = signal.sizes["time"] / rate_of(signal) * speed / math.tau
+    if turns < FOLLOWED_TURNS:
+        return (
+            f"The speed is taken as constant: a record of {turns:.3g} revolutions is too short to follow the mesh line "
+            f"in phase, which takes {FOLLOWED_TURNS:g}."
+        )
+    return f"{otherwise}; the speed is taken as constant."
 
 
 def _estimate(
@@ -191,6 +214,13 @@ def _remark_other(
         return
     ratio = blind.speed / nominal
     here = "no mesh line" if found is None else f"only a comb of {found.score:.0f} dB"
+    if found is not None and blind.score >= found.score + STRONGER_DB and not _related(blind, found):
+        notes.append(
+            f"Near the given speed there is a mesh line at {found.gmf:.2f} Hz ({found.score:.0f} dB), but one of "
+            f"{blind.score:.0f} dB at {blind.gmf:.2f} Hz is stronger: another stage of the gearbox, or, with "
+            f"{counts[0]} teeth, {blind.speed * 30 / math.pi:.1f} rpm."
+        )
+        return
     if found is not None and blind.score < found.score + STRONGER_DB:
         # half the speed has every line of the whole one among its own, and nearly its score
         whole = round(ratio)
@@ -206,6 +236,16 @@ def _remark_other(
         f"of {blind.score:.0f} dB at {blind.gmf:.2f} Hz, which with {counts[0]} teeth is "
         f"{blind.speed * 30 / math.pi:.1f} rpm ({ratio:.3f} times the given speed)."
     )
+
+
+def _related(blind: Comb, found: SpeedEstimate) -> bool:
+    """Whether the lines of a comb may be harmonics, part orders or sidebands of another one's mesh line."""
+    ratio = max(blind.gmf / found.gmf, found.gmf / blind.gmf)
+    if abs(ratio / round(ratio) - 1.0) < SPEED_TOLERANCE:
+        return True
+    apart = abs(blind.gmf - found.gmf)
+    turns = (blind.speed / math.tau, found.speed / math.tau)
+    return any(abs(apart - k * shaft) < SPEED_TOLERANCE * shaft * k for shaft in turns for k in range(1, SIDEBANDS + 1))
 
 
 def refined_speed(signal: xr.DataArray, nominal: float) -> float | None:

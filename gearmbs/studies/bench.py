@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
+from gearmbs._shown import Written
 from gearmbs.drivetrain import (
     Accelerometer,
     Drivetrain,
@@ -47,7 +48,7 @@ IDLE = 75.0
 
 
 @dataclass(frozen=True)
-class BenchSettings:
+class BenchSettings(Written):
     """What the bench is made of; see `bench_choices` for why.
 
     Parameters

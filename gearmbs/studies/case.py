@@ -450,15 +450,29 @@ class Case(Section, Shown):
     def changed(self, **sections: Any) -> Case:
         """Return a copy with fields of its sections changed.
 
+        With a new curve of speed or torque the record lasts as long as the curve unless ``duration`` is given, too.
+
         Examples
         --------
         >>> Case().changed(fault={"misalignment": "1 deg"}).fault.plane
         'skew'
         """
         data = self.settings()
+        operation = sections.get("operation")
+        curves = [v for k, v in operation.items() if k in ("speed", "torque")] if isinstance(operation, dict) else []
+        if any(not isinstance(value, str) and isinstance(value, Sequence) for value in curves):
+            # the length of the old record says nothing of a new curve's
+            data["operation"].pop("duration", None)
         for key, value in sections.items():
             data[key] = {**data[key], **value} if isinstance(value, dict) and key in data else value
         return make_case(data)
+
+    def __str__(self) -> str:
+        """The case file, and what follows from it."""
+        from gearmbs.studies.case_file import case_toml
+
+        rest = f"mesh frequency {self.mesh_frequency:.6g} Hz; settings that are not named are at their defaults"
+        return f"{case_toml(self)}# {rest}"
 
     def settings(self) -> dict[str, Any]:
         """Return all settings as nested dictionaries, quantities as the user wrote them, else in SI."""

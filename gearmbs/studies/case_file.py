@@ -7,17 +7,16 @@ import math
 from pathlib import Path
 from typing import Any
 
-from gearmbs.studies.case import Case
 from gearmbs.studies.quantities import SHOWN, Measure
 from gearmbs.studies.section import Section, measures_of
 
 
-def case_toml(case: Case) -> str:
+def case_toml(case: Section) -> str:
     """Return the case file of a case, from which `gearmbs.load_case` makes it again.
 
     Settings that were left at their defaults are left out; quantities stand as they were written, or in SI.
     """
-    lines = [f"name = {json.dumps(case.name)}"]
+    lines = [f"name = {json.dumps(vars(case)['name'])}"]
     tables: list[str] = []
     for key in type(case).model_fields:
         section = getattr(case, key)
@@ -33,7 +32,7 @@ def case_toml(case: Case) -> str:
     return "\n".join([*lines, *tables]) + "\n"
 
 
-def write_case(case: Case, path: str | Path) -> Path:
+def write_case(case: Section, path: str | Path) -> Path:
     """Write a case as a case file."""
     from gearmbs.view.files import write_whole
 

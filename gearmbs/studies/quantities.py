@@ -108,7 +108,7 @@ class Measure:
         factor = SHOWN.get(shown, 1.0)
         low, high = (None if limit is None else limit * factor for limit in (self.low, self.high))
         if (low is None or number >= low * (1.0 - 1e-12)) and (high is None or number <= high * (1.0 + 1e-12)):
-            return number
+            return float(number)
         span = f"{_plain(self.low)} to {_plain(self.high)}" if self.high is not None else f"{_plain(self.low)} or more"
         if self.low is None:
             span = f"up to {_plain(self.high)}"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from gearmbs.studies.quantities import Measure
+from gearmbs.units import NUMBER
 
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass
@@ -21,8 +22,13 @@ else:
 ROUND = 10.0
 """Plain speeds that are whole multiples of so many rad/s, and as many at least, look like rpm."""
 
+TURNS = 300.0
+"""Speeds of so many turns a second and more that are written in Hz look like rpm; hardly a gear turns as fast."""
+
 HALF_METRE = 0.5
 """Plain lengths from here on, m, look like millimetres."""
+
+HERTZ = re.compile(rf"({NUMBER.pattern})\s*Hz")
 
 
 class CaseError(ValueError):
@@ -100,6 +106,12 @@ class Section(BaseModel, metaclass=_OneError):
                     _remark(f"{cls.section}.{name}", data[name], measure)
         return made
 
+    def __repr_args__(self) -> Any:
+        """What was set, quantities as they were written; pydantic makes the text of it."""
+        for name in type(self).model_fields:
+            if name in self.model_fields_set:
+                yield name, self.written.get(name, getattr(self, name))
+
     @property
     def written(self) -> dict[str, Any]:
         """The quantities that the user wrote with units, as written."""
@@ -120,7 +132,15 @@ def _has_text(value: Any) -> bool:
 
 
 def _remark(field: str, value: Any, measure: Measure) -> None:
-    """Warn of a plain number in SI that looks as if it were meant in the unit people use."""
+    """Warn of a plain number in SI, or a speed in Hz, that looks as if it were meant in the unit people use."""
+    in_hertz = isinstance(value, str) and measure.dimension == "angular speed" and re.fullmatch(HERTZ, value.strip())
+    if in_hertz and float(in_hertz[1]) >= TURNS:
+        warnings.warn(
+            f"{field} = {value!r} is {60.0 * float(in_hertz[1]):.6g} rpm; write '{in_hertz[1]} rpm' if that is meant, "
+            f"'{60.0 * float(in_hertz[1]):.6g} rpm' if not",
+            CaseWarning,
+            stacklevel=6,
+        )
     if isinstance(value, bool) or not isinstance(value, Real):
         return
     number, meant = float(value), ""

@@ -6,16 +6,14 @@ full. Where a file cannot be written, the record is kept elsewhere, and the mess
 
 from __future__ import annotations
 
-import os
 import shutil
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
 
 import xarray as xr
 
 import gearmbs
+from gearmbs._kept import KeptElsewhere, keep
 from gearmbs.studies.case import Case
 from gearmbs.view.files import whole_file
 from gearmbs.view.files import write_whole as write_text
@@ -33,24 +31,8 @@ __all__ = [
     "write_text",
 ]
 
-T = TypeVar("T")
-
 BYTES, COLUMNS, PACKED = 8, 13, 0.6
 """Of a number, numbers an output time holds, and what compression leaves of them at best."""
-
-
-class KeptElsewhere(OSError):
-    """A file could not be written where it was wanted; its content is in another place.
-
-    Attributes
-    ----------
-    path : Path
-        Where it is.
-    """
-
-    def __init__(self, message: str, path: Path) -> None:
-        super().__init__(message)
-        self.path = path
 
 
 def write_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
@@ -75,32 +57,6 @@ def write_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
 def keep_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
     """Write a dataset, and if that is impossible somewhere else where it is possible; see `keep`."""
     return keep(lambda place: write_dataset(place, dataset), path)
-
-
-def keep(save: Callable[[Path], T], path: str | Path) -> T:
-    """Return ``save(path)``; if that is impossible save somewhere else where it is possible.
-
-    Raises
-    ------
-    KeptElsewhere
-        If it had to be saved elsewhere: in the working folder or the one for temporary files.
-    OSError
-        If it cannot be saved anywhere.
-    """
-    path = Path(path)
-    try:
-        return save(path)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        for folder in (Path("."), Path(tempfile.gettempdir())):
-            other = folder.absolute() / f"gearmbs-kept-{os.getpid()}" / path.name
-            try:
-                save(other)
-            except OSError:
-                shutil.rmtree(other.parent, ignore_errors=True)
-                continue
-            raise KeptElsewhere(f"{path}: cannot be written ({reason}); it is in {other} instead", other) from error
-        raise OSError(error.errno, f"{path}: cannot be written ({reason}), nor anywhere else; it is lost") from error
 
 
 def check_place(target: str | Path, needed: float, what: str = "the result") -> None:

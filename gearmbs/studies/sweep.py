@@ -118,6 +118,9 @@ class Sweep(Shown):
         note = "; ".join(f"{name} failed: {error}" for name, error in self.failures.items())
         return html_table(f"Sweep of {self.field}, {self.case.name}", (table.index.name, *table.columns), rows, note)
 
+    def __str__(self) -> str:
+        return f"{self!r}\n{self.table().to_string(float_format='{:.5g}'.format)}"
+
     def __repr__(self) -> str:
         return f"Sweep({self.case.name!r}, {self.field}: {len(self.records)} of {len(self.cases)} records)"
 

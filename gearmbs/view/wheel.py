@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gearmbs.gears import GearSpec
+from gearmbs.units import shown
 from gearmbs.view.figure_style import BLUE, GREEN, GREY, VERMILLION, drawn_on, legend_below, look
 from gearmbs.view.outline import gear_outline
 
@@ -54,8 +53,8 @@ def wheel_plot(gear: GearSpec, *, title: str | None = None, ax: Axes | None = No
         ax.set_aspect("equal")
         ax.set_xlabel("mm")
         ax.set_ylabel("mm")
-        helix = f", helix {math.degrees(gear.helix_angle):.4g}°" if gear.helix_angle else ""
-        sizes = f"module {gear.module * MM:.4g} mm, face {gear.face_width * MM:.4g} mm{helix}"
+        helix = f", helix {shown(gear.helix_angle, 'deg', '.4g')}" if gear.helix_angle else ""
+        sizes = f"module {shown(gear.module, 'mm', '.4g')}, face {shown(gear.face_width, 'mm', '.4g')}{helix}"
         ax.set_title(title or f"{gear.name}: {abs(gear.teeth)} teeth, {sizes}")
         legend_below(ax, 2)
     return figure

@@ -23,6 +23,7 @@ def test_a_second_hinge_is_remarked():
         solution = rod(((0, 0, 0), (0, 1, 0)), second).simulate(0.05)
         assert solution.success
         assert "Body 'rod' cannot move: 'pin 1' and 'pin 2' together leave it no motion; fix it" in solution.message
+        assert repr(solution).endswith("fix it to the ground if that is meant.")
 
 
 @pytest.mark.parametrize(

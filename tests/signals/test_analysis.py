@@ -73,6 +73,33 @@ def test_analysis_of_a_noise_free_simulated_second():
     np.testing.assert_allclose(report.harmonics["band"][:, 0], expected, rtol=1e-3)
 
 
+def test_a_short_record_is_told_from_a_weak_line():
+    """What is too short to follow has nothing wrong with its lines."""
+    t = np.arange(5120) / 12800.0
+    line = np.cos(2 * np.pi * 525.0 * t) + 0.4 * np.cos(2 * np.pi * 1050.0 * t)
+    for speed in (None, "1500 rpm"):
+        notes = analyse(make_signal(line, 12800.0), teeth=21, speed=speed).notes
+        assert [note[:68] for note in notes] == ["The speed is taken as constant: a record of 10 revolutions is too sh"]
+
+
+def test_the_right_speed_of_a_weaker_stage_is_not_doubted():
+    """A second mesh, six times as strong, of a shaft that turns at 0.37 times the speed; the speed of that one is."""
+    t = np.arange(8 * 12800) / 12800.0
+    rng = np.random.default_rng(3)
+
+    def mesh(frequency, shaft):
+        return sum(
+            np.cos(2 * np.pi * k * frequency * t + k) * (1 + 0.3 * np.cos(2 * np.pi * shaft * t)) / k for k in (1, 2, 3)
+        )
+
+    record = make_signal(mesh(21 * 25.0, 25.0) + 6 * mesh(37 * 9.25, 9.25) + rng.standard_normal(t.size), 12800.0)
+    right = analyse(record, teeth=21, speed="1500 rpm")
+    assert right.speed == pytest.approx(50 * np.pi, rel=1e-4)
+    assert not [note for note in right.notes if note.startswith("CHECK")]
+    half = analyse(record, teeth=21, speed="750 rpm")
+    assert [note for note in half.notes if note.startswith("CHECK")]
+
+
 def test_report_reads_well():
     report = analyse(record()[:, [0]])
     text = report.to_markdown()

@@ -129,6 +129,12 @@ def test_samples_without_a_rate_are_asked_for_it():
             track(samples, speed="1000 rpm")
 
 
+def test_orders_in_the_place_of_the_speed_are_told():
+    signal = make_signal(np.sin(np.arange(4000) / 10.0), 1000.0, speed=10.0)
+    with pytest.raises(SignalError, match=r"orders are given by name, orders=\[21, 42\]"):
+        order_track(signal, [21, 42])
+
+
 def test_order_map_keeps_orders_in_their_columns():
     signal, _ = run_up()
     found = order_map(signal, maximum=70.0)

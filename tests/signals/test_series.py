@@ -1,5 +1,7 @@
 """Many files as one series: one table, in memory for one file, taken up again after being killed."""
 
+import builtins
+import errno
 import json
 import os
 import signal as signals
@@ -11,6 +13,7 @@ import pandas as pd
 import pytest
 
 from gearmbs.signals import SignalError, analyse, features, make_signal, series, to_signal, write_signal
+from gearmbs.signals.series import StoreWarning
 
 RATE = 8192.0
 TEETH = 20
@@ -108,6 +111,30 @@ def test_killed_and_taken_up_again_it_is_the_same_table(folder, tmp_path):
     assert seen[-1] == 1.0
     with pytest.raises(SignalError, match="begun with other settings"):
         series(folder, store=other, speed="1600 rpm")
+
+
+def test_a_disk_that_fills_up_ends_neither_the_work_nor_its_table(folder, tmp_path, monkeypatch):
+    """The journal is given up with a remark; a table without room is kept elsewhere, and the error says where."""
+    monkeypatch.chdir(tmp_path)
+    whole = series(folder, speed="1500 rpm")
+    store = tmp_path / "full" / "table.csv"
+    real = builtins.open
+
+    def full(file, mode="r", *args, **settings):
+        if str(file).startswith(str(store.parent)) and mode[0] in "aw":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return real(file, mode, *args, **settings)
+
+    monkeypatch.setattr(builtins, "open", full)
+    with (
+        pytest.warns(StoreWarning, match="table.rows.jsonl cannot be written"),
+        pytest.raises(SignalError, match=r"No space left on device.*it is in .*gearmbs-kept-") as told,
+    ):
+        series(folder, speed="1500 rpm", store=store)
+    monkeypatch.undo()
+    kept = next(tmp_path.glob("gearmbs-kept-*/table.csv"))
+    assert str(kept) in str(told.value)
+    pd.testing.assert_frame_equal(pd.read_csv(kept), whole, check_dtype=False)
 
 
 def test_files_that_come_later_or_change_are_analysed_by_calling_again(folder, tmp_path):

@@ -1,6 +1,10 @@
 """Objects that show themselves: figures one can read, tables with what the user gave."""
 
+import json
+import re
+
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
@@ -110,6 +114,16 @@ def test_reports_draw_and_save_themselves(tmp_path):
         assert report._repr_html_() is None
         assert report._repr_markdown_()
         assert report.save(tmp_path / f"{k}.md").read_text() == report.to_markdown()
+        page = report.save(tmp_path / f"{k}.html").read_text()
+        assert page.count("<table>") == len(re.findall(r"^\|-", report.to_markdown(), re.MULTILINE))
+        assert "data:image/svg+xml" in page
+        found = json.loads(report.save(tmp_path / f"{k}.json").read_text())
+        assert found["kind"] == type(report).__name__
+        assert set(found["tables"]) == set(report.tables())
+        paths = report.save(tmp_path / f"{k}.csv")
+        assert [path.name for path in paths] == [f"{k}_{name}.csv" for name in report.tables()]
+        table = next(iter(report.tables().values()))
+        pd.testing.assert_frame_equal(pd.read_csv(paths[0]), table.reset_index(drop=True), check_dtype=False)
 
 
 def test_tables_tell_what_the_user_gave():

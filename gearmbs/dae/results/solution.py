@@ -415,7 +415,7 @@ class Solution(Shown):
         name = mechanism.name if mechanism is not None else "mechanism"
         return (
             f"Solution({name!r}: {self.t.size} times from {self.t[0]:g} to {self.t[-1]:g} s, "
-            f"{self.status.name}; {self.stats})"
+            f"{self.status.name}; {self.stats})" + (f"\n{self.remark}" if self.remark else "")
         )
 
     def to_dataset(self) -> xr.Dataset:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.mechanism.elements import Compiled, ForceElement
+from gearmbs.units import shown
 
 
 @dataclass(eq=False, repr=False)
@@ -39,8 +40,8 @@ class LineSpring(ForceElement):
 
     def __repr__(self) -> str:
         return (
-            f"LineSpring({self.name!r}, {self.i.name!r} to {self.j.name!r}, {self.stiffness:g} N/m, "
-            f"{self.damping:g} N s/m, {self.preload:g} N at {self.length:g} m)"
+            f"LineSpring({self.name!r}, {self.i.name!r} to {self.j.name!r}, {shown(self.stiffness, 'N/m', 'g')}, "
+            f"{shown(self.damping, 'N s/m', 'g')}, {shown(self.preload, 'N', 'g')} at {shown(self.length, 'm', 'g')})"
         )
 
 
@@ -73,8 +74,10 @@ class AxisSpring(ForceElement):
 
     def __repr__(self) -> str:
         return (
-            f"AxisSpring({self.name!r}, {self.i.name!r} about z of {self.j.name!r}, {self.stiffness:g} N m/rad, "
-            f"{self.damping:g} N m s/rad, {self.preload:g} N m at {self.angle:g} rad)"
+            f"AxisSpring({self.name!r}, {self.i.name!r} about z of {self.j.name!r}, "
+            f"{shown(self.stiffness, 'N m/rad', 'g')}, "
+            f"{shown(self.damping, 'N m s/rad', 'g')}, {shown(self.preload, 'N m', 'g')} at "
+            f"{shown(self.angle, 'rad', 'g')})"
         )
 
 
