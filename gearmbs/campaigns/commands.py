@@ -195,6 +195,7 @@ def dataset(
     signals: Annotated[int, typer.Option(help="At least so many signals.")] = 20_000,
     specimens: Annotated[int, typer.Option(help="Individuals with manufacturing errors of their own.")] = 200,
     duration: Annotated[str, typer.Option(help="Length of a record.")] = "0.5 s",
+    sensors: Annotated[int, typer.Option(help="Signals of each simulated record, at places on the housing.")] = 4,
     seed: Annotated[int, typer.Option(help="Of design, specimens and sensors.")] = 0,
     workers: Annotated[int | None, typer.Option(help="Processes; default: the cores.")] = None,
     dask: Annotated[str | None, typer.Option(help='Address of a Dask scheduler, or "local".')] = None,
@@ -206,7 +207,7 @@ def dataset(
         from gearmbs.units import to_si
 
         seconds = to_si(duration, "time", "--duration")
-        plan = data_set_plan(signals, specimens=specimens, duration=seconds, seed=seed)
+        plan = data_set_plan(signals, specimens=specimens, duration=seconds, sensors=sensors, seed=seed)
         campaign = Campaign(out.with_name(out.name + ".campaign"), plan)
         if dask is not None:
             with dask_client(dask, workers) as client:
@@ -214,7 +215,7 @@ def dataset(
         else:
             status = campaign.run(workers, progress=True)
         typer.echo(str(status))
-        for path in write_data_set(campaign, out, layers=SensorLayers(seed=seed), seed=seed):
+        for path in write_data_set(campaign, out, layers=SensorLayers(sensors=sensors, seed=seed), seed=seed):
             typer.echo(f"wrote {path}")
 
 

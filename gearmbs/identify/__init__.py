@@ -7,6 +7,7 @@ from gearmbs._lazy import late
 if TYPE_CHECKING:
     from gearmbs.identify.cases import CaseProblem, compare_models, identify
     from gearmbs.identify.errors import IdentifyError
+    from gearmbs.identify.experiments import rank_experiments
     from gearmbs.identify.fit import fit
     from gearmbs.identify.identifiability import Identifiability
     from gearmbs.identify.measured import harmonic_table
@@ -26,6 +27,7 @@ __all__ = [
     "harmonic_table",
     "identify",
     "posterior",
+    "rank_experiments",
 ]
 
 late(
@@ -42,5 +44,6 @@ late(
         "harmonic_table": ".measured",
         "identify": ".cases",
         "posterior": ".posterior:posterior",
+        "rank_experiments": ".experiments",
     },
 )

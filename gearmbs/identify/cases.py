@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-8
 """Of the integrator, so that differences over a step of 1e-2 are right to a few percent."""
 
-Gains = Literal["none", "one", "channel", "case"]
+Gains = Literal["none", "one", "channel", "case", "line"]
 
 
 class CaseProblem:
@@ -47,8 +47,10 @@ class CaseProblem:
         By the names in the column ``case``.
     free : sequence of Free or str
         Paths of fields with their starts and bounds in any unit; of a plain path the start is the first case's value.
-    gains : {"none", "one", "channel", "case"}
-        Free gains: none, one for all, one for each channel, one for each channel of each case.
+        A path belongs to all cases, or to one whose name stands before it: "high:operation.torque".
+    gains : {"none", "one", "channel", "case", "line"}
+        Free gains: none, one for all, one for each channel, one for each channel of each case, or one for each harmonic
+        of each channel, which stands for an unknown transfer path and leaves the changes from case to case.
     channels : mapping of str to str, optional
         Component of the force that stands for each measured channel; default the channel's own name.
     way : {"band", "orders"}
@@ -76,7 +78,7 @@ class CaseProblem:
         self.table = check_table(measured)
         self.cases = {name: case.changed(solver={"tolerance": TOLERANCE}) for name, case in cases.items()}
         self.way, self.workers = way, workers
-        self.free = [_in_si(item, next(iter(self.cases.values()))) for item in free]
+        self.free = [_in_si(item, self.cases) for item in free]
         unknown = set(self.table["case"]) - set(self.cases)
         if unknown:
             raise IdentifyError(f"measured: no case is given for {', '.join(sorted(unknown))}")
@@ -90,6 +92,7 @@ class CaseProblem:
                 f"channels={{...: "
                 f"one of {', '.join(COMPONENTS)}}}"
             )
+        self.gains, self.channels = gains, dict(channels or {})
         self.groups = _groups(self.table, gains)
         self._known: dict[tuple[str, tuple[float, ...]], dict[tuple[str, int], float]] = {}
 
@@ -103,14 +106,36 @@ class CaseProblem:
         """Simulations so far."""
         return len(self._known)
 
+    def with_case(self, name: str, case: Case, like: str) -> CaseProblem:
+        """Return the problem with one more case, measured as another one was; its values stand for none yet."""
+        import pandas as pd
+
+        more = self.table[self.table["case"] == like].assign(case=name, value=1.0)
+        table = pd.concat([self.table, more], ignore_index=True)
+        settings: dict[str, Any] = {"gains": self.gains, "channels": self.channels, "way": self.way}
+        found = CaseProblem(table, {**self.cases, name: case}, self.free, workers=self.workers, **settings)
+        found._known = dict(self._known)
+        return found
+
     def case(self, name: str, p: Sequence[float]) -> Case:
         """Return a case with the parameters p."""
         sections: dict[str, dict[str, float]] = {}
         for free, value in zip(self.free, p):
             for path, factor in {free.name: 1.0, **free.also}.items():
-                section, _, field = path.partition(".")
+                owner, _, place = path.rpartition(":")
+                if owner not in ("", name):
+                    continue
+                section, _, field = place.partition(".")
                 sections.setdefault(section, {})[field] = factor * float(value)
         return self.cases[name].changed(**sections)
+
+    def _own(self, name: str, p: Sequence[float] | np.ndarray) -> tuple[float, ...]:
+        """Return p with the starts of what belongs to other cases, so that nothing is simulated twice."""
+        found = []
+        for free, value in zip(self.free, p):
+            owners = {path.rpartition(":")[0] for path in (free.name, *free.also)}
+            found.append(float(value) if owners & {"", name} else float(free.start))
+        return tuple(found)
 
     def _simulate(self, key: tuple[str, tuple[float, ...]]) -> dict[tuple[str, int], float]:
         from gearmbs.studies import SimulationFailed, run_case
@@ -131,7 +156,7 @@ class CaseProblem:
         """Return the logarithms of the predicted values, gains left out, for several parameter vectors; NaN where it
         fails."""
         names = list(dict.fromkeys(self.table["case"]))
-        keys = [(name, tuple(float(v) for v in p)) for p in points for name in names]
+        keys = [(name, self._own(name, p)) for p in points for name in names]
         new = [key for key in dict.fromkeys(keys) if key not in self._known]
         if self.workers > 1 and len(new) > 1:
             with ThreadPoolExecutor(self.workers) as pool:
@@ -140,9 +165,9 @@ class CaseProblem:
             self._known.update((key, self._simulate(key)) for key in new)
         found = []
         for p in points:
-            q = tuple(float(v) for v in p)
+            own = {name: self._known[name, self._own(name, p)] for name in names}
             rows = zip(self.table["case"], self.components, self.table["harmonic"])
-            levels = [self._known[(str(n), q)].get((c, int(h)), np.nan) for n, c, h in rows]
+            levels = [own[str(n)].get((c, int(h)), np.nan) for n, c, h in rows]
             with np.errstate(all="ignore"):
                 found.append(self._without_gains(np.log(np.array(levels))))
         return found
@@ -294,7 +319,13 @@ def compare_models(problems: Mapping[str, CaseProblem], **settings: Any) -> pd.D
 
 def _groups(table: pd.DataFrame, gains: str) -> np.ndarray | None:
     """Return which free gain each row has."""
-    keys = {"none": None, "one": [], "channel": ["channel"], "case": ["case", "channel"]}
+    keys = {
+        "none": None,
+        "one": [],
+        "channel": ["channel"],
+        "case": ["case", "channel"],
+        "line": ["channel", "harmonic"],
+    }
     if gains not in keys:
         raise IdentifyError(f"gains is {gains!r}; choose one of {', '.join(keys)}")
     columns = keys[gains]
@@ -305,13 +336,16 @@ def _groups(table: pd.DataFrame, gains: str) -> np.ndarray | None:
     return np.array([places[row] for row in rows])
 
 
-def _in_si(item: Free | str, case: Case) -> Free:
-    """Return a parameter with its start and bounds in SI; a path starts at the case's value."""
+def _in_si(item: Free | str, cases: Mapping[str, Case]) -> Free:
+    """Return a parameter with its start and bounds in SI; a path starts at its case's value."""
     from gearmbs.studies.case import units_of_fields
 
     path = item if isinstance(item, str) else item.name
-    section, _, field = path.partition(".")
-    holder = getattr(case, section, None)
+    owner, _, place = path.rpartition(":")
+    if owner and owner not in cases:
+        raise IdentifyError(f"{path}: there is no case {owner!r}; the cases are {', '.join(cases)}")
+    section, _, field = place.partition(".")
+    holder = getattr(cases[owner] if owner else next(iter(cases.values())), section, None)
     if holder is None or field not in type(holder).model_fields:
         raise IdentifyError(f"{path}: a case has no such field; write section.field, for instance contact.depth")
     unit = units_of_fields(holder).get(field, "1")

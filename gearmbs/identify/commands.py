@@ -18,6 +18,10 @@ def identify(
     only_check: Annotated[
         bool, typer.Option("--only-check", help="Only tell what the recordings can tell of the parameters.")
     ] = False,
+    experiments: Annotated[
+        bool,
+        typer.Option(help="Rank further measurements, the file's [experiment.NAME] or usual ones, by what they add."),
+    ] = False,
     profiles: Annotated[bool, typer.Option(help="Intervals from profiles, too: more simulations.")] = False,
 ) -> None:
     """Find parameters of cases from recordings, with their errors; tell what cannot be found."""
@@ -29,8 +33,13 @@ def identify(
         found = problem.identifiability()
         text = ["# What the measurement can tell", "", *_rows(found.table()), ""]
         text += [f"* {line}" for line in found.remarks()] or ["* every parameter is determined"]
+        if experiments:
+            from gearmbs.identify.experiments import rank_experiments
+
+            ranked = rank_experiments(problem, settings["experiments"])
+            text += ["", "# What further measurements would add", "", *_rows(ranked), ""]
         if not only_check:
-            result = problem.fit(**settings)
+            result = problem.fit(starts=settings["starts"])
             text += ["", "# Fit", "", result.report(), f"{problem.simulations} simulations."]
             if profiles:
                 text += ["", "# Intervals from profiles", ""]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from gearmbs.studies import Case
 
-SECTIONS = ("recording", "case", "free", "measured", "gains", "channels", "starts", "workers")
+SECTIONS = ("recording", "case", "free", "measured", "gains", "channels", "starts", "workers", "experiment")
 LEVELS = ("harmonics", "way", "sections", "floor")
 
 
@@ -27,7 +27,8 @@ def load_problem(path: str | Path) -> tuple[CaseProblem, dict[str, Any]]:
     under
     ``[case.all]``; ``[measured]`` says how recordings are read and cut; each ``[[free]]`` is a parameter;
     ``channels`` says which
-    component of the force stands for which channel. A recording may be a CSV table of harmonics, too.
+    component of the force stands for which channel; ``[experiment.NAME]`` may list changes of the first case for
+    `rank_experiments`. A recording may be a CSV table of harmonics, too.
 
     Raises
     ------
@@ -63,7 +64,7 @@ def load_problem(path: str | Path) -> tuple[CaseProblem, dict[str, Any]]:
         way=way,
         workers=int(tree.get("workers", 1)),
     )
-    return problem, {"starts": int(tree.get("starts", 1))}
+    return problem, {"starts": int(tree.get("starts", 1)), "experiments": tree.get("experiment")}
 
 
 def _cases(given: dict[str, Any], recordings: dict[str, str]) -> dict[str, Case]:

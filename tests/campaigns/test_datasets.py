@@ -12,6 +12,7 @@ from gearmbs.campaigns import Campaign, CampaignError
 from gearmbs.campaigns.datasets import (
     SensorLayers,
     data_set_plan,
+    feature_table,
     features,
     leak_and_no_leak,
     macro_auroc,
@@ -33,6 +34,20 @@ def test_layers_are_the_same_for_the_same_seed_and_specimen():
     assert not np.array_equal(one, layers.measured(x, RATE, specimen=1, record=8, full_scale=10.0))
     assert layers.path(1) == layers.path(1)
     assert layers.path(1) != layers.path(2)
+
+
+def test_sensors_share_the_housing_and_the_drift_but_not_the_noise():
+    layers = SensorLayers(seed=3, noise=(0.0, 0.0), bits=24)
+    x = np.sin(2 * np.pi * 480 * np.arange(6400) / RATE)
+    here, there = layers.path(1, 0), layers.path(1, 1)
+    assert [m.frequency for m in here.modes] == [m.frequency for m in there.modes]
+    assert [m.mass for m in here.modes] != [m.mass for m in there.modes]
+    # a tone stays a tone behind any path: the drift that both sensors hear is the same
+    one, two = (layers.measured(x, RATE, 1, 7, 100.0, sensor) for sensor in (0, 1))
+    assert not np.array_equal(one, two)
+    noisy = SensorLayers(seed=3, noise=(0.1, 0.1))
+    rest = [noisy.measured(x, RATE, 1, 7, 100.0, k) - layers.measured(x, RATE, 1, 7, 100.0, k) for k in (0, 1)]
+    assert abs(np.corrcoef(rest)[0, 1]) < 0.05
 
 
 def test_the_path_is_the_modal_sum():
@@ -105,11 +120,14 @@ def test_from_plan_to_files(tmp_path):
     assert len(rows) == 12
     assert sorted(rows.state.unique()) == ["broken", "chipped", "cracked", "healthy", "pitted", "worn"]
     assert rows.loc[rows.state == "healthy", "severity"].eq(0).all()
-    for name in ("signal.line_of_action", "signal.sensor"):
+    for name in ("signal.line_of_action", "signal.sensor_1", "signal.sensor_4"):
         assert np.isfinite(np.stack(rows[name])).all()
         assert len(rows[name].iloc[0]) == 1280
     card = (tmp_path / "data" / "README.md").read_text()
     assert card.startswith("---\nlicense: cc0-1.0")
     assert "specimens in two splits: 0" in card
+    assert "* signals: 48" in card
+    x, labels, owners, sizes = feature_table(campaign, SensorLayers(), window=0.05)
+    assert len(x) == len(labels) == len(owners) == len(sizes) == 12 * 4 * 2
     tree = json.loads((tmp_path / "data" / "croissant.json").read_text())
     assert {f["name"] for f in tree["recordSet"][0]["field"]} == set(rows.columns)

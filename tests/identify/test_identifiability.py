@@ -6,7 +6,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gearmbs.identify import CaseProblem, Free, Identifiability, IdentifyError, harmonic_table, identify
+from gearmbs.identify import (
+    CaseProblem,
+    Free,
+    Identifiability,
+    IdentifyError,
+    harmonic_table,
+    identify,
+    rank_experiments,
+)
 from gearmbs.signals import make_signal
 from gearmbs.studies import Case, run_case
 
@@ -91,3 +99,39 @@ def test_tables_of_recordings():
     assert list(table.channel) == ["a1", "a1"]
     np.testing.assert_allclose(table["value"], [2.0 / np.sqrt(2), 0.5 / np.sqrt(2)], rtol=0.01)
     assert (table.sigma >= 0.02).all()
+
+
+def test_a_parameter_of_one_case_and_gains_of_lines():
+    cases = {name: Case(operation={"torque": torque}) for name, torque in (("low", 50.0), ("high", 100.0))}
+    rows = [(case, a, k, 1.0 + k, 0.02) for case in cases for a in ("a1", "a2") for k in (1, 2, 3)]
+    table = pd.DataFrame(rows, columns=["case", "channel", "harmonic", "value", "sigma"])
+    free = [Free("high:operation.torque", "100 N m"), "contact.depth"]
+    settings = {"gains": "line", "channels": {"a1": "line_of_action", "a2": "line_of_action"}}
+    problem = CaseProblem(table, cases, free, **settings)
+    assert problem.case("high", [80.0, 1e-4]).operation.torque == 80.0
+    assert problem.case("low", [80.0, 1e-4]).operation.torque == 50.0
+    assert problem._own("low", [80.0, 2e-4]) == (100.0, 2e-4)
+    # whatever path lies between force and sensor, only changes from case to case are left
+    gain = np.random.default_rng(0).uniform(0.1, 10.0, (2, 3))
+    place = {"a1": 0, "a2": 1}
+    table["value"] *= [gain[place[a], k - 1] for _, a, k, *_ in rows]
+    again = CaseProblem(table, cases, free, **settings)
+    np.testing.assert_allclose(again.measured, problem.measured, atol=1e-12)
+    assert problem.lost == 6
+    with pytest.raises(IdentifyError, match="there is no case 'middle'"):
+        CaseProblem(table, cases, ["middle:operation.torque"], **settings)
+
+
+def test_the_experiment_that_would_tell():
+    """Backlash does not show in a healthy pair, and does where both flanks are in contact."""
+    cases = {"healthy": Case(operation=SHORT)}
+    rows = [("healthy", c, k, 1.0, 0.02) for c in COMPONENTS for k in (1, 2, 3)]
+    table = pd.DataFrame(rows, columns=["case", "channel", "harmonic", "value", "sigma"])
+    problem = CaseProblem(table, cases, ["friction.dynamic", "fault.backlash"], way="orders")
+    candidates = {"torque x 2": {"operation.torque": 2.0}, "misaligned": {"fault.misalignment": "0.5 deg"}}
+    ranked = rank_experiments(problem, candidates)
+    assert ranked.index[0] == "misaligned"
+    assert ranked.gain.iloc[0] > 10 * ranked.gain.iloc[1]
+    assert ranked.worst.iloc[0] < 0.3 < ranked.worst.iloc[1]
+    with pytest.raises(IdentifyError, match=r"no field 'operation\.heat'"):
+        rank_experiments(problem, {"x": {"operation.heat": 2.0}})

@@ -26,11 +26,17 @@ MEANINGS = {
     "severity": "where in its range the fault's size lies, 0 to 1; 0 if healthy",
     "split": "train, validation, test, or withheld (severities kept from training)",
     "signal.line_of_action": "clean signal: force on the driven gear along the line of action over its mass, m/s^2",
-    "signal.sensor": "measured signal: the clean one behind housing, noise, converter, m/s^2",
     "error.peak_to_peak": "transmission error, m",
     "operation.speed": "speed of the driver, rad/s",
     "operation.torque": "load torque, N m",
 }
+
+
+def _meaning(name: str) -> str:
+    if name.startswith("signal.sensor_"):
+        place = name.removeprefix("signal.sensor_")
+        return f"measured signal at place {place}: the clean one behind housing, noise, converter, m/s^2"
+    return MEANINGS.get(name, "setting of the case or result, SI units")
 
 
 def write_card(
@@ -54,9 +60,7 @@ def write_card(
     lines += ["", "## What is in it", ""]
     lines += [f"* {name}: {value}" for name, value in facts.items()]
     lines += ["", "## Columns", "", "| column | meaning |", "|---|---|"]
-    lines += [
-        f"| `{name}` | {MEANINGS.get(name, 'setting of the case or result, SI units')} |" for name in _columns(files)
-    ]
+    lines += [f"| `{name}` | {_meaning(name)} |" for name in _columns(files)]
     lines += [
         "",
         "## How it was made",
@@ -103,7 +107,7 @@ def write_croissant(folder: Path, title: str, files: Sequence[Path]) -> Path:
             "@type": "cr:Field",
             "@id": f"records/{name}",
             "name": name,
-            "description": MEANINGS.get(name, "setting of the case or result, SI units"),
+            "description": _meaning(name),
             "dataType": TYPES.get(kind, "sc:Float"),
             "source": {"fileSet": {"@id": "parquet"}, "extract": {"column": name}},
         }

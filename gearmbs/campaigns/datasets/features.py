@@ -88,6 +88,6 @@ def _analytic(x: np.ndarray) -> np.ndarray:
 
 
 def windows(x: np.ndarray, size: int) -> np.ndarray:
-    """Return the whole windows of a signal side by side, shape (k, size)."""
-    count = x.size // size
-    return x[: count * size].reshape(count, size)
+    """Return the whole windows of signals along the last axis side by side, shape (..., k, size)."""
+    count = x.shape[-1] // size
+    return x[..., : count * size].reshape(*x.shape[:-1], count, size)

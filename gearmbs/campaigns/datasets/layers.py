@@ -2,8 +2,8 @@
 stays.
 
 Transfer path, noise, clipping and quantisation use `gearmbs.signals`. What varies from specimen to specimen (modes of
-the housing) is drawn
-from the specimen's number, what varies from record to record (noise) from the record's.
+the housing and where its sensors sit) is drawn from the specimen's number, what varies from record to record (drift,
+noise) from the record's.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ class SensorLayers:
 
     Attributes
     ----------
+    sensors : int
+        Places on the housing: each sees the same modes with other weights, and has noise of its own.
     modes : int
         Modes of the housing between seat and sensor.
     lowest, highest : float
@@ -37,6 +39,7 @@ class SensorLayers:
     seed : int
     """
 
+    sensors: int = 4
     modes: int = 6
     lowest: float = 400.0
     highest: float = 5500.0
@@ -46,10 +49,13 @@ class SensorLayers:
     bits: int = 16
     seed: int = 0
 
-    def path(self, specimen: int) -> ModalPath:
-        """Return the transfer path of a specimen: modes with random frequencies, dampings, signs and weights."""
-        generator = np.random.default_rng([self.seed, 1, specimen])
-        u = generator.random((self.modes, 2))
+    def path(self, specimen: int, sensor: int = 0) -> ModalPath:
+        """Return the transfer path of a specimen to a sensor: modes with random frequencies, dampings, weights.
+
+        Frequencies and dampings are the specimen's, signs and weights also the sensor's.
+        """
+        u = np.random.default_rng([self.seed, 1, specimen]).random((self.modes, 2))
+        generator = np.random.default_rng([self.seed, 3, specimen, sensor])
         modes = []
         for k in range(self.modes):
             frequency = self.lowest * (self.highest / self.lowest) ** ((k + u[k, 0]) / self.modes)
@@ -58,7 +64,9 @@ class SensorLayers:
             modes.append(Mode(float(frequency), float(damping), 1.0 / weight))
         return ModalPath(tuple(modes))
 
-    def measured(self, clean: np.ndarray, rate: float, specimen: int, record: int, full_scale: float) -> np.ndarray:
+    def measured(
+        self, clean: np.ndarray, rate: float, specimen: int, record: int, full_scale: float, sensor: int = 0
+    ) -> np.ndarray:
         """Return the measured samples of a clean signal, shape (n,).
 
         Parameters
@@ -71,22 +79,25 @@ class SensorLayers:
             Whose housing, and whose noise.
         full_scale : float
             Of the converter, in the unit of the measured signal.
+        sensor : int
+            At which place, from 0.
         """
-        generator = np.random.default_rng([self.seed, 2, record])
-        x = self._wandering(clean, generator)
-        x = self.through(x, rate, specimen)
+        # the machine drifts alike for all its sensors
+        x = self._wandering(clean, np.random.default_rng([self.seed, 2, record]))
+        x = self.through(x, rate, specimen, sensor)
+        generator = np.random.default_rng([self.seed, 4, record, sensor])
         level = float(generator.uniform(*self.noise)) * float(np.std(x))
         signal = make_signal(x[:, None], rate, units="m/s^2", channels=["sensor"])
         noisy = add_noise(signal, seed=int(generator.integers(1 << 31)), rms=level)
         return quantise(noisy, bits=self.bits, full_scale=full_scale).values[:, 0]
 
-    def through(self, x: np.ndarray, rate: float, specimen: int) -> np.ndarray:
+    def through(self, x: np.ndarray, rate: float, specimen: int, sensor: int = 0) -> np.ndarray:
         """Return a signal behind the transfer path, as it is when it has settled: by its spectrum over the record.
 
         The path is scaled so that white noise keeps its RMS.
         """
         frequency = np.fft.rfftfreq(x.size, 1.0 / rate)
-        response = self.path(specimen).accelerance(frequency)
+        response = self.path(specimen, sensor).accelerance(frequency)
         response = response / np.sqrt(np.mean(np.abs(response) ** 2))
         return np.fft.irfft(np.fft.rfft(x - x.mean()) * response, x.size)
 

@@ -42,17 +42,27 @@ GRADES = [
 ]
 
 
-def data_set_plan(signals: int, *, specimens: int = 200, duration: float = 0.5, seed: int = 0, unit: int = 48) -> Plan:
+def data_set_plan(
+    signals: int,
+    *,
+    specimens: int = 200,
+    duration: float = 0.5,
+    sensors: int = 1,
+    seed: int = 0,
+    unit: int = 48,
+) -> Plan:
     """Return the plan of a data set: every specimen and operating point in all states.
 
     Parameters
     ----------
     signals : int
-        At least so many, up to a multiple of the number of states.
+        At least so many, up to a multiple of the number of states and of sensors.
     specimens : int
         Individuals: manufacturing errors of grade 6 on both wheels, backlash, eccentricities.
     duration : float
         Of a record, s.
+    sensors : int
+        Signals that `SensorLayers` will make of each record.
     """
     from gearmbs.studies import Case
 
@@ -77,7 +87,7 @@ def data_set_plan(signals: int, *, specimens: int = 200, duration: float = 0.5, 
         base,
         factors,
         "sobol",
-        n=-(-signals // len(STATES)),
+        n=-(-signals // (len(STATES) * sensors)),
         seed=seed,
         keep=["contact", "signal:line_of_action"],
         unit=unit,
@@ -125,19 +135,20 @@ def write_data_set(
     severity = table["severity" if "severity" in table else "state.severity"].to_numpy()
     split = withhold(split_by_group(groups, test=test, validation=validation, seed=seed), severity, *withheld)
     done = (table["status"] == "done").to_numpy()
-    sensors, full_scale = _sensor_signals(campaign, table, groups, done, layers)
-    files = campaign.export(
-        out, "parquet", split=split, add={"split": split, "severity": severity, "signal.sensor": sensors}
-    )
+    measured, full_scale = _sensor_signals(campaign, table, groups, done, layers)
+    columns = {f"signal.sensor_{k + 1}": [None if x is None else x[k] for x in measured] for k in range(layers.sensors)}
+    files = campaign.export(out, "parquet", split=split, add={"split": split, "severity": severity, **columns})
     spec = campaign.folder.specs[0]
     facts = {
-        "signals": int(done.sum()),
+        "signals": int(done.sum()) * layers.sensors,
+        "records (simulations)": int(done.sum()),
+        "sensors a record": layers.sensors,
         "specimens": int(np.unique(groups).size),
         "states": ", ".join(sorted(table["state"].unique())),
         "samples a signal": spec.samples,
         "sampling rate, Hz": spec.rate,
         "full scale of the converter, m/s^2": f"{full_scale:.4g}",
-        "signals by split": ", ".join(f"{n} {int((done & (split == n)).sum())}" for n in sorted(set(split))),
+        "records by split": ", ".join(f"{n} {int((done & (split == n)).sum())}" for n in sorted(set(split))),
         "specimens in two splits": max(shared_groups(split, groups).values()),
         "processor time of the simulations, core hours": f"{campaign.status().processor_seconds / 3600:.3g}",
     }
@@ -147,7 +158,7 @@ def write_data_set(
 
 
 def _sensor_signals(campaign: Campaign, table: Any, groups: np.ndarray, done: np.ndarray, layers: SensorLayers) -> Any:
-    """Return the measured signals by row, None for failed cases, and the full scale of the converter."""
+    """Return the signals of all sensors by row, None for failed cases, and the full scale of the converter."""
     spec = campaign.folder.specs[0]
     clean = campaign.open()[spec.name]
     healthy = np.flatnonzero(done & (table["state"] == "healthy").to_numpy())[:50]
@@ -160,7 +171,8 @@ def _sensor_signals(campaign: Campaign, table: Any, groups: np.ndarray, done: np
             continue
         x = clean.isel(case=k).values[0].astype(float)
         record = int(table["index"].iloc[k])
-        sensors.append(layers.measured(x, spec.rate, int(groups[k]), record, full_scale).astype(np.float32))
+        heard = [layers.measured(x, spec.rate, int(groups[k]), record, full_scale, j) for j in range(layers.sensors)]
+        sensors.append(np.array(heard, dtype=np.float32))
     return sensors, full_scale
 
 
@@ -182,7 +194,7 @@ def feature_table(
         if x is None:
             continue
         shaft = float(table["operation.speed"].iloc[k]) / (2.0 * np.pi)
-        for part in windows(x, int(window * spec.rate)):
+        for part in windows(x, int(window * spec.rate)).reshape(-1, int(window * spec.rate)):
             rows.append(features(part, spec.rate, shaft, teeth))
             labels.append(table["state"].iloc[k])
             owners.append(groups[k])

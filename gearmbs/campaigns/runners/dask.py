@@ -38,8 +38,15 @@ class DaskRunner:
         return sum(self.client.nthreads().values()) or 1
 
     def __call__(self, path: str, units: Iterator[int]) -> Iterator[UnitReport]:
-        """Yield the reports of units as they end."""
+        """Yield the reports of units as they end.
+
+        Raises
+        ------
+        CampaignError
+            If the scheduler is lost.
+        """
         from distributed import wait
+        from distributed.comm import CommClosedError
 
         path = os.path.abspath(path)
         at_work: dict[Any, int] = {}
@@ -59,6 +66,11 @@ class DaskRunner:
                     unit = at_work.pop(future)
                     yield self._report(future, unit)
                     future.release()
+        except CommClosedError as error:
+            at_work.clear()
+            raise CampaignError(
+                "the scheduler is lost; what is done is in the folder: start another one and run again"
+            ) from error
         finally:
             if at_work:
                 self.client.cancel(list(at_work))
