@@ -105,7 +105,7 @@ def _valid(source: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:
     block = max(1, BLOCK // step) * step
     for start in range(0, count, block):
         stop = min(start + block, count)
-        piece = convolve_valid(source[start : stop + taps.size - 1], taps)[::step]
+        piece = convolve_valid(source[start : stop + taps.size - 1], taps, step)
         out[start // step : start // step + piece.size] = piece
     return out
 

@@ -74,26 +74,43 @@ def windowed_sinc(length: int, cutoffs: float | Sequence[float], kind: str, rate
     return taps / np.sum(taps * np.cos(np.pi * place * at))
 
 
-def convolve_valid(values: np.ndarray, taps: np.ndarray) -> np.ndarray:
+def convolve_valid(values: np.ndarray, taps: np.ndarray, every: int = 1) -> np.ndarray:
     """Return the fully supported part of a convolution, by overlapping pieces of the Fourier transform.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
     taps : ndarray, shape (m,)
+    every : int
+        Return only each of so many samples, from the first on. Where it is a power of two the others are not computed.
 
     Returns
     -------
-    ndarray, shape (n - m + 1,)
+    ndarray, shape (ceil((n - m + 1) / every),)
     """
     lap = taps.size - 1
     count = values.size - lap
     # about where the transforms cost least a sample
     size = 1 << (min(8 * taps.size, values.size) - 1).bit_length()
-    step = size - lap
+    folded = size % every == 0 and size - lap >= every
+    step = (size - lap) // every * every if folded else size - lap
     pieces = -(-count // step)
     padded = np.zeros((pieces - 1) * step + size)
     padded[: values.size] = values
     rows = np.lib.stride_tricks.sliding_window_view(padded, size)[::step]
-    out = np.fft.irfft(np.fft.rfft(rows, axis=1) * np.fft.rfft(taps, size), size, axis=1)
-    return out[:, lap:].ravel()[:count]
+    # the first supported sample comes first
+    shifted = np.roll(np.pad(taps, (0, size - taps.size)), -lap)
+    spectrum = np.fft.rfft(rows, axis=1) * np.fft.rfft(shifted)
+    if not folded:
+        return np.fft.irfft(spectrum, size, axis=1)[:, :step].ravel()[:count:every]
+    return _every_sample(spectrum, size, every)[:, : step // every].ravel()[: -(-count // every)]
+
+
+def _every_sample(spectrum: np.ndarray, size: int, every: int) -> np.ndarray:
+    """Return every so many-th of the ``size`` samples of each row of half spectra: what lies above folds down."""
+    if every == 1:
+        return np.fft.irfft(spectrum, size, axis=1)
+    short = size // every
+    whole = np.concatenate([spectrum, spectrum[:, -2:0:-1].conj()], axis=1)
+    folded = whole.reshape(-1, every, short).sum(axis=1)[:, : short // 2 + 1]
+    return np.fft.irfft(folded, short, axis=1) / every

@@ -86,7 +86,7 @@ def even_signal(
         rows = slice(k, min(k + BLOCK, len(even)))
         fine = _fine(t, columns, rate, factor, (low, high), (low + rows.start, low + rows.stop - 1), taps.size // 2)
         for column, source in zip(even.T, fine.T, strict=True):
-            column[rows] = convolve_valid(np.ascontiguousarray(source), taps)[::factor]
+            column[rows] = convolve_valid(np.ascontiguousarray(source), taps, factor)
     return make_signal(
         even[first - low : last - low + 1],
         rate,

@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
@@ -352,11 +353,22 @@ class Case(Section, Shown):
             )
         return self
 
+    @cached_property
+    def _pairs(self) -> dict[tuple[int, ...], tuple[tuple, GearPair]]:
+        """The pair that was built, by the identity of the sections, which a copy of the case may share or not."""
+        return {}
+
     def pair(self) -> GearPair:
         """Return the gear pair of the case."""
         from gearmbs.studies.tooth_faults import tooth_fault
 
-        return self._pair(tuple(tooth_fault(table) for table in self.fault.teeth))
+        sections = (self.gears, self.fault, self.contact, self.friction, self.operation)
+        key = tuple(map(id, sections))
+        if key not in self._pairs:
+            faults = tuple(tooth_fault(table) for table in self.fault.teeth)
+            self._pairs.clear()
+            self._pairs[key] = sections, self._pair(faults)
+        return self._pairs[key][1]
 
     def _pair(self, faults: tuple) -> GearPair:
         """Return the gear pair of the case with these faults of teeth.

@@ -129,7 +129,7 @@ class Recorder:
 
     def columns(self, part: Solution) -> _Columns:
         """Return what is recorded of one part of a solution."""
-        forces = np.concatenate([part.reaction(seat)[0] for seat in rig.SEATS], axis=1)
+        forces = np.concatenate([part.reaction_force(seat) for seat in rig.SEATS], axis=1)
         angles = np.empty((part.t.size, 2))
         for wheel, (gear, axes) in enumerate(zip(rig.GEARS, self._axes, strict=True)):
             x_axis = part.orientation(gear)[:, :, 0] @ axes[:, :2]

@@ -94,6 +94,16 @@ def test_changed_keeps_the_rest():
     assert case.fault.plane == "skew"
 
 
+def test_the_pair_is_built_once_and_anew_for_a_changed_case():
+    case = Case()
+    pair = case.pair()
+    assert case.pair() is pair
+    assert case == Case()
+    tilted = case.model_copy(update={"fault": Case(fault={"misalignment": "1 deg"}).fault})
+    assert tilted.pair().misalignment == pytest.approx(np.pi / 180)
+    assert case.pair().misalignment == 0.0
+
+
 def test_paper_cases():
     cases = paper_cases()
     assert [c.name for c in cases][:3] == ["healthy, low load", "misaligned, low load", "distance, low load"]

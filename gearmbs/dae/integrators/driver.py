@@ -41,6 +41,10 @@ DROP_ROUNDS_ALLOWED = 3
 UNSATISFIED = 1e-3
 """Part of its terms by which an equation set aside may be off at the end of a run."""
 DROP_TOLERANCES = (0.0, 1e-9, 1e-7, 1e-5)
+FEWEST_ENTRIES = 200
+"""Of a matrix from which negligible ones are left out: with fewer a run gains less than another choice of pivots."""
+LEAVING_PLANS = 12
+"""Choices of pivots in a run that may leave entries out."""
 
 
 @njit(HOOK_SIG, cache=True, nogil=True, error_model="numpy")
@@ -73,6 +77,7 @@ class Run:
         self.wall_time = 0.0
         self.repivots = 0
         self.first_pivots = 0
+        self.counted = np.zeros(len(problem.indices), dtype=bool)
         self.started = False
         self.start_note = ""
         self.steps_given = options.first_step is not None, options.min_step is not None
@@ -110,7 +115,8 @@ class Run:
             )
         try:
             drop = DROP_TOLERANCES[st.drop_level]
-            self.plan = analyse(self.indptr, self.indices, st.matrix, self.scale, drop)
+            self.plan = analyse(self.indptr, self.indices, st.matrix, self.scale, drop, self._entries_to_leave())
+            st.gamma_planned = st.gamma
         except SingularMatrixError as error:
             if st.steps > 0 and st.drop_rounds < DROP_ROUNDS_ALLOWED:
                 st.drop_rounds += 1
@@ -125,6 +131,12 @@ class Run:
         st.factorizations += 1
         st.growth_limit = max(GROWTH_LIMIT, 100.0 * growth)
         return None
+
+    def _entries_to_leave(self) -> np.ndarray | None:
+        """Return which entries of the matrix have counted so far, if the others may be left out of a plan."""
+        if self.state.drop_level > 0 or len(self.counted) < FEWEST_ENTRIES or self.repivots > LEAVING_PLANS:
+            return None
+        return self.counted
 
     def _unsatisfied(self) -> tuple[Status, str] | None:
         """Return a failure if equations that were set aside at a singular position do not hold at the end."""

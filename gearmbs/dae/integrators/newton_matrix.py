@@ -13,6 +13,8 @@ GAMMA_DRIFT_AT_KINKS = 0.3
 MATRIX_MAX_AGE = 50
 SLOPE_MAX_AGE = 20
 RATE_OF_FRESH = 0.1
+PLANNED_RANGE = 1e4
+"""Ratio of leading coefficients within which a plan that leaves negligible entries out is trusted."""
 DROPPED_STEPS = 5
 
 
@@ -36,7 +38,12 @@ def evaluate_matrix(functions, st):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def factor_matrix(st, plan, factors):
-    """Factor the matrix carried over to the step's leading coefficient; return whether its pivots still fit."""
+    """Factor the matrix carried over to the step's leading coefficient; return whether its plan still fits."""
+    if plan.left_src.shape[0] > 0:
+        # what is negligible at one step size need not be at another
+        ratio = st.gamma / st.gamma_planned
+        if ratio > PLANNED_RANGE or ratio * PLANNED_RANGE < 1.0:
+            return False
     change = st.gamma - st.gamma_evaluated
     jac, slope, matrix = st.jac, st.jac_slope, st.matrix
     for p in range(jac.shape[0]):

@@ -133,6 +133,7 @@ class RunState(Struct):
     gamma_evaluated: float
     gamma_factored: float
     growth_limit: float  # growth of its factors beyond which pivots are chosen anew
+    gamma_planned: float  # leading coefficient at which pivots, and entries to leave out, were chosen
     rate: float  # of convergence of the corrector, as last seen
     rate_allowed: float  # beyond which the matrix is evaluated anew for the next step
     drop_level: int  # how large pivots may be to be left out near a singular position

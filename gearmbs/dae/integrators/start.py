@@ -100,7 +100,8 @@ def begin(run: Run) -> Failure | None:
 def choose_first_pivots(run: Run, h: float) -> Failure | None:
     """Factor the Newton matrix of a first step of size ``h``; return a failure or None."""
     st = run.state
-    run.problem.jacobian(st.t, st.y, st.yp, 1.0 / h, st.matrix, st.idata, st.rdata, st.work)
+    st.gamma = 1.0 / h
+    run.problem.jacobian(st.t, st.y, st.yp, st.gamma, st.matrix, st.idata, st.rdata, st.work)
     st.jacobians += 1
     run.first_pivots += 1
     return run.repivot()

@@ -3,12 +3,16 @@
 `analyse` chooses pivots on values and lays down a plan. `factor` replays the plan column by column (left-looking),
 `solve` applies it. Pivots stay frozen until a multiplier grows beyond `GROWTH_LIMIT` or a pivot vanishes; then the
 caller analyses again with the current values.
+
+Mechanisms that move in a plane, or wheels on axes that hardly tilt, leave many entries of a pattern made for motions in
+space at zero but for rounding. Entries that have been negligible so far can be left out of the plan; `factor` looks at
+them, and as soon as one counts the caller analyses again.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, types, uint32
+from numba import boolean, float64, int64, types, uint32
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.structs import IndexVector, IntVector, Struct, Vector
@@ -26,10 +30,18 @@ GROWTH_LIMIT = 1e5
 SMALLEST_NODE = 4
 """Columns that are worth to be taken together: as many as `_through_node` takes at once."""
 
+ROUNDING = 1e-15
+"""Size of an entry of the equilibrated matrix up to which it is rounding when a plan is made."""
+NEGLIGIBLE = 1e-13
+"""Size up to which it may stay left out of the plan."""
+WORTH_LEAVING = 0.8
+"""Largest share of entries that count with which the others are left out: fewer would not pay for looking at them."""
+
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
 _IVEC = int64[::1]
 _UVEC = uint32[::1]
+_MASK = boolean[::1]
 
 
 class LUPlan(Struct):
@@ -54,6 +66,8 @@ class LUPlan(Struct):
         Scales, in pivot order.
     kept : ndarray
         One for a proper pivot; zero for an equation and an unknown set aside because the matrix is nearly singular.
+    left_src, left_limit : ndarray
+        Entries left out, by their index in the CSC values, and the largest absolute values with which they may be.
     """
 
     a_ptr: IntVector
@@ -70,6 +84,8 @@ class LUPlan(Struct):
     row_scale: Vector
     col_scale: Vector
     kept: Vector
+    left_src: IndexVector
+    left_limit: Vector
 
 
 class LUFactors(Struct):
@@ -210,18 +226,95 @@ def _scaled(indptr, indices, vals, scale):
     return row_scale, col_scale, scaled
 
 
+@njit(types.Tuple((_UVEC, _UVEC))(_VEC, _MASK), cache=True, nogil=True, error_model="numpy")
+def _parted(scaled, counted):
+    """Mark the entries that count in ``counted``; return the indices of those to plan for, and of those left out."""
+    total = 0
+    for p in range(scaled.shape[0]):
+        if not abs(scaled[p]) <= ROUNDING:
+            counted[p] = True
+        if counted[p]:
+            total += 1
+    if total > WORTH_LEAVING * scaled.shape[0]:
+        counted[:] = True
+        total = scaled.shape[0]
+    taken, left = np.empty(total, dtype=np.uint32), np.empty(scaled.shape[0] - total, dtype=np.uint32)
+    k = 0
+    for p in range(scaled.shape[0]):
+        if counted[p]:
+            taken[k] = p
+            k += 1
+        else:
+            left[p - k] = p
+    return taken, left
+
+
+@njit(types.Tuple((_IVEC, _IVEC, _VEC))(_IVEC, _IVEC, _VEC, _UVEC), cache=True, nogil=True, error_model="numpy")
+def _taken_pattern(indptr, indices, scaled, taken):
+    """Return the CSC form of the entries ``taken`` of a matrix."""
+    part_ptr = np.zeros_like(indptr)
+    part, values = np.empty(taken.shape[0], dtype=np.int64), np.empty(taken.shape[0])
+    e = 0
+    for j in range(indptr.shape[0] - 1):
+        while e < taken.shape[0] and taken[e] < indptr[j + 1]:
+            part[e], values[e] = indices[taken[e]], scaled[taken[e]]
+            e += 1
+        part_ptr[j + 1] = e
+    return part_ptr, part, values
+
+
+@njit(_VEC(_IVEC, _IVEC, _UVEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
+def _limits(indptr, indices, left, row_scale, col_scale):
+    """Return the absolute values up to which the entries ``left`` are negligible."""
+    limits = np.empty(left.shape[0])
+    e = 0
+    for j in range(indptr.shape[0] - 1):
+        while e < left.shape[0] and left[e] < indptr[j + 1]:
+            limits[e] = NEGLIGIBLE / (row_scale[indices[left[e]]] * col_scale[j])
+            e += 1
+    return limits
+
+
 @njit(
-    types.Tuple((int64, _IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _VEC, _VEC, _VEC))(
-        _IVEC, _IVEC, _VEC, _VEC, float64, LINES_TYPE, LINES_TYPE
-    ),
+    types.Tuple(
+        (
+            int64,
+            _IVEC,
+            _UVEC,
+            _UVEC,
+            _VEC,
+            _IVEC,
+            _UVEC,
+            _IVEC,
+            _UVEC,
+            _IVEC,
+            _UVEC,
+            _UVEC,
+            _VEC,
+            _VEC,
+            _VEC,
+            _UVEC,
+            _VEC,
+        )
+    )(_IVEC, _IVEC, _VEC, _VEC, float64, _MASK, LINES_TYPE, LINES_TYPE),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def _plan(indptr, indices, vals, scale, drop, columns, rows_left):
-    """Return the rank and the fields of an `LUPlan`, in their order; parameters as in `analyse` and `choose_pivots`."""
-    n = indptr.shape[0] - 1
-    row_scale, col_scale, scaled = _scaled(indptr, indices, vals, scale)
+def _plan(all_ptr, all_indices, vals, scale, drop, counted, columns, rows_left):
+    """Return the rank and the fields of an `LUPlan`, in their order.
+
+    Parameters
+    ----------
+    all_ptr, all_indices, vals, scale, drop, counted
+        As the pattern and the others of `analyse`.
+    columns, rows_left
+        As in `choose_pivots`.
+    """
+    n = all_ptr.shape[0] - 1
+    row_scale, col_scale, all_scaled = _scaled(all_ptr, all_indices, vals, scale)
+    taken, left = _parted(all_scaled, counted)
+    indptr, indices, scaled = _taken_pattern(all_ptr, all_indices, all_scaled, taken)
     growth = np.inf
     for threshold in THRESHOLDS:
         if growth > GROWTH_ALLOWED:
@@ -248,6 +341,8 @@ def _plan(indptr, indices, vals, scale, drop, columns, rows_left):
         if k < rank:
             kept[k] = 1.0
     a_ptr, a_pos, a_src, a_scale = _entries_in_order(indptr, indices, row_scale, col_scale, cols, row_place)
+    for e in range(a_src.shape[0]):
+        a_src[e] = taken[a_src[e]]
     u_by_col, u_pos = _upper_by_columns(u_ptr, u_cols, col_place)
     l_pos = np.empty(l_rows.shape[0], dtype=np.uint32)
     for e in range(l_rows.shape[0]):
@@ -269,10 +364,19 @@ def _plan(indptr, indices, vals, scale, drop, columns, rows_left):
         row_scale[rows],
         col_scale[cols],
         kept,
+        left,
+        _limits(all_ptr, all_indices, left, row_scale, col_scale),
     )
 
 
-def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np.ndarray, drop: float = 0.0) -> LUPlan:
+def analyse(
+    indptr: np.ndarray,
+    indices: np.ndarray,
+    vals: np.ndarray,
+    scale: np.ndarray,
+    drop: float = 0.0,
+    counted: np.ndarray | None = None,
+) -> LUPlan:
     """Choose pivots for a matrix and lay down the plan to factor every matrix of its pattern.
 
     Parameters
@@ -286,6 +390,9 @@ def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np
     drop : float
         When positive, unknowns without a pivot larger than this fraction of their entries are set aside, each with an
         equation: they come out of `solve` as zero.
+    counted : ndarray of bool, optional
+        Entries of the pattern that have counted in any matrix before; those that count in this one are marked. The
+        others are left out of the plan, if they are many. Default: no entry is left out.
 
     Returns
     -------
@@ -303,10 +410,15 @@ def analyse(indptr: np.ndarray, indices: np.ndarray, vals: np.ndarray, scale: np
     n = len(indptr) - 1
     size = 3 * len(indices) + 4 * n
     rank = -1
+    counted = np.ones(len(indices), dtype=bool) if counted is None else counted
     while rank < 0:
         lines = new_lines(n, size, True), new_lines(n, size, False)
-        rank, *plan = _plan(indptr, indices, vals, np.asarray(scale, dtype=float), max(drop, CANCELLED), *lines)
+        rank, *plan = _plan(
+            indptr, indices, vals, np.asarray(scale, dtype=float), max(drop, CANCELLED), counted, *lines
+        )
         size *= 2
+    if rank < n and not counted.all():
+        return analyse(indptr, indices, vals, scale, drop)
     if rank < len(indptr) - 1 and drop == 0.0:
         rows, cols = (np.asarray(plan[i], dtype=np.int64)[rank:] for i in (9, 10))
         raise SingularMatrixError(rows, cols)
@@ -378,8 +490,13 @@ def factor(plan, factors, vals):
     Returns
     -------
     growth : float
-        Largest multiplier in L. Above `GROWTH_LIMIT`, infinite or NaN the pivots no longer fit: analyse again.
+        Largest multiplier in L. Above `GROWTH_LIMIT`, infinite or NaN the pivots no longer fit, or an entry that was
+        left out counts: analyse again.
     """
+    left_src, left_limit = plan.left_src, plan.left_limit
+    for p in range(left_src.shape[0]):
+        if not abs(vals[left_src[p]]) <= left_limit[p]:
+            return np.inf
     x, w = factors.x, factors.w
     l_vals = factors.l_vals
     u_vals = factors.u_vals

@@ -56,11 +56,16 @@ SAME_POSITION = 0.05
 SINGULAR = 1e-8
 """Relative singular value of the index-1 matrix below which a direction counts as undetermined."""
 
-ROUNDED = 1e-15
-"""Change of an entry of the scaled matrix that is rounding.
+ROUNDED = 1e-13
+"""Change of an entry of the equilibrated matrix that is rounding, of all the products that it is made of.
 
 Of wheels that spin about fixed axes the mass matrix and the constraints' gradients stay what they are in global
 components, and so do the factors."""
+
+FEWEST_ENTRIES = 200
+"""Of a matrix from which negligible ones are left out: with fewer it is factored as fast as they are looked at."""
+LEAVING_PLANS = 12
+"""Choices of pivots that may leave entries out."""
 
 REACTION_PASSES = 30
 """Most corrections of loads that depend on reactions, such as joint friction, to the multipliers of one output."""
@@ -202,6 +207,8 @@ def allow_rounding(plan, allowed):
     """Write by how much each entry of the matrix may change and still count as unchanged."""
     for p in range(plan.a_src.size):
         allowed[plan.a_src[p]] = ROUNDED / plan.a_scale[p]
+    for p in range(plan.left_src.size):
+        allowed[plan.left_src[p]] = plan.left_limit[p]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -380,6 +387,8 @@ class Evaluator:
         self.plan: LUPlan | None = None
         self.factors: LUFactors | None = None
         self.growth = GROWTH_LIMIT
+        self.counted = np.zeros(self.vals.size, dtype=bool)
+        self.plans = 0
 
     def fill(self, t: np.ndarray, y: np.ndarray, epochs, records: Records) -> None:
         """Fill ``records`` for all rows of ``y``; ``epochs`` names the integer tables valid from each row on.
@@ -399,19 +408,31 @@ class Evaluator:
                         _least_squares_row(first, *place, self.pattern, table, rdata, work.size, records)
                         first, attempt, self.plan = first + 1, 0, None
                         continue
-                    self._choose_pivots(*place, table, GENERIC_TURNS[max(attempt, 1) - 1])
+                    if attempt > 1 or not self._choose_sparsely(*place, table):
+                        self._choose_pivots(*place, table, GENERIC_TURNS[max(attempt, 1) - 1])
                 done = evaluate_rows(
                     first, last, t, y, slots, table, rdata, work, vals, self.plan, self.factors, records, self.growth
                 )
                 attempt = attempt + 1 if done == first else 1 if done < last else 0
                 first = done
 
-    def _choose_pivots(self, t: np.ndarray, y: np.ndarray, table: np.ndarray, turn: float) -> None:
+    def _choose_sparsely(self, t: np.ndarray, y: np.ndarray, table: np.ndarray) -> bool:
+        """Choose pivots at one row, if there entries can be left out that have been negligible so far."""
+        self.plans += 1
+        if self.vals.size < FEWEST_ENTRIES or self.plans > LEAVING_PLANS:
+            return False
+        self._choose_pivots(t, y, table, 0.0, self.counted)
+        assert self.plan is not None
+        return self.plan.left_src.size > 0
+
+    def _choose_pivots(
+        self, t: np.ndarray, y: np.ndarray, table: np.ndarray, turn: float, counted: np.ndarray | None = None
+    ) -> None:
         """Choose pivots near one row, every angle turned off it so that no entry is zero by accident."""
         indptr, indices, slots = self.pattern
         self.vals[:] = 0.0
         assemble(t, _turned(y, table, turn), slots, table, self.rdata, self.work.size, self.vals)
-        self.plan = analyse(indptr, indices, self.vals, np.ones(indptr.size - 1))
+        self.plan = analyse(indptr, indices, self.vals, np.ones(indptr.size - 1), counted=counted)
         self.factors = new_factors(self.plan)
         # an ill-scaled mechanism may grow with the best of pivots
         self.growth = max(GROWTH_LIMIT, 100.0 * factor(self.plan, self.factors, self.vals))

@@ -284,6 +284,14 @@ class Solution(Shown):
 
     def reaction(self, joint: str) -> tuple[np.ndarray, np.ndarray]:
         """Return force (N) and moment about marker I's origin (N m) of a joint on I's body, each (m, 3), global."""
+        return self.reaction_force(joint), _sum_of_rows(self._records.moment, self._rows_of_joint(joint))
+
+    def reaction_force(self, joint: str) -> np.ndarray:
+        """Return the force of a joint on I's body, shape (m, 3), N, global, without its moment."""
+        return _sum_of_rows(self._records.force, self._rows_of_joint(joint))
+
+    def _rows_of_joint(self, joint: str) -> list[int]:
+        """Return the numbers of the constraint rows of a joint."""
         rows = self.system.model.rows_of_joint.get(joint)
         if rows is None:
             known = sorted(self.system.model.rows_of_joint)
@@ -294,7 +302,7 @@ class Solution(Shown):
                     f"{', '.join(known)} carry all of it"
                 )
             raise KeyError(f"joint {joint!r}; the joints are {', '.join(known) or 'none in this mechanism'}")
-        return _sum_of_rows(self._records.force, rows), _sum_of_rows(self._records.moment, rows)
+        return rows
 
     def load(self, element: str) -> tuple[np.ndarray, np.ndarray]:
         """Return force F (N) and torque N (N m) of a force element on I's body at marker I, each (m, 3), global."""

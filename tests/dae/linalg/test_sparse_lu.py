@@ -232,3 +232,59 @@ def test_fill_that_does_not_fit_is_told_and_given_room():
     assert wide[0] == compacted[0] == n
     np.testing.assert_array_equal(compacted[2], wide[2])
     np.testing.assert_array_equal(compacted[3], wide[3])
+
+
+def sparse_with_rounding(n, seed):
+    """Pattern, values and a mask of a matrix of which many entries are zero but for rounding."""
+    rng = np.random.default_rng(seed)
+    pattern = rng.uniform(size=(n, n)) < 0.3
+    np.fill_diagonal(pattern, True)
+    counts = pattern & ((rng.uniform(size=(n, n)) < 0.4) | np.eye(n, dtype=bool))
+    matrix = rng.uniform(0.5, 1.0, (n, n)) * np.where(counts, 1.0, 1e-18) + 4.0 * np.eye(n)
+    a = sp.csc_array(pattern.astype(float))
+    a.sort_indices()
+    columns = np.repeat(np.arange(n), np.diff(a.indptr))
+    at = a.indices, columns
+    return a.indptr.astype(np.int64), a.indices.astype(np.int64), np.ascontiguousarray(matrix[at]), counts[at]
+
+
+@pytest.mark.parametrize("n", [7, 30])
+def test_negligible_entries_are_left_out_until_they_count(n):
+    indptr, indices, vals, counts = sparse_with_rounding(n, n)
+    counted = np.zeros(vals.size, dtype=bool)
+    plan = analyse(indptr, indices, vals, np.ones(n), counted=counted)
+    np.testing.assert_array_equal(counted, counts)
+    np.testing.assert_array_equal(np.sort(plan.left_src), np.flatnonzero(~counts))
+    factors = new_factors(plan)
+    assert factor(plan, factors, vals) < GROWTH_LIMIT
+    whole = sp.csc_array((vals, indices, indptr), shape=(n, n)).toarray()
+    b, x = np.arange(1.0, n + 1.0), np.empty(n)
+    solve(plan, factors, b, x)
+    np.testing.assert_allclose(whole @ x, b, rtol=1e-12)
+
+    # rounding may change, an entry that counts may not stay out, and never leaves again
+    vals[plan.left_src] *= -3.0
+    assert factor(plan, factors, vals) < GROWTH_LIMIT
+    grown = int(plan.left_src[0])
+    vals[grown] = 0.3
+    assert factor(plan, factors, vals) == np.inf
+    plan = analyse(indptr, indices, vals, np.ones(n), counted=counted)
+    assert counted.sum() == counts.sum() + 1
+    assert counted[grown]
+    assert grown not in plan.left_src
+    factors = new_factors(plan)
+    assert factor(plan, factors, vals) < GROWTH_LIMIT
+    whole = sp.csc_array((vals, indices, indptr), shape=(n, n)).toarray()
+    solve(plan, factors, b, x)
+    np.testing.assert_allclose(whole @ x, b, rtol=1e-12)
+    vals[plan.left_src[0]] = np.nan
+    assert factor(plan, factors, vals) == np.inf
+
+
+def test_what_only_rounding_keeps_from_being_singular_is_not_left_out():
+    a = np.array([[1.0, 2.0, 3.0], [2.0, 4.0, 6.0], [1.0, 1.0, 1.0]])
+    indptr, indices, _ = csc(np.ones((3, 3)))
+    vals = a.T.ravel() * 1.0
+    vals[4] += 1e-16
+    with pytest.raises(SingularMatrixError):
+        analyse(indptr, indices, vals, np.ones(3), counted=np.zeros(9, dtype=bool))
