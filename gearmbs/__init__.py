@@ -9,7 +9,7 @@
 
 Studies
     `Case`, `CaseError`, `load_case`, `make_case`, `run_case`, `run_cases`, `run_paper`, `sweep`, `record_signal`,
-    `run_train`, `run_bench`, `run_resonance`, `gear_rig`
+    `run_train`, `run_bench`, `run_gearbox`, `run_resonance`, `gear_rig`
 Gears
     `GearPair`, `GearSpec`, `Material`, `ContactLaw`, `FlankFriction`, `faults`, `IdealMesh`, `planetary`,
     `planetary_mechanism`, `diagnose_planetary`
@@ -92,6 +92,7 @@ if TYPE_CHECKING:
         run_bench,
         run_case,
         run_cases,
+        run_gearbox,
         run_paper,
         run_resonance,
         run_train,
@@ -167,6 +168,7 @@ __all__ = [
     "run_case",
     "run_cases",
     "run_deck",
+    "run_gearbox",
     "run_paper",
     "run_resonance",
     "run_train",
@@ -244,6 +246,7 @@ late(
         "run_deck": ".adams",
         "run_bench": ".studies",
         "run_paper": ".studies",
+        "run_gearbox": ".studies",
         "run_resonance": ".studies",
         "run_train": ".studies",
         "save": ".saving",

@@ -18,6 +18,7 @@ from gearmbs._command import case_bars, fail, guarded
 from gearmbs.campaigns.commands import app as campaign_app
 from gearmbs.identify.commands import identify as identify_command
 from gearmbs.studies.commands import bench as bench_command
+from gearmbs.studies.commands import gearbox as gearbox_command
 from gearmbs.studies.commands import resonance as resonance_command
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ app = typer.Typer(
 app.add_typer(campaign_app)
 app.command("identify")(identify_command)
 app.command("bench")(bench_command)
+app.command("gearbox")(gearbox_command)
 app.command("resonance")(resonance_command)
 
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")]
@@ -306,6 +308,9 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
         write_text(report, train_report(train, data))
         train_scene(train).save_html(scene)
         for mesh in data.mesh.values:
+            if "mesh_track" in data:
+                # of a run-up the report says where which harmonic is highest
+                continue
             levels = data["mesh_rms"].sel(mesh=mesh, signal=f"force of {mesh}")
             shown = "".join(f"{v:10.4g}" for v in levels.values)
             typer.echo(f"{mesh!s:<18}{float(levels.mesh_frequency):10.5g} Hz{shown}   RMS of the normal force, N")

@@ -74,7 +74,7 @@ class _Builder:
         total = sum(p[0] for p in pieces)
         middle = sum(p[0] * p[1] for p in pieces) / total
         inertia = sum(p[2] + p[0] * (p[1] - middle) ** 2 * np.diag([1.0, 1.0, 0.0]) for p in pieces)
-        spin = train.speeds[shaft.name] if train.running else 0.0
+        spin = train.start_share * train.speeds[shaft.name]
         body = self.m.body(
             shaft.name, total, inertia, com=(0.0, 0.0, middle), position=seat.origin,
             orientation=seat.axes @ turn_z(layout.angles[shaft.name]), angular_velocity=spin * seat.axes[:, 2],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,7 +18,7 @@ from gearmbs.drivetrain.errors import DrivetrainError, require
 from gearmbs.drivetrain.part import Part
 from gearmbs.drivetrain.torque_element import FROM_OWN, ShaftTorque
 from gearmbs.mechanism.elements import State
-from gearmbs.mechanism.functions import as_function, constant, ramp, step
+from gearmbs.mechanism.functions import as_function, constant, curve_integral, ramp, step
 from gearmbs.mechanism.joints import Joint, Row, Term
 from gearmbs.units import Quantity
 
@@ -65,13 +66,48 @@ class SpeedDrive(Drive):
     ----------
     function : TimeFunction or str, optional
         The rotation itself, rad, in place of the run-up and the speed.
+    curve : sequence of (time, speed), optional
+        A run-up or coast-down: points from the end of the drivetrain's ``run_up`` on, joined by a monotone cubic; none
+        faster than ``speed``, all in its sense. Before the first point its speed is held, or reached from rest.
     """
 
     kind: ClassVar[str] = "speed"
     function: Any = None
+    curve: Any = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.curve is None:
+            return
+        require(self.function is None, f"{self.label}: give function or curve, not both")
+        try:
+            points = tuple((t, w) for t, w in self.curve)
+        except (TypeError, ValueError):
+            raise DrivetrainError(f"{self.label}: curve is {self.curve!r}; give points (time, speed)") from None
+        times = self._in_si("curve", [t for t, _ in points], "time")
+        speeds = self._in_si("curve", [w for _, w in points], "angular speed")
+        require(
+            len(points) > 1 and times[0] >= 0.0 and all(b > a for a, b in pairwise(times)),
+            f"{self.label}: curve has times {times} s; give two or more, increasing, the first not negative",
+        )
+        for w in speeds:
+            require(w * self.speed >= 0.0 and abs(w) <= abs(self.speed) * (1.0 + 1e-9),
+                    f"{self.label}: curve goes to {w:.6g} rad/s, but speed is {self.speed:.6g} rad/s; give the "
+                    "fastest speed as speed")  # fmt: skip
+        object.__setattr__(self, "curve", tuple(zip(times, speeds, strict=True)))
+
+    @property
+    def start_share(self) -> float:
+        """Speed at the start of a train that runs already, over the operating speed."""
+        return 1.0 if self.curve is None else self.curve[0][1] / self.speed
 
     def add(self, at: Attached) -> None:
-        if self.function is not None:
+        if self.curve is not None:
+            first = self.curve[0][1]
+            later = [(at.run_up + t, w) for t, w in self.curve if t > 0.0]
+            times = [0.0, at.run_up, *(t for t, _ in later)]
+            turned = curve_integral(times, [first if at.running else 0.0, first, *(w for _, w in later)])
+        elif self.function is not None:
             turned = as_function(self.function, "rad", self.label)
         else:
             turned = ramp(at.speed, over=0.0 if at.running else at.run_up)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from gearmbs.drivetrain.bearings import Bearing
 from gearmbs.drivetrain.couplings import Coupling
-from gearmbs.drivetrain.drives import Drive
+from gearmbs.drivetrain.drives import Drive, SpeedDrive
 from gearmbs.drivetrain.errors import DrivetrainError, require
 from gearmbs.drivetrain.loads import Load
 from gearmbs.drivetrain.part import Part
@@ -240,6 +240,18 @@ class Drivetrain:
         from gearmbs.drivetrain.description import read_description
 
         return read_description(path).train
+
+    @property
+    def start_share(self) -> float:
+        """Speed of the shafts at the start over the operating speed: 0 from rest, 1 of a train that runs already."""
+        if not self.running:
+            return 0.0
+        return min((d.start_share for d in self.drives if isinstance(d, SpeedDrive)), default=1.0)
+
+    @property
+    def changes_speed(self) -> bool:
+        """Whether a drive follows a curve: a run-up or coast-down."""
+        return any(isinstance(d, SpeedDrive) and d.curve is not None for d in self.drives)
 
     @property
     def rate_scale(self) -> float:

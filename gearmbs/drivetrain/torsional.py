@@ -7,6 +7,7 @@ angles of its shafts, where s is 1 for external and -1 for internal pairs.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -248,6 +249,8 @@ def _mesh_spring(train: Drivetrain, mesh: str, names: tuple[str, ...]) -> Torsio
     geometry, law = pair.geometry, pair.contact_model
     force = train.power.on_driven(mesh) / geometry.driven.base_radius
     share = max(1.0, geometry.contact_ratio)
+    # a helical flank has its normal out of the transverse plane, in gap and in force, and a longer line of contact
+    transverse = math.cos(driver.gear.base_helix_angle)
     # at no load laws with an exponent have no stiffness; a linear one has it always
     one = law.tangent_stiffness(force / share, 1) if force > 0.0 else law.law.stiffness
     if law.law.exponent == 1.0:
@@ -256,8 +259,8 @@ def _mesh_spring(train: Drivetrain, mesh: str, names: tuple[str, ...]) -> Torsio
         mesh,
         (names.index(driver.shaft), names.index(driven.shaft)),
         (geometry.driver.base_radius, geometry.sign * geometry.driven.base_radius),
-        one * geometry.contact_ratio,
-        _mesh_damping(law, force / share) * geometry.contact_ratio,
+        transverse * one * geometry.contact_ratio,
+        transverse * _mesh_damping(law, force / share) * geometry.contact_ratio,
         max(0.0, geometry.normal_backlash),
         force,
         int(pair.rotation),

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from gearmbs.studies.claims import Claim
     from gearmbs.studies.crank_slider import CrankSlider
     from gearmbs.studies.flexible_rig import flexible_rig
+    from gearmbs.studies.gearbox import GearboxSettings, gearbox_choices, industrial_gearbox
+    from gearmbs.studies.gearbox_study import GearboxStudy, run_gearbox
     from gearmbs.studies.paper import PaperStudy, run_paper
     from gearmbs.studies.parallel import run_cases
     from gearmbs.studies.preset import paper_cases
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from gearmbs.studies.rig import gear_rig
     from gearmbs.studies.simulation import SimulationFailed, SimulationInterrupted, run_case, simulate_case
     from gearmbs.studies.sweep import Sweep, sweep
+    from gearmbs.studies.train_modes import train_campbell, train_modes
     from gearmbs.studies.train_report import train_report, train_scene
     from gearmbs.studies.trains import load_train, run_train, train_signal
 
@@ -33,6 +36,8 @@ __all__ = [
     "CaseWarning",
     "Claim",
     "CrankSlider",
+    "GearboxSettings",
+    "GearboxStudy",
     "PaperStudy",
     "RattleSettings",
     "ResonanceSettings",
@@ -45,7 +50,9 @@ __all__ = [
     "bench_train",
     "flexible_rig",
     "gear_rig",
+    "gearbox_choices",
     "housing_signal",
+    "industrial_gearbox",
     "load_case",
     "load_train",
     "make_case",
@@ -60,6 +67,7 @@ __all__ = [
     "run_bench",
     "run_case",
     "run_cases",
+    "run_gearbox",
     "run_paper",
     "run_resonance",
     "run_train",
@@ -67,6 +75,8 @@ __all__ = [
     "simulate_case",
     "sweep",
     "sweep_resonance",
+    "train_campbell",
+    "train_modes",
     "train_report",
     "train_scene",
     "train_signal",
@@ -107,6 +117,13 @@ late(
         "Sweep": ".sweep",
         "bearing_rig": ".bearing_rig",
         "flexible_rig": ".flexible_rig",
+        "GearboxSettings": ".gearbox",
+        "GearboxStudy": ".gearbox_study",
+        "gearbox_choices": ".gearbox",
+        "industrial_gearbox": ".gearbox",
+        "run_gearbox": ".gearbox_study",
+        "train_campbell": ".train_modes",
+        "train_modes": ".train_modes",
         "gear_rig": ".rig",
         "housing_signal": ".bearing_rig",
         "load_case": ".case",

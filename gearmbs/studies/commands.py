@@ -1,4 +1,4 @@
-"""``gearmbs bench`` and ``gearmbs resonance``: whole studies on the command line."""
+"""``gearmbs bench``, ``gearmbs gearbox`` and ``gearmbs resonance``: whole studies on the command line."""
 
 from __future__ import annotations
 
@@ -76,4 +76,30 @@ def resonance(
             study = run_resonance(settings, progress=move)
         paths = study.save(out)
         typer.echo(study.report())
+        typer.echo("\n".join(f"wrote {path}" for path in paths))
+
+
+def gearbox(
+    out: Out = Path("out/gearbox"),
+    speed: Annotated[str, typer.Option(help='Of the motor, e.g. "1793 rpm".')] = "1793 rpm",
+    power: Annotated[str, typer.Option(help='Of the motor, e.g. "750 kW".')] = "750 kW",
+    helix: Annotated[str, typer.Option(help='Helix angle, e.g. "14 deg"; 0: spur wheels.')] = "14 deg",
+    duration: Annotated[float, typer.Option(help="Length of the steady record, s.")] = 1.0,
+    run_up: Annotated[float, typer.Option(help="Length of the run-up, s.")] = 4.0,
+) -> None:
+    """Study an industrial gearbox of two helical stages: modes, Campbell diagram, steady state, run-up, housing."""
+    with guarded():
+        from gearmbs.studies.gearbox import GearboxSettings, industrial_gearbox
+        from gearmbs.studies.store import check_place
+
+        settings = GearboxSettings(speed=speed, power=power, helix_angle=helix)
+        industrial_gearbox(settings)
+        check_place(out, 0)
+
+        from gearmbs.studies.gearbox_study import run_gearbox
+
+        with case_bars(["steady", "run-up"]) as move:
+            study = run_gearbox(settings, duration=duration, run_up=run_up, progress=move)
+        paths = study.save(out)
+        typer.echo("modes, Hz: " + ", ".join(f"{f:.4g}" for f in study.campbell()["frequency"].values[0]))
         typer.echo("\n".join(f"wrote {path}" for path in paths))

@@ -79,6 +79,8 @@ def _sensors(train: Drivetrain, record: xr.Dataset) -> list[str]:
 
 
 def _levels(train: Drivetrain, record: xr.Dataset) -> list[str]:
+    if "mesh_track" in record:
+        return _highest(train, record)
     lines = ["## Mesh harmonics, RMS", ""]
     harmonics = record.harmonic.values
     for mesh in train.meshes:
@@ -88,6 +90,24 @@ def _levels(train: Drivetrain, record: xr.Dataset) -> list[str]:
         for signal in record.signal.values:
             row = levels.sel(signal=signal).values
             lines.append(f"| {signal} | " + " | ".join(f"{v:.4g}" for v in row) + " |")
+        lines.append("")
+    return lines
+
+
+def _highest(train: Drivetrain, record: xr.Dataset) -> list[str]:
+    """Return where along a run-up each mesh harmonic of each signal is highest."""
+    lines = ["## Mesh harmonics along the run-up: highest RMS, at the speed of the drive, at the mesh frequency", ""]
+    tracks = record["mesh_track"]
+    speed = tracks["track_speed"].values * RPM
+    for mesh in train.meshes:
+        lines += [f"### {mesh.name}", "", "| signal | harmonic | RMS | rpm | Hz |", _rule(4)]
+        for signal in tracks.signal.values:
+            for h in tracks.harmonic.values:
+                row = tracks.sel(signal=signal, mesh=mesh.name, harmonic=h)
+                if np.isfinite(row.values).any():
+                    k = int(np.nanargmax(row.values))
+                    at = h * float(row["track_frequency"].values[k])
+                    lines.append(f"| {signal} | {h} | {row.values[k]:.4g} | {speed[k]:.5g} | {at:.5g} |")
         lines.append("")
     return lines
 

@@ -27,6 +27,10 @@ from gearmbs.studies.tooth_faults import tooth_fault
 from gearmbs.studies.train_recorder import CONTACT, TrainColumns, TrainRecorder
 
 COUNTED = ("pairs_drive", "pairs_back")
+TRACK_MOMENTS = 60
+"""Moments of a run-up at which mesh harmonics are told."""
+TRACK_CYCLES = 16.0
+"""Mesh cycles in a window around each."""
 
 
 def load_train(path: str | Path) -> Description:
@@ -64,7 +68,8 @@ def run_train(
         tooth pairs on drive and coast flanks and transmission error; by ``bearing`` the force of the seat on the shaft;
         by ``sensor`` what it measures; by ``shaft`` its speed. ``mesh_rms``: RMS of the mesh harmonics by ``signal``
         (the normal force of each mesh, the bearings' forces, the sensors), mesh and harmonic, at the record's mean
-        speed.
+        speed; of a run-up or coast-down (`gearmbs.drivetrain.SpeedDrive` with ``curve``) instead ``mesh_track``, the
+        same at 60 moments.
 
     Raises
     ------
@@ -168,7 +173,10 @@ def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution
     speed = _interpolated(known.t, known.speed, t)
     bearing = values[:, meshes : meshes + 3 * bearings].reshape(t.size, bearings, 3)
     out = _dataset(train, t, contact, bearing, values[:, meshes + 3 * bearings :], speed, error)
-    out["mesh_rms"] = _harmonics(train, run, out, rate, known, start, stop)
+    if train.changes_speed:
+        out["mesh_track"] = mesh_tracks(train, run, out, known)
+    else:
+        out["mesh_rms"] = _harmonics(train, run, out, rate, known, start, stop)
     out.attrs = attributes(train, run, solution)
     return out
 
@@ -181,10 +189,8 @@ def _interpolated(t: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarr
     return out
 
 
-def _harmonics(
-    train: Drivetrain, run: RunSettings, record: xr.Dataset, rate: float, known: TrainColumns, start: float, stop: float
-) -> xr.DataArray:
-    """Return the RMS of each signal at the harmonics of each mesh, at the mean speed of the record."""
+def _signals(train: Drivetrain, record: xr.Dataset) -> tuple[list[str], np.ndarray]:
+    """Return names and values, shape (m, signals), of all that mesh harmonics are told of."""
     names = [f"force of {m.name}" for m in train.meshes]
     columns = [record["normal_force"].values]
     for k, bearing in enumerate(train.bearings):
@@ -192,7 +198,61 @@ def _harmonics(
         columns.append(record["bearing_force"].values[:, k])
     names += [s.name for s in train.sensors]
     columns.append(record["measured"].values)
-    signals = np.concatenate(columns, axis=1)
+    return names, np.concatenate(columns, axis=1)
+
+
+def mesh_tracks(train: Drivetrain, run: RunSettings, record: xr.Dataset, known: TrainColumns) -> xr.DataArray:
+    """Return the RMS of each signal at the harmonics of each mesh along a run-up or coast-down.
+
+    Returns
+    -------
+    DataArray
+        Dims (signal, mesh, harmonic, moment); ``track_time`` (s), ``track_speed`` (of the first drive's shaft, rad/s)
+        and, by mesh, ``track_frequency`` (Hz) of each moment. A moment is the middle of a window of some mesh cycles,
+        see `gearmbs.signals.order_track`; NaN where a mesh does not turn enough for one.
+    """
+    from gearmbs.signals import SignalError, order_track
+
+    names, signals = _signals(train, record)
+    t = record["time"].values
+    moments = np.linspace(t[0], t[-1], TRACK_MOMENTS + 2)[1:-1]
+    orders = np.arange(1, run.harmonics + 1)
+    rms = np.full((len(names), len(train.meshes), run.harmonics, moments.size), np.nan)
+    frequency = np.zeros((len(train.meshes), moments.size))
+    shafts = [shaft.name for shaft in train.shafts]
+    for k, mesh in enumerate(train.meshes):
+        driver, _ = train.wheels_of(mesh)
+        column = shafts.index(driver.shaft)
+        # the angle in mesh cycles: an order is then a harmonic of the mesh
+        angle = xr.DataArray(driver.gear.teeth * np.abs(np.interp(t, known.t, known.turned[:, column])), dims="time",
+                             coords={"time": t}, attrs={"units": "rad"})  # fmt: skip
+        frequency[k] = driver.gear.teeth * np.abs(np.interp(moments, known.t, known.speed[:, column])) / (2.0 * np.pi)
+        signal = make_signal(signals, float(run.output_rate(train)), units="1", channels=names, t0=float(t[0]))
+        try:
+            found = order_track(signal, orders=orders.tolist(), phase=angle, scaling="rms", revolutions=TRACK_CYCLES)
+        except SignalError:
+            continue
+        at = found["time"].values
+        inside = (moments >= at[0]) & (moments <= at[-1])
+        for h in range(run.harmonics):
+            for n in range(len(names)):
+                rms[n, k, h, inside] = np.interp(moments[inside], at, found.values[:, h, n])
+    return xr.DataArray(
+        rms, dims=("signal", "mesh", "harmonic", "moment"),
+        coords={"signal": names, "mesh": [m.name for m in train.meshes], "harmonic": orders,
+                "track_time": ("moment", moments, {"units": "s"}),
+                "track_speed": ("moment", np.abs(np.interp(moments, known.t, known.speed[:, shafts.index(
+                    train.drives[0].shaft)])), {"units": "rad/s"}),
+                "track_frequency": (("mesh", "moment"), frequency, {"units": "Hz"})},
+        attrs={"long_name": "RMS at the harmonics of the mesh frequencies, in the signals' own units"},
+    )  # fmt: skip
+
+
+def _harmonics(
+    train: Drivetrain, run: RunSettings, record: xr.Dataset, rate: float, known: TrainColumns, start: float, stop: float
+) -> xr.DataArray:
+    """Return the RMS of each signal at the harmonics of each mesh, at the mean speed of the record."""
+    names, signals = _signals(train, record)
     shafts = [shaft.name for shaft in train.shafts]
     rms = np.full((len(names), len(train.meshes), run.harmonics), np.nan)
     frequency = np.zeros(len(train.meshes))
