@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from gearmbs.view.motion import PairMotion, solution_motion, static_motion
     from gearmbs.view.outline import gear_outline, profile_area
     from gearmbs.view.page import Page
-    from gearmbs.view.planetary import planetary_plot
+    from gearmbs.view.planetary import planetary_plot, planetary_scene
     from gearmbs.view.reports import analysis_figures, comparison_figures, report_plot
     from gearmbs.view.revolution import average_plot
     from gearmbs.view.scene import Part, Scene
@@ -72,6 +72,7 @@ __all__ = [
     "order_track_plot",
     "pair_solids",
     "planetary_plot",
+    "planetary_scene",
     "profile_area",
     "read_stl",
     "report_plot",
@@ -116,6 +117,7 @@ late(
         "gear_solid": ".solid",
         "gmf_bars": ".bars",
         "planetary_plot": ".planetary",
+        "planetary_scene": ".planetary",
         "load_sharing_plot": ".curves",
         "mechanism_plot": ".topology",
         "mechanism_scene": ".scenes",
