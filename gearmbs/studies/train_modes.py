@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from gearmbs.drivetrain import Drivetrain, SpeedDrive, TorqueDrive, TorqueLoad
+from gearmbs.drivetrain import Drivetrain, SpeedDrive, TorqueLoad
 from gearmbs.mechanism import linear_modes, static_equilibrium
 from gearmbs.mechanism.functions import constant
 
@@ -18,11 +18,10 @@ if TYPE_CHECKING:
 
 
 def resting(train: Drivetrain) -> Drivetrain:
-    """Return a drivetrain at rest under its operating torques, without friction; prescribed shafts are held."""
+    """Return a drivetrain at rest under the loads of its operating point, without friction, its drives holding it."""
     drives = [
-        replace(drive, curve=None, function=constant(0.0)) if isinstance(drive, SpeedDrive)
-        else TorqueDrive(name=drive.name, shaft=drive.shaft, speed=drive.speed, station=drive.station, on=drive.on,
-                         torque=abs(train.power.drive[drive.name]))
+        SpeedDrive(name=drive.name, shaft=drive.shaft, speed=drive.speed, station=drive.station, on=drive.on,
+                   function=constant(0.0))
         for drive in train.drives
     ]  # fmt: skip
     loads = [
@@ -38,8 +37,9 @@ def resting(train: Drivetrain) -> Drivetrain:
 def train_modes(train: Drivetrain) -> Modes:
     """Return the modes of a whole drivetrain about its position of rest under the operating torques.
 
-    Tooth contacts have the stiffness of the pairs that touch there, and no friction. Shafts whose speed is prescribed
-    are held.
+    Tooth contacts have the stiffness of the pairs that touch there, and no friction. Shafts of prescribed speed are
+    held; other drives hold the train while it comes to rest, and then give way to the torque they held it with. Where a
+    corner of a tooth touches, the ratio of torques is another at the next angle: rigid rotation then has a frequency.
 
     Parameters
     ----------
@@ -58,7 +58,12 @@ def train_modes(train: Drivetrain) -> Modes:
     still = resting(train)
     m = still.build()
     after = 2.0 * still.run_up
-    static_equilibrium(m, t=after, move=True)
+    rest = static_equilibrium(m, t=after, move=True)
+    for drive in train.drives:
+        if not isinstance(drive, SpeedDrive):
+            held = m.joints.pop(drive.name)
+            torque = float(rest.solution.reaction(drive.name)[1][-1] @ held.j.global_orientation()[:, 2])
+            m.axis_torque(drive.name, held.i, held.j, torque)
     return linear_modes(m, t=after)
 
 
