@@ -16,6 +16,7 @@ from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec
 from gearmbs.units import Quantity
 
+
 @dataclass(frozen=True, kw_only=True)
 class Shaft(Part):
     """A rigid shaft: a cylinder, sections one after the other, or a rotor given by its numbers.
