@@ -358,6 +358,10 @@ def analyse(
     band: Annotated[
         str | None, typer.Option(help='Band of the envelope, e.g. "1 kHz, 5 kHz"; default: kurtogram.')
     ] = None,
+    shaft: Annotated[
+        list[str] | None,
+        typer.Option(help='Speed of another shaft by that given, e.g. 0.345; "none" if there is no other; repeat.'),
+    ] = None,
     gaps: Gaps = None,
     format: Annotated[str | None, typer.Option(help="Format of the file, if its name does not say.")] = None,
     tables: Annotated[Path | None, typer.Option(help="Folder for the tables as CSV.")] = None,
@@ -399,7 +403,13 @@ def analyse(
 
             one = signal.sel(channel=report.levels["channel"].values)
             turns = known if isinstance(known, float) else report.speed
-            bearings = diagnose_bearing(one, bearing_list(bearing), turns, band=None if band is None else pair_of(band))
+            bearings = diagnose_bearing(
+                one,
+                bearing_list(bearing),
+                turns,
+                band=None if band is None else pair_of(band),
+                shafts=None if shaft is None else shaft_ratios(shaft),
+            )
             found |= bearings.tables()
             text = f"{bearings.to_markdown()}\n\n{text}"
         try:
@@ -537,6 +547,14 @@ def bearing_list(texts: list[str]) -> dict[str, tuple[str, float]]:
         key = name.strip() if name.strip() not in found else text
         found[key] = (name.strip(), value)
     return found
+
+
+def shaft_ratios(texts: list[str]) -> list[float]:
+    """Return the ratios of other shafts, none for the word "none"."""
+    try:
+        return [] if [text.strip().lower() for text in texts] == ["none"] else [float(text) for text in texts]
+    except ValueError:
+        raise ValueError(f"--shaft {' '.join(texts)!r}: give ratios such as 0.345, or none") from None
 
 
 def pair_of(text: str) -> tuple[float, float]:

@@ -12,6 +12,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from gearmbs.bearings.errors import BearingError
+from gearmbs.bearings.series import Known, dimension_series, known_of
 
 if TYPE_CHECKING:
     from gearmbs.bearings.geometry import Bearing
@@ -86,6 +87,7 @@ SUFFIX = re.compile(
     r"|CM|CN|C[2345]|P[456])+"
 )
 """Suffixes that makers write onto the digits: seals and shields, cages, snap rings, clearance, precision."""
+MAKERS = re.compile(r"^(?:SKF|FAG|NSK|NTN|INA|KOYO)\s*")
 SMALL_BORES = {0: 10, 1: 12, 2: 15, 3: 17}
 
 
@@ -103,10 +105,16 @@ def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
     plain = re.sub(r"[^A-Z0-9]", "", designation.upper())
     if plain in ALIASES:
         return Bearing(**{**RECORDINGS[ALIASES[plain]], **changes})
-    digits = re.match(r"^\s*(?:SKF|FAG|NSK|NTN|INA|KOYO)?\s*(\d{4,5})", designation.upper())
+    bare = MAKERS.sub("", designation.upper().strip())
+    group = dimension_series(bare)
+    if group is not None:
+        fixed = known_of(bare, _boundary("".join(group)))
+        if fixed is not None:
+            return _asked(designation, fixed, changes)
+    digits = re.match(r"^(\d{4,5})", bare)
     series = digits[1] if digits else ""
     if digits and plain not in ALIASES:
-        _check_suffix(designation, designation.upper()[digits.end() :])
+        _check_suffix(designation, bare[digits.end() :])
     if series in ELEMENTS:
         z, d, pitch = ELEMENTS[series]
         found = {"elements": z, "element_diameter": 1e-3 * d, "pitch_diameter": 1e-3 * pitch}
@@ -141,6 +149,33 @@ def _check_suffix(designation: str, rest: str) -> None:
             f"designation {designation!r}: {letters!r} right after the digits is no suffix that is known; leave it "
             f"out, or write it apart, '{designation.strip()[: -len(rest.rstrip())]}-{letters}', if your maker uses it"
         )
+
+
+def _asked(designation: str, fixed: Known, changes: dict[str, Any]) -> Bearing:
+    """Return a bearing whose designation fixes some fields, the length of rollers by the rating if that is given."""
+    from gearmbs.bearings.geometry import Bearing
+    from gearmbs.bearings.ratings import roller_length_for
+
+    own = {**fixed.fields, "designation": designation.strip(), **changes}
+    missing = [name for name in fixed.asked if own.get(name) is None]
+    if missing == ["roller_length"] and own.get("dynamic_rating") is not None:
+        return roller_length_for(Bearing(**{**own, "roller_length": own["element_diameter"]}))
+    if not missing:
+        return Bearing(**own)
+    sizes = ", ".join(
+        f"{key.replace('_', ' ')} {1e3 * value:.4g} mm"
+        if key != "contact_angle"
+        else f"contact angle {math.degrees(value):.4g} deg"
+        for key, value in fixed.fields.items()
+        if key != "kind"
+    )
+    hint = (
+        " (or dynamic_rating= of the maker's catalogue, which gives the length)" if "roller_length" in missing else ""
+    )
+    raise BearingError(
+        f"designation {designation!r}: {fixed.fields['kind']} bearing, {sizes}; the rest differs between makers: give "
+        f"{', '.join(f'{name}=' for name in missing)}{hint}"
+    )
 
 
 def _clearance(designation: str, boundary: dict[str, float]) -> dict[str, float]:

@@ -7,6 +7,7 @@ draw from their own seed.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -64,7 +65,7 @@ class Defect(Written):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SurfaceDefect(Defect):
+class SurfaceDefect(Defect, ABC):
     """Missing material over the angle of a ring or an element."""
 
     part: str = OUTER
@@ -77,10 +78,11 @@ class SurfaceDefect(Defect):
                 f"{type(self).__name__}.element is {self.element}; the bearing has 0 to {bearing.elements - 1}",
             )
 
+    @abstractmethod
     def finest(self, bearing: Bearing) -> float:
         """Return the length over which the profile changes fastest, m."""
-        raise NotImplementedError
 
+    @abstractmethod
     def missing(self, angle: np.ndarray, bearing: Bearing, height: float) -> np.ndarray:
         """Return the missing material as the element's centre feels it.
 
@@ -92,7 +94,6 @@ class SurfaceDefect(Defect):
         height : float
             Place along a roller from its middle, m; 0 for balls.
         """
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -31,7 +31,13 @@ class RollingBearing(ForceElement):
         Damping of the contacts as a time, s: damper by spring under 2.5 % of the dynamic rating; it grows with load,
         so that the range measured on bearings, 0.25e-5 to 2.5e-5 s, is that of 0.3 to 10 % of the rating.
     cage_slip : float
-        Share by which the cage is slower than ideal rolling.
+        Share by which the cage is slower than ideal rolling, in the mean.
+    slip_scatter : float
+        Standard deviation of the slip about its mean: a share, drawn with ``slip_seed``. It makes the lines of defects
+        as broad as measured ones, whose blows come at times that are a little random.
+    slip_memory : float
+        Turns of the cage over which the slip forgets itself.
+    slip_seed : int
     cage_angle : float or str
         Angle of element 0 at the start, from x of J, rad.
     preload : float or str
@@ -39,7 +45,7 @@ class RollingBearing(ForceElement):
     sense : {1, -1}
         Direction along z in which the inner ring of an angular contact or tapered bearing presses into the outer one.
     centrifugal : bool
-        Let the balls' own centrifugal load press them outward, with contact angles that differ at both rings.
+        Let the elements' own centrifugal load press them outward; of balls both contact angles then differ.
     smooth : float or str
         Half width of a smooth transition of contact, m; 0 keeps Hertz's law.
     rolling_friction : float

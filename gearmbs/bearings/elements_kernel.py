@@ -16,7 +16,13 @@ import numpy as np
 
 from gearmbs._jit import njit
 from gearmbs.bearings import layout as B
-from gearmbs.bearings.laws_kernel import ball_law, ball_law_at_speed, hertz_energy, roller_law
+from gearmbs.bearings.laws_kernel import (
+    ball_law,
+    ball_law_at_speed,
+    hertz_energy,
+    roller_law,
+    roller_law_at_speed,
+)
 from gearmbs.bearings.profile_kernel import place_of, profile_curvature, profile_slope, profile_value
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations.force_elements import DERIVATIVES, DIAGNOSTICS
@@ -44,7 +50,7 @@ def element_sums(ints, reals, states, want, work):
     spin = work[B.S_W + 2]
     load = 0.0
     if ints[B.CENTRIFUGAL]:
-        cage = work[B.S_SPIN] + reals[B.CAGE] * spin
+        cage = work[B.S_SPIN] + work[B.S_CAGE] * spin
         load = reals[B.MASS_RADIUS] * cage * cage
     plain = ints[B.KIND] == B.BALL and ints[B.PATHS] == 1 and not ints[B.CENTRIFUGAL]
     plain = plain and ints[B.OUTER_NODES] + ints[B.INNER_NODES] + ints[B.SPIN_NODES] == 0
@@ -90,7 +96,7 @@ def plain_ball(reals, work, p, c, s, x, y, reach):
     lever = nx * reals[p + B.PATH_HEIGHT] - ny * reals[p + B.PATH_RADIUS]
     along = nx * (work[1] * c - work[0] * s) + lever * (work[B.S_TILT + 1] * c - work[B.S_TILT] * s)
     rate = nx * (work[B.S_V] * c + work[B.S_V + 1] * s) + ny * work[B.S_V + 2]
-    rate += lever * (work[B.S_TILT + 2] * c + work[B.S_TILT + 3] * s) + along * reals[B.CAGE] * work[B.S_W + 2]
+    rate += lever * (work[B.S_TILT + 2] * c + work[B.S_TILT + 3] * s) + along * work[B.S_CAGE] * work[B.S_W + 2]
     factor = 1.0 + reals[B.DAMPING] * rate
     if factor <= 0.0:
         return
@@ -145,16 +151,19 @@ def one_path(ints, reals, states, want, work, j, path, c, s, load):
     else:
         nx, ny = reals[p + B.PATH_RADIAL], reals[p + B.PATH_AXIAL]
         delta = nx * lift + ny * axial - reals[p + B.PATH_GAP] - h
-        roller_law(share * reals[B.STIFFNESS], reals[B.EXPONENT], reals[B.SMOOTH], nx, ny, delta, law)
+        if ints[B.CENTRIFUGAL]:
+            delta, energy = roller_law_at_speed(reals, share, nx, ny, delta, load, law)
+        else:
+            roller_law(share * reals[B.STIFFNESS], reals[B.EXPONENT], reals[B.SMOOTH], nx, ny, delta, law)
     if want & DIAGNOSTICS:
-        if not (ints[B.CENTRIFUGAL] and ints[B.KIND] == B.BALL):
+        if not ints[B.CENTRIFUGAL]:
             energy = hertz_energy(share * reals[B.STIFFNESS], reals[B.EXPONENT], delta, reals[B.SMOOTH])
         work[B.S_SUMS + 1] += energy
     if law[0] <= 0.0:
         return
     nx, ny = law[1], law[2]
     lever = nx * height - ny * radius
-    psi_rate = reals[B.CAGE] * work[B.S_W + 2]
+    psi_rate = work[B.S_CAGE] * work[B.S_W + 2]
     along = nx * u_t + lever * phi_t - profile[0] - profile[1]
     rate = nx * (work[B.S_V] * c + work[B.S_V + 1] * s) + ny * work[B.S_V + 2]
     rate += lever * (work[B.S_TILT + 2] * c + work[B.S_TILT + 3] * s) + along * psi_rate
@@ -265,7 +274,7 @@ def path_slopes(ints, reals, work, c, s, path, spin, f, factor):
     for k in range(3):
         rates[k] = work[B.S_V + k]
     rates[3], rates[4] = work[B.S_TILT + 2], work[B.S_TILT + 3]
-    rates[B.PSI], rates[B.THETA] = reals[B.CAGE] * work[B.S_W + 2], work[B.S_THETA_RATE]
+    rates[B.PSI], rates[B.THETA] = work[B.S_CAGE] * work[B.S_W + 2], work[B.S_THETA_RATE]
     if spin >= 0:
         gh[B.BETA + spin] = profile[2]
         rates[B.BETA + spin] = reals[B.SPIN] * work[B.S_W + 2]

@@ -20,6 +20,7 @@ import numpy as np
 from gearmbs._jit import njit
 from gearmbs.bearings import layout as B
 from gearmbs.bearings.elements_kernel import element_sums
+from gearmbs.bearings.profile_kernel import place_of, profile_slope, profile_value
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations.force_elements import DERIVATIVES, DIAGNOSTICS, FORCE_SIG, FRAME_A, FRAME_P, FRAME_V, FRAME_W
 
@@ -106,6 +107,19 @@ def inner_angle_bend(frames, work, out):
 
 
 @njit(cache=True, error_model="numpy")
+def cage_rate(ints, reals, psi, work):
+    """Write kappa_c at an angle of the cage, with its random slip, and its slope by the angle."""
+    work[B.S_CAGE], work[B.S_CAGE_SLOPE] = reals[B.CAGE], 0.0
+    nodes = ints[B.SLIP_NODES]
+    if nodes:
+        turns = reals[B.SLIP_TURNS]
+        interval, part = place_of(nodes, psi / turns)
+        work[B.S_CAGE] *= 1.0 - profile_value(reals, ints[B.AT_SLIP], interval, part)
+        slope = profile_slope(reals, ints[B.AT_SLIP], nodes, interval, part)
+        work[B.S_CAGE_SLOPE] = -reals[B.CAGE] * slope / turns
+
+
+@njit(cache=True, error_model="numpy")
 def friction_torque(reals, total, speed):
     """Return the friction torque about z at a sum of normal forces and a speed, its slope by either."""
     square = speed * speed + reals[B.SLOW] ** 2
@@ -121,7 +135,7 @@ def friction_torque(reals, total, speed):
 @njit(cache=True, error_model="numpy")
 def drive_of(ints, reals, work):
     """Return the torque about z that drives cage and elements."""
-    drive = reals[B.CAGE] * work[B.S_LOCAL + B.PSI]
+    drive = work[B.S_CAGE] * work[B.S_LOCAL + B.PSI]
     for k in range(ints[B.SPINS]):
         drive += reals[B.SPIN] * work[B.S_LOCAL + B.BETA + k]
     return drive
@@ -134,6 +148,7 @@ def bearing_force(ints, reals, t, frames, states, inputs, want, work, wrench, ra
     Arguments as in `gearmbs.dae.equations.force_elements`; the tables as in `gearmbs.bearings.layout`.
     """
     measure(ints, reals, frames, work)
+    cage_rate(ints, reals, states[0], work)
     element_sums(ints, reals, states, want, work)
     speed = work[B.S_W + 2]
     friction, by_total, by_speed = friction_torque(reals, work[B.S_SUMS], speed)
@@ -146,7 +161,7 @@ def bearing_force(ints, reals, t, frames, states, inputs, want, work, wrench, ra
         e0, e1, e2 = frames[1, FRAME_A + 3 * c], frames[1, FRAME_A + 3 * c + 1], frames[1, FRAME_A + 3 * c + 2]
         wrench[0, c] = e0 * work[g] + e1 * work[g + 1] + e2 * work[g + 2]
         wrench[0, 3 + c] = e0 * nx + e1 * ny + e2 * nz
-    rates[0] = reals[B.CAGE] * speed
+    rates[0] = work[B.S_CAGE] * speed
     for k in range(ints[B.SPINS]):
         rates[1 + k] = reals[B.SPIN] * speed
     if want & DIAGNOSTICS:
@@ -185,7 +200,9 @@ def vary_locally(ints, reals, frames, work, by_total, by_speed):
     coordinates_by_variations(ints, reals, frames, work, dq, dr, bend)
     cage = 0.0
     if ints[B.CENTRIFUGAL]:
-        cage = 2.0 * reals[B.MASS_RADIUS] * (work[B.S_SPIN] + reals[B.CAGE] * work[B.S_W + 2])
+        cage = 2.0 * reals[B.MASS_RADIUS] * (work[B.S_SPIN] + work[B.S_CAGE] * work[B.S_W + 2])
+    # with the cage's angle its rate changes
+    swing = work[B.S_CAGE_SLOPE] * work[B.S_W + 2]
     sum_by_load = work[base + n * (12 + 2 * n) + 6]
     for r in range(n + 1):
         # the last row is the sum of the normal forces
@@ -198,11 +215,12 @@ def vary_locally(ints, reals, frames, work, by_total, by_speed):
                     total += sum_q[k] * dq[k, c] + sum_v[k] * dr[k, c]
             force[r, c] = total
         effect = by_load[r] if r < n else sum_by_load
-        force[r, 11] += effect * cage * reals[B.CAGE]
+        force[r, 11] += effect * cage * work[B.S_CAGE]
         force[r, 12] += effect * cage
         for k in range(states):
             column = B.PSI if k == 0 else B.BETA + k - 1
             force[r, m + k] = stiff[r, column] if r < n else sum_q[column]
+        force[r, m] += swing * ((damp[r, B.PSI] if r < n else sum_v[B.PSI]) + effect * cage)
     ax, ay, az = work[B.S_A], work[B.S_A + 1], work[B.S_A + 2]
     for c in range(m + states):
         for k in range(3):
@@ -210,10 +228,11 @@ def vary_locally(ints, reals, frames, work, by_total, by_speed):
             out[3 + k, c] = force[B.THETA, c] * work[B.S_TURN + k]
         out[3, c] -= az * force[4, c]
         out[4, c] += az * force[3, c]
-        out[5, c] += ax * force[4, c] - ay * force[3, c] + reals[B.CAGE] * force[B.PSI, c] + by_total * force[n, c]
+        out[5, c] += ax * force[4, c] - ay * force[3, c] + work[B.S_CAGE] * force[B.PSI, c] + by_total * force[n, c]
         for k in range(spins):
             out[5, c] += reals[B.SPIN] * force[B.BETA + k, c]
     out[5, 11] += by_speed
+    out[5, m] += work[B.S_CAGE_SLOPE] * work[base + B.PSI]
     q3, q4, turn = work[base + 3], work[base + 4], work[base + B.THETA]
     for k in range(3):
         # a x G_a with da = p x a, and g
@@ -243,7 +262,7 @@ def coordinates_by_variations(ints, reals, frames, work, dq, dr, bend):
         # a' = w x a: by a, then by w
         dr[3, 3 + k], dr[4, 3 + k] = wy * dz - wz * dy, wz * dx - wx * dz
         dr[3, 9 + k], dr[4, 9 + k] = dx, dy
-    dr[B.PSI, 11] = reals[B.CAGE]
+    dr[B.PSI, 11] = work[B.S_CAGE]
     for k in range(ints[B.SPINS]):
         dr[B.BETA + k, 11] = reals[B.SPIN]
     if ints[B.INNER_NODES]:
@@ -313,10 +332,11 @@ def spread(ints, reals, frames, work, wrench, jac):
             jac[b + c1, 15 + c] -= wrench[0, b + c2]
             jac[b + c2, 15 + c] += wrench[0, b + c1]
     for k in range(states):
-        factor = reals[B.CAGE] if k == 0 else reals[B.SPIN]
+        factor = work[B.S_CAGE] if k == 0 else reals[B.SPIN]
         for c in range(3):
             c1, c2 = (c + 1) % 3, (c + 2) % 3
             z = frames[1, FRAME_A + 3 * c + 2]
             jac[6 + k, 9 + c], jac[6 + k, 21 + c] = factor * z, -factor * z
             turn = frames[1, FRAME_A + 3 * c1 + 2] * w[c2] - frames[1, FRAME_A + 3 * c2 + 2] * w[c1]
             jac[6 + k, 15 + c] = factor * turn
+    jac[6, 24] = work[B.S_CAGE_SLOPE] * work[B.S_W + 2]

@@ -228,3 +228,58 @@ def ball_law_at_speed(reals, x, y, h, load, law):
         law[3 + k] = nx * fx + ny * fy
         law[7 + k] = (-ny * fx + nx * fy) / force
     return inner, energy
+
+
+@njit(cache=True, error_model="numpy")
+def roller_law_at_speed(reals, share, nx, ny, delta, load, law):
+    """Write the contact of a slice of a roller pressed outward; return its deflection and energy.
+
+    With delta_i + delta_o = delta and F the centrifugal load along the normal, K_o delta_o^n = K_i delta_i^n + F; of a
+    tapered roller the flange takes what is left. What is written is the contact with the inner ring, see `ball_law`;
+    the energy is that of both contacts less F delta_o.
+
+    Parameters
+    ----------
+    reals : ndarray
+    share : float
+        Of the slice in the roller.
+    nx, ny : float
+        Normal.
+    delta : float
+        Approach of the rings there, m.
+    load : float
+        Centrifugal load of the roller, N.
+    law : ndarray, shape (11,)
+    """
+    n, k_i, k_o = reals[B.EXPONENT], share * reals[B.INNER_STIFFNESS], share * reals[B.OUTER_STIFFNESS]
+    push = share * load * nx
+    rest = (push / k_o) ** (1.0 / n)
+    law[0] = 0.0
+    if delta <= rest:
+        return delta - rest, k_o * rest ** (n + 1.0) / (n + 1.0) - push * rest
+    low, high = 0.0, delta - rest
+    inner = high / (1.0 + (k_i / k_o) ** (1.0 / n))
+    for _ in range(ITERATIONS):
+        q_i, s_i = hertz_force(k_i, n, inner)
+        q_o, s_o = hertz_force(k_o, n, delta - inner)
+        miss = q_o - q_i - push
+        if miss > 0.0:
+            low = inner
+        else:
+            high = inner
+        there = inner + miss / (s_i + s_o)
+        if there <= low or there >= high:
+            there = 0.5 * (low + high)
+        change, inner = abs(there - inner), there
+        if change <= 1e-16 * delta:
+            break
+    outer = delta - inner
+    q_i, s_i = hertz_force(k_i, n, inner)
+    _, s_o = hertz_force(k_o, n, outer)
+    slope, by_push = s_i * s_o / (s_i + s_o), -s_i / (s_i + s_o)
+    law[0], law[1], law[2] = q_i, nx, ny
+    law[3], law[4], law[5], law[6] = slope * nx, slope * ny, -slope, by_push * share * nx
+    for k in range(7, 11):
+        law[k] = 0.0
+    energy = (k_i * inner ** (n + 1.0) + k_o * outer ** (n + 1.0)) / (n + 1.0) - push * outer
+    return delta - rest, energy

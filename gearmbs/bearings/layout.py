@@ -24,7 +24,10 @@ AT_ELEMENTS = 9
 AT_OUTER = 10
 AT_INNER = 11
 AT_SPIN = 12
-INTEGERS = 13
+SLIP_NODES = 13
+"""Nodes of the cage's random slip, 0: none, and its place among the reals."""
+AT_SLIP = 14
+INTEGERS = 15
 """Behind: for each path its row of the outer and of the inner profiles or -1; for each element its spin or -1."""
 
 STIFFNESS = 0
@@ -33,7 +36,7 @@ EXPONENT = 1
 DAMPING = 2
 """chi, s/m."""
 CAGE = 3
-"""d psi' / d Omega."""
+"""d psi' / d Omega, in the mean."""
 SPIN = 4
 """d beta' / d Omega."""
 DISTANCE = 5
@@ -57,7 +60,9 @@ OUTER_STIFFNESS = 17
 INNER_REACH = 18
 """Distance of the ball's centre from the groove centre of the inner ring without load, of the outer ring."""
 OUTER_REACH = 19
-REALS = 20
+SLIP_TURNS = 20
+"""Turns of the cage after which its random slip repeats."""
+REALS = 21
 
 PATH_RADIAL = 0
 """Reals of a path: radial and axial distance of the groove centres, rings centred; of a roller the normal."""
@@ -101,7 +106,10 @@ SUMS = 6
 S_LAW = 28
 """Of one contact: Q, n, derivatives of Q and of its direction by X, Y, h and the centrifugal load."""
 LAW = 11
-S_LOCAL = 40
+S_CAGE = 39
+"""d psi' / d Omega at the cage's angle, and its slope by it."""
+S_CAGE_SLOPE = 40
+S_LOCAL = 41
 """From here: generalised forces, then what the derivatives need; see `scratch`."""
 
 VARIATIONS = 13

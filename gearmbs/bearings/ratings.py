@@ -66,6 +66,17 @@ def dynamic_rating(bearing: Bearing) -> float:
     return 1.3 * f_c * cosine**0.7 * z ** (2 / 3) * size
 
 
+def roller_length_for(bearing: Bearing) -> Bearing:
+    """Return a roller bearing with the effective length that gives its ``dynamic_rating`` by ISO 281.
+
+    The rating grows with the length to the 7/9, so the length follows from it, from number and diameter.
+    """
+    require(bearing.rollers, f"a {bearing.kind} bearing has no rollers whose length could follow from its rating")
+    require(bearing.dynamic_rating is not None, "Bearing.dynamic_rating is missing; give the maker's")
+    length = bearing.roller_length * (bearing.dynamic_rating / dynamic_rating(bearing)) ** (9.0 / 7.0)
+    return bearing.changed(roller_length=length)
+
+
 def static_rating(bearing: Bearing) -> float:
     """Return the basic static radial load rating C_0 by ISO 76, N."""
     g, z, cosine = bearing.ratio, bearing.elements, math.cos(bearing.contact_angle)

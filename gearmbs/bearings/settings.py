@@ -18,6 +18,9 @@ class BearingSettings:
     bearing: Bearing
     damping: Quantity = 1e-5
     cage_slip: float = 0.0
+    slip_scatter: float = 0.0
+    slip_memory: float = 0.25
+    slip_seed: int = 0
     cage_angle: Quantity = 0.0
     preload: Quantity = 0.0
     sense: int = 1
@@ -44,14 +47,20 @@ class BearingSettings:
             require(value >= 0.0, f"RollingBearing.{name} is {value!r}; it must not be negative")
         require(self.slow_speed > 0.0, f"RollingBearing.slow_speed is {self.slow_speed}; it must be positive")
         require(-0.5 < self.cage_slip < 0.5, f"RollingBearing.cage_slip is {self.cage_slip}; give a share such as 0.01")
+        require(
+            0.0 <= self.slip_scatter < 0.2,
+            f"RollingBearing.slip_scatter is {self.slip_scatter}; give a share such as 0.01",
+        )
+        require(
+            0.01 <= self.slip_memory <= 100.0,
+            f"RollingBearing.slip_memory is {self.slip_memory}; give turns of the cage, 0.01 to 100",
+        )
+        whole = isinstance(self.slip_seed, int) and not isinstance(self.slip_seed, bool) and self.slip_seed >= 0
+        require(whole, f"RollingBearing.slip_seed is {self.slip_seed!r}; give a whole number from 0 up")
         require(self.sense in (1, -1), f"RollingBearing.sense is {self.sense!r}; give 1 or -1")
         require(1 <= self.slices <= 99, f"RollingBearing.slices is {self.slices!r}; give 1 to 99")
         require(self.stiffness is None or self.stiffness > 0.0, f"RollingBearing.stiffness is {self.stiffness}")
         if self.centrifugal:
-            require(
-                not self.bearing.rollers,
-                "RollingBearing.centrifugal: rollers have no centrifugal load here; leave it off",
-            )
             require(self.bearing.kind != "four point", "RollingBearing.centrifugal: four-point bearings have none here")
             require(self.smooth == 0.0, "RollingBearing.smooth: not together with the centrifugal load; leave it 0")
             require(self.stiffness is None, "RollingBearing.stiffness: with centrifugal load each contact has its own")

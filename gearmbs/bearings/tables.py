@@ -11,11 +11,15 @@ from gearmbs.bearings import defects as df
 from gearmbs.bearings import layout as B
 from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.geometry import Bearing
+from gearmbs.bearings.profile_kernel import MARGIN
 from gearmbs.bearings.profiles import spline_coefficients
 from gearmbs.bearings.settings import BearingSettings
 
 TYPICAL_LOAD = 0.025
 """Share of the dynamic rating at which damping is given."""
+
+SLIP_TURNS = 1024.0
+"""Turns of the cage after which its random slip repeats."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +71,10 @@ def pack(settings: BearingSettings) -> BearingTables:
         parts += [spline_coefficients(profile) for profile in profiles]
         for k, element in enumerate(spinning):
             integers[B.INTEGERS + 2 * len(paths) + element] = k
+    if settings.slip_scatter:
+        integers[B.AT_SLIP] = sum(part.size for part in parts)
+        parts.append(_random_slip(settings))
+        integers[B.SLIP_NODES] = parts[-1].size - MARGIN
     return BearingTables(integers, np.concatenate(parts), spinning)
 
 
@@ -83,6 +91,16 @@ def _spin_profiles(settings: BearingSettings, surfaces: list, spinning: tuple[in
     return profiles
 
 
+def _random_slip(settings: BearingSettings) -> np.ndarray:
+    """Return the coefficients of the cage's random slip: a cubic spline through the knots of a white sequence."""
+    rng = np.random.default_rng(settings.slip_seed)
+    inner = rng.standard_normal(max(round(SLIP_TURNS / settings.slip_memory), 8))
+    inner -= inner.mean()
+    # mean square of the spline by that of its coefficients: the sum of squares of the four weights over an interval
+    inner *= settings.slip_scatter / math.sqrt(151.0 / 315.0)
+    return np.take(inner, np.arange(inner.size + MARGIN), mode="wrap")
+
+
 def _scalars(settings: BearingSettings) -> np.ndarray:
     bearing = settings.bearing
     reals = np.zeros(B.REALS)
@@ -91,7 +109,7 @@ def _scalars(settings: BearingSettings) -> np.ndarray:
     typical = (5.0 * TYPICAL_LOAD * bearing.rating / bearing.elements / stiffness) ** (1.0 / n)
     reals[B.DAMPING] = n * settings.damping / typical
     reals[B.CAGE] = bearing.ftf * (1.0 - settings.cage_slip)
-    reals[B.SPIN] = bearing.bsf
+    reals[B.SPIN], reals[B.SLIP_TURNS] = bearing.bsf, SLIP_TURNS
     reals[B.DISTANCE] = 0.0 if bearing.rollers else bearing.groove_distance
     reals[B.SMOOTH] = settings.smooth
     reals[B.ROLLING] = settings.rolling_friction * 0.5 * bearing.pitch_diameter
@@ -110,9 +128,9 @@ def _scalars(settings: BearingSettings) -> np.ndarray:
     reals[B.INNER_AXIS : B.INNER_AXIS + 3] = inner / np.linalg.norm(inner)
     reals[B.OUTER_TILT : B.OUTER_TILT + 2] = outer / math.sqrt(1.0 + float(outer @ outer))
     reals[B.MASS_RADIUS] = 0.5 * bearing.element_mass * bearing.pitch_diameter
+    reals[B.INNER_STIFFNESS], reals[B.OUTER_STIFFNESS] = bearing.contact_stiffness
     if not bearing.rollers:
         d = bearing.element_diameter
-        reals[B.INNER_STIFFNESS], reals[B.OUTER_STIFFNESS] = bearing.contact_stiffness
         reals[B.INNER_REACH], reals[B.OUTER_REACH] = (
             (bearing.inner_curvature - 0.5) * d,
             (bearing.outer_curvature - 0.5) * d,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,38 +12,16 @@ import xarray as xr
 
 from gearmbs.units import to_si
 
-from .angular import angular_resample
-from .bearing_evidence import HARMONICS, SLIP, Evidence, find_lines, power_of, squared_envelope_power
-from .bearing_lines import CAGE, BearingLines, bearing_lines
+from .bearing_envelopes import envelope_spectra
+from .bearing_evidence import HARMONICS, SLIP, EnvelopeSpectrum
+from .bearing_judgement import Judged, judge
+from .bearing_lines import BearingLines, bearing_lines
 from .bearing_report import BearingReport, PartFinding
 from .door import to_signal
-from .envelope import kurtogram
 from .errors import MissingMetadataError, SignalError
-from .phase import analytic
-from .separation import level_lines, prewhiten
-from .signal import like, rate_of, require, units_of
+from .signal import rate_of, require, units_of
 
-CLEAR, SIGNS, NONE = "clear", "signs", "none"
-CLEAR_CHANCE, CLEAR_RATIO = -30.0, 30.0
-SIGNS_CHANCE, SIGNS_RATIO = -6.0, 10.0
-"""Decimal logarithm of the chance, and power of the fundamental by its neighbourhood, from which a part is named."""
-EDGE = 0.95
-"""Share of half the sampling rate above which no band is chosen: filters against aliasing end there."""
-LEAST_LINES = 3.0
-"""A band is at least so many times as wide as the highest fundamental."""
 LEAST_TURNS = 20
-NEIGHBOURHOOD = 4.0
-"""Width over which lines are levelled, in shaft turns."""
-
-
-@dataclass(frozen=True)
-class _Channel:
-    """Spectra of one channel's squared envelope, whole and in its band."""
-
-    name: str
-    band: tuple[float, float]
-    spectra: tuple[tuple[np.ndarray, np.ndarray], ...]
-    levelled: tuple[np.ndarray, np.ndarray]
 
 
 def diagnose_bearing(
@@ -54,14 +31,15 @@ def diagnose_bearing(
     *,
     band: tuple[float, float] | None = None,
     phase: xr.DataArray | None = None,
+    shafts: Sequence[float] | None = None,
     slip: float = SLIP,
     harmonics: int = HARMONICS,
 ) -> BearingReport:
     """Look for the lines of one or several bearings in a record and say what they mean.
 
-    The record is prewhitened, so that lines of gears and resonances do not stand out; its squared envelope is taken as
-    a whole and in one band; the evidence for each part of each bearing is judged by the probability of its lines by
-    chance (`gearmbs.signals.bearing_evidence`).
+    Lines are looked for in three spectra of the squared envelope (`gearmbs.signals.bearing_envelopes`). A part is named
+    if its lines are no noise (`gearmbs.signals.bearing_evidence`), not those of known shafts, and stronger than
+    families of lines at hardly any other place of the record (`gearmbs.signals.bearing_judgement`).
 
     Parameters
     ----------
@@ -75,6 +53,10 @@ def diagnose_bearing(
         Hz; default: the band of the kurtogram that is wide enough for the lines and lies below the filter's edge.
     phase : xarray.DataArray, optional
         Angle of the shaft over time, rad, where the speed varies: envelopes are then followed in angle.
+    shafts : sequence of float, optional
+        Speeds of the machine's other shafts by that of the reference shaft; empty if there is none. Their lines and the
+        sums of these are left out. Default: those of ``bearing`` and the ratio of the signal's ``teeth``; without any,
+        other shafts are not known, and a line at the cage's turns accuses nothing, for another shaft may turn as fast.
     slip : float
         Share by which lines may lie beside their kinematic place.
     harmonics : int
@@ -110,23 +92,25 @@ def diagnose_bearing(
             f"signal: {highest:.4g} Hz, the highest line of the bearing, needs a sampling rate above "
             f"{5 * highest:.4g} Hz, it is {rate:g} Hz"
         )
-    channels = [_channel(signal, c, band, phase, shaft, highest) for c in range(signal.sizes["channel"])]
-    findings = [
-        _finding(channel, lines, part, order, shaft, slip, harmonics)
-        for channel in channels
-        for lines in known
-        for part, order in lines.orders.items()
-    ]
+    others = _other_shafts(signal, known, shafts)
+    bands, findings, spectra = {}, [], {}
+    for c in range(signal.sizes["channel"]):
+        name = str(signal["channel"].values[c])
+        bands[name], found = envelope_spectra(signal.isel(channel=[c]), shaft, highest, band=band, phase=phase)
+        judged = judge(found, known, shaft, others, slip=slip, harmonics=harmonics, looks=signal.sizes["channel"])
+        findings += [_finding(name, one, found, shaft) for one in judged]
+        spectra[name] = _table(found[0], highest * (harmonics + 1))
     return BearingReport(
         source=str(signal.attrs.get("source", signal.name or "signal")),
         rate=rate,
         duration=signal.sizes["time"] / rate,
         shaft=shaft,
         bearings=known,
-        findings=_judged(findings),
-        bands={channel.name: channel.band for channel in channels},
-        spectra=_spectra(channels, signal, highest * (harmonics + 1)),
+        findings=findings,
+        bands=bands,
+        spectra=spectra,
         levels=_levels(signal),
+        shafts=others,
         notes=notes,
     )
 
@@ -165,135 +149,47 @@ def _shaft(signal: xr.DataArray, speed: Any, phase: xr.DataArray | None) -> tupl
     return float(require(signal, "speed", given, needed_for="the diagnosis of a bearing")) / math.tau, []
 
 
-def _channel(
-    signal: xr.DataArray, c: int, band: Any, phase: xr.DataArray | None, shaft: float, highest: float
-) -> _Channel:
-    one = signal.isel(channel=[c])
-    rate = rate_of(one)
-    chosen = choose_band(one, highest) if band is None else (float(band[0]), float(band[1]))
-    if not 0.0 <= chosen[0] < chosen[1] <= rate / 2:
-        raise SignalError(f"band: must lie inside 0 to {rate / 2:g} Hz, got {band}")
-
-    def power(of: xr.DataArray, part: tuple[float, float] | None) -> tuple[np.ndarray, np.ndarray]:
-        if phase is None:
-            return squared_envelope_power(of.values[:, 0], rate, part)
-        orders, found = _angular_power(of, part, phase)
-        return orders * shaft, found
-
-    white = prewhiten(one)
-    bands = (chosen,) if band is not None else (None, chosen)
-    levelled = power(level_lines(one, NEIGHBOURHOOD * shaft), bands[0])
-    return _Channel(str(one["channel"].values[0]), chosen, tuple(power(white, part) for part in bands), levelled)
+def _other_shafts(
+    signal: xr.DataArray, bearings: Sequence[BearingLines], shafts: Sequence[float] | None
+) -> tuple[float, ...] | None:
+    """Return the ratios of shafts beside the reference shaft, None if they are not known."""
+    if shafts is not None:
+        found = tuple(float(ratio) for ratio in shafts)
+        if not all(math.isfinite(ratio) and ratio > 0.0 for ratio in found):
+            raise SignalError(f"shafts: give positive ratios to the speed of the reference shaft, got {shafts!r}")
+        return found
+    teeth = signal.attrs.get("teeth")
+    if isinstance(teeth, Sequence) and len(teeth) == 2:
+        return (float(teeth[0]) / float(teeth[1]),)
+    return tuple(sorted({lines.ratio for lines in bearings} - {1.0})) or None
 
 
-def _angular_power(
-    signal: xr.DataArray, band: tuple[float, float] | None, phase: xr.DataArray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return orders and power of the squared envelope over the angle of the shaft."""
-    values = signal.values[:, 0]
-    if band is not None:
-        line = np.fft.rfft(values)
-        f = np.fft.rfftfreq(values.size, 1.0 / rate_of(signal))
-        line[(f < band[0]) | (f > band[1])] = 0.0
-        values = np.fft.irfft(line, values.size)
-    square = like(signal, (np.abs(analytic(values)) ** 2)[:, None])
-    angular = angular_resample(square, phase)
-    return power_of(angular.values[:, 0], float(angular.attrs["samples_per_rev"]))
-
-
-def choose_band(signal: xr.DataArray, highest: float) -> tuple[float, float]:
-    """Return the band of highest kurtosis that is wide enough for a line and its sidebands, Hz.
-
-    Parameters
-    ----------
-    signal : xarray.DataArray
-        One channel counts, the first.
-    highest : float
-        Highest fundamental, Hz.
-    """
-    rate, n = rate_of(signal), min(signal.sizes["time"], 1 << 17)
-    fits = int(math.log2(max(rate / 2 / (LEAST_LINES * highest), 2.0)))
-    levels = max(1, min(fits, int(math.log2(max(n // 32, 2)))))
-    found = kurtogram(signal, levels=levels)
-    width, centre = found["bandwidth"].values, found["centre"].values
-    value = np.where(np.isfinite(found["kurtosis"].values[:, 0]), found["kurtosis"].values[:, 0], -np.inf)
-    good = (centre + 0.5 * width <= EDGE * rate / 2) | (found["bands"].values == 1)
-    best = int(np.argmax(np.where(good & (width >= LEAST_LINES * highest), value, -np.inf)))
-    top = min(centre[best] + 0.5 * width[best], EDGE * rate / 2)
-    return float(centre[best] - 0.5 * width[best]), float(top)
-
-
-def _finding(
-    channel: _Channel, lines: BearingLines, part: str, order: float, shaft: float, slip: float, harmonics: int
-) -> PartFinding:
-    turns = shaft * lines.ratio
-    found: list[Evidence] = [
-        find_lines(f, power, order * turns, turns, slip=slip, harmonics=harmonics) for f, power in channel.spectra
-    ]
-    best = min(range(len(found)), key=lambda k: found[k].log_chance)
-    evidence, (frequency, power) = found[best], channel.spectra[best]
-    if not _stands_out(evidence, SIGNS_CHANCE, SIGNS_RATIO):
-        # blows at perfectly even times make single lines, which prewhitening lowers to the noise; but so do gears:
-        # only what is clear counts
-        other = find_lines(*channel.levelled, order * turns, turns, slip=slip, harmonics=harmonics)
-        if _stands_out(other, CLEAR_CHANCE, CLEAR_RATIO):
-            evidence, (frequency, power), best = other, channel.levelled, 0
-    # of several spectra the best was taken
-    chance = min(evidence.log_chance + math.log10(len(found) + 1), 0.0)
-    sides = _sidebands(frequency, power, evidence.found, lines.sidebands[part] * turns)
-    whole = len(found) > 1 and best == 0
+def _finding(channel: str, judged: Judged, spectra: Sequence[EnvelopeSpectrum], shaft: float) -> PartFinding:
+    lines, part, evidence = judged.lines, judged.part, judged.evidence
+    spectrum = next(s for s in spectra if s.where == evidence.where)
+    sides = _sidebands(spectrum, evidence.found, lines.sidebands[part] * shaft * lines.ratio)
     return PartFinding(
-        lines.name, part, channel.name, evidence.kinematic, evidence.found, evidence.ratios, chance, sides,
-        "whole record" if whole else f"{channel.band[0]:.0f} to {channel.band[1]:.0f} Hz", evidence.score,
+        lines.name, part, channel, evidence.kinematic, evidence.found, evidence.ratios, evidence.log_chance, sides,
+        evidence.where, judged.grade, judged.beside, judged.stronger, judged.places,
     )  # fmt: skip
 
 
-def _stands_out(evidence: Evidence, chance: float, ratio: float) -> bool:
-    return bool(evidence.ratios) and evidence.log_chance <= chance and evidence.ratios[0] >= ratio
-
-
-def _sidebands(frequency: np.ndarray, power: np.ndarray, line: float, spacing: float) -> float:
+def _sidebands(spectrum: EnvelopeSpectrum, line: float, spacing: float) -> float:
     """Return the power of the first sidebands by that of the line; NaN where there are none to be expected."""
     if spacing <= 0.0:
         return math.nan
-    step = float(frequency[1] - frequency[0])
 
     def near(f: float) -> float:
-        k = round(f / step)
-        return float(power[max(k - 2, 1) : k + 3].max(initial=0.0))
+        k = round(f / spectrum.step)
+        return float(spectrum.ratio[max(k - 2, 1) : k + 3].max(initial=0.0))
 
     return 0.5 * (near(line - spacing) + near(line + spacing)) / max(near(line), 1e-300)
 
 
-def _judged(findings: list[PartFinding]) -> list[PartFinding]:
-    """Grade each finding; where lines of parts coincide, the one that explains more of them is named."""
-    graded = []
-    for finding in findings:
-        first = finding.ratios[0] if finding.ratios else 0.0
-        grade = NONE
-        if finding.log_chance <= SIGNS_CHANCE and first >= SIGNS_RATIO:
-            # another shaft may turn as fast as a cage
-            sure = finding.part != CAGE and finding.log_chance <= CLEAR_CHANCE and first >= CLEAR_RATIO
-            grade = CLEAR if sure else SIGNS
-        graded.append(finding.graded(grade))
-    for k, finding in enumerate(graded):
-        rivals = [
-            f for f in graded if f.channel == finding.channel and f.bearing == finding.bearing and f.grade != NONE
-        ]
-        if finding.grade != NONE and any(f.score > finding.score for f in rivals):
-            graded[k] = finding.graded(finding.grade, beside=True)
-    return graded
-
-
-def _spectra(channels: list[_Channel], signal: xr.DataArray, top: float) -> dict[str, pd.DataFrame]:
-    """Return the envelope spectra that the verdict used, up to a frequency, as tables."""
-    out = {}
-    for channel in channels:
-        frequency, power = channel.spectra[0]
-        keep = frequency <= top
-        mean = max(float(np.median(power[keep])) / math.log(2.0), 1e-300)
-        out[channel.name] = pd.DataFrame({"frequency": frequency[keep], "power": power[keep] / mean})
-    return out
+def _table(spectrum: EnvelopeSpectrum, top: float) -> pd.DataFrame:
+    """Return an envelope spectrum up to a frequency as a table."""
+    keep = spectrum.frequency <= top
+    return pd.DataFrame({"frequency": spectrum.frequency[keep], "power": spectrum.ratio[keep]})
 
 
 def _levels(signal: xr.DataArray) -> pd.DataFrame:

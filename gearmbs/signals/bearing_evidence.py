@@ -6,14 +6,15 @@ its largest value over all f that slip allows is exceeded by chance with the pro
 
     p = N P(gamma_K > max_f sum_k r(k f)),
 
-N being the number of independent frequencies looked at. Lines at whole multiples of the shaft are left out, for they
-are of shafts and gears.
+N being the number of independent frequencies looked at. The mean over several bands scatters less than that: there p is
+an upper limit.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.fft
@@ -21,16 +22,78 @@ import scipy.fft
 HARMONICS = 4
 SLIP = 0.015
 """Share by which a line may lie beside its kinematic place."""
-AROUND = 0.2
-"""Half width of the neighbourhood that gives the mean power, in shaft turns."""
-LEAST_BINS = 25
-SHAFT_BINS = 2.5
-"""Half width of what belongs to a multiple of the shaft, in lines of the spectrum."""
+AROUND = 0.4
+"""Width of the neighbourhood that gives the mean power, in shaft turns."""
+LEAST_BINS = 51
+LINE_BINS = 2.5
+"""Half width of what belongs to a line, in lines of the spectrum: the main lobe of a Hann window has two."""
+LOWEST = 3
+"""Lines at the bottom of a spectrum that the removed mean touches."""
+
+
+@dataclass(frozen=True, eq=False)
+class EnvelopeSpectrum:
+    """Power of a squared envelope by its neighbourhood.
+
+    Attributes
+    ----------
+    step : float
+        Distance of its lines, Hz.
+    ratio : ndarray, shape (m,)
+        Power at k step by the mean power round it; 1 where it is not to count.
+    where : str
+        Which part of the record it shows, for reports.
+    """
+
+    step: float
+    ratio: np.ndarray
+    where: str = ""
+
+    @classmethod
+    def of(cls, power: np.ndarray, step: float, turns: float, where: str = "") -> EnvelopeSpectrum:
+        """Return a spectrum by its neighbourhood, medians of which are not raised by single lines.
+
+        Parameters
+        ----------
+        power : ndarray, shape (m,)
+            Of the squared envelope, or the mean of several by their neighbourhoods.
+        step : float
+            Hz.
+        turns : float
+            Of the shaft, Hz.
+        """
+        width = min(max(round(AROUND * turns / step), LEAST_BINS), power.size)
+        count = max(power.size // width, 1)
+        blocks = power[: count * width].reshape(count, width)
+        middle = (np.arange(count) + 0.5) * width - 0.5
+        medians = np.median(blocks, axis=1) / math.log(2.0)
+        level = np.interp(np.arange(power.size), middle, np.maximum(medians, 1e-300))
+        return cls(step, power / level, where)
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """Hz, shape (m,)."""
+        return self.step * np.arange(self.ratio.size)
+
+    @property
+    def top(self) -> float:
+        """Highest frequency, Hz."""
+        return self.step * (self.ratio.size - 1)
+
+    def without(self, lines: Iterable[float], share: float) -> EnvelopeSpectrum:
+        """Return the spectrum in which some lines do not count, nor what is within a share of them."""
+        ratio = self.ratio.copy()
+        for line in lines:
+            half = LINE_BINS * self.step + share * line
+            first, last = math.ceil((line - half) / self.step), math.floor((line + half) / self.step)
+            if last >= 0 and first < ratio.size:
+                ratio[max(first, 0) : last + 1] = 1.0
+        return replace(self, ratio=ratio)
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What was found of one part of a bearing.
+    """What was found of one family of lines.
 
     Attributes
     ----------
@@ -39,56 +102,21 @@ class Evidence:
     ratios : tuple of float
         Power of each harmonic by the mean power round it.
     log_chance : float
-        Decimal logarithm of the probability of such lines by chance.
+        Decimal logarithm of the probability of such a family by chance.
+    where : str
+        The spectrum.
     """
 
     kinematic: float
     found: float
     ratios: tuple[float, ...]
     log_chance: float
-
-    @property
-    def slip(self) -> float:
-        """found/kinematic - 1."""
-        return self.found / self.kinematic - 1.0
-
-    @property
-    def level(self) -> float:
-        """Power of the fundamental by its neighbourhood, dB."""
-        return 10.0 * float(np.log10(max(self.ratios[0], 1e-3))) if self.ratios else float("-inf")
-
-    @property
-    def score(self) -> float:
-        """Sum of the harmonics' levels above their neighbourhood, in decades; ranks parts."""
-        return float(np.sum(np.log10(1.0 + np.asarray(self.ratios))))
-
-
-def squared_envelope_power(
-    values: np.ndarray, rate: float, band: tuple[float, float] | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return frequencies and power of the squared envelope of one channel in a band, Hann window."""
-    n = values.size
-    line = scipy.fft.rfft(values - values.mean())
-    if band is not None:
-        f = scipy.fft.rfftfreq(n, 1.0 / rate)
-        line[(f < band[0]) | (f > band[1])] = 0.0
-    full = np.zeros(n, dtype=complex)
-    full[: line.size] = line
-    square = np.abs(scipy.fft.ifft(full)) ** 2
-    return power_of(square, rate)
-
-
-def power_of(envelope: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return frequencies and power of an envelope, its mean removed, Hann window."""
-    spectrum = scipy.fft.rfft((envelope - envelope.mean()) * np.hanning(envelope.size))
-    return scipy.fft.rfftfreq(envelope.size, 1.0 / rate), np.abs(spectrum) ** 2
+    where: str = ""
 
 
 def find_lines(
-    frequency: np.ndarray,
-    power: np.ndarray,
+    spectrum: EnvelopeSpectrum,
     line: float,
-    shaft: float,
     *,
     slip: float = SLIP,
     harmonics: int = HARMONICS,
@@ -97,42 +125,54 @@ def find_lines(
 
     Parameters
     ----------
-    frequency, power : ndarray, shape (m,)
-        Spectrum of a squared envelope.
-    line, shaft : float
-        Kinematic fundamental and turns of the shaft, Hz.
+    spectrum : EnvelopeSpectrum
+    line : float
+        Kinematic fundamental, Hz.
     slip : float
         Share that the fundamental may lie off.
     harmonics : int
         How many harmonics count.
     """
-    step = float(frequency[1] - frequency[0])
-    around = max(round(AROUND * shaft / step), LEAST_BINS)
-    fits = [k for k in range(1, harmonics + 1) if round(k * line * (1 + slip) / step) + around < power.size]
-    spacing = step / (2.0 * max(fits, default=1))
+    step, size = spectrum.step, spectrum.ratio.size
+    fits = [k for k in range(1, harmonics + 1) if round(k * line * (1 + slip) / step) < size]
+    if not fits:
+        return Evidence(line, line, (), 0.0, spectrum.where)
+    spacing = step / (2.0 * fits[-1])
     half = max(slip * line, spacing)
     candidates = np.linspace(line - half, line + half, 2 * int(half / spacing) + 1)
-    ratios = np.ones((len(fits), candidates.size))
-    for row, k in enumerate(fits):
-        first = max(int(k * (line - half) / step) - around, 2)
-        last = int(k * (line + half) / step) + around + 1
-        mean = np.median(power[first:last]) / np.log(2.0)
-        at = np.rint(k * candidates / step).astype(int)
-        found = power[at] / max(mean, 1e-300)
-        turns = k * candidates / shaft
-        of_shaft = np.abs(turns - np.rint(turns)) * shaft < SHAFT_BINS * step
-        ratios[row] = np.where(of_shaft & (np.rint(turns) >= 1), 1.0, found)
-    if not fits:
-        return Evidence(line, line, (), 0.0)
+    ratios = np.stack([_at(spectrum, k * candidates) for k in fits])
+    trials = max(1.0, 2.0 * half / step * sum(fits) / len(fits))
     total = ratios.sum(axis=0)
     best = int(np.argmax(total))
-    trials = max(1.0, 2.0 * half / step * sum(fits) / len(fits))
     chance = log_tail(float(total[best]), len(fits)) + math.log(trials)
-    return Evidence(
-        line, float(candidates[best]), tuple(float(r) for r in ratios[:, best]), min(chance / math.log(10.0), 0.0)
-    )
+    found = tuple(float(r) for r in ratios[:, best])
+    return Evidence(line, float(candidates[best]), found, min(chance / math.log(10.0), 0.0), spectrum.where)
+
+
+def _at(spectrum: EnvelopeSpectrum, frequency: np.ndarray) -> np.ndarray:
+    """Return the ratio at frequencies; 1 outside the spectrum."""
+    place = np.rint(frequency / spectrum.step).astype(int)
+    inside = (place >= LOWEST) & (place < spectrum.ratio.size)
+    return np.where(inside, spectrum.ratio[np.clip(place, 0, spectrum.ratio.size - 1)], 1.0)
 
 
 def log_tail(total: float, count: int) -> float:
     """Return ln P(gamma_K > x) for a whole number K, e^-x sum_(j < K) x^j/j!."""
     return -total + math.log(sum(total**j / math.factorial(j) for j in range(count)))
+
+
+def squared_envelope(values: np.ndarray, rate: float, band: tuple[float, float] | None) -> np.ndarray:
+    """Return the squared envelope of one channel in a band."""
+    n = values.size
+    line = scipy.fft.rfft(values - values.mean())
+    if band is not None:
+        f = scipy.fft.rfftfreq(n, 1.0 / rate)
+        line[(f < band[0]) | (f > band[1])] = 0.0
+    full = np.zeros(n, dtype=complex)
+    full[: line.size] = line
+    return np.abs(scipy.fft.ifft(full)) ** 2
+
+
+def power_of(envelope: np.ndarray) -> np.ndarray:
+    """Return the power of an envelope by frequency, its mean removed, Hann window."""
+    return np.abs(scipy.fft.rfft((envelope - envelope.mean()) * np.hanning(envelope.size))) ** 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import pandas as pd
 
@@ -36,11 +36,12 @@ class PartFinding:
         Power of the first sidebands by that of the line; NaN for parts that have none.
     where : str
         Band in which they are clearest.
-    score : float
-        Sum of the harmonics' levels in decades.
-    grade : {"clear", "signs", "none"}
+    grade : {"clear", "signs", "open", "none"}
+        "open": lines that may also be another shaft's, and accuse nothing.
     beside : bool
-        Whether another part of the bearing explains more lines: some of these are then its own.
+        Whether there are lines, but another part, or another cause, explains more of them.
+    stronger, places : int
+        At how many of the other places of the record a family of lines stands as strong, and how many places there are.
     """
 
     bearing: str
@@ -52,9 +53,10 @@ class PartFinding:
     log_chance: float
     sidebands: float
     where: str
-    score: float
     grade: str = "none"
     beside: bool = False
+    stronger: int = 0
+    places: int = 0
 
     @property
     def slip(self) -> float:
@@ -66,10 +68,6 @@ class PartFinding:
         """Level of the fundamental over its neighbourhood, dB."""
         return 10.0 * math.log10(max(self.ratios[0], 1e-3)) if self.ratios else -30.0
 
-    def graded(self, grade: str, beside: bool = False) -> PartFinding:
-        """Return the finding with a grade."""
-        return replace(self, grade=grade, beside=beside)
-
     def sentence(self) -> str:
         """Return what it means, with its grounds."""
         strength = "Clear lines" if self.grade == "clear" else "Signs"
@@ -78,7 +76,8 @@ class PartFinding:
             f"{strength} of a defect of {WORDS[self.part]} of bearing {self.bearing} in channel {self.channel}: "
             f"{self.found:.2f} Hz, {100 * self.slip:+.2f} % beside the kinematic {self.kinematic:.2f} Hz, "
             f"{self.level:.0f} dB above its neighbourhood, {heard} of {len(self.ratios)} harmonics "
-            f"({self.where}); by chance with a probability of {_chance(self.log_chance)}"
+            f"({self.where}); in noise with a probability of {_chance(self.log_chance)}, and families as strong "
+            f"stand at {self.stronger} of {self.places} other places"
         )
         if self.part in ("inner race", ELEMENT) and self.sidebands > 0.1:
             kind = "the shaft's turns, as an inner race has them" if self.part != ELEMENT else "the cage's turns"
@@ -108,6 +107,8 @@ class BearingReport:
         Squared envelope spectrum by channel: ``frequency`` and ``power`` by its median, mean 1 in noise.
     levels : DataFrame
         RMS, crest factor and kurtosis by channel.
+    shafts : tuple of float, optional
+        Ratios of the other shafts; None: not known.
     notes : list of str
     """
 
@@ -120,13 +121,14 @@ class BearingReport:
     bands: dict[str, tuple[float, float]]
     spectra: dict[str, pd.DataFrame]
     levels: pd.DataFrame
+    shafts: tuple[float, ...] | None = None
     notes: list[str] = field(default_factory=list)
 
     @property
     def accused(self) -> list[PartFinding]:
-        """Findings that name a part, the strongest first; of lines that coincide only those of the better fit."""
-        named = [f for f in self.findings if f.grade != "none" and not f.beside]
-        return sorted(named, key=lambda f: (f.grade != "clear", -f.score))
+        """Findings that name a part, the strongest first; a cage, whose turns also an element shows, last."""
+        named = [f for f in self.findings if f.grade in ("clear", "signs")]
+        return sorted(named, key=lambda f: (f.grade != "clear", f.part == CAGE, f.log_chance))
 
     @property
     def fault(self) -> str | None:
@@ -146,23 +148,35 @@ class BearingReport:
             return (
                 f"No lines of a defect of bearing {names} stand out. A defect of a rolling element often shows none, "
                 "and an old, spread one may have lost its lines: this acquits the races of a fresh local defect only."
+                + "".join(f" {remark}" for remark in self.remarks)
             )
         parts = [finding.sentence() for finding in self.accused]
         if self.accused[0].part == CAGE:
             parts.append(
                 "Modulation at the cage's turns comes from the cage, elements that differ, or a shaft as fast."
             )
-        return " ".join(parts)
+        return " ".join([*parts, *self.remarks])
+
+    @property
+    def remarks(self) -> list[str]:
+        """What stands in the record but accuses nothing, in words."""
+        return [
+            f"A modulation at {f.found:.2f} Hz in channel {f.channel} is where the cage of bearing {f.bearing} turns "
+            f"({f.kinematic:.2f} Hz), but so might another shaft, or a mating wheel: say which shafts there are "
+            "(shafts=, --shaft) to have it judged."
+            for f in self.findings
+            if f.grade == "open"
+        ]
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """The numbers as tables: bearing_evidence, bearing_lines, bearing_levels."""
         rows = [
             (f.bearing, f.channel, f.part, f.kinematic, f.found, 100 * f.slip, f.level, f.log_chance, f.sidebands,
-             f.where, "beside" if f.beside else f.grade)
+             f.where, f.stronger, f.places, "beside" if f.beside else f.grade)
             for f in self.findings
         ]  # fmt: skip
         columns = ["bearing", "channel", "part", "kinematic", "found", "slip_percent", "level_db", "log10_chance",
-                   "sidebands", "where", "grade"]  # fmt: skip
+                   "sidebands", "where", "stronger", "places", "grade"]  # fmt: skip
         kinematic = pd.concat([lines.table(self.shaft) for lines in self.bearings], ignore_index=True)
         return {
             "bearing_evidence": pd.DataFrame(rows, columns=columns),
@@ -208,11 +222,23 @@ class BearingReport:
         return "\n".join(parts)
 
     def _evidence(self) -> str:
-        head = ["bearing", "channel", "part", "kinematic Hz", "found Hz", "slip %", "dB", "chance", "verdict"]
+        head = [
+            "bearing",
+            "channel",
+            "part",
+            "kinematic Hz",
+            "found Hz",
+            "slip %",
+            "dB",
+            "chance",
+            "as strong",
+            "verdict",
+        ]
         shown = [
             [
                 f.bearing, f.channel, f.part, f"{f.kinematic:.2f}", f"{f.found:.2f}", f"{100 * f.slip:+.2f}",
-                f"{f.level:.0f}", _chance(f.log_chance), "lines of another part" if f.beside else f.grade,
+                f"{f.level:.0f}", _chance(f.log_chance), f"{f.stronger} of {f.places}",
+                "lines of another cause" if f.beside else f.grade,
             ]
             for f in self.findings
         ]  # fmt: skip

@@ -38,6 +38,10 @@ CASES = {
     "cylindrical": (CYLINDRICAL, {"slices": 5}),
     "tapered": (TAPERED, {"preload": 300.0, "sense": -1, "defects": RINGS, "slices": 5}),
     "centrifugal": (ANGULAR, {"preload": 200.0, "centrifugal": True}),
+    "random slip": (DEEP, {"slip_scatter": 0.02, "slip_memory": 0.3, "defects": RINGS, "rolling_friction": 0.01}),
+    "random slip, centrifugal": (ANGULAR, {"preload": 200.0, "centrifugal": True, "slip_scatter": 0.02}),
+    "centrifugal rollers": (CYLINDRICAL, {"centrifugal": True, "slices": 5}),
+    "centrifugal tapered": (TAPERED, {"centrifugal": True, "preload": 300.0, "slices": 5, "defects": RINGS}),
     "centrifugal with defects": (DEEP, {"centrifugal": True, "defects": ALL, "rolling_friction": 0.01}),
 }
 
@@ -67,12 +71,12 @@ def test_jacobian_against_differences(name):
                 # differences do not resolve less
                 scale = max(abs(near[rows, columns]).max(), abs(value[rows]).max())
                 assert exact[rows, columns] == pytest.approx(near[rows, columns], abs=1e-6 * scale), (rows, block)
-        near = probe.differences(steps=(1e-6, 1e-4, 1e-2, 1e-1))
+        near = probe.differences(steps=(1e-6, 1e-4, 1e-2, 1e-1), state_step=1e-4)
         assert exact[6:] == pytest.approx(near[6:], abs=1e-7 * abs(near[6:]).max())
     assert checked >= 3
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [name for name in CASES if name != "random slip, centrifugal"])
 def test_power_is_stored_or_dissipated(name):
     """Power of the wrench + dU/dt + what damping and friction take = 0, at constant centrifugal load."""
     bearing, settings = CASES[name]

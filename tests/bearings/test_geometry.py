@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import re
+
 import numpy as np
 import pytest
 
 from gearmbs.bearings import Bearing, BearingError, equivalent_load, groove_contact, mean_load, rating_life
 from gearmbs.bearings.hertz import line_contact
+from gearmbs.bearings.ratings import dynamic_rating, load_factors
 
 MULTIPLES = {
     "CWRU drive end": (0.3983, 3.5848, 5.4152, 2.3567),
@@ -138,3 +142,42 @@ def test_an_uncertain_bearing_asks():
 def test_refuses(changes, message):
     with pytest.raises(BearingError, match=message):
         Bearing.from_designation("6205").changed(**changes)
+
+
+@pytest.mark.parametrize(
+    ("designation", "diameter", "pitch"),
+    [("NU206 ECP", 9e-3, 46.5e-3), ("NJ 208", 11e-3, 60.5e-3), ("N305", 10e-3, 44e-3), ("SKF NUP 308-E", 14e-3, 66e-3)],
+)
+def test_rollers_follow_from_the_interchangeable_raceways(designation, diameter, pitch):
+    bearing = Bearing.from_designation(designation, elements=12, roller_length="9 mm")
+    assert bearing.kind == "cylindrical roller"
+    assert bearing.element_diameter == pytest.approx(diameter)
+    assert bearing.pitch_diameter == pytest.approx(pitch)
+
+
+def test_roller_length_follows_from_the_makers_rating():
+    """Thirteen rollers of 9 x 10 mm are in an NU 206 of 44 kN."""
+    bearing = Bearing.from_designation("NU206", elements=13, dynamic_rating="44 kN")
+    assert bearing.roller_length == pytest.approx(10e-3, rel=0.05)
+    assert dynamic_rating(bearing) == pytest.approx(44e3)
+
+
+@pytest.mark.parametrize(
+    ("designation", "factor", "limit"),
+    [("30206", 1.6, 0.37), ("30204", 1.7, 0.35), ("30210", 1.4, 0.42), ("30305", 2.0, 0.30), ("30308", 1.74, 0.35)],
+)
+def test_contact_angles_of_tapered_bearings_give_the_makers_load_factors(designation, factor, limit):
+    bearing = Bearing.from_designation(designation, elements=12, element_diameter="7 mm", roller_length="10 mm")
+    assert load_factors(bearing, 1.0, 10.0)[1] == pytest.approx(factor, abs=0.06)
+    assert 1.5 * math.tan(bearing.contact_angle) == pytest.approx(limit, abs=0.006)
+
+
+@pytest.mark.parametrize(
+    ("designation", "asked"),
+    [("NU206", "give elements=, roller_length= (or dynamic_rating="), ("30206", "element_diameter=, roller_length="),
+     ("7206-B", "contact angle 40 deg"), ("QJ208", "four point bearing"), ("30215", "contact_angle="),
+     ("NU2206", "is not in the catalogue")],
+)  # fmt: skip
+def test_asks_for_what_designations_leave_open(designation, asked):
+    with pytest.raises(BearingError, match=re.escape(asked)):
+        Bearing.from_designation(designation)

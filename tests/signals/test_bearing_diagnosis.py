@@ -21,7 +21,7 @@ from gearmbs.signals import (
     spectrum,
     with_metadata,
 )
-from gearmbs.signals.bearing_evidence import find_lines, log_tail, power_of
+from gearmbs.signals.bearing_evidence import EnvelopeSpectrum, find_lines, log_tail, power_of
 
 RATE, SHAFT, SECONDS = 12000.0, 29.0, 5.0
 LINES = bearing_lines("6205")
@@ -91,8 +91,8 @@ def test_chance_is_the_share_of_noise_that_reaches_it():
     rng = np.random.default_rng(3)
     chances = []
     for _ in range(150):
-        frequency, power = power_of(rng.standard_normal(1 << 14) ** 2, 4096.0)
-        chances.append(find_lines(frequency, power, 103.7, 29.0).log_chance)
+        power = power_of(rng.standard_normal(1 << 14) ** 2)
+        chances.append(find_lines(EnvelopeSpectrum.of(power, 0.25, 29.0), 103.7).log_chance)
     shares = [np.mean(np.array(chances) < level) for level in (-1.0, -2.0)]
     assert 0.01 < shares[0] < 0.2
     assert shares[1] < 0.05
@@ -164,6 +164,45 @@ def test_what_is_missing_is_asked_for():
         diagnose_bearing(data.isel(time=slice(0, 5000)), "6205", f"{SHAFT} Hz")
     with pytest.raises(SignalError, match="needs a sampling rate above"):
         diagnose_bearing(data, "6205", "60000 rpm")
+
+
+def test_a_modulation_at_the_cages_turns_may_be_another_shafts():
+    """A wheel with one high tooth on a shaft of 0.4 times the speed: not told from a cage unless shafts are known."""
+    ratio = LINES.ftf
+    once_a_turn = (1.0 + 0.9 * (np.cos(2 * np.pi * ratio * SHAFT * TIME) > 0.9)) * np.random.default_rng(5).normal(
+        size=TIME.size
+    )
+    data = record(once_a_turn, MESH)
+    open_report = diagnose_bearing(data, "6205", f"{SHAFT} Hz")
+    assert open_report.fault is None
+    assert "so might another shaft" in open_report.verdict
+    alone = diagnose_bearing(data, "6205", f"{SHAFT} Hz", shafts=[])
+    assert (alone.fault, alone.clear) == ("cage", False)
+    known = diagnose_bearing(data, "6205", f"{SHAFT} Hz", shafts=[ratio])
+    assert known.fault is None
+    assert known.remarks == []
+    by_teeth = diagnose_bearing(with_metadata(data, teeth=(19, 48)), "6205", f"{SHAFT} Hz")
+    assert by_teeth.shafts == pytest.approx((19 / 48,))
+    with pytest.raises(SignalError, match="shafts: give positive ratios"):
+        diagnose_bearing(data, "6205", f"{SHAFT} Hz", shafts=[-1.0])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_families_of_other_causes_seldom_accuse(seed):
+    """Strong families of lines at random orders: what stands out everywhere accuses nobody."""
+    rng = np.random.default_rng(seed)
+    orders = rng.uniform(0.7, 6.0, 14)
+    far = [o for o in orders if all(abs(np.log(o / line)) > 0.03 for line in LINES.orders.values())]
+    data = record(*[pulses(o * SHAFT, jitter=0.002, seed=k) for k, o in enumerate(far)], noise=0.5, seed=seed)
+    report = diagnose_bearing(data, "6205", f"{SHAFT} Hz", shafts=[])
+    assert report.fault is None
+
+
+def test_two_defects_are_both_named():
+    data = record(pulses(LINES.bpfo * SHAFT), pulses(LINES.bpfi * SHAFT, modulation=0.6, seed=2), MESH)
+    report = diagnose_bearing(data, "6205", f"{SHAFT} Hz")
+    assert {f.part for f in report.accused} == {"outer race", "inner race"}
+    assert all(f.stronger <= 2 and f.places > 80 for f in report.accused)
 
 
 # --- separation of gears and bearings ---------------------------------------------------------------------------
@@ -252,6 +291,7 @@ def test_one_command_names_the_race(tmp_path):
     [
         (("--bearing", "6305"), "how many balls it has"),
         (("--bearing", "6205@fast"), "write for example 6205@0.345"),
+        (("--bearing", "6205", "--shaft", "slow"), "give ratios such as 0.345, or none"),
         (("--bearing", "6205", "--band", "2000"), "give two frequencies"),
     ],
 )

@@ -1,0 +1,226 @@
+"""Which parts of a bearing the lines of a record accuse, and which lines have other causes.
+
+That lines are no noise does not make them a bearing's: other shafts, gears and machines have families of lines, too,
+and some of them lie where a bearing's would. So a part is named only if
+
+* its lines are no noise (`gearmbs.signals.bearing_evidence`), the number of parts and channels looked at considered;
+* they are left when those of known shafts are taken out: multiples of each shaft and sums of these, to which all lines
+  of a pair of gears and its sidebands belong in an envelope;
+* hardly any other place of the record holds a family as strong: the orders from a third of a turn to beyond the highest
+  line are looked at in windows as wide as slip makes the part's own. The share of places that beat it is the
+  probability with which a family of any other cause would have been taken for the part.
+
+The strongest part is named first; its lines and sidebands are then taken out, and the rest is judged again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .bearing_evidence import EnvelopeSpectrum, Evidence, find_lines
+from .bearing_lines import CAGE, ELEMENT, OUTER, BearingLines
+
+CLEAR, SIGNS, OPEN, NONE = "clear", "signs", "open", "none"
+CLEAR_CHANCE, SIGNS_CHANCE = -12.0, -6.0
+"""Decimal logarithm of the chance from which lines are no noise."""
+LEAST_RATIO = 10.0
+"""Least power of the fundamental by its neighbourhood, as rare as 5e-5 in noise."""
+LEAST_SHARE = 0.025
+"""Share of places with a family as strong, the part's own counted, up to which a part is named."""
+LOWEST_ORDER = 0.3
+ABOVE = 1.1
+"""Places are looked at up to so many times the highest fundamental."""
+PARENTS = 6
+"""Families are looked for whose second to so manieth multiple a family may be."""
+OWN, HALF, COMPARABLE = 2 / 3, 1 / 2, 0.1
+"""Share of a slower family's own lines that must stand out to make it the cause, of a cage's half of the four beside
+the part's (families have gaps); and how strong by the part's."""
+SIDEBANDS = 2
+"""Sidebands on either side of a line that belong to it."""
+SUMS = 6
+"""Multiples of two shafts are added up to so many turns in all."""
+SPARSE = 25.0
+"""Multiples of a shaft are taken out as a whole if they are so many lines of the spectrum apart, five widths of one."""
+SPEED_SHARE = 3e-4
+"""A speed is read to three or four digits."""
+WIDTH_SHARE = 2e-3
+"""Half width of a bearing's line that slip makes, as a share of its frequency."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One part of one bearing: its evidence, grade, and how many of the other places are as strong."""
+
+    lines: BearingLines
+    part: str
+    evidence: Evidence
+    grade: str
+    stronger: int
+    places: int
+    beside: bool = False
+
+
+def without_shafts(spectrum: EnvelopeSpectrum, shafts: Sequence[float]) -> EnvelopeSpectrum:
+    """Return a spectrum in which multiples of shafts, and sums of these, do not count.
+
+    Parameters
+    ----------
+    spectrum : EnvelopeSpectrum
+    shafts : sequence of float
+        Turns of the known shafts, Hz.
+    """
+    known = [turns for turns in shafts if turns > 0.0]
+    lines: set[float] = set()
+    for turns in known:
+        # all multiples of a slow shaft would leave nothing
+        most = int(spectrum.top / turns) if turns > SPARSE * spectrum.step else SUMS
+        lines |= {k * turns for k in range(1, most + 1)}
+    for a, first in enumerate(known):
+        for second in known[a + 1 :]:
+            for j in range(1, SUMS):
+                for k in range(1, SUMS - j + 1):
+                    lines |= {j * first + k * second, abs(j * first - k * second)}
+    return spectrum.without(sorted(lines), SPEED_SHARE)
+
+
+def judge(
+    spectra: Sequence[EnvelopeSpectrum],
+    bearings: Sequence[BearingLines],
+    turns: float,
+    shafts: Sequence[float] | None,
+    *,
+    slip: float,
+    harmonics: int,
+    looks: int = 1,
+) -> list[Judged]:
+    """Grade every part of every bearing in one channel.
+
+    Parameters
+    ----------
+    spectra : sequence of EnvelopeSpectrum
+    bearings : sequence of BearingLines
+    turns : float
+        Of the reference shaft, Hz.
+    shafts : sequence of float, optional
+        Ratios of all other shafts; None: not known, so that a cage's line may be another shaft's.
+    slip, harmonics
+        As of `find_lines`.
+    looks : int
+        How many channels are looked at.
+    """
+    ratios = {1.0, *(lines.ratio for lines in bearings), *(shafts or ())}
+    spectra = [without_shafts(spectrum, [turns * ratio for ratio in sorted(ratios)]) for spectrum in spectra]
+    parts = [(lines, part) for lines in bearings for part in lines.orders]
+    trials = math.log10(len(parts) * looks * len(spectra))
+    first = look = _Look(spectra, parts, turns, slip, harmonics)
+    named: dict[tuple[BearingLines, str], Judged] = {}
+    while True:
+        # what is left of a part must stand where it stood before stronger ones were taken out
+        left = [key for key in parts if key not in named and _same_place(look, first, key)]
+        strong = [key for key in left if _stands_out(look.of(key), SIGNS_CHANCE - trials)]
+        if not strong:
+            break
+        fit = [key for key in strong if not look.is_a_multiple(key) and _share(*look.rivals(key)) <= LEAST_SHARE]
+        if not fit:
+            break
+        key = min(fit, key=lambda k: look.of(k).log_chance)
+        evidence, (stronger, places) = look.of(key), look.rivals(key)
+        grade = CLEAR if stronger == 0 and _stands_out(evidence, CLEAR_CHANCE - trials) else SIGNS
+        if key[1] == CAGE:
+            grade = OPEN if shafts is None else SIGNS
+        named[key] = Judged(*key, evidence, grade, stronger, places)
+        spectra = [_without_family(s, key, evidence.found, turns) for s in spectra]
+        look = _Look(spectra, parts, turns, slip, harmonics)
+    out = []
+    for key in parts:
+        beside = _stands_out(first.of(key), SIGNS_CHANCE - trials)
+        out.append(named.get(key) or Judged(*key, first.of(key), NONE, *first.rivals(key), beside))
+    return out
+
+
+class _Look:
+    """Evidence for parts, and at all places, in some spectra; each is looked at once."""
+
+    def __init__(
+        self, spectra: Sequence[EnvelopeSpectrum], parts: Sequence[tuple[BearingLines, str]], turns: float, slip: float,
+        harmonics: int,
+    ) -> None:  # fmt: skip
+        self.spectra, self.turns, self.slip, self.harmonics = spectra, turns, slip, harmonics
+        self.highest = max(lines.orders[part] * lines.ratio for lines, part in parts) * turns
+        self._parts: dict[tuple[BearingLines, str], Evidence] = {}
+        self._places: dict[tuple[str, float], tuple[np.ndarray, np.ndarray]] = {}
+
+    def of(self, key: tuple[BearingLines, str]) -> Evidence:
+        """Return the evidence for a part, of the spectrum in which it is clearest."""
+        if key not in self._parts:
+            line = key[0].orders[key[1]] * key[0].ratio * self.turns
+            found = [find_lines(s, line, slip=self.slip, harmonics=self.harmonics) for s in self.spectra]
+            self._parts[key] = min(found, key=lambda e: e.log_chance)
+        return self._parts[key]
+
+    def rivals(self, key: tuple[BearingLines, str]) -> tuple[int, int]:
+        """Return at how many other places a family as strong stands, and how many places there are."""
+        own, shaft = self.of(key), key[0].ratio * self.turns
+        if (own.where, shaft) not in self._places:
+            spectrum = next(s for s in self.spectra if s.where == own.where)
+            lowest = LOWEST_ORDER * shaft
+            count = int(math.log(max(ABOVE * self.highest / lowest, 2.0)) / (2.0 * self.slip))
+            places = lowest * np.exp(2.0 * self.slip * np.arange(count))
+            found = [find_lines(spectrum, float(f), slip=self.slip, harmonics=self.harmonics) for f in places]
+            self._places[own.where, shaft] = places, np.array([evidence.log_chance for evidence in found])
+        places, chances = self._places[own.where, shaft]
+        # windows that hold the part's own lines, or families of their multiples, are no other places
+        times = places / own.found
+        nearest = np.clip(np.rint(times), 1, PARENTS)
+        other = np.abs(np.log(times / nearest)) > 3.0 * self.slip
+        return int(np.sum(chances[other] <= own.log_chance)), int(np.sum(other))
+
+    def is_a_multiple(self, key: tuple[BearingLines, str]) -> bool:
+        """Return whether the lines of a part are multiples of a slower family whose other lines stand out, too.
+
+        Elements over the outer race are one of the cage's multiples: there its neighbours among these are looked at. Of
+        other fractions those do not count that cage and elements make themselves.
+        """
+        own, elements = self.of(key), round(key[0].bpfo / key[0].ftf)
+        spectrum = next(s for s in self.spectra if s.where == own.where)
+
+        def heard(fractions: list[float], share: float) -> bool:
+            places = [round(own.found * fraction / spectrum.step) for fraction in fractions]
+            levels = [float(spectrum.ratio[max(k - 1, 0) : k + 2].max(initial=0.0)) for k in places]
+            least = max(LEAST_RATIO, COMPARABLE * own.ratios[0])
+            return len(levels) > 1 and sum(level >= least for level in levels) >= share * len(levels)
+
+        if key[1] == OUTER and heard([(elements + k) / elements for k in (-2, -1, 1, 2)], HALF):
+            return True
+        counted = [m for m in range(2, PARENTS + 1) if math.gcd(m, elements) == 1 and (key[1] != ELEMENT or m % 2)]
+        return any(heard([k / m for k in range(1, 2 * m) if k % m], OWN) for m in counted)
+
+
+def _same_place(look: _Look, first: _Look, key: tuple[BearingLines, str]) -> bool:
+    return abs(look.of(key).found - first.of(key).found) <= max(s.step for s in look.spectra)
+
+
+def _share(stronger: int, places: int) -> float:
+    return (1 + stronger) / (1 + places)
+
+
+def _stands_out(evidence: Evidence, chance: float) -> bool:
+    return bool(evidence.ratios) and evidence.log_chance <= chance and evidence.ratios[0] >= LEAST_RATIO
+
+
+def _without_family(
+    spectrum: EnvelopeSpectrum, key: tuple[BearingLines, str], found: float, turns: float
+) -> EnvelopeSpectrum:
+    """Return a spectrum in which a family, and its sidebands by shaft and cage, do not count."""
+    lines, part = key
+    if part == CAGE:
+        # all its multiples would leave little
+        return spectrum.without([k * found for k in range(1, PARENTS + 1)], WIDTH_SHARE)
+    spacings = (lines.ratio * turns, lines.ratio * lines.ftf * turns)
+    beside = [m * spacing for spacing in spacings for m in range(-SIDEBANDS, SIDEBANDS + 1)]
+    places = {k * found + offset for k in range(1, int(spectrum.top / found) + 2) for offset in beside}
+    return spectrum.without(sorted(abs(place) for place in places), WIDTH_SHARE)
