@@ -198,6 +198,41 @@ def to_si(value: Any, unit: str, field: str = "value") -> float:
     return number
 
 
+def si_unit(text: Any) -> str | None:
+    """Return the SI unit of a text that is a number with a unit, for `to_si`; None for anything else.
+
+    Examples
+    --------
+    >>> si_unit("0.1 mm"), si_unit("1500 rpm"), si_unit("20 N m"), si_unit("pump"), si_unit(3.0)
+    ('m', 'rad/s', 'm^2*kg/s^2', None, None)
+    """
+    if not isinstance(text, str):
+        return None
+    clean = text.strip().replace("·", "*").replace("µ", "u").replace("μ", "u")
+    for pattern, written in SPELLINGS:
+        clean = re.sub(pattern, written, clean)
+    number = NUMBER.match(clean)
+    unit = "" if number is None else clean[number.end() :].strip()
+    if not unit:
+        return None
+    known = _common(unit)
+    if known is None:
+        try:
+            return f"{_registry().Quantity(1.0, unit).to_base_units().units}"
+        except Exception:
+            return None
+    powers = dict(zip(("m", "kg", "s", "rad"), known[1]))
+    if powers == {"m": 0.0, "kg": 0.0, "s": -1.0, "rad": 0.0}:
+        return "Hz"
+    above = "*".join(_power(base, p) for base, p in powers.items() if p > 0.0)
+    below = "".join(f"/{_power(base, -p)}" for base, p in powers.items() if p < 0.0)
+    return (above or "1") + below
+
+
+def _power(base: str, power: float) -> str:
+    return base if power == 1.0 else f"{base}^{power:g}"
+
+
 @functools.lru_cache(maxsize=1024)
 def _parse(text: str, target: str, field: str) -> float:
     clean = re.sub(r"(?<=\d)\s*°", " deg", text.strip()).replace("·", "*").replace("µ", "u").replace("μ", "u")

@@ -38,7 +38,7 @@ MAY_KNOW = {
     "view": {"contact", "gears", "mechanism", "signals", "dae.results"},
     "adams": {"dae", "dae.equations", "dae.model", "dae.analyses", "dae.results", "mechanism"},
     "studies": {"bearings", "dae", "dae.results", "drivetrain", "flexible", "gears", "mechanism", "signals", "view"},
-    "campaigns": {"adams", "gears", "signals", "studies", "view"},
+    "campaigns": {"adams", "bearings", "drivetrain", "gears", "signals", "studies", "view"},
     "identify": {"signals", "studies", "view"},
     "cli": {"adams", "campaigns", "identify", "signals", "studies", "view"},
 }

@@ -1,4 +1,4 @@
-"""What a campaign simulates: a case of the gear pair, a deck with parameters, or any function of parameters."""
+"""What a campaign simulates: gear pairs, drivetrains, bearings, decks with parameters, functions."""
 
 from typing import TYPE_CHECKING
 
@@ -6,16 +6,22 @@ from gearmbs._lazy import late
 
 if TYPE_CHECKING:
     from gearmbs.campaigns.subjects.base import Kept, Outcome, Subject, make_subject, subject_kinds
+    from gearmbs.campaigns.subjects.bearing import BearingSubject
     from gearmbs.campaigns.subjects.deck import DeckSubject
+    from gearmbs.campaigns.subjects.drivetrain import DrivetrainSubject
     from gearmbs.campaigns.subjects.function import FunctionSubject
     from gearmbs.campaigns.subjects.pair import PairSubject
+    from gearmbs.campaigns.subjects.planetary import PlanetarySubject
 
 __all__ = [
+    "BearingSubject",
     "DeckSubject",
+    "DrivetrainSubject",
     "FunctionSubject",
     "Kept",
     "Outcome",
     "PairSubject",
+    "PlanetarySubject",
     "Subject",
     "make_subject",
     "subject_kinds",
@@ -24,11 +30,14 @@ __all__ = [
 late(
     __name__,
     {
+        "BearingSubject": ".bearing",
         "DeckSubject": ".deck",
+        "DrivetrainSubject": ".drivetrain",
         "FunctionSubject": ".function",
         "Kept": ".base",
         "Outcome": ".base",
         "PairSubject": ".pair",
+        "PlanetarySubject": ".planetary",
         "Subject": ".base",
         "make_subject": ".base",
         "subject_kinds": ".base",

@@ -16,11 +16,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gearmbs.campaigns.errors import CampaignError
+from gearmbs.units import DIMENSIONS
 
 KINDS = {
     "pair": "gearmbs.campaigns.subjects.pair:PairSubject",
     "function": "gearmbs.campaigns.subjects.function:FunctionSubject",
     "deck": "gearmbs.campaigns.subjects.deck:DeckSubject",
+    "drivetrain": "gearmbs.campaigns.subjects.drivetrain:DrivetrainSubject",
+    "planetary": "gearmbs.campaigns.subjects.planetary:PlanetarySubject",
+    "bearing": "gearmbs.campaigns.subjects.bearing:BearingSubject",
     "paper claims": "gearmbs.campaigns.subjects.claims:ClaimsSubject",
 }
 """Subjects that come with the package; a plan may also name one as ``"module:Class"``."""
@@ -204,3 +208,12 @@ def check_keep(subject: Subject, keep: Sequence[str]) -> None:
                 f"'signal:...' where it has "
                 "signals, or module:function of a record"
             )
+
+
+def tooth_fault_unit(table: Mapping[str, Any], key: str) -> str:
+    """Return the SI unit of a parameter of a fault of a tooth, given as a table with its kind."""
+    from gearmbs.studies.tooth_faults import kinds, tooth_fault
+
+    label = tooth_fault(str(table.get("kind"))).label
+    dimension = kinds()[label].units.get(key, "dimensionless")
+    return "1" if dimension == "dimensionless" else DIMENSIONS[dimension].replace("*", " ")

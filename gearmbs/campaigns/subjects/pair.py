@@ -16,10 +16,11 @@ from gearmbs.campaigns.subjects.base import (
     SignalSpec,
     Subject,
     kept_by_functions,
+    tooth_fault_unit,
 )
 from gearmbs.signals import COMPONENTS
 from gearmbs.studies.case import Case, make_case, units_of_fields
-from gearmbs.units import DIMENSIONS, to_si
+from gearmbs.units import to_si
 
 FIRST_ORDERS = 3
 PLAIN = {"name", "title"}
@@ -78,13 +79,7 @@ class PairSubject(Subject):
 
     def table_unit(self, path: str, table: Mapping[str, Any], key: str) -> str:
         """Return the SI unit of a parameter of a fault of a tooth."""
-        from gearmbs.studies.tooth_faults import kinds, tooth_fault
-
-        if path != "fault.teeth":
-            return "1"
-        label = tooth_fault(str(table.get("kind"))).label
-        dimension = kinds()[label].units.get(key, "dimensionless")
-        return "1" if dimension == "dimensionless" else DIMENSIONS[dimension].replace("*", " ")
+        return tooth_fault_unit(table, key) if path == "fault.teeth" else "1"
 
     def check(self, data: dict[str, Any], name: str) -> Case:
         """Return the validated case, whose record can be evaluated."""

@@ -1,0 +1,83 @@
+"""Drivetrains as the subject of a campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gearmbs.campaigns.subjects.base import Kept, kept_by_functions
+from gearmbs.campaigns.subjects.tables import TablesSubject, in_si, scalars, told
+
+
+class DrivetrainSubject(TablesSubject):
+    """Drivetrains of a TOML file, rolling bearings and faults of teeth included.
+
+    Keeps ``harmonics`` (``SIGNAL.MESH.K``: RMS of the mesh harmonics of mesh forces, bearing forces and sensors),
+    ``forces`` (mean, RMS, least and largest normal force, transmission error and pairs in contact of each mesh, and
+    force of each bearing), ``signal:NAME`` of a sensor, and ``record``.
+    """
+
+    kind: ClassVar[str] = "drivetrain"
+    keeps: ClassVar[tuple[str, ...]] = ("harmonics", "forces", "record")
+
+    def made(self, tables: dict[str, Any]) -> Any:
+        """Return the drivetrain and its run."""
+        from gearmbs.drivetrain.description import make_description
+        from gearmbs.studies.tooth_faults import tooth_fault
+        from gearmbs.studies.trains import check_record
+
+        found = make_description(tables, str(tables.get("name", "drivetrain")), tooth_fault)
+        check_record(found.train, found.run)
+        return found
+
+    def canonical(self, thing: Any) -> Any:
+        """Return the parts and pairs with their defaults and the run in SI, without the name."""
+        from gearmbs.studies.trains import plain
+
+        train = {key: value for key, value in plain(thing.train).items() if key not in ("name", "kind")}
+        for mesh in train["meshes"]:
+            mesh["settings"] = plain(thing.train.pairs[mesh["name"]])
+        return in_si({"train": train, "run": plain(thing.run)})
+
+    def span_and_rate(self, thing: Any) -> tuple[float, float]:
+        """Return the length of a record, s, and its sampling rate, Hz."""
+        return float(thing.run.duration), float(thing.run.output_rate(thing.train))
+
+    def channels(self, thing: Any) -> dict[str, str]:
+        """Return the sensors and their units."""
+        return {sensor.name: sensor.unit for sensor in thing.train.sensors}
+
+    def run(self, thing: Any, progress: Callable[[float], None], keep: Sequence[str]) -> Any:
+        """Return the record."""
+        from gearmbs.studies.trains import run_train
+
+        span = thing.train.run_up + thing.run.settling + thing.run.duration
+        return run_train(thing.train, thing.run, progress=told(progress, span))
+
+    def reduce(self, thing: Any, record: Any, keep: Sequence[str]) -> Kept:
+        """Return of a record what is kept."""
+        kept = Kept(numbers=kept_by_functions(keep, record))
+        if "harmonics" in keep:
+            levels = record["mesh_rms"].transpose("signal", "mesh", "harmonic")
+            for (i, j, k), value in np.ndenumerate(levels.values):
+                kept.numbers[f"{levels.signal.values[i]}.{levels.mesh.values[j]}.{k + 1}"] = float(value)
+        if "forces" in keep:
+            for mesh in record.mesh.values:
+                for name in ("normal_force", "transmission_error", "pairs_back"):
+                    kept.numbers |= scalars(f"{mesh}.{name}", record[name].sel(mesh=mesh).values)
+            for bearing in record.bearing.values:
+                size = np.linalg.norm(record["bearing_force"].sel(bearing=bearing).values, axis=1)
+                kept.numbers |= scalars(f"{bearing}.force", size)
+        for item in keep:
+            if item.startswith("signal:"):
+                name = item.removeprefix("signal:")
+                kept.signals[name] = np.atleast_2d(record["measured"].sel(sensor=name).values)
+        return kept
+
+    def partial(self, error: Exception) -> Any:
+        """Return the record up to where the integrator stopped."""
+        from gearmbs.studies import SimulationFailed
+
+        return error.partial() if isinstance(error, SimulationFailed) else None
