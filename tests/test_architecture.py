@@ -80,8 +80,8 @@ CIRCLES = {
     ("mechanism.analyses", "mechanism.compile", "mechanism.friction", "mechanism.locked", "mechanism.lumping",
      "mechanism.measures", "mechanism.mechanism", "mechanism.simulate"):
         "methods of Mechanism, and the functions that carry them out",
-    ("adams.builders.builder", "adams.builders.constraints", "adams.builders.contacts", "adams.builders.forces",
-     "adams.builders.initial",
+    ("adams.builders.builder", "adams.builders.constraints", "adams.builders.contacts", "adams.builders.curve_data",
+     "adams.builders.curves", "adams.builders.data_calls", "adams.builders.forces", "adams.builders.initial",
      "adams.builders.mechanism", "adams.builders.model", "adams.parse.check", "adams.parse.deck"):
         "a deck builds its mechanism; types only, and one method",
     ("campaigns.campaign", "campaigns.exports", "campaigns.report", "campaigns.response", "campaigns.sensitivity"):

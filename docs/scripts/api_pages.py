@@ -67,6 +67,10 @@ DESCRIBED = {
 """Exported values of the kernels, described here."""
 
 MORE = {
+    "gearmbs.mechanism": {
+        "gearmbs.mechanism.curves": ["Curve", "point_on_curve", "curve_on_curve"],
+        "gearmbs.mechanism.stops": ["Stop"],
+    },
     "gearmbs.gears": {
         "gearmbs.gears.fault": EVERYTHING,
         "gearmbs.gears.faults": EVERYTHING,

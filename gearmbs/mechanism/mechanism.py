@@ -538,6 +538,11 @@ class Mechanism(LoadMethods, Shown):
         self.states[name] = State(name, str(expression), value)
         return self.states[name]
 
+    def algebraic_state(self, name: str, expression: Expression) -> State:
+        """Add a state z = expression, whose values are kept with the solution and at which a simulation may stop."""
+        self.states[name] = State(name, str(expression), algebraic=True)
+        return self.states[name]
+
     def spline(self, name: str, x: npt.ArrayLike, y: npt.ArrayLike) -> None:
         """Name a table of points for CUBSPL and AKISPL."""
         points = np.asarray(x, dtype=float), np.asarray(y, dtype=float)

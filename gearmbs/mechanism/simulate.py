@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.integrators.ida import solve_ida
 from gearmbs.dae.integrators.options import Options
@@ -20,6 +21,7 @@ from gearmbs.mechanism.lumping import lumped, why_not_lumped
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
 from gearmbs.mechanism.spin_check import warn_of_spin
+from gearmbs.mechanism.stops import Stop, stop_options, with_stops
 from gearmbs.progress import time_bar
 
 INTEGRATORS = ("WSTIFF", "GSTIFF", "IDA")
@@ -64,6 +66,7 @@ def simulate(
     advice: Mapping[Status, str] | None = None,
     consumer: Callable[[Solution], None] | None = None,
     lump: bool = False,
+    stops: Sequence[Stop] = (),
     **options,
 ) -> Solution:
     """Integrate a mechanism and return its motion and forces.
@@ -104,6 +107,9 @@ def simulate(
         joints as without it; reactions inside are recovered exactly. Where that is not possible, as with any body that
         deforms, all bodies are integrated, and the solution's ``message`` says why. See
         `gearmbs.mechanism.lumping.lumped`.
+    stops : sequence of Stop
+        The run ends where a state of the mechanism passes a value; times are in the result's ``t_events``, one array a
+        stop. Not with IDA, and not with ``lump``.
     **options
         Handed to the integrator.
 
@@ -133,6 +139,11 @@ def simulate(
     system = mechanism.compile(t_start) if one is None else one.whole
     members = None if one is None else one.members
     problem = (system if one is None else one.system).problem(formulation, rate_scale)
+    if stops:
+        if name == "IDA" or lump:
+            raise ModelError("stops: they need the integrator WSTIFF or GSTIFF, and lump=False")
+        problem = with_stops(problem, mechanism.state_names, int(problem.idata[tables.H_Z]), stops)
+        options.update(stop_options(stops))
     problem.advice = {**ADVICE, **(advice or {})}
     first, last = float(t_eval[0]), float(t_eval[-1])
     times = None if every_step else t_eval
@@ -215,4 +226,5 @@ SETTINGS = (
     "progress",
     "consumer",
     "lump",
+    "stops",
 )

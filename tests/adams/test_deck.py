@@ -52,7 +52,7 @@ def test_everything_is_read():
     assert deck.only(st.Integrator).method == "WSTIFF"
     assert deck.units.length == 1e-3
     kinds = [(d.severity, d.message.split()[0]) for d in deck.diagnostics]
-    assert ("unsupported", "SENSOR/1") in kinds
+    assert ("unsupported", "TIRE/1") in kinds
     assert sum(severity == "ignored" for severity, _ in kinds) == 2
 
 

@@ -73,12 +73,11 @@ def test_a_range_of_elements_is_switched():
             run_deck(deck, parse_script(f"m\no\n{text}\nsimulate/dynamics, end=0.01, steps=1\n"))
 
 
-def test_a_sensor_or_contact_that_is_left_out_may_be_switched():
-    deck = parse_deck(with_lines("SENSOR/1, FUNCTION=TIME, VALUE=1\n"))
-    script = parse_script("m\no\ndeactivate/sensor, id=1\nsimulate/dynamics, end=0.01, steps=1\n")
-    assert run_deck(deck, script, allow_unsupported=True).success
-    with pytest.raises(DeckError, match="SENSOR/1 is not supported"):
-        run_deck(deck, script)
+def test_a_sensor_is_switched():
+    deck = parse_deck(with_lines("SENSOR/1, GE, FUNCTION=TIME, VALUE=0.005, HALT\n"))
+    script = "m\no\n{}simulate/dynamics, end=0.01, steps=1\n"
+    assert run_deck(deck, parse_script(script.format(""))).t[-1] == pytest.approx(0.005)
+    assert run_deck(deck, parse_script(script.format("deactivate/sensor, id=1\n"))).t[-1] == pytest.approx(0.01)
 
 
 VARIABLES = """\

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from gearmbs.adams.builders.curve_data import curve_points
+from gearmbs.adams.builders.data_calls import translated
 from gearmbs.adams.builders.frames import inertia_about_cm, marker_orientation, part_orientation
 from gearmbs.adams.builders.model import KINDS, AdamsModel, BodyState
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
@@ -20,11 +22,17 @@ from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.curves import add_curve
 from gearmbs.mechanism.elements import State
 from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
-from gearmbs.mechanism.expression_syntax import Call, Name, Node, Number, parse, unparse
+from gearmbs.mechanism.expression_syntax import Call, Name, Node, Number
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Marker
+
+
+def sensor_state(number: int) -> str:
+    """Return the name of the state that follows a SENSOR's function."""
+    return f"SENSOR_{number}"
 
 
 class Builder:
@@ -36,8 +44,10 @@ class Builder:
         inactive: frozenset[tuple[str, int]],
         state: Mapping[int, BodyState],
         span: tuple[float, float],
+        sensed: Mapping[int, float],
     ) -> None:
         self.deck = deck
+        self.sensed = sensed
         self.span = span
         self.state = state
         self.units = deck.units
@@ -46,7 +56,7 @@ class Builder:
         self.mechanism.units = deck.units
         # in decks a text is an expression in the deck's units, and checked with its line
         self.mechanism.reads_units = False
-        self.model = AdamsModel(self.mechanism, deck)
+        self.model = AdamsModel(self.mechanism, deck, sensed=sensed)
         self.markers: dict[int, Marker] = {}
         self.joints: dict[int, Joint] = {}
         self.problems: list[Diagnostic] = []
@@ -127,6 +137,10 @@ class Builder:
             return joint.i or 0, joint.j
         if isinstance(s, st.Gcon):
             return self.gcon_pair(s)
+        if isinstance(s, st.Ptcv):
+            return s.i or 0, s.rm
+        if isinstance(s, st.Cvcv):
+            return s.irm or 0, s.jrm
         if isinstance(s, st.Contact):
             i, j = (self.deck.of(st.Graphics)[refs[0]].marker for refs in (s.igeom, s.jgeom))
             return i or 0, j
@@ -157,7 +171,7 @@ class Builder:
                 return Number(0.0, call.at) if (kind, first.integer) in self.model.pairs else call
             return replaced(call, args=(Name(name, first.at), *call.args[1:]))
 
-        return unparse(parse(source), rename)
+        return translated(self.deck, self.sensed, source, rename)
 
     # --- parts and markers --------------------------------------------------------------------------
 
@@ -238,9 +252,14 @@ class Builder:
         for spline in self.deck.of(st.Spline).values():
             if spline.data_file is None:
                 m.splines[spline.id] = spline_data(spline)
+        for curve in self.deck.of(st.CurveStatement).values():
+            if curve.matrix in self.deck.of(st.Matrix):
+                self.attempt(curve, lambda c: add_curve(m, f"CURVE_{c.id}", curve_points(self.deck, c.id)))
         for diff in self.active(st.Diff):
             if diff.implicit:
                 self.unsupported(diff, "IMPLICIT")
                 continue
             text = f"({self.text(diff.function)})/{self.units.time!r}"
             m.states[diff.id] = State(f"DIFF_{diff.id}", text, diff.ic[0])
+        for sensor in self.active(st.Sensor):
+            m.algebraic_state(sensor_state(sensor.id), self.text(sensor.function or "0"))

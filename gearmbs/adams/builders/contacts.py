@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.adams.builders.builder import Builder
+from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.parse import statements as st
 from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson
 from gearmbs.mechanism.contacts.mesh_files import READERS, read_mesh
@@ -19,9 +20,12 @@ from gearmbs.mechanism.contacts.shapes import (
     Ellipsoid,
     Frustum,
     HalfSpace,
+    Mesh,
     Shape,
     Sphere,
     Torus,
+    extruded,
+    revolved,
 )
 from gearmbs.mechanism.parts import Marker
 
@@ -143,14 +147,34 @@ def _external(b: Builder, g: st.Graphics) -> Shape:
     return read_mesh(name if name.is_absolute() else Path(b.deck.file).parent / name, b.units.length)
 
 
+def _extrusion(b: Builder, g: st.Graphics) -> Shape:
+    """The closed curve in the xy plane, drawn out along z."""
+    profile = curve_points(b.deck, g.curve).points[:, :2]
+    return Mesh(*extruded(b.units.length * profile, _size(b, g, "length")))
+
+
+def _revolution(b: Builder, g: st.Graphics) -> Shape:
+    """The curve's distance from z, turned about z."""
+    points = b.units.length * curve_points(b.deck, g.curve).points
+    radii, z = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
+    closed = bool(np.allclose(points[0], points[-1]))
+    if closed:
+        radii, z = radii[:-1], z[:-1]
+    else:
+        radii, z = np.r_[0.0, radii, 0.0], np.r_[z[0], z, z[-1]]
+    return Mesh(*revolved(radii, z, closed))
+
+
 MAKERS: dict[str, Callable[[Builder, st.Graphics], Shape]] = {
     "BOX": _box,
     "CYLINDER": _cylinder,
     "ELLIPSOID": _ellipsoid,
     "EXTERNAL": _external,
+    "EXTRUSION": _extrusion,
     "FRUSTUM": _frustum,
     "PLANE": _plane,
     "POINT": _point,
+    "REVOLUTION": _revolution,
     "TORUS": _torus,
 }
 CONTACTS: dict[type, Callable[[Builder, Any], None]] = {st.Contact: add_contact}

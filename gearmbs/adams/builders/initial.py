@@ -30,6 +30,9 @@ def part_states(model: AdamsModel, pose: np.ndarray) -> dict[int, BodyState]:
     """Return the parts' states from R, A, v, omega of their centres of mass."""
     found = {}
     for row, (name, body) in zip(pose, model.mechanism.bodies.items()):
+        if name not in model.sources:
+            # a runner on a curve, which starts where its point is
+            continue
         axes = row[POSE_A:POSE_V].reshape(3, 3)
         arm = axes @ body.com
         spin = row[POSE_W:POSE_COLUMNS].copy()

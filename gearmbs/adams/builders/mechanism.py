@@ -8,6 +8,7 @@ from functools import partial
 from gearmbs.adams.builders.builder import Builder
 from gearmbs.adams.builders.constraints import CONSTRAINTS
 from gearmbs.adams.builders.contacts import CONTACTS
+from gearmbs.adams.builders.curves import CURVES
 from gearmbs.adams.builders.forces import FORCES
 from gearmbs.adams.builders.initial import with_initial_motions
 from gearmbs.adams.builders.model import AdamsModel, BodyState
@@ -39,6 +40,7 @@ def build_model(
     inactive: frozenset[tuple[str, int]] = frozenset(),
     state: Mapping[int, BodyState] | None = None,
     span: tuple[float, float] = (0.0, 1.0),
+    sensed: Mapping[int, float] | None = None,
 ) -> AdamsModel:
     """Build the mechanism of a deck.
 
@@ -54,6 +56,8 @@ def build_model(
     span : tuple of float
         Start of the analysis and about its end, in the deck's unit; motions given by their velocity or acceleration
         start from it.
+    sensed : mapping of int to float, optional
+        What sensors have evaluated, by id.
 
     Returns
     -------
@@ -66,11 +70,11 @@ def build_model(
     """
     if deck.unsupported and not allow_unsupported:
         raise DeckError(deck.unsupported)
-    builder = Builder(deck, inactive, state or {}, span)
+    builder = Builder(deck, inactive, state or {}, span, sensed or {})
     if builder.add_bodies():
         builder.name_elements()
         builder.add_data()
-        for kind, make in (CONSTRAINTS | FORCES | CONTACTS).items():
+        for kind, make in (CONSTRAINTS | CURVES | FORCES | CONTACTS).items():
             for statement in builder.active(kind):
                 builder.attempt(statement, partial(make, builder))
     model = builder.model

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from gearmbs.adams.builders.data_calls import translated
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
@@ -20,6 +22,7 @@ KINDS: dict[type, str] = {
     st.Vtorque: "vtorque", st.Gforce: "gforce", st.Bushing: "bushing", st.Field: "field",
     st.SpringDamper: "springdamper", st.Gcon: "gcon", st.Coupler: "coupler", st.Gear: "gear",
     st.Beam: "beam", st.Friction: "friction", st.Contact: "contact",
+    st.Ptcv: "ptcv", st.Cvcv: "cvcv",
 }  # fmt: skip
 """Kinds under which functions such as JOINT and SFORCE ask for an element's force."""
 
@@ -53,6 +56,8 @@ class AdamsModel:
         (kind, id) -> (I marker id, J marker id or None) of everything that transmits a force.
     sources : dict
         Name in the mechanism -> statement.
+    sensed : mapping of int to float
+        What sensors have evaluated.
     initial_motions : list
         Joints with initial conditions: joint, "rotation" or "translation", displacement and velocity in deck units.
     """
@@ -62,6 +67,7 @@ class AdamsModel:
     names: dict[tuple[str, int], str] = field(default_factory=dict)
     pairs: dict[tuple[str, int], tuple[int, int | None]] = field(default_factory=dict)
     sources: dict[str, st.Statement] = field(default_factory=dict)
+    sensed: Mapping[int, float] = field(default_factory=dict)
     initial_motions: list[tuple[Joint, str, tuple[float, ...]]] = field(default_factory=list)
 
     def scope(self, marker_index: dict[int, int], marker_body: list[int]) -> Scope:
@@ -72,19 +78,27 @@ class AdamsModel:
             markers[m.name.upper()] = marker_index[id(m)]
             if m.number is not None:
                 markers[m.number] = marker_index[id(m)]
-        variables = {v.id: v.function or "" for v in deck.of(st.Variable).values()}
+        variables = {v.id: translated(deck, self.sensed, v.function or "") for v in deck.of(st.Variable).values()}
         return Scope(
             markers=markers,
             marker_body=marker_body,
             variables=variables,  # type: ignore[arg-type]
-            diffs={d.id: None if d.implicit else d.function for d in deck.of(st.Diff).values()},
-            splines={s.id: spline_data(s) for s in deck.of(st.Spline).values()},
+            diffs={
+                d.id: None if d.implicit else translated(deck, self.sensed, d.function or "0")
+                for d in deck.of(st.Diff).values()
+            },
+            splines={s.id: spline_data(s) for s in deck.of(st.Spline).values()} | _curves(self.mechanism),
             arrays=self.mechanism.arrays,
             plants=self.mechanism.plants,
             forces=dict(self.pairs),  # type: ignore[arg-type]
             absent=frozenset((*key, base) for key in self.pairs if key not in self.names for base in (0, 3)),
             units=deck.units,
         )
+
+
+def _curves(mechanism: Mechanism) -> dict[Any, Any]:
+    """Return the splines that have names, those of curves."""
+    return {name.upper(): data for name, data in mechanism.splines.items() if isinstance(name, str)}
 
 
 def markers_of(mechanism: Mechanism) -> list[Marker]:

@@ -32,13 +32,18 @@ REQUIRED: dict[type, tuple[str, ...]] = {
     st.Friction: ("joint", "mu_static", "mu_dynamic"),
     st.Contact: ("igeom", "jgeom", "law"),
     st.Graphics: ("type",),
+    st.Matrix: ("rows", "columns", "values"),
+    st.CurveStatement: ("matrix",),
+    st.Ptcv: ("i", "curve", "rm"),
+    st.Cvcv: ("icurve", "jcurve", "irm", "jrm"),
+    st.Sensor: ("function",),
 }
 MEASURES = frozenset(
     """DX DY DZ DM AX AY AZ INCANG PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
     WDTX WDTY WDTZ WDTM""".split()
 )
 """Functions of the places and motions of markers."""
-MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv", "corner")
+MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv", "corner", "icm", "irm", "jrm", "iicm", "jicm")
 TWO_PARTS = (st.Joint, st.Jprim)
 UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
     st.Marker: ("flex_body", "point_mass", "node_id", "curve"),
@@ -48,6 +53,8 @@ UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
     st.Spline: ("data_file",),
     st.Request: ("function",),
     st.Part: ("planar",),
+    st.Matrix: ("data_file",),
+    st.CurveStatement: ("function",),
     st.Contact: ("normal_function", "friction_function", "iflex", "jflex"),
 }
 
@@ -63,6 +70,9 @@ WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
     st.Variable: ("ic",),
     st.Contact: ("augmented", "max_deformation", "flip_i", "flip_j"),
     st.Graphics: ("xmin", "xmax", "ymin", "ymax"),
+    st.CurveStatement: ("minpar", "maxpar"),
+    st.Cvcv: ("ivel", "jvel"),
+    st.Sensor: ("angular", "bisection", "codgen"),
 }
 """Arguments that are read and change nothing: each is remarked on."""
 WHY = {
@@ -73,6 +83,9 @@ WHY = {
     st.Variable: "variables need no starting value",
     st.Contact: "solids press by depth and rub by speed alone",
     st.Graphics: "a plane touches everywhere",
+    st.CurveStatement: "the points alone say how far the curve goes",
+    st.Cvcv: "the speeds follow from those of the parts",
+    st.Sensor: "the time is found to the last digits, and every analysis chooses its pivots anew",
 }
 
 
@@ -100,6 +113,9 @@ def check(deck: Deck) -> list[Diagnostic]:
         required = REQUIRED.get(cls, ())
         if cls is st.Marker and (statement.flex_body or statement.point_mass):  # type: ignore[attr-defined]
             required = ()
+        if getattr(statement, "data_file", None) or (cls is st.CurveStatement and "function" in statement.given):
+            # not supported, which is said below
+            required = ()
         for name in required:
             if getattr(statement, name) in (None, ()):
                 keyword = _choices(cls, name) if specs_of(cls)[name].kind == CHOICE else name.upper()
@@ -118,6 +134,7 @@ def check(deck: Deck) -> list[Diagnostic]:
     _check_constraints(deck, fail)
     _check_forces(deck, fail)
     _check_contacts(deck, fail)
+    _check_curves(deck, fail)
     _check_data(deck, fail)
     _check_floating(deck, fail)
     return errors
@@ -271,6 +288,24 @@ def _check_contacts(deck: Deck, fail: Fail) -> None:
         for name in ("stiction", "transition") if contact.coulomb == "ON" else ("transition",):
             if rubs and not (getattr(contact, name) or 0.0) > 0.0:
                 fail(contact, f"{specs_of(st.Contact)[name].keyword} is missing or not positive")
+
+
+def _check_curves(deck: Deck, fail: Fail) -> None:
+    for curve in deck.of(st.CurveStatement).values():
+        if curve.matrix is not None and curve.matrix not in deck.of(st.Matrix):
+            fail(curve, f"there is no MATRIX/{curve.matrix}", "matrix")
+    users = [(p, "curve") for p in deck.of(st.Ptcv).values()]
+    users += [(g, "curve") for g in deck.of(st.Graphics).values()]  # type: ignore[misc]
+    users += [(c, name) for c in deck.of(st.Cvcv).values() for name in ("icurve", "jcurve")]  # type: ignore[misc]
+    for statement, name in users:
+        ref = getattr(statement, name)
+        if ref is not None and ref not in deck.of(st.CurveStatement):
+            fail(statement, f"there is no CURVE/{ref} for {name.upper()}", name)
+    for matrix in deck.of(st.Matrix).values():
+        if not matrix.sparse and (matrix.rows or 0) * (matrix.columns or 0) != len(matrix.values) and matrix.values:
+            fail(
+                matrix, f"{matrix.rows} rows and {matrix.columns} columns need as many values, got {len(matrix.values)}"
+            )
 
 
 def _check_data(deck: Deck, fail: Fail) -> None:

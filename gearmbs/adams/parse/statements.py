@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from gearmbs.adams.parse.statement import Statement
 from gearmbs.adams.parse.statements_contact import Contact, Graphics
+from gearmbs.adams.parse.statements_curves import CurveStatement, Cvcv, Matrix, Ptcv
 from gearmbs.adams.parse.statements_data import (
     Array,
     Diff,
@@ -24,6 +25,7 @@ from gearmbs.adams.parse.statements_data import (
     Spline,
     Variable,
 )
+from gearmbs.adams.parse.statements_events import Sensor, String
 from gearmbs.adams.parse.statements_forces import (
     Accgrav,
     Beam,
@@ -55,6 +57,8 @@ STATEMENTS: dict[str, type[Statement]] = {
     "BUSHING": Bushing,
     "CONTACT": Contact,
     "COUPLER": Coupler,
+    "CURVE": CurveStatement,
+    "CVCV": Cvcv,
     "DIFF": Diff,
     "EQUILIBRIUM": Equilibrium,
     "FIELD": Field,
@@ -69,16 +73,20 @@ STATEMENTS: dict[str, type[Statement]] = {
     "JPRIM": Jprim,
     "KINEMATICS": Kinematics,
     "MARKER": Marker,
+    "MATRIX": Matrix,
     "MOTION": Motion,
     "OUTPUT": Output,
     "PART": Part,
     "PINPUT": PlantInput,
     "POUTPUT": PlantOutput,
+    "PTCV": Ptcv,
     "REQUEST": Request,
     "RESULTS": Results,
+    "SENSOR": Sensor,
     "SFORCE": Sforce,
     "SPLINE": Spline,
     "SPRINGDAMPER": SpringDamper,
+    "STRING": String,
     "UNITS": Units,
     "VARIABLE": Variable,
     "VFORCE": Vforce,
@@ -92,12 +100,12 @@ WITHOUT_ID = frozenset("ACCGRAV EQUILIBRIUM IC INTEGRATOR KINEMATICS OUTPUT RESU
 ON_DEMAND = frozenset(["GRAPHICS"])
 """Statements that are read only as far as others name them."""
 
-IGNORED = frozenset("MATERIAL PREFERENCES DEBUG LSOLVER STRING".split())
+IGNORED = frozenset("MATERIAL PREFERENCES DEBUG LSOLVER".split())
 """Statements without effect on the numbers computed here."""
 
 UNSUPPORTED = frozenset(
-    """CLEARANCE CURVE CVCV EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART FLEX_BODY GSE LSE MATRIX MFORCE MREQUEST
-    NFORCE NODE NORMAL_MODE_ANALYSIS POINT_MASS PSTATE PTCV SECTION SENSOR SURFACE TFSISO TIRE UCON""".split()
+    """CLEARANCE EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART FLEX_BODY GSE LSE MFORCE MREQUEST
+    NFORCE NODE NORMAL_MODE_ANALYSIS POINT_MASS PSTATE SECTION SURFACE TFSISO TIRE UCON""".split()
 )
 """Statements of ADAMS that change the motion and are not modelled here."""
 
@@ -114,6 +122,8 @@ __all__ = [
     "Bushing",
     "Contact",
     "Coupler",
+    "CurveStatement",
+    "Cvcv",
     "Diff",
     "Equilibrium",
     "Field",
@@ -128,18 +138,22 @@ __all__ = [
     "Jprim",
     "Kinematics",
     "Marker",
+    "Matrix",
     "Motion",
     "Output",
     "Part",
     "Plant",
     "PlantInput",
     "PlantOutput",
+    "Ptcv",
     "Request",
     "Results",
+    "Sensor",
     "Sforce",
     "Spline",
     "SpringDamper",
     "Statement",
+    "String",
     "Units",
     "Variable",
     "Vforce",

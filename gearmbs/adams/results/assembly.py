@@ -52,6 +52,9 @@ def assembly_of(model: AdamsModel, solution: Solution) -> Assembly:
     bodies = model.mechanism.bodies
     distances, angles = {}, {}
     for name, body in bodies.items():
+        if name not in model.sources:
+            # a runner on a curve, which is no part
+            continue
         label = model.sources[name].label()
         distances[label] = float(
             np.linalg.norm(solution.com_position(name)[0] - body.position - body.orientation @ body.com)

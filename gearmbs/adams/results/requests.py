@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearmbs._jit import njit
+from gearmbs.adams.builders.data_calls import translated
 from gearmbs.adams.builders.model import AdamsModel, markers_of
 from gearmbs.adams.parse import statements as st
 from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution
@@ -135,6 +136,7 @@ class RequestEvaluator:
 
     def expression(self, text: str) -> np.ndarray:
         """Return the values of an expression over time, in the deck's units, shape (m,)."""
+        text = translated(self.model.deck, self.model.sensed, text)
         tape = compile_expression(text, self.scope, accelerations=True)
         m = self.solution.t.size
         y = np.zeros((m, max(1, len(tape.algebraic))))
@@ -193,7 +195,10 @@ class RequestEvaluator:
         if name is None:
             # inactive
             return out
-        if kind == "gcon" or name in self.model.mechanism.constraints:
+        if kind in ("ptcv", "cvcv"):
+            for axis in "XYZ"[: 3 if kind == "ptcv" else 2]:
+                out[:, :6] += self._constraint_wrench(f"{name}.{axis}", i)
+        elif kind == "gcon" or name in self.model.mechanism.constraints:
             out[:, :6] = self._constraint_wrench(name, i)
         elif kind in ("joint", "jprim", "motion", "coupler", "gear"):
             out[:, :3], out[:, 3:6] = self._reaction(name)

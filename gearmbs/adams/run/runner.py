@@ -21,13 +21,15 @@ from gearmbs.adams.results.record import NEWTON, Segment
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.results.result import AdamsResult
 from gearmbs.adams.run.script_check import check_linear, check_script, is_sequence
-from gearmbs.adams.run.session import Session, change, output_times, switch
+from gearmbs.adams.run.sensors import MOST, Watch, act, after, up_to
+from gearmbs.adams.run.session import Session, active_sensors, change, output_times, switch
 from gearmbs.dae.analyses.kinematic_analysis import kinematic
 from gearmbs.dae.analyses.modes import Modes
 from gearmbs.dae.analyses.quasi_static import initial_conditions, quasi_static
 from gearmbs.dae.analyses.statics import StaticResult, static_equilibrium
 from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.errors import ModelError
+from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.analyses import frozen_friction, linear_modes
 
@@ -39,6 +41,9 @@ FIRST_STEP = 0.05
 
 STATIC_TOLERANCE = 1e-10
 """Unbalanced load allowed at an equilibrium, relative to the heaviest weight or largest load."""
+
+WATCHED = (None, "DYNAMICS", "TRANSIENT", "KINEMATICS")
+"""Analyses in which sensors watch."""
 
 METHODS = {"GSTIFF": "GSTIFF", "WSTIFF": "WSTIFF", "SI2_GSTIFF": "GSTIFF"}
 
@@ -135,9 +140,8 @@ def _carry_out(
         modes = _linear(session, command, allow_unsupported)
         result.log[-1] = (command, modes)
     elif isinstance(command, Simulate):
-        segment = _simulate(session, command, tol, allow_unsupported, progress)
-        result.log[-1] = (command, segment)
-        return segment.success
+        result.log.pop()
+        return _simulate(session, command, result, tol, allow_unsupported, progress)
     return True
 
 
@@ -200,25 +204,64 @@ def _settings(session: Session, tol: float | None) -> tuple[dict[str, Any], str 
 def _simulate(
     session: Session,
     command: Simulate,
+    result: AdamsResult,
     tol: float | None,
     allow_unsupported: bool,
     progress: bool | Callable[[float], None] | None,
-) -> Segment:
-    """Carry out one SIMULATE."""
+) -> bool:
+    """Carry out one SIMULATE, in parts where sensors fire; return whether the next command may follow."""
+    times = output_times(session, command) if is_sequence(command) else np.array([session.time])
+    watch = Watch(active_sensors(session) if command.kind in WATCHED and times.size > 1 else [])
+    while True:
+        segment, fired = _part(session, command, watch, times, tol, allow_unsupported, progress)
+        result.log.append((command, segment))
+        if not segment.success:
+            return False
+        loud = [s for s in fired if not watch.silent(s)]
+        for sensor in fired:
+            watch.note_passage(sensor, RequestEvaluator(segment.model, segment.solution))
+        if any(s.halt for s in loud):
+            return False
+        times = after(times, session.time, loud)
+        if not fired or times.size < 2 or any(s.back for s in loud):
+            return True
+        watch.parts += 1
+        if watch.parts > MOST:
+            message = f"{fired[0].label()}: it fired {MOST} times in one analysis; its function chatters"
+            raise DeckError([Diagnostic(ERROR, message, session.deck.file, fired[0].line)])
+
+
+def _part(
+    session: Session,
+    command: Simulate,
+    watch: Watch,
+    times: np.ndarray,
+    tol: float | None,
+    allow_unsupported: bool,
+    progress: bool | Callable[[float], None] | None,
+) -> tuple[Segment, list[st.Sensor]]:
+    """Carry out an analysis up to its end or to where sensors fire; return also these."""
     kind = command.kind or "DYNAMICS"
     if kind in ("DISPLACEMENT", "VELOCITY", "ACCELERATION"):
         # parts of the analysis of initial conditions, which is always done to the end
         kind = "INITIAL_CONDITIONS"
-    times = output_times(session, command) if is_sequence(command) else np.array([session.time])
     model = None
+    fired: list[st.Sensor] = []
     try:
         model = _model(session, allow_unsupported, (session.time, float(times[-1])))
         options, note = _settings(session, tol)
         if kind == "STATICS":
             note = _frozen(session, model)
-        solution, equilibrium = _solve(session, command, kind, model, times, options, progress)
+        if watch.first_step is not None:
+            options["first_step"] = watch.first_step * session.deck.units.time
+        solution, equilibrium = _solve(
+            session, command, kind, model, times, dict(options, stops=watch.stops()), progress
+        )
+        if watch.sensors:
+            solution, fired = _to_passage(session, command, watch, model, times, options, solution)
     except (ModelError, ArithmeticError) as error:
         raise _failed(session, command, model, error) from error
+
     evaluator = RequestEvaluator(model, solution)
     segment = Segment(command, kind, model, solution, options, note, equilibrium=equilibrium)
     if kind != "STATICS":
@@ -231,7 +274,32 @@ def _simulate(
     for kind_id in model.pairs:
         segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
     _remember(session, model, segment, evaluator)
-    return segment
+    act(session, watch, segment, fired, evaluator)
+    return segment, fired
+
+
+def _to_passage(
+    session: Session,
+    command: Simulate,
+    watch: Watch,
+    model: AdamsModel,
+    times: np.ndarray,
+    options: dict[str, Any],
+    solution: Solution,
+) -> tuple[Solution, list[st.Sensor]]:
+    """Return a solution that ends where sensors fire, and these; the given one if none does."""
+    scale = session.deck.units.time
+    met = watch.true_at_start(solution, RequestEvaluator(model, solution))
+    if met:
+        return initial_conditions(model.mechanism.compile(float(times[0]) * scale)), met
+    if solution.result.status != Status.TERMINAL_EVENT:
+        return solution, []
+    end, fired = watch.passed(solution)
+    if up_to(times, end / scale).size < 2:
+        # at once, as where two sensors fire together
+        return initial_conditions(model.mechanism.compile(float(times[0]) * scale)), fired
+    # again, to end at the very time: the steps up to it are the same
+    return _solve(session, command, "DYNAMICS", model, up_to(times, end / scale), options, False)[0], fired
 
 
 def _frozen(session: Session, model: AdamsModel) -> str | None:
@@ -252,6 +320,7 @@ def _solve(
     """Solve one analysis at the output times, given in the deck's unit; of a single equilibrium return it, too."""
     scale = session.deck.units.time
     times = times * scale
+    stops = options.pop("stops", [])
     options_without = {"integrator": NEWTON, "formulation": "I3"}
     if kind == "INITIAL_CONDITIONS":
         options.update(options_without)
@@ -269,14 +338,14 @@ def _solve(
         if report.degrees_of_freedom > 0:
             message = f"a kinematic analysis needs zero degrees of freedom; the model has {report.degrees_of_freedom}"
             raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
-        if not system.model.differential_states.any():
+        if not system.model.differential_states.any() and not stops:
             options.update(options_without)
             return kinematic(system, times), None
-    output_step = float(times[1] - times[0])
+    output_step = float(np.diff(times).max())
     options.setdefault("first_step", FIRST_STEP * output_step)
     options.setdefault("max_step", output_step)
     solution = model.mechanism.simulate(
-        float(times[-1]), t_start=session.time * scale, t_eval=times, progress=progress, **options
+        float(times[-1]), t_start=session.time * scale, t_eval=times, progress=progress, stops=stops, **options
     )
     return solution, None
 
@@ -315,11 +384,11 @@ def _model(session: Session, allow_unsupported: bool, span: tuple[float, float])
     inactive = frozenset(session.inactive)
     if session.state is None:
         session.state = {}
-        model = build_model(session.deck, allow_unsupported, inactive, span=span)
+        model = build_model(session.deck, allow_unsupported, inactive, span=span, sensed=session.sensed)
         if not model.initial_motions:
             return model
         session.state = with_initial_motions(model)
-    model = build_model(session.deck, allow_unsupported, inactive, session.state, span)
+    model = build_model(session.deck, allow_unsupported, inactive, session.state, span, session.sensed)
     model.mechanism.turns.update(session.turns)
     for name, state in zip(model.mechanism.state_names, model.mechanism.every_state):
         state.start = session.states.get(name, state.start)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from gearmbs.adams.builders.data_calls import translated
 from gearmbs.adams.builders.mechanism import build_model
 from gearmbs.adams.builders.model import AdamsModel, markers_of
 from gearmbs.adams.errors import ERROR, WARNING, DeckError, Diagnostic
@@ -11,7 +12,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Change, Linear, Script, Simulate, Stop, Switch
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
-from gearmbs.adams.run.session import Session, change, output_times, switch, unsupported
+from gearmbs.adams.run.session import Session, active_sensors, change, output_times, switch, unsupported
 from gearmbs.dae.equations.expressions.errors import ExpressionError, NotEvaluatedError
 from gearmbs.dae.equations.expressions.opcodes import LEVEL_TIME
 from gearmbs.dae.equations.expressions.tape import Tape
@@ -85,7 +86,7 @@ def is_sequence(command: Simulate) -> bool:
 
 
 def _advance(session: Session, command: Simulate) -> None:
-    if is_sequence(command):
+    if is_sequence(command) and not any(s.back for s in active_sensors(session)):
         session.time = float(output_times(session, command)[-1])
 
 
@@ -124,7 +125,9 @@ def expression_errors(model: AdamsModel, session: Session) -> list[Diagnostic]:
                 continue
             left_out = False
             try:
-                tape = compile_expression(text, scope, accelerations=isinstance(statement, st.Request))
+                tape = compile_expression(
+                    translated(deck, {}, text), scope, accelerations=isinstance(statement, st.Request)
+                )
                 message = _misplaced(statement, text, tape)
             except ExpressionError as error:
                 message = str(error)

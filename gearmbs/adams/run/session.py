@@ -38,6 +38,8 @@ class Session:
         In the deck's unit.
     places : dict
         (statement class, id, argument) -> (file, line) of the command that gave it.
+    sensed : dict of int to float
+        What sensors have evaluated, by id.
     """
 
     deck: Deck
@@ -47,11 +49,17 @@ class Session:
     turns: dict[tuple[str, str, str], float] = field(default_factory=dict)
     time: float = 0.0
     places: dict[tuple[type, int, str], tuple[str, int]] = field(default_factory=dict)
+    sensed: dict[int, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, deck: Deck) -> Session:
         """Return the start of a session; what it changes leaves ``deck`` as it is."""
         return cls(replace(deck, items={kind: dict(group) for kind, group in deck.items.items()}))
+
+
+def active_sensors(session: Session) -> list[st.Sensor]:
+    """Return the sensors that watch."""
+    return [s for s in session.deck.of(st.Sensor).values() if ("SENSOR", s.id) not in session.inactive]
 
 
 def unsupported(command: Any, message: str) -> DeckError:

@@ -1,0 +1,58 @@
+"""Functions of a deck's data elements in terms of those that mechanisms know: SENVAL, CURVE, ARYVAL of variables."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+
+from gearmbs.adams.builders.curve_data import curve_points
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.deck import Deck
+from gearmbs.mechanism.expression_syntax import Call, Chain, Name, Node, Number, Power, unparse
+from gearmbs.mechanism.expression_syntax import parse as parsed
+
+CONCERNED = re.compile(r"\b(SENVAL|CURVE|ARYVAL)\s*\(", re.IGNORECASE)
+
+
+def data_call(deck: Deck, sensed: Mapping[int, float], call: Call) -> Node:
+    """Return what a call stands for; others as they are.
+
+    SENVAL(s) is the number that sensor s evaluated last, 0 before; ARYVAL(a, k) of an array of variables is VARVAL of
+    the k-th; CURVE(u, order, component, c), with u from -1 to 1, a spline of the curve's parameter.
+    """
+    numbers = [a.integer if isinstance(a, Number) else None for a in call.args]
+    if call.name == "SENVAL" and len(numbers) == 1 and numbers[0] in deck.of(st.Sensor):
+        return Number(sensed.get(numbers[0] or 0, 0.0), call.at)
+    if call.name == "ARYVAL" and len(numbers) == 2 and numbers[0] is not None and numbers[1] is not None:
+        array = deck.of(st.Array).get(numbers[0])
+        if array is not None and 1 <= numbers[1] <= len(array.variables):
+            ref = array.variables[numbers[1] - 1]
+            return Call("VARVAL", (Number(float(ref), call.at, ref),), call.at)
+    if call.name == "CURVE" and len(numbers) == 4 and numbers[3] in deck.of(st.CurveStatement):
+        return _curve(deck, call, numbers)
+    return call
+
+
+def _curve(deck: Deck, call: Call, numbers: list[int | None]) -> Node:
+    order, component, number = numbers[1], numbers[2], numbers[3]
+    if order not in (0, 1, 2) or component not in (1, 2, 3):
+        return call
+    half = 0.5 * curve_points(deck, number).length
+    at = call.at
+    travel = Chain(Chain(call.args[0], (("+", Number(1.0, at, 1)),), at), (("*", Number(half, at)),), at)
+    name = Name(f"CURVE_{number}.{'XYZ'[component - 1]}", at)
+    value = Call("CUBSPL", (travel, Number(0.0, at, 0), name, Number(float(order), at, order)), at)
+    scale = Power(Number(half, at), Number(float(order), at, order), at)
+    return Chain(scale, (("*", value),), at)
+
+
+def translated(deck: Deck, sensed: Mapping[int, float], text: str, rename: Callable[[Call], Node] | None = None) -> str:
+    """Return an expression with the calls of data elements replaced, and then those that ``rename`` knows."""
+    if rename is None and CONCERNED.search(text) is None:
+        return text
+
+    def both(call: Call) -> Node:
+        found = data_call(deck, sensed, call)
+        return rename(found) if rename is not None and found is call else found
+
+    return unparse(parsed(text), both)

@@ -1,0 +1,136 @@
+"""SENSORs of a deck during an analysis: when they fire, what they do then.
+
+An analysis with sensors is carried out in parts. Each ends exactly where a sensor's function passes its value; the next
+goes on from there, with its order, its pivots and its first step chosen anew. A sensor that has fired waits for its
+function to come back, EQ for its next passage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gearmbs.adams.builders.builder import sensor_state
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.results.record import Segment
+from gearmbs.adams.results.requests import RequestEvaluator
+from gearmbs.adams.run.session import Session
+from gearmbs.dae.results.solution import Solution
+from gearmbs.mechanism.stops import Stop
+
+DIRECTIONS = {"GE": 1, "LE": -1, "EQ": 0}
+MOST = 10_000
+"""Passages in one analysis after which a sensor is taken to chatter."""
+SAME = 1e-9
+"""Of the span of an analysis: output times nearer to a passage are that time."""
+
+
+@dataclass
+class Watch:
+    """What the sensors of one analysis wait for.
+
+    Attributes
+    ----------
+    sensors : list of Sensor
+    waits : dict of int to int
+        By id of a sensor that has fired: the direction in which its function is expected to pass next.
+    parts : int
+        Carried out so far.
+    first_step : float or None
+        That a STEPSIZE asks for, in the deck's unit.
+    """
+
+    sensors: list[st.Sensor]
+    waits: dict[int, int] = field(default_factory=dict)
+    parts: int = 0
+    first_step: float | None = None
+
+    def stops(self) -> list[Stop]:
+        """Return where the next part ends."""
+        return [Stop(sensor_state(s.id), s.value, self.waits.get(s.id, DIRECTIONS[s.relation])) for s in self.sensors]
+
+    def silent(self, sensor: st.Sensor) -> bool:
+        """Whether a sensor that passes does nothing, but is ready again."""
+        return sensor.relation != "EQ" and sensor.id in self.waits
+
+    def true_at_start(self, solution: Solution, evaluator: RequestEvaluator) -> list[st.Sensor]:
+        """Return the sensors whose condition is met when the analysis starts."""
+        if self.parts > 0:
+            return []
+        found = []
+        for sensor in self.sensors:
+            off = float(evaluator.state(sensor_state(sensor.id))[0]) - sensor.value
+            met = {"GE": off >= 0.0, "LE": off <= 0.0, "EQ": abs(off) <= sensor.error}[sensor.relation]
+            if met:
+                found.append(sensor)
+        return found
+
+    def passed(self, solution: Solution) -> tuple[float, list[st.Sensor]]:
+        """Return the time at which a run was stopped, s, and the sensors that did it."""
+        last = [times[-1] if len(times) else -np.inf for times in solution.result.t_events]
+        end = max(last)
+        return float(end), [s for s, t in zip(self.sensors, last) if t == end]
+
+    def note_passage(self, sensor: st.Sensor, evaluator: RequestEvaluator) -> None:
+        """Expect a sensor's function back from where it went."""
+        values = evaluator.state(sensor_state(sensor.id)) - sensor.value
+        if self.silent(sensor):
+            del self.waits[sensor.id]
+            return
+        came = -1.0 if values.size < 2 else float(np.sign(values[-2]))
+        rising = DIRECTIONS[sensor.relation] or (1 if came < 0.0 else -1)
+        self.waits[sensor.id] = -rising
+
+
+def up_to(times: np.ndarray, end: float) -> np.ndarray:
+    """Return the output times before a passage, and its own."""
+    span = times[-1] - times[0]
+    return np.append(times[times < end - SAME * span], end)
+
+
+def after(times: np.ndarray, now: float, fired: Sequence[st.Sensor]) -> np.ndarray:
+    """Return the output times from a passage on, in steps of the last DT that is given."""
+    end, span = times[-1], times[-1] - times[0]
+    steps = [s.dt for s in fired if s.dt is not None]
+    if steps:
+        count = int(np.floor((end - now) / steps[-1] * (1.0 + 1e-12)))
+        rest = now + steps[-1] * np.arange(1, count + 1)
+        rest = rest if len(rest) and end - rest[-1] < SAME * span else np.append(rest, end)
+    else:
+        rest = times[times > now + SAME * span]
+    return np.append(now, rest)
+
+
+def act(
+    session: Session, watch: Watch, segment: Segment, fired: Sequence[st.Sensor], evaluator: RequestEvaluator
+) -> None:
+    """Carry out what sensors do at the end of a part besides ending analyses: notes, values, steps."""
+    notes = [] if segment.note is None else [segment.note]
+    watch.first_step = None
+    for sensor in fired:
+        if watch.silent(sensor):
+            continue
+        actions = [word for word, on in actions_of(sensor) if on]
+        notes.append(
+            f"{sensor.label()}: {sensor.function} is {sensor.relation} {sensor.value:g} at TIME = {session.time:.9g}"
+            + (f": {', '.join(actions)}" if actions else "")
+        )
+        if sensor.evaluate is not None:
+            session.sensed[sensor.id] = float(evaluator.expression(sensor.evaluate)[-1])
+            notes[-1] += f"; SENVAL({sensor.id}) = {session.sensed[sensor.id]:.9g}"
+        if sensor.stepsize is not None:
+            watch.first_step = sensor.stepsize
+        if sensor.yydump:
+            problem, y = segment.solution.problem, segment.solution.result.y[-1]
+            notes.append("\n".join(f"   {name} = {value:.12g}" for name, value in zip(problem.names, y)))
+    segment.note = "\n".join(notes) or None
+
+
+def actions_of(s: st.Sensor) -> list[tuple[str, bool]]:
+    """Return what a sensor does, by name."""
+    return [
+        ("CODGEN", s.codgen), ("DT", s.dt is not None), ("HALT", s.halt), ("PRINT", s.print_), ("RESTART", s.restart),
+        ("RETURN", s.back), ("STEPSIZE", s.stepsize is not None), ("YYDUMP", s.yydump),
+    ]  # fmt: skip

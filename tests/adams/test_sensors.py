@@ -1,0 +1,129 @@
+"""SENSOR: a body thrown up, whose passages are known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
+from gearmbs.adams.results.msg import message_text
+from gearmbs.mechanism import Mechanism, ModelError
+from gearmbs.mechanism.stops import Stop
+
+DECK = """thrown
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/1, PART=1
+MARKER/2, PART=1, FLOATING
+PART/2, MASS=2, CM=20, IP=1,1,1{start}
+MARKER/20, PART=2
+ACCGRAV/KGRAV=-10
+VFORCE/1, I=20, JFLOAT=2, RM=1, FZ=SENVAL(1)
+{sensor}
+REQUEST/1, F2=DZ(20)\\F3=VZ(20)\\F4=SENVAL(1)
+END
+"""
+ONE = "SIMULATE/DYNAMICS, END=2, STEPS=20\n"
+
+
+def run(sensor, commands=ONE, start=", QG=0,0,10"):
+    script = parse_script("m\no\n" + commands)
+    return run_deck(parse_deck(DECK.format(sensor=sensor, start=start)), script)
+
+
+def test_return_goes_on_with_the_next_command():
+    result = run(
+        "SENSOR/1, LE, VALUE=5, FUNCTION=DZ(20), RETURN",
+        ONE + "DEACTIVATE/SENSOR, ID=1\nSIMULATE/DYNAMICS, DURATION=0.5, STEPS=5\n",
+    )
+    assert result.t == pytest.approx(np.r_[np.linspace(0, 1, 11), np.linspace(1, 1.5, 6)], abs=1e-9)
+    assert result.request(1)[10, 1] == pytest.approx(5.0, abs=1e-9)
+    assert "SENSOR/1: DZ(20) is LE 5 at TIME = 1: RETURN" in message_text(result)
+
+
+def test_halt_ends_the_script():
+    result = run("SENSOR/1, EQ, VALUE=5, FUNCTION=DZ(20), HALT", ONE + "SIMULATE/DYNAMICS, DURATION=1, STEPS=1\n")
+    assert result.success
+    assert len(result.segments) == 1
+    assert result.t[-1] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_force_is_switched_at_the_very_time():
+    """50 N from the passage on: the fall turns to a rise at 15 m/s^2."""
+    result = run("SENSOR/1, LE, VALUE=5, FUNCTION=DZ(20), EVALUATE=50 + 0*DZ(20)")
+    t, z, v, sensed = result.t, *result.request(1)[:, 1:4].T
+    late = np.maximum(t - 1.0, 0.0)
+    # of the two rows at the passage, both have the place and the speed
+    assert np.abs(z - np.where(t < 1.0, 10 - 5 * t**2, 5 - 10 * late + 7.5 * late**2)).max() < 1e-8
+    assert np.abs(v - np.where(t < 1.0, -10 * t, -10 + 15 * late)).max() < 1e-8
+    assert list(sensed[:11]) == [0.0] * 11
+    assert sensed[-1] == 50.0
+
+
+def test_dt_changes_the_outputs_and_print_adds_one():
+    t = run("SENSOR/1, LE, VALUE=5, FUNCTION=DZ(20), DT=0.01", "SIMULATE/DYNAMICS, END=1.2, STEPS=12\n").t
+    assert t == pytest.approx(np.r_[np.linspace(0, 1, 11), np.linspace(1, 1.2, 21)], abs=1e-9)
+    t = run("SENSOR/1, LE, VALUE=8.75, FUNCTION=DZ(20), PRINT", "SIMULATE/DYNAMICS, END=1.2, STEPS=3\n").t
+    assert t == pytest.approx([0.0, 0.4, 0.5, 0.5, 0.8, 1.2], abs=1e-9)
+
+
+def test_eq_fires_at_each_passage_and_ge_when_it_comes_from_below():
+    """Thrown up with 10 m/s: at 3.75 m after 0.5 s and 1.5 s."""
+    start = ", QG=0,0,0, VZ=10"
+    both = run("SENSOR/1, EQ, VALUE=3.75, FUNCTION=DZ(20), PRINT", start=start)
+    assert sorted(np.round(both.t, 9)).count(0.5) == 2
+    assert sorted(np.round(both.t, 9)).count(1.5) == 2
+    assert message_text(both).count("is EQ 3.75") == 2
+    rising = run("SENSOR/1, GE, VALUE=3.75, FUNCTION=DZ(20), PRINT", start=start)
+    assert message_text(rising).count("is GE 3.75") == 1
+
+
+def test_other_actions_and_several_sensors():
+    result = run(
+        "SENSOR/1, LE, VALUE=5, FUNCTION=DZ(20), CODGEN, RESTART, STEPSIZE=1E-5, YYDUMP\n"
+        "SENSOR/2, GE, VALUE=0.3, FUNCTION=TIME, RESTART\nSENSOR/3, GE, VALUE=1, FUNCTION=TIME, RESTART"
+    )
+    text = message_text(result)
+    assert "TIME = 1: CODGEN, RESTART, STEPSIZE, YYDUMP" in text
+    assert "R_z(PART_2) = 5" in text
+    assert "SENSOR/2: TIME is GE 0.3 at TIME = 0.3: RESTART" in text
+    assert result.request(1)[-1, 1] == pytest.approx(-10.0, abs=1e-8)
+
+
+def test_a_condition_that_is_met_at_the_start_fires_there():
+    result = run("SENSOR/1, GE, VALUE=5, FUNCTION=DZ(20), RETURN")
+    assert list(result.t) == [0.0]
+
+
+def test_driven_mechanisms_are_watched_too():
+    deck = DECK.format(sensor="SENSOR/1, GE, VALUE=0.5, FUNCTION=AZ(20,1), RETURN", start="").replace(
+        "ACCGRAV", "JOINT/1, REVOLUTE, I=20, J=1\nMOTION/1, JOINT=1, ROTATION, FUNCTION=TIME**2\nACCGRAV"
+    )
+    result = run_deck(parse_deck(deck), parse_script("m\no\nSIMULATE/KINEMATICS, END=1, STEPS=10\n"))
+    assert result.t[-1] == pytest.approx(np.sqrt(0.5), abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "message"),
+    [
+        ("SENSOR/1, VALUE=1", "FUNCTION is missing"),
+        ("SENSOR/1, GE, LE, VALUE=1, FUNCTION=TIME", "both GE and LE"),
+        ("SENSOR/1, VALUE=1, FUNCTION=DZ(77)", "77"),
+    ],
+)
+def test_mistakes_are_named(sensor, message):
+    with pytest.raises(DeckError, match=message):
+        run(sensor)
+
+
+def test_stops_of_a_mechanism():
+    m = Mechanism("fall", gravity=(0, 0, -10))
+    m.body("ball", 1.0, (1, 1, 1), position=(0, 0, 10)).marker(name="ball")
+    m.algebraic_state("height", "DZ(ball)")
+    s = m.simulate(2.0, rate=10, stops=[Stop("height", 5.0, 1), Stop("height", 3.75, -1)], tol=1e-9)
+    assert s.result.t_events[0].size == 0
+    assert s.result.t_events[1] == pytest.approx([np.sqrt(1.25)], abs=1e-9)
+    with pytest.raises(ModelError, match="there is no state 'depth'; the mechanism has height"):
+        m.simulate(1.0, stops=[Stop("depth")])
+    with pytest.raises(ModelError, match="WSTIFF or GSTIFF"):
+        m.simulate(1.0, stops=[Stop("height")], integrator="IDA")
