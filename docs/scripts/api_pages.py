@@ -69,7 +69,7 @@ DESCRIBED = {
 MORE = {
     "gearmbs.mechanism": {
         "gearmbs.mechanism.curves": ["Curve", "point_on_curve", "curve_on_curve"],
-        "gearmbs.mechanism.stops": ["Stop"],
+        "gearmbs.mechanism.stops": ["StopAt"],
     },
     "gearmbs.gears": {
         "gearmbs.gears.fault": EVERYTHING,

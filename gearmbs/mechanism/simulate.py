@@ -21,7 +21,7 @@ from gearmbs.mechanism.lumping import lumped, why_not_lumped
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
 from gearmbs.mechanism.spin_check import warn_of_spin
-from gearmbs.mechanism.stops import Stop, stop_options, with_stops
+from gearmbs.mechanism.stops import StopAt, stop_options, with_stops
 from gearmbs.progress import time_bar
 
 INTEGRATORS = ("WSTIFF", "GSTIFF", "IDA")
@@ -66,7 +66,7 @@ def simulate(
     advice: Mapping[Status, str] | None = None,
     consumer: Callable[[Solution], None] | None = None,
     lump: bool = False,
-    stops: Sequence[Stop] = (),
+    stops: Sequence[StopAt] = (),
     **options,
 ) -> Solution:
     """Integrate a mechanism and return its motion and forces.
@@ -107,7 +107,7 @@ def simulate(
         joints as without it; reactions inside are recovered exactly. Where that is not possible, as with any body that
         deforms, all bodies are integrated, and the solution's ``message`` says why. See
         `gearmbs.mechanism.lumping.lumped`.
-    stops : sequence of Stop
+    stops : sequence of StopAt
         The run ends where a state of the mechanism passes a value; times are in the result's ``t_events``, one array a
         stop. Not with IDA, and not with ``lump``.
     **options

@@ -15,7 +15,7 @@ from gearmbs.dae.problem import EVENTS_SIG, DAEProblem
 
 
 @dataclass(frozen=True)
-class Stop:
+class StopAt:
     """End where a state passes a value.
 
     Attributes
@@ -40,7 +40,7 @@ def passes(t, y, yp, out, idata, rdata, work):
         out[k] = y[idata[idata.size - 1 - count + k]] - rdata[rdata.size - count + k]
 
 
-def with_stops(problem: DAEProblem, names: Sequence[str], first: int, stops: Sequence[Stop]) -> DAEProblem:
+def with_stops(problem: DAEProblem, names: Sequence[str], first: int, stops: Sequence[StopAt]) -> DAEProblem:
     """Return a problem that ends where states pass values.
 
     Parameters
@@ -50,7 +50,7 @@ def with_stops(problem: DAEProblem, names: Sequence[str], first: int, stops: Seq
         Of all states, in the order of the unknowns.
     first : int
         Place of the first among the unknowns.
-    stops : sequence of Stop
+    stops : sequence of StopAt
 
     Raises
     ------
@@ -67,6 +67,6 @@ def with_stops(problem: DAEProblem, names: Sequence[str], first: int, stops: Seq
     return replace(problem, idata=idata, rdata=rdata, events=passes, n_events=len(stops))
 
 
-def stop_options(stops: Sequence[Stop]) -> dict[str, Any]:
+def stop_options(stops: Sequence[StopAt]) -> dict[str, Any]:
     """Return the options of the integrator that go with `with_stops`."""
     return {"event_direction": [stop.direction for stop in stops], "event_action": [STOP] * len(stops)}

@@ -8,7 +8,7 @@ import pytest
 from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
 from gearmbs.adams.results.msg import message_text
 from gearmbs.mechanism import Mechanism, ModelError
-from gearmbs.mechanism.stops import Stop
+from gearmbs.mechanism.stops import StopAt
 
 DECK = """thrown
 UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
@@ -120,10 +120,10 @@ def test_stops_of_a_mechanism():
     m = Mechanism("fall", gravity=(0, 0, -10))
     m.body("ball", 1.0, (1, 1, 1), position=(0, 0, 10)).marker(name="ball")
     m.algebraic_state("height", "DZ(ball)")
-    s = m.simulate(2.0, rate=10, stops=[Stop("height", 5.0, 1), Stop("height", 3.75, -1)], tol=1e-9)
+    s = m.simulate(2.0, rate=10, stops=[StopAt("height", 5.0, 1), StopAt("height", 3.75, -1)], tol=1e-9)
     assert s.result.t_events[0].size == 0
     assert s.result.t_events[1] == pytest.approx([np.sqrt(1.25)], abs=1e-9)
     with pytest.raises(ModelError, match="there is no state 'depth'; the mechanism has height"):
-        m.simulate(1.0, stops=[Stop("depth")])
+        m.simulate(1.0, stops=[StopAt("depth")])
     with pytest.raises(ModelError, match="WSTIFF or GSTIFF"):
-        m.simulate(1.0, stops=[Stop("height")], integrator="IDA")
+        m.simulate(1.0, stops=[StopAt("height")], integrator="IDA")

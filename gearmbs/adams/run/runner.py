@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,7 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.analyses import frozen_friction, linear_modes
+from gearmbs.mechanism.stops import StopAt
 
 DEFAULT_TOLERANCE = 1e-8
 """Local error where a deck gives no ERROR, tighter than ADAMS's 1e-3 so that results do not depend on it."""
@@ -140,7 +141,6 @@ def _carry_out(
         modes = _linear(session, command, allow_unsupported)
         result.log[-1] = (command, modes)
     elif isinstance(command, Simulate):
-        result.log.pop()
         return _simulate(session, command, result, tol, allow_unsupported, progress)
     return True
 
@@ -214,6 +214,9 @@ def _simulate(
     watch = Watch(active_sensors(session) if command.kind in WATCHED and times.size > 1 else [])
     while True:
         segment, fired = _part(session, command, watch, times, tol, allow_unsupported, progress)
+        if result.log[-1][1] is None:
+            # the command stands there already, for what may go wrong
+            result.log.pop()
         result.log.append((command, segment))
         if not segment.success:
             return False
@@ -254,9 +257,7 @@ def _part(
             note = _frozen(session, model)
         if watch.first_step is not None:
             options["first_step"] = watch.first_step * session.deck.units.time
-        solution, equilibrium = _solve(
-            session, command, kind, model, times, dict(options, stops=watch.stops()), progress
-        )
+        solution, equilibrium = _solve(session, command, kind, model, times, options, progress, watch.stops())
         if watch.sensors:
             solution, fired = _to_passage(session, command, watch, model, times, options, solution)
     except (ModelError, ArithmeticError) as error:
@@ -316,11 +317,11 @@ def _solve(
     times: np.ndarray,
     options: dict[str, Any],
     progress: bool | Callable[[float], None] | None,
+    stops: Sequence[StopAt] = (),
 ) -> tuple[Solution, StaticResult | None]:
     """Solve one analysis at the output times, given in the deck's unit; of a single equilibrium return it, too."""
     scale = session.deck.units.time
     times = times * scale
-    stops = options.pop("stops", [])
     options_without = {"integrator": NEWTON, "formulation": "I3"}
     if kind == "INITIAL_CONDITIONS":
         options.update(options_without)

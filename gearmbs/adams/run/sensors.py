@@ -18,7 +18,7 @@ from gearmbs.adams.results.record import Segment
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.run.session import Session
 from gearmbs.dae.results.solution import Solution
-from gearmbs.mechanism.stops import Stop
+from gearmbs.mechanism.stops import StopAt
 
 DIRECTIONS = {"GE": 1, "LE": -1, "EQ": 0}
 MOST = 10_000
@@ -47,9 +47,9 @@ class Watch:
     parts: int = 0
     first_step: float | None = None
 
-    def stops(self) -> list[Stop]:
+    def stops(self) -> list[StopAt]:
         """Return where the next part ends."""
-        return [Stop(sensor_state(s.id), s.value, self.waits.get(s.id, DIRECTIONS[s.relation])) for s in self.sensors]
+        return [StopAt(sensor_state(s.id), s.value, self.waits.get(s.id, DIRECTIONS[s.relation])) for s in self.sensors]
 
     def silent(self, sensor: st.Sensor) -> bool:
         """Whether a sensor that passes does nothing, but is ready again."""
