@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from gearmbs.gears import faults
     from gearmbs.gears.contact_element import GearContact
     from gearmbs.gears.contact_model import ContactModel
+    from gearmbs.gears.elastic_ring import ElasticRim, RimModes, RingMeshes
     from gearmbs.gears.geometry import PairGeometry, Placement
     from gearmbs.gears.ideal_mesh import IdealMesh
     from gearmbs.gears.laws import ContactLaw, FlankFriction
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ContactLaw",
     "ContactModel",
+    "ElasticRim",
     "FlankFriction",
     "GearContact",
     "GearPair",
@@ -31,6 +33,8 @@ __all__ = [
     "PairGeometry",
     "Placement",
     "PlanetarySet",
+    "RimModes",
+    "RingMeshes",
     "Support",
     "TransmissionError",
     "faults",
@@ -46,6 +50,7 @@ late(
     {
         "ContactLaw": ".laws",
         "ContactModel": ".contact_model",
+        "ElasticRim": ".elastic_ring",
         "FlankFriction": ".laws",
         "GearContact": ".contact_element",
         "GearPair": ".pair",
@@ -56,6 +61,8 @@ late(
         "PairGeometry": ".geometry",
         "Placement": ".geometry",
         "PlanetarySet": ".planetary_set",
+        "RimModes": ".elastic_ring",
+        "RingMeshes": ".elastic_ring",
         "Support": ".planetary_rig",
         "TransmissionError": ".transmission",
         "faults": ".faults:",

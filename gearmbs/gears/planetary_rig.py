@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs._shown import Written
+from gearmbs.gears.elastic_ring import ElasticRim, ring_meshes
 from gearmbs.gears.planetary_set import MEMBERS, PlanetarySet
 from gearmbs.gears.spec import require
 from gearmbs.mechanism import Mechanism, ramp, step
@@ -59,6 +60,7 @@ def planetary_mechanism(
     supports: Mapping[str, Support] | None = None,
     pins: Support | PinBearing | None = None,
     masses: Mapping[str, tuple[float, Any]] | None = None,
+    rim: ElasticRim | None = None,
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Mechanism:
     """Return the mechanism of a planetary set, its axis along global z, planet 1 on global x where angles begin with 0.
@@ -82,6 +84,9 @@ def planetary_mechanism(
         makes one for rolling bearings. By default planets turn in revolute joints.
     masses : mapping, optional
         Mass, kg, and moments of inertia (or that about z), kg m^2, of "sun", "planet", "carrier", "ring".
+    rim : ElasticRim, optional
+        Lets the rim of a ring that is held or supported bend under the planets that pass: one element ``ring meshes``
+        stands for the meshes with the ring.
     gravity : (float, float, float)
 
     Returns
@@ -102,6 +107,10 @@ def planetary_mechanism(
     """
     supports, speeds, torques = dict(supports or {}), dict(speeds or {}), dict(torques or {})
     _check(held, speeds, torques, supports)
+    require(
+        rim is None or "ring" in (held, *supports),
+        "planetary: the rim of a ring that turns is given; a rim can bend on a ring that is held or has a support",
+    )
     drives = {m: to_si(v, "angular speed", f"speeds[{m!r}]") for m, v in speeds.items()}
     loads = {m: to_si(v, "torque", f"torques[{m!r}]") for m, v in torques.items()}
     over = to_si(run_up, "time", "run_up")
@@ -130,7 +139,7 @@ def planetary_mechanism(
         if member in loads:
             load = loads[member] if over == 0 else step(0.0, 0.0, over, loads[member])
             m.torque(f"{member} load", body, load, axis=Z)
-    _planets(m, gears, start, masses["planet"], turning, pins)
+    _planets(m, gears, start, masses["planet"], turning, pins, rim)
     return m
 
 
@@ -212,10 +221,12 @@ def _planets(
     weight: tuple,
     turning: dict[str, float],
     pins: Support | PinBearing | None,
+    rim: ElasticRim | None,
 ) -> None:
     """Add planets, their pins and their meshes."""
     carrier, spin = m.bodies["carrier"], turning["carrier"]
     to_sun, to_ring = gears.meshes("sun"), gears.meshes("ring")
+    wheels: list[Any] = []
     for k in range(gears.planets):
         psi = float(gears.angles[k])  # type: ignore[index]
         radial, tangential = gears.pin_errors.get(k, (0.0, 0.0))
@@ -244,4 +255,10 @@ def _planets(
         wheel: Any = planet
         if gears.planet_at_ring is not None:
             wheel = planet.marker((0.0, 0.0, 0.0), _about_z(start["steps"][k]), name=f"{name} step")
-        m.gear_contact(f"{name}-ring", wheel, m.bodies["ring"], to_ring[k])
+        if rim is None:
+            m.gear_contact(f"{name}-ring", wheel, m.bodies["ring"], to_ring[k])
+        else:
+            wheels.append(wheel if isinstance(wheel, Marker) else wheel.marker(name=f"{name}.wheel"))
+    if rim is not None:
+        ring = m.bodies["ring"].marker(name="ring.wheel")
+        m.add(ring_meshes("ring meshes", wheels, ring, to_ring, rim, gears.ring))

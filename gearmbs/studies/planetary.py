@@ -14,7 +14,7 @@ import xarray as xr
 
 from gearmbs.bearings import Bearing, RollingBearing
 from gearmbs.dae import Status
-from gearmbs.gears import ContactLaw, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
+from gearmbs.gears import ContactLaw, ElasticRim, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
 from gearmbs.gears.planetary_rig import PinBearing
 from gearmbs.mechanism import Mechanism
 from gearmbs.signals import fixed_sensor
@@ -24,7 +24,7 @@ from gearmbs.units import to_si
 
 MEMBERS = ("sun", "carrier", "ring")
 OVERSAMPLING = 4
-SECTIONS = ("planetary", "contact", "friction", "operation", "support", "pins", "fault")
+SECTIONS = ("planetary", "contact", "friction", "operation", "support", "pins", "rim", "fault")
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,8 @@ class PlanetaryRun:
     supports : dict of str to Support
     pins : Support or callable, optional
         See `planetary_mechanism` and `rolling_pins`.
+    rim : ElasticRim, optional
+        Lets the ring's rim bend.
     """
 
     gears: PlanetarySet
@@ -58,6 +60,7 @@ class PlanetaryRun:
     tolerance: float = 1e-6
     supports: Mapping[str, Support] = field(default_factory=dict)
     pins: Support | PinBearing | None = None
+    rim: ElasticRim | None = None
 
     def mechanism(self) -> Mechanism:
         """Return the mechanism that is simulated."""
@@ -69,6 +72,7 @@ class PlanetaryRun:
             run_up=self.run_up,
             supports=self.supports,
             pins=self.pins,
+            rim=self.rim,
         )
 
 
@@ -139,7 +143,8 @@ def planetary_run(data: Mapping[str, Any]) -> PlanetaryRun:
             operation[name] = to_si(operation[name], kind, f"operation.{name}")
     supports = {name: Support(**values) for name, values in data.get("support", {}).items()}
     pins = _pins(dict(data["pins"])) if "pins" in data else None
-    return PlanetaryRun(gears, supports=supports, pins=pins, **operation)
+    rim = ElasticRim(**data["rim"]) if "rim" in data else None
+    return PlanetaryRun(gears, supports=supports, pins=pins, rim=rim, **operation)
 
 
 def rolling_pins(bearing: Any, **settings: Any) -> PinBearing:
@@ -201,8 +206,9 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
     -------
     xarray.Dataset
         Over ``time``: ``speed`` (member), ``force`` of the meshes with the sun and the ring (mesh, planet), ``share``
-        of the load, ``ring_sensor``, the forces on the ring weighted by the planets' path past a sensor at angle 0, and
-        ``carrier_angle``. Attributes hold the frequencies of `PlanetarySet.frequencies`.
+        of the load, ``ring_sensor``, the forces on the ring weighted by the planets' path past a sensor at angle 0,
+        ``carrier_angle``, and with a rim that bends ``rim_velocity``, its radial velocity at angle 0.
+        Attributes hold the frequencies of `PlanetarySet.frequencies`.
 
     Raises
     ------
@@ -228,7 +234,20 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
     def forces(form: str) -> np.ndarray:
         return np.column_stack([solution.diagnostics(form.format(k))["normal_force"] for k in planets])
 
-    both = {"sun": forces("sun-planet {}"), "ring": forces("planet {}-ring")}
+    both = {"sun": forces("sun-planet {}")}
+    motion: dict[str, Any] = {}
+    if run.rim is None:
+        both["ring"] = forces("planet {}-ring")
+    else:
+        told = solution.diagnostics("ring meshes")
+        both["ring"] = np.column_stack([told[f"normal_force_{k}"] for k in planets])
+        rate = mechanism.elements["ring meshes"].rim_motion(solution, 0.0)["radial_velocity"][fine]
+        told_rate = resample_poly(rate, 1, OVERSAMPLING, padtype="line")
+        motion["rim_velocity"] = (
+            "time",
+            told_rate,
+            {"units": "m/s", "long_name": "radial velocity of the rim at angle 0"},
+        )
     turned = np.unwrap(_angle(solution, "carrier"))
     heard = fixed_sensor(both["ring"][fine], turned[fine], [float(a) for a in gears.angles or ()])
     heard = resample_poly(heard, 1, OVERSAMPLING, padtype="line")
@@ -249,6 +268,7 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
             "share": (("time", "planet"), share, {"units": "1"}),
             "ring_sensor": ("time", heard, {"units": "N", "long_name": "ring forces past the sensor"}),
             "carrier_angle": ("time", angle, {"units": "rad"}),
+            **motion,
         },
         coords={
             "time": ("time", time, {"units": "s"}),
