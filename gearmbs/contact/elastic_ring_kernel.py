@@ -187,25 +187,21 @@ def hand_on(planet, ring, wrench, states, table, radius, phi, p, out, forces):
 
 
 @njit(cache=True, error_model="numpy")
-def vary(planet, ring, wrench, jac, states, table, radius, phi, p, dx, s, out, forces):
-    """Write the changes of what `hand_on` gives with those of the frames and states.
+def vary_piece(planet, ring, states, table, radius, phi, p, dx, s):
+    """Write the changes of where and how the piece moves to ``s[0:68]``; return that of theta.
 
     Parameters
     ----------
-    planet, ring, wrench, states, table, radius, phi, p
-        As of `hand_on`, which has been called.
-    jac : ndarray, shape (6, 24)
-        Derivatives of the contact's wrench.
+    planet, ring, states, table, radius, phi, p
+        As of `locate`, which has been called.
     dx : ndarray
         Variations of planet and ring, twelve each, then of the states.
     s : ndarray
-        Scratch, 90 places.
-    out, forces : ndarray
-        As of `hand_on`, written: changes.
+        Written: the ring's axis in ``s[0:3]``, changes of e_r, e_t and theta's gradient in ``s[12:21]``, of w and psi,
+        their derivatives and rates in ``s[30:44]``, the piece's variations in ``s[44:56]``, the axis's in ``s[59:62]``.
     """
     m = table.shape[1]
     a = FRAME_A
-    far2 = 1.0 / dot(p, TANGENT, p, TANGENT)
     z = vector_at(s, 0, 3)
     for c in range(3):
         z[c] = ring[a + 3 * c + 2]
@@ -215,7 +211,7 @@ def vary(planet, ring, wrench, jac, states, table, radius, phi, p, dx, s, out, f
         s[9 + c] = dx[c] - dx[12 + c]
         s[3 + c] = s[9 + c] - s[6 + c]
     d_angle = dot(p, TANGENT, s, 3)
-    far = np.sqrt(far2)
+    far = 1.0 / np.sqrt(dot(p, TANGENT, p, TANGENT))
     d_far = dot(p, RADIAL, s, 3)
     # changes of e_r, e_t (12, 15) and of the tangent (18)
     cross(dx, 15, p, RADIAL, s, 12)
@@ -263,6 +259,29 @@ def vary(planet, ring, wrench, jac, states, table, radius, phi, p, dx, s, out, f
         rate += d_rate * p[DRIFT + c] + p[RATE] * (d_drift * p[ALONG + c] + drift * s[15 + c])
         s[50 + c] = dx[18 + c] + s[62 + c] + s[65 + c] + rate
         s[53 + c] = dx[21 + c] + s[59 + c] * p[TURN_RATE] + z[c] * turning
+    return d_angle
+
+
+@njit(cache=True, error_model="numpy")
+def vary(planet, ring, wrench, jac, states, table, radius, phi, p, dx, s, out, forces):
+    """Write the changes of what `hand_on` gives with those of the frames and states.
+
+    Parameters
+    ----------
+    planet, ring, wrench, states, table, radius, phi, p
+        As of `hand_on`, which has been called.
+    jac : ndarray, shape (6, 24)
+        Derivatives of the contact's wrench.
+    dx : ndarray
+        Variations of planet and ring, twelve each, then of the states.
+    s : ndarray
+        Scratch, 90 places.
+    out, forces : ndarray
+        As of `hand_on`, written: changes.
+    """
+    d_angle = vary_piece(planet, ring, states, table, radius, phi, p, dx, s)
+    z = vector_at(s, 0, 3)
+    drift, d_drift = p[W0] + p[W0 + 2], s[30] + s[32]
     # the contact's wrench in s[68:74]
     for r in range(6):
         total = 0.0
@@ -283,7 +302,7 @@ def vary(planet, ring, wrench, jac, states, table, radius, phi, p, dx, s, out, f
     radial, along = dot(p, FORCE, p, RADIAL), dot(p, FORCE, p, ALONG)
     d_radial = dot(s, 74, p, RADIAL) + dot(p, FORCE, s, 12)
     d_along = dot(s, 74, p, ALONG) + dot(p, FORCE, s, 15)
-    for j in range(m):
+    for j in range(table.shape[1]):
         kappa = (1.0 - 1.0 / table[WAVES, j] ** 2) / radius
         pushed = d_radial * phi[j, 0] + (d_along - d_axial * kappa) * phi[j, 1]
         forces[j] = pushed + d_angle * (radial * phi[j, 1] + (along - axial * kappa) * phi[j, 2])
@@ -313,6 +332,79 @@ def react(arm, darm, wrench, dwrench, out):
         out[3 + c] -= dwrench[3 + c] + s[c] + s[3 + c]
 
 
+@njit(cache=True, error_model="numpy")
+def mesh_columns(k, n, planet, ring, contact, own, acting, states, table, radius, phi, p, dx, s, change, jac):
+    """Add the derivatives of the mesh of planet k of n to ``jac``.
+
+    Parameters
+    ----------
+    k, n : int
+    planet, ring, contact, own, states, table, radius, phi, p
+        As of `vary`; ``contact`` is the contact's wrench, ``own`` its derivatives.
+    acting : ndarray, shape (6,)
+        On the planet.
+    dx, s, change : ndarray
+        Scratch: variations; 90 places; changes of wrench and forces on the modes.
+    jac : ndarray
+        As of every element.
+    """
+    m = table.shape[1]
+    last, pushed, arm = 6 * (n + 1 if n > 1 else 1), vector_at(change, 6, m), vector_at(p, ARM, 3)
+    for c in range(24 + 2 * m):
+        for q in range(24 + 2 * m):
+            dx[q] = 0.0
+        dx[c] = 1.0
+        vary(planet, ring, contact, own, states, table, radius, phi, p, dx, s, change, pushed)
+        column = 12 * k + c if c < 12 else 12 * (n - 1) + c
+        for r in range(6):
+            jac[6 * k + r, column] += change[r]
+        for j in range(m):
+            jac[last + m + j, column] += pushed[j] / table[MASS, j]
+        if n > 1:
+            for q in range(3):
+                s[q] = dx[q] - dx[12 + q]
+                s[3 + q] = 0.0
+                s[6 + q] = 0.0
+            react(arm, vector_at(s, 0, 3), acting, change, vector_at(s, 3, 6))
+            for r in range(6):
+                jac[6 * n + r, column] += s[3 + r]
+
+
+@njit(cache=True, error_model="numpy")
+def rim_rates(last, column, states, forces, table, stiffness, damping, want, rates, jac, diagnostics):
+    """Write the rates of the rim's states, their derivatives by the states, its energy and the power it loses.
+
+    Parameters
+    ----------
+    last, column : int
+        Row and column of ``jac`` where the states begin.
+    states, forces : ndarray
+        Amplitudes and their rates; forces of all meshes on the modes.
+    table, stiffness, damping
+        Of the modes.
+    want, rates, jac, diagnostics
+        As of every element.
+    """
+    m = table.shape[1]
+    energy, lost = 0.0, 0.0
+    for j in range(m):
+        total = forces[j]
+        for l in range(m):
+            total -= stiffness[j, l] * states[l] + damping[j, l] * states[m + l]
+            energy += 0.5 * states[j] * stiffness[j, l] * states[l]
+            lost += states[m + j] * damping[j, l] * states[m + l]
+        energy += 0.5 * table[MASS, j] * states[m + j] ** 2
+        rates[j], rates[m + j] = states[m + j], total / table[MASS, j]
+    diagnostics[0] += energy
+    diagnostics[1] += lost
+    if want & DERIVATIVES:
+        for j in range(m):
+            jac[last + j, column + m + j] += 1.0
+            for l in range(m):
+                jac[last + m + j, column + l] -= stiffness[j, l] / table[MASS, j]
+                jac[last + m + j, column + m + l] -= damping[j, l] / table[MASS, j]
+
+
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
 def ring_meshes(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
     """Evaluate all meshes with the ring; the frames are those of the planets, then the ring's.
@@ -338,7 +430,6 @@ def ring_meshes(ints, reals, t, frames, states, inputs, want, work, wrench, rate
     p, phi, forces = vector_at(work, 0, PIECE), matrix_at(work, PIECE, m, 5), vector_at(work, PIECE + 5 * m, m)
     at = PIECE + 6 * m
     told, change = vector_at(work, at, CONTACT), vector_at(work, at + CONTACT, 6 + m)
-    pushed = vector_at(change, 6, m)
     dx, scratch = vector_at(work, at + CONTACT + 6 + m, 24 + 2 * m), vector_at(work, at + CONTACT + 30 + 3 * m, 90)
     own = matrix_at(work, at + CONTACT + 120 + 3 * m, 6, 24)
     at += CONTACT + 264 + 3 * m
@@ -374,42 +465,9 @@ def ring_meshes(ints, reals, t, frames, states, inputs, want, work, wrench, rate
         diagnostics[3 + k] = told[7]
         if n > 1:
             react(arm, vector_at(scratch, 0, 3), acting, acting, vector_at(wrench, 6 * n, 6))
-        if want & DERIVATIVES == 0:
-            continue
-        for c in range(24 + 2 * m):
-            for q in range(24 + 2 * m):
-                dx[q] = 0.0
-            dx[c] = 1.0
-            vary(planet, ring, contact, own, states, table, radius, phi, p, dx, scratch, change, pushed)
-            column = 12 * k + c if c < 12 else 12 * (n - 1) + c
-            for r in range(6):
-                jac[6 * k + r, column] += change[r]
-            last = 6 * (n + 1 if n > 1 else 1)
-            for j in range(m):
-                jac[last + m + j, column] += change[6 + j] / table[MASS, j]
-            if n > 1:
-                for q in range(3):
-                    scratch[q] = dx[q] - dx[12 + q]
-                    scratch[3 + q] = 0.0
-                    scratch[6 + q] = 0.0
-                react(arm, vector_at(scratch, 0, 3), acting, change, vector_at(scratch, 3, 6))
-                for r in range(6):
-                    jac[6 * n + r, column] += scratch[3 + r]
-    energy, lost = 0.0, 0.0
-    for j in range(m):
-        total = forces[j]
-        for l in range(m):
-            total -= stiffness[j, l] * states[l] + damping[j, l] * states[m + l]
-            energy += 0.5 * states[j] * stiffness[j, l] * states[l]
-            lost += states[m + j] * damping[j, l] * states[m + l]
-        energy += 0.5 * table[MASS, j] * states[m + j] ** 2
-        rates[j], rates[m + j] = states[m + j], total / table[MASS, j]
-    diagnostics[0] += energy
-    diagnostics[1] += lost
-    if want & DERIVATIVES:
-        last, first = 6 * (n + 1 if n > 1 else 1), 12 * (n + 1)
-        for j in range(m):
-            jac[last + j, first + m + j] += 1.0
-            for l in range(m):
-                jac[last + m + j, first + l] -= stiffness[j, l] / table[MASS, j]
-                jac[last + m + j, first + m + l] -= damping[j, l] / table[MASS, j]
+        if want & DERIVATIVES:
+            mesh_columns(
+                k, n, planet, ring, contact, own, acting, states, table, radius, phi, p, dx, scratch, change, jac
+            )
+    last, column = 6 * (n + 1 if n > 1 else 1), 12 * (n + 1)
+    rim_rates(last, column, states, forces, table, stiffness, damping, want, rates, jac, diagnostics)
