@@ -24,8 +24,8 @@ Mechanisms
 Differential-algebraic equations
     `solve_dae`, `DAEProblem`, `DAEResult`, `Status`
 Signals
-    `read_signal`, `write_signal`, `make_signal`, `to_signal`, `analyse`, `compare`, `features`, `spectrum`,
-    `envelope_spectrum`, `spectrogram`, `waterfall`, `order_map`, `order_track`, `campbell`,
+    `read_signal`, `write_signal`, `make_signal`, `to_signal`, `analyse`, `compare`, `trend`, `series`, `features`,
+    `spectrum`, `envelope_spectrum`, `spectrogram`, `waterfall`, `order_map`, `order_track`, `campbell`,
     `diagnose_bearing`
 ADAMS decks
     `read_deck`, `run_deck`, `write_deck`
@@ -76,9 +76,11 @@ if TYPE_CHECKING:
         order_map,
         order_track,
         read_signal,
+        series,
         spectrogram,
         spectrum,
         to_signal,
+        trend,
         waterfall,
         write_signal,
     )
@@ -173,6 +175,7 @@ __all__ = [
     "run_resonance",
     "run_train",
     "save",
+    "series",
     "simulate",
     "solution_scene",
     "solve_dae",
@@ -183,6 +186,7 @@ __all__ = [
     "sweep",
     "to_si",
     "to_signal",
+    "trend",
     "waterfall",
     "waterfall_plot",
     "write_deck",
@@ -253,6 +257,7 @@ late(
         "simulate": ".mechanism",
         "solution_scene": ".view",
         "solve_dae": ".dae",
+        "series": ".signals",
         "spectrogram": ".signals",
         "spectrogram_plot": ".view",
         "spectrum": ".signals",
@@ -260,6 +265,7 @@ late(
         "sweep": ".studies",
         "to_si": ".units",
         "to_signal": ".signals",
+        "trend": ".signals",
         "waterfall": ".signals",
         "waterfall_plot": ".view",
         "write_deck": ".adams",

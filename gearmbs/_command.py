@@ -55,3 +55,18 @@ def case_bars(names: list[str]) -> Iterator[Callable[[str, float], None]]:
     with Progress(*columns, TimeElapsedColumn(), console=console, refresh_per_second=4) as progress:
         tasks = {name: progress.add_task(name, total=1.0) for name in names}
         yield lambda name, fraction: progress.update(tasks[name], completed=fraction)
+
+
+@contextmanager
+def stage_bar(name: str) -> Iterator[Callable[[float, str], None]]:
+    """Show one bar with the stage it is in, on a terminal; yield the function that moves it."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description:>24}"), BarColumn(), TextColumn("{task.fields[stage]}"))
+    with Progress(
+        *columns, TimeElapsedColumn(), console=console, transient=True, disable=not console.is_terminal
+    ) as progress:
+        task = progress.add_task(name, total=1.0, stage="reading")
+        yield lambda fraction, stage: progress.update(task, completed=fraction, stage=stage)

@@ -55,6 +55,7 @@ EXCEPTIONS = {
     ): "the door for force elements: beams of large motion hand their kernel to the mechanism",
     ("flexible", "dae"): "the error of models, of which its own is one",
     ("bearings", "dae.equations"): "the same door: a bearing hands its kernel to the mechanism",
+    ("signals", "view"): "its commands draw figures and write files",
     ("signals", "bearings"): "the kinematic lines of a bearing by its designation",
     ("bearings", "dae.compiled"): "its kernels: views of flat tables",
     ("drivetrain", "dae.equations"): "the same door: torques about an axis hand their kernels to the mechanism",

@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from gearmbs.cli import app, tooth_counts
+from gearmbs.cli import app
 from gearmbs.signals import make_signal, write_signal
+from gearmbs.signals.commands import tooth_counts
 
 RATE, SHAFT, TEETH = 12800.0, 30.0, 32
 

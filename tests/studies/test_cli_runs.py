@@ -8,6 +8,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from gearmbs import cli
+from gearmbs.studies import run_commands
 
 CASE = "[operation]\nrun_up = '30 ms'\nsettling = '10 ms'\nduration = '200 ms'\n"
 
@@ -45,7 +46,7 @@ def signalled_after(fraction, number):
 def test_an_interrupted_run_ends_with_130_and_a_partial_file(tmp_path, monkeypatch, keep_handlers, integrator, number):
     path = tmp_path / "long.toml"
     path.write_text(CASE + f"[solver]\nintegrator = '{integrator}'\n")
-    monkeypatch.setattr(cli, "case_bars", signalled_after(0.3, number))
+    monkeypatch.setattr(run_commands, "case_bars", signalled_after(0.3, number))
     result = CliRunner().invoke(cli.app, ["run", str(path)])
     assert result.exit_code == 130
     assert "interrupted at t = 0." in result.output

@@ -1,0 +1,53 @@
+"""``gearmbs adams``: decks of ADAMS from the command line."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gearmbs._command import fail, guarded
+
+
+def adams(
+    model: Annotated[Path, typer.Argument(help="ADAMS/Solver deck (.adm).")],
+    script: Annotated[Path | None, typer.Argument(help="Commands (.acf).")] = None,
+    end: Annotated[float | None, typer.Option(help="End time, when there is no script.")] = None,
+    steps: Annotated[int | None, typer.Option(help="Output steps, when there is no script; default: 100.")] = None,
+    tolerance: Annotated[float | None, typer.Option(help="Local error instead of INTEGRATOR/ERROR.")] = None,
+    skip_unsupported: Annotated[bool, typer.Option(help="Leave out what is not supported.")] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="Prefix of the files written; default: the script's, or the model's name."),
+    ] = None,
+) -> None:
+    """Run an ADAMS deck; write .req, .res, .msg and NetCDF."""
+    with guarded():
+        from gearmbs.adams import DeckError, read_script, run_deck
+
+        if script is None and end is None:
+            fail(f"give a script (.acf), or --end and --steps: gearmbs adams {model} --end 5 --steps 500")
+        commands = read_script(script) if script is not None else None
+        prefix = out or (commands.output(model) if commands else model.with_suffix(""))
+        try:
+            result = run_deck(
+                model,
+                commands,
+                prefix,
+                end=end,
+                steps=steps,
+                tol=tolerance,
+                allow_unsupported=skip_unsupported,
+                progress=sys.stderr.isatty(),
+            )
+        except DeckError as error:
+            if error.result is not None and error.result.segments:
+                typer.echo(f"wrote what was computed to {prefix}.req, .res, .msg, .nc")
+            raise
+        for message in result.messages:
+            typer.echo(str(message))
+        if not result.success:
+            fail(f"{model}: the analysis did not finish; see {prefix}.msg")
+        typer.echo(f"wrote {prefix}.req, .res, .msg, .nc")
