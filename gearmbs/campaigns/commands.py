@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from gearmbs._command import fail, guarded
+from gearmbs.campaigns.datasets.commands import baseline, dataset
 
 app = typer.Typer(
     name="campaign", help="Plan, run and evaluate campaigns of many cases.", no_args_is_help=True, add_completion=False
@@ -190,36 +191,6 @@ def sensitivity(folder: Place, result: Annotated[str, typer.Argument(help="Colum
 
 
 @app.command()
-def dataset(
-    out: Annotated[Path, typer.Argument(help="Folder of the data set; its campaign is beside it.")],
-    signals: Annotated[int, typer.Option(help="At least so many signals.")] = 20_000,
-    specimens: Annotated[int, typer.Option(help="Individuals with manufacturing errors of their own.")] = 200,
-    duration: Annotated[str, typer.Option(help="Length of a record.")] = "0.5 s",
-    sensors: Annotated[int, typer.Option(help="Signals of each simulated record, at places on the housing.")] = 4,
-    seed: Annotated[int, typer.Option(help="Of design, specimens and sensors.")] = 0,
-    workers: Annotated[int | None, typer.Option(help="Processes; default: the cores.")] = None,
-    dask: Annotated[str | None, typer.Option(help='Address of a Dask scheduler, or "local".')] = None,
-) -> None:
-    """Make a labelled data set of gear faults: simulate, put sensors on, split by specimen, write card and metadata."""
-    with guarded():
-        from gearmbs.campaigns import Campaign, dask_client
-        from gearmbs.campaigns.datasets import SensorLayers, data_set_plan, write_data_set
-        from gearmbs.units import to_si
-
-        seconds = to_si(duration, "time", "--duration")
-        plan = data_set_plan(signals, specimens=specimens, duration=seconds, sensors=sensors, seed=seed)
-        campaign = Campaign(out.with_name(out.name + ".campaign"), plan)
-        if dask is not None:
-            with dask_client(dask, workers) as client:
-                status = campaign.run(client=client, progress=True)
-        else:
-            status = campaign.run(workers, progress=True)
-        typer.echo(str(status))
-        for path in write_data_set(campaign, out, layers=SensorLayers(sensors=sensors, seed=seed), seed=seed):
-            typer.echo(f"wrote {path}")
-
-
-@app.command()
 def slurm(
     folder: Place,
     elements: Annotated[int, typer.Option(help="Elements of the job array.")] = 100,
@@ -230,3 +201,7 @@ def slurm(
         from gearmbs.campaigns.job_script import job_script
 
         typer.echo(job_script(folder, elements, minutes))
+
+
+app.command()(dataset)
+app.command()(baseline)

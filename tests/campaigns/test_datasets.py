@@ -14,14 +14,18 @@ from gearmbs.campaigns.datasets import (
     data_set_plan,
     feature_table,
     features,
+    from_simulation_to_recordings,
     leak_and_no_leak,
     macro_auroc,
     random_split,
+    recording_features,
     shared_groups,
     split_by_group,
     withhold,
     write_data_set,
 )
+from gearmbs.campaigns.datasets.features import NAMES
+from gearmbs.signals import make_signal
 
 RATE = 12800.0
 
@@ -108,6 +112,31 @@ def test_a_leak_looks_like_skill():
 def test_features_do_not_know_the_gain():
     x = np.random.default_rng(0).standard_normal(3200)
     np.testing.assert_allclose(features(x, RATE, 16.7, 29), features(7.0 * x + 3.0, RATE, 16.7, 29), rtol=1e-9)
+
+
+def test_a_classifier_on_recordings():
+    """Simulated windows whose second feature tells the states, and recordings where it does as well."""
+    generator = np.random.default_rng(0)
+    labels = np.repeat(["broken", "healthy", "worn"], 60)
+    x = generator.standard_normal((180, len(NAMES)))
+    x[:, 1] += 4.0 * (labels == "broken")
+    real_labels, groups = np.repeat(["broken", "healthy"], 40), np.repeat(np.arange(8), 10)
+    real = generator.standard_normal((80, len(NAMES)))
+    real[:, 1] += 4.0 * (real_labels == "broken")
+    found, alone = from_simulation_to_recordings(x, labels, real, real_labels, groups)
+    assert found.auroc > 0.9
+    assert found.groups == 8
+    assert alone[NAMES[1]] > 0.85
+    assert max(abs(v - 0.5) for n, v in alone.items() if n != NAMES[1]) < 0.25
+    with pytest.raises(CampaignError, match="two states or more"):
+        from_simulation_to_recordings(x, labels, real, np.full(80, "broken"), groups)
+
+
+def test_windows_of_a_recording():
+    signal = make_signal(np.random.default_rng(0).standard_normal((3200, 2)), RATE, units="m/s^2")
+    found = recording_features(signal, shaft=16.7, teeth=29, window=0.1)
+    assert found.shape == (4, len(NAMES))
+    np.testing.assert_array_equal(found[2], features(signal.values[:1280, 1], RATE, 16.7, 29))
 
 
 @pytest.mark.slow

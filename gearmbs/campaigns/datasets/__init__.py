@@ -5,8 +5,15 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
-    from gearmbs.campaigns.datasets.baseline import Score, classifier, leak_and_no_leak, macro_auroc, score
-    from gearmbs.campaigns.datasets.features import features
+    from gearmbs.campaigns.datasets.baseline import (
+        Score,
+        classifier,
+        from_simulation_to_recordings,
+        leak_and_no_leak,
+        macro_auroc,
+        score,
+    )
+    from gearmbs.campaigns.datasets.features import features, recording_features
     from gearmbs.campaigns.datasets.layers import SensorLayers
     from gearmbs.campaigns.datasets.make import data_set_plan, feature_table, write_data_set
     from gearmbs.campaigns.datasets.splits import random_split, shared_groups, split_by_group, withhold
@@ -18,9 +25,11 @@ __all__ = [
     "data_set_plan",
     "feature_table",
     "features",
+    "from_simulation_to_recordings",
     "leak_and_no_leak",
     "macro_auroc",
     "random_split",
+    "recording_features",
     "score",
     "shared_groups",
     "split_by_group",
@@ -37,9 +46,11 @@ late(
         "data_set_plan": ".make",
         "feature_table": ".make",
         "features": ".features:features",
+        "from_simulation_to_recordings": ".baseline",
         "leak_and_no_leak": ".baseline",
         "macro_auroc": ".baseline",
         "random_split": ".splits",
+        "recording_features": ".features",
         "score": ".baseline",
         "shared_groups": ".splits",
         "split_by_group": ".splits",

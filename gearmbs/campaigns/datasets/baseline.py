@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gearmbs.campaigns.datasets.features import NAMES
 from gearmbs.campaigns.datasets.splits import random_split, split_by_group
 from gearmbs.campaigns.errors import CampaignError
 
@@ -123,3 +124,35 @@ def leak_and_no_leak(
         model = classifier(seed).fit(x[train], labels[train])
         found[name] = score(model, x[held], labels[held], groups[held], seed)
     return found
+
+
+def from_simulation_to_recordings(
+    x: np.ndarray, labels: np.ndarray, real: np.ndarray, real_labels: np.ndarray, real_groups: np.ndarray, seed: int = 0
+) -> tuple[Score, dict[str, float]]:
+    """Train the baseline on simulated windows alone and score it on windows of recordings.
+
+    Parameters
+    ----------
+    x, labels : ndarray
+        Features of simulated windows and their states; those whose state no recording has are left out.
+    real, real_labels, real_groups : ndarray
+        The same of recordings, and the number of the recording each window is of.
+
+    Returns
+    -------
+    Score
+        Of the classifier.
+    dict of float
+        Of two classes the AUROC of every single feature, as a classical indicator would give: above a half if it is
+        larger for the class that comes first in the alphabet.
+    """
+    known = np.isin(labels, np.unique(real_labels))
+    if np.unique(labels[known]).size < 2:
+        raise CampaignError(f"recordings: labels are {sorted(set(real_labels))}; give recordings of two states or more")
+    model = classifier(seed).fit(x[known], labels[known])
+    classes = np.unique(real_labels)
+    alone = {}
+    if classes.size == 2:
+        one = classes[:1]
+        alone = {name: macro_auroc(real_labels, real[:, k : k + 1], one) for k, name in enumerate(NAMES)}
+    return score(model, real, real_labels, real_groups, seed), alone

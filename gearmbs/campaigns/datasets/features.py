@@ -3,7 +3,12 @@ harmonics."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 HARMONICS = 4
 SIDEBANDS = 3
@@ -91,3 +96,24 @@ def windows(x: np.ndarray, size: int) -> np.ndarray:
     """Return the whole windows of signals along the last axis side by side, shape (..., k, size)."""
     count = x.shape[-1] // size
     return x[..., : count * size].reshape(*x.shape[:-1], count, size)
+
+
+def recording_features(signal: xr.DataArray, *, shaft: float, teeth: int, window: float = 0.25) -> np.ndarray:
+    """Return the features of all windows of all channels of a recording, shape (windows, len(NAMES)).
+
+    Parameters
+    ----------
+    signal : DataArray
+        Dimensions (time, channel), with its sampling rate; see `gearmbs.signals.read_signal`.
+    shaft : float
+        Frequency of the shaft that carries the wheel, Hz.
+    teeth : int
+    window : float
+        s.
+    """
+    from gearmbs.signals import rate_of
+
+    rate = rate_of(signal)
+    size = int(window * rate)
+    parts = windows(signal.transpose("channel", "time").values, size).reshape(-1, size)
+    return np.array([features(part, rate, shaft, teeth) for part in parts])
