@@ -18,6 +18,9 @@ def adams(
     steps: Annotated[int | None, typer.Option(help="Output steps, when there is no script; default: 100.")] = None,
     tolerance: Annotated[float | None, typer.Option(help="Local error instead of INTEGRATOR/ERROR.")] = None,
     skip_unsupported: Annotated[bool, typer.Option(help="Leave out what is not supported.")] = False,
+    redundancy: Annotated[
+        str, typer.Option(help="Redundant constraints: keep what ADAMS keeps (adams), or what stands first (declared).")
+    ] = "adams",
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", help="Prefix of the files written; default: the script's, or the model's name."),
@@ -41,6 +44,7 @@ def adams(
                 tol=tolerance,
                 allow_unsupported=skip_unsupported,
                 progress=sys.stderr.isatty(),
+                redundancy=redundancy,
             )
         except DeckError as error:
             if error.result is not None and error.result.segments:

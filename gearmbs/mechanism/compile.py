@@ -26,6 +26,7 @@ from gearmbs.mechanism.expression_syntax import Scope
 from gearmbs.mechanism.functions import TimeFunction
 from gearmbs.mechanism.modal import ModalBody
 from gearmbs.mechanism.parts import Body, Marker
+from gearmbs.mechanism.redundancy import row_order
 
 if TYPE_CHECKING:
     from gearmbs.dae.equations.expressions import Tape
@@ -112,7 +113,9 @@ class _Compiler:
         elements = [*self.force_names, *(f"reaction of {name}" for name in self.measured)]
         names = Names(tuple(m.bodies), tuple(self.row_names), tuple(elements), tuple(m.state_names))
         start = [s.start for s in m.every_state]
-        return System(self.builder.build(names), Configuration(pose, q_f, v_f), start, t0, m, self.marker_index)
+        system = System(self.builder.build(names), Configuration(pose, q_f, v_f), start, t0, m, self.marker_index)
+        system.row_order = row_order(m)
+        return system
 
     # --- bodies and markers -------------------------------------------------------------------------
 

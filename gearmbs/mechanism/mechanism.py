@@ -59,6 +59,9 @@ class Mechanism(LoadMethods, Shown):
 
     Attributes
     ----------
+    redundancy : {"declared", "adams"}
+        Which of redundant constraint rows are kept: those added first, or as in ADAMS, see
+        `gearmbs.mechanism.redundancy`. Only their reactions depend on it.
     turns : dict of (str, str, str) to float
         About which angle, in rad, AX, AY and AZ start to count, by function and names of the markers:
         ``m.turns["AZ", "shaft.I", "shaft.J"] = 4 * np.pi`` winds a torsion spring twice. Default: 0.
@@ -81,6 +84,7 @@ class Mechanism(LoadMethods, Shown):
         self.plants: dict[tuple[str, Any], tuple[Any, ...]] = {}
         self.units = Units()
         self.reads_units = True
+        self.redundancy = "declared"
         self.turns: dict[tuple[str, str, str], float] = {}
         self.given: dict[str, dict[str, Any]] = {}
 

@@ -56,6 +56,7 @@ class Builder:
         self.mechanism.units = deck.units
         # in decks a text is an expression in the deck's units, and checked with its line
         self.mechanism.reads_units = False
+        self.mechanism.redundancy = "adams"
         self.model = AdamsModel(self.mechanism, deck, sensed=sensed)
         self.markers: dict[int, Marker] = {}
         self.joints: dict[int, Joint] = {}

@@ -6,6 +6,7 @@ import numpy as np
 
 from gearmbs.adams.parse.commands import Command, Simulate
 from gearmbs.adams.results.record import NEWTON, RunRecord, Segment
+from gearmbs.adams.results.rows import row_text
 
 RULE = "-" * 79
 TITLES = {"KINEMATICS": "Kinematic", "STATICS": "Static", "INITIAL_CONDITIONS": "Initial Conditions"}
@@ -121,9 +122,9 @@ def _initial_conditions(result: RunRecord, segment: Segment, time: float) -> lis
         if report.redundant:
             out.append("  Degree-of-freedom analysis identified redundant constraints in the model:")
             out.append("  " + "-" * 73)
-            for name in report.redundant:
-                joint, _, label = name.rpartition(": ")
-                out.append(f"   -  deactivating constraint equation  {label} in {joint}")
+            out += [
+                f"   -  deactivating constraint equation  {row_text(segment.model, name)}" for name in report.redundant
+            ]
         out.append(f"  The model has {report.degrees_of_freedom} degrees of freedom.")
         moved = segment.assembly
         largest = ""

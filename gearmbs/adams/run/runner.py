@@ -60,6 +60,7 @@ def run_deck(
     tol: float | None = None,
     allow_unsupported: bool = False,
     progress: bool | Callable[[float], None] | None = None,
+    redundancy: str = "adams",
 ) -> AdamsResult:
     """Run an ADAMS deck.
 
@@ -81,6 +82,8 @@ def run_deck(
         Leave out what is not supported instead of refusing to run.
     progress : bool or callable
         As in :func:`gearmbs.mechanism.simulate`.
+    redundancy : {"adams", "declared"}
+        Which of redundant constraint rows are kept: as in ADAMS, as far as that is known, or those that stand first.
 
     Returns
     -------
@@ -100,6 +103,7 @@ def run_deck(
         raise DeckError(script.unsupported)
     result = AdamsResult(deck, script)
     session = Session.of(deck)
+    session.redundancy = redundancy
     command = Command(script.file)
     try:
         check_script(deck, script, allow_unsupported)
@@ -386,10 +390,12 @@ def _model(session: Session, allow_unsupported: bool, span: tuple[float, float])
     if session.state is None:
         session.state = {}
         model = build_model(session.deck, allow_unsupported, inactive, span=span, sensed=session.sensed)
+        model.mechanism.redundancy = session.redundancy
         if not model.initial_motions:
             return model
         session.state = with_initial_motions(model)
     model = build_model(session.deck, allow_unsupported, inactive, session.state, span, session.sensed)
+    model.mechanism.redundancy = session.redundancy
     model.mechanism.turns.update(session.turns)
     for name, state in zip(model.mechanism.state_names, model.mechanism.every_state):
         state.start = session.states.get(name, state.start)

@@ -40,6 +40,8 @@ class Session:
         (statement class, id, argument) -> (file, line) of the command that gave it.
     sensed : dict of int to float
         What sensors have evaluated, by id.
+    redundancy : str
+        Which redundant rows are kept, see `gearmbs.mechanism.redundancy`.
     """
 
     deck: Deck
@@ -50,6 +52,7 @@ class Session:
     time: float = 0.0
     places: dict[tuple[type, int, str], tuple[str, int]] = field(default_factory=dict)
     sensed: dict[int, float] = field(default_factory=dict)
+    redundancy: str = "adams"
 
     @classmethod
     def of(cls, deck: Deck) -> Session:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.sparse import block_array, csc_array, diags_array
+from scipy.sparse import block_array, csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
@@ -99,12 +99,18 @@ class InitialReport:
         return "\n".join(lines)
 
 
-def independent_rows(jacobian: csc_array, weights: np.ndarray, least: float = LEAST) -> np.ndarray:
+def independent_rows(
+    jacobian: csc_array, weights: np.ndarray, least: float = LEAST, order: np.ndarray | None = None
+) -> np.ndarray:
     """Return the indices of a largest set of independent rows of the constraint Jacobian, in order.
 
     Earlier rows are preferred, so that a redundancy is blamed on the joint added last. ``least`` is the distance of a
-    row of length 1 from those before below which it counts as redundant.
+    row of length 1 from those before below which it counts as redundant; ``order`` names all rows in another order of
+    preference.
     """
+    if order is not None:
+        preferred = csc_array(csr_array(jacobian)[order])
+        return np.sort(order[independent_rows(preferred, weights, least)])
     m = jacobian.shape[0]
     if m == 0:
         return np.zeros(0, dtype=np.int64)
@@ -208,7 +214,7 @@ def assemble_position(
     jacobian, phi, _ = system.constraint_jacobian(place, t)
     if not np.all(np.isfinite(phi)):
         raise _not_finite(system, phi, t)
-    kept = independent_rows(jacobian, weights)
+    kept = independent_rows(jacobian, weights, order=system.row_order)
     report = InitialReport(degrees_of_freedom=jacobian.shape[1] - kept.size)
     before = place
     length = np.sqrt(weights[3]) if weights.size else 1.0
@@ -219,7 +225,7 @@ def assemble_position(
         if not dropped.size or np.abs(phi[dropped]).max() <= CONFLICT * max(1.0, length):
             break
         # rows that are redundant where the assembly began need not be so where it ends
-        others = independent_rows(jacobian, weights, NEARLY)
+        others = independent_rows(jacobian, weights, NEARLY, system.row_order)
         if np.array_equal(others, kept):
             raise _conflict(system, dropped, phi)
         kept = others

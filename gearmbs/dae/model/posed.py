@@ -64,6 +64,8 @@ class PosedModel:
         self.assembler = AccelerationSystem(model)
         self._of_whole = self.assembler
         self._dropped = np.zeros(0, dtype=np.int64)
+        self.row_order: np.ndarray | None = None
+        """All rows from the one that is to be kept first to the one to be dropped first, if not as they stand."""
         self.typical_length: float | None = None
         """A length that replaces the one found, for tolerances of another model of the same mechanism."""
 
