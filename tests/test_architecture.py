@@ -79,7 +79,7 @@ CIRCLES = {
     ("bearings.catalogue", "bearings.geometry", "bearings.ratings"):
         "a bearing is found by its designation and tells its ratings; methods, and types only",
     ("mechanism.analyses", "mechanism.compile", "mechanism.friction", "mechanism.locked", "mechanism.lumping",
-     "mechanism.measures", "mechanism.mechanism", "mechanism.simulate"):
+     "mechanism.measures", "mechanism.mechanism", "mechanism.redundancy", "mechanism.simulate"):
         "methods of Mechanism, and the functions that carry them out",
     ("adams.builders.builder", "adams.builders.constraints", "adams.builders.contacts", "adams.builders.curve_data",
      "adams.builders.curves", "adams.builders.data_calls", "adams.builders.forces", "adams.builders.initial",

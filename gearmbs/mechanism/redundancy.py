@@ -2,9 +2,9 @@
 
 "declared" keeps what was added first. "adams" keeps, as far as published results show, what ADAMS does: places before
 orientations, orientations of planar joints after those of others, what couples joints after these, and motions last, a
-later one before an earlier. (A door on two pins with two motions loses all four rows of orientation, one of place along the
-axis, and its first motion; a delta robot keeps the orientations of its cylindrical joints and loses those of its planar
-ones.)
+later one before an earlier. (A door on two pins with two motions loses all four rows of orientation, one of place
+along the axis, and its first motion; a delta robot keeps the orientations of its cylindrical joints and loses those of
+its planar ones.)
 """
 
 from __future__ import annotations
