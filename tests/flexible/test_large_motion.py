@@ -17,7 +17,7 @@ from gearmbs.flexible import (
     add_beam,
     reduce_model,
 )
-from gearmbs.mechanism import Mechanism, quasi_static
+from gearmbs.mechanism import Mechanism, linear_modes, quasi_static
 
 SPEED, TIME = 6.0, 15.0
 DRIVE = f"{SPEED / TIME}*(TIME**2/2+{(TIME / (2 * np.pi)) ** 2}*(COS({2 * np.pi / TIME}*TIME)-1))"
@@ -173,6 +173,31 @@ def test_spin_up_of_a_modal_body_needs_its_stiffening():
     with pytest.warns(UserWarning, match="lack the stiffening by centrifugal force"):
         soft = m.simulate(9.0, rate=20, tol=1e-6)
     assert np.abs(lag_of(soft, tip)).max() > 1.15 * np.abs(lag).max()
+
+
+def supported(m, seats):
+    for name, marker, z in seats:
+        m.bushing(name, marker, m.ground.marker((0, 0, z)), stiffness=(2e7, 2e7, 1e7), torsional_stiffness=(0, 0, 1e4))
+    found = linear_modes(m)
+    return np.sort(found.frequencies[np.array(found.kinds) == "oscillating"])[:8]
+
+
+def test_modes_and_beams_agree_in_small_motion():
+    """A round bar on springs: reduced finite elements against nodes and beams, extrapolated to short elements."""
+    diameter, length = 0.05, 1.0
+
+    def beams(elements):
+        m = Mechanism("beams")
+        bar = add_beam(m, "b", BeamSection.ring(ElasticMaterial(), diameter), (0, 0, 0), (0, 0, length), elements)
+        return supported(m, [("A", bar.first, 0.0), ("B", bar.last, length)])
+
+    shaft = Shaft([ShaftSection(length, diameter)], seats={"A": 0.0, "B": length}, elements=48)
+    model = reduce_model(shaft.model(), internal=40)
+    m = Mechanism("modes")
+    body = model.add_to(m, damping=0.0)
+    modal = supported(m, [(key, body.marker(model.place(key)), z) for key, z in (("A", 0.0), ("B", length))])
+    coarse, fine = beams(24), beams(48)
+    np.testing.assert_allclose(fine + (fine - coarse) / 3, modal, rtol=1e-4)
 
 
 def test_a_preload_raises_the_frequencies_as_a_string():

@@ -166,6 +166,24 @@ def test_free_flight_conserves_momentum_angular_momentum_and_energy(formulation,
     np.testing.assert_allclose(solution.energy_balance().elastic, strain, rtol=1e-12)
 
 
+@pytest.mark.parametrize(("integrator", "tol"), [("WSTIFF", 1e-11), pytest.param("IDA", 1e-12, marks=pytest.mark.slow)])
+def test_tumbling_for_a_hundred_seconds(integrator, tol):
+    """No damping: energy and angular momentum about the centre of mass, summed over the mass points."""
+    m, body = with_cloud(velocity=(0.3, -0.2, 0.5), angular_velocity=(2.0, -3.0, 1.5))
+    points = [body.marker(point, name=f"P{k}") for k, point in enumerate(POINTS)]
+    solution = m.simulate(100.0, rate=2, integrator=integrator, tol=tol)
+    assert solution.success
+    place = np.array([solution.marker_position(p) for p in points])
+    speed = np.array([solution.marker_velocity(p) for p in points])
+    place = place - np.average(place, axis=0, weights=MASSES)
+    drift = np.average(speed, axis=0, weights=MASSES)
+    angular = np.einsum("p,pti->ti", MASSES, np.cross(place, speed - drift))
+    strain = 0.5 * solution.modal_coordinates("cloud") ** 2 @ [300.0, 600.0]
+    energy = 0.5 * np.einsum("p,pti,pti->t", MASSES, speed, speed) + strain
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-9)
+    assert np.abs(angular - angular[0]).max() < 1e-9 * np.linalg.norm(angular[0])
+
+
 def test_two_masses_on_a_spring_vibrate_at_their_reduced_mass():
     """The mode moves one mass only, as of a body held at the other; free, both move: k (m1 + m2) / (m1 m2)."""
     m1, m2, k = 2.0, 0.5, 800.0
