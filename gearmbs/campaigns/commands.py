@@ -35,8 +35,13 @@ def run(
     folder: Place,
     workers: Annotated[int | None, typer.Option(help="Processes; default: the cores.")] = None,
     dask: Annotated[
-        str | None, typer.Option(help='Address of a Dask scheduler, or "local" for a cluster here.')
+        str | None,
+        typer.Option(
+            help='Address of a Dask scheduler; "local" for a cluster here; "slurm" or "pbs" for jobs of those.'
+        ),
     ] = None,
+    walltime: Annotated[str, typer.Option(help="Of a job of Slurm or PBS.")] = "01:00:00",
+    queue: Annotated[str | None, typer.Option(help="Of Slurm or PBS.")] = None,
     minutes: Annotated[float | None, typer.Option(help="Start no further unit after so long.")] = None,
 ) -> None:
     """Work on what is not done yet; after an interruption, the same command goes on."""
@@ -45,7 +50,8 @@ def run(
 
         campaign = Campaign(folder)
         if dask is not None:
-            with dask_client(dask, workers) as client:
+            jobs = {"walltime": walltime, "queue": queue} if dask in ("slurm", "pbs") else {}
+            with dask_client(dask, workers, **jobs) as client:
                 status = campaign.run(client=client, progress=True, minutes=minutes)
         else:
             status = campaign.run(workers, progress=True, minutes=minutes)
@@ -195,12 +201,13 @@ def slurm(
     folder: Place,
     elements: Annotated[int, typer.Option(help="Elements of the job array.")] = 100,
     minutes: Annotated[int, typer.Option(help="Wall time of an element.")] = 60,
+    system: Annotated[str, typer.Option(help="slurm or pbs.")] = "slurm",
 ) -> None:
-    """Print a job script for Slurm that works on a campaign as a job array; nothing is submitted."""
+    """Print a job script for Slurm or PBS that works on a campaign as a job array; nothing is submitted."""
     with guarded():
         from gearmbs.campaigns.job_script import job_script
 
-        typer.echo(job_script(folder, elements, minutes))
+        typer.echo(job_script(folder, elements, minutes, system))
 
 
 app.command()(dataset)

@@ -12,7 +12,9 @@ import time
 
 import pytest
 
-from gearmbs.campaigns import Campaign
+from gearmbs.campaigns import Campaign, CampaignError
+from gearmbs.campaigns.job_script import job_script
+from gearmbs.campaigns.runners.dask import batch_cluster
 from tests.campaigns.support import digest, small
 
 DRIVER = (
@@ -78,3 +80,26 @@ def test_dask_with_a_worker_killed(tmp_path, undisturbed):
         campaign.run(client=client, progress=kill_once)
     assert digest(campaign) == undisturbed
     assert Campaign(campaign.path).status().failed == 0
+
+
+def test_job_scripts_of_both_systems():
+    slurm, pbs = (job_script("x/faults.campaign", 40, 150, system) for system in ("slurm", "pbs"))
+    assert "--array=1-40" in slurm
+    assert "--part $SLURM_ARRAY_TASK_ID/40 --minutes 135" in slurm
+    assert "#PBS -l walltime=02:30:00" in pbs
+    assert "--part $PBS_ARRAY_INDEX/40 --minutes 135" in pbs
+    assert "${TMPDIR:-/tmp}/gearmbs-kernels" in pbs
+    with pytest.raises(CampaignError, match="choose slurm or pbs"):
+        job_script("x", 1, 60, "lsf")
+
+
+@pytest.mark.parametrize(("system", "words"), [("slurm", "#SBATCH -t 02:00:00"), ("pbs", "#PBS -l walltime=02:00:00")])
+def test_clusters_of_batch_systems(system, words):
+    pytest.importorskip("dask_jobqueue")
+    with batch_cluster(system, walltime="02:00:00", queue="day") as cluster:
+        script = cluster.job_script()
+    assert words in script
+    assert "--lifetime 6480s" in script
+    assert "export NUMBA_NUM_THREADS=1" in script
+    with pytest.raises(CampaignError, match="write hours"):
+        batch_cluster(system, walltime="2h")

@@ -16,6 +16,10 @@ from gearmbs.campaigns.errors import CampaignError
 from gearmbs.campaigns.runners.processes import ONE_THREAD
 from gearmbs.campaigns.work import DIED, UnitReport, work_unit
 
+BATCH = {"slurm": "SLURMCluster", "pbs": "PBSCluster"}
+"""Clusters of dask-jobqueue by batch system."""
+
+MOST_JOBS = 100
 UNITS_A_WORKER = 3
 """Units on the way for each worker: enough to keep it at work, few enough to be given up lightly."""
 
@@ -86,14 +90,69 @@ class DaskRunner:
         raise error
 
 
-@contextmanager
-def dask_client(address: str, workers: int | None = None) -> Iterator[Any]:
-    """Yield a client of a scheduler by its address, or of a cluster of this machine for ``"local"``.
+def batch_cluster(system: str, *, walltime: str = "01:00:00", memory: str = "2GB", **settings: Any) -> Any:
+    """Return a cluster of a batch system whose jobs are workers of one thread; it has none yet, see its ``adapt``.
+
+    A worker takes no further unit when nine tenths of its walltime are over, and hands back what it holds.
+
+    Parameters
+    ----------
+    system : {"slurm", "pbs"}
+    walltime : str
+        Of a job, hours:minutes:seconds.
+    memory : str
+        Of a job.
+    **settings
+        Of dask-jobqueue's `SLURMCluster` or `PBSCluster`: queue, account, job_extra_directives, ...
 
     Raises
     ------
     CampaignError
-        Without the package distributed, or without an answer from the address.
+        Without the package dask-jobqueue, or for a walltime of another form.
+    """
+    try:
+        import dask_jobqueue
+    except ImportError:
+        raise CampaignError(
+            "dask-jobqueue is not installed; install the extra: pip install 'gearmbs[cluster]'"
+        ) from None
+    parts = walltime.split(":")
+    if len(parts) != 3 or not all(part.isdigit() for part in parts):
+        raise CampaignError(f"walltime is {walltime!r}; write hours:minutes:seconds, as 01:00:00")
+    seconds = sum(int(part) * size for part, size in zip(parts, (3600, 60, 1)))
+    own = {
+        "cores": 1,
+        "processes": 1,
+        "memory": memory,
+        "walltime": walltime,
+        "worker_extra_args": ["--lifetime", f"{int(0.9 * seconds)}s", "--lifetime-stagger", f"{seconds // 20}s"],
+        # compiled code on the node's own disk, so that nodes of different processors do not share it
+        "job_script_prologue": [
+            "export NUMBA_CACHE_DIR=${TMPDIR:-/tmp}/gearmbs-kernels",
+            *(f"export {name}={value}" for name, value in ONE_THREAD.items()),
+        ],
+    }
+    return getattr(dask_jobqueue, BATCH[system])(**{**own, **settings})
+
+
+@contextmanager
+def dask_client(address: str, workers: int | None = None, **settings: Any) -> Iterator[Any]:
+    """Yield a client of a scheduler.
+
+    Parameters
+    ----------
+    address : str
+        Of a scheduler that runs; ``"local"`` for a cluster of this machine; ``"slurm"`` or ``"pbs"`` for one whose
+        workers are jobs of a batch system, as many as there is work for.
+    workers : int, optional
+        Of a cluster made here; the most there are of a batch system, default 100.
+    **settings
+        Of `batch_cluster`.
+
+    Raises
+    ------
+    CampaignError
+        Without the packages, or without an answer from the address.
     """
     try:
         from distributed import Client, LocalCluster
@@ -112,6 +171,11 @@ def dask_client(address: str, workers: int | None = None) -> Iterator[Any]:
             for name, value in saved.items():
                 if value is None:
                     os.environ.pop(name, None)
+        return
+    if address in BATCH:
+        with batch_cluster(address, **settings) as cluster, Client(cluster) as client:
+            cluster.adapt(minimum=1, maximum=workers or MOST_JOBS)
+            yield client
         return
     try:
         client = Client(address)
