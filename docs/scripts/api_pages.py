@@ -74,11 +74,13 @@ MORE = {
     "gearmbs.gears": {
         "gearmbs.gears.fault": EVERYTHING,
         "gearmbs.gears.faults": EVERYTHING,
+        "gearmbs.gears.modifications": EVERYTHING,
         "gearmbs.gears.mesh": EVERYTHING,
         "gearmbs.gears.history": EVERYTHING,
         "gearmbs.gears.pattern": EVERYTHING,
         "gearmbs.gears.stiffness": EVERYTHING,
         "gearmbs.gears.iso1328": EVERYTHING,
+        "gearmbs.gears.iso6336": EVERYTHING,
     },
     "gearmbs.bearings": {
         "gearmbs.bearings.catalogue": EVERYTHING,

@@ -9,8 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.helicoid import edge_bends, edge_of
 from gearmbs.contact.jit import kernel
 from gearmbs.contact.records import integers_of, reals_of
+from gearmbs.contact.support import tilt_of
 
 SHORTEST = 0.01  # length of roll over base radius where the lookup ends towards the base circle
 
@@ -110,7 +112,6 @@ def roll_under_corner(side, corner, strip, j, lookup, wheel, want):
         return
     a, zeta = side.x[L.A], strip.zeta[j]
     mate = side.base_1 if wheel == 0 else side.base_2
-    f = L.F2 if wheel == 0 else L.F1
     r, se, ce = corner.radius[j], corner.sin[j], corner.cos[j]
     Px = a - r * ce - 2.0 * side.x[L.P] * zeta
     Py = -r * se - 2.0 * side.x[L.Q] * zeta
@@ -119,25 +120,66 @@ def roll_under_corner(side, corner, strip, j, lookup, wheel, want):
         lookup.roll += SHORTEST * mate - corner.rounding[j]
         return
     s = np.copysign(np.sqrt(s2), mate)
-    # a helical edge moves around its wheel with the axial offset
-    around = 0.5 * side.twist_2 / side.base_2 if wheel == 0 else -0.5 * side.twist_1 / side.base_1
     lookup.roll += s - corner.rounding[j]
     i_s = 1.0 / s
+    first = wheel == 1
+    tilt = tilt_of(side)
+    k_edge = side.twist_1 / side.base_1 if first else side.twist_2 / side.base_2
+    sign = 0.5 if first else -0.5
+    edge = edge_of(ce, se, r, k_edge, zeta + sign * side.x[L.H], tilt)
+    # a helical edge moves around its wheel with the axial offset and the tilt
+    turn = (0.0, sign * edge.Z, edge.p, edge.q, edge.F if first else 0.0, 0.0 if first else edge.F)
     for i in range(6):
-        turn_i = 1.0 if i == f else (around if i == L.H else 0.0)
-        dx = 1.0 if i == L.A else (-2.0 * zeta if i == L.P else r * se * turn_i)
-        dy = -2.0 * zeta if i == L.Q else -r * ce * turn_i
+        dx = 1.0 if i == L.A else r * se * turn[i]
+        dy = -r * ce * turn[i]
+        dx -= 2.0 * zeta if i == L.P else 0.0
+        dy -= 2.0 * zeta if i == L.Q else 0.0
         by_i = (Px * dx + Py * dy) * i_s
         grad[i] += by_i
         if want == 0:
             continue
         for k in range(6):
-            turn_k = 1.0 if k == f else (around if k == L.H else 0.0)
-            ex = 1.0 if k == L.A else (-2.0 * zeta if k == L.P else r * se * turn_k)
-            ey = -2.0 * zeta if k == L.Q else -r * ce * turn_k
+            ex = 1.0 if k == L.A else r * se * turn[k]
+            ey = -r * ce * turn[k]
+            ex -= 2.0 * zeta if k == L.P else 0.0
+            ey -= 2.0 * zeta if k == L.Q else 0.0
             value = dx * ex + dy * ey - by_i * (Px * ex + Py * ey) * i_s
-            value += turn_i * turn_k * r * (Px * ce + Py * se)
+            value += turn[i] * turn[k] * r * (Px * ce + Py * se)
             hess[i, k] += value * i_s
+    if want != 0 and k_edge != 0.0:
+        bends = edge_bends(edge, ce, se, r, k_edge, tilt)
+        add_bends(hess, bends, (Px * se - Py * ce) * r * i_s, sign, L.F1 if first else L.F2)
+
+
+@kernel
+def add_bends(hess, bends, share, sign, f):
+    """Add second derivatives of a tip edge's polar angle to a Hessian.
+
+    Parameters
+    ----------
+    hess : ndarray, shape (6, 6)
+    bends : EdgeBends
+    share : float
+        Derivative of the place by the polar angle.
+    sign : float
+        +0.5 for wheel 1, -0.5 for wheel 2: of its place along the axis by the axial offset.
+    f : int
+        Its spin.
+    """
+    hess[L.P, L.P] += share * bends.pp
+    hess[L.Q, L.Q] += share * bends.qq
+    hess[f, f] += share * bends.FF
+    hess[L.H, L.H] += share * sign * sign * bends.ZZ
+    for i, k, value in (
+        (L.P, L.Q, bends.pq),
+        (L.P, f, bends.pF),
+        (L.Q, f, bends.qF),
+        (L.P, L.H, sign * bends.pZ),
+        (L.Q, L.H, sign * bends.qZ),
+        (f, L.H, sign * bends.FZ),
+    ):
+        hess[i, k] += share * value
+        hess[k, i] += share * value
 
 
 @kernel

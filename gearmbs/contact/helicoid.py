@@ -270,6 +270,44 @@ def edge_of(ce, se, r, k, Z, tilt):
     )  # fmt: skip
 
 
+class EdgeBends(NamedTuple):
+    """Second derivatives of the polar angle of a helical tip edge in the section."""
+
+    pp: float
+    pq: float
+    qq: float
+    pF: float
+    qF: float
+    pZ: float
+    qZ: float
+    FF: float
+    FZ: float
+    ZZ: float
+
+
+@inlined
+def edge_bends(edge, ce, se, r, k, tilt):
+    """Return the second derivatives of the polar angle, from those of the equation it solves; see `edge_of`."""
+    p, q, i_w, i_w3 = tilt.p, tilt.q, tilt.i_w, tilt.i_w3
+    kr = k * r
+    w_p, w_q = -p * i_w, -q * i_w
+    n_n, n_p, n_q = -kr * (p * ce + q * se), w_p - kr * se, w_q + kr * ce
+    lag, inv = edge.lag, -edge.inverse
+    e_F, e_Z, e_p, e_q = edge.F, edge.Z, edge.p, edge.q
+    return EdgeBends(
+        inv * (n_n * e_p * e_p + 2.0 * n_p * e_p - lag * (i_w + p * p * i_w3)),
+        inv * (n_n * e_p * e_q + n_p * e_q + n_q * e_p - lag * p * q * i_w3),
+        inv * (n_n * e_q * e_q + 2.0 * n_q * e_q - lag * (i_w + q * q * i_w3)),
+        inv * ((n_n * e_p + n_p) * e_F - w_p),
+        inv * ((n_n * e_q + n_q) * e_F - w_q),
+        inv * (n_n * e_p + n_p) * e_Z,
+        inv * (n_n * e_q + n_q) * e_Z,
+        inv * n_n * e_F * e_F,
+        inv * n_n * e_F * e_Z,
+        inv * n_n * e_Z * e_Z,
+    )
+
+
 @inlined
 def edge_slopes(screw, edge, sn, cs, r, rt, Z, sa, ca, tilt):
     """Support of a helical tip edge, rounded in the transverse section, and its slopes.
@@ -314,7 +352,7 @@ def edge_curvatures(screw, edge, sn, cs, ce, se, r, rt, k, Z, sa, ca, tilt):
         As in `edge_of`.
     """
     A, B, kap2 = screw.A, screw.B, screw.kap2
-    p, q, i_w, i_w3, i_w5 = tilt.p, tilt.q, tilt.i_w, tilt.i_w3, tilt.i_w5
+    i_w, i_w3, i_w5 = tilt.i_w, tilt.i_w3, tilt.i_w5
     kap = np.sqrt(kap2)
     by_eta = corner_slopes(A, B, kap, sn, cs, r, rt, tilt).F
     c = corner_curvatures(A, B, kap, sn, cs, r, rt, tilt)
@@ -322,18 +360,8 @@ def edge_curvatures(screw, edge, sn, cs, ce, se, r, rt, k, Z, sa, ca, tilt):
     c_AB = c.AB + Z * (3.0 * kap2 * B * i_w5 - 2.0 * B * i_w3)
     c_BB = c.BB + Z * A * (i_w3 + 3.0 * B * B * i_w5)
     a_A, a_B = c.alpha_A + Z * A * B * i_w3, c.alpha_B + Z * (i_w + B * B * i_w3)
-    # second derivatives of eta, from those of the equation it solves
-    kr = k * r
-    w_p, w_q = -p * i_w, -q * i_w
-    n_n, n_p, n_q = -kr * (p * ce + q * se), w_p - kr * se, w_q + kr * ce
-    lag, inv = edge.lag, -edge.inverse
+    pp, pq, qq, pF, qF, pZ, qZ, FF, FZ, ZZ = edge_bends(edge, ce, se, r, k, tilt)
     e_F, e_Z, e_p, e_q = edge.F, edge.Z, edge.p, edge.q
-    pp = inv * (n_n * e_p * e_p + 2.0 * n_p * e_p - lag * (i_w + p * p * i_w3))
-    pq = inv * (n_n * e_p * e_q + n_p * e_q + n_q * e_p - lag * p * q * i_w3)
-    qq = inv * (n_n * e_q * e_q + 2.0 * n_q * e_q - lag * (i_w + q * q * i_w3))
-    pF, qF = inv * ((n_n * e_p + n_p) * e_F - w_p), inv * ((n_n * e_q + n_q) * e_F - w_q)
-    pZ, qZ = inv * (n_n * e_p + n_p) * e_Z, inv * (n_n * e_q + n_q) * e_Z
-    FF, FZ, ZZ = inv * n_n * e_F * e_F, inv * n_n * e_F * e_Z, inv * n_n * e_Z * e_Z
     eta_p, eta_q = c.AF * sa + c.BF * ca, c.AF * ca - c.BF * sa
     to_p, to_q = eta_p + c.FF * e_p, eta_q + c.FF * e_q
     by_Z_A, by_Z_B = kap2 * i_w3, A * B * i_w3

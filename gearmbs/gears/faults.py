@@ -15,10 +15,32 @@ import numpy as np
 from gearmbs.gears.fault import Fault, Flank
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.iso1328 import random_pitch, tolerances
+from gearmbs.gears.modifications import Crowning, EndRelief, FlankMap, LeadCorrection, RootRelief, TipRelief
 from gearmbs.gears.spec import require
 from gearmbs.gears.stiffness import Crack, pair_stiffness
 from gearmbs.gears.tooth_deviations import ToothDeviations
 from gearmbs.units import Quantity
+
+__all__ = [
+    "BrokenTooth",
+    "ChippedCorner",
+    "Crowning",
+    "CumulativePitchError",
+    "Eccentricity",
+    "EndRelief",
+    "Fault",
+    "FlankMap",
+    "GradedFlanks",
+    "LeadCorrection",
+    "Pit",
+    "PitchError",
+    "RootCrack",
+    "RootRelief",
+    "TipRelief",
+    "Waviness",
+    "Wear",
+    "Wobble",
+]
 
 POINTS_A_WAVE = 10
 """Points of the profile that a wave along the flank must be resolved by."""
@@ -397,103 +419,3 @@ class GradedFlanks(Fault):
                 lead = limit.lead_slope * scale[2, tooth] * across
                 lead = lead + 0.5 * limit.lead_form * scale[3, tooth] * np.sin(3 * math.pi * across + wave[1])
                 deviations.shape[flank, tooth] += self.profile * profile[None, :] + self.lead * lead[:, None]
-
-
-@dataclass(frozen=True, kw_only=True)
-class TipRelief(Fault):
-    """Material taken from the tip of all teeth.
-
-    Parameters
-    ----------
-    amount : float or str
-        At the tip.
-    length : float or str
-        Length of roll below the tip over which it extends.
-    power : float
-        1 linear, 2 parabolic.
-    teeth, flank
-        Which flanks.
-    """
-
-    label: ClassVar[str] = "tip relief"
-    units: ClassVar[dict[str, str]] = {"amount": "length", "length": "length"}
-
-    amount: Quantity = 20e-6
-    length: Quantity = 3e-3
-    power: float = 1.0
-    teeth: Any = "all"
-    flank: Flank = "both"
-
-    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
-        name = type(self).__name__
-        require(self.length > 0, f"{name}.length is {self.length} m; it must be positive")
-        require(self.power >= 1, f"{name}.power is {self.power}; give 1 (linear) or more")
-        relief = self.amount * np.clip(1 - self._distance(deviations, pair) / self.length, 0, None) ** self.power
-        for flank in deviations.flanks(self.flank):
-            deviations.shape[flank, deviations.tooth_list(self.teeth)] += relief
-
-    def _distance(self, deviations: ToothDeviations, pair: PairGeometry) -> np.ndarray:
-        return deviations.gear.sign * (deviations.gear.tip_roll_length - deviations.roll_length)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RootRelief(TipRelief):
-    """Material taken from the flank near the root; ``length`` counts from the start of the active profile."""
-
-    label: ClassVar[str] = "root relief"
-
-    def _distance(self, deviations: ToothDeviations, pair: PairGeometry) -> np.ndarray:
-        start = pair.first_roll_lengths[self.wheel == "driven"]
-        return np.maximum(deviations.gear.sign * (deviations.roll_length - start), 0.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Crowning(Fault):
-    """Flanks relieved towards both ends of the face, as a parabola.
-
-    Parameters
-    ----------
-    amount : float or str
-        At the ends of the face.
-    teeth, flank
-        Which flanks.
-    """
-
-    label: ClassVar[str] = "crowning"
-    units: ClassVar[dict[str, str]] = {"amount": "length"}
-    along_face: ClassVar[bool] = True
-
-    amount: Quantity = 10e-6
-    teeth: Any = "all"
-    flank: Flank = "both"
-
-    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
-        relief = self.amount * (2 * deviations.section / deviations.gear.face_width) ** 2
-        for flank in deviations.flanks(self.flank):
-            deviations.shape[flank, deviations.tooth_list(self.teeth)] += relief[:, None]
-
-
-@dataclass(frozen=True, kw_only=True)
-class LeadCorrection(Fault):
-    """A flank that leans along the face: helix slope, as a fault or against a known misalignment.
-
-    Parameters
-    ----------
-    amount : float or str
-        Material missing at the +z end less that at the -z end.
-    teeth, flank
-        Which flanks.
-    """
-
-    label: ClassVar[str] = "lead deviation"
-    units: ClassVar[dict[str, str]] = {"amount": "length"}
-    along_face: ClassVar[bool] = True
-
-    amount: Quantity = 10e-6
-    teeth: Any = "all"
-    flank: Flank = "both"
-
-    def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
-        slope = self.amount * deviations.section / deviations.gear.face_width
-        for flank in deviations.flanks(self.flank):
-            deviations.shape[flank, deviations.tooth_list(self.teeth)] += slope[:, None]

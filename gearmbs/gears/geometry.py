@@ -223,6 +223,11 @@ class PairGeometry(Written):
         return one.sign * getattr(one, radius) + two.sign * getattr(two, radius)
 
     @property
+    def mesh_angle(self) -> float:
+        """Direction from the driver to the mesh, rad: that of the driven wheel, opposite to that of an internal one."""
+        return 0.0 if self.sign > 0 else math.pi
+
+    @property
     def base_radius_sum(self) -> float:
         """Signed sum of the base radii r_b1 + r_b2, m."""
         return self._sum("base_radius")
@@ -309,6 +314,12 @@ class PairGeometry(Written):
         """Overlap ratio eps_beta: common face width over axial pitch; 0 for spur wheels."""
         low, high = self.common_face
         return (high - low) * math.sin(self.driver.helix_angle) / (math.pi * self.driver.module)
+
+    @property
+    def half_overlap(self) -> float:
+        """How far the contact moves along the path from mid-face to an end of the common face, m."""
+        low, high = self.common_face
+        return 0.5 * (high - low) * math.tan(self.driver.base_helix_angle)
 
     @property
     def total_contact_ratio(self) -> float:

@@ -97,8 +97,9 @@ def contact_pattern(
     The load of a pair of teeth is integrated between the ends of its own common face by the midpoint rule, eight points
     to a section, over gaps that are straight between the sections. With ``load="adams"`` it is the one force of the
     overlap, spread as its cross-section, depth^1.5. The total of the drive flanks less that of the coast flanks, times
-    r_b, is the torque within 0.2 % while involutes touch. A corner in contact has another arm than r_b: deviations of
-    1.3 % were seen and, for jammed teeth, which carry much more on both sides, 3 % of the drive flanks' load.
+    r_b cos(beta_b), is the torque within 0.2 % while involutes touch. A corner in contact has another arm than r_b:
+    deviations of 1.3 % were seen and, for jammed teeth, which carry much more on both sides, 3 % of the drive flanks'
+    load.
     """
     side = COAST_ALIASES.get(side, side)
     if side not in ("drive", "coast"):
@@ -143,12 +144,15 @@ def contact_pattern(
 
 
 def _engagement(geometry: PairGeometry, rotation: int, tooth: int) -> tuple[float, float, float]:
-    """Driver angle at which a tooth touches at the pitch point; roll angles half a pitch before and after its path."""
+    """Driver angle at which a tooth touches at the pitch point; roll angles half a pitch before and after its path.
+
+    At mid-face; a helix begins at one end of the face before, and ends at the other after it.
+    """
     gear = geometry.wheels[0]
     alpha = geometry.working_pressure_angle
-    middle, reach = gear.base_radius * math.tan(alpha), 0.5 * gear.base_pitch
-    # tooth 0 touches at length of roll s when the driver is at s / r_b - psi - alpha, on the drive flank
-    offset = rotation * (math.tan(alpha) - gear.base_half_angle - alpha)
+    middle, reach = gear.base_radius * math.tan(alpha), 0.5 * gear.base_pitch + geometry.half_overlap
+    # tooth 0 touches at length of roll s when the driver is at s / r_b - psi - alpha from the mesh, on the drive flank
+    offset = rotation * (math.tan(alpha) - gear.base_half_angle - alpha) + geometry.mesh_angle
     offset -= 2 * math.pi * tooth / gear.teeth
     begin = geometry.first_roll_lengths[0] - middle - reach
     end = gear.tip_roll_length - middle + reach

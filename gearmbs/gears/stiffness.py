@@ -9,6 +9,7 @@ References
 .. [3] Yang, D. C. H., Lin, J. Y.: Hertzian damping, tooth friction and bending elasticity in gear impact dynamics.
    J. Mechanisms, Transmissions and Automation in Design 109 (1987) 189-196. Constant Hertz stiffness.
 .. [4] ISO 6336-1: Calculation of load capacity of spur and helical gears, method B for c' and c_gamma.
+.. [5] Cornell, R. W.: Compliance and stress sensitivity of spur gear teeth. J. Mech. Design 103 (1981) 447-459.
 """
 
 from __future__ import annotations
@@ -57,7 +58,8 @@ def rack_root(gear: GearSpec, points: int = POINTS) -> tuple[np.ndarray, np.ndar
 
     The rack's tip circle rolls off on the pitch circle; ``gamma`` is the angle at which it touches the curve.
     """
-    _external(gear)
+    if gear.internal:
+        raise ValueError(f"{gear.name} is internal: no rack cuts it; its root is the arc of the drawing")
     alpha = gear.transverse_pressure_angle
     radius, depth, across = _rack_tip(gear)
     gamma = np.linspace(math.pi / 2, alpha, points)
@@ -68,12 +70,15 @@ def rack_root(gear: GearSpec, points: int = POINTS) -> tuple[np.ndarray, np.ndar
     return half, height
 
 
-def _external(gear: GearSpec) -> None:
-    if gear.internal:
-        raise ValueError(
-            f"{gear.name} is internal: the potential-energy method is for teeth cut by a rack; give the contact law of "
-            "an internal pair a constant stiffness, for instance by with_iso_stiffness()"
-        )
+def ring_root(gear: GearSpec, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
+    """Root arc of an internal wheel: half thickness and height over the axis, from root circle to involute."""
+    centre = gear.fillet_half_angle
+    middle = gear.fillet_centre_radius * np.array([math.sin(centre), math.cos(centre)])
+    # from where the arc touches the root circle to where it stands radially
+    begin = math.pi / 2 - centre
+    end = begin + math.pi - math.acos(gear.fillet_radius / gear.fillet_centre_radius)
+    turn = np.linspace(begin, end, points)
+    return middle[0] + gear.fillet_radius * np.cos(turn), middle[1] + gear.fillet_radius * np.sin(turn)
 
 
 def _rack_tip(gear: GearSpec) -> tuple[float, float, float]:
@@ -127,17 +132,21 @@ def tooth_compliance(gear: GearSpec, crack: Crack | None = None, root_angle: flo
     -------
     ToothCompliance
     """
-    rb, psi, b = gear.base_radius, gear.base_half_angle, gear.face_width
+    rb, b, sign = gear.base_radius, gear.face_width, gear.sign
     E = gear.material.youngs_modulus
     G = E / (2 * (1 + gear.material.poisson_ratio))
-    half, height = rack_root(gear)
-    start = math.sqrt(max(half[-1] ** 2 + height[-1] ** 2 - rb**2, 0.0))
+    half, height = ring_root(gear) if gear.internal else rack_root(gear)
+    start = gear.form_roll_length
+    if not gear.internal:
+        start = math.sqrt(max(half[-1] ** 2 + height[-1] ** 2 - rb**2, 0.0))
     roll_length = np.linspace(start, gear.tip_roll_length, 2 * POINTS)
-    beta = roll_length / rb - psi
-    x_load = rb * ((beta + psi) * np.cos(beta) - np.sin(beta))
-    y_load = rb * ((beta + psi) * np.sin(beta) + np.cos(beta))
+    beta = roll_length / rb - sign * gear.base_half_angle
+    cos, sin = np.cos(beta), np.sin(beta)
+    x_load = sign * (roll_length * cos - rb * sin)
+    from_axis = roll_length * sin + rb * cos
     x = np.concatenate([half, x_load[1:]])
-    y = np.concatenate([height, y_load[1:]]) - height[0]
+    y = sign * (np.concatenate([height, from_axis[1:]]) - height[0])
+    y_load = sign * (from_axis - height[0])
     thick = 2 * x
     if crack is not None:
         left = half[0] - crack.depth * math.sin(crack.angle)
@@ -153,20 +162,52 @@ def tooth_compliance(gear: GearSpec, crack: Crack | None = None, root_angle: flo
         steps = 0.5 * (density[1:] + density[:-1]) * np.diff(y)
         return np.concatenate([[0.0], np.cumsum(steps)])[half.size - 1 :]
 
-    cos, sin = np.cos(beta), np.sin(beta)
-    lever = cos * (y_load - height[0]) - x_load * sin
+    lever = cos * y_load - x_load * sin
     bending = (lever**2 * along(1 / second) - 2 * lever * cos * along(y / second) + cos**2 * along(y**2 / second)) / E
     shear = SHEAR * cos**2 * along(1 / area) / G
     axial = sin**2 * along(1 / area) / E
+    if gear.internal:
+        foundation = half_plane_foundation(gear, beta, lever / cos, 2 * half[0])
+    else:
+        foundation = _disc_foundation(gear, beta, from_axis, root_angle)
+    parts = (roll_length, bending, shear, axial, foundation)
+    # by rising length of roll, which is from the tip to the root of an internal wheel
+    return ToothCompliance(*(part[::sign] for part in parts))
+
+
+def _disc_foundation(gear: GearSpec, beta: np.ndarray, from_axis: np.ndarray, root_angle: float | None) -> np.ndarray:
+    """Compliance of the body of an external wheel, a ring fixed at its bore [2]_, m/N."""
     theta = root_half_angle(gear) if root_angle is None else root_angle
     ratio = gear.root_radius / gear.bore_radius if gear.bore_radius > 0 else 7.0
     fit = {
         name: c[0] / theta**2 + c[1] * ratio**2 + c[2] * ratio / theta + c[3] / theta + c[4] * ratio + c[5]
         for name, c in SAINSOT.items()
     }
-    u = (y_load - gear.root_radius) / (2 * gear.root_radius * theta)
-    foundation = cos**2 / (E * b) * (fit["L"] * u**2 + fit["M"] * u + fit["P"] * (1 + fit["Q"] * np.tan(beta) ** 2))
-    return ToothCompliance(roll_length, bending, shear, axial, foundation)
+    u = (from_axis - gear.root_radius) / (2 * gear.root_radius * theta)
+    stiff = gear.material.youngs_modulus * gear.face_width
+    return np.cos(beta) ** 2 / stiff * (fit["L"] * u**2 + fit["M"] * u + fit["P"] * (1 + fit["Q"] * np.tan(beta) ** 2))
+
+
+def half_plane_foundation(gear: GearSpec, beta: np.ndarray, lever: np.ndarray, thickness: float) -> np.ndarray:
+    """Compliance of the body under a tooth as that of an elastic half plane [5]_, m/N.
+
+    ``cos^2 beta / (E b) [5.306 (l / h)^2 + 2 (1 - nu) l / h + 1.534 (1 + 0.4167 tan^2 beta / (1 + nu))]``: the rim of
+    an internal wheel without its own bending.
+
+    Parameters
+    ----------
+    gear : GearSpec
+    beta : ndarray
+        Angle of the load against the direction across the tooth, rad.
+    lever : ndarray
+        Height above the root where the load meets the tooth's middle line, m.
+    thickness : float
+        Of the tooth at its root, m.
+    """
+    nu = gear.material.poisson_ratio
+    slender = lever / thickness
+    shape = 5.306 * slender**2 + 2 * (1 - nu) * slender + 1.534 * (1 + 0.4167 * np.tan(beta) ** 2 / (1 + nu))
+    return np.cos(beta) ** 2 * shape / (gear.material.youngs_modulus * gear.face_width)
 
 
 def hertz_stiffness(pair: PairGeometry) -> float:

@@ -341,9 +341,10 @@ def _passing(pair: Mesh, begin: float, end: float) -> tuple[set[int], set[int]]:
     gear, mate = geometry.wheels
     alpha = geometry.working_pressure_angle
     middle = gear.base_radius * math.tan(alpha)
-    centre = (math.tan(alpha) - gear.base_half_angle - alpha) * gear.teeth / (2 * math.pi)
-    first = (geometry.first_roll_lengths[0] - middle) / gear.base_pitch
-    last = (gear.tip_roll_length - middle) / gear.base_pitch
+    turned = math.tan(alpha) - gear.base_half_angle - alpha + side * geometry.mesh_angle
+    centre = turned * gear.teeth / (2 * math.pi)
+    first = (geometry.first_roll_lengths[0] - middle - geometry.half_overlap) / gear.base_pitch
+    last = (gear.tip_roll_length - middle + geometry.half_overlap) / gear.base_pitch
     # the tooth of the driven wheel that tooth 0 of the driver meets
     angle = side * centre * 2 * math.pi / gear.teeth
     rows = mesh.gaps(angle, mesh.ideal_angle(angle))

@@ -19,6 +19,12 @@ PAIRS = {
     "ring -1 mm": GearPair(
         GearSpec(23, "3 mm"), GearSpec.ring(70, "3 mm", addendum="2 mm"), centre_distance_error="-1 mm", slices=7
     ),
+    "ring +1 mm": GearPair(
+        GearSpec(23, "3 mm"),
+        GearSpec.ring(70, "3 mm", addendum="2.5 mm", dedendum="5 mm"),
+        centre_distance_error="1 mm",
+        backlash="1.4 mm",
+    ),
     "ring skew": GearPair(GearSpec(23, "3 mm"), GearSpec.ring(70, "3 mm"), misalignment="1 deg", backlash="0.9 mm"),
     "ring inclination": GearPair(
         GearSpec(23, "3 mm", tip_rounding="0.2 mm"),
@@ -45,6 +51,24 @@ PAIRS = {
         centre_distance_error="1 mm",
     ),
     "helical ring": GearPair(GearSpec(23, "3 mm", **HELIX), GearSpec.ring(70, "3 mm", **HELIX), backlash="0.2 mm"),
+    "helical ring +1 mm": GearPair(
+        GearSpec(23, "3 mm", **HELIX),
+        GearSpec.ring(70, "3 mm", addendum="2.5 mm", dedendum="5 mm", **HELIX),
+        centre_distance_error="1 mm",
+        backlash="1.4 mm",
+    ),
+    "helical ring -1 mm": GearPair(
+        GearSpec(23, "3 mm", **HELIX),
+        GearSpec.ring(70, "3 mm", addendum="2 mm", **HELIX),
+        centre_distance_error="-1 mm",
+    ),
+    "helical ring inclination": GearPair(
+        GearSpec(23, "3 mm", **HELIX),
+        GearSpec.ring(70, "3 mm", **HELIX),
+        misalignment="1 deg",
+        plane="inclination",
+        backlash="0.9 mm",
+    ),
     "helical ring skew": GearPair(
         GearSpec(23, "3 mm", hand="left", **HELIX),
         GearSpec.ring(70, "3 mm", hand="left", **HELIX),

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numba import njit
 
+from benchmarks.random_poses import rotations
 from gearmbs.contact import gear_contact
 from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
 from gearmbs.gears.faults import BrokenTooth, ChippedCorner, Eccentricity, GradedFlanks, Pit, RootCrack
 
 from .probe_tools import Contact
-from .test_fuzz import rotations
 
 PARTS = 16
 ROUNDS = 6

@@ -12,7 +12,9 @@ from gearmbs.gears.faults import (
     Crowning,
     CumulativePitchError,
     Eccentricity,
+    EndRelief,
     Fault,
+    FlankMap,
     GradedFlanks,
     LeadCorrection,
     Pit,
@@ -34,6 +36,8 @@ ALL = [
     Crowning,
     CumulativePitchError,
     Eccentricity,
+    EndRelief,
+    FlankMap,
     GradedFlanks,
     LeadCorrection,
     Pit,
@@ -395,3 +399,32 @@ def test_wear_is_least_at_the_pitch_point():
     assert abs(deviations.radius[worn.argmin()] - pair.driver.pitch_radius) < 0.3e-3
     assert worn.max() == pytest.approx(20e-6, rel=0.05)
     assert np.all(deviations.shape[1 - deviations.drive] == 0)
+
+
+def test_end_relief_takes_from_the_ends_of_the_face():
+    pair = GearPair.paper(backlash="0.4 mm", faults=[EndRelief(amount="20 um", length="4 mm", ends=1)])
+    shape = tooth_deviations(pair)[0].shape[0, 3]
+    section = tooth_deviations(pair)[0].section
+    assert shape[-1, 0] == pytest.approx(20e-6)
+    assert np.all(shape[section <= 6e-3] == 0)
+    assert shape[np.isclose(section, 8.125e-3), 5] == pytest.approx(20e-6 * (2.125 / 4) ** 2)
+    with pytest.raises(ValueError, match="face width"):
+        tooth_deviations(GearPair.paper(faults=[EndRelief(length="30 mm")]))
+    with pytest.raises(ValueError, match="ends is 2"):
+        tooth_deviations(GearPair.paper(faults=[EndRelief(ends=2)]))
+
+
+def test_flank_map_passes_through_its_numbers():
+    amounts = [["1 um", "2 um", "4 um"], ["0 um", "0 um", "-1 um"], ["3 um", "3 um", "3 um"]]
+    pair = GearPair.paper(faults=[FlankMap(amounts=amounts, teeth=2, flank="drive")])
+    found = tooth_deviations(pair)[0]
+    assert found.shape[0, 2, 0, -1] == pytest.approx(4e-6)
+    assert found.shape[0, 2, 16, -1] == pytest.approx(-1e-6)
+    assert found.shape[0, 2, 8, 0] == pytest.approx(0.5e-6)
+    assert np.all(found.shape[0, 2, -1] == pytest.approx(3e-6))
+    assert not found.shape[1].any()
+    assert not found.shape[0, 1].any()
+    assert pair.faults[0].severity == pytest.approx(4e-6)
+    for wrong in ([[0.0, 1.0]], [[0.0, 1e-6], [0.0]], "flat", [[0.0, float("nan")], [0.0, 0.0]]):
+        with pytest.raises(ValueError, match=r"FlankMap\.amounts"):
+            FlankMap(amounts=wrong)

@@ -1,9 +1,11 @@
 """Contact pattern, load sharing and histories."""
 
+import math
+
 import numpy as np
 import pytest
 
-from gearmbs.gears import ContactLaw, FlankFriction, GearPair
+from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
 from gearmbs.gears.faults import Crowning, RootCrack
 from gearmbs.gears.history import contact_history
 from gearmbs.gears.pattern import contact_pattern
@@ -108,3 +110,23 @@ def test_history_counts_separations_and_coast_hits():
     assert np.all(history.damping_power >= 0)
     with pytest.raises(ValueError, match="instants"):
         contact_history(pair, (zero, np.zeros((n, 3, 3)), zero, zero), (zero[1:], np.zeros((n, 3, 3)), zero, zero))
+
+
+@pytest.mark.parametrize("internal", [False, True])
+@pytest.mark.parametrize("helix", [0.0, 0.26])
+def test_tooth_of_any_kind_of_wheel_passes_its_engagement(helix, internal):
+    one = GearSpec(23, "3 mm", helix_angle=helix)
+    two = GearSpec(70, "3 mm", helix_angle=helix, internal=internal, hand="right" if internal else "left")
+    pair = GearPair(one, two, backlash="0.2 mm", friction=FlankFriction.none())
+    found = contact_pattern(pair, torque=200.0, points=61, sections=21)
+    assert found.force[0] == found.force[-1] == 0
+    # loaded for the total contact ratio, in pitches, a little longer by the load
+    pitches = found.roll_angle * one.teeth / (2 * math.pi)
+    loaded = np.ptp(pitches[found.force > 0])
+    step = pitches[1] - pitches[0]
+    assert pair.total_contact_ratio - 2 * step < loaded < pair.total_contact_ratio + 0.25 + 2 * step
+    torque = found.total * two.base_radius * math.cos(two.base_helix_angle)
+    assert torque == pytest.approx(200.0, rel=0.015)
+    # teeth one pitch apart share the load
+    middle = abs(pitches - pitches.mean()).argmin()
+    assert 0.2 < found.share[middle] <= 1

@@ -9,12 +9,14 @@ from gearmbs.gears import GearPair, GearSpec, Material
 from gearmbs.gears.faults import RootCrack
 from gearmbs.gears.stiffness import (
     Crack,
+    compliance_roll_lengths,
     hertz_stiffness,
     iso_mesh_stiffness,
     iso_single_stiffness,
     mesh_stiffness,
     pair_stiffness,
     rack_root,
+    ring_root,
     tooth_compliance,
 )
 
@@ -174,3 +176,46 @@ def test_mesh_stiffness_tells_that_it_leaves_cracks_out():
     with pytest.warns(UserWarning, match="leaves the pair's root cracks out"):
         curve = mesh_stiffness(pair.with_faults(RootCrack()), 20)
     assert np.array_equal(curve.stiffness, mesh_stiffness(pair, 20).stiffness)
+
+
+def test_internal_teeth_by_energy():
+    one, ring = GearSpec(23, "3 mm"), GearSpec.ring(70, "3 mm")
+    tooth = tooth_compliance(ring)
+    assert np.all(np.diff(tooth.roll_length) > 0)
+    # softest at the tip, which has the shorter length of roll
+    assert np.all(np.diff(tooth.total) < 0)
+    pair = GearPair(one, ring, backlash="0.1 mm")
+    outside = GearPair(one, GearSpec(70, "3 mm"))
+    assert mesh_stiffness(pair).mean > mesh_stiffness(outside).mean
+    # the outline the beam follows: from the root circle along the arc to the involute
+    half, height = ring_root(ring)
+    radius = np.hypot(half, height)
+    assert (radius[0], radius[-1]) == pytest.approx((ring.root_radius, ring.form_radius), rel=1e-12)
+    assert math.atan2(half[-1], height[-1]) == pytest.approx(ring.half_angle(ring.form_radius), rel=1e-12)
+    rolls = compliance_roll_lengths(pair.geometry)
+    cracked = pair_stiffness(pair.geometry, rolls, (None, Crack(2e-3)))
+    assert np.all(cracked < pair_stiffness(pair.geometry, rolls))
+
+
+def test_a_short_internal_tooth_is_a_beam_of_its_outline():
+    # bending alone, by quadrature over the beam's sections
+    ring = GearSpec.ring(70, "3 mm")
+    tooth = tooth_compliance(ring)
+    roll = ring.tip_roll_length
+    beta = roll / ring.base_radius + ring.base_half_angle
+    load = np.array(
+        [
+            ring.base_radius * math.sin(beta) - roll * math.cos(beta),
+            ring.base_radius * math.cos(beta) + roll * math.sin(beta),
+        ]
+    )
+    assert math.hypot(*load) == pytest.approx(ring.tip_radius)
+    half, height = ring_root(ring, 4000)
+    radii = np.linspace(ring.form_radius, ring.tip_radius, 8000)
+    angle = np.array([ring.half_angle(r) for r in radii])
+    x = np.concatenate([half, (radii * np.sin(angle))[1:]])
+    y = np.concatenate([height, (radii * np.cos(angle))[1:]])
+    moment = math.cos(beta) * (y - load[1]) - math.sin(beta) * load[0]
+    density = moment**2 / (ring.material.youngs_modulus * (2 * x) ** 3 * ring.face_width / 12)
+    energy = float((0.5 * (density[1:] + density[:-1]) * -np.diff(y)).sum())
+    assert tooth.bending[0] == pytest.approx(energy, rel=1e-4)
