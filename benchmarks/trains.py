@@ -1,0 +1,130 @@
+"""What a mesh, a body and a mesh cycle of a drivetrain cost: the bench beside its first pair, and stages in line.
+
+    python -m benchmarks.trains --repeats 5
+
+All models run in turn in one process, so that a busy machine slows all of them alike; what counts are processor times
+and the medians of ratios within a turn.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from benchmarks.markdown import number, table
+
+SPAN = 0.2
+"""Simulated time of each run, s."""
+STAGES = (1, 2, 5, 10)
+
+
+def stages_in_line(count: int) -> Any:
+    """Return so many equal stages one after the other, with joints as bearings, as a drivetrain."""
+    from gearmbs.drivetrain import Drivetrain, GearMesh, IdealBearing, Shaft, SpeedDrive, TorqueLoad, Wheel
+    from gearmbs.gears import GearSpec
+
+    wheels, meshes = [], []
+    for k in range(count):
+        for shaft, side in ((k, "a"), (k + 1, "b")):
+            gear = GearSpec(29, 95e-3 / 31, face_width=0.02, name=f"{side}{k}")
+            wheels.append(Wheel(name=f"{side}{k}", shaft=f"s{shaft}", station=0.05 + 0.1 * k, gear=gear))
+        meshes.append(GearMesh(name=f"m{k}", driver=f"a{k}", driven=f"b{k}", settings={"backlash": "0.1 mm"}))
+    return Drivetrain(
+        f"{count} stages",
+        shafts=[Shaft(name=f"s{k}", length=0.1 * (count + 1)) for k in range(count + 1)],
+        wheels=wheels,
+        meshes=meshes,
+        bearings=[IdealBearing(name=f"of {k}", shaft=f"s{k}", station=0.02) for k in range(count + 1)],
+        drives=[SpeedDrive(name="drive", shaft="s0", speed="1000 rpm")],
+        loads=[TorqueLoad(name="load", shaft=f"s{count}", torque=100.0)],
+        running=True,
+        run_up=0.02,
+    )
+
+
+def models() -> dict[str, tuple[Any, float, int, int]]:
+    """Return mechanism, fastest mesh (rad/s), meshes and bodies of every model, by name."""
+    from gearmbs.studies import BenchSettings, bench_train, gear_rig
+
+    joints = bench_train("5 MPa", settings=BenchSettings(bearings="ideal", motor="speed", pump_teeth=0))
+    trains = {"bench, joints": joints, "bench, elastic bearings": bench_train("5 MPa")}
+    trains |= {f"{n} stage{'s' if n > 1 else ''} in line": stages_in_line(n) for n in STAGES}
+    pair = gear_rig(joints.pairs["pair 1"], speed="1000 rpm", torque="200 N m", run_up=0.02)
+    out = {"healthy pair": (pair, joints.rate_scale, 1, len(pair.bodies))}
+    for name, train in trains.items():
+        m = train.build()
+        out[name] = (m, train.rate_scale, len(train.meshes), len(m.bodies))
+    return out
+
+
+def measure(repeats: int, span: float = SPAN, report: Callable[[str], None] = print) -> list[dict[str, Any]]:
+    """Return a row a model: meshes, bodies, steps, processor time, and its ratio to the pair's."""
+    found = models()
+    spent: dict[str, list[float]] = {name: [] for name in found}
+    steps = {}
+    for turn in range(repeats + 1):
+        for name, (m, scale, _, _) in found.items():
+            start = time.process_time()
+            solution = m.simulate(span, rate=12800, tol=1e-7, rate_scale=scale)
+            if not solution.success:
+                raise RuntimeError(f"{name}: {solution.message}")
+            # the first turn compiles
+            if turn:
+                spent[name].append(time.process_time() - start)
+            steps[name] = solution.stats.steps
+        report(f"turn {turn} of {repeats}")
+    pair = np.array(spent["healthy pair"])
+    return [
+        {
+            "model": name, "meshes": meshes, "bodies": bodies, "steps": steps[name],
+            "seconds": float(np.median(spent[name])), "ratio": float(np.median(np.array(spent[name]) / pair)),
+            "cycles": meshes * scale / (2.0 * math.pi) * span,
+        }
+        for name, (_, scale, meshes, bodies) in found.items()
+    ]  # fmt: skip
+
+
+def exponent(rows: list[dict[str, Any]]) -> float:
+    """Return the exponent with which processor time grows with the number of stages in line."""
+    line = [row for row in rows if "in line" in row["model"]]
+    return float(np.polyfit(np.log([row["meshes"] for row in line]), np.log([row["seconds"] for row in line]), 1)[0])
+
+
+def render(rows: list[dict[str, Any]], span: float = SPAN) -> str:
+    """Return the table in Markdown: times of one simulated second, and a step's cost shared out."""
+    cells = []
+    for row in rows:
+        step = 1e6 * row["seconds"] / row["steps"]
+        cells.append([
+            row["model"], str(row["meshes"]), str(row["bodies"]), number(row["seconds"] / span), number(row["ratio"]),
+            number(row["steps"] / span), number(step), number(step / row["meshes"]), number(step / row["bodies"]),
+            number(1e3 * row["seconds"] / row["cycles"]),
+        ])  # fmt: skip
+    header = [
+        "model", "meshes", "bodies", "s a simulated s", "of the pair's", "steps a s", "us a step", "us a step and mesh",
+        "us a step and body", "ms a mesh cycle",
+    ]  # fmt: skip
+    return (
+        table(header, cells) + f"\nStages in line: processor time grows with the power {exponent(rows):.2f} of them.\n"
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--span", type=float, default=SPAN, help="simulated time of each run, s")
+    given = parser.parse_args()
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    print(render(measure(given.repeats, given.span), given.span))
+
+
+if __name__ == "__main__":
+    main()

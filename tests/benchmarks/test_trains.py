@@ -1,0 +1,24 @@
+"""The cost of drivetrains: what its table says."""
+
+import pytest
+
+from benchmarks import trains
+
+
+def test_shares_of_a_step_and_the_exponent():
+    rows = [
+        {"model": f"{n} stages in line", "meshes": n, "bodies": n + 1, "steps": 1000, "seconds": 0.1 * n**1.1,
+         "ratio": 1.0, "cycles": 50.0 * n}
+        for n in (1, 2, 5, 10)
+    ]  # fmt: skip
+    assert trains.exponent(rows) == pytest.approx(1.1)
+    text = trains.render(rows, 0.1)
+    assert "| 1 stages in line | 1 | 2 | 1 | 1 | 10000 | 100 | 100 | 50 | 2 |" in text
+    assert "grows with the power 1.10" in text
+
+
+def test_every_model_is_measured():
+    rows = trains.measure(1, 0.002, report=lambda text: None)
+    assert [row["model"] for row in rows][:3] == ["healthy pair", "bench, joints", "bench, elastic bearings"]
+    assert rows[0]["ratio"] == 1.0
+    assert rows[-1]["meshes"] == 10
