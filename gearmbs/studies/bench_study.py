@@ -47,11 +47,16 @@ class BenchStudy:
         """Judge the three claims by a sensor, "laser" or "support"."""
         return judge(self.table.sel(sensor=sensor), sensor)
 
+    def judged(self) -> dict[str, list[Claim]]:
+        """Return the three claims as the bench's sensors, and the pair if it was run, have them."""
+        out = {f"bench, {name}": self.claims(name) for name in SENSORS}
+        if self.pair is not None:
+            out[f"pair, {self.pair.component.replace('_', ' ')}"] = self.pair.claims()
+        return out
+
     def report(self) -> str:
         """Return the report in Markdown: verdicts of bench and pair side by side, tables, choices."""
-        judged = {f"bench, {name}": self.claims(name) for name in SENSORS}
-        if self.pair is not None:
-            judged[f"pair, {self.pair.component.replace('_', ' ')}"] = self.pair.claims()
+        judged = self.judged()
         lines = ["# The test bench of Fig. 2", "", "## The three claims", "",
                  "| claim | " + " | ".join(judged) + " |", "|---|" + "---|" * len(judged)]  # fmt: skip
         for k, claim in enumerate(next(iter(judged.values()))):
@@ -95,6 +100,35 @@ class BenchStudy:
                 )
         return figure
 
+    def verdict_figure(self):
+        """Return the verdicts on the three claims with their numbers: a row a claim, a column a place of judgement."""
+        from textwrap import fill
+
+        from matplotlib.patches import Rectangle
+
+        from gearmbs.view.figure_style import look, new_figure
+
+        judged = self.judged()
+        with look():
+            figure = new_figure(3.4 * len(judged) + 2.0, 4.6)
+            ax = figure.subplots()
+            for column, claims in enumerate(judged.values()):
+                for row, claim in enumerate(claims):
+                    word, colour = ("held", "#d5e8d4") if claim.held else ("not held", "#f8cecc")
+                    ax.add_patch(Rectangle((column, row), 1.0, 1.0, facecolor=colour, edgecolor="white", lw=3.0))
+                    ax.text(column + 0.5, row + 0.2, word, ha="center", va="center", fontweight="bold")
+                    ax.text(column + 0.5, row + 0.62, fill(claim.numbers, 44), ha="center", va="center", fontsize=7)
+            names = [fill(claim.name, 22) for claim in next(iter(judged.values()))]
+            ax.set(xlim=(0, len(judged)), ylim=(len(names), 0))
+            ax.set_xticks(np.arange(len(judged)) + 0.5, list(judged))
+            ax.set_yticks(np.arange(len(names)) + 0.5, names)
+            ax.xaxis.tick_top()
+            ax.tick_params(length=0)
+            ax.grid(visible=False)
+            for spine in ax.spines.values():
+                spine.set_visible(False)
+        return figure
+
     def save(self, folder: str | Path) -> list[Path]:
         """Write records, table, figures and report to a folder; return the paths."""
         from gearmbs.view import save_figure
@@ -110,7 +144,7 @@ class BenchStudy:
         paths += [folder / "bench.nc", folder / "report.md"]
         for load in PRESSURES:
             paths += save_figure(self.figure(load), folder / f"{load}_load")
-        return paths
+        return [*paths, *save_figure(self.verdict_figure(), folder / "verdicts")]
 
 
 def run_bench(
