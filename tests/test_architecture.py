@@ -57,6 +57,7 @@ EXCEPTIONS = {
     ("bearings", "dae.equations"): "the same door: a bearing hands its kernel to the mechanism",
     ("signals", "view"): "its commands draw figures and write files",
     ("signals", "bearings"): "the kinematic lines of a bearing by its designation",
+    ("signals", "drivetrain"): "its commands take bearings and shafts from the description of a drivetrain",
     ("bearings", "dae.compiled"): "its kernels: views of flat tables",
     ("drivetrain", "dae.equations"): "the same door: torques about an axis hand their kernels to the mechanism",
     ("drivetrain", "dae.compiled"): "its kernels: views of tables, calls of laws through addresses",

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
         DEFECTS,
         Defect,
         Line,
+        LooseFit,
         Misalignment,
         OffSize,
         Pit,
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from gearmbs.bearings.errors import BearingError
     from gearmbs.bearings.geometry import Bearing
     from gearmbs.bearings.hertz import PointContact, groove_contact
+    from gearmbs.bearings.loose import add_bearing
     from gearmbs.bearings.profiles import spall_depth
     from gearmbs.bearings.ratings import equivalent_load, mean_load, rating_life
     from gearmbs.bearings.statics import BearingState, BearingStatics, stiffness_matrix
@@ -32,6 +34,7 @@ __all__ = [
     "BearingStatics",
     "Defect",
     "Line",
+    "LooseFit",
     "Misalignment",
     "OffSize",
     "Pit",
@@ -40,6 +43,7 @@ __all__ = [
     "Spall",
     "UnevenSpacing",
     "Waviness",
+    "add_bearing",
     "equivalent_load",
     "groove_contact",
     "mean_load",
@@ -58,6 +62,7 @@ late(
         "BearingStatics": ".statics",
         "Defect": ".defects",
         "Line": ".defects",
+        "LooseFit": ".defects",
         "Misalignment": ".defects",
         "OffSize": ".defects",
         "Pit": ".defects",
@@ -66,6 +71,7 @@ late(
         "Spall": ".defects",
         "UnevenSpacing": ".defects",
         "Waviness": ".defects",
+        "add_bearing": ".loose",
         "equivalent_load": ".ratings",
         "groove_contact": ".hertz",
         "mean_load": ".ratings",

@@ -300,6 +300,39 @@ class Misalignment(Defect):
 
 
 @dataclass(frozen=True, kw_only=True)
+class LooseFit(Defect):
+    """A ring that is loose on its seat; it is a body of its own then, see `gearmbs.bearings.add_bearing`.
+
+    Parameters
+    ----------
+    part : {"outer", "inner"}
+        Ring in the housing, or on the shaft.
+    clearance : float or str
+        Diametral, between ring and seat, m.
+    stiffness : float or str
+        Of the ring on its seat, and of the shoulder beside it, N/m.
+    damping : float or str
+        Damper by spring there, s.
+    creep : float
+        Viscous torque against turning in the seat, N m s/rad.
+    """
+
+    label: ClassVar[str] = "loose fit"
+    units: ClassVar[dict[str, str]] = {"clearance": "length", "stiffness": "stiffness", "damping": "time"}
+    part: str = OUTER
+    clearance: Quantity = "20 um"
+    stiffness: Quantity = 5e8
+    damping: Quantity = 1e-5
+    creep: float = 0.05
+
+    def check(self, bearing: Bearing) -> None:
+        require(self.part != ELEMENT, "LooseFit.part is 'element'; choose outer or inner")
+        require(0.0 < self.clearance < 1e-3, f"LooseFit.clearance is {self.clearance:g} m; give it in '... um'")
+        require(self.stiffness > 0.0, f"LooseFit.stiffness is {self.stiffness:g} N/m; it must be positive")
+        require(self.damping >= 0.0 and self.creep >= 0.0, "LooseFit: damping and creep must not be negative")
+
+
+@dataclass(frozen=True, kw_only=True)
 class UnevenSpacing(Defect):
     """Pockets of the cage that are not evenly spaced: drawn with a standard deviation, or one that is off.
 
@@ -344,7 +377,7 @@ class UnevenSpacing(Defect):
 
 
 DEFECTS: dict[str, type[Defect]] = {
-    kind.label: kind for kind in (Spall, Line, Pit, Waviness, OffSize, Misalignment, UnevenSpacing)
+    kind.label: kind for kind in (Spall, Line, Pit, Waviness, OffSize, Misalignment, LooseFit, UnevenSpacing)
 }
 """Classes by label, for files and command lines."""
 

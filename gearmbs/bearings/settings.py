@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gearmbs.bearings.defects import Defect
+from gearmbs.bearings.defects import Defect, LooseFit
 from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.geometry import Bearing
 from gearmbs.units import Quantity, to_si
@@ -68,5 +68,9 @@ class BearingSettings:
         for defect in self.defects:
             require(
                 isinstance(defect, Defect), f"RollingBearing.defects holds {defect!r}; give defects of gearmbs.bearings"
+            )
+            require(
+                not isinstance(defect, LooseFit),
+                "RollingBearing.defects holds a LooseFit: such a ring is a body; use gearmbs.bearings.add_bearing",
             )
             defect.check(self.bearing)

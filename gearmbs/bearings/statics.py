@@ -150,6 +150,51 @@ class BearingStatics:
             found.append(self.under(load, cage_angle=cage_angle, start=start))
         return found
 
+    def deflection_curve(self, direction: npt.ArrayLike, loads: npt.ArrayLike, *, cage_angle: float | None = None):
+        """Return displacement and stiffness along a direction over the size of a load.
+
+        Parameters
+        ----------
+        direction : sequence of 3 or 5 floats
+            Of the load; its first three components are made a unit vector, moments are taken by it.
+        loads : sequence of float
+            Sizes, N, growing.
+
+        Returns
+        -------
+        xarray.Dataset
+            Over ``load``: ``deflection`` (m) and ``stiffness`` (N/m) along the force, all five components of
+            ``displacement``, number of loaded elements and the largest element force.
+
+        Examples
+        --------
+        >>> curve = BearingStatics(Bearing.from_designation("6205")).deflection_curve([1, 0, 0], [100.0, 1000.0])
+        >>> [round(float(1e6 * d), 1) for d in curve.deflection]
+        [3.0, 13.9]
+        """
+        import xarray as xr
+
+        along = np.asarray(direction, dtype=float)
+        size = float(np.linalg.norm(along[:3])) if along.shape in ((3,), (5,)) else 0.0
+        require(size > 0.0, f"direction is {direction!r}; give 3 or 5 numbers with a force among them")
+        along = along / size
+        sizes = np.asarray(loads, dtype=float)
+        states = self.curve([load * along for load in sizes], cage_angle=cage_angle)
+        force = along[:3]
+        # by the flexibility: what the load does not hold gives way
+        held = [state.stiffness[: along.size, : along.size] for state in states]
+        softness = [float(along @ np.linalg.lstsq(matrix, along, rcond=1e-12)[0]) for matrix in held]
+        return xr.Dataset(
+            {
+                "deflection": ("load", [float(force @ state.displacement[:3]) for state in states], {"units": "m"}),
+                "stiffness": ("load", 1.0 / np.array(softness), {"units": "N/m"}),
+                "displacement": (("load", "axis"), np.stack([state.displacement for state in states])),
+                "loaded_elements": ("load", [state.loaded for state in states]),
+                "largest_element_force": ("load", [state.largest for state in states], {"units": "N"}),
+            },
+            {"load": ("load", sizes, {"units": "N"}), "axis": list(AXES)},
+        )
+
     # --- the iteration -----------------------------------------------------------------------------
 
     def _newton(self, place: np.ndarray, wanted: np.ndarray, cage_angle: float | None) -> np.ndarray:

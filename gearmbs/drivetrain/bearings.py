@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from gearmbs.dae.equations.force_elements import DISSIPATED, STORED, Diagnostic
 from gearmbs.drivetrain.errors import require, told_of
 from gearmbs.drivetrain.part import Part
-from gearmbs.mechanism.elements import Compiled, ForceElement
+from gearmbs.mechanism.elements import ForceElement
 from gearmbs.mechanism.parts import Marker
 from gearmbs.units import Quantity
 
@@ -200,33 +199,12 @@ class ClearanceBearing(Bearing):
         return np.eye(5)[: 3 if self.axial else 2]
 
     def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
+        from gearmbs.bearings.clearance import ClearanceForce
+
         reals = (self.clearance, self.stiffness, self.exponent, self.damping, self.depth)
         m.add(ClearanceForce(self.name, shaft, seat, reals))
         if self.axial:
             m.joint("inplane", f"{self.name} axial", shaft, seat)
-
-
-@dataclass(eq=False, repr=False)
-class ClearanceForce(ForceElement):
-    """The force of a bore on a journal with clearance; ``reals`` as in `gearmbs.drivetrain.clearance_kernel`."""
-
-    reals: tuple[float, ...]
-
-    kind = "clearance bearing"
-    has_torque = False
-    diagnostics = (
-        Diagnostic("elastic_energy", "J", STORED),
-        Diagnostic("damping_power", "W", DISSIPATED),
-        Diagnostic("penetration", "m"),
-    )
-
-    def compiled(self) -> Compiled:
-        from gearmbs.drivetrain.clearance_kernel import WORK, clearance_bearing
-
-        return Compiled(clearance_bearing, reals=self.reals, scratch=WORK)
-
-    def __repr__(self) -> str:
-        return f"ClearanceForce({self.name!r}, {self.i.body.name!r} in {self.j.body.name!r})"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -259,7 +237,8 @@ class RollingContactBearing(Bearing):
     ----------
     rolling : gearmbs.bearings.Bearing, str or mapping
     settings : mapping
-        Keywords of `gearmbs.bearings.RollingBearing`: damping, preload, sense, defects, ...
+        Keywords of `gearmbs.bearings.RollingBearing`: damping, preload, sense, defects, ... A `LooseFit` among the
+        defects makes the ring a body of its own.
     """
 
     kind: ClassVar[str] = "rolling"
@@ -271,9 +250,9 @@ class RollingContactBearing(Bearing):
         require(self.rolling is not None, f"{self.label}: rolling is missing; give a designation such as '6205'")
 
     def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
-        from gearmbs.bearings import RollingBearing
+        from gearmbs.bearings.loose import add_bearing
 
-        m.add(RollingBearing(self.name, shaft, seat, bearing=self.rolling, **self.settings))
+        add_bearing(m, self.name, shaft, seat, self.rolling, **self.settings)
 
 
 BEARINGS: dict[str, type[Bearing]] = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gearmbs.drivetrain.errors import DrivetrainError
 from gearmbs.drivetrain.parts import GearMesh
@@ -138,6 +138,35 @@ class KinematicTable:
         name = mesh if isinstance(mesh, str) else mesh.name
         driver, driven = self.train.wheels_of(name)
         return {"speed": abs(self.speeds[driver.shaft]), "teeth": (driver.gear.teeth, driven.gear.teeth)}
+
+    def for_bearings(self, shaft: str | None = None) -> dict[str, Any]:
+        """Return ``bearing``, ``speed`` (rad/s) and ``shafts`` as `gearmbs.signals.diagnose_bearing` takes them.
+
+        Parameters
+        ----------
+        shaft : str, optional
+            Whose speed is the reference; default: the first drive's.
+
+        Raises
+        ------
+        DrivetrainError
+            If no bearing has ``rolling``, or the reference shaft stands still.
+        """
+        reference = self.train.drives[0].shaft if shaft is None and self.train.drives else shaft
+        turns = abs(self.speeds.get(reference, 0.0)) if reference is not None else 0.0
+        if turns == 0.0:
+            raise DrivetrainError(
+                f"shaft '{reference}': is none of the drivetrain's or stands still; give a shaft that turns"
+            )
+        found = {}
+        for part in self.train.bearings:
+            if part.rolling is not None:
+                own = abs(self.speeds[part.shaft] - self.speeds.get(self.train.carrier(part), 0.0))
+                found[part.name] = (part.rolling, own / turns)
+        if not found:
+            raise DrivetrainError(f"drivetrain '{self.train.name}': no bearing has rolling; give a designation")
+        others = sorted({abs(speed) / turns for name, speed in self.speeds.items() if name != reference and speed})
+        return {"bearing": found, "speed": turns, "shafts": others}
 
     def to_markdown(self) -> str:
         """Return the table of frequencies in Markdown."""

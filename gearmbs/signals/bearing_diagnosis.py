@@ -14,11 +14,12 @@ from gearmbs.units import to_si
 
 from .bearing_envelopes import envelope_spectra
 from .bearing_evidence import HARMONICS, SLIP, EnvelopeSpectrum
-from .bearing_judgement import Judged, judge
+from .bearing_judgement import NONE, Judged, judge
 from .bearing_lines import BearingLines, bearing_lines
 from .bearing_report import BearingReport, PartFinding
 from .door import to_signal
 from .errors import MissingMetadataError, SignalError
+from .phase import phase_from_speed
 from .signal import rate_of, require, units_of
 
 LEAST_TURNS = 20
@@ -27,7 +28,7 @@ LEAST_TURNS = 20
 def diagnose_bearing(
     signal: Any,
     bearing: Any,
-    speed: float | str | None = None,
+    speed: Any = None,
     *,
     band: tuple[float, float] | None = None,
     phase: xr.DataArray | None = None,
@@ -47,8 +48,9 @@ def diagnose_bearing(
         Dimensions (time, channel), or whatever `to_signal` makes a signal of by itself.
     bearing : Bearing, str, mapping, BearingLines, or a sequence of these
         See `bearing_lines`; a mapping from names to (bearing, ratio) gives bearings on shafts of other speeds.
-    speed : float or str, optional
-        Of the inner ring's shaft, rad/s or text; default the signal's.
+    speed : float, str or curve, optional
+        Of the inner ring's shaft, rad/s or text; default the signal's. Of a curve, as for `speed_curve`, the angle is
+        taken, see ``phase``.
     band : (float, float), optional
         Hz; default: the band of the kurtogram that is wide enough for the lines and lies below the filter's edge.
     phase : xarray.DataArray, optional
@@ -79,6 +81,8 @@ def diagnose_bearing(
         raise SignalError(f"slip: must lie between 0 and 0.2, got {slip!r}")
     if not 1 <= harmonics <= 20:
         raise SignalError(f"harmonics: must lie between 1 and 20, got {harmonics!r}")
+    if phase is None and speed is not None and not isinstance(speed, (int, float, str)):
+        phase = phase_from_speed(signal, speed)
     shaft, notes = _shaft(signal, speed, phase)
     rate = rate_of(signal)
     turns = signal.sizes["time"] / rate * shaft
@@ -99,7 +103,7 @@ def diagnose_bearing(
         bands[name], found = envelope_spectra(signal.isel(channel=[c]), shaft, highest, band=band, phase=phase)
         judged = judge(found, known, shaft, others, slip=slip, harmonics=harmonics, looks=signal.sizes["channel"])
         findings += [_finding(name, one, found, shaft) for one in judged]
-        spectra[name] = _table(found[0], highest * (harmonics + 1))
+        spectra[name] = _table(_shown(found, judged), highest * (harmonics + 1))
     return BearingReport(
         source=str(signal.attrs.get("source", signal.name or "signal")),
         rate=rate,
@@ -184,6 +188,15 @@ def _sidebands(spectrum: EnvelopeSpectrum, line: float, spacing: float) -> float
         return float(spectrum.ratio[max(k - 2, 1) : k + 3].max(initial=0.0))
 
     return 0.5 * (near(line - spacing) + near(line + spacing)) / max(near(line), 1e-300)
+
+
+def _shown(spectra: Sequence[EnvelopeSpectrum], judged: Sequence[Judged]) -> EnvelopeSpectrum:
+    """Return the spectrum with the clearest of the lines that were named, without any the first."""
+    named = [one.evidence for one in judged if one.grade != NONE]
+    if not named:
+        return spectra[0]
+    where = min(named, key=lambda evidence: evidence.log_chance).where
+    return next(spectrum for spectrum in spectra if spectrum.where == where)
 
 
 def _table(spectrum: EnvelopeSpectrum, top: float) -> pd.DataFrame:

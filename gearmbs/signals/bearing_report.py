@@ -104,7 +104,8 @@ class BearingReport:
     bands : dict
         Band in Hz by channel: the kurtogram's or the one given.
     spectra : dict of DataFrame
-        Squared envelope spectrum by channel: ``frequency`` and ``power`` by its median, mean 1 in noise.
+        Squared envelope spectrum by channel, that with the clearest lines: ``frequency`` and ``power`` by its
+        neighbourhood, mean 1 in noise.
     levels : DataFrame
         RMS, crest factor and kurtosis by channel.
     shafts : tuple of float, optional

@@ -41,6 +41,9 @@ def analyse(
         list[str] | None,
         typer.Option(help='Speed of another shaft by that given, e.g. 0.345; "none" if there is no other; repeat.'),
     ] = None,
+    train: Annotated[
+        Path | None, typer.Option(help="Drivetrain (TOML) whose bearings with rolling are looked for, with its shafts.")
+    ] = None,
     gaps: Gaps = None,
     format: Annotated[str | None, typer.Option(help="Format of the file, if its name does not say.")] = None,
     tables: Annotated[Path | None, typer.Option(help="Folder for the tables as CSV.")] = None,
@@ -77,18 +80,18 @@ def analyse(
         )
         found = report.tables()
         text = report.to_markdown()
-        if bearing:
-            from gearmbs.signals import diagnose_bearing
+        if bearing or train is not None:
+            from gearmbs.signals import diagnose_bearing, shaft_phase
 
-            one = signal.sel(channel=report.levels["channel"].values)
+            asked = bearings_asked(bearing or [], shaft, train)
             turns = known if isinstance(known, float) else report.speed
-            bearings = diagnose_bearing(
-                one,
-                bearing_list(bearing),
-                turns,
-                band=None if band is None else pair_of(band),
-                shafts=None if shaft is None else shaft_ratios(shaft),
-            )
+            if tacho is not None or speed_channel is not None or not isinstance(known, float | None):
+                asked["phase"] = shaft_phase(
+                    signal, known, tacho=tacho, pulses_per_rev=pulses, speed_channel=speed_channel
+                )
+            asked["speed"] = asked.get("speed") if turns is None else turns
+            one = signal.sel(channel=report.levels["channel"].values)
+            bearings = diagnose_bearing(one, band=None if band is None else pair_of(band), **asked)
             found |= bearings.tables()
             text = f"{bearings.to_markdown()}\n\n{text}"
         try:
@@ -210,6 +213,19 @@ def compare(
 
             files += _save_figures(comparison_figures(report), figures)
     _hand_over(report.to_markdown(), out, files)
+
+
+def bearings_asked(texts: list[str], shafts: list[str] | None, train: Path | None) -> dict[str, Any]:
+    """Return bearings, ratios of other shafts and, of a drivetrain, the speed, as `diagnose_bearing` takes them."""
+    asked: dict[str, Any] = {"bearing": {}, "shafts": None}
+    if train is not None:
+        from gearmbs.drivetrain.description import read_description
+
+        asked = read_description(train).train.kinematics.for_bearings()
+    asked["bearing"] = {**asked["bearing"], **bearing_list(texts)}
+    if shafts is not None:
+        asked["shafts"] = [*(asked["shafts"] or ()), *shaft_ratios(shafts)]
+    return asked
 
 
 def bearing_list(texts: list[str]) -> dict[str, tuple[str, float]]:

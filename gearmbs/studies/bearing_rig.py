@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.bearings import Bearing, BearingError, RollingBearing
+from gearmbs.bearings import Bearing, BearingError, RollingBearing, add_bearing
 from gearmbs.mechanism import Mechanism
 from gearmbs.studies.rig import BEARINGS, SHAFTS, gear_rig
 from gearmbs.units import Quantity, to_si
@@ -57,7 +57,7 @@ def bearing_rig(
     mount_damping : float
         Fraction of critical damping there.
     **settings
-        As of `gearmbs.bearings.RollingBearing`: defects, cage_slip, damping, ...
+        As of `gearmbs.bearings.add_bearing`: defects, cage_slip, damping, ...
 
     Returns
     -------
@@ -86,11 +86,7 @@ def bearing_rig(
     housing = rig.body(HOUSING, mass=mass, inertia=(moment, moment, moment))
     pin = rig.revolute("pin", spindle, rig.ground, at=(0, 0, 0), axis=(0, 0, 1))
     rig.rotation("drive", pin, speed, level="velocity")
-    rig.add(
-        RollingBearing.between(
-            BEARING, spindle, housing, bearing, at=(0, 0, 0), axis=(0, 0, 1), x=(1, 0, 0), **settings
-        )
-    )
+    add_bearing(rig, BEARING, spindle.marker(name="bearing.I"), housing.marker(name="bearing.J"), bearing, **settings)
     # four feet at the corners of the block make it as stiff against tilting as against shifting
     rig.bushing(
         MOUNT,

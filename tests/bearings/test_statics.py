@@ -190,3 +190,13 @@ def test_a_load_it_cannot_carry():
         BearingStatics(ROLLERS).under([500.0, 0.0, 100.0])
     with pytest.raises(BearingError, match="give 3 or 5 numbers"):
         BearingStatics(ROLLERS).under([500.0])
+
+
+def test_deflection_curve_has_the_slope_of_its_stiffness():
+    loads = np.linspace(200.0, 2000.0, 37)
+    curve = BearingStatics(Bearing.from_designation("6205/CN")).deflection_curve([3.0, 0.0, 0.0], loads)
+    slope = np.gradient(curve.deflection.values, loads)
+    np.testing.assert_allclose(1.0 / curve.stiffness.values[3:-3], slope[3:-3], rtol=5e-3)
+    assert curve.loaded_elements.values[0] <= curve.loaded_elements.values[-1]
+    with pytest.raises(BearingError, match="direction is"):
+        BearingStatics(Bearing.from_designation("6205")).deflection_curve([0.0, 0.0, 0.0], loads)

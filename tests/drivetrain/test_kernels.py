@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearmbs.drivetrain.bearings import ClearanceForce
+from gearmbs.bearings.clearance import ClearanceForce
 from gearmbs.drivetrain.torque_element import ACCOUNTS, ShaftTorque
 from gearmbs.mechanism import Diagnostic, Mechanism
 from gearmbs.mechanism.elements import State

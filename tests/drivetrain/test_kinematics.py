@@ -41,6 +41,21 @@ def test_sidebands_and_names_of_lines(table):
     assert table.for_analysis("mesh") == {"speed": pytest.approx(50 * np.pi), "teeth": (20, 60)}
 
 
+def test_bearings_and_shafts_for_a_diagnosis(table):
+    from gearmbs.signals import diagnose_bearing, make_signal
+
+    given = table.for_bearings()
+    assert given["speed"] == pytest.approx(50 * np.pi)
+    assert given["shafts"] == pytest.approx([1 / 3])
+    assert [(name, ratio) for name, (_, ratio) in given["bearing"].items()] == [("a", 1.0)]
+    report = diagnose_bearing(make_signal(np.random.default_rng(0).standard_normal(40000), 8000.0), **given)
+    assert report.fault is None
+    assert report.shafts == pytest.approx((1 / 3,))
+    assert table.for_bearings("out")["bearing"]["a"][1] == pytest.approx(3.0)
+    with pytest.raises(DrivetrainError, match="is none of the drivetrain's"):
+        table.for_bearings("elsewhere")
+
+
 def test_table_as_text(table):
     assert "| mesh | mesh | GMF | 500 | 20 |" in table.to_markdown()
     assert "<table" in table._repr_html_()

@@ -133,6 +133,8 @@ def test_speed_that_varies_is_followed_in_angle():
     assert report.fault == "outer race"
     assert report.accused[0].slip == pytest.approx(0.0, abs=2e-3)
     assert diagnose_bearing(data, "6205", f"{SHAFT} Hz").fault != "inner race"
+    points = [(t, 2.0 * np.pi * s) for t, s in zip(TIME[::200], speed[::200])]
+    assert diagnose_bearing(data, "6205", points).fault == "outer race"
 
 
 def test_own_band_and_its_limits():
@@ -284,6 +286,52 @@ def test_one_command_names_the_race(tmp_path):
     assert (tmp_path / "tables" / "bearing_evidence.csv").exists()
     banded = run("analyse", path, *options[:4], "--band", "2 kHz, 4 kHz")
     assert "Band for case: 2000 to 4000 Hz" in banded.output
+
+
+TRAIN = """
+[shafts.a]
+length = "0.2 m"
+radius = "10 mm"
+[shafts.b]
+length = "0.2 m"
+radius = "10 mm"
+[wheels.one]
+shaft = "a"
+module = "2 mm"
+teeth = 20
+face_width = "20 mm"
+[wheels.two]
+shaft = "b"
+module = "2 mm"
+teeth = 50
+face_width = "20 mm"
+[meshes.m]
+driver = "one"
+driven = "two"
+[bearings.left]
+shaft = "a"
+rolling = "6205"
+[bearings.right]
+shaft = "b"
+rolling = "6206"
+[drives.d]
+shaft = "a"
+speed = "1740 rpm"
+[loads.l]
+shaft = "b"
+torque = "10 N m"
+"""
+
+
+def test_bearings_and_shafts_of_a_drivetrain(tmp_path):
+    from gearmbs.signals import write_signal
+
+    path = write_signal(record(pulses(LINES.bpfi * SHAFT, -0.004, modulation=0.6), MESH), tmp_path / "case.nc")
+    (tmp_path / "train.toml").write_text(TRAIN)
+    result = run("analyse", path, "--train", tmp_path / "train.toml", "--speed", f"{60 * SHAFT} rpm")
+    assert result.exit_code == 0, result.output
+    assert "Clear lines of a defect of the inner race of bearing left" in result.output
+    assert "| right | case | outer race |" in result.output
 
 
 @pytest.mark.parametrize(
