@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from gearmbs.campaigns.errors import CampaignError
     from gearmbs.campaigns.factors import Choice, Factor, Specimens, choose
     from gearmbs.campaigns.plan import Plan, load_plan, make_plan
-    from gearmbs.campaigns.response import ResponseSurface, condition_map, fit_surface
+    from gearmbs.campaigns.response import ResponseSurface, condition_figure, condition_map, fit_surface
     from gearmbs.campaigns.runners.dask import dask_client
     from gearmbs.campaigns.sensitivity import SobolIndices, main_effects, morris_effects, sobol_indices
     from gearmbs.campaigns.status import CampaignStatus
@@ -63,6 +63,7 @@ __all__ = [
     "Subject",
     "canonical",
     "choose",
+    "condition_figure",
     "condition_map",
     "content_key",
     "dask_client",
@@ -87,6 +88,7 @@ late(
         "PolynomialChaos": ".chaos",
         "fit_chaos": ".chaos",
         "fit_surface": ".response",
+        "condition_figure": ".response",
         "condition_map": ".response",
         "ResponseSurface": ".response",
         "Campaign": ".campaign",

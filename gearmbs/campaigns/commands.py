@@ -196,6 +196,23 @@ def sensitivity(folder: Place, result: Annotated[str, typer.Argument(help="Colum
             typer.echo(f"from a polynomial that explains {found.q_squared:.1%} of the variance of points left out")
 
 
+@app.command("map")
+def condition(
+    folder: Place,
+    holds: Annotated[str, typer.Argument(help='Condition, as "orders_line_of_action_2 > 30".')],
+    across: Annotated[str, typer.Option(help="Factor of the horizontal axis.")],
+    along: Annotated[str, typer.Option(help="Factor of the vertical axis.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Picture: PNG, SVG or PDF.")],
+    bins: Annotated[int, typer.Option(help="Along each axis, of equal numbers of cases.")] = 8,
+) -> None:
+    """Draw over two factors in which part of the cases a condition holds."""
+    with guarded():
+        from gearmbs.campaigns import Campaign, condition_figure
+
+        condition_figure(Campaign(folder), holds, across, along, bins).savefig(out, dpi=120)
+        typer.echo(f"wrote {out}")
+
+
 @app.command()
 def slurm(
     folder: Place,

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
+    from matplotlib.figure import Figure
 
     from gearmbs.campaigns.campaign import Campaign
 
@@ -175,3 +176,25 @@ def condition_map(
     np.add.at(hits, (i, j), held.astype(float))
     with np.errstate(all="ignore"):
         return hits / counts, counts, edges_x, edges_y
+
+
+def condition_figure(campaign: Campaign, condition: str, across: str, along: str, bins: int = 8) -> Figure:
+    """Draw a `condition_map`: in which part of the cases a condition holds, over two factors."""
+    from gearmbs.view.figure_style import new_figure
+
+    share, counts, edges_x, edges_y = condition_map(campaign, condition, across, along, bins)
+    figure = new_figure(5.6, 4.2)
+    ax = figure.subplots()
+    mesh = ax.pcolormesh(edges_x, edges_y, share, vmin=0.0, vmax=1.0)
+    figure.colorbar(mesh, ax=ax, label="part of the cases")
+    ax.set_xlabel(across)
+    ax.set_ylabel(along)
+    ax.set_title(
+        f"{condition}: {np.nansum(share * counts) / counts.sum():.0%} of {counts.sum():.0f} cases", fontsize=10
+    )
+    logarithmic = {f.name for f in campaign.plan.factors if getattr(f, "scale", "") == "log"}
+    if across in logarithmic:
+        ax.set_xscale("log")
+    if along in logarithmic:
+        ax.set_yscale("log")
+    return figure

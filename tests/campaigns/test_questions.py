@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from scipy.io import loadmat
 from scipy.stats import qmc
+from typer.testing import CliRunner
 
 from gearmbs.campaigns import (
     Campaign,
@@ -22,6 +23,7 @@ from gearmbs.campaigns import (
     sobol_indices,
 )
 from gearmbs.campaigns.designs import factorial, morris, saltelli
+from gearmbs.cli import app
 from tests.campaigns.models import PI
 from tests.campaigns.support import function, ranges, small
 
@@ -126,6 +128,11 @@ def test_condition_map(tmp_path):
     np.testing.assert_allclose(share[:2], 0.0)
     np.testing.assert_allclose(share[2:], 1.0)
     assert abs(edges[2]) < 0.05
+    picture = tmp_path / "map.png"
+    command = ["campaign", "map", str(campaign.path), "x2 > 0", "--across", "x1", "--along", "x2", "-o", str(picture)]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    assert picture.read_bytes().startswith(b"\x89PNG")
     found = campaign.sensitivity("y")
     assert found.q_squared > 0.9
     np.testing.assert_allclose(found.indices, [FIRST, TOTAL], atol=0.05)
