@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.drivetrain import RunSettings
+from gearmbs.progress import told_of_span
 from gearmbs.signals import convert
 from gearmbs.signals.orders import harmonic_amplitudes
 from gearmbs.studies.bench import PRESSURES, STATES, BenchSettings, bench_choices, bench_train
@@ -183,7 +184,7 @@ def run_bench(
         for state in STATES:
             train = bench_train(pressure, state, settings)
             name = f"bench, {state}, {load} load"
-            told = _told(name, train.run_up + run.settling + run.duration, progress)
+            told = told_of_span(progress, name, train.run_up + run.settling + run.duration)
             records[load, state] = run_train(train, run, progress=told)
     rows = [[[levels(records[load, state], sensor) for state in STATES] for load in PRESSURES] for sensor in SENSORS]
     table = xr.DataArray(
@@ -198,12 +199,6 @@ def run_bench(
         )
         beside = run_paper(base, workers=workers, progress=progress)
     return BenchStudy(table, records, settings, beside)
-
-
-def _told(name: str, span: float, progress: Callable[[str, float], None] | None) -> Callable[[float], None] | bool:
-    if progress is None:
-        return False
-    return lambda t: progress(name, min(t / span, 1.0))
 
 
 def levels(record: xr.Dataset, sensor: str, harmonics: int = 3) -> np.ndarray:

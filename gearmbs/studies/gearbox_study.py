@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.drivetrain import Drivetrain, RunSettings
+from gearmbs.progress import told_of_span
 from gearmbs.studies.gearbox import SHAFTS, GearboxSettings, gearbox_choices, industrial_gearbox
 from gearmbs.studies.store import write_dataset, write_text
 from gearmbs.studies.train_modes import mesh_orders, train_modes
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 HIGHEST = 2000.0
 """Modes up to this frequency are told, Hz."""
+SETTLING = 0.3
+"""Time from the load's coming on to the record, s: the clutches' modes have then lost all but a thousandth."""
 SLOWEST = 0.25
 """Speed at which the run-up begins, over the operating speed."""
 
@@ -149,16 +152,12 @@ def run_gearbox(
         raise ValueError("settings: a run-up is added here; leave curve out, and motor 'speed'")
     train = industrial_gearbox(s)
     speed = to_si(s.speed, "angular speed", "speed")
-    points = ((0.3, SLOWEST * speed), (0.3 + run_up, speed))
+    points = ((SETTLING, SLOWEST * speed), (SETTLING + run_up, speed))
     faster = industrial_gearbox(replace(s, curve=points))
     modes = train_modes(train)
     records = []
     for name, one, length in (("steady", train, duration), ("run-up", faster, run_up)):
-        run = RunSettings(settling=0.3, duration=length, tolerance=tolerance)
-        told = None if progress is None else _part_done(progress, name, one.run_up + 0.3 + length)
-        records.append(run_train(one, run, progress=told or False))
+        run = RunSettings(settling=SETTLING, duration=length, tolerance=tolerance)
+        told = told_of_span(progress, name, one.run_up + run.settling + length)
+        records.append(run_train(one, run, progress=told))
     return GearboxStudy(train, modes, records[0], records[1], s)
-
-
-def _part_done(progress: Callable[[str, float], None], name: str, span: float) -> Callable[[float], None]:
-    return lambda t: progress(name, min(t / span, 1.0))

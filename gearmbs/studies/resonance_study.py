@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
+from gearmbs.progress import told_of_span
 from gearmbs.studies.resonance import (
     DIRECTIONS,
     MODELS,
@@ -169,12 +170,7 @@ def run_resonance(
     s = settings or ResonanceSettings()
     sweeps: dict[tuple[str, str], xr.Dataset] = {}
     for direction in DIRECTIONS:
-        span = chirp(s, direction).duration
-        told = None if progress is None else _part_done(progress, direction, span)
-        sweeps[MODELS[0], direction] = sweep_resonance(s, direction, MODELS[0], progress=told or False)
+        told = told_of_span(progress, direction, chirp(s, direction).duration)
+        sweeps[MODELS[0], direction] = sweep_resonance(s, direction, MODELS[0], progress=told)
         sweeps[MODELS[1], direction] = sweep_resonance(s, direction, MODELS[1])
     return ResonanceStudy(s, sweeps, separation_load(s))
-
-
-def _part_done(progress: Callable[[str, float], None], name: str, span: float) -> Callable[[float], None]:
-    return lambda t: progress(name, min(t / span, 1.0))

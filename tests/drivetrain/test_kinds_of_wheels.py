@@ -5,6 +5,7 @@ import pytest
 
 from gearmbs.drivetrain import (
     Drivetrain,
+    DrivetrainError,
     GearMesh,
     IdealBearing,
     RollingContactBearing,
@@ -71,3 +72,38 @@ def test_rolling_bearings_at_the_seats():
         assert carried == pytest.approx(share * force, rel=0.03)
     table = train.kinematics
     assert table.bearing_frequencies("left")["BPFO"] < 9 * table.shaft_frequency("out") / 2
+
+
+def test_helical_wheels_from_a_file(tmp_path):
+    """A file gives a helix as a wheel's drawing does; both hands are needed."""
+    path = tmp_path / "helical.toml"
+    wheel = "[wheels.{name}]\nshaft = '{shaft}'\nteeth = {z}\nmodule = '3 mm'\nface_width = '40 mm'\n" + (
+        "helix_angle = '15 deg'\nhand = '{hand}'\n"
+    )
+    rest = """
+[shafts.in]
+[shafts.out]
+[meshes.mesh]
+driver = "p"
+driven = "g"
+backlash = "0.1 mm"
+[bearings.a]
+shaft = "in"
+[bearings.b]
+shaft = "out"
+[drives.motor]
+shaft = "in"
+speed = "1500 rpm"
+[loads.brake]
+shaft = "out"
+torque = "100 N m"
+"""
+    text = wheel.format(name="p", shaft="in", z=20, hand="right") + wheel.format(
+        name="g", shaft="out", z=60, hand="left"
+    )
+    path.write_text(text + rest)
+    pair = Drivetrain.from_file(path).pairs["mesh"]
+    assert pair.overlap_ratio == pytest.approx(0.04 * np.sin(np.deg2rad(15)) / (np.pi * 3e-3))
+    path.write_text(text.replace("left", "right") + rest)
+    with pytest.raises(DrivetrainError, match="hand"):
+        Drivetrain.from_file(path)
