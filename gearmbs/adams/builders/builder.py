@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from gearmbs.adams.builders.accelerations import FUNCTIONS, Accelerations
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.builders.data_calls import translated
 from gearmbs.adams.builders.frames import inertia_about_cm, marker_orientation, part_orientation
@@ -20,6 +21,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import measured_markers
 from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.readers import read_variables
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.curves import add_curve
@@ -58,6 +60,7 @@ class Builder:
         self.mechanism.reads_units = False
         self.mechanism.redundancy = "adams"
         self.model = AdamsModel(self.mechanism, deck, sensed=sensed)
+        self.accelerations = Accelerations(self)
         self.markers: dict[int, Marker] = {}
         self.joints: dict[int, Joint] = {}
         self.problems: list[Diagnostic] = []
@@ -162,6 +165,8 @@ class Builder:
         """Return an expression with element ids replaced by the mechanism's names."""
 
         def rename(call: Call) -> Node:
+            if call.name in FUNCTIONS:
+                return self.accelerations.call(call)
             kind = ELEMENT_FORCES.get(call.name)
             first = call.args[0] if call.args else None
             if kind is None or not isinstance(first, Number) or first.integer is None:
@@ -243,8 +248,12 @@ class Builder:
 
     def add_data(self) -> None:
         m = self.mechanism
+        read = read_variables(self.deck, requests=False)
         for variable in self.deck.of(st.Variable).values():
-            m.variables[variable.id] = self.text(variable.function or "0")
+            if variable.id in read:
+                self.attempt(variable, lambda v: m.variables.update({v.id: self.text(v.function or "0")}))
+            else:
+                m.variables[variable.id] = variable.function or "0"
         for array in self.deck.of(st.Array).values():
             m.arrays[array.id] = array.numbers
         for kind, group in (("pinput", st.PlantInput), ("poutput", st.PlantOutput)):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from gearmbs.adams.builders.data_calls import translated
 from gearmbs.adams.builders.mechanism import build_model
 from gearmbs.adams.builders.model import AdamsModel, markers_of
@@ -12,12 +10,12 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Change, Linear, Script, Simulate, Stop, Switch
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
+from gearmbs.adams.parse.readers import read_variables
 from gearmbs.adams.run.session import Session, active_sensors, change, output_times, switch, unsupported
 from gearmbs.dae.equations.expressions.errors import ExpressionError, NotEvaluatedError
 from gearmbs.dae.equations.expressions.opcodes import LEVEL_TIME
 from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.mechanism.expression_compiler import compile_expression
-from gearmbs.mechanism.expression_syntax import Call, Number, parse, walk
 
 SINGLE = ("STATICS", "INITIAL_CONDITIONS", "DISPLACEMENT", "VELOCITY", "ACCELERATION")
 """Analyses that need no span of time."""
@@ -126,7 +124,7 @@ def expression_errors(model: AdamsModel, session: Session) -> list[Diagnostic]:
             left_out = False
             try:
                 tape = compile_expression(
-                    translated(deck, {}, text), scope, accelerations=isinstance(statement, st.Request)
+                    translated(deck, {}, text), scope, accelerations=not isinstance(statement, (st.Motion, st.Gcon))
                 )
                 message = _misplaced(statement, text, tape)
             except ExpressionError as error:
@@ -144,35 +142,6 @@ def expression_errors(model: AdamsModel, session: Session) -> list[Diagnostic]:
                     continue
                 found.append(Diagnostic(ERROR, message, file, line))
     return found
-
-
-def read_variables(deck: Deck) -> set[int]:
-    """Return the VARIABLEs that anything but a list for a control program reads, directly or through others."""
-    read: set[int] = set()
-    waiting = [
-        text
-        for statement in deck
-        if not isinstance(statement, st.Variable)
-        for name, spec in specs_of(type(statement)).items()
-        if spec.kind == EXPRESSION and (text := getattr(statement, name)) is not None
-    ]
-    plants: dict[str, Mapping[int, st.Plant]] = {"PINVAL": deck.of(st.PlantInput), "POUVAL": deck.of(st.PlantOutput)}
-    while waiting:
-        for node in walk(parse(waiting.pop())):
-            first = node.args[0] if isinstance(node, Call) and node.args else None
-            if not isinstance(node, Call) or not isinstance(first, Number) or first.integer is None:
-                continue
-            members: tuple[int, ...] = ()
-            if node.name == "VARVAL":
-                members = (first.integer,)
-            elif node.name in plants and first.integer in plants[node.name]:
-                members = plants[node.name][first.integer].variables
-            for member in members:
-                variable = deck.of(st.Variable).get(member)
-                if variable is not None and member not in read:
-                    read.add(member)
-                    waiting.append(variable.function or "0")
-    return read
 
 
 def _misplaced(statement: st.Statement, text: str, tape: Tape) -> str:

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 MAX_LOAD_ITERATIONS = 200
 """Passes in which loads that depend on each other may come to agree at the start; friction converges like a power of
 the friction coefficient."""
+REMEMBERED = 12
+"""Earlier passes that are looked at where they do not come closer."""
+CLOSER = 0.9
 MAX_STATE_ITERATIONS = 100
 
 
@@ -45,6 +48,7 @@ def accelerations(system: PosedModel, place: Configuration, t: float) -> tuple[n
     """
     base = place.coordinates
     inner = _algebraic_start(system, place, t)
+    passes: list[tuple[np.ndarray, np.ndarray]] = []
     for attempt in range(MAX_LOAD_ITERATIONS if _coupled(system.model) else 1):
         found = system.assembler.at(place, t, inner, system.state_start)
         diagnosis.check_finite(system, found.rhs, found.loads, t)
@@ -59,9 +63,26 @@ def accelerations(system: PosedModel, place: Configuration, t: float) -> tuple[n
         y[int(idata[T.H_F]) :] = inner
         reactions_from(solution[base:].copy(), y, idata, found.rdata, found.work)
         inner = y[int(idata[T.H_F]) :].copy()
-        if last is not None and np.abs(inner - last).max() <= 1e-13 * (1e-3 + np.abs(inner).max()):
-            break
+        if last is not None:
+            if np.abs(inner - last).max() <= 1e-13 * (1e-3 + np.abs(inner).max()):
+                break
+            passes = [*passes[-REMEMBERED:], (last, inner)]
+            inner = _extrapolated(passes)
     return solution[:base], solution[base:], found
+
+
+def _extrapolated(passes: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Return the loads to go on with: as found, while passes come closer, else where a straight line has them agree.
+
+    Loads that depend on accelerations do so linearly, and may answer with more than they were given: passes then
+    diverge, but this (Anderson's mixing) finds the answer in as many as there are such loads.
+    """
+    off = np.array([after - before for before, after in passes])
+    if len(passes) < 3 or np.abs(off[-1]).max() < CLOSER * np.abs(off[-2]).max():
+        return passes[-1][1]
+    steps = np.diff(np.array([after for _, after in passes]), axis=0)
+    weights = np.linalg.lstsq(np.diff(off, axis=0).T, off[-1], rcond=1e-12)[0]
+    return passes[-1][1] - weights @ steps
 
 
 def _algebraic_start(system: PosedModel, place: Configuration, t: float) -> np.ndarray | None:

@@ -1,0 +1,84 @@
+"""Accelerations in forces, equations and sensors: probes change nothing and show what requests show."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearmbs.adams import DeckError, parse_deck, run_deck
+
+DECK = """accelerations
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=MILLIMETER, TIME=SECOND
+PART/1, GROUND
+MARKER/10, PART=1, REULER=20D,30D,40D
+MARKER/11, PART=1, FLOATING
+PART/2, MASS=2, CM=20, IP=4000,5000,6000, QG=100,50,0
+MARKER/20, PART=2, REULER=10D,20D,30D
+MARKER/21, PART=2, QP=-100,-50,0
+MARKER/22, PART=2, QP=30,-20,10, REULER=5D,6D,7D
+JOINT/1, SPHERICAL, I=21, J=10
+SPRINGDAMPER/1, TRANSLATIONAL, I=22, J=10, K=0.5, C=0.01, LENGTH=20
+ACCGRAV/IGRAV=1000, JGRAV=-2000, KGRAV=-9000
+{extra}
+REQUEST/1, F2=ACCX(22,10,20)\\F3=ACCM(20)\\F4=WDTZ(22,0,22)\\F6=ACCY(22)
+REQUEST/2, F2=VARVAL(1)\\F3=VARVAL(2)\\F4=VARVAL(3)\\F6=DIF(1)\\F7=VZ(20)\\F8=DZ(20)
+END
+"""
+ASKED = """VARIABLE/1, FUNCTION=ACCX(22,10,20)
+VARIABLE/2, FUNCTION=ACCM(20)
+VARIABLE/3, FUNCTION=WDTZ(22,0,22)
+VARIABLE/4, FUNCTION=ACCZ(20)
+DIFF/1, IC=0, FUNCTION=VARVAL(4) + 0*VARVAL(1) + 0*VARVAL(2) + 0*VARVAL(3)
+"""
+
+
+def run(extra, steps=50):
+    return run_deck(parse_deck(DECK.format(extra=extra)), end=0.5, steps=steps)
+
+
+def test_a_probe_changes_nothing():
+    plain = run("VARIABLE/1, FUNCTION=1\nVARIABLE/2, FUNCTION=1\nVARIABLE/3, FUNCTION=1\nDIFF/1, IC=0, FUNCTION=0")
+    probed = run(ASKED)
+    assert probed.success
+    for column in (6, 7):
+        values, expected = probed.request(2)[:, column], plain.request(2)[:, column]
+        assert np.abs(values - expected).max() < 2e-6 * np.abs(expected).max()
+    moved, expected = probed.part(2)[:, :12], plain.part(2)[:, :12]
+    assert np.abs(moved - expected).max() < 1e-5 * np.abs(expected).max()
+    force, expected = (r.force("joint", 1) for r in (probed, plain))
+    assert np.abs(force - expected).max() < 1e-4 * np.abs(expected).max()
+
+
+def test_the_integral_of_an_acceleration_is_the_velocity():
+    result = run(ASKED)
+    gained, velocity = result.request(2)[:, 5], result.request(2)[:, 6]
+    assert np.ptp(velocity) > 100.0
+    assert gained == pytest.approx(velocity - velocity[0], abs=1e-5 * np.ptp(velocity))
+
+
+def test_a_force_by_acceleration_adds_mass():
+    """-m a on a free body: it falls as if it had more inertia, with the weight it has."""
+    deck = """added mass
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/10, PART=1
+MARKER/11, PART=1, FLOATING
+PART/2, MASS=2, CM=20, IP=1,1,1
+MARKER/20, PART=2
+ACCGRAV/KGRAV=-9.81
+VFORCE/1, I=20, JFLOAT=11, RM=10, FZ=-3*ACCZ(20)
+REQUEST/1, F2=DZ(20)\\F3=ACCZ(20)
+END
+"""
+    result = run_deck(parse_deck(deck), end=1.0, steps=10)
+    expected = -9.81 * 2.0 / 5.0
+    assert result.request(1)[:, 2] == pytest.approx(np.full(11, expected), rel=1e-6)
+    assert result.request(1)[-1, 1] == pytest.approx(0.5 * expected, rel=1e-6)
+
+
+def test_what_is_no_unknown_is_named():
+    with pytest.raises(DeckError, match="in a frame that moves, MARKER/20"):
+        run("VARIABLE/1, FUNCTION=ACCX(22,10,20,20)\nVARIABLE/2,FUNCTION=1\nVARIABLE/3,FUNCTION=1\n"
+            "DIFF/1, IC=0, FUNCTION=VARVAL(1)")  # fmt: skip
+    with pytest.raises(DeckError, match="accelerations"):
+        run(ASKED + "GCON/1, FUNCTION=ACCX(22)")
