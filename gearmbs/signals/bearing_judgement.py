@@ -41,7 +41,7 @@ OWN, HALF, COMPARABLE = 2 / 3, 1 / 2, 0.1
 the part's (families have gaps); and how strong by the part's."""
 SIDEBANDS = 2
 """Sidebands on either side of a line that belong to it."""
-SUMS = 4
+SUMS = 6
 """Multiples of two shafts are added up to so many turns in all."""
 SPARSE = 25.0
 """Multiples of a shaft are taken out as a whole if they are so many lines of the spectrum apart, five widths of one."""

@@ -303,7 +303,7 @@ face_width = "20 mm"
 [wheels.two]
 shaft = "b"
 module = "2 mm"
-teeth = 50
+teeth = 70
 face_width = "20 mm"
 [meshes.m]
 driver = "one"
