@@ -116,6 +116,19 @@ def bore_edges(gear: GearSpec) -> list[Edge]:
     return [Arc(east, west, np.zeros(2), -1), Arc(west, east, np.zeros(2), -1)]
 
 
+def backwards(edges: list[Edge]) -> list[Edge]:
+    """Return a chain of edges run the other way."""
+    return [_backwards(edge) for edge in reversed(edges)]
+
+
+def _backwards(edge: Edge) -> Edge:
+    if isinstance(edge, Line):
+        return Line(edge.stop, edge.start)
+    if isinstance(edge, Arc):
+        return Arc(edge.stop, edge.start, edge.centre, -edge.sense)
+    return Spline(edge.control[::-1], edge.knots[0] + edge.knots[-1] - edge.knots[::-1])
+
+
 def _flank_edges(gear: GearSpec) -> list[Edge]:
     """Edges of the clockwise flank of tooth 0 from the root circle outward."""
     begin = max(gear.form_radius, gear.base_radius)

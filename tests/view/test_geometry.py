@@ -1,5 +1,4 @@
 import math
-import re
 
 import numpy as np
 import pytest
@@ -21,6 +20,7 @@ from gearmbs.view import (
 from gearmbs.view.edges import Arc, Spline, bore_edges, profile_edges
 from gearmbs.view.mesh import ball, box, cylinder, rod
 from gearmbs.view.outline import half_tooth
+from tests.view.looking_at_step import check_shell, check_volume, step_entities
 
 PAPER = GearPair.paper().driver
 WHEELS = {
@@ -246,25 +246,8 @@ def test_dxf_passes_the_audit_of_another_program(wheel, tmp_path):
     assert not drawing.audit().errors
 
 
-def step_entities(path):
-    return {int(n): body for n, body in re.findall(r"#(\d+)=(.*);", path.read_text())}
-
-
 def test_step_is_a_closed_shell(wheel, tmp_path):
-    entities = step_entities(write_step(wheel, tmp_path / "wheel.step"))
-    # each edge is used twice, once each way: the shell is closed and its faces agree on what is outside
-    uses = {}
-    for body in entities.values():
-        match = re.match(r"ORIENTED_EDGE\('',\*,\*,#(\d+),\.([TF])\.\)", body)
-        if match:
-            uses.setdefault(int(match[1]), []).append(match[2])
-    assert all(sorted(u) == ["F", "T"] for u in uses.values())
-    edges = [n for n, body in entities.items() if body.startswith("EDGE_CURVE")]
-    assert sorted(uses) == edges
-    references = {int(n) for body in entities.values() for n in re.findall(r"#(\d+)", body)}
-    assert references <= set(entities)
-    walls = len(profile_edges(wheel)) + len(bore_edges(wheel))
-    assert sum(body.startswith("ADVANCED_FACE") for body in entities.values()) == walls + 2
+    check_shell(wheel, tmp_path)
 
 
 def test_step_of_a_pair_and_of_faults(tmp_path):
@@ -276,20 +259,7 @@ def test_step_of_a_pair_and_of_faults(tmp_path):
 
 
 def test_step_volume_in_a_cad_kernel(wheel, tmp_path):
-    pytest.importorskip("OCP", reason="the CAD kernel OCP (cadquery-ocp) is not installed")
-    from OCP.BRepCheck import BRepCheck_Analyzer
-    from OCP.BRepGProp import BRepGProp
-    from OCP.GProp import GProp_GProps
-    from OCP.STEPControl import STEPControl_Reader
-
-    reader = STEPControl_Reader()
-    reader.ReadFile(str(write_step(wheel, tmp_path / "wheel.step")))
-    reader.TransferRoots()
-    shape = reader.OneShape()
-    found = GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, found)
-    assert BRepCheck_Analyzer(shape).IsValid()
-    assert found.Mass() * 1e-9 == pytest.approx(profile_area(wheel) * wheel.face_width, rel=1e-8)
+    check_volume(wheel, tmp_path)
 
 
 def test_simple_solids():
