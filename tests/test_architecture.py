@@ -35,7 +35,7 @@ MAY_KNOW = {
     "flexible": {"mechanism"},
     "drivetrain": {"bearings", "dae", "gears", "mechanism"},
     "signals": set(),
-    "view": {"contact", "gears", "mechanism", "signals", "dae.results"},
+    "view": {"contact", "flexible", "gears", "mechanism", "signals", "dae.results"},
     "adams": {"dae", "dae.equations", "dae.model", "dae.analyses", "dae.results", "mechanism"},
     "studies": {"bearings", "dae", "dae.results", "drivetrain", "flexible", "gears", "mechanism", "signals", "view"},
     "campaigns": {"adams", "bearings", "drivetrain", "gears", "signals", "studies", "view"},

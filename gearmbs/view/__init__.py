@@ -25,6 +25,14 @@ if TYPE_CHECKING:
     from gearmbs.view.export_step import write_step
     from gearmbs.view.export_stl import read_stl, write_stl
     from gearmbs.view.figure_style import COLOURS, save_figure
+    from gearmbs.view.flexible_bodies import (
+        BodyAnimation,
+        deformation_animation,
+        deformed_plot,
+        modal_energy_plot,
+        mode_animation,
+        whirl_plot,
+    )
     from gearmbs.view.maps import sensitivity_map
     from gearmbs.view.mesh import Mesh
     from gearmbs.view.motion import PairMotion, solution_motion, static_motion
@@ -44,6 +52,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COLOURS",
+    "BodyAnimation",
     "ContactPoints",
     "ContactProbe",
     "Mesh",
@@ -58,6 +67,8 @@ __all__ = [
     "comparison_bars",
     "comparison_figures",
     "contact_pattern_plot",
+    "deformation_animation",
+    "deformed_plot",
     "gear_outline",
     "gear_scene",
     "gear_solid",
@@ -67,6 +78,8 @@ __all__ = [
     "mechanism_scene",
     "mesh_animation",
     "mesh_view",
+    "modal_energy_plot",
+    "mode_animation",
     "order_map_plot",
     "order_plot",
     "order_track_plot",
@@ -89,6 +102,7 @@ __all__ = [
     "transmission_error_plot",
     "waterfall_plot",
     "wheel_plot",
+    "whirl_plot",
     "write_dxf",
     "write_step",
     "write_stl",
@@ -97,6 +111,12 @@ __all__ = [
 late(
     __name__,
     {
+        "deformed_plot": ".flexible_bodies",
+        "deformation_animation": ".flexible_bodies",
+        "mode_animation": ".flexible_bodies",
+        "modal_energy_plot": ".flexible_bodies",
+        "whirl_plot": ".flexible_bodies",
+        "BodyAnimation": ".flexible_bodies",
         "COLOURS": ".figure_style",
         "ContactPoints": ".contacts",
         "ContactProbe": ".contacts",
