@@ -122,16 +122,21 @@ class KinematicTable:
 
     def nearest(self, frequency: float, harmonics: int = 3, order: int = 2) -> tuple[str, float]:
         """Return what a line of a spectrum comes from: its name, and how far it is from there, Hz."""
-        known: list[tuple[str, float]] = []
+        known = self.known_lines(harmonics, order)
+        name = min(known, key=lambda one: abs(known[one] - frequency))
+        return name, frequency - known[name]
+
+    def known_lines(self, harmonics: int = 3, order: int = 2) -> dict[str, float]:
+        """Return the frequencies (Hz) of all lines and their harmonics, and of the sidebands of all meshes, by name."""
+        known: dict[str, float] = {}
         for row in self.lines.itertuples():
             for h in range(1, harmonics + 1):
-                known.append((f"{h} x {row.name} of {row.of}", h * float(row.frequency)))  # type: ignore[arg-type]
+                known[f"{h} x {row.name} of {row.of}"] = h * float(row.frequency)  # type: ignore[arg-type]
         for mesh in self.train.meshes:
             for row in self.sidebands(mesh.name, harmonics, order).itertuples():
                 name = f"{row.harmonic} x GMF of {mesh.name} {row.order:+d} x {row.shaft}"
-                known.append((name, float(row.frequency)))  # type: ignore[arg-type]
-        name, found = min(known, key=lambda item: abs(item[1] - frequency))
-        return name, frequency - found
+                known[name] = float(row.frequency)  # type: ignore[arg-type]
+        return known
 
     def for_analysis(self, mesh: str | GearMesh) -> dict[str, object]:
         """Return ``speed`` (rad/s) and ``teeth`` of a mesh, as `gearmbs.signals.make_signal` takes them."""

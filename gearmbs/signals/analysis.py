@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
@@ -24,7 +25,7 @@ from .indicators import condition_indicators
 from .planetary_diagnosis import diagnose_planetary
 from .planetary_lines import planetary_lines
 from .planetary_report import PlanetaryReport
-from .report_parts import impulsive_band, levels, line_spectrum, strongest_lines
+from .report_parts import impulsive_band, levels, line_spectrum, name_lines, strongest_lines
 from .shaft_finding import Known, Shaft, known_shaft, mesh_shaft
 from .signal import check_teeth, common_unit, make_signal, rate_of, units_of
 from .simulated import read_any
@@ -252,6 +253,9 @@ def _report(signal: xr.DataArray, counts: tuple[int, ...], options: AnalysisOpti
     strongest = strongest_lines(
         spectral.assign_coords(frequency=spectral["frequency"] * scale), options.lines, gmf, "gmf_order"
     )
+    if signal.attrs.get("known_lines") and strongest.size:
+        within = 1.5 * scale * float(spectral["frequency"].diff("frequency")[0])
+        strongest = name_lines(strongest, json.loads(signal.attrs["known_lines"]), within)
     tell("kurtogram")
     impulsive = impulsive_band(signal, lambda f, _: tell("kurtogram", f))
     if isinstance(impulsive, str):

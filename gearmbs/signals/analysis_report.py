@@ -47,7 +47,8 @@ class AnalysisReport(Shown):
     indicators : xarray.Dataset or None
         See `condition_indicators`; None if the record is too short for an average.
     lines : pandas.DataFrame
-        The strongest lines of the spectrum by channel.
+        The strongest lines of the spectrum by channel; in column ``of`` what they come from, if the signal's attribute
+        ``known_lines`` (JSON, name to Hz) tells, as that of a drivetrain's record does.
     impulsive : xarray.Dataset or None
         Band with the highest kurtosis by channel (`best_centre`, `best_bandwidth`, `best_kurtosis`).
     average : xarray.DataArray or None
@@ -155,10 +156,12 @@ class AnalysisReport(Shown):
             parts += ["## Sidebands, dB relative to their harmonic", "", self._sideband_table(channels), ""]
         if self.impulsive is not None:
             parts += ["## Most impulsive band", "", transposed(self.impulsive, channels, IMPULSIVE), ""]
+        header = ["channel", "Hz", "x GMF", "RMS", *(["what it is"] if "of" in self.lines else [])]
         rows = [
-            [r.channel, f"{r.frequency:.2f}", f"{r.gmf_order:.3f}", significant(r.rms)] for r in self.lines.itertuples()
+            [r.channel, f"{r.frequency:.2f}", f"{r.gmf_order:.3f}", significant(r.rms), getattr(r, "of", "")]
+            for r in self.lines.itertuples()
         ]
-        parts += ["## Strongest lines", "", markdown_table(["channel", "Hz", "x GMF", "RMS"], rows), ""]
+        parts += ["## Strongest lines", "", markdown_table(header, [row[: len(header)] for row in rows]), ""]
         kept = {name: why for name, why in self.missing.items() if name != "estimate"}
         return "\n".join(parts + missing_list(kept))
 

@@ -85,6 +85,14 @@ def strongest_lines(
     return pd.DataFrame(rows, columns=["channel", "frequency", name, "rms"])
 
 
+def name_lines(lines: pd.DataFrame, known: Mapping[str, float], within: float) -> pd.DataFrame:
+    """Add the column ``of``: which of the known lines (name to Hz) is nearest, or empty if none is near enough."""
+    names, frequencies = list(known), np.array(list(known.values()))
+    nearest = [int(np.argmin(np.abs(frequencies - f))) for f in lines["frequency"]]
+    near = [names[k] if abs(frequencies[k] - f) <= within else "" for k, f in zip(nearest, lines["frequency"])]
+    return lines.assign(of=near)
+
+
 def line_spectrum(signal: xr.DataArray) -> xr.DataArray:
     """RMS spectrum averaged over segments of 2 s."""
     return spectrum(signal, scaling="rms", segment=LINE_SECONDS)

@@ -305,6 +305,7 @@ def attributes(train: Drivetrain, run: RunSettings | None, solution: Solution) -
         "gearmbs_version": gearmbs.__version__,
     }
     if train.meshes:
+        out["known_lines"] = json.dumps(train.kinematics.known_lines())
         given = train.kinematics.for_analysis(train.meshes[0])
         out |= {"mesh_speed": given["speed"], "mesh_speed_units": "rad/s", "mesh_teeth": list(given["teeth"])}  # type: ignore[call-overload]
     if run is not None:
@@ -370,8 +371,12 @@ def train_signal(record: xr.Dataset, channel: str, mesh: str | None = None) -> x
     parts = json.loads(record.attrs["train_json"])
     wheels = [parts[parts[mesh][side]] for side in ("driver", "driven")]
     speed = float(np.abs(record["speed"].sel(shaft=wheels[0]["shaft"]).mean()))
+    # lines are where the speed that was held puts them, not the nominal one
+    first = parts[parts[meshes[0]]["driver"]]["shaft"]
+    held = float(np.abs(record["speed"].sel(shaft=first).mean())) / float(record.attrs["mesh_speed"])
+    placed = {name: held * frequency for name, frequency in json.loads(record.attrs["known_lines"]).items()}
     return make_signal(
         values.values[:, None], float(record.attrs["run_rate"]), units=unit, channels=[channel],
         t0=float(record.time.values[0]), speed=speed, teeth=tuple(abs(int(w["gear"]["teeth"])) for w in wheels),
-        attrs={"source": record.attrs["title"]},
+        attrs={"source": record.attrs["title"], "known_lines": json.dumps(placed)},
     )  # fmt: skip

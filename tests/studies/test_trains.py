@@ -20,6 +20,7 @@ from gearmbs.drivetrain import (
     SpeedSensor,
     TorqueSensor,
 )
+from gearmbs.signals import analyse
 from gearmbs.signals.simulated import read_any
 from gearmbs.studies import run_train, train_report, train_scene, train_signal
 from gearmbs.studies.trains import check_record, load_train
@@ -93,6 +94,10 @@ def test_harmonics_of_the_mesh(train, record):
 def test_signals_go_on_to_the_analysis(tmp_path, record):
     one = train_signal(record, "seat")
     assert one.attrs["teeth"] == (20, 60)
+    report = analyse(one)
+    named = report.lines[report.lines.of != ""]
+    assert (named.of.str.contains("GMF of mesh")).any()
+    assert "| what it is |" in report.to_markdown()
     path = tmp_path / "record.nc"
     record.to_netcdf(path, engine="h5netcdf")
     signal = read_any(path)
