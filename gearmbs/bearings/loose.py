@@ -15,7 +15,7 @@ from gearmbs.bearings.geometry import Bearing
 
 if TYPE_CHECKING:
     from gearmbs.mechanism import Mechanism
-    from gearmbs.mechanism.parts import Body, Marker
+    from gearmbs.mechanism.parts import Marker
 
 DEPTH = 1e-6
 """Penetration at which the damping of a seat is fully on, m."""
@@ -80,11 +80,12 @@ def add_bearing(
 def _ring(m: Mechanism, name: str, part: str, seat: Marker, fit: LooseFit, bearing: Bearing) -> Marker:
     """Add a loose ring as a body on its seat; return its marker for the bearing."""
     fit.check(bearing)
-    body, at, frame = seat.body, _place(seat), seat.global_orientation()
+    body, at, frame = seat.body, seat.global_position(), seat.global_orientation()
     mass, moments = ring_inertia(bearing, part)
+    velocity = body.velocity + np.cross(body.angular_velocity, at - body.position)
     label = f"{name}.{part} ring"
     ring = m.body(
-        label, mass, moments, position=at, orientation=frame, velocity=_velocity(body, at),
+        label, mass, moments, position=at, orientation=frame, velocity=velocity,
         angular_velocity=body.angular_velocity,
     )  # fmt: skip
     width = bearing.width
@@ -120,11 +121,3 @@ def ring_inertia(bearing: Bearing, part: str) -> tuple[float, tuple[float, float
     square = (0.5 * seat) ** 2 + race**2
     across = mass * (3.0 * square + width**2) / 12.0
     return mass, (across, across, 0.5 * mass * square)
-
-
-def _place(marker: Marker) -> np.ndarray:
-    return np.asarray(marker.global_position(), dtype=float)
-
-
-def _velocity(body: Body, at: np.ndarray) -> np.ndarray:
-    return np.asarray(body.velocity) + np.cross(body.angular_velocity, at - np.asarray(body.position))

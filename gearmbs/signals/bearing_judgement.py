@@ -8,7 +8,8 @@ and some of them lie where a bearing's would. So a part is named only if
   of a pair of gears and its sidebands belong in an envelope;
 * hardly any other place of the record holds a family as strong: the orders from a third of a turn to beyond the highest
   line are looked at in windows as wide as slip makes the part's own. The share of places that beat it is the
-  probability with which a family of any other cause would have been taken for the part.
+  probability with which a family of any other cause would have been taken for the part;
+* they are not just every second to sixth line of a slower family, nor the cage's multiple among its neighbours.
 
 The strongest part is named first; its lines and sidebands are then taken out, and the rest is judged again.
 """
@@ -29,7 +30,7 @@ CLEAR_CHANCE, SIGNS_CHANCE = -12.0, -6.0
 """Decimal logarithm of the chance from which lines are no noise."""
 LEAST_RATIO = 10.0
 """Least power of the fundamental by its neighbourhood, as rare as 5e-5 in noise."""
-LEAST_SHARE = 0.025
+MOST_SHARE = 0.025
 """Share of places with a family as strong, the part's own counted, up to which a part is named."""
 LOWEST_ORDER = 0.3
 ABOVE = 1.1
@@ -124,7 +125,7 @@ def judge(
         strong = [key for key in left if _stands_out(look.of(key), SIGNS_CHANCE - trials)]
         if not strong:
             break
-        fit = [key for key in strong if not look.is_a_multiple(key) and _share(*look.rivals(key)) <= LEAST_SHARE]
+        fit = [key for key in strong if not look.is_a_multiple(key) and _share(*look.rivals(key)) <= MOST_SHARE]
         if not fit:
             break
         key = min(fit, key=lambda k: look.of(k).log_chance)
