@@ -274,10 +274,10 @@ def _parse(text: str, target: str, field: str) -> float:
 
 def _remedy(text: str, target: str) -> str:
     """Return what may have been meant by a text that cannot be read."""
-    number = NUMBER.match(text)
+    number, wanted = NUMBER.match(text), _common(target)
     unit = "" if number is None else text[number.end() :].strip()
-    known = [name for name in (*COMMON, target) if _common(name) and _common(name)[1] == _common(target)[1]]  # type: ignore[index]
-    near = difflib.get_close_matches(unit, known, 1, 0.5) if unit and _common(target) else []
+    known = [name for name in (*COMMON, target) if (found := _common(name)) and wanted and found[1] == wanted[1]]
+    near = difflib.get_close_matches(unit, known, 1, 0.5) if unit else []
     if number is not None and near:
         return f"did you mean '{number[0]} {near[0]}'?"
     return f"write for example '1 {USUAL.get(target, target)}'"

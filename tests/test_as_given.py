@@ -43,6 +43,8 @@ def test_a_text_becomes_a_number_that_remembers_it():
 def test_a_slip_in_a_unit_is_told_with_what_was_meant(text, dimension, meant):
     with pytest.raises(ValueError, match=f"did you mean '{meant}'"):
         to_si(text, dimension)
+    with pytest.raises(ValueError, match="write for example '1 dimensionless'"):
+        to_si("5 apples", "dimensionless")
 
 
 @pytest.mark.parametrize(
