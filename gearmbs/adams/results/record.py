@@ -45,6 +45,8 @@ class Segment:
         Of a single static analysis.
     assembly : Assembly or None
         How far the parts were moved at the start; None for statics, which moves them anyway.
+    passage : tuple of float and str or None
+        When constraints came to depend on each other, s, and which.
     requests : dict of int to RequestSeries
         Values in the deck's units.
     wrenches : dict
@@ -61,6 +63,7 @@ class Segment:
     wrenches: dict[tuple[str, int], np.ndarray] = field(default_factory=dict)
     equilibrium: StaticResult | None = None
     assembly: Assembly | None = None
+    passage: tuple[float, str] | None = None
 
     @property
     def success(self) -> bool:
@@ -120,6 +123,12 @@ class RunRecord:
             found.append(segment.assembly.remark(time, self.unit("length")))
         if segment.equilibrium is not None and segment.equilibrium.stable is False:
             found.append(f"the equilibrium at TIME = {time:g} is unstable: the parts leave it when they are touched")
+        if segment.passage is not None:
+            when, rows = segment.passage
+            found.append(
+                f"about TIME = {when / self.deck.units.time:.4g} the mechanism passed a position in which it locks or can "
+                f"branch: {rows} depend on each other there; what follows may depend on ERROR: try a smaller one"
+            )
         return found
 
     @cached_property

@@ -32,6 +32,7 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.analyses import frozen_friction, linear_modes
+from gearmbs.mechanism.passages import singular_passage
 from gearmbs.mechanism.stops import StopAt
 
 DEFAULT_TOLERANCE = 1e-8
@@ -278,6 +279,8 @@ def _part(
             raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, request.line)]) from error
     for kind_id in model.pairs:
         segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
+    if kind not in ("STATICS", "INITIAL_CONDITIONS"):
+        segment.passage = singular_passage(solution)
     _remember(session, model, segment, evaluator)
     act(session, watch, segment, fired, evaluator)
     return segment, fired
