@@ -26,7 +26,7 @@ END
 
 
 def remarks(stroke):
-    """A crank of 1 m at 36.87 degrees and a rod of 1 m; the slider is drawn in, to where both lie on each other at 0."""
+    """A crank of 1 m at 36.87 degrees and a rod of 1 m; the slider is drawn in, to where one lies on the other."""
     text = DECK.format(x=0.8, y=0.6, end=1.6, rod=1.0, start=1.6, stroke=stroke)
     result = run_deck(parse_deck(text), end=1.0, steps=50, tol=1e-4)
     return [m for m in result.messages if "locks or can branch" in m]

@@ -126,8 +126,8 @@ class RunRecord:
         if segment.passage is not None:
             when, rows = segment.passage
             found.append(
-                f"about TIME = {when / self.deck.units.time:.4g} the mechanism passed a position in which it locks or can "
-                f"branch: {rows} depend on each other there; what follows may depend on ERROR: try a smaller one"
+                f"about TIME = {when / self.deck.units.time:.4g} the mechanism passed a position in which it locks or "
+                f"can branch: {rows} depend on each other there; what follows may depend on ERROR: try a smaller one"
             )
         return found
 
