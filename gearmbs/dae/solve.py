@@ -116,8 +116,7 @@ def solve_dae(
     if not (np.isfinite([t0, t_end]).all() and t_end > t0):
         raise ValueError(f"t_span is ({t0:g}, {t_end:g}); it must be two increasing, finite times")
     if isinstance(fun, DAEProblem):
-        _check_problem(fun, t0, y0, events, of_equations)
-        problem = fun
+        problem = _checked_problem(fun, t0, y0, events, of_equations)
     else:
         problem, chosen = _posed(fun, (t0, t_end), y0, yp0, rtol, atol, events, of_equations, chosen, options)
     if not chosen.uses_ida:
@@ -127,14 +126,15 @@ def solve_dae(
     return _run_ida(problem, chosen, (t0, t_end), t_eval)
 
 
-def _check_problem(
+def _checked_problem(
     problem: DAEProblem, t0: float, y0: np.ndarray | None, events: Any, of_equations: Mapping[str, Any]
-) -> None:
-    """Refuse what a DAEProblem says itself."""
+) -> DAEProblem:
+    """Return the problem; refuse what a DAEProblem says itself."""
     if y0 is not None or of_equations.get("jac") is not None or events is not None:
         raise ValueError("a DAEProblem brings its own y0, jac and events: set them there")
     if problem.t0 != t0:
         raise ValueError(f"t_span starts at {t0:g}, the problem at {problem.t0:g}")
+    return problem
 
 
 def _posed(

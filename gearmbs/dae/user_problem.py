@@ -50,6 +50,17 @@ class _UserFunctions:
         assert callback.address is not None
         self.addresses[slot] = callback.address
 
+    def tables(
+        self, compiled: dict[str, Any], least: np.ndarray, scales: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, int]:
+        """Return the tables of the problem and the length of its work array, with the addresses of its callbacks."""
+        idata, rdata, work_size = differences.pack_tables(
+            compiled["indptr"], compiled["indices"], least, scales, self.parameters
+        )
+        for slot, address in self.addresses.items():
+            idata[slot] = address
+        return idata, rdata, work_size
+
     def residual(self, fun: Callable) -> Callable:
         takes_p = _takes(fun, 4, "the residual")
         if isinstance(fun, CPUDispatcher):
@@ -195,6 +206,19 @@ def _compiled(
     }
 
 
+def _start(
+    y0: np.ndarray, atol: float | np.ndarray, scale: float | np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return initial values, absolute tolerances and scales as vectors; raise a ValueError if they cannot be that."""
+    y0 = np.array(y0, dtype=float).ravel()
+    if len(y0) == 0:
+        raise ValueError("y0 is empty")
+    atols = _vector(atol, len(y0), "atol")
+    if not (atols > 0).all():
+        raise ValueError(f"atol must be positive, is {atols.min():g} for unknown {int(np.argmin(atols))}")
+    return y0, atols, _vector(scale, len(y0), "scale")
+
+
 def as_problem(
     fun: Callable,
     t0: float,
@@ -248,30 +272,17 @@ def as_problem(
     error_probe : callable
         Returns the first exception raised by a Python callback, or None.
     """
-    y0 = np.array(y0, dtype=float).ravel()
+    y0, atols, scales = _start(y0, atol, scale)
     n = len(y0)
-    if n == 0:
-        raise ValueError("y0 is empty")
     parameters = np.array([] if p is None else p, dtype=float).ravel()
-    scales = _vector(scale, n, "scale")
-    atols = _vector(atol, n, "atol")
-    if not (atols > 0).all():
-        raise ValueError(f"atol must be positive, is {atols.min():g} for unknown {int(np.argmin(atols))}")
     functions = _UserFunctions(n, parameters)
     compiled = _compiled(functions, fun, jac, jac_sparsity, events)
-    least = np.minimum(scales, atols / differences.INCREMENT)
-    idata, rdata, work_size = differences.pack_tables(
-        compiled["indptr"], compiled["indices"], least, scales, parameters
-    )
-    for slot, address in functions.addresses.items():
-        idata[slot] = address
+    idata, rdata, work_size = functions.tables(compiled, np.minimum(scales, atols / differences.INCREMENT), scales)
     rates = np.zeros(n) if yp0 is None else _vector(yp0, n, "yp0")
+    tables = idata, rdata, np.zeros(work_size)
+    mask = _mask(differential, n, "differential") if differential is not None else np.empty(n, dtype=np.bool_)
     if differential is None:
-        differential = np.empty(n, dtype=np.bool_)
-        work = np.zeros(work_size)
-        differences.find_differential(compiled["residual"], float(t0), y0, rates, differential, idata, rdata, work)
-    else:
-        differential = _mask(differential, n, "differential")
+        differences.find_differential(compiled["residual"], float(t0), y0, rates, mask, *tables)
     problem = DAEProblem(
         n=n,
         **compiled,
@@ -280,10 +291,10 @@ def as_problem(
         work_size=work_size,
         y0=y0,
         yp0=rates,
-        error_mask=differential.copy() if error_mask is None else _mask(error_mask, n, "error_mask"),
+        error_mask=mask.copy() if error_mask is None else _mask(error_mask, n, "error_mask"),
         atol_scale=atols,
         scale=scales,
-        differential=differential,
+        differential=mask,
         t0=float(t0),
         names=list(names),
         jacobian_residuals=1 + int(idata[differences.N_COLOURS]) if jac is None else 0,

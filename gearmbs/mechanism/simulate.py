@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,10 @@ from gearmbs.mechanism.quantities import quantity
 from gearmbs.mechanism.spin_check import warn_of_spin
 from gearmbs.mechanism.stops import StopAt, stop_options, with_stops
 from gearmbs.progress import time_bar
+
+if TYPE_CHECKING:
+    from gearmbs.dae.model.members import Members
+    from gearmbs.dae.model.system import System
 
 INTEGRATORS = ("WSTIFF", "GSTIFF", "IDA")
 ADVICE = {
@@ -123,47 +127,66 @@ def simulate(
     ModelError
         If the model or an option is wrong, or the mechanism cannot be assembled.
     """
-    if every_step and (rate is not None or t_eval is not None):
-        raise ModelError("every_step: outputs are at the integrator's own steps; leave rate and t_eval away")
     if consumer is not None and not every_step:
         raise ModelError("consumer: it takes the integrator's own steps; give every_step=True, too")
     t_start = quantity(t_start, "time", "t_start")
-    t_eval = _output_times(t_start, quantity(t_end, "time", "t_end"), rate, t_eval)
-    if not np.isfinite(tol) or tol <= 0.0:
-        raise ModelError(f"tol = {tol}; it must be a positive number")
-    name = integrator.upper()
-    if name not in INTEGRATORS:
-        raise ModelError(f"integrator: {integrator!r} is unknown; choose one of {', '.join(INTEGRATORS)}")
-    _check_options(name, options)
-    one = lumped(mechanism, t_start) if lump else None
-    system = mechanism.compile(t_start) if one is None else one.whole
-    members = None if one is None else one.members
-    problem = (system if one is None else one.system).problem(formulation, rate_scale)
+    t_eval = _output_times(t_start, quantity(t_end, "time", "t_end"), rate, t_eval, every_step)
+    name = _checked(integrator, tol, options)
+    system, problem, members = _prepared(mechanism, t_start, lump, formulation, rate_scale)
     if stops:
         if name == "IDA" or lump:
             raise ModelError("stops: they need the integrator WSTIFF or GSTIFF, and lump=False")
         problem = with_stops(problem, mechanism.state_names, int(problem.idata[tables.H_Z]), stops)
         options.update(stop_options(stops))
     problem.advice = {**ADVICE, **(advice or {})}
-    first, last = float(t_eval[0]), float(t_eval[-1])
-    times = None if every_step else t_eval
-    stream = None if consumer is None else Stream(system, problem, last, consumer, members)
-    with time_bar(progress, mechanism.name, first, last) as report:
-        result = _integrated(name, problem, times, stream, t_end=last, tol=tol, progress=report, **options)
-    remarks = [locking_remark(mechanism, system), why_not_lumped(mechanism) if lump and one is None else ""]
+    remarks = [locking_remark(mechanism, system), why_not_lumped(mechanism) if lump and members is None else ""]
     remark = " ".join(text for text in remarks if text)
+    stream = None if consumer is None else Stream(system, problem, float(t_eval[-1]), consumer, members)
+    with time_bar(progress, mechanism.name, float(t_eval[0]), float(t_eval[-1])) as report:
+        result = _integrated(name, problem, t_eval, every_step, stream, tol=tol, progress=report, **options)
     solution = Solution(system, problem, result, members, remark)
-    if stream is None or consumer is None:
-        warn_of_spin(mechanism.bodies, solution)
-        return solution
+    if stream is not None:
+        return _closed(stream, solution, name)
+    warn_of_spin(mechanism.bodies, solution)
+    return solution
+
+
+def _closed(stream: Stream, solution: Solution, name: str) -> Solution:
+    """Return the solution of a run whose steps were handed on; IDA's are so only now."""
     if name == "IDA":
         for part in solution.parts():
-            consumer(part)
+            stream.consumer(part)
     return stream.close(solution)
 
 
-def _output_times(start: float, end: float, rate: float | None, given: np.ndarray | None) -> np.ndarray:
+def _checked(integrator: str, tol: float, options: Mapping[str, Any]) -> str:
+    """Return the integrator's name in capitals; raise a ModelError for a setting or an option that it cannot have."""
+    if not np.isfinite(tol) or tol <= 0.0:
+        raise ModelError(f"tol = {tol}; it must be a positive number")
+    name = integrator.upper()
+    if name not in INTEGRATORS:
+        raise ModelError(f"integrator: {integrator!r} is unknown; choose one of {', '.join(INTEGRATORS)}")
+    _check_options(name, options)
+    return name
+
+
+def _prepared(
+    mechanism: Mechanism, t_start: float, lump: bool, formulation: str, rate_scale: float
+) -> tuple[System, DAEProblem, Members | None]:
+    """Return the system of all bodies, what is integrated, and how the first follows from the second if it is less."""
+    one = lumped(mechanism, t_start) if lump else None
+    if one is None:
+        system = mechanism.compile(t_start)
+        return system, system.problem(formulation, rate_scale), None
+    return one.whole, one.system.problem(formulation, rate_scale), one.members
+
+
+def _output_times(
+    start: float, end: float, rate: float | None, given: np.ndarray | None, every_step: bool
+) -> np.ndarray:
     """Return the output times; see `simulate`."""
+    if every_step and (rate is not None or given is not None):
+        raise ModelError("every_step: outputs are at the integrator's own steps; leave rate and t_eval away")
     if given is not None:
         # a column of a table is taken apart from it, for the kernels
         return np.ascontiguousarray(given, dtype=float)
@@ -178,17 +201,18 @@ def _output_times(start: float, end: float, rate: float | None, given: np.ndarra
 
 
 def _integrated(
-    name: str, problem: DAEProblem, times: np.ndarray | None, stream: Stream | None, **options
+    name: str, problem: DAEProblem, t_eval: np.ndarray, every_step: bool, stream: Stream | None, **options
 ) -> DAEResult:
-    """Run an integrator, with outputs at ``times`` or, if they are None, at its own steps."""
+    """Run an integrator to the last of the output times, with outputs there or at its own steps."""
+    times, last = None if every_step else t_eval, float(t_eval[-1])
     if name == "IDA":
-        return solve_ida(problem, times, **options)
+        return solve_ida(problem, times, t_end=last, **options)
     from gearmbs.dae.integrators.wstiff import solve_wstiff
 
     # errors are controlled on positions and velocities, and so is the corrector
     options.setdefault("corrector", "modified")
     options.setdefault("slopes", times is not None)
-    return solve_wstiff(problem, times, method=name, consumer=stream, **options)
+    return solve_wstiff(problem, times, method=name, consumer=stream, t_end=last, **options)
 
 
 def _sampled(start: float, end: float, rate: float) -> np.ndarray:

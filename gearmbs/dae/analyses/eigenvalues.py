@@ -19,11 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky, eig, qr, solve_triangular
 
+from gearmbs.dae.analyses.instant import ROUNDING
 from gearmbs.dae.analyses.linearised import Reduced
 from gearmbs.dae.errors import SingularModelError
-
-ROUNDING = 2e-13
-"""Rounding errors of coefficients, of the sum of the terms they are made of; times the root of their number."""
 
 SLOWEST = 1e-6
 """Angular frequency, rad/s, below which a motion counts as free of stiffness."""

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 SETTLE_PASSES = 50
 
+ROUNDING = 2e-13
+"""Rounding errors of coefficients, of the sum of the terms they are made of; times the root of their number."""
+
 
 class Instant:
     """Unknowns y of a system at a fixed time, with the tables they belong to.
@@ -95,7 +98,7 @@ class Instant:
     def axes(self) -> np.ndarray:
         """Return the axes of the Euler angles, shape (bodies, 3, 3): row k turns with angle k."""
         self.pose()
-        kin = T.unpack(self.idata, self.rdata, self.work).kin
+        kin = T.kinematics_in(self.idata, self.work)
         return kin[1 : len(self.system.model.bodies), KIN_AXES : KIN_AXES + 9].reshape(-1, 3, 3).copy()
 
     def spatial(self, coordinates: np.ndarray) -> np.ndarray:

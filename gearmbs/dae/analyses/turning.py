@@ -20,18 +20,28 @@ turns is alike about its axis the coefficients are constant, and the eigenvalues
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from gearmbs.dae.analyses.instant import Instant
+from gearmbs.dae.analyses.instant import ROUNDING, Instant
 
-TURN = 2e-3
-"""Angle, rad, between the places at which rates of the coefficients are differenced, to fourth order."""
-DIFFERENCED = 1000.0
-"""Error of a rate of rates against that of rounding: the weight of such terms where rounding is judged."""
+EPS = float(np.finfo(float).eps)
+
 WEIGHTS = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12.0
+"""Of five values, for their rate in the middle to fourth order."""
 REACH = 4
+
+TRUNCATION = 2.0 * math.factorial(5) / 30.0
+"""Error of a rate of rates, by the fourth power of the angle between the places: each rate has 1/30 of the fifth
+derivative, which of T, singular about one radian away, is about 5!."""
+ROUNDING_OF_RATES = float(np.abs(WEIGHTS).sum()) ** 2 * EPS
+"""The same from rounding, by the inverse square of that angle."""
+TURN = (0.5 * ROUNDING_OF_RATES / TRUNCATION) ** (1.0 / 6.0)
+"""Angle, rad, between the places at which rates are differenced: where the sum of both errors is least."""
+DIFFERENCED = (ROUNDING_OF_RATES / TURN**2 + TRUNCATION * TURN**4) / ROUNDING
+"""This error against that of other terms: the weight of such terms where rounding is judged."""
 
 
 @dataclass

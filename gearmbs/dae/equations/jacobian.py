@@ -21,6 +21,11 @@ from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, KIN_H
 from gearmbs.dae.equations.update import inertia_times, update_tables
 from gearmbs.dae.problem import JACOBIAN_SIG
 
+J_AXES, J_AXIS_RATES, TURNED_MOMENTUM, CROSS = 0, 9, 18, 30
+"""Places in the scratch of `body_entries`: J a_m, J adot_m, and dh/dtheta_m = a_m x h + J adot_m, three vectors each;
+then two vectors that come and go."""
+CROSS_2 = CROSS + 3
+
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def body_entries(mode, b, cj, tab, slot, vals, k):
@@ -30,13 +35,13 @@ def body_entries(mode, b, cj, tab, slot, vals, k):
     kin = tab.kin[b]
     s = vector_at(tab.scratch, S_TERM, 100)
     mass = tab.body[b, T.BODY_MASS]
-    # J a_k in s[0:9], J adot_k in s[9:18], dh/dtheta_m = a_m x h + J adot_m in s[18:27]
     for m in range(3):
-        inertia_times(kin, tab.body[b], kin, KIN_AXES + 3 * m, s, 3 * m, s[30:33])
-        inertia_times(kin, tab.body[b], kin, KIN_ADOT + 3 * m, s, 9 + 3 * m, s[30:33])
-        terms.cross3(kin, KIN_AXES + 3 * m, kin, KIN_H, s, 18 + 3 * m)
+        axis, axis_rate, turned = KIN_AXES + 3 * m, KIN_ADOT + 3 * m, TURNED_MOMENTUM + 3 * m
+        inertia_times(kin, tab.body[b], kin, axis, s, J_AXES + 3 * m, s[CROSS:CROSS_2])
+        inertia_times(kin, tab.body[b], kin, axis_rate, s, J_AXIS_RATES + 3 * m, s[CROSS:CROSS_2])
+        terms.cross3(kin, axis, kin, KIN_H, s, turned)
         for c in range(3):
-            s[18 + 3 * m + c] += s[9 + 3 * m + c]
+            s[turned + c] += s[J_AXIS_RATES + 3 * m + c]
     for m in range(3):
         k = put(mode, slot, vals, k, u + m, u + m, mass * cj)
         k = put(mode, slot, vals, k, p + m, p + m, cj)
@@ -47,24 +52,24 @@ def body_entries(mode, b, cj, tab, slot, vals, k):
         k = put(mode, slot, vals, k, th + m, th + m, -cj)
         for n in range(3):
             # L_eps_m = a_m . h
-            k = put(mode, slot, vals, k, e + m, e + n, -terms.dot3(kin, KIN_AXES + 3 * m, s, 3 * n))
-            mixed_mn = terms.dot3(kin, KIN_ADOT + 3 * n, s, 3 * m)
+            k = put(mode, slot, vals, k, e + m, e + n, -terms.dot3(kin, KIN_AXES + 3 * m, s, J_AXES + 3 * n))
+            mixed_mn = terms.dot3(kin, KIN_ADOT + 3 * n, s, J_AXES + 3 * m)
             if m < n:
-                terms.cross3(kin, KIN_AXES + 3 * m, kin, KIN_AXES + 3 * n, s, 30)
-                mixed_mn += terms.dot3(s, 30, kin, KIN_H)
+                terms.cross3(kin, KIN_AXES + 3 * m, kin, KIN_AXES + 3 * n, s, CROSS)
+                mixed_mn += terms.dot3(s, CROSS, kin, KIN_H)
             # d2T/d(eps_m)d(theta_n) serves p - L_eps and p' - L_theta
             k = put(mode, slot, vals, k, e + m, th + n, -mixed_mn)
             k = put(mode, slot, vals, k, p + n, e + m, -mixed_mn)
     for m in range(3):
         for n in range(3):
-            value = terms.dot3(kin, KIN_ADOT + 3 * m, s, 18 + 3 * n)
+            value = terms.dot3(kin, KIN_ADOT + 3 * m, s, TURNED_MOMENTUM + 3 * n)
             if n < m:
                 # d(adot_m)/d(theta_n) . h, with adot_m = sum_{l<m} eps_l a_l x a_m
                 for l in range(m):
                     lo, hi = min(n, l), max(n, l)
-                    terms.cross3(kin, KIN_AXES + 3 * hi, kin, KIN_AXES + 3 * m, s, 30)
-                    terms.cross3(kin, KIN_AXES + 3 * lo, s, 30, s, 33)
-                    value += tab.scratch[S_PRODUCT + l] * terms.dot3(s, 33, kin, KIN_H)
+                    terms.cross3(kin, KIN_AXES + 3 * hi, kin, KIN_AXES + 3 * m, s, CROSS)
+                    terms.cross3(kin, KIN_AXES + 3 * lo, s, CROSS, s, CROSS_2)
+                    value += tab.scratch[S_PRODUCT + l] * terms.dot3(s, CROSS_2, kin, KIN_H)
             k = put(mode, slot, vals, k, p + m, th + n, -value)
     return k
 

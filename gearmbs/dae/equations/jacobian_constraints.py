@@ -111,18 +111,12 @@ def hessian_entries(mode, j, r, lam, mu, y, idata, tab, slot, vals, k):
 
     Parameters
     ----------
-    mode, slot, vals, k
-        As of `gearmbs.dae.equations.entries.put`; returned is the number of the next entry.
-    j, r : int
-        The term, and its constraint row.
+    mode, j, r, idata, tab, slot, vals, k
+        As of `gradient_entries`.
     lam, mu : float
         Multipliers of the row.
-    y
+    y : ndarray
         Unknowns.
-    idata
-        Header and tables of integers.
-    tab
-        Named views of the tables, up to date with y.
     """
     rate_rows, rate_row = has_rate_rows(idata[T.H_FORMULATION]), idata[T.H_MU] + r
     coef, kind = tab.coef[j], tab.term[j, T.TERM_TYPE]
@@ -214,20 +208,10 @@ def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k):
 
     Parameters
     ----------
-    mode, slot, vals, k
-        As of `gearmbs.dae.equations.entries.put`; returned is the number of the next entry.
-    t
-        S.
-    r : int
-        Constraint row.
-    y, yp
-        Unknowns and their derivatives.
-    cj
-        Factor of dG/dy'.
-    idata
-        Header and tables of integers.
-    tab
-        Named views of the tables, up to date with y.
+    mode, r, y, yp, cj, idata, tab, slot, vals, k
+        As of `row_entries`.
+    t : float
+        Time, s.
     """
     rate_rows = has_rate_rows(idata[T.H_FORMULATION])
     lam, mu = idata[T.H_LAMBDA] + r, idata[T.H_MU] + r

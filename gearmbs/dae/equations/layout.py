@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections import namedtuple
 
+import numpy as np
+
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations.rotation import KIN_COLUMNS
@@ -280,3 +282,21 @@ def unpack(idata, rdata, work):
         vector_at(work, i[H_W_TAPE], i[H_W_TAPE_SIZE]),
         vector_at(work, i[H_W_PARTIAL], i[H_N_PARTIAL]),
     )
+
+
+# --- the same for Python, which needs no kernel for it --------------------------------------------------
+
+
+def rows_in(table: np.ndarray, first: int, rows: int, columns: int) -> np.ndarray:
+    """Return the view of ``rows`` rows that begin at ``first`` of a packed table."""
+    return table[first : first + rows * columns].reshape(rows, columns)
+
+
+def kinematics_in(idata: np.ndarray, work: np.ndarray) -> np.ndarray:
+    """Return the kinematics table, shape (frames, KIN_COLUMNS)."""
+    return rows_in(work, int(idata[H_W_KIN]), int(idata[H_FRAMES]), KIN_COLUMNS)
+
+
+def forces_in(idata: np.ndarray) -> np.ndarray:
+    """Return the table of force elements, shape (elements, FORCE_COLUMNS)."""
+    return rows_in(idata, int(idata[H_I_FORCE]), int(idata[H_FORCES]), FORCE_COLUMNS)

@@ -38,7 +38,7 @@ def are_satisfied(phi):
     return satisfied
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def violations(t, y, phi, idata, tab):
     """Write Phi and Phi_q v + Phi_t of each row to ``phi``, as `saddle` does; return the fastest body's |omega|.
 

@@ -165,7 +165,7 @@ def unchanged(vals, before, allowed):
     return True
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def project(t, at, phi, plan, factors, pair, idata, tab):
     """Move y to the nearest position and velocity, in the metric of the masses, that satisfy the constraints.
 

@@ -61,7 +61,8 @@ def accelerations(system: PosedModel, place: Configuration, t: float) -> tuple[n
         y, idata = found.y, found.idata
         last, inner = inner, _inner(y, found.loads, idata)
         y[int(idata[T.H_F]) :] = inner
-        reactions_from(solution[base:].copy(), y, idata, found.rdata, found.work)
+        if (T.forces_in(idata)[:, T.FORCE_KIND] == T.REACTION).any():
+            reactions_from(solution[base:].copy(), y, idata, found.rdata, found.work)
         inner = y[int(idata[T.H_F]) :].copy()
         if last is not None:
             if np.abs(inner - last).max() <= 1e-13 * (1e-3 + np.abs(inner).max()):
@@ -228,8 +229,8 @@ def _state_rates(system: PosedModel, y, yp, z: slice, idata, rdata, work) -> Non
 
 def _rates(y, yp, acc: np.ndarray, t: float, idata, rdata, work) -> None:
     """Fill y' from the accelerations; p' and p_f' are what makes their own residuals vanish."""
-    tab = T.unpack(idata, rdata, work)
-    places = [[int(k) for k in row] for row in tab.at[1 : int(idata[T.H_BODIES])]]
+    kin, bodies = T.kinematics_in(idata, work), int(idata[T.H_BODIES])
+    places = T.rows_in(idata, int(idata[T.H_I_AT]), bodies, T.AT_COLUMNS)[1:].tolist()
     for at in places:
         u, v, v_f, modal, modes = (at[k] for k in (T.AT_U, T.AT_V, T.AT_VF, T.AT_V_MODES, T.AT_MODES))
         yp[u : u + 3] = acc[v : v + 3]
@@ -239,8 +240,8 @@ def _rates(y, yp, acc: np.ndarray, t: float, idata, rdata, work) -> None:
     _momentum_rates(t, y, yp, idata, rdata, work)
     for b, at in enumerate(places, start=1):
         e, alpha = at[T.AT_EPS], at[T.AT_V] + 3
-        adot = tab.kin[b, KIN_ADOT : KIN_ADOT + 9].reshape(3, 3)
-        euler_rates(tab.kin, b, acc[alpha : alpha + 3] - y[e : e + 3] @ adot, 0, yp, e)
+        adot = kin[b, KIN_ADOT : KIN_ADOT + 9].reshape(3, 3)
+        euler_rates(kin, b, acc[alpha : alpha + 3] - y[e : e + 3] @ adot, 0, yp, e)
 
 
 def _momentum_rates(t: float, y, yp, idata, rdata, work) -> None:

@@ -239,26 +239,10 @@ def eval_request(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, w
 
     Parameters
     ----------
-    ints : ndarray of int
-        Integer table of the expression (`Tape.ints`).
-    floats : ndarray
-        Real table of the expression (`Tape.floats`).
-    t : float
-        Time, s.
-    kin : ndarray, shape (bodies, KIN_COLUMNS)
-        Positions, orientations and velocities of the bodies.
+    ints, floats, t, kin, marker_body, marker_frame, y, ref, work
+        As of `eval_value`.
     acc : ndarray, shape (bodies, 6)
         Accelerations a and alpha of the bodies; not used where none are asked for.
-    marker_body : ndarray of int
-        Body of each marker.
-    marker_frame : ndarray, shape (markers, 12)
-        Origin and orientation of each marker in its body.
-    y : ndarray
-        Unknowns, for states and for loads asked for by name.
-    ref : ndarray
-        References of the counted angles.
-    work : ndarray
-        Scratch, `Tape.work_size` entries.
     """
     forward(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, work, 0)
     return work[ints[op.HEAD_RESULT]]
@@ -309,26 +293,10 @@ def eval_gradient(ints, floats, t, kin, marker_body, marker_frame, y, ref, grad,
 
     Parameters
     ----------
-    ints : ndarray of int
-        Integer table of the expression (`Tape.ints`).
-    floats : ndarray
-        Real table of the expression (`Tape.floats`).
-    t : float
-        Time, s.
-    kin : ndarray, shape (bodies, KIN_COLUMNS)
-        Positions, orientations and velocities of the bodies.
-    marker_body : ndarray of int
-        Body of each marker.
-    marker_frame : ndarray, shape (markers, 12)
-        Origin and orientation of each marker in its body.
-    y : ndarray
-        Unknowns, for states and for loads asked for by name.
-    ref : ndarray
-        References of the counted angles.
+    ints, floats, t, kin, marker_body, marker_frame, y, ref, work
+        As of `eval_value`.
     grad : ndarray
         Receives the gradient: 12 spatial variations of each body of the tape, then its unknowns.
-    work : ndarray
-        Scratch, `Tape.work_size` entries.
     """
     forward(ints, floats, t, kin, kin, marker_body, marker_frame, y, ref, work, 1)
     backward(ints, work, 3 * ints[op.HEAD_COUNT], ints[op.HEAD_RESULT])
@@ -347,28 +315,12 @@ def angle_rates(ints, floats, t, kin, marker_body, marker_frame, y, ref, rates, 
 
     Parameters
     ----------
-    ints : ndarray of int
-        Integer table of the expression (`Tape.ints`).
-    floats : ndarray
-        Real table of the expression (`Tape.floats`).
-    t : float
-        Time, s.
-    kin : ndarray, shape (bodies, KIN_COLUMNS)
-        Positions, orientations and velocities of the bodies.
-    marker_body : ndarray of int
-        Body of each marker.
-    marker_frame : ndarray, shape (markers, 12)
-        Origin and orientation of each marker in its body.
-    y : ndarray
-        Unknowns, for states and for loads asked for by name.
-    ref : ndarray
-        References of the counted angles.
+    ints, floats, t, kin, marker_body, marker_frame, y, ref, work
+        As of `eval_value`.
     rates : ndarray
         Receives the rates, rad/s.
     grad : ndarray
         Scratch of the size of the gradient.
-    work : ndarray
-        Scratch, `Tape.work_size` entries.
     """
     if ints[op.HEAD_ANGLES] == 0:
         return
@@ -399,24 +351,8 @@ def update_angles(ints, floats, t, kin, marker_body, marker_frame, y, ref, work)
 
     Parameters
     ----------
-    ints : ndarray of int
-        Integer table of the expression (`Tape.ints`).
-    floats : ndarray
-        Real table of the expression (`Tape.floats`).
-    t : float
-        Time, s.
-    kin : ndarray, shape (bodies, KIN_COLUMNS)
-        Positions, orientations and velocities of the bodies.
-    marker_body : ndarray of int
-        Body of each marker.
-    marker_frame : ndarray, shape (markers, 12)
-        Origin and orientation of each marker in its body.
-    y : ndarray
-        Unknowns, for states and for loads asked for by name.
-    ref : ndarray
-        References of the counted angles.
-    work : ndarray
-        Scratch, `Tape.work_size` entries.
+    ints, floats, t, kin, marker_body, marker_frame, y, ref, work
+        As of `eval_value`.
     """
     if ints[op.HEAD_ANGLES] == 0:
         return

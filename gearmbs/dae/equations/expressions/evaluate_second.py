@@ -89,28 +89,12 @@ def eval_second(ints, floats, t, kin, marker_body, marker_frame, y, ref, grad, h
 
     Parameters
     ----------
-    ints : ndarray of int
-        Integer table of the expression (`Tape.ints`).
-    floats : ndarray
-        Real table of the expression (`Tape.floats`).
-    t : float
-        Time, s.
-    kin : ndarray, shape (bodies, KIN_COLUMNS)
-        Positions, orientations and velocities of the bodies.
-    marker_body : ndarray of int
-        Body of each marker.
-    marker_frame : ndarray, shape (markers, 12)
-        Origin and orientation of each marker in its body.
-    y : ndarray
-        Unknowns, for states and for loads asked for by name.
-    ref : ndarray
-        References of the counted angles.
+    ints, floats, t, kin, marker_body, marker_frame, y, ref, work
+        As of `eval_value`.
     grad : ndarray
         Receives the gradient over R and theta of the bodies of the tape, and time.
     hess : ndarray
         Receives the Hessian over R and theta of the bodies of the tape, and time, row by row.
-    work : ndarray
-        Scratch, `Tape.work_size` entries.
     """
     count = ints[op.HEAD_COUNT]
     columns = 6 * ints[op.HEAD_BODIES] + 1

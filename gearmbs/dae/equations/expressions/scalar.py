@@ -12,6 +12,45 @@ from gearmbs.dae.equations.time_functions import smooth_step
 
 
 @njit("UniTuple(float64, 3)(int64, float64, float64)", cache=True, error_model="numpy", nogil=True)
+def _piecewise(code, a, p):
+    """Return what `unary` does of roundings, steps and powers, which are defined piece by piece."""
+    if code == op.AINT:
+        return (np.floor(a) if a >= 0.0 else np.ceil(a)), 0.0, 0.0
+    if code == op.ANINT:
+        return (np.floor(a + 0.5) if a >= 0.0 else np.ceil(a - 0.5)), 0.0, 0.0
+    if code == op.STEP01 or code == op.STEP5_01:
+        _, f, slope, curvature = smooth_step(a, 1 if code == op.STEP5_01 else 0)
+        return f, slope, curvature
+    if code == op.HAVERSINE01:
+        if a <= 0.0:
+            return 0.0, 0.0, 0.0
+        if a >= 1.0:
+            return 1.0, 0.0, 0.0
+        c, s = math.cos(math.pi * a), math.sin(math.pi * a)
+        return 0.5 * (1.0 - c), 0.5 * math.pi * s, 0.5 * math.pi * math.pi * c
+    if code == op.POSITIVE_PART:
+        if a > 0.0:
+            return a, 1.0, 0.0
+        return 0.0, 0.0, 0.0
+    if code == op.UNIT_STEP:
+        return (1.0 if a > 0.0 else 0.0), 0.0, 0.0
+    if code == op.POWER_INT:
+        if p == 0.0:
+            return 1.0, 0.0, 0.0
+        if p == 1.0:
+            return a, 1.0, 0.0
+        if p == 2.0:
+            return a * a, 2.0 * a, 2.0
+        if a == 0.0:
+            if p < 0.0:
+                return math.inf, -math.inf, math.inf
+            return 0.0, 0.0, 0.0
+        f = a**p
+        return f, p * f / a, p * (p - 1.0) * f / (a * a)
+    return math.nan, math.nan, math.nan
+
+
+@njit("UniTuple(float64, 3)(int64, float64, float64)", cache=True, error_model="numpy", nogil=True)
 def unary(code, a, p):
     """Return f(a), f'(a), f''(a) of the one-operand operation ``code``; ``p`` is its constant parameter."""
     if code == op.NEG:
@@ -66,40 +105,7 @@ def unary(code, a, p):
         f = math.tanh(a)
         g = 1.0 - f * f
         return f, g, -2.0 * f * g
-    if code == op.AINT:
-        return (np.floor(a) if a >= 0.0 else np.ceil(a)), 0.0, 0.0
-    if code == op.ANINT:
-        return (np.floor(a + 0.5) if a >= 0.0 else np.ceil(a - 0.5)), 0.0, 0.0
-    if code == op.STEP01 or code == op.STEP5_01:
-        _, f, slope, curvature = smooth_step(a, 1 if code == op.STEP5_01 else 0)
-        return f, slope, curvature
-    if code == op.HAVERSINE01:
-        if a <= 0.0:
-            return 0.0, 0.0, 0.0
-        if a >= 1.0:
-            return 1.0, 0.0, 0.0
-        c, s = math.cos(math.pi * a), math.sin(math.pi * a)
-        return 0.5 * (1.0 - c), 0.5 * math.pi * s, 0.5 * math.pi * math.pi * c
-    if code == op.POSITIVE_PART:
-        if a > 0.0:
-            return a, 1.0, 0.0
-        return 0.0, 0.0, 0.0
-    if code == op.UNIT_STEP:
-        return (1.0 if a > 0.0 else 0.0), 0.0, 0.0
-    if code == op.POWER_INT:
-        if p == 0.0:
-            return 1.0, 0.0, 0.0
-        if p == 1.0:
-            return a, 1.0, 0.0
-        if p == 2.0:
-            return a * a, 2.0 * a, 2.0
-        if a == 0.0:
-            if p < 0.0:
-                return math.inf, -math.inf, math.inf
-            return 0.0, 0.0, 0.0
-        f = a**p
-        return f, p * f / a, p * (p - 1.0) * f / (a * a)
-    return math.nan, math.nan, math.nan
+    return _piecewise(code, a, p)
 
 
 @njit("UniTuple(float64, 6)(float64, float64)", cache=True, error_model="numpy", nogil=True)
