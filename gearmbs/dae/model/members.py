@@ -13,7 +13,7 @@ import numpy as np
 from numba import float64, int64, types, void
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.views import vector_at
+from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.accelerations import ROW_RECORD
@@ -199,8 +199,9 @@ def _deduct_loads(loads, members, tab, wrench, s):
         body = tab.kin[tab.marker_body[i]]
         for c in range(3):
             s[3 + c] = body[KIN_R + c] + tab.frame[i, T.MK_ARM + c]
-        _deduct(members.of_marker[i], 1.0, loads[f], 0, loads[f], 3, s[3:6], wrench, s)
-        _deduct(members.of_marker[j], -1.0, loads[f], 0, loads[f], 3, s[3:6], wrench, s)
+        point = vector_at(s, 3, 3)
+        _deduct(members.of_marker[i], 1.0, loads[f], 0, loads[f], 3, point, wrench, s)
+        _deduct(members.of_marker[j], -1.0, loads[f], 0, loads[f], 3, point, wrench, s)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -296,6 +297,58 @@ def _internal_reactions(members, tab, wrench, multipliers, phi, force, moment, s
                 wrench[parent, c] += wrench[child, c]
 
 
+@njit(cache=True, error_model="numpy", nogil=True)
+def _expand(first, count, t, idata, rdata, work, members, narrow, wide, wrench, s):
+    """Do what `expand` promises, in arrays that its caller keeps alive.
+
+    Parameters
+    ----------
+    first, count, t, idata, rdata, work, members, narrow, wide
+        As of `expand`.
+    wrench, s : ndarray, shapes (members, 6) and (24,)
+        Scratch.
+    """
+    idata, t = uncounted(idata), uncounted(t)
+    tab = T.unpack(idata, rdata, work)
+    n = members.group.size
+    base = 6 * n
+    wrench, s = matrix_at(wrench, 0, n, 6), uncounted(s)
+    rows, elements, told = members.row.size, narrow.loads.shape[1], narrow.loads.shape[2]
+    size, poses = narrow.solution.shape[1], narrow.pose.shape[1]
+    groups = size - rows
+    wide_rows, wide_size, wide_poses = wide.force.shape[1], wide.solution.shape[1], wide.pose.shape[1]
+    for k in range(count):
+        to = first + k
+        solution = vector_at(narrow.solution, size * k, size)
+        phi = vector_at(narrow.phi, ROW_RECORD * rows * k, ROW_RECORD * rows)
+        loads = matrix_at(narrow.loads, elements * told * k, elements, told)
+        pose = vector_at(wide.pose, wide_poses * to, wide_poses)
+        result = vector_at(wide.solution, wide_size * to, wide_size)
+        wide_phi = vector_at(wide.phi, ROW_RECORD * wide_rows * to, ROW_RECORD * wide_rows)
+        force = matrix_at(wide.force, 3 * wide_rows * to, wide_rows, 3)
+        moment = matrix_at(wide.moment, 3 * wide_rows * to, wide_rows, 3)
+        _take_pose(vector_at(narrow.pose, poses * k, poses), tab)
+        update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
+        update_functions(t[k], tab)
+        for m in range(n):
+            _move_member(m, members, tab, solution, pose, result, wrench, s)
+        _deduct_loads(loads, members, tab, wrench, s)
+        _deduct_rows(vector_at(solution, groups, rows), members, tab, wrench, s)
+        _internal_reactions(members, tab, wrench, vector_at(result, base, wide_rows), wide_phi, force, moment, s)
+        wide.strayed[to] = narrow.strayed[k]
+        for f in range(elements):
+            for c in range(told):
+                wide.loads[to, f, c] = loads[f, c]
+        for r in range(rows):
+            row = members.row[r]
+            result[base + row] = solution[groups + r]
+            for c in range(ROW_RECORD):
+                wide_phi[ROW_RECORD * row + c] = phi[ROW_RECORD * r + c]
+            for c in range(3):
+                force[row, c] = narrow.force[k, r, c]
+                moment[row, c] = narrow.moment[k, r, c]
+
+
 @njit(
     void(int64, int64, _VEC, _IVEC, _VEC, _VEC, MEMBERS_TYPE, RECORDS_TYPE, RECORDS_TYPE),
     cache=True,
@@ -317,36 +370,8 @@ def expand(first, count, t, idata, rdata, work, members, narrow, wide):
     narrow, wide : Records
         Of the integrated model, and of the whole one.
     """
-    tab = T.unpack(idata, rdata, work)
     n = members.group.size
-    wrench = np.zeros((n, 6))
-    s = np.zeros(24)
-    base = 6 * n
-    groups = narrow.solution.shape[1] - members.row.size
-    for k in range(count):
-        to = first + k
-        _take_pose(narrow.pose[k], tab)
-        update_markers(tab.marker_body, tab.marker, tab.kin, tab.frame)
-        update_functions(t[k], tab)
-        for m in range(n):
-            _move_member(m, members, tab, narrow.solution[k], wide.pose[to], wide.solution[to], wrench, s)
-        _deduct_loads(narrow.loads[k], members, tab, wrench, s)
-        _deduct_rows(narrow.solution[k, groups:], members, tab, wrench, s)
-        _internal_reactions(
-            members, tab, wrench, wide.solution[to, base:], wide.phi[to], wide.force[to], wide.moment[to], s
-        )
-        wide.strayed[to] = narrow.strayed[k]
-        for f in range(narrow.loads.shape[1]):
-            for c in range(narrow.loads.shape[2]):
-                wide.loads[to, f, c] = narrow.loads[k, f, c]
-        for r in range(members.row.size):
-            row = members.row[r]
-            wide.solution[to, base + row] = narrow.solution[k, groups + r]
-            for c in range(ROW_RECORD):
-                wide.phi[to, ROW_RECORD * row + c] = narrow.phi[k, ROW_RECORD * r + c]
-            for c in range(3):
-                wide.force[to, row, c] = narrow.force[k, r, c]
-                wide.moment[to, row, c] = narrow.moment[k, r, c]
+    _expand(first, count, t, idata, rdata, work, members, narrow, wide, np.zeros((n, 6)), np.zeros(24))
 
 
 class MemberEvaluator(Evaluator):
