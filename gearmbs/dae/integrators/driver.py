@@ -23,7 +23,9 @@ from gearmbs.dae.integrators.rounding import rounding_level
 from gearmbs.dae.integrators.stall import StallWatch
 from gearmbs.dae.integrators.step import advance
 from gearmbs.dae.linalg.sparse_lu import (
+    FEWEST_ENTRIES,
     GROWTH_LIMIT,
+    LEAVING_PLANS,
     LUFactors,
     LUPlan,
     SingularMatrixError,
@@ -41,10 +43,6 @@ DROP_ROUNDS_ALLOWED = 3
 UNSATISFIED = 1e-3
 """Part of its terms by which an equation set aside may be off at the end of a run."""
 DROP_TOLERANCES = (0.0, 1e-9, 1e-7, 1e-5)
-FEWEST_ENTRIES = 200
-"""Of a matrix from which negligible ones are left out: with fewer a run gains less than another choice of pivots."""
-LEAVING_PLANS = 12
-"""Choices of pivots in a run that may leave entries out."""
 
 
 @njit(HOOK_SIG, cache=True, nogil=True, error_model="numpy")

@@ -36,6 +36,10 @@ NEGLIGIBLE = 1e-13
 """Size up to which it may stay left out of the plan."""
 WORTH_LEAVING = 0.8
 """Largest share of entries that count with which the others are left out: fewer would not pay for looking at them."""
+FEWEST_ENTRIES = 200
+"""Of a matrix from which some are left out: a smaller one is factored as fast as they are looked at."""
+LEAVING_PLANS = 12
+"""Plans of a run that may leave entries out; after so many it is taken to need them all."""
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]

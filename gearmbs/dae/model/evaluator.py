@@ -24,7 +24,9 @@ from gearmbs.dae.equations.rotation import POSE_COLUMNS
 from gearmbs.dae.equations.update import update_tables
 from gearmbs.dae.linalg.sparse_lu import (
     FACTORS_TYPE,
+    FEWEST_ENTRIES,
     GROWTH_LIMIT,
+    LEAVING_PLANS,
     PLAN_TYPE,
     LUFactors,
     LUPlan,
@@ -61,11 +63,6 @@ ROUNDED = 1e-13
 
 Of wheels that spin about fixed axes the mass matrix and the constraints' gradients stay what they are in global
 components, and so do the factors."""
-
-FEWEST_ENTRIES = 200
-"""Of a matrix from which negligible ones are left out: with fewer it is factored as fast as they are looked at."""
-LEAVING_PLANS = 12
-"""Choices of pivots that may leave entries out."""
 
 REACTION_PASSES = 30
 """Most corrections of loads that depend on reactions, such as joint friction, to the multipliers of one output."""
