@@ -25,7 +25,18 @@ from gearmbs.view.motion import (
 )
 from gearmbs.view.page import Page, packed, rounded
 from gearmbs.view.solid import pair_deviations, section_outline
-from gearmbs.view.transverse import ARROW, FILLS, LINES, MM, TOLERANCE, force_text, mesh_view, projected
+from gearmbs.view.transverse import (
+    ARROW,
+    FILLS,
+    LINES,
+    MM,
+    TOLERANCE,
+    action_ends,
+    force_text,
+    mesh_view,
+    pitch_point,
+    projected,
+)
 
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
@@ -159,7 +170,8 @@ def _page_data(motion: PairMotion, points: list[ContactPoints], span: float, sec
                 "fill": FILLS[w],
                 "line": LINES[w],
                 "outline": packed(outline * MM),
-                "bore": wheel.bore_radius * MM,
+                # filled between outline and bore, or rim
+                "bore": (wheel.outer_radius if wheel.internal else wheel.bore_radius) * MM,
                 "base": wheel.base_radius * MM,
                 "maps": [_affine(motion, w, k, means[k], section) for k in range(len(motion))],
             }
@@ -178,18 +190,14 @@ def _page_data(motion: PairMotion, points: list[ContactPoints], span: float, sec
             fx, fy, _ = force @ mean * unit
             rows.append([*rounded([x, y, fx, fy]), force_text(float(np.linalg.norm(force)))])
         arrows.append(rows)
-    alpha, rb = pair.working_pressure_angle, pair.wheels[0].base_radius
-    begin = rb * np.array([math.cos(alpha), -pair.rotation * math.sin(alpha)])
-    end = begin + pair.line_of_action * np.array([math.sin(alpha), pair.rotation * math.cos(alpha)])
-    first, second = pair.wheels
     return {
         "wheels": wheels,
         "values": rounded(motion.value, 9),
         "label": motion.label,
         "unit": motion.unit,
         "span": span * MM,
-        "centre": pair.centre_distance * first.base_radius / (first.base_radius + second.base_radius) * MM,
-        "action": rounded(np.concatenate([begin, end]) * MM),
+        "centre": pitch_point(pair) * MM,
+        "action": rounded(action_ends(pair, pair.rotation).ravel() * MM),
         "points": dots,
         "arrows": arrows,
         "force": rounded([float(p.force.sum()) for p in points]),

@@ -99,7 +99,8 @@ class ContactProbe:
         touching = rows[:, COLUMN["gap"]] < 0.0
         width = self._widths(place, rows)[touching]
         rows = rows[touching]
-        mean = mean_frame(place)
+        # the kernel's frame of an internal pair points from the internal wheel to its mate
+        mean = mean_frame(place) * [self.pair.sign, self.pair.sign, 1]
         side = rows[:, COLUMN["side"]]
         sine, cosine = np.sin(rows[:, COLUMN["alpha"]]), side * np.cos(rows[:, COLUMN["alpha"]])
         zero = np.zeros(len(rows))

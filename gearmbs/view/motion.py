@@ -77,7 +77,7 @@ def static_motion(pair: GearPair, *, torque: float | None = None, pitches: float
         raise ValueError(f"torque is {load} N m; give 0 (touching) or a positive load")
     mesh = StaticMesh(pair)
     rb = pair.driven.base_radius
-    lag = pair.penetration(load) * pair.rotation / rb if load > 0.0 else 0.0
+    lag = mesh.turning * pair.penetration(load) / rb if load > 0.0 else 0.0
     phase = pitches * np.arange(frames) / frames
     places = []
     for step in phase:

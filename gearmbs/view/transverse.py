@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon
+from matplotlib.patches import PathPatch, Polygon
+from matplotlib.path import Path
 
 from gearmbs.gears import GearPair
 from gearmbs.gears.pair import Placement
@@ -82,7 +83,7 @@ def mesh_view(
         draw_wheels(ax, pair, place, mean, section, exaggeration)
         draw_lines(ax, pair)
         draw_contacts(ax, pair, points, place, mean)
-        centre = _pitch_point(pair)
+        centre = pitch_point(pair)
         ax.set_xlim((centre - 0.5 * span) * MM, (centre + 0.5 * span) * MM)
         ax.set_ylim(-0.5 * span * MM, 0.5 * span * MM)
         ax.set_aspect("equal")
@@ -102,7 +103,14 @@ def draw_wheels(
     for k, (wheel, deviation, pose) in enumerate(zip(pair.wheels, pair_deviations(pair), poses)):
         outline = section_outline(wheel, section, TOLERANCE, deviation, exaggeration)
         shape = projected(outline, *pose, place.origin_1, mean, section)
-        ax.add_patch(Polygon(shape * MM, closed=True, facecolor=FILLS[k], edgecolor=LINES[k], linewidth=1.1, zorder=2))
+        if wheel.internal:
+            rim = projected(circle(wheel.outer_radius, 1e-5), *pose, place.origin_1, mean, section)
+            # run the other way, the rim leaves the space within the teeth open
+            body = Path.make_compound_path(*(Path(_closed(p) * MM, closed=True) for p in (shape, rim[::-1])))
+            ax.add_patch(PathPatch(body, facecolor=FILLS[k], edgecolor=LINES[k], linewidth=1.1, zorder=2))
+        else:
+            look = {"facecolor": FILLS[k], "edgecolor": LINES[k], "linewidth": 1.1}
+            ax.add_patch(Polygon(shape * MM, closed=True, zorder=2, **look))
         for radius, style in ((wheel.base_radius, (0, (5, 3))), (wheel.pitch_radius, (0, (1, 2)))):
             ring = projected(_closed(circle(radius, 1e-5)), *pose, place.origin_1, mean, section)
             ax.plot(*(ring.T * MM), color=GREY, linewidth=0.8, linestyle=style, zorder=2.5)
@@ -126,12 +134,8 @@ def projected(
 
 def draw_lines(ax: Axes, pair: GearPair) -> None:
     """Draw the lines of action of drive and back flanks and the line of centres."""
-    alpha, rb = pair.working_pressure_angle, pair.wheels[0].base_radius
-    reach = pair.line_of_action
     for side, colour in ((pair.rotation, PURPLE), (-pair.rotation, GREY)):
-        begin = rb * np.array([math.cos(alpha), -side * math.sin(alpha)])
-        end = begin + reach * np.array([math.sin(alpha), side * math.cos(alpha)])
-        ax.plot(*(np.array([begin, end]).T * MM), color=colour, linewidth=0.9, linestyle=(0, (7, 2, 1, 2)), zorder=3)
+        ax.plot(*(action_ends(pair, side).T * MM), color=colour, linewidth=0.9, linestyle=(0, (7, 2, 1, 2)), zorder=3)
     ax.axhline(0.0, color=GREY, linewidth=0.6, zorder=1)
 
 
@@ -184,13 +188,27 @@ def _at_rest(pair: GearPair, driver_angle: float, torque: float | None) -> Place
     if load == 0.0:
         return pair.placement(driver_angle)
     mesh = StaticMesh(pair)
-    lag = pair.penetration(load) * pair.rotation / pair.driven.base_radius
+    lag = mesh.turning * pair.penetration(load) / pair.driven.base_radius
     return pair.frames(driver_angle, mesh.loaded_angle(driver_angle, load, mesh.ideal_angle(driver_angle) + lag))
 
 
-def _pitch_point(pair: GearPair) -> float:
-    first, second = pair.wheels
-    return pair.centre_distance * first.base_radius / (first.base_radius + second.base_radius)
+def pitch_point(pair: GearPair) -> float:
+    """Return where the pitch circles touch on the line of centres, m from the driver's axis.
+
+    Towards the driven wheel it counts positive; the mesh of an internal one is on the other side.
+    """
+    return pair.centre_distance * pair.driver.base_radius / pair.base_radius_sum
+
+
+def action_ends(pair: GearPair, side: int) -> np.ndarray:
+    """Return both ends of a side's line of action, shape (2, 2), m from the driver's axis.
+
+    From the driver's base circle to that of its mate, in an internal pair to the driver's tip circle.
+    """
+    alpha, gear = pair.working_pressure_angle, pair.wheels[0]
+    begin = gear.base_radius * np.array([math.cos(alpha), -side * math.sin(alpha)])
+    reach = pair.line_of_action if pair.sign > 0 else gear.tip_roll_length
+    return pair.sign * np.array([begin, begin + reach * np.array([math.sin(alpha), side * math.cos(alpha)])])
 
 
 def _closed(points: np.ndarray) -> np.ndarray:

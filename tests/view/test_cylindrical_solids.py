@@ -7,9 +7,10 @@ import pytest
 from scipy.interpolate import BSpline
 
 from gearmbs.gears import GearPair, GearSpec, faults
-from gearmbs.view import gear_outline, gear_solid, pair_solids, profile_area, write_dxf, write_stl
+from gearmbs.view import gear_outline, gear_solid, mesh_animation, pair_solids, profile_area, write_dxf, write_stl
 from gearmbs.view.edges import DEGREE, Spline, profile_edges
 from gearmbs.view.step_faces import Sweep
+from gearmbs.view.transverse import action_ends, pitch_point
 from tests.view.looking_at_step import check_shell, check_volume
 
 WHEELS = {
@@ -95,3 +96,21 @@ def test_faults_are_drawn_on_a_ring():
     drawn = pair_solids(pair, 1e-5)[1]
     assert drawn.watertight
     assert drawn.volume < plain.volume
+
+
+@pytest.mark.parametrize("helix", [0.0, 0.26])
+def test_animation_of_a_ring_shows_its_mesh(helix):
+    ring = GearSpec.ring(70, "3 mm", helix_angle=helix)
+    pinion = GearSpec(23, "3 mm", helix_angle=helix)
+    pair = GearPair(pinion, ring, backlash="0.1 mm")
+    assert pitch_point(pair) == pytest.approx(-pinion.pitch_radius)
+    animation = mesh_animation(pair, frames=3, torque=20.0)
+    for k, points in enumerate(animation.points):
+        # flanks touch on the line of action
+        place = animation.motion.placement(k)
+        begin, end = action_ends(pair, pair.rotation)
+        along = (end - begin) / np.linalg.norm(end - begin)
+        away = (points.point - place.origin_1)[(points.force > 0) & (points.kind == 0)][:, :2] - begin
+        assert len(away) > 0
+        assert abs(away @ [-along[1], along[0]]).max() < 1e-12
+        assert points.force.sum() * ring.base_radius == pytest.approx(20.0, rel=0.15)
