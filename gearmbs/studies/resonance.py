@@ -43,6 +43,8 @@ SAMPLES = 64
 """Samples of the lag in a mesh cycle."""
 STEPS = 20
 """Steps of the multibody model in a mesh cycle, at least: a tooth that passes unseen excites nothing."""
+JUMP = 0.1
+"""Change of the logarithm of the amplitude from window to window from which it is a jump, and not a slope."""
 SETTLING = 100
 """Mesh cycles at the first frequency that are left out."""
 
@@ -301,7 +303,8 @@ def sweep_resonance(
 
 
 def jump_frequency(sweep: xr.Dataset) -> float:
-    """Return the mesh frequency at which a sweep's amplitude changes by the largest factor between two windows, Hz."""
+    """Return the mesh frequency at which a sweep's amplitude changes most between windows, Hz; NaN without a jump."""
     a, f = sweep["rms"].values, sweep["frequency"].values
-    k = int(np.argmax(np.abs(np.diff(np.log(a)))))
-    return float(0.5 * (f[k] + f[k + 1]))
+    steps = np.abs(np.diff(np.log(a)))
+    k = int(np.argmax(steps))
+    return float(0.5 * (f[k] + f[k + 1])) if steps[k] > JUMP else math.nan

@@ -117,8 +117,9 @@ class ResonanceStudy:
         for d in DIRECTIONS:
             whole, classical = (jumps[m][d] for m in MODELS)
             lowest = 1e6 * float(self.sweeps[MODELS[0], d]["lowest"].min())
+            cells = [f"{whole:.5g}", f"{classical:.5g}", f"{100.0 * (whole / classical - 1.0):+.2f}", f"{lowest:.3g}"]
             lines.append(
-                f"| {d} | {whole:.5g} | {classical:.5g} | {100.0 * (whole / classical - 1.0):+.2f} | {lowest:.3g} |"
+                f"| {d} | " + " | ".join(cell.replace("+nan", "-").replace("nan", "no jump") for cell in cells) + " |"
             )
         if self.threshold is not None:
             lines += ["", str(self.threshold) + "."]

@@ -131,6 +131,11 @@ def test_wrong_settings(changes, words):
         ResonanceSettings(**changes)
 
 
+def test_no_jump_where_amplitudes_only_slope():
+    quiet = sweep_resonance(ResonanceSettings(span=(0.4, 0.45), cycles=1000), "up", "one degree")
+    assert np.isnan(jump_frequency(quiet))
+
+
 def test_wrong_model():
     with pytest.raises(ValueError, match="model is 'guess'"):
         sweep_resonance(model="guess")
