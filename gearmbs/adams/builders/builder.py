@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.adams.builders.accelerations import FUNCTIONS, Accelerations
+from gearmbs.adams.builders.control import linear_system
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.builders.data_calls import translated
 from gearmbs.adams.builders.frames import inertia_about_cm, marker_orientation, part_orientation
@@ -271,5 +272,13 @@ class Builder:
                 continue
             text = f"({self.text(diff.function)})/{self.units.time!r}"
             m.states[diff.id] = State(f"DIFF_{diff.id}", text, diff.ic[0])
+        for system in (*self.active(st.Lse), *self.active(st.Tfsiso)):
+            self.attempt(system, self.add_linear_system)
         for sensor in self.active(st.Sensor):
             m.algebraic_state(sensor_state(sensor.id), self.text(sensor.function or "0"))
+
+    def add_linear_system(self, statement: st.Lse | st.Tfsiso) -> None:
+        """Add the states of an LSE or TFSISO."""
+        system = linear_system(self.deck, statement)
+        for name, rate, start in zip(system.names, system.rates(), system.start):
+            self.mechanism.states[name] = State(name, f"({self.text(rate)})/{self.units.time!r}", float(start))

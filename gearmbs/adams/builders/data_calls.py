@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 
+from gearmbs.adams.builders.control import linear_systems
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
@@ -18,7 +19,8 @@ def data_call(deck: Deck, sensed: Mapping[int, float], call: Call) -> Node:
     """Return what a call stands for; others as they are.
 
     SENVAL(s) is the number that sensor s evaluated last, 0 before; ARYVAL(a, k) of an array of variables is VARVAL of
-    the k-th; CURVE(u, order, component, c), with u from -1 to 1, a spline of the curve's parameter.
+    the k-th, of one of states or outputs what the linear system makes it; CURVE(u, order, component, c), with u from -1
+    to 1, a spline of the curve's parameter.
     """
     numbers = [a.integer if isinstance(a, Number) else None for a in call.args]
     if call.name == "SENVAL" and len(numbers) == 1 and numbers[0] in deck.of(st.Sensor):
@@ -28,8 +30,19 @@ def data_call(deck: Deck, sensed: Mapping[int, float], call: Call) -> Node:
         if array is not None and 1 <= numbers[1] <= len(array.variables):
             ref = array.variables[numbers[1] - 1]
             return Call("VARVAL", (Number(float(ref), call.at, ref),), call.at)
+        return _of_system(deck, call, numbers[0], numbers[1])
     if call.name == "CURVE" and len(numbers) == 4 and numbers[3] in deck.of(st.CurveStatement):
         return _curve(deck, call, numbers)
+    return call
+
+
+def _of_system(deck: Deck, call: Call, array: int, place: int) -> Node:
+    """Return a state or an output of the linear system that an array belongs to."""
+    for _, system in linear_systems(deck):
+        if array == system.x and 1 <= place <= len(system.names):
+            return Call("DIF", (Name(system.names[place - 1], call.at),), call.at)
+        if array == system.y and 1 <= place <= len(system.c):
+            return parsed(system.outputs()[place - 1])
     return call
 
 

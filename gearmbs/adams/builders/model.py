@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gearmbs.adams.builders.control import linear_systems
 from gearmbs.adams.builders.data_calls import translated
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
@@ -86,7 +87,8 @@ class AdamsModel:
             diffs={
                 d.id: None if d.implicit else translated(deck, self.sensed, d.function or "0")
                 for d in deck.of(st.Diff).values()
-            },
+            }
+            | {name: text for _, system in linear_systems(deck) for name, text in zip(system.names, system.rates())},
             splines={s.id: spline_data(s) for s in deck.of(st.Spline).values()} | _curves(self.mechanism),
             arrays=self.mechanism.arrays,
             plants=self.mechanism.plants,

@@ -73,6 +73,8 @@ WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
     st.CurveStatement: ("minpar", "maxpar"),
     st.Cvcv: ("ivel", "jvel"),
     st.Sensor: ("angular", "bisection", "codgen"),
+    st.Lse: ("static_hold",),
+    st.Tfsiso: ("static_hold",),
 }
 """Arguments that are read and change nothing: each is remarked on."""
 WHY = {
@@ -85,6 +87,8 @@ WHY = {
     st.Graphics: "a plane touches everywhere",
     st.CurveStatement: "the points alone say how far the curve goes",
     st.Cvcv: "the speeds follow from those of the parts",
+    st.Lse: "at an equilibrium its states settle as those of DIFF do",
+    st.Tfsiso: "at an equilibrium its states settle as those of DIFF do",
     st.Sensor: "the time is found to the last digits, and every analysis chooses its pivots anew",
 }
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from gearmbs.adams.parse.statement import Statement
 from gearmbs.adams.parse.statements_contact import Contact, Graphics
+from gearmbs.adams.parse.statements_control import Lse, Tfsiso
 from gearmbs.adams.parse.statements_curves import CurveStatement, Cvcv, Matrix, Ptcv
 from gearmbs.adams.parse.statements_data import (
     Array,
@@ -72,6 +73,7 @@ STATEMENTS: dict[str, type[Statement]] = {
     "JOINT": Joint,
     "JPRIM": Jprim,
     "KINEMATICS": Kinematics,
+    "LSE": Lse,
     "MARKER": Marker,
     "MATRIX": Matrix,
     "MOTION": Motion,
@@ -87,6 +89,7 @@ STATEMENTS: dict[str, type[Statement]] = {
     "SPLINE": Spline,
     "SPRINGDAMPER": SpringDamper,
     "STRING": String,
+    "TFSISO": Tfsiso,
     "UNITS": Units,
     "VARIABLE": Variable,
     "VFORCE": Vforce,
@@ -104,8 +107,8 @@ IGNORED = frozenset("MATERIAL PREFERENCES DEBUG LSOLVER".split())
 """Statements without effect on the numbers computed here."""
 
 UNSUPPORTED = frozenset(
-    """CLEARANCE EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART FLEX_BODY GSE LSE MFORCE MREQUEST
-    NFORCE NODE NORMAL_MODE_ANALYSIS POINT_MASS PSTATE SECTION SURFACE TFSISO TIRE UCON""".split()
+    """CLEARANCE EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART FLEX_BODY GSE MFORCE MREQUEST
+    NFORCE NODE NORMAL_MODE_ANALYSIS POINT_MASS PSTATE SECTION SURFACE TIRE UCON""".split()
 )
 """Statements of ADAMS that change the motion and are not modelled here."""
 
@@ -137,6 +140,7 @@ __all__ = [
     "Joint",
     "Jprim",
     "Kinematics",
+    "Lse",
     "Marker",
     "Matrix",
     "Motion",
@@ -154,6 +158,7 @@ __all__ = [
     "SpringDamper",
     "Statement",
     "String",
+    "Tfsiso",
     "Units",
     "Variable",
     "Vforce",
