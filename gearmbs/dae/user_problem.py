@@ -10,6 +10,7 @@ import numpy as np
 from numba.core.registry import CPUDispatcher
 from scipy.sparse import csc_array, issparse
 
+from gearmbs.dae.compiled.python_callback import PythonCallback
 from gearmbs.dae.integrators import differences
 from gearmbs.dae.linalg.sparse_lu import LUFactors, LUPlan, SingularMatrixError, analyse, factor, new_factors, solve
 from gearmbs.dae.problem import DAEProblem
@@ -41,11 +42,11 @@ class _UserFunctions:
         self.n = n
         self.parameters = parameters
         self.errors: list[BaseException] = []
-        self.callbacks: list[differences.PythonCallback] = []
+        self.callbacks: list[PythonCallback] = []
         self.addresses: dict[int, int] = {}
 
     def _register(self, slot: int, function: Callable, n_out: int) -> None:
-        callback = differences.PythonCallback(function, self.n, n_out, self.errors)
+        callback = PythonCallback(function, self.n, n_out, self.errors)
         self.callbacks.append(callback)
         assert callback.address is not None
         self.addresses[slot] = callback.address

@@ -205,6 +205,7 @@ class _Compiler:
                 },
                 splines={_upper(k): v for k, v in m.splines.items()},
                 arrays={_upper(k): v for k, v in m.arrays.items()},
+                functions=m.functions,
                 plants={(kind, _upper(k)): v for (kind, k), v in m.plants.items()},
                 forces=forces,
                 absent=frozenset(absent),

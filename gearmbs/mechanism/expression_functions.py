@@ -132,10 +132,14 @@ class Lowering:
             function, low, high = self.functions[name]
             self.count(node, low, high)
             return self.guarded(node.at, lambda: function(self, node))
+        if name in self.scope.functions:
+            own = self.scope.functions[name]
+            self.count(node, own.count, own.count)
+            return self.builder.external(own.address, self.values(node))
         if name in UNSUPPORTED:
             message = f"the function {name} is not supported at column {node.at + 1} of {shown(self.text)}"
             raise NotEvaluatedError(message)
-        known = [*UNARY, *BINARY, *ELEMENT_FORCES, *self.functions]
+        known = [*UNARY, *BINARY, *ELEMENT_FORCES, *self.functions, *self.scope.functions]
         near = difflib.get_close_matches(name, known, 1)
         self.fail(f"unknown function {name}" + (f"; did you mean {near[0]}?" if near else ""), node.at)
 

@@ -6,7 +6,15 @@ import math
 from functools import partial
 
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.mechanism.expression_functions import EULER_SEQUENCES, Function, Lowering
+from gearmbs.mechanism.expression_functions import (
+    BINARY,
+    ELEMENT_FORCES,
+    EULER_SEQUENCES,
+    UNARY,
+    UNSUPPORTED,
+    Function,
+    Lowering,
+)
 from gearmbs.mechanism.expression_syntax import Call, Ref
 
 
@@ -342,3 +350,8 @@ def _table() -> dict[str, Function]:
 
 FUNCTIONS = _table()
 """Name -> (function, least, most number of arguments)."""
+
+
+def known_functions() -> frozenset[str]:
+    """Return the names of all functions of the language, those that are not evaluated here among them."""
+    return frozenset((*UNARY, *BINARY, *ELEMENT_FORCES, *FUNCTIONS, *UNSUPPORTED))

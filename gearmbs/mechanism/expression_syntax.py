@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from gearmbs.dae.equations.expressions.errors import ExpressionError
 from gearmbs.dae.equations.expressions.spline_data import SplineData
@@ -133,6 +134,8 @@ class Scope:
         Expression of every DIFF; None for an implicit one.  DIF becomes ``("diff", ref)``.
     splines : mapping to SplineData
     arrays : mapping to sequences of float
+    functions : mapping
+        Functions of the user by name, see `gearmbs.mechanism.user_functions.UserFunction`.
     plants : mapping of ("pinput" | "poutput", ref) to VARIABLE refs
     forces : mapping of (kind, ref) to (I marker ref, J marker ref or None)
         Elements whose forces JOINT, SFORCE, FX ... can ask for.
@@ -151,6 +154,7 @@ class Scope:
     diffs: Mapping[Ref, str | None] = field(default_factory=dict)
     splines: Mapping[Ref, SplineData] = field(default_factory=dict)
     arrays: Mapping[Ref, Sequence[float]] = field(default_factory=dict)
+    functions: Mapping[str, Any] = field(default_factory=dict)
     plants: Mapping[tuple[str, Ref], Sequence[Ref]] = field(default_factory=dict)
     forces: Mapping[tuple[str, Ref], tuple[Ref, Ref | None]] = field(default_factory=dict)
     absent: frozenset[tuple[str, Ref, int]] = frozenset()

@@ -26,6 +26,7 @@ from gearmbs.mechanism.load_methods import Expression, LoadMethods
 from gearmbs.mechanism.modal import ModalBody, Mode, ShapeIntegrals, Shapes, make_modal_body
 from gearmbs.mechanism.parts import Body, Marker, make_body
 from gearmbs.mechanism.quantities import quantity
+from gearmbs.mechanism.user_functions import UserFunction
 
 E = TypeVar("E", bound=ForceElement)
 
@@ -80,6 +81,7 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         self.states: dict[Any, State] = {}
         self.splines: dict[Any, SplineData] = {}
         self.arrays: dict[Any, tuple[float, ...]] = {}
+        self.functions: dict[str, UserFunction] = {}
         self.plants: dict[tuple[str, Any], tuple[Any, ...]] = {}
         self.units = Units()
         self.reads_units = True
@@ -354,6 +356,35 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         value = quantity(start, "dimensionless", f"state '{name}': start")
         self.states[name] = State(name, str(expression), value)
         return self.states[name]
+
+    def function(
+        self, name: str, function: Callable, partials: Callable | None = None, count: int | None = None
+    ) -> UserFunction:
+        """Let expressions call a Python function of numbers by a name of its own, for instance ``SPRING(DX(a, b))``.
+
+        The function is called at every evaluation, some microseconds a time, and should be smooth; its derivatives are
+        made by differences unless ``partials`` returns them.
+
+        Parameters
+        ----------
+        name : str
+            Letters, digits and underscores; not that of a function that expressions have.
+        function, partials, count
+            See `gearmbs.mechanism.user_functions.UserFunction`.
+
+        Raises
+        ------
+        ModelError
+            If the name is taken or none.
+        """
+        from gearmbs.mechanism.expression_library import known_functions
+
+        key = name.upper()
+        if not name.isidentifier() or key in self.functions or key in known_functions():
+            taken = "taken" if name.isidentifier() else "no name of letters, digits and underscores"
+            raise ModelError(f"function '{name}': the name is {taken}; choose another")
+        self.functions[key] = UserFunction(name, function, partials, count)
+        return self.functions[key]
 
     def algebraic_state(self, name: str, expression: Expression) -> State:
         """Add a state z = expression, whose values are kept with the solution and at which a simulation may stop."""

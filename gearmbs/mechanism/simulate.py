@@ -22,6 +22,7 @@ from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
 from gearmbs.mechanism.spin_check import warn_of_spin
 from gearmbs.mechanism.stops import StopAt, stop_options, with_stops
+from gearmbs.mechanism.user_functions import raised_errors
 from gearmbs.progress import time_bar
 
 if TYPE_CHECKING:
@@ -132,7 +133,8 @@ def simulate(
     t_start = quantity(t_start, "time", "t_start")
     t_eval = _output_times(t_start, quantity(t_end, "time", "t_end"), rate, t_eval, every_step)
     name = _checked(integrator, tol, options)
-    system, problem, members = _prepared(mechanism, t_start, lump, formulation, rate_scale)
+    with raised_errors(mechanism.functions.values()):
+        system, problem, members = _prepared(mechanism, t_start, lump, formulation, rate_scale)
     if stops:
         if name == "IDA" or lump:
             raise ModelError("stops: they need the integrator WSTIFF or GSTIFF, and lump=False")
@@ -142,7 +144,8 @@ def simulate(
     remarks = [locking_remark(mechanism, system), why_not_lumped(mechanism) if lump and members is None else ""]
     remark = " ".join(text for text in remarks if text)
     stream = None if consumer is None else Stream(system, problem, float(t_eval[-1]), consumer, members)
-    with time_bar(progress, mechanism.name, float(t_eval[0]), float(t_eval[-1])) as report:
+    bar = time_bar(progress, mechanism.name, float(t_eval[0]), float(t_eval[-1]))
+    with bar as report, raised_errors(mechanism.functions.values()):
         result = _integrated(name, problem, t_eval, every_step, stream, tol=tol, progress=report, **options)
     solution = Solution(system, problem, result, members, remark)
     if stream is not None:

@@ -91,6 +91,7 @@ class AdamsModel:
             | {name: text for _, system in linear_systems(deck) for name, text in zip(system.names, system.rates())},
             splines={s.id: spline_data(s) for s in deck.of(st.Spline).values()} | _curves(self.mechanism),
             arrays=self.mechanism.arrays,
+            functions=self.mechanism.functions,
             plants=self.mechanism.plants,
             forces=dict(self.pairs),  # type: ignore[arg-type]
             absent=frozenset((*key, base) for key in self.pairs if key not in self.names for base in (0, 3)),

@@ -7,6 +7,7 @@ time are in `evaluate_time`, Hessians in `evaluate_second`.
 from __future__ import annotations
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.python_callback import call_address
 from gearmbs.dae.equations.expressions import opcodes as op
 from gearmbs.dae.equations.expressions.integrals import integral
 from gearmbs.dae.equations.expressions.marker_motion import KIN_V, KIN_W
@@ -82,6 +83,18 @@ def _leaf_value(ints, at, kin, acc, marker_body, marker_frame, y, w):
     return resolve(ints[at + 4], ints[at + 5], kin, marker_body, marker_frame, w)
 
 
+@njit("float64(int64[::1], int64, float64, int64, float64[::1])", cache=True, nogil=True)
+def external(ints, at, t, order, work):
+    """Call a function of the user with its arguments; value and derivatives stay in its scratch at the end of work."""
+    count = ints[at + 2]
+    begin = work.size - ints[op.HEAD_EXTERNAL] + ints[at + 3]
+    given, found = work[begin : begin + count], work[begin + count :]
+    for i in range(count):
+        given[i] = work[ints[ints[at + 1] + i]]
+    call_address(ints[at + 4], t, given, given, float(order), found)
+    return found[0]
+
+
 @njit("int64(int64[::1], int64, float64[::1])", cache=True, nogil=True)
 def selected(ints, at, work):
     """Return the register an IF takes its value from."""
@@ -144,7 +157,8 @@ def forward(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, work, 
             if code == op.UNWRAP:
                 d = (unwrap_angle(a, ref[ints[at + 2]]), 1.0, 0.0)
             elif code == op.INTEGRAL:
-                d = (integral(ints, floats, t, ints[at + 1], ints[at + 2], work[work.size - n :]), 0.0, 0.0)
+                scratch = work[work.size - ints[op.HEAD_EXTERNAL] - n :]
+                d = (integral(ints, floats, t, ints[at + 1], ints[at + 2], scratch), 0.0, 0.0)
             else:
                 d = unary(code, a, float(ints[at + 2]))
             work[k] = d[0]
@@ -169,6 +183,8 @@ def forward(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, work, 
                     work[3 * n + k] = e[3]
                     work[4 * n + k] = e[4]
                     work[5 * n + k] = e[5]
+        elif code == op.EXTERNAL:
+            work[k] = external(ints, at, t, order, work)
         else:
             work[k] = work[selected(ints, at, work)]
         at += op.WIDTH
@@ -191,6 +207,11 @@ def backward(ints, work, adjoint, result):
             continue
         if code == op.SELECT:
             work[adjoint + selected(ints, at, work)] += g
+            continue
+        if code == op.EXTERNAL:
+            partials = work.size - ints[op.HEAD_EXTERNAL] + ints[at + 3] + ints[at + 2] + 1
+            for i in range(ints[at + 2]):
+                work[adjoint + ints[ints[at + 1] + i]] += g * work[partials + i]
             continue
         if work[n + k] != 0.0:
             work[adjoint + ints[at + 1]] += g * work[n + k]

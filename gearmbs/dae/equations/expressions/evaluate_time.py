@@ -6,7 +6,7 @@ import math
 
 from gearmbs._jit import njit
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.dae.equations.expressions.evaluate import TABLES, selected
+from gearmbs.dae.equations.expressions.evaluate import TABLES, external, selected
 from gearmbs.dae.equations.expressions.integrals import integral
 from gearmbs.dae.equations.expressions.scalar import binary, unary
 from gearmbs.dae.equations.expressions.splines import spline_value
@@ -30,7 +30,7 @@ def eval_time(ints, floats, t, out, work):
             f = d[0]
             f1 = f2 = 0.0
             if code == op.INTEGRAL:
-                f = integral(ints, floats, t, a, ints[at + 2], work[work.size - n :])
+                f = integral(ints, floats, t, a, ints[at + 2], work[work.size - ints[op.HEAD_EXTERNAL] - n :])
                 f1, f2 = work[a], work[n + a]
             elif work[n + a] != 0.0 or work[2 * n + a] != 0.0:
                 f1 = d[1] * work[n + a]
@@ -52,6 +52,13 @@ def eval_time(ints, floats, t, out, work):
                 f2 += e[5] * b1 * b1 + e[2] * b2
             if a1 != 0.0 and b1 != 0.0:
                 f2 += 2.0 * e[4] * a1 * b1
+        elif code == op.EXTERNAL:
+            # of time alone, its first argument
+            f = external(ints, at, t, 2, work)
+            a = ints[ints[at + 1]]
+            first = work.size - ints[op.HEAD_EXTERNAL] + ints[at + 3] + ints[at + 2] + 1
+            f1 = work[first] * work[n + a]
+            f2 = work[first + 1] * work[n + a] ** 2 + work[first] * work[2 * n + a]
         elif code == op.SELECT:
             s = selected(ints, at, work)
             f, f1, f2 = work[s], work[n + s], work[2 * n + s]

@@ -21,7 +21,9 @@ HEAD_CODE = 6
 """Offset of the first instruction."""
 HEAD_ANGLES = 7
 """Number of reference angles (entries of ``ref``)."""
-HEAD_SIZE = 8
+HEAD_EXTERNAL = 8
+"""Scratch at the end of ``work`` for functions of the user."""
+HEAD_SIZE = 9
 
 WIDTH = 10
 """Integers an instruction takes: code, operands a b c d e, gradient slots of up to four bodies."""
@@ -87,6 +89,9 @@ DIM = 71
 POSITIVE_POWER = 72
 SPLINE = 73
 LAST_BINARY = 73
+
+# a function of the user: where its arguments are listed, how many, its scratch, its address
+EXTERNAL = 80
 
 # condition and three branches
 SELECT = 90

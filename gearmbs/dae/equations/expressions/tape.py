@@ -95,10 +95,11 @@ class Tape:
         """Scratch that suffices for every evaluator the tape may be used with."""
         n = self.length
         size = 4 * n + LEAF_WORK
+        external = int(self.ints[op.HEAD_EXTERNAL])
         if self.second_order:
             c = self.second_size
             size = max(size, 7 * n + n * c + JACOBIAN_AT + 6 * c)
-        return size + n if self.integrates else size
+        return size + external + (n if self.integrates else 0)
 
     @property
     def constant(self) -> float | None:
@@ -246,6 +247,20 @@ class TapeBuilder:
             raise ExpressionError(f"the components {keys} are not stored together")
         return self._emit(op.FORCE, slots[0], 0, 0, k, axis)
 
+    def external(self, address: int, arguments: Sequence[int]) -> int:
+        """Return the register of a function of the user, called through its address.
+
+        Parameters
+        ----------
+        address : int
+            Of a C function as of `gearmbs.dae.compiled.python_callback`, called as f(t, a, a, order, out) with the
+            arguments in a; out receives the value, and for order 1 the partials behind it, for order 2 the first and
+            second derivative by the first argument.
+        arguments : sequence of int
+            Registers.
+        """
+        return self._emit(op.EXTERNAL, address, *arguments)
+
     def wound(self, a: int, key: AngleKey) -> int:
         """Return the register of an angle continued through full turns; ``key`` goes to ``Tape.angles``."""
         for register, code in enumerate(self._code):
@@ -294,14 +309,25 @@ class TapeBuilder:
         body_slot = {b: s for s, b in enumerate(bodies)}
         keys = tuple(self._algebraic)
         code = np.zeros((len(used), op.WIDTH), dtype=np.int64)
+        listed: list[int] = []
+        scratch = 0
+        code_at = op.HEAD_SIZE + len(bodies) + len(self._algebraic)
         for row, c in zip(code, used):
+            if c[0] == op.EXTERNAL:
+                count = len(c) - 2
+                row[:5] = op.EXTERNAL, code_at + code.size + len(listed), count, scratch, c[1]
+                row[5:] = -1
+                listed += [renumber[a] for a in c[2:]]
+                # the arguments, and the value with as many derivatives, two at least
+                scratch += count + 1 + max(count, 2)
+                continue
             row[: len(c)] = c
             row[6:] = -1
             if c[0] <= op.LAST_LEAF:
                 slots = [body_slot.get(b, -1) for b in self._bodies_of(c)]
                 row[6 : 6 + len(slots)] = slots
             else:
-                for operand in range(1, 1 + _operands(c[0])):
+                for operand in _operands(c):
                     row[operand] = renumber[c[operand]]
                 if c[0] == op.UNWRAP:
                     row[2] = angle_slot[c[2]]
@@ -311,9 +337,12 @@ class TapeBuilder:
         smooth = {op.CONST, op.TIME, op.DISPLACEMENT, op.COSINE}
         body_at = op.HEAD_SIZE
         algebraic_at = body_at + len(bodies)
-        code_at = algebraic_at + len(keys)
-        header = [len(used), renumber[result], len(bodies), len(keys), body_at, algebraic_at, code_at, len(angle_slot)]
-        ints = np.concatenate([np.array(header + bodies + [-1] * len(keys), dtype=np.int64), code.ravel()])
+        header = [
+            len(used), renumber[result], len(bodies), len(keys), body_at, algebraic_at, code_at, len(angle_slot),
+            scratch,
+        ]  # fmt: skip
+        begin = np.array(header + bodies + [-1] * len(keys), dtype=np.int64)
+        ints = np.concatenate([begin, code.ravel(), np.array(listed, dtype=np.int64)])
         return Tape(
             ints=ints,
             floats=np.array(self._floats or [0.0]),
@@ -321,7 +350,7 @@ class TapeBuilder:
             algebraic=keys,
             n_angles=len(angle_slot),
             level=max(levels, default=op.LEVEL_CONSTANT),
-            second_order=all(c[0] in smooth for c in used if c[0] <= op.LAST_LEAF),
+            second_order=all(c[0] in smooth for c in used if c[0] <= op.LAST_LEAF or c[0] == op.EXTERNAL),
             text=text,
             integrates=any(c[0] == op.INTEGRAL for c in used),
             angles=tuple(self._angles[a] for a in angle_slot),
@@ -332,7 +361,7 @@ class TapeBuilder:
         stack = [result]
         while stack:
             c = self._code[stack.pop()]
-            for operand in range(1, 1 + _operands(c[0])):
+            for operand in _operands(c):
                 if c[operand] not in seen:
                     seen.add(c[operand])
                     stack.append(c[operand])
@@ -365,13 +394,16 @@ class TapeBuilder:
         return value
 
 
-def _operands(code: int) -> int:
-    """Return how many of an instruction's entries are registers."""
+def _operands(c: tuple[int, ...]) -> range:
+    """Return which of an instruction's entries are registers."""
+    code = c[0]
+    if code == op.EXTERNAL:
+        return range(2, len(c))
     if code <= op.LAST_LEAF:
-        return 0
+        return range(0)
     if code <= op.LAST_UNARY:
-        return 1
-    return 2 if code <= op.LAST_BINARY else 4
+        return range(1, 2)
+    return range(1, 3) if code <= op.LAST_BINARY else range(1, 5)
 
 
 def _binary_python(code: int, a: float, b: float) -> tuple[float, ...]:

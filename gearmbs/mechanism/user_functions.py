@@ -1,0 +1,117 @@
+"""Functions of the user in expressions: Python functions of numbers, with derivatives by differences."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from gearmbs.dae.compiled.python_callback import PythonCallback
+from gearmbs.dae.errors import ModelError
+
+STEP = 6e-6
+"""Relative step of first differences, the cube root of the rounding error."""
+SECOND_STEP = 1e-4
+LEAST = 1e-3
+"""Arguments below it are differenced as if they were so large."""
+
+
+class UserFunction:
+    """A Python function that expressions may call by its name.
+
+    Parameters
+    ----------
+    name : str
+    function : callable
+        Takes numbers, in the units of the expression that calls it, and returns one.
+    partials : callable, optional
+        Takes the same numbers and returns the derivatives by each of them; else they are made by differences.
+    count : int, optional
+        Of the arguments; default: those of the function.
+
+    Raises
+    ------
+    ModelError
+        If it cannot be seen how many arguments it takes.
+    """
+
+    def __init__(
+        self, name: str, function: Callable, partials: Callable | None = None, count: int | None = None
+    ) -> None:
+        self.name, self.function, self.partials = name, function, partials
+        self.count = _arguments(name, function) if count is None else count
+        self.errors: list[BaseException] = []
+        self._callback: Any = None
+
+    @property
+    def address(self) -> int:
+        """Address by which compiled code calls it in this process."""
+        if self._callback is None:
+            self._callback = PythonCallback(self._call, self.count, 1 + max(self.count, 2), self.errors)
+        return int(self._callback.address)
+
+    def _call(self, t: float, arguments: np.ndarray, _: np.ndarray, order: float, out: np.ndarray) -> None:
+        x = arguments.tolist()
+        out[0] = self.function(*x)
+        if order == 1.0 and self.partials is not None:
+            out[1 : 1 + self.count] = self.partials(*x)
+        elif order == 1.0:
+            for k in range(self.count):
+                h = STEP * max(abs(x[k]), LEAST)
+                out[1 + k] = (self._moved(x, k, h) - self._moved(x, k, -h)) / (2.0 * h)
+        elif order == 2.0:
+            h = SECOND_STEP * max(abs(x[0]), LEAST)
+            after, before = self._moved(x, 0, h), self._moved(x, 0, -h)
+            out[1], out[2] = (after - before) / (2.0 * h), (after - 2.0 * out[0] + before) / h**2
+
+    def _moved(self, x: list[float], k: int, h: float) -> float:
+        return float(self.function(*x[:k], x[k] + h, *x[k + 1 :]))
+
+    def raise_error(self) -> None:
+        """Raise what went wrong in the function while compiled code called it.
+
+        Raises
+        ------
+        ModelError
+            With the error as its cause.
+        """
+        if self.errors:
+            error = self.errors[0]
+            self.errors.clear()
+            if not isinstance(error, Exception):
+                raise error
+            raise ModelError(f"function '{self.name}': {type(error).__name__}: {error}") from error
+
+    def __getstate__(self) -> dict[str, Any]:
+        # an address means nothing in another process
+        return {**self.__dict__, "_callback": None, "errors": []}
+
+
+def _arguments(name: str, function: Callable) -> int:
+    try:
+        found = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        found = None  # type: ignore[assignment]
+    if found is None or any(p.kind in (p.VAR_POSITIONAL, p.KEYWORD_ONLY) for p in found):
+        raise ModelError(f"function '{name}': it cannot be seen how many numbers it takes; give count=")
+    taken = [p for p in found if p.default is p.empty]
+    if not taken:
+        raise ModelError(f"function '{name}': it takes no numbers; a constant needs no function")
+    return len(taken)
+
+
+@contextmanager
+def raised_errors(functions: Iterable[UserFunction]) -> Iterator[None]:
+    """Raise what went wrong in functions of the user inside, instead of what followed from it."""
+    called = list(functions)
+    try:
+        yield
+    except Exception:
+        for function in called:
+            function.raise_error()
+        raise
+    for function in called:
+        function.raise_error()
