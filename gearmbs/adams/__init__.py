@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
+    from gearmbs.adams.builders.routines import RoutineCall, load_routines
     from gearmbs.adams.errors import DeckError, Diagnostic
     from gearmbs.adams.parse.commands import Script, parse_script, read_script
     from gearmbs.adams.parse.deck import Deck
@@ -18,7 +19,9 @@ __all__ = [
     "Deck",
     "DeckError",
     "Diagnostic",
+    "RoutineCall",
     "Script",
+    "load_routines",
     "parse_deck",
     "parse_script",
     "read_deck",
@@ -34,7 +37,9 @@ late(
         "Deck": ".parse.deck",
         "DeckError": ".errors",
         "Diagnostic": ".errors",
+        "RoutineCall": ".builders.routines",
         "Script": ".parse.commands",
+        "load_routines": ".builders.routines",
         "parse_deck": ".parse.reader",
         "parse_script": ".parse.commands",
         "read_deck": ".parse.reader",

@@ -18,6 +18,9 @@ def adams(
     steps: Annotated[int | None, typer.Option(help="Output steps, when there is no script; default: 100.")] = None,
     tolerance: Annotated[float | None, typer.Option(help="Local error instead of INTEGRATOR/ERROR.")] = None,
     skip_unsupported: Annotated[bool, typer.Option(help="Leave out what is not supported.")] = False,
+    routines: Annotated[
+        Path | None, typer.Option(help="Python file with functions for USER(...), such as sfosub(call).")
+    ] = None,
     redundancy: Annotated[
         str, typer.Option(help="Redundant constraints: keep what ADAMS keeps (adams), or what stands first (declared).")
     ] = "adams",
@@ -28,7 +31,7 @@ def adams(
 ) -> None:
     """Run an ADAMS deck; write .req, .res, .msg and NetCDF."""
     with guarded():
-        from gearmbs.adams import DeckError, read_script, run_deck
+        from gearmbs.adams import DeckError, load_routines, read_script, run_deck
 
         if script is None and end is None:
             fail(f"give a script (.acf), or --end and --steps: gearmbs adams {model} --end 5 --steps 500")
@@ -45,6 +48,7 @@ def adams(
                 allow_unsupported=skip_unsupported,
                 progress=sys.stderr.isatty(),
                 redundancy=redundancy,
+                routines=None if routines is None else load_routines(routines),
             )
         except DeckError as error:
             if error.result is not None and error.result.segments:

@@ -250,6 +250,7 @@ class Builder:
     def add_data(self) -> None:
         m = self.mechanism
         read = read_variables(self.deck, requests=False)
+        m.functions.update(self.deck.functions)
         for variable in self.deck.of(st.Variable).values():
             if variable.id in read:
                 self.attempt(variable, lambda v: m.variables.update({v.id: self.text(v.function or "0")}))

@@ -260,7 +260,7 @@ def _check_constraints(deck: Deck, fail: Fail) -> None:
 def _check_forces(deck: Deck, fail: Fail) -> None:
     for kind, names in ((st.Vforce, "fx fy fz"), (st.Vtorque, "tx ty tz"), (st.Gforce, "fx fy fz tx ty tz")):
         for force in deck.of(kind).values():
-            if all(getattr(force, name) is None for name in names.split()):
+            if force.function is None and all(getattr(force, name) is None for name in names.split()):
                 fail(force, f"give at least one of {', '.join(names.upper().split())}")
     for beam in deck.of(st.Beam).values():
         for name in ("length", "area", "emodulus", "gmodulus"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -15,6 +15,7 @@ from gearmbs.mechanism.expression_syntax import Units
 
 if TYPE_CHECKING:
     from gearmbs.mechanism import Mechanism
+    from gearmbs.mechanism.user_functions import UserFunction
 
 S = TypeVar("S", bound=st.Statement)
 
@@ -33,6 +34,8 @@ class Deck:
         Warnings, ignored and unsupported statements; errors raise.
     unread : dict
         (name, id) -> text of statements that are read only as far as others name them.
+    functions : dict
+        Functions that routines of the user have become, by name.
     """
 
     title: str = ""
@@ -40,6 +43,7 @@ class Deck:
     items: dict[type, dict[int, Any]] = field(default_factory=dict)
     diagnostics: list[Diagnostic] = field(default_factory=list)
     unread: dict[tuple[str, int], RawStatement] = field(default_factory=dict)
+    functions: dict[str, UserFunction] = field(default_factory=dict)
 
     def of(self, kind: type[S]) -> dict[int, S]:
         """Return the statements of one class by id."""
@@ -74,9 +78,12 @@ class Deck:
         lines += [f"  {d}" for d in self.diagnostics]
         return "\n".join(lines)
 
-    def to_mechanism(self, allow_unsupported: bool = False) -> Mechanism:
-        """Build the mechanism; see :func:`gearmbs.adams.builders.mechanism.build_mechanism`."""
+    def to_mechanism(
+        self, allow_unsupported: bool = False, routines: Mapping[str, Callable] | None = None
+    ) -> Mechanism:
+        """Build the mechanism; see `gearmbs.adams.builders.mechanism.build_mechanism`, and `run_deck` for routines."""
         # the one arrow from reading to building: a facade, so that read_deck(path).to_mechanism() reads as one sentence
         from gearmbs.adams.builders.mechanism import build_mechanism
+        from gearmbs.adams.builders.routines import bound
 
-        return build_mechanism(self, allow_unsupported=allow_unsupported)
+        return build_mechanism(bound(self, routines, allow_unsupported), allow_unsupported=allow_unsupported)

@@ -32,6 +32,7 @@ class Variable(Statement):
 
     ic: float | None = arg("IC", REAL)
     function: str | None = arg("FUNCTION", EXPRESSION)
+    routine: str | None = arg("ROUTINE", TEXT)
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class Diff(Statement):
     ic: Vector = arg("IC", REALS, (0.0,), count=(1, 2))
     function: str | None = arg("FUNCTION", EXPRESSION)
     implicit: bool = arg("IMPLICIT", FLAG, False)
+    routine: str | None = arg("ROUTINE", TEXT)
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,7 @@ class Request(Statement):
     f7: str | None = arg("F7", EXPRESSION)
     f8: str | None = arg("F8", EXPRESSION)
     function: str | None = arg("FUNCTION", TEXT)
+    routine: str | None = arg("ROUTINE", TEXT)
     title: tuple[str, ...] = arg("TITLE", STRINGS, ())
     cnames: tuple[str, ...] = arg("CNAMES", STRINGS, ())
     cunits: tuple[str, ...] = arg("CUNITS", STRINGS, ())

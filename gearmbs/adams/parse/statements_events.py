@@ -18,6 +18,7 @@ class Sensor(Statement):
     value: float = arg("VALUE", REAL, 0.0)
     error: float = arg("ERROR", REAL, 1e-3)
     function: str | None = arg("FUNCTION", EXPRESSION)
+    routine: str | None = arg("ROUTINE", TEXT)
     evaluate: str | None = arg("EVALUATE", EXPRESSION)
     angular: bool = arg("ANGULAR", FLAG, False)
     bisection: bool = arg("BISECTION", FLAG, False)

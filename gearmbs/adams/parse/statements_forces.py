@@ -20,6 +20,7 @@ class Sforce(Statement):
     type: str | None = arg("type", CHOICE, choices="TRANSLATIONAL ROTATIONAL")
     action_only: bool = arg("ACTIONONLY", FLAG, False)
     function: str | None = arg("FUNCTION", EXPRESSION)
+    routine: str | None = arg("ROUTINE", TEXT)
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,8 @@ class _Acting(Statement):
     i: int | None = arg("I", ID)
     jfloat: int | None = arg("JFLOAT", ID)
     rm: int | None = arg("RM", ID)
+    function: str | None = arg("FUNCTION", EXPRESSION)
+    routine: str | None = arg("ROUTINE", TEXT)
 
 
 @dataclass(frozen=True)

@@ -135,5 +135,6 @@ class Motion(Statement):
     direction: str | None = arg("direction", CHOICE, choices="TRANSLATIONAL ROTATIONAL X Y Z B1 B2 B3")
     level: str | None = arg("level", CHOICE, choices="DISPLACEMENT VELOCITY ACCELERATION")
     function: str | None = arg("FUNCTION", EXPRESSION)
+    routine: str | None = arg("ROUTINE", TEXT)
     icdisp: float | None = arg("ICDISP", REAL)
     icvel: float | None = arg("ICVEL", REAL)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from gearmbs.adams.builders.initial import part_states, with_initial_motions
 from gearmbs.adams.builders.mechanism import build_model
 from gearmbs.adams.builders.model import AdamsModel
+from gearmbs.adams.builders.routines import bound
 from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Change, Command, Linear, Script, Simulate, Stop, Switch, read_script
@@ -62,6 +63,7 @@ def run_deck(
     allow_unsupported: bool = False,
     progress: bool | Callable[[float], None] | None = None,
     redundancy: str = "adams",
+    routines: Mapping[str, Callable] | None = None,
 ) -> AdamsResult:
     """Run an ADAMS deck.
 
@@ -85,6 +87,9 @@ def run_deck(
         As in :func:`gearmbs.mechanism.simulate`.
     redundancy : {"adams", "declared"}
         Which of redundant constraint rows are kept: as in ADAMS, as far as that is known, or those that stand first.
+    routines : mapping, optional
+        Python functions for the deck's USER(...), by statement ("SFORCE/3"), the name in ROUTINE=, or ADAMS's name
+        (SFOSUB, ...); each takes a `gearmbs.adams.RoutineCall`.
 
     Returns
     -------
@@ -98,7 +103,7 @@ def run_deck(
         a run can tell (a position without equilibrium, for instance) comes with the ``result`` of the commands before,
         whose files are written.
     """
-    deck = adm if isinstance(adm, Deck) else read_deck(adm)
+    deck = bound(adm if isinstance(adm, Deck) else read_deck(adm), routines, allow_unsupported)
     script = _script(acf, end, steps, dtout)
     if script.unsupported and not allow_unsupported:
         raise DeckError(script.unsupported)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 from gearmbs.adams.builders.data_calls import translated
 from gearmbs.adams.builders.mechanism import build_model
 from gearmbs.adams.builders.model import AdamsModel, markers_of
@@ -93,7 +96,7 @@ def _model_errors(session: Session, allow_unsupported: bool) -> list[Diagnostic]
 
     Later analyses start elsewhere, where an element that cannot be built now may be; they are left to the run.
     """
-    quiet = Deck(session.deck.title, session.deck.file, session.deck.items, list(session.deck.diagnostics))
+    quiet = replace(session.deck, diagnostics=list(session.deck.diagnostics))
     try:
         model = build_model(quiet, allow_unsupported, frozenset(session.inactive))
     except DeckError as error:

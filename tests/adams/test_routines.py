@@ -1,0 +1,169 @@
+"""USER(...) bound to Python functions: forces, motions, variables and requests as their expressions would have them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
+from gearmbs.cli import app
+
+DECK = """spring
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=MILLIMETER, TIME=SECOND
+PART/1, GROUND
+MARKER/1, PART=1
+MARKER/10, PART=1, FLOATING
+PART/2, MASS=2, CM=20, IP=1e4,1e4,1e4, QG=100,0,0
+MARKER/20, PART=2
+JOINT/1, TRANSLATIONAL, I=21, J=11
+MARKER/21, PART=2, ZP=101,0,0
+MARKER/11, PART=1, ZP=1,0,0
+{force}
+REQUEST/1, F2=DX(20,1)\\F3=VX(20,1)
+END
+"""
+WRITTEN = "-0.3*DX(20,1,1) - 0.01*VX(20,1,1) + 2*SIN(5*TIME)"
+SCRIPT = "m\no\nSIMULATE/DYNAMICS, END=1, STEPS=50\n"
+
+
+def run(force, routines=None, script=SCRIPT, **more):
+    return run_deck(parse_deck(DECK.format(force=force)), parse_script(script), tol=1e-9, routines=routines, **more)
+
+
+def pull(call):
+    k, c, amplitude = call.parameters
+    x, v = call.sysfnc("DX", 20, 1, 1), call.sysfnc("VX", 20, 1, 1)
+    return -k * x - c * v + amplitude * math.sin(5 * call.time)
+
+
+PULLED = "SFORCE/1, TRANSLATIONAL, I=21, J=11, ACTIONONLY, FUNCTION={}"
+EXPECTED = PULLED.format(WRITTEN)
+
+
+@pytest.mark.parametrize(
+    ("force", "name"),
+    [
+        ("USER(0.3, 0.01, 2)", "sfosub"),
+        ("USER(0.3, 0.01, 2)", "SFORCE/1"),
+        ("USER(0.3, 1E-2, 2)\\ROUTINE=library::PULL", "pull"),
+    ],
+)
+def test_a_force_by_a_routine_is_that_of_the_expression(force, name):
+    expected = run(EXPECTED).request(1)
+    found = run(PULLED.format(force), {name: pull})
+    assert found.success
+    np.testing.assert_allclose(found.request(1)[:, 1:3], expected[:, 1:3], atol=2e-7)
+
+
+def test_values_are_those_of_the_expression_to_the_last_digit():
+    deck = DECK.format(force=EXPECTED + "\nREQUEST/2, F2=SFORCE(1,0,4,1)")
+    found = run_deck(
+        parse_deck(DECK.format(force=PULLED.format("USER(0.3, 0.01, 2)") + "\nREQUEST/2, F2=SFORCE(1,0,4,1)")),
+        parse_script("m\no\nSIMULATE/DYNAMICS, END=1E-6, STEPS=1\n"),
+        routines={"sfosub": pull},
+    )
+    expected = run_deck(parse_deck(deck), parse_script("m\no\nSIMULATE/DYNAMICS, END=1E-6, STEPS=1\n"))
+    assert found.request(2)[0, 1] == expected.request(2)[0, 1]
+
+
+def test_forces_of_several_components():
+    def both(call):
+        x, y, z = call.sysary("TDISP", 20, 1, 1)
+        vx, *_ = call.sysary("VEL", (20, 1, 1))
+        return -0.3 * x - 0.01 * vx + 2 * math.sin(5 * call.time), -y, -z
+
+    expected = run(EXPECTED).request(1)
+    text = "VFORCE/1, I=20, JFLOAT=10, RM=1, FUNCTION=USER(1)"
+    np.testing.assert_allclose(run(text, {"vfosub": both}).request(1)[:, 1:3], expected[:, 1:3], atol=2e-7)
+    text = "GFORCE/1, I=20, JFLOAT=10, RM=1, FUNCTION=USER(1)"
+    found = run(text, {"gfosub": lambda call: (*both(call), 0, 0, 0)})
+    np.testing.assert_allclose(found.request(1)[:, 1:3], expected[:, 1:3], atol=2e-7)
+
+
+def test_variables_states_motions_and_requests():
+    text = """VARIABLE/1, FUNCTION=USER(0.3)
+DIFF/1, IC=1, FUNCTION=USER(-2)
+SFORCE/1, TRANSLATIONAL, I=21, J=11, ACTIONONLY, FUNCTION=VARVAL(1) + DIF(1)
+REQUEST/2, FUNCTION=USER(7)"""
+    routines = {
+        "varsub": lambda call: -call.parameters[0] * call.sysfnc("DX", 20, 1, 1),
+        "difsub": lambda call: call.parameters[0] * call.sysfnc("DIF", 1),
+        "reqsub": lambda call: (0, call.sysfnc("DX", 20, 1), call.parameters[0], 0, 0, 0, 0, call.time),
+    }
+    found = run(text, routines)
+    plain = run(
+        "VARIABLE/1, FUNCTION=-0.3*DX(20,1,1)\nDIFF/1, IC=1, FUNCTION=-2*DIF(1)\n"
+        "SFORCE/1, TRANSLATIONAL, I=21, J=11, ACTIONONLY, FUNCTION=VARVAL(1) + DIF(1)"
+    )
+    np.testing.assert_allclose(found.request(1)[:, 1:3], plain.request(1)[:, 1:3], atol=2e-7)
+    assert found.request(2)[:, 1] == pytest.approx(found.request(1)[:, 1])
+    assert found.request(2)[:, 2] == pytest.approx(7)
+    assert found.request(2)[:, 7] == pytest.approx(found.t)
+    moved = run(
+        "MOTION/1, JOINT=1, FUNCTION=USER(3)", {"motsub": lambda c: 100 + c.parameters[0] * math.sin(2 * c.time)}
+    )
+    np.testing.assert_allclose(moved.request(1)[:, 1], 100 + 3 * np.sin(2 * moved.t), atol=1e-6)
+    np.testing.assert_allclose(moved.request(1)[:, 2], 6 * np.cos(2 * moved.t), atol=1e-5)
+
+
+def test_routines_act_at_an_equilibrium():
+    text = "SFORCE/1, TRANSLATIONAL, I=21, J=11, ACTIONONLY, FUNCTION=USER()".replace("USER()", "USER(0)")
+    found = run(text, {"sfosub": lambda c: 6 - 0.3 * c.sysfnc("DX", 20, 1, 1)}, script="m\no\nSIMULATE/STATICS\n")
+    assert found.request(1)[-1, 1] == pytest.approx(20, abs=1e-6)
+
+
+def test_missing_routines_are_named_all_at_once():
+    text = PULLED.format("USER(1)\\ROUTINE=lib::own") + "\nVARIABLE/3, FUNCTION=USER(2)\nDIFF/4, IC=0, FUNCTION=USER(3)"
+    with pytest.raises(DeckError) as caught:
+        run(text, {"varsub": lambda call: 1.0})
+    message = str(caught.value)
+    assert "SFORCE/1: its routine OWN is missing" in message
+    assert "DIFF/4: its routine DIFSUB is missing" in message
+    assert "VARIABLE/3" not in message
+    left = run(text, allow_unsupported=True)
+    assert left.success
+    assert left.request(1)[:, 1] == pytest.approx(100)
+
+
+@pytest.mark.parametrize(
+    ("routine", "words"),
+    [
+        (lambda call: (1, 2), "returns 2 numbers, it must return 1"),
+        (lambda call: call.sysary("PLACE", 1), "SYSARY has no 'PLACE'"),
+        (lambda call: call.sysfnc("DX", 99), "MARKER 99"),
+        (lambda call: call.nothing, "has no attribute 'nothing'"),
+    ],
+)
+def test_what_a_routine_does_wrong_is_said(routine, words):
+    with pytest.raises((DeckError, AttributeError), match=words):
+        run(PULLED.format("USER(1)"), {"sfosub": routine})
+
+
+def test_a_late_wish_is_said():
+    def late(call):
+        x = call.sysfnc("DX", 20, 1, 1)
+        return call.sysfnc("VX", 20, 1, 1) if x > 50 else -x
+
+    with pytest.raises(Exception, match=r"SFORCE/1: USER.*asks for VX\(20,1,1\) only in some cases"):
+        run(PULLED.format("USER(1)"), {"sfosub": late})
+
+
+def test_routines_from_a_file_on_the_command_line(tmp_path):
+    (tmp_path / "m.adm").write_text(DECK.format(force=PULLED.format("USER(0.3, 0.01, 2)")))
+    (tmp_path / "own.py").write_text(
+        "import math\n\ndef sfosub(call):\n    k, c, a = call.parameters\n"
+        "    return -k*call.sysfnc('DX', 20, 1, 1) - c*call.sysfnc('VX', 20, 1, 1) + a*math.sin(5*call.time)\n"
+    )
+    arguments = ["adams", str(tmp_path / "m.adm"), "--end", "0.1", "--steps", "5"]
+    refused = CliRunner().invoke(app, arguments)
+    assert refused.exit_code == 1
+    assert "SFOSUB is missing" in refused.output
+    result = CliRunner().invoke(app, [*arguments, "--routines", str(tmp_path / "own.py")])
+    assert result.exit_code == 0, result.output
+    (tmp_path / "empty.py").write_text("x = 1\n")
+    bad = CliRunner().invoke(app, [*arguments, "--routines", str(tmp_path / "empty.py")])
+    assert bad.exit_code == 1
+    assert "defines no functions" in bad.output
