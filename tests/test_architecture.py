@@ -83,9 +83,9 @@ CIRCLES = {
      "mechanism.measures", "mechanism.mechanism", "mechanism.redundancy", "mechanism.simulate"):
         "methods of Mechanism, and the functions that carry them out",
     ("adams.builders.accelerations", "adams.builders.builder", "adams.builders.constraints", "adams.builders.contacts",
-     "adams.builders.curve_data", "adams.builders.curves", "adams.builders.data_calls", "adams.builders.forces",
-     "adams.builders.initial", "adams.builders.mechanism", "adams.builders.model", "adams.parse.check",
-     "adams.parse.deck", "adams.parse.readers"):
+     "adams.builders.control", "adams.builders.curve_data", "adams.builders.curves", "adams.builders.data_calls",
+     "adams.builders.forces", "adams.builders.initial", "adams.builders.mechanism", "adams.builders.model",
+     "adams.builders.routines", "adams.parse.check", "adams.parse.deck", "adams.parse.readers"):
         "a deck builds its mechanism; types only, and one method",
     ("campaigns.campaign", "campaigns.exports", "campaigns.report", "campaigns.response", "campaigns.sensitivity"):
         "methods of Campaign, and the functions that carry them out",

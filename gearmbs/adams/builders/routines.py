@@ -78,12 +78,12 @@ class RoutineCall:
     time: float = 0.0
     rehearsal: bool = False
     _values: dict[str, float] = field(default_factory=dict)
-    _draw: np.random.Generator | None = None
+    _draw: np.random.Generator = field(default_factory=np.random.default_rng)
 
     def sysfnc(self, name: str, *ids: int) -> float:
         """Return a function of the deck's expressions by its name, for instance ``sysfnc("DX", 12, 10, 10)``."""
         text = f"{name.upper()}({','.join(str(int(i)) for i in _flat(ids))})"
-        if self._draw is not None:
+        if self.rehearsal:
             self._values.setdefault(text, float(self._draw.uniform(0.1, 1.0)))
         elif text not in self._values:
             raise ValueError(f"asks for {text} only in some cases; ask for all it may need before the first branch")
