@@ -44,13 +44,18 @@ def analyse(
     train: Annotated[
         Path | None, typer.Option(help="Drivetrain (TOML) whose bearings with rolling are looked for, with its shafts.")
     ] = None,
+    planetary: Annotated[
+        str | None, typer.Option(help='Planetary set, its ring at rest: teeth of sun, planets, ring, e.g. "17,19,55".')
+    ] = None,
+    planets: Annotated[int, typer.Option(help="How many planets.")] = 3,
+    member: Annotated[str, typer.Option(help="Whose speed is given, of a planetary set: carrier or sun.")] = "carrier",
     gaps: Gaps = None,
     format: Annotated[str | None, typer.Option(help="Format of the file, if its name does not say.")] = None,
     tables: Annotated[Path | None, typer.Option(help="Folder for the tables as CSV.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for spectrum and average as PNG and SVG.")] = None,
     out: ReportFile = None,
 ) -> None:
-    """Analyse a record, measured or simulated: of gears (--teeth), of bearings (--bearing), or of any machine."""
+    """Analyse a record, measured or simulated: of gears, of bearings, of a planetary set, or of any machine."""
     with guarded(), stage_bar(file.name) as move:
         from gearmbs.signals import analyse as analyse_signal
         from gearmbs.signals.simulated import read_any
@@ -68,6 +73,18 @@ def analyse(
             progress=lambda f, s: move(0.3 * f, s),
         )
         known = parse_speed(speed)
+        if planetary is not None or (teeth is None and "planetary" in signal.attrs):
+            own: dict[str, Any] = {"planetary": None}
+            if planetary is not None:
+                own = {"planetary": tooth_counts(planetary), "planets": planets, "member": member}
+            of_set = analyse_signal(
+                signal, speed=known, speed_channel=speed_channel, tacho=tacho, pulses_per_rev=pulses, **own
+            )
+            files = _save_tables(of_set.tables(), tables)
+            if figures is not None:
+                files += _save_figures({"planetary": of_set.plot()}, figures)
+            _hand_over(of_set.to_markdown(), out, files)
+            return
         report = analyse_signal(
             signal,
             speed=known,

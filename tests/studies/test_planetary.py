@@ -56,6 +56,22 @@ def test_a_file_holds_a_set(tmp_path):
     assert run.pins.radial == 2e8
 
 
+def test_analyse_on_the_command_line(tmp_path):
+    from gearmbs.signals import PlanetaryModel, write_signal
+
+    record = PlanetaryModel((23, 31, 85), noise=0.01).signal(duration=12.0, rate=1000, carrier_rate=1.0)
+    write_signal(record, tmp_path / "ring.csv")
+    arguments = ["analyse", str(tmp_path / "ring.csv"), "--planetary", "23,31,85", "--speed", "60 rpm"]
+    result = CliRunner().invoke(app, [*arguments, "--figures", str(tmp_path), "--tables", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    assert "3 planets of 31" in result.output
+    assert (tmp_path / "planetary.png").exists()
+    assert (tmp_path / "planetary_evidence.csv").exists()
+    bad = CliRunner().invoke(app, [*arguments[:3], "23,31", "--speed", "60 rpm"])
+    assert bad.exit_code == 1
+    assert "teeth of sun, planet and ring" in bad.output
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
