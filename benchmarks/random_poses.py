@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 import time
-from collections.abc import Callable
 
 import numpy as np
 from numba import njit
 
-from benchmarks.markdown import number, table
 from gearmbs.contact import gear_contact
 from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
 
-TITLE = "Random poses"
 POSES = 1_000_000
-QUICK_POSES = 20_000
 BLOCK = 20_000
 NEIGHBOUR = 1e-9
 """Turn of wheel 2 to a neighbouring pose, rad."""
@@ -112,32 +109,14 @@ def sweep(pair: GearPair, slices: int, count: int, seed: int = 2, lean: float = 
     return {"poses": count, "touching": touching, "not_finite": bad, "pulling": pulling, "jump": float(worst[0])}
 
 
-def _measure(kind: str, count: int) -> dict:
-    start = time.process_time()
-    found = sweep(*pair_of(kind), count)
-    return {"kind": kind, **found, "seconds": time.process_time() - start}
+def main() -> None:
+    """Print what a million poses of each kind of wheels show: ``python -m benchmarks.random_poses [poses]``."""
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else POSES
+    for kind in KINDS:
+        start = time.process_time()
+        found = sweep(*pair_of(kind), count)
+        print(f"{kind}: {found}, {time.process_time() - start:.0f} processor seconds", flush=True)
 
 
-def cells(quick: bool) -> list[tuple[str, Callable[[], dict]]]:
-    """Return name and measurement of each part."""
-    count = QUICK_POSES if quick else POSES
-    return [(kind, lambda kind=kind: _measure(kind, count)) for kind in KINDS]
-
-
-def finish(results: list[dict]) -> dict:
-    """Return nothing: the parts say it all."""
-    return {}
-
-
-def render(extra: dict) -> str:
-    """Return the table in Markdown."""
-    header = ["wheels", "poses", "touching", "not finite", "pulling", "largest jump over the allowed", "processor s"]
-    rows = [
-        [r["kind"], *(str(r[key]) for key in ("poses", "touching", "not_finite", "pulling"))]
-        + [number(r["jump"]), number(r["seconds"])]
-        for r in extra["results"]
-    ]
-    text = (
-        "Random poses and speeds: wheels shifted by 0.5 mm, along the axis by 3 mm, tilted by 0.6 degrees, turned at "
-    )
-    return text + "will (standard deviations).\n\n" + table(header, rows)
+if __name__ == "__main__":
+    main()

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from types import ModuleType
 
-from benchmarks import contact, digits, gear_pair, plots, precision, random_poses, size, step_parts
+from benchmarks import contact, digits, gear_pair, plots, precision, size, step_parts
 from benchmarks.machine import describe
 from benchmarks.store import Store
 from gearmbs.view.files import write_whole
@@ -20,7 +20,6 @@ PARTS: dict[str, ModuleType] = {
     "digits": digits,
     "size": size,
     "contact": contact,
-    "poses": random_poses,
     "step": step_parts,
 }
 
