@@ -203,3 +203,24 @@ def test_parts_that_cannot_be_built_are_errors_with_their_line():
     )
     with pytest.raises(DeckError, match=r":7: error: JOINT/1: its initial conditions cannot be met"):
         parse_deck(model(body), "deck.adm").to_mechanism()
+
+
+def test_inertias_beyond_all_rounding_are_an_error_of_the_deck():
+    text = """x
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/1, PART=1
+PART/2, MASS=2, CM=20, IP=4E32,1,1
+MARKER/20, PART=2
+MARKER/21, PART=2, QP=1,0,0
+PART/3, MASS=1, CM=30, IP=1,1,1, QG=1,0,0
+MARKER/30, PART=3
+JOINT/2, CYLINDRICAL, I=21, J=30
+ACCGRAV/KGRAV=-9.8
+END
+"""
+    with (
+        pytest.warns(UserWarning, match="principal moments"),
+        pytest.raises(DeckError, match=r"singular to rounding .* masses and moments of inertia"),
+    ):
+        run_deck(parse_deck(text), parse_script("a\nb\nSIMULATE/DYNAMICS, END=0.1, STEPS=5\n"))

@@ -122,6 +122,12 @@ def run_deck(
         result.errors.extend(error.diagnostics)
         error.result = result
         raise
+    except ModelError as error:
+        # what only shows when results are made
+        failed = _failed(session, command, None, error)
+        result.errors.extend(failed.diagnostics)
+        failed.result = result
+        raise failed from error
     except BaseException as error:
         message = str(error) or type(error).__name__
         result.errors.append(Diagnostic(ERROR, message, command.file, command.line))

@@ -22,6 +22,7 @@ from gearmbs.dae.equations.reactions import renew_reactions
 from gearmbs.dae.equations.residual import update
 from gearmbs.dae.equations.rotation import POSE_COLUMNS
 from gearmbs.dae.equations.update import update_tables
+from gearmbs.dae.errors import ModelError
 from gearmbs.dae.linalg.sparse_lu import (
     FACTORS_TYPE,
     FEWEST_ENTRIES,
@@ -30,6 +31,7 @@ from gearmbs.dae.linalg.sparse_lu import (
     PLAN_TYPE,
     LUFactors,
     LUPlan,
+    SingularMatrixError,
     analyse,
     factor,
     new_factors,
@@ -429,7 +431,13 @@ class Evaluator:
         indptr, indices, slots = self.pattern
         self.vals[:] = 0.0
         assemble(t, _turned(y, table, turn), slots, table, self.rdata, self.work.size, self.vals)
-        self.plan = analyse(indptr, indices, self.vals, np.ones(indptr.size - 1), counted=counted)
+        try:
+            self.plan = analyse(indptr, indices, self.vals, np.ones(indptr.size - 1), counted=counted)
+        except SingularMatrixError as error:
+            raise ModelError(
+                f"the equations are singular to rounding at t = {t[0]:.6g} s: look for masses and moments of inertia "
+                "that differ by too many orders of magnitude"
+            ) from error
         self.factors = new_factors(self.plan)
         # an ill-scaled mechanism may grow with the best of pivots
         self.growth = max(GROWTH_LIMIT, 100.0 * factor(self.plan, self.factors, self.vals))
