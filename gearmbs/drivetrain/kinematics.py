@@ -128,14 +128,21 @@ class KinematicTable:
 
     def known_lines(self, harmonics: int = 3, order: int = 2) -> dict[str, float]:
         """Return the frequencies (Hz) of all lines and their harmonics, and of the sidebands of all meshes, by name."""
-        known: dict[str, float] = {}
+        return {name: at for lines in self.lines_by_part(harmonics, order).values() for name, at in lines.items()}
+
+    def lines_by_part(self, harmonics: int = 3, order: int = 2) -> dict[str, dict[str, float]]:
+        """Return the same by what they come from: "shaft <name>", "mesh <name>", "sidebands of <mesh>", and so on."""
+        known: dict[str, dict[str, float]] = {}
         for row in self.lines.itertuples():
+            part = f"hunting teeth of {row.of}" if row.name == "hunting tooth" else f"{row.kind} {row.of}"
             for h in range(1, harmonics + 1):
-                known[f"{h} x {row.name} of {row.of}"] = h * float(row.frequency)  # type: ignore[arg-type]
-        for mesh in self.train.meshes:
-            for row in self.sidebands(mesh.name, harmonics, order).itertuples():
-                name = f"{row.harmonic} x GMF of {mesh.name} {row.order:+d} x {row.shaft}"
-                known[name] = float(row.frequency)  # type: ignore[arg-type]
+                name = f"{h} x {row.name} of {row.of}"
+                known.setdefault(part, {})[name] = h * float(row.frequency)  # type: ignore[arg-type]
+            if row.name == "GMF":
+                sidebands = known.setdefault(f"sidebands of {row.of}", {})
+                for side in self.sidebands(str(row.of), harmonics, order).itertuples():
+                    name = f"{side.harmonic} x GMF of {row.of} {side.order:+d} x {side.shaft}"
+                    sidebands[name] = float(side.frequency)  # type: ignore[arg-type]
         return known
 
     def for_analysis(self, mesh: str | GearMesh) -> dict[str, object]:

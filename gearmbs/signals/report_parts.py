@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -16,6 +17,8 @@ from .spectra import spectrum
 
 LINE_SECONDS = 2.0
 KURTOGRAM_LEVELS = 6
+SAME_LINE = 1e-9
+"""Known lines closer than this part of their frequency are one."""
 IMPULSIVE = {"best_centre": "centre, Hz", "best_bandwidth": "bandwidth, Hz", "best_kurtosis": "kurtosis - 2"}
 BAND_FEATURES = {"best_centre": "band_centre_hz", "best_bandwidth": "band_width_hz", "best_kurtosis": "band_kurtosis"}
 PURE = ("crest", "kurtosis", "skewness", "shape_factor", "impulse_factor")
@@ -86,11 +89,17 @@ def strongest_lines(
 
 
 def name_lines(lines: pd.DataFrame, known: Mapping[str, float], within: float) -> pd.DataFrame:
-    """Add the column ``of``: which of the known lines (name to Hz) is nearest, or empty if none is near enough."""
-    names, frequencies = list(known), np.array(list(known.values()))
-    nearest = [int(np.argmin(np.abs(frequencies - f))) for f in lines["frequency"]]
-    near = [names[k] if abs(frequencies[k] - f) <= within else "" for k, f in zip(nearest, lines["frequency"])]
-    return lines.assign(of=near)
+    """Add the column ``of``: which of the known lines (name to Hz) is nearest, or empty if none is near enough.
+
+    Lines at one frequency are all named, as those of shafts that turn together.
+    """
+    frequencies = np.array(list(known.values()))
+    names = []
+    for f in lines["frequency"]:
+        nearest = frequencies[np.argmin(np.abs(frequencies - f))]
+        same = [name for name, at in known.items() if math.isclose(at, nearest, rel_tol=SAME_LINE)]
+        names.append(" or ".join(same) if abs(nearest - f) <= within else "")
+    return lines.assign(of=names)
 
 
 def line_spectrum(signal: xr.DataArray) -> xr.DataArray:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gearmbs.studies.rig import gear_rig
     from gearmbs.studies.simulation import SimulationFailed, SimulationInterrupted, run_case, simulate_case
     from gearmbs.studies.sweep import Sweep, sweep
+    from gearmbs.studies.train_figure import train_spectrum
     from gearmbs.studies.train_modes import train_campbell, train_modes
     from gearmbs.studies.train_report import train_report, train_scene
     from gearmbs.studies.trains import load_train, run_train, train_signal
@@ -80,6 +81,7 @@ __all__ = [
     "train_report",
     "train_scene",
     "train_signal",
+    "train_spectrum",
 ]
 
 late(
@@ -101,6 +103,7 @@ late(
         "load_train": ".trains",
         "train_signal": ".trains",
         "train_report": ".train_report",
+        "train_spectrum": ".train_figure",
         "train_scene": ".train_report",
         "bench_train": ".bench",
         "BenchSettings": ".bench",

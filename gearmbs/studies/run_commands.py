@@ -204,7 +204,7 @@ def run_planetary_set(file: Path, out: Path | None) -> None:
 
 
 def run_drivetrain(file: Path, out: Path | None) -> None:
-    """Simulate a drivetrain; write its record, a report and a 3-D view."""
+    """Simulate a drivetrain; write its record, a report, a 3-D view and a spectrum with its lines named."""
     with guarded():
         from gearmbs.studies.trains import check_record, load_train
 
@@ -214,8 +214,10 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
 
         from gearmbs.studies.simulation import SimulationFailed
         from gearmbs.studies.store import check_place, keep_dataset, write_text
+        from gearmbs.studies.train_figure import train_spectrum
         from gearmbs.studies.train_report import train_report, train_scene
         from gearmbs.studies.trains import run_train
+        from gearmbs.view import save_figure
 
         target = out or file.with_suffix(".nc")
         check_place(target.parent, 0, "its record")
@@ -229,6 +231,9 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
         report, scene = target.with_suffix(".md"), target.with_suffix(".html")
         write_text(report, train_report(train, data))
         train_scene(train).save_html(scene)
+        written = [target, report, scene]
+        if "mesh_rms" in data and train.meshes:
+            written += save_figure(train_spectrum(train, data), target.with_suffix(""))
         for mesh in data.mesh.values:
             if "mesh_track" in data:
                 # of a run-up the report says where which harmonic is highest
@@ -236,7 +241,7 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
             levels = data["mesh_rms"].sel(mesh=mesh, signal=f"force of {mesh}")
             shown = "".join(f"{v:10.4g}" for v in levels.values)
             typer.echo(f"{mesh!s:<18}{float(levels.mesh_frequency):10.5g} Hz{shown}   RMS of the normal force, N")
-        typer.echo("\n".join(f"wrote {path}" for path in (target, report, scene)))
+        typer.echo("\n".join(f"wrote {path}" for path in written))
 
 
 def _level_table(data: Any) -> str:

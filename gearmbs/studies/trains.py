@@ -332,6 +332,13 @@ def plain(value: Any) -> Any:
     return value if isinstance(value, str | int | float | bool) or value is None else repr(value)
 
 
+def held_speed(record: xr.Dataset) -> float:
+    """Return the mean speed of a record over the nominal one: lines of a spectrum are where that puts them."""
+    parts = json.loads(record.attrs["train_json"])
+    first = parts[parts[str(record.mesh.values[0])]["driver"]]["shaft"]
+    return float(np.abs(record["speed"].sel(shaft=first).mean())) / float(record.attrs["mesh_speed"])
+
+
 def train_signal(record: xr.Dataset, channel: str, mesh: str | None = None) -> xr.DataArray:
     """Return one channel of a drivetrain's record as a signal with speed and teeth, for `analyse` and its like.
 
@@ -371,9 +378,7 @@ def train_signal(record: xr.Dataset, channel: str, mesh: str | None = None) -> x
     parts = json.loads(record.attrs["train_json"])
     wheels = [parts[parts[mesh][side]] for side in ("driver", "driven")]
     speed = float(np.abs(record["speed"].sel(shaft=wheels[0]["shaft"]).mean()))
-    # lines are where the speed that was held puts them, not the nominal one
-    first = parts[parts[meshes[0]]["driver"]]["shaft"]
-    held = float(np.abs(record["speed"].sel(shaft=first).mean())) / float(record.attrs["mesh_speed"])
+    held = held_speed(record)
     placed = {name: held * frequency for name, frequency in json.loads(record.attrs["known_lines"]).items()}
     return make_signal(
         values.values[:, None], float(record.attrs["run_rate"]), units=unit, channels=[channel],

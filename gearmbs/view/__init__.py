@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from gearmbs.view.maps import sensitivity_map
     from gearmbs.view.mesh import Mesh
     from gearmbs.view.motion import PairMotion, solution_motion, static_motion
+    from gearmbs.view.named_lines import named_lines_plot
     from gearmbs.view.outline import gear_outline, profile_area
     from gearmbs.view.page import Page
     from gearmbs.view.planetary import planetary_plot, planetary_scene
@@ -80,6 +81,7 @@ __all__ = [
     "mesh_view",
     "modal_energy_plot",
     "mode_animation",
+    "named_lines_plot",
     "order_map_plot",
     "order_plot",
     "order_track_plot",
@@ -143,6 +145,7 @@ late(
         "mechanism_scene": ".scenes",
         "mesh_animation": ".animation",
         "mesh_view": ".transverse",
+        "named_lines_plot": ".named_lines",
         "order_map_plot": ".changing_speed",
         "order_plot": ".signals",
         "order_track_plot": ".changing_speed",

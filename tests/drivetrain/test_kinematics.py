@@ -41,6 +41,15 @@ def test_sidebands_and_names_of_lines(table):
     assert table.for_analysis("mesh") == {"speed": pytest.approx(50 * np.pi), "teeth": (20, 60)}
 
 
+def test_lines_by_what_they_come_from(table):
+    parts = table.lines_by_part(harmonics=2, order=1)
+    meshing = ["mesh mesh", "sidebands of mesh", "hunting teeth of mesh"]
+    assert list(parts) == ["shaft in", "shaft out", *meshing, "bearing a", "load pump"]
+    assert parts["mesh mesh"] == pytest.approx({"1 x GMF of mesh": 500.0, "2 x GMF of mesh": 1000.0})
+    assert len(parts["sidebands of mesh"]) == 8
+    assert table.known_lines(2, 1) == {name: at for lines in parts.values() for name, at in lines.items()}
+
+
 def test_bearings_and_shafts_for_a_diagnosis(table):
     from gearmbs.signals import diagnose_bearing, make_signal
 

@@ -22,7 +22,7 @@ from gearmbs.drivetrain import (
 )
 from gearmbs.signals import analyse
 from gearmbs.signals.simulated import read_any
-from gearmbs.studies import run_train, train_report, train_scene, train_signal
+from gearmbs.studies import run_train, train_report, train_scene, train_signal, train_spectrum
 from gearmbs.studies.trains import check_record, load_train
 from tests.drivetrain.support import stage
 from tests.drivetrain.test_description import TEXT
@@ -119,6 +119,24 @@ def test_report_and_view(train, record):
     assert {"in", "out", "box"} <= {part.name for part in scene.parts}
 
 
+def test_figure_names_lines_by_the_kinematic_table(train, record):
+    """Its strongest lines are named where the table has them, mesh lines go through the spectrum, all have a row."""
+    figure = train_spectrum(train, record, "force of mesh")
+    upper, lower = figure.axes
+    assert upper.get_title(loc="left") == f"{train.name}: force of mesh"
+    rows = [text.get_text() for text in lower.get_yticklabels()]
+    assert {"shaft in", "shaft out", "mesh mesh", "sidebands of mesh"} <= set(rows)
+    named = upper.texts[-1].get_text().splitlines()
+    assert 5 <= len(named) <= 10
+    gmf = next(text for text in named if text.endswith("  1 x GMF of mesh"))
+    assert float(gmf.split()[1]) == pytest.approx(500.0, abs=1.5 / 0.12)
+    ticks = lower.collections[rows.index("mesh mesh")].get_segments()
+    assert sorted(segment[0, 0] for segment in ticks) == pytest.approx([500.0, 1000.0, 1500.0], rel=1e-3)
+    assert train_spectrum(train, record, maximum=600.0).axes[0].get_title(loc="left").endswith(": seat")
+    with pytest.raises(DrivetrainError, match="in a run-up lines move"):
+        train_spectrum(train, record.assign(mesh_track=record.mesh_rms))
+
+
 def test_command_line(tmp_path):
     path = tmp_path / "train.toml"
     quick = TEXT.replace('duration = "0.2 s"', 'duration = "0.02 s"\nsettling = 0.0\ntolerance = 1e-6')
@@ -130,7 +148,7 @@ def test_command_line(tmp_path):
     result = CliRunner().invoke(app, ["run", str(path)])
     assert result.exit_code == 0, result.output
     assert "mesh                     500 Hz" in result.output
-    for suffix in (".nc", ".md", ".html"):
+    for suffix in (".nc", ".md", ".html", ".png", ".svg"):
         assert path.with_suffix(suffix).exists()
 
 

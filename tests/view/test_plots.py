@@ -9,6 +9,7 @@ from gearmbs.view import (
     average_plot,
     contact_pattern_plot,
     load_sharing_plot,
+    named_lines_plot,
     order_plot,
     sensitivity_map,
     spectrum_plot,
@@ -195,3 +196,19 @@ def test_load_sharing_and_contact_pattern(pair):
     assert_readable(figure)
     empty = contact_pattern(pair, points=5, sections=3, side="coast")
     assert "no load" in contact_pattern_plot(empty).axes[0].texts[0].get_text()
+
+
+def test_lines_at_one_frequency_are_all_named():
+    """Of a tone on a bin the figure says both lines it can be, and what is not known it does not name."""
+    t = np.arange(8000) / 8000.0
+    tones = np.sin(2 * np.pi * 600.0 * t) + 0.5 * np.sin(2 * np.pi * 950.0 * t)
+    found = signals.spectrum(signals.make_signal(tones[:, None], 8000.0, units="N"))
+    known = {"mesh one": {"2 x one": 600.0}, "mesh two": {"3 x two": 600.0}, "shaft in": {"1 x in": 0.5}}
+    figure = named_lines_plot(found, known, maximum=2000.0)
+    upper, lower = figure.axes
+    assert upper.texts[-1].get_text() == " 1  600 Hz  2 x one or 3 x two"
+    assert [text.get_text() for text in lower.get_yticklabels()] == ["mesh one", "mesh two"]
+    with pytest.raises(ValueError, match="no line between"):
+        named_lines_plot(found, {"shaft in": {"1 x in": 9000.0}})
+    with pytest.raises(ValueError, match="select one"):
+        named_lines_plot(found.isel(channel=0, drop=True), known)
