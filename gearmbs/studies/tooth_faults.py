@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 
 
 def kinds() -> dict[str, type[faults.Fault]]:
-    """Return the faults a case can hold by their labels, such as "broken tooth"."""
+    """Return the faults a case can hold by their labels, such as "broken tooth"; modifications meant come last."""
     found = (value for value in vars(faults).values() if isinstance(value, type) and issubclass(value, faults.Fault))
-    return {kind.label: kind for kind in found if kind is not faults.Fault}
+    ordered = sorted(found, key=lambda kind: kind.__module__ != faults.__name__)
+    return {kind.label: kind for kind in ordered if kind is not faults.Fault}
 
 
 def tooth_fault(value: Any) -> faults.Fault:
