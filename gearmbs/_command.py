@@ -41,7 +41,8 @@ def guarded() -> Iterator[None]:
         if isinstance(error, OSError) and error.filename and error.strerror:
             text = f"{error.filename}: {error.strerror}"
             text += "; choose another place or make room" if error.errno in UNWRITABLE else ""
-        fail(f"{text} (on the command line: --{asked} ...)" if asked else text)
+        told = asked is None or f"--{asked} " in text
+        fail(text if told else f"{text} (on the command line: --{asked} ...)")
 
 
 @contextmanager

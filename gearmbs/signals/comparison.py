@@ -187,7 +187,8 @@ def _common_cases(experiment: States, model: States | None, reference: str) -> t
         for name, side in sides:
             if reference not in side[load]:
                 raise SignalError(
-                    f"reference: the {name} at load {load!r} has no state {reference!r}, only {list(side[load])}"
+                    f"reference: the {name} at load {load!r} has no state {reference!r}, only {list(side[load])}; "
+                    "say which of them the others are held against: reference=... (--reference)"
                 )
         for state in experiment[load]:
             if all(state in side[load] for _, side in sides):

@@ -50,7 +50,7 @@ def features(reports: Iterable[Reported], *, by: By = "record") -> pd.DataFrame:
     Raises
     ------
     SignalError
-        If there are no reports, or `by` is neither.
+        If there are no reports, something else is among them, or `by` is neither.
 
     See Also
     --------
@@ -66,6 +66,8 @@ def feature_rows(report: Reported, by: By = "record") -> list[dict[str, Any]]:
     """The numbers of a report as rows of plain values: one, or one for each channel."""
     if by not in ("record", "channel"):
         raise SignalError(f"by: must be 'record' or 'channel', got {by!r}")
+    if not hasattr(report, "channel_features"):
+        raise SignalError(f"reports: {type(report).__name__} is no report; give what analyse returns")
     data = report.channel_features()
     names = [str(c) for c in data["channel"].values]
     head = {"source": report.source, "rate_hz": report.rate, "duration_s": report.duration}

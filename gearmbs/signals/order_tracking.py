@@ -84,7 +84,7 @@ def order_track(
         gaps = gaps[gaps > 1e-9]
         revolutions = max(LEAST_TURNS, 2.0 / float(gaps.min())) if gaps.size else LEAST_TURNS
     windows = _Windows(signal, speed, revolutions, overlap, float(wanted.max()), shaft)
-    out = np.empty((windows.starts.size, wanted.size, signal.sizes["channel"]))
+    out = np.empty((windows.starts.size, wanted.size, windows.angular.sizes["channel"]))
     turns = windows.angular["angle"].values
     carriers = [np.exp(-2j * np.pi * order * turns)[:, None] * windows.angular.values for order in wanted]
     for i, start in enumerate(windows.starts):
@@ -133,7 +133,7 @@ def order_map(
     if scaling not in SCALINGS:
         raise SignalError(f"scaling: must be one of {', '.join(SCALINGS)}, got {scaling!r}")
     windows = _Windows(signal, speed, revolutions, overlap, maximum, shaft, window)
-    power = np.empty((windows.starts.size, windows.length // 2 + 1, signal.sizes["channel"]))
+    power = np.empty((windows.starts.size, windows.length // 2 + 1, windows.angular.sizes["channel"]))
     for i, start in enumerate(windows.starts):
         piece = windows.angular.values[start : start + windows.length]
         line = scipy.fft.rfft((piece - piece.mean(axis=0)) * windows.weights[:, None], axis=0)

@@ -253,7 +253,7 @@ def _part_rows(
 def _files(files: Files) -> tuple[list[Path], list[Any] | None]:
     """The files of a series in their order, and their labels."""
     if isinstance(files, Mapping):
-        return [Path(path) for path in files.values()], list(files)
+        return _paths(files.values()), list(files)
     if isinstance(files, (str, Path)):
         folder = Path(files)
         if folder.is_dir():
@@ -267,18 +267,23 @@ def _files(files: Files) -> tuple[list[Path], list[Any] | None]:
         else:
             paths = [folder]
     else:
-        try:
-            paths = [Path(path) for path in files]
-        except TypeError:
-            raise SignalError(
-                "files: must be paths, a folder or a pattern; samples in memory go into analyse one by one, "
-                "and their reports into features"
-            ) from None
+        paths = _paths(files)
     if not paths:
         raise SignalError(f"files: {files} names no file")
     if len(paths) == 1 and not paths[0].exists():
         raise SignalFileError(paths[0], "cannot be opened (No such file or directory)")
     return paths, None
+
+
+def _paths(files: Iterable[str | Path]) -> list[Path]:
+    """The files of a list or mapping as paths."""
+    try:
+        return [Path(path) for path in files]
+    except TypeError:
+        raise SignalError(
+            "files: must be paths, a folder or a pattern; samples in memory go into analyse one by one, "
+            "and their reports into features"
+        ) from None
 
 
 def _counted(path: Path) -> list[tuple[int, float, str]]:

@@ -59,11 +59,12 @@ def check_record(case: Case, source: str = "") -> None:
     turns = f"operation.speed = {operation.top_speed:.6g} rad/s ({operation.top_speed * 30.0 / math.pi:.6g} rpm)"
     top = (HARMONICS + HALF_WIDTH + TRANSITION) * gmf
     if top >= 0.5 * rate:
-        times = math.floor(2.0 * top / rate) + 1
+        enough = (math.floor(2.0 * top / rate) + 1) * rate
+        finer = case.changed(solver={"signal_rate": enough, "output_rate": None}).output_rate
         raise CaseError(
             f"{source}: solver.signal_rate = {rate:g} Hz: {turns} with {case.gears.teeth[0]} teeth puts "
             f"the band of mesh harmonic {HARMONICS} up to {top:.6g} Hz, above half that rate; give signal_rate = "
-            f"{times * rate:g} and output_rate = {times * case.output_rate:g}, leave both out so that they follow the "
+            f"{enough:g} and output_rate = {finer:g}, leave both out so that they follow the "
             "mesh frequency, or give a lower speed (a plain number is in rad/s; write '1000 rpm')"
         )
     if operation.speed_curve is None:

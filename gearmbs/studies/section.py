@@ -93,6 +93,21 @@ class Section(BaseModel, metaclass=_OneError):
         except ValidationError as error:
             raise CaseError(explained(error, cls, cls.label({}))) from None
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refuse to set a field, in the package's own words.
+
+        Raises
+        ------
+        CaseError
+            Always for fields, which do not change.
+        """
+        if name in type(self).model_fields:
+            raise CaseError(
+                f"{self.section or 'case'}.{name}: a case does not change once it is made; "
+                "case.changed(...) makes another one"
+            )
+        super().__setattr__(name, value)
+
     @model_validator(mode="wrap")
     @classmethod
     def _remember(cls, data: Any, handler: Any) -> Any:

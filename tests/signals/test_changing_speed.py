@@ -229,3 +229,12 @@ def test_analysis_of_a_pair_that_speeds_up_follows_it_in_angle():
     plain = analyse(signal)
     first = plain.orders.set_index("order").loc[1.0, "rms"]
     assert first == pytest.approx(0.3 / math.sqrt(2), rel=0.02)
+
+
+def test_orders_of_what_becomes_a_signal():
+    signal, _ = run_up()
+    table = pd.DataFrame({"time": signal["time"].values, "a": signal.values[:, 0], "b": signal.values[:, 0]})
+    tracks = order_track(table, RUN_UP, orders=(29, 58))
+    np.testing.assert_array_equal(tracks.sel(channel="a"), tracks.sel(channel="b"))
+    np.testing.assert_allclose(tracks.sel(channel="b").median("time"), [1.0, 0.5], rtol=1e-2)
+    assert order_map(table, RUN_UP)["channel"].values.tolist() == ["a", "b"]

@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pandas as pd
 import pytest
+import scipy.io
 from typer.testing import CliRunner
 
 from gearmbs.cli import app
@@ -161,6 +162,19 @@ def test_a_folder_is_one_series(tmp_path):
     listed = run("trend", folder / "s1.csv", folder / "s2.csv", "--teeth", TEETH, "--channel", "housing")
     assert listed.exit_code == 0, listed.output
     assert "housing.fm4" in listed.output
+
+
+def test_an_option_that_a_message_names_is_not_named_again(tmp_path):
+    """A speed that the file may hold is offered with its option; where there is none, the option is all there is."""
+    x = np.random.default_rng(0).standard_normal(25600)
+    for inside, said in (({"rate": 25.0}, '(--speed "25 Hz")'), ({}, "(on the command line: --speed ...)")):
+        scipy.io.savemat(tmp_path / "x.mat", {"bearing": {"sr": RATE, "gs": x, **inside}})
+        result = run("analyse", tmp_path / "x.mat", "--bearing", "6205")
+        text = " ".join(result.output.split())
+        assert result.exit_code == 1
+        assert "speed is missing" in text
+        assert text.endswith(said)
+        assert text.count("--speed") == 1
 
 
 def test_the_command_line_answers_what_is_asked(tmp_path):

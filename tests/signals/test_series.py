@@ -163,6 +163,8 @@ def test_features_of_reports_and_reasons_for_what_is_not_there():
     assert features([long], by="channel")["fm4"].item() == long.indicators["fm4"].item()
     with pytest.raises(SignalError, match="there are none"):
         features([])
+    with pytest.raises(SignalError, match="NoneType is no report"):
+        features([long, None])
 
 
 @pytest.mark.parametrize(
@@ -170,6 +172,7 @@ def test_features_of_reports_and_reasons_for_what_is_not_there():
     [
         ([], {}, "names no file"),
         ([np.zeros(9)], {}, "samples in memory go into analyse"),
+        ({"low": np.zeros(9)}, {}, "samples in memory go into analyse"),
         ("none/*.csv", {}, "names no file"),
         ("none.csv", {}, "cannot be opened"),
         ("x", {"errors": "drop"}, "errors: must be"),

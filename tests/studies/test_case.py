@@ -214,6 +214,14 @@ def test_sections_raise_the_same_error():
     assert len(str(caught.value).splitlines()) == 1
     with pytest.raises(CaseError, match="give its fields by name"):
         Operation(3)
+    case = Case()
+    for change, words in (
+        (lambda: setattr(case, "name", "x"), "case.name"),
+        (lambda: setattr(case.operation, "speed", 1.0), "operation.speed"),
+    ):
+        with pytest.raises(CaseError, match=rf"{words}: .* does not change .*changed\(\.\.\.\)") as caught:
+            change()
+        assert len(str(caught.value).splitlines()) == 1
 
 
 def test_one_count_of_teeth_is_for_both_wheels(tmp_path):

@@ -72,6 +72,8 @@ def test_material_and_sizes_of_each_wheel(tmp_path):
             {"operation": {"speed": "1000 rad/s"}, "solver": {"signal_rate": 12800.0}},
             r"signal_rate = 12800 Hz: .*9549.3 rpm.* up to 16154.2 Hz.*signal_rate = 38400",
         ),
+        # far too low a rate alone asks for no more samples of force than by default: 51.2 kHz or more, by doubling
+        ({"solver": {"signal_rate": 100.0}}, "give signal_rate = 3400 and output_rate = 54400,"),
         ({"operation": {"duration": "0.05 s"}}, r"operation.duration = 0.05 s: .*483.333 Hz needs .* at least 0.05"),
         ({"operation": {"run_up": 0.004, "settling": 0.0}}, r"operation.settling = 0 s: .* needs 0.01 s before"),
         (
