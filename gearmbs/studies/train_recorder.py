@@ -41,6 +41,17 @@ class TrainColumns(NamedTuple):
     speed: np.ndarray
 
 
+def counted_turns(t: np.ndarray, turned: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """Return angles counted through full turns, shape (m, shafts), rad.
+
+    Where teeth are apart a step of the integrator can take more than a turn: the speeds at its ends say how many.
+    """
+    step = np.diff(turned, axis=0)
+    expected = 0.5 * (speed[1:] + speed[:-1]) * np.diff(t)[:, None]
+    step += 2.0 * np.pi * np.round((expected - step) / (2.0 * np.pi))
+    return np.concatenate([turned[:1], turned[:1] + np.cumsum(step, axis=0)])
+
+
 class TrainRecorder:
     """Collects the columns of a drivetrain's record from the parts of a solution, as a consumer of `simulate`.
 
@@ -71,7 +82,7 @@ class TrainRecorder:
     def joined(self) -> TrainColumns:
         """Return all columns, angles counted through full turns."""
         whole = TrainColumns(*(np.concatenate(c) for c in zip(*self._parts, strict=True)))
-        return whole._replace(turned=np.unwrap(whole.turned, axis=0))
+        return whole._replace(turned=counted_turns(whole.t, whole.turned, whole.speed))
 
     def columns(self, part: Solution) -> TrainColumns:
         """Return what is recorded of one part of a solution."""

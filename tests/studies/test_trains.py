@@ -23,6 +23,7 @@ from gearmbs.drivetrain import (
 from gearmbs.signals import analyse
 from gearmbs.signals.simulated import read_any
 from gearmbs.studies import run_train, train_report, train_scene, train_signal, train_spectrum
+from gearmbs.studies.train_recorder import counted_turns
 from gearmbs.studies.trains import check_record, load_train
 from tests.drivetrain.support import stage
 from tests.drivetrain.test_description import TEXT
@@ -108,6 +109,16 @@ def test_signals_go_on_to_the_analysis(tmp_path, record):
     assert train_signal(record, "b y").sizes["time"] == record.sizes["time"]
     with xr.open_dataset(path, engine="h5netcdf") as again:
         assert json.loads(again.attrs["train_json"])["pinion"]["gear"]["teeth"] == 20
+
+
+def test_turns_are_counted_over_long_steps():
+    """An even acceleration seen at steps of up to three turns, in both senses."""
+    t = np.array([0.0, 0.01, 0.05, 0.06, 0.15, 0.2])
+    angle = np.stack([1.0 + 150.0 * t + 40.0 * t**2, -2.0 - 90.0 * t], axis=1)
+    speed = np.stack([150.0 + 80.0 * t, np.full(t.size, -90.0)], axis=1)
+    seen = np.angle(np.exp(1j * angle))
+    found = counted_turns(t, seen, speed)
+    np.testing.assert_allclose(found - found[0], angle - angle[0], atol=1e-12)
 
 
 def test_report_and_view(train, record):
