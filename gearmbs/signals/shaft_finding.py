@@ -33,6 +33,8 @@ VARYING = 0.02
 """A speed that strays more than this part from its mean is followed in angle, not in frequency."""
 OTHER_COMB = 0.03
 STRONGER_DB = 3.0
+SHARED_HARMONIC = 2
+"""Combs of which one has lines in common with the other's harmonics up to this one are not told apart."""
 USUAL_RPM = (20.0, 12_000.0)
 USUAL_RATE = (100.0, 2e6)
 SHAFT_HARMONICS = 5
@@ -239,9 +241,12 @@ def _remark_other(
 
 
 def _related(blind: Comb, found: SpeedEstimate) -> bool:
-    """Whether the lines of a comb may be harmonics, part orders or sidebands of another one's mesh line."""
+    """Whether the lines of a comb may be harmonics, part orders or sidebands of another one's mesh line.
+
+    Combs at two to three, say, share every other line, which makes a comb where there is none.
+    """
     ratio = max(blind.gmf / found.gmf, found.gmf / blind.gmf)
-    if abs(ratio / round(ratio) - 1.0) < SPEED_TOLERANCE:
+    if any(abs(k * ratio / round(k * ratio) - 1.0) < SPEED_TOLERANCE for k in range(1, SHARED_HARMONIC + 1)):
         return True
     apart = abs(blind.gmf - found.gmf)
     turns = (blind.speed / math.tau, found.speed / math.tau)

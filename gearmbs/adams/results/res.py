@@ -18,7 +18,7 @@ ENTITY_TYPES = {
     "joint": "Joint", "jprim": "Primitive_Joint", "motion": "Motion", "sforce": "SForce", "vforce": "VForce",
     "vtorque": "VTorque", "gforce": "GForce", "bushing": "Bushing", "field": "Field",
     "springdamper": "SpringDamper", "gcon": "GCon", "coupler": "Coupler", "gear": "Gear", "beam": "Beam",
-    "friction": "Friction",
+    "friction": "Friction", "contact": "Contact", "ptcv": "PTCV", "cvcv": "CVCV",
 }  # fmt: skip
 PER_LINE = 6
 STEP_TYPES = {"KINEMATICS": "kinematic", "STATICS": "static", "INITIAL_CONDITIONS": "initialConditions"}
