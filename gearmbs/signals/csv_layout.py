@@ -13,6 +13,7 @@ from typing import Any, Literal
 from .errors import SignalFileError
 from .labels import is_clock, name_and_unit, unique_names
 from .signal import UNKNOWN_UNITS
+from .unit_names import is_usual
 
 HEAD_LINES = 400
 COMMENT = re.compile(r"^\s*[#%]")
@@ -207,7 +208,10 @@ def _labels(above: list[str], separator: str | None, width: int) -> tuple[list[s
 def _units_row(
     above: list[str], separator: str | None, width: int, labels: list[str], line: int
 ) -> tuple[list[str], list[str]] | None:
-    """Names and units where the units stand in a row of their own below the names, else None."""
+    """Names and units where the units stand in a row of their own below the names, else None.
+
+    Units are in brackets, or plain where the names above begin with the time's.
+    """
     rows = [text for text in above[:line] if text.strip() and not COMMENT.match(text)]
     upper = split_cells(rows[-1], separator) if rows else []
     in_brackets = [re.match(r"^\s*[\[(]([^\[\]()]*)[\])]\s*$", label) for label in labels]
@@ -217,6 +221,9 @@ def _units_row(
         and any(in_brackets)
     ):
         return upper, [(m.group(1).strip() if m else "") or UNKNOWN_UNITS for m in in_brackets]
+    plain = [label.strip() for label in labels]
+    if len(upper) == width and is_clock(upper[0]) and plain[0] and all(not unit or is_usual(unit) for unit in plain):
+        return upper, [unit or UNKNOWN_UNITS for unit in plain]
     return None
 
 

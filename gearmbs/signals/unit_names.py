@@ -37,6 +37,13 @@ def check_units(units: Any) -> None:
             raise SignalError(f"units: {text!r} is not a unit{hint}")
 
 
+def is_usual(text: str) -> bool:
+    """True for the units of measured signals themselves, in any of their spellings; not for all that could be one."""
+    for old, new in REPLACEMENTS:
+        text = text.replace(old, new)
+    return text in USUAL or text in ALIASES
+
+
 def _is_unit(text: str) -> bool:
     clean = text.strip()
     if clean in USUAL or clean in ALIASES or clean in DIMENSIONS.values() or clean.lower() in COUNTS:

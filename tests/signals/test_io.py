@@ -204,6 +204,9 @@ def test_channel_choice(tmp_path):
         ("1 2\n3 4\n", ["ch1", "ch2"], ["unknown"] * 2, None, [1.0, 2.0]),
         ("time [s];v [m/s]\n0,0;1,5\n0,1;2,5\n0,2;3,5\n", ["v"], ["m/s"], 10.0, [1.5]),
         ("Time,A,B\n(ms),(mV),(V)\n\n0,1,2\n1,3,4\n2,5,6\n", ["A", "B"], ["mV", "V"], 1000.0, [1.0, 2.0]),
+        ("Time;A;B\nms;m/s²;\n0;1;2\n1;3;4\n2;5;6\n", ["A", "B"], ["m/s²", "unknown"], 1000.0, [1.0, 2.0]),
+        # names that could be units stay names where no row above calls one column the time
+        ("run,of,today\nt,V,A\n0,1,2\n0.5,3,4\n1,5,6\n", ["V", "A"], ["unknown", "unknown"], 2.0, [1.0, 2.0]),
         (
             "# Fs = 2000 Hz\n# teeth: [32, 80]\nx\ty\n1e3\t-2E-3\n4\t5\n",
             ["x", "y"],
