@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +20,11 @@ from gearmbs.studies.resonance import (
     sweep_resonance,
 )
 from gearmbs.units import Quantity, to_si
+
+LOADS = (1.0, 1000.0)
+"""Between these a study looks for the load of separation, N m."""
+AROUND = (0.6, 1.5)
+"""Where the multibody model's is looked for, over that of the model of one degree of freedom."""
 
 
 class SeparationLoad(NamedTuple):
@@ -49,9 +54,13 @@ def lowest_lag(settings: ResonanceSettings, torque: Quantity, model: str = MODEL
 
 
 def separation_load(
-    settings: ResonanceSettings | None = None, between: tuple[Quantity, Quantity] = (1.0, 1000.0), *, steps: int = 12
+    settings: ResonanceSettings | None = None,
+    between: tuple[Quantity, Quantity] = LOADS,
+    *,
+    steps: int = 12,
+    model: str = MODELS[1],
 ) -> SeparationLoad | None:
-    """Return the load at which separation begins or ceases, by bisection with the model of one degree of freedom.
+    """Return the load at which separation begins or ceases, by bisection.
 
     Until teeth part, the equation is linear in x and so is every amplitude in the load: only what the load changes of
     the stiffness curve makes a threshold. Deflection prolongs the contact of each pair of teeth. Where that raises the
@@ -65,6 +74,7 @@ def separation_load(
         Two loads, N m, at one of which teeth part and at the other not.
     steps : int
         Halvings of the ratio of the two.
+    model : {"one degree", "multibody"}
 
     Returns
     -------
@@ -73,16 +83,26 @@ def separation_load(
     """
     s = settings or ResonanceSettings()
     low, high = (to_si(torque, "torque", "between") for torque in between)
-    parted = [lowest_lag(s, torque) < 0.0 for torque in (low, high)]
+    parted = [lowest_lag(s, torque, model) < 0.0 for torque in (low, high)]
     if parted[0] == parted[1]:
         return None
     for _ in range(steps):
         middle = math.sqrt(low * high)
-        if (lowest_lag(s, middle) < 0.0) == parted[0]:
+        if (lowest_lag(s, middle, model) < 0.0) == parted[0]:
             low = middle
         else:
             high = middle
     return SeparationLoad(math.sqrt(low * high), parted[1])
+
+
+def separation_loads(settings: ResonanceSettings) -> dict[str, SeparationLoad | None]:
+    """Return the load of separation of both models, that of the multibody one to 0.7 %; None where there is none."""
+    whole, classical = MODELS
+    found = separation_load(settings)
+    if found is None:
+        return {classical: None}
+    low, high = (factor * found.torque for factor in AROUND)
+    return {classical: found, whole: separation_load(settings, (low, high), steps=7, model=whole)}
 
 
 @dataclass(frozen=True)
@@ -94,12 +114,13 @@ class ResonanceStudy:
     settings : ResonanceSettings
     sweeps : dict of (str, str) to Dataset
         By model and direction; see `sweep_resonance`.
-    threshold : SeparationLoad or None
+    thresholds : dict of str to (SeparationLoad or None)
+        By model; see `separation_loads`.
     """
 
     settings: ResonanceSettings
     sweeps: dict[tuple[str, str], xr.Dataset]
-    threshold: SeparationLoad | None = None
+    thresholds: dict[str, SeparationLoad | None] = field(default_factory=dict)
 
     def jumps(self) -> dict[str, dict[str, float]]:
         """Return the mesh frequencies at which amplitudes jump, Hz, by model and direction."""
@@ -121,9 +142,12 @@ class ResonanceStudy:
             lines.append(
                 f"| {d} | " + " | ".join(cell.replace("+nan", "-").replace("nan", "no jump") for cell in cells) + " |"
             )
-        if self.threshold is not None:
-            lines += ["", str(self.threshold) + "."]
-        return "\n".join(lines) + "\n"
+        return "\n".join(lines) + "\n" + self.thresholds_text()
+
+    def thresholds_text(self) -> str:
+        """Return the load of separation of each model, a paragraph each."""
+        none = f"no load from {LOADS[0]:g} to {LOADS[1]:g} N m at which teeth begin or cease to part"
+        return "".join(f"\n{model.capitalize()}: {found or none}.\n" for model, found in self.thresholds.items())
 
     def figure(self) -> Any:
         """Return amplitude over mesh frequency of both models in both directions, and the lowest lag below it."""
@@ -174,4 +198,4 @@ def run_resonance(
         told = told_of_span(progress, direction, chirp(s, direction).duration)
         sweeps[MODELS[0], direction] = sweep_resonance(s, direction, MODELS[0], progress=told)
         sweeps[MODELS[1], direction] = sweep_resonance(s, direction, MODELS[1])
-    return ResonanceStudy(s, sweeps, separation_load(s))
+    return ResonanceStudy(s, sweeps, separation_loads(s))

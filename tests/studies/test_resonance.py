@@ -14,7 +14,7 @@ from gearmbs.studies.resonance import (
     jump_frequency,
     sweep_resonance,
 )
-from gearmbs.studies.resonance_study import ResonanceStudy, lowest_lag, separation_load
+from gearmbs.studies.resonance_study import ResonanceStudy, lowest_lag, separation_load, separation_loads
 
 WINDOW = 20
 
@@ -107,9 +107,22 @@ def test_no_separation_below_a_load():
     found = separation_load(settings, (5.0, 200.0))
     assert found.parted_above
     assert "teeth part above" in str(found)
-    assert lowest_lag(settings, 0.8 * found.torque, "multibody") > 0.0
-    assert lowest_lag(settings, 1.1 * found.torque, "multibody") < 0.0
+    own = separation_load(settings, (0.6 * found.torque, 1.5 * found.torque), steps=4, model="multibody")
+    assert own.parted_above
+    # the deflection excites more than a stiffness that is a function of the phase alone says
+    assert 0.75 * found.torque < own.torque < 1.05 * found.torque
+    assert lowest_lag(settings, 0.95 * own.torque, "multibody") > 0.0
+    assert lowest_lag(settings, 1.05 * own.torque, "multibody") < 0.0
     assert separation_load(settings, (5.0, 10.0)) is None
+
+
+def test_loads_of_both_models_are_printed():
+    settings = ResonanceSettings(addendum=1.157, damping_ratio=0.03, cycles=400)
+    found = separation_loads(settings)
+    assert list(found) == ["one degree", "multibody"]
+    text = ResonanceStudy(settings, {}, {**found, "other": None}).thresholds_text()
+    assert f"Multibody: teeth part above {found['multibody'].torque:.4g} N m, none below." in text
+    assert "Other: no load from 1 to 1000 N m" in text
 
 
 def test_report_and_figure(study, tmp_path):
