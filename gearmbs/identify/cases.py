@@ -249,6 +249,7 @@ def identify(
     check: bool = True,
     tell: Callable[[str], None] | None = None,
     starts: int = 1,
+    progress: Callable[[float, str], None] | None = None,
     **settings: Any,
 ) -> Fit:
     """Find parameters of cases from measured mesh harmonics.
@@ -266,6 +267,8 @@ def identify(
         Is told the remarks, when they are not to be an error.
     starts : int
         Searches from different starts.
+    progress : callable, optional
+        As for `fit`.
     **settings
         Of `CaseProblem`.
 
@@ -273,8 +276,7 @@ def identify(
     ------
     IdentifyError
         If a combination of the parameters is not determined; the message names it. With ``tell``, or ``check=False``,
-        the
-        fit is made all the same.
+        the fit is made all the same.
 
     Examples
     --------
@@ -292,7 +294,7 @@ def identify(
         for line in remarks:
             assert tell is not None
             tell(line)
-    return problem.fit(starts=starts)
+    return problem.fit(starts=starts, progress=progress)
 
 
 def compare_models(problems: Mapping[str, CaseProblem], **settings: Any) -> pd.DataFrame:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gearmbs.identify.cases import CaseProblem
 from gearmbs.identify.errors import IdentifyError
+from gearmbs.progress import staged
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,8 +26,13 @@ EXPERIMENTS: dict[str, dict[str, Any]] = {
 FACTORS = ("operation.speed", "operation.torque")
 
 
+@staged("ranking experiments")
 def rank_experiments(
-    problem: CaseProblem, candidates: Mapping[str, Mapping[str, Any]] | None = None, *, of: str | None = None
+    problem: CaseProblem,
+    candidates: Mapping[str, Mapping[str, Any]] | None = None,
+    *,
+    of: str | None = None,
+    progress: Callable[[float, str], None] | None = None,
 ) -> pd.DataFrame:
     """Rank further measurements by how much better the worst known combination would be known.
 
@@ -41,6 +47,8 @@ def rank_experiments(
         Default `EXPERIMENTS`.
     of : str, optional
         Case that is changed; default the first.
+    progress : callable, optional
+        Called as progress(fraction, experiment); without it a bar is shown where somebody watches.
 
     Returns
     -------
@@ -58,7 +66,10 @@ def rank_experiments(
 
     before = np.linalg.svd(problem.derivatives(), compute_uv=False)[-1]
     rows = {}
-    for name, changes in (EXPERIMENTS if candidates is None else candidates).items():
+    asked = EXPERIMENTS if candidates is None else candidates
+    for k, (name, changes) in enumerate(asked.items()):
+        if progress is not None:
+            progress((k + 1) / (len(asked) + 1), name)
         rows[name] = _worth(problem, name, changes, of or next(iter(problem.cases)), before)
     table = pd.DataFrame.from_dict(rows, orient="index").sort_values("worst", na_position="last")
     table.index.name = "experiment"

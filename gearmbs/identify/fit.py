@@ -1,10 +1,8 @@
 """Least squares of any model, with what one must know of the answer: errors, correlations, residuals, profiles.
 
 In terms of the weighted residuals r = (f(p) - y) / sigma and their Jacobian J the estimate minimises r.r, its
-covariance is
-(J'J)^-1, times s^2 = r.r / (m - n) where the noise is not known (G. A. F. Seber, C. J. Wild, Nonlinear Regression,
-Wiley,
-1989, chapters 2 and 5).
+covariance is (J'J)^-1, times s^2 = r.r / (m - n) where the noise is not known (G. A. F. Seber, C. J. Wild, Nonlinear
+Regression, Wiley, 1989, chapters 2 and 5).
 """
 
 from __future__ import annotations
@@ -19,12 +17,17 @@ from gearmbs.identify.differences import SMOOTH_STEP, central, steps
 from gearmbs.identify.errors import IdentifyError
 from gearmbs.identify.parameters import Free, Scale
 from gearmbs.identify.result import Fit
+from gearmbs.progress import staged
 
 Model = Callable[[np.ndarray], np.ndarray]
+Progress = Callable[[float, str], None]
+USUAL_STEPS = 10
+"""Steps that a search usually takes, each with a Jacobian by central differences."""
 POLISH = 50
 """Gauss-Newton steps at most after the search."""
 
 
+@staged("fitting")
 def fit(
     model: Model,
     measured: ArrayLike,
@@ -39,6 +42,7 @@ def fit(
     most_runs: int = 2000,
     seed: int = 0,
     lost: int = 0,
+    progress: Progress | None = None,
 ) -> Fit:
     """Find the parameters of a model that fit measured values best.
 
@@ -66,6 +70,9 @@ def fit(
         Of the starts.
     lost : int
         Degrees of freedom that the model itself has used up, as by gains it fits.
+    progress : callable, optional
+        Called as progress(fraction, stage), the fraction of as many evaluations as searches usually take; without it a
+        bar is shown where somebody watches, see `gearmbs.progress`.
 
     Returns
     -------
@@ -85,6 +92,8 @@ def fit(
     [2.0, -0.5]
     """
     problem = _Problem(model, measured, free, sigma, many, step, lost)
+    if progress is not None:
+        problem.tell = told_of_runs(progress, starts * USUAL_STEPS * (2 * len(free) + 1))
     low, high = problem.scale.bounds()
     attempts = []
     for z0 in _starts(problem.scale, low, high, starts, seed):
@@ -101,6 +110,11 @@ def fit(
     if loss == "linear":
         z = _polished(problem, z, low, high, tolerance)
     return problem.result(z, waterfall=[cost for _, cost in attempts], runs=problem.total)
+
+
+def told_of_runs(progress: Progress, usual: int) -> Callable[[int], None]:
+    """Return what tells how many evaluations are done, as a part of a usual number and never all of them."""
+    return lambda done: progress(min(done / usual, 0.99), f"{done} evaluations")
 
 
 class _Problem:
@@ -121,6 +135,7 @@ class _Problem:
         self._many = many or (lambda points: [np.asarray(model(p), dtype=float) for p in points])
         self.step, self.lost = step, lost
         self.runs = self.total = 0
+        self.tell: Callable[[int], None] = lambda done: None
 
     def residuals(self, points: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return the residuals at several z."""
@@ -128,6 +143,7 @@ class _Problem:
         self.total += len(points)
         with np.errstate(all="ignore"):
             found = self._many([self.scale.p(np.asarray(z)) for z in points])
+        self.tell(self.total)
         return [(np.asarray(f, dtype=float) - self.measured) / self.sigma for f in found]
 
     def residual(self, z: np.ndarray) -> np.ndarray:

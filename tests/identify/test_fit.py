@@ -97,3 +97,22 @@ def test_reports_and_errors():
         Free("x", -1.0)
     with pytest.raises(IdentifyError, match="not between"):
         fit(decay, noisy(1), [Free("a", 1.0, 2.0, 3.0), *FREE[1:]])
+
+
+def test_a_fit_tells_how_far_it_is():
+    x = np.linspace(0.0, 1.0, 20)
+    free = [Free("a", 1.0), Free("b", -1.0, log=False)]
+    told = []
+    fit(
+        lambda p: p[0] * np.exp(p[1] * x),
+        2.0 * np.exp(-0.5 * x),
+        free,
+        progress=lambda fraction, stage: told.append((fraction, stage)),
+    )
+    fractions = [fraction for fraction, _ in told]
+    assert fractions == sorted(fractions)
+    assert 0.0 < fractions[0] < fractions[-1] <= 0.99
+    counts = [int(stage.removesuffix(" evaluations")) for _, stage in told]
+    # one at a time, and four for each Jacobian
+    assert counts[0] == 1
+    assert set(np.diff(counts)) <= {1, 4}
