@@ -6,6 +6,7 @@ Nothing here needs the simulation itself: a record says all that is needed in it
 from __future__ import annotations
 
 import contextlib
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -81,6 +82,19 @@ def record_signal(record: xr.Dataset, component: str | None = None) -> xr.DataAr
     return signal.assign_coords({name: ("time", record[name].values, record[name].attrs) for name in turning})
 
 
+def held_speed(record: xr.Dataset) -> float:
+    """Return the mean speed of a record over the nominal one: lines of a spectrum are where that puts them."""
+    parts = json.loads(record.attrs["train_json"])
+    first = parts[parts[str(record.mesh.values[0])]["driver"]]["shaft"]
+    return float(np.abs(record["speed"].sel(shaft=first).mean())) / float(record.attrs["mesh_speed"])
+
+
+def placed_lines(record: xr.Dataset) -> str:
+    """Return the lines of the kinematic table where the speed of a drivetrain's record puts them, as JSON."""
+    held = held_speed(record)
+    return json.dumps({name: held * at for name, at in json.loads(record.attrs["known_lines"]).items()})
+
+
 def sensor_signals(record: xr.Dataset, sensor: str | None = None, **settings: Any) -> xr.DataArray:
     """Return what the sensors of a drivetrain's record measured as a signal, with speed and teeth of its first mesh.
 
@@ -104,15 +118,20 @@ def sensor_signals(record: xr.Dataset, sensor: str | None = None, **settings: An
         if name not in names:
             raise SignalError(f"channel: there is no {name!r}; choose one of {', '.join(names) or 'none'}")
     attributes = record.attrs
+    attrs, speed = {"source": str(attributes.get("title", "simulation"))}, float(attributes["mesh_speed"])
+    # in a run-up lines move
+    if "known_lines" in attributes and "mesh_track" not in record:
+        attrs["known_lines"] = placed_lines(record)
+        speed *= held_speed(record)
     return make_signal(
         record["measured"].sel(sensor=kept).values,
         float(attributes["run_rate"]),
         units=[str(u) for u in record.sensor_units.sel(sensor=kept).values],
         channels=kept,
         t0=float(record.time.values[0]),
-        speed=settings.get("speed") or float(attributes["mesh_speed"]),
+        speed=settings.get("speed") or speed,
         teeth=settings.get("teeth") or tuple(int(z) for z in np.ravel(attributes["mesh_teeth"])),
-        attrs={"source": str(attributes.get("title", "simulation"))},
+        attrs=attrs,
     )
 
 
@@ -170,7 +189,7 @@ def read_any(path: str | Path, component: str | None = None, **settings: Any) ->
             if holds_ring(data):
                 return ring_signal(data[["ring_sensor", "carrier_angle"]].load())
             if "measured" in data and "train_json" in data.attrs:
-                return sensor_signals(data[["measured"]].load(), component, **settings)
+                return sensor_signals(data, component, **settings)
     return read_signal(path, **settings)
 
 

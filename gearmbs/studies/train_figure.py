@@ -8,7 +8,8 @@ import xarray as xr
 
 from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError
 from gearmbs.signals import spectrum
-from gearmbs.studies.trains import held_speed, train_signal
+from gearmbs.signals.simulated import held_speed
+from gearmbs.studies.trains import train_signal
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -21,6 +21,7 @@ from gearmbs.mechanism.simulate import simulate
 from gearmbs.signals import even_signal, make_signal
 from gearmbs.signals.monotone_cubic import monotone_cubic
 from gearmbs.signals.orders import MIN_PERIODS, harmonic_amplitudes
+from gearmbs.signals.simulated import placed_lines
 from gearmbs.signals.uneven import MARGIN
 from gearmbs.studies.simulation import SimulationFailed, SimulationInterrupted
 from gearmbs.studies.tooth_faults import tooth_fault
@@ -332,13 +333,6 @@ def plain(value: Any) -> Any:
     return value if isinstance(value, str | int | float | bool) or value is None else repr(value)
 
 
-def held_speed(record: xr.Dataset) -> float:
-    """Return the mean speed of a record over the nominal one: lines of a spectrum are where that puts them."""
-    parts = json.loads(record.attrs["train_json"])
-    first = parts[parts[str(record.mesh.values[0])]["driver"]]["shaft"]
-    return float(np.abs(record["speed"].sel(shaft=first).mean())) / float(record.attrs["mesh_speed"])
-
-
 def train_signal(record: xr.Dataset, channel: str, mesh: str | None = None) -> xr.DataArray:
     """Return one channel of a drivetrain's record as a signal with speed and teeth, for `analyse` and its like.
 
@@ -378,10 +372,8 @@ def train_signal(record: xr.Dataset, channel: str, mesh: str | None = None) -> x
     parts = json.loads(record.attrs["train_json"])
     wheels = [parts[parts[mesh][side]] for side in ("driver", "driven")]
     speed = float(np.abs(record["speed"].sel(shaft=wheels[0]["shaft"]).mean()))
-    held = held_speed(record)
-    placed = {name: held * frequency for name, frequency in json.loads(record.attrs["known_lines"]).items()}
     return make_signal(
         values.values[:, None], float(record.attrs["run_rate"]), units=unit, channels=[channel],
         t0=float(record.time.values[0]), speed=speed, teeth=tuple(abs(int(w["gear"]["teeth"])) for w in wheels),
-        attrs={"source": record.attrs["title"], "known_lines": json.dumps(placed)},
+        attrs={"source": record.attrs["title"], "known_lines": placed_lines(record)},
     )  # fmt: skip

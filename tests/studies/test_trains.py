@@ -103,6 +103,8 @@ def test_signals_go_on_to_the_analysis(tmp_path, record):
     record.to_netcdf(path, engine="h5netcdf")
     signal = read_any(path)
     assert list(signal.channel.values) == ["seat", "laser", "rim", "speed", "torque"]
+    assert json.loads(signal.attrs["known_lines"]) == json.loads(one.attrs["known_lines"])
+    assert signal.attrs["speed"] == pytest.approx(one.attrs["speed"])
     assert "m/s^2" in str(signal.attrs) + str(signal.coords)
     with pytest.raises(DrivetrainError, match="no channel 'moon'; known are seat"):
         train_signal(record, "moon")
