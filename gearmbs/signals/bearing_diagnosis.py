@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
+from gearmbs.progress import staged
 from gearmbs.units import to_si
 
 from .bearing_envelopes import envelope_spectra
@@ -25,6 +26,7 @@ from .signal import rate_of, require, units_of
 LEAST_TURNS = 20
 
 
+@staged("diagnosing bearings")
 def diagnose_bearing(
     signal: Any,
     bearing: Any,
@@ -35,6 +37,7 @@ def diagnose_bearing(
     shafts: Sequence[float] | None = None,
     slip: float = SLIP,
     harmonics: int = HARMONICS,
+    progress: Callable[[float, str], None] | None = None,
 ) -> BearingReport:
     """Look for the lines of one or several bearings in a record and say what they mean.
 
@@ -63,6 +66,8 @@ def diagnose_bearing(
         Share by which lines may lie beside their kinematic place.
     harmonics : int
         How many harmonics count.
+    progress : callable, optional
+        Called as progress(fraction, channel); without it a bar is shown where somebody watches.
 
     Returns
     -------
@@ -100,6 +105,8 @@ def diagnose_bearing(
     bands, findings, spectra = {}, [], {}
     for c in range(signal.sizes["channel"]):
         name = str(signal["channel"].values[c])
+        if progress is not None:
+            progress((c + 0.5) / signal.sizes["channel"], name)
         bands[name], found = envelope_spectra(signal.isel(channel=[c]), shaft, highest, band=band, phase=phase)
         judged = judge(found, known, shaft, others, slip=slip, harmonics=harmonics, looks=signal.sizes["channel"])
         findings += [_finding(name, one, found, shaft) for one in judged]
