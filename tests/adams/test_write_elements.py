@@ -86,7 +86,23 @@ def test_beam_with_its_own_damping_and_bushing_with_preload_survive():
     assert write_deck(parse_deck(again).to_mechanism()) == again
 
 
-@pytest.mark.parametrize("kind", [k for k in STATEMENTS if k not in ("joint", "gear")])
+@pytest.mark.parametrize("kind", ["ptcv", "cvcv"])
+def test_curves_are_written_as_the_constraints_that_keep_to_them(kind):
+    deck = parse_deck(model(PARTS + STATEMENTS[kind]))
+    text = write_deck(deck.to_mechanism())
+    assert "\nGCON/1\n" in text
+    one, two = (run_deck(d, end=0.1, steps=4, tol=1e-8) for d in (deck, parse_deck(text)))
+    for body in ("PART_2", "PART_3"):
+        a, b = (r.segments[0].solution.com_position(body) for r in (one, two))
+        np.testing.assert_allclose(b, a, atol=1e-8)
+
+
+def test_contacts_of_solids_are_refused_by_name():
+    with pytest.raises(ModelError, match="contact 'CONTACT_7'.* has no form in an ADAMS deck"):
+        write_deck(parse_deck(model(PARTS + STATEMENTS["contact"])).to_mechanism())
+
+
+@pytest.mark.parametrize("kind", [k for k in STATEMENTS if k not in ("joint", "gear", "contact", "ptcv", "cvcv")])
 def test_decks_of_every_element_are_written_with_it(kind):
     """A GEAR is a coupler of its joints."""
     deck = parse_deck(model(PARTS + STATEMENTS[kind]))
