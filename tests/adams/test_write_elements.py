@@ -98,7 +98,7 @@ def test_curves_are_written_as_the_constraints_that_keep_to_them(kind):
 
 
 def test_contacts_of_solids_are_refused_by_name():
-    with pytest.raises(ModelError, match="contact 'CONTACT_7'.* has no form in an ADAMS deck"):
+    with pytest.raises(ModelError, match=r"contact 'CONTACT_7'.* has no form in an ADAMS deck"):
         write_deck(parse_deck(model(PARTS + STATEMENTS["contact"])).to_mechanism())
 
 
