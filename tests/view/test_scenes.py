@@ -212,21 +212,27 @@ def opened(page, tmp_path, query=""):
     shot = tmp_path / "shot.png"
     quiet = ["--no-first-run", "--disable-background-networking", "--disable-sync", "--hide-scrollbars"]
     common = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", *quiet, "--window-size=800,600"]
+    texts = []
     for k, action in enumerate(("--dump-dom", f"--screenshot={shot}")):
-        profile = tmp_path / f"profile{k}{len(query)}"
-        profile.mkdir()
-        command = [
-            *common,
-            f"--user-data-dir={profile}",
-            "--virtual-time-budget=1500",
-            action,
-            f"{page.as_uri()}{query}",
-        ]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-        if k == 0:
-            text = done.stdout
+        # a browser now and then hangs at its start on a busy machine, whatever the page
+        for attempt in (1, 2, 3):
+            profile = tmp_path / f"profile{k}{len(query)}{attempt}"
+            profile.mkdir()
+            command = [
+                *common,
+                f"--user-data-dir={profile}",
+                "--virtual-time-budget=1500",
+                action,
+                f"{page.as_uri()}{query}",
+            ]
+            try:
+                texts.append(subprocess.run(command, capture_output=True, text=True, timeout=60, check=False).stdout)
+                break
+            except subprocess.TimeoutExpired:
+                if attempt == 3:
+                    raise
     with Image.open(shot) as image:
-        return text, np.asarray(image.convert("RGB")).astype(int)
+        return texts[0], np.asarray(image.convert("RGB")).astype(int)
 
 
 @needs_browser
