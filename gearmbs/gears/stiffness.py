@@ -189,7 +189,7 @@ def _disc_foundation(gear: GearSpec, beta: np.ndarray, from_axis: np.ndarray, ro
 
 
 def half_plane_foundation(gear: GearSpec, beta: np.ndarray, lever: np.ndarray, thickness: float) -> np.ndarray:
-    """Compliance of the body under a tooth as that of an elastic half plane [5]_, m/N.
+    """Compliance of the body under a tooth as that of an elastic half plane (Cornell 1981), m/N.
 
     ``cos^2 beta / (E b) [5.306 (l / h)^2 + 2 (1 - nu) l / h + 1.534 (1 + 0.4167 tan^2 beta / (1 + nu))]``: the rim of
     an internal wheel without its own bending.
