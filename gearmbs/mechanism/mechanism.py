@@ -147,7 +147,7 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         """Add a body that deforms by modes; its markers move and turn with their shapes.
 
         Deformations are small: displacements are linear in the modal coordinates. The equations are those of
-        `gearmbs.dae.equations.modal_inertia` and `gearmbs.dae.equations.elastic`.
+        `gearmbs.dae.equations.modal_inertia` and `gearmbs.dae.equations.elastic_frames`.
 
         Parameters
         ----------

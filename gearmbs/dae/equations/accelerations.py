@@ -16,15 +16,9 @@ from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.elastic import (
-    apply_frame_load,
-    bias_rate,
-    is_elastic,
-    own_rate,
-    put_spatial,
-    touches_elastic,
-    wrench_at,
-)
+from gearmbs.dae.equations.elastic_constraints import bias_rate, put_spatial
+from gearmbs.dae.equations.elastic_frames import is_elastic, own_rate, touches_elastic
+from gearmbs.dae.equations.elastic_loads import apply_frame_load, wrench_at
 from gearmbs.dae.equations.entries import NUMBERS, add_number, put, put_pair
 from gearmbs.dae.equations.force_elements import DIAGNOSTICS
 from gearmbs.dae.equations.forces import evaluate_element

@@ -9,7 +9,8 @@ from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.elastic import is_elastic, put_row, touches_elastic
+from gearmbs.dae.equations.elastic_constraints import put_row
+from gearmbs.dae.equations.elastic_frames import is_elastic, touches_elastic
 from gearmbs.dae.equations.entries import put
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_HESSIAN, S_TERM, S_VECTOR
 from gearmbs.dae.equations.unknowns import has_rate_rows, multiplier_factor, multipliers_of_row

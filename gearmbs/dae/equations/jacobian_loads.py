@@ -9,7 +9,8 @@ from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.elastic import is_elastic, load_at, put_arm, put_chain, put_load
+from gearmbs.dae.equations.elastic_frames import is_elastic
+from gearmbs.dae.equations.elastic_loads import load_at, put_arm, put_chain, put_load
 from gearmbs.dae.equations.entries import put
 from gearmbs.dae.equations.force_elements import DERIVATIVES
 from gearmbs.dae.equations.forces import evaluate_element

@@ -84,7 +84,7 @@ H_R_MODAL = 58
 """Integrals of modal bodies and shapes of elastic frames."""
 H_N_MODAL = 59
 H_W_PARTIAL = 60
-"""Partial derivatives of elastic frames, see `gearmbs.dae.equations.elastic`."""
+"""Partial derivatives of elastic frames, see `gearmbs.dae.equations.elastic_frames`."""
 H_N_PARTIAL = 61
 H_SIZE = 62
 

@@ -28,7 +28,8 @@ from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.elastic import bring_to_body, is_elastic, own_rate
+from gearmbs.dae.equations.elastic_frames import is_elastic, own_rate
+from gearmbs.dae.equations.elastic_loads import bring_to_body
 from gearmbs.dae.equations.forces import evaluate_element
 from gearmbs.dae.equations.modal_inertia import modal_residual
 from gearmbs.dae.equations.reactions import reaction_wrench

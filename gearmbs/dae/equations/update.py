@@ -8,7 +8,7 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations import time_functions
 from gearmbs.dae.equations.constraint_terms import dot3
 from gearmbs.dae.equations.counted_angles import predict_element_angles
-from gearmbs.dae.equations.elastic import update_frame
+from gearmbs.dae.equations.elastic_frames import update_frame
 from gearmbs.dae.equations.expression_loads import TIME, time_at
 from gearmbs.dae.equations.modal_inertia import add_momentum, update_inertia
 from gearmbs.dae.equations.rotation import (

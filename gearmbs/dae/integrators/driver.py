@@ -22,17 +22,9 @@ from gearmbs.dae.integrators.records import Records
 from gearmbs.dae.integrators.rounding import rounding_level
 from gearmbs.dae.integrators.stall import StallWatch
 from gearmbs.dae.integrators.step import advance
-from gearmbs.dae.linalg.sparse_lu import (
-    FEWEST_ENTRIES,
-    GROWTH_LIMIT,
-    LEAVING_PLANS,
-    LUFactors,
-    LUPlan,
-    SingularMatrixError,
-    analyse,
-    factor,
-    new_factors,
-)
+from gearmbs.dae.linalg.counted_entries import FEWEST_ENTRIES, LEAVING_PLANS
+from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse
+from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, LUFactors, factor, new_factors
 from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 

@@ -10,7 +10,8 @@ from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.corrector import ROUNDING_LEVEL
 from gearmbs.dae.integrators.run_state import STATE_TYPE
 from gearmbs.dae.integrators.weights import weighted_max
-from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, PLAN_TYPE, solve
+from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
+from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, solve
 
 NOISE_SAMPLES = 2
 NOISE_MARGIN = 4.0

@@ -24,7 +24,8 @@ from gearmbs.dae.integrators.newton_matrix import SLOPE_MAX_AGE, form_matrix, re
 from gearmbs.dae.integrators.rounding import accept_noise, count_noise, forget_noise, remember_noise
 from gearmbs.dae.integrators.run_state import STATE_TYPE
 from gearmbs.dae.integrators.weights import renew_weights, weighted_argmax
-from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, PLAN_TYPE
+from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
+from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
 from gearmbs.dae.problem import HISTORY_CHANGED
 
 EPS = 2.220446049250313e-16

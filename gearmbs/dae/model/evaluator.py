@@ -23,21 +23,9 @@ from gearmbs.dae.equations.residual import update
 from gearmbs.dae.equations.rotation import POSE_COLUMNS
 from gearmbs.dae.equations.update import update_tables
 from gearmbs.dae.errors import ModelError
-from gearmbs.dae.linalg.sparse_lu import (
-    FACTORS_TYPE,
-    FEWEST_ENTRIES,
-    GROWTH_LIMIT,
-    LEAVING_PLANS,
-    PLAN_TYPE,
-    LUFactors,
-    LUPlan,
-    SingularMatrixError,
-    analyse,
-    factor,
-    new_factors,
-    solve,
-    solve_pair,
-)
+from gearmbs.dae.linalg.counted_entries import FEWEST_ENTRIES, LEAVING_PLANS
+from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan, SingularMatrixError, analyse
+from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, LUFactors, factor, new_factors, solve, solve_pair
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from gearmbs.dae.compiled.pointers import address
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.elastic import partials_size
+from gearmbs.dae.equations.elastic_frames import partials_size
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.force_elements import FORCE_SIG, Diagnostic
 from gearmbs.dae.equations.modal_inertia import ModalInertia, present_size

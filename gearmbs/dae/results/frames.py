@@ -61,7 +61,7 @@ def elastic_motion(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return motion (m, 27) and accelerations (m, 6) of an elastic frame from those of its body.
 
-    The equations are those of `gearmbs.dae.equations.elastic`.
+    The equations are those of `gearmbs.dae.equations.elastic_frames`.
 
     Parameters
     ----------

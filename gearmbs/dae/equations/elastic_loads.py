@@ -1,0 +1,220 @@
+"""Loads at elastic frames: force, moment and modal forces on the body, and their entries in the rows of eq. (5)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearmbs._jit import njit
+from gearmbs.dae.compiled.views import vector_at
+from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.constraint_terms import cross3, dot3
+from gearmbs.dae.equations.elastic_coordinates import FORCE, POSITION, VELOCITY, coordinates, is_idle, place, turns
+from gearmbs.dae.equations.elastic_frames import DB, DP, DV, DW, DX, PARTIALS, is_elastic, partials
+from gearmbs.dae.equations.entries import put
+from gearmbs.dae.equations.modal_inertia import to_body
+from gearmbs.dae.equations.rotation import KIN_AXES, KIN_FORCE, KIN_MOMENT, KIN_R, KIN_SHIFT, KIN_TURN
+
+
+@njit(cache=True, error_model="numpy")
+def wrench_at(f, point, force, torque, sign, marker_body, kin, frame, s):
+    """Write arm, force and moment about the origin of frame f to ``s[0:9]``.
+
+    Parameters
+    ----------
+    point : int
+        Marker at whose origin the force acts.
+    force, torque : ndarray, shape (3,)
+    sign : float
+        Factor of both.
+    """
+    owner = marker_body[point]
+    for c in range(3):
+        s[c] = kin[owner, KIN_R + c] + frame[point, T.MK_ARM + c] - kin[f, KIN_R + c]
+        s[3 + c] = sign * force[c]
+    cross3(s, 0, s, 3, s, 6)
+    for c in range(3):
+        s[6 + c] += sign * torque[c]
+
+
+@njit(cache=True, error_model="numpy")
+def load_at(f, sign, row, y, marker_body, kin, frame, s):
+    """As `wrench_at` for the F and N that a force element has in y.
+
+    Parameters
+    ----------
+    f, sign : int, float
+        The frame that feels the load, and the factor of both.
+    row : ndarray of int
+        Row of the force element.
+    y
+        Unknowns.
+    marker_body, kin, frame : ndarray
+        The markers' frames, tables of kinematics and of markers.
+    s : ndarray
+        Written, 15 places.
+    """
+    force, torque = s[9:12], s[12:15]
+    for c in range(3):
+        force[c] = y[row[T.FORCE_F] + c] if row[T.FORCE_F] >= 0 else 0.0
+        torque[c] = y[row[T.FORCE_N] + c] if row[T.FORCE_N] >= 0 else 0.0
+    wrench_at(f, row[T.FORCE_I], force, torque, sign, marker_body, kin, frame, s)
+
+
+@njit(cache=True, error_model="numpy")
+def bring_to_body(f, at, modal, kin, partial, scratch, out):
+    """Bring the forces added up for elastic frame f to its body and to the modes: eq. (5), and mu in eq. (6)."""
+    row, body, n = kin[f], kin[at[f, T.AT_BODY]], at[f, T.AT_MODES]
+    x, y, z = row[KIN_R] - body[KIN_R], row[KIN_R + 1] - body[KIN_R + 1], row[KIN_R + 2] - body[KIN_R + 2]
+    shape, axes = at[f, T.AT_SHAPE] + 3, at[f, T.AT_PARTIAL] + 3 * PARTIALS + DB
+    s = vector_at(scratch, 0, 6)
+    for pair in range(2):
+        # forces with moments, then mu's displacements with its rotations
+        along, about = (KIN_FORCE, KIN_MOMENT) if pair == 0 else (KIN_SHIFT, KIN_TURN)
+        first, sign = (at[f, T.AT_PF], 1.0) if pair == 0 else (at[f, T.AT_QF], -1.0)
+        for c in range(3):
+            body[along + c] += row[along + c]
+            body[about + c] += row[about + c]
+        body[about] += y * row[along + 2] - z * row[along + 1]
+        body[about + 1] += z * row[along] - x * row[along + 2]
+        body[about + 2] += x * row[along + 1] - y * row[along]
+        to_body(body, row, along, s, 0)
+        to_body(body, row, about, s, 3)
+        fx, fy, fz, tx, ty, tz = sign * s[0], sign * s[1], sign * s[2], sign * s[3], sign * s[4], sign * s[5]
+        for k in range(n):
+            p, b = shape + 3 * k, axes + PARTIALS * k
+            push = modal[p] * fx + modal[p + 1] * fy + modal[p + 2] * fz
+            out[first + k] += push + partial[b] * tx + partial[b + 1] * ty + partial[b + 2] * tz
+
+
+@njit(cache=True, error_model="numpy")
+def apply_frame_load(f, s, at, kin, partial, rhs):
+    """Add the spatial and modal forces of force ``s[3:6]`` and moment ``s[6:9]`` at elastic frame f."""
+    t = np.empty(6)
+    body, v = at[f, T.AT_BODY], at[f, T.AT_V]
+    for c in range(3):
+        t[c] = kin[f, KIN_R + c] - kin[body, KIN_R + c]
+    cross3(t, 0, s, 3, t, 3)
+    for c in range(3):
+        rhs[v + c] += s[3 + c]
+        rhs[v + 3 + c] += t[3 + c] + s[6 + c]
+    d = partials(f, at, partial)
+    for m in range(at[f, T.AT_MODES]):
+        rhs[at[f, T.AT_V_MODES] + m] += dot3(d[3 + m], DP, s, 3) + dot3(d[3 + m], DX, s, 6)
+
+
+@njit(cache=True, error_model="numpy")
+def put_load(mode, slot, vals, k, f, sign, force, torque, point, s, at, marker_body, kin, frame, partial):
+    """Hand over the entries of a load on elastic frame f in the rows of eq. (5); return the next entry's number.
+
+    Parameters
+    ----------
+    sign : float
+        1 on I's body, -1 on J's.
+    force, torque : int
+        Places of F and N in y, or -1.
+    point : int
+        Marker at whose origin the force acts.
+    s : ndarray
+        Arm, force and moment of `wrench_at`, then scratch: 18 places.
+    """
+    d = partials(f, at, partial)
+    owner = marker_body[point]
+    for i in range(coordinates(f, at)):
+        row = place(f, i, FORCE, at)
+        if is_idle(f, i, False, at, partial):
+            continue
+        if i < 3:
+            if force >= 0:
+                k = put(mode, slot, vals, k, row, force + i, -sign)
+            continue
+        c = i - 3
+        # P_c . F + X_c . (r x F + N): by F it is P_c + X_c x r, by the arm r it is F x X_c
+        cross3(d[c], DX, s, 0, s, 9)
+        for m in range(3):
+            if force >= 0:
+                k = put(mode, slot, vals, k, row, force + m, -sign * (d[c, DP + m] + s[9 + m]))
+            if torque >= 0:
+                k = put(mode, slot, vals, k, row, torque + m, -sign * d[c, DX + m])
+        for j in range(3, coordinates(f, at)):
+            e = j - 3
+            if e >= c >= 3 or is_idle(f, j, False, at, partial):
+                # two modes turn one after the other; displacements are linear
+                continue
+            if c > e >= 3 and not (turns(d[c]) and turns(d[e])):
+                continue
+            value = 0.0
+            if min(c, e) < 3:
+                cross3(d[min(c, e)], DX, d[max(c, e)], DP, s, 12)
+                value += dot3(s, 12, s, 3)
+            if e < c:
+                cross3(d[e], DX, d[c], DX, s, 12)
+                value += dot3(s, 12, s, 6)
+            k = put(mode, slot, vals, k, row, place(f, j, POSITION, at), -value)
+        if force >= 0 and owner != f:
+            cross3(s, 3, d[c], DX, s, 9)
+            k = put_arm(mode, slot, vals, k, row, f, point, s, 1.0, at, marker_body, kin, frame, partial, True)
+            k = put_arm(mode, slot, vals, k, row, owner, point, s, -1.0, at, marker_body, kin, frame, partial, False)
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def put_arm(mode, slot, vals, k, row, b, point, s, sign, at, marker_body, kin, frame, partial, to_origin):
+    """Hand over ``sign`` times the derivatives of ``s[9:12]`` . x by the coordinates of frame b.
+
+    Parameters
+    ----------
+    row : int
+        Row of the entries.
+    b : int
+        A frame; nothing depends on the ground.
+    point : int
+        x is the origin of this marker, which is fixed in b, or
+    to_origin : bool
+        that of the frame itself.
+    s : ndarray
+        Scratch from the 13th place on.
+    """
+    for i in range(coordinates(b, at)):
+        if i < 3:
+            value = s[9 + i]
+        elif is_idle(b, i, True, at, partial):
+            continue
+        elif is_elastic(b, at):
+            # markers of a modal body are at the origins of their frames
+            value = dot3(s, 9, partials(b, at, partial)[i - 3], DP)
+        elif to_origin:
+            continue
+        else:
+            cross3(kin[b], KIN_AXES + 3 * (i - 3), frame[point], T.MK_ARM, s, 12)
+            value = dot3(s, 9, s, 12)
+        k = put(mode, slot, vals, k, row, place(b, i, POSITION, at), sign * value)
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def put_chain(mode, slot, vals, k, row, f, d, col, sign, at, kin, partial):
+    """Hand over the entries of one row that depends on elastic frame f; return the number of the next entry.
+
+    Parameters
+    ----------
+    row : int
+        Row of the entries.
+    d, col : ndarray, int
+        ``d[col:col+12]`` holds the derivatives by displacement, rotation, velocity and angular velocity of the frame.
+    sign : float
+        Factor of ``d``.
+    """
+    for c in range(3):
+        k = put(mode, slot, vals, k, row, at[f, T.AT_R] + c, sign * d[col + c])
+        k = put(mode, slot, vals, k, row, at[f, T.AT_U] + c, sign * d[col + 6 + c])
+    rows = partials(f, at, partial)
+    for i in range(3, coordinates(f, at)):
+        if is_idle(f, i, False, at, partial):
+            continue
+        p = rows[i - 3]
+        moved = dot3(d, col, p, DP) + dot3(d, col + 3, p, DX)
+        pushed = dot3(d, col + 6, p, DP) + dot3(d, col + 9, p, DX)
+        changed = dot3(d, col + 6, p, DV) + dot3(d, col + 9, p, DW)
+        k = put(mode, slot, vals, k, row, place(f, i, POSITION, at), sign * (moved + changed))
+        k = put(mode, slot, vals, k, row, place(f, i, VELOCITY, at), sign * pushed)
+    return k
