@@ -126,3 +126,42 @@ def test_included_angle():
     assert angle.max() > 0.9 * math.pi / 2
     with pytest.raises(Exception, match="vertex apart"):
         solution.evaluate("INCANG(pivot, pivot, tip)")
+
+
+def test_arguments_that_only_say_how_to_draw_or_print_are_read():
+    lines = (
+        'RESULTS/XRF, NOFLOATINGMARKERS, NOCONTACTS, NOTIRES\nREQUEST/9, F2=TIME\\CNAMES="", "", CLABELS="(s)", ""\n'
+    )
+    assert not parse_deck(with_lines(lines)).unsupported
+
+
+def test_the_old_friction_of_joints_is_refused_and_its_sizes_are_remarked():
+    text = PENDULUM.replace("REVOLUTE", "REVOLUTE, DELTA_V=0.01, MAXIMUM_DEFORMATION=0.01, INNER_RADIUS=1", 1)
+    deck = parse_deck(text)
+    (remark,) = [m for m in remarks(deck) if "INNER_RADIUS" in m]
+    assert remark.endswith("they shape the friction of MU_STAT and MU_DYN; write FRICTION")
+    assert not deck.unsupported
+    deck = parse_deck(text.replace("INNER_RADIUS=1", "MU_DYN_ROT=0.3"))
+    assert [d.message for d in deck.unsupported] == ["JOINT/1: MU_DYN_ROT is not supported"]
+
+
+def test_paths_of_windows_are_read_in_scripts():
+    script = parse_script("file/model=C:\\Users\\Ben.T\\run 1\\test\nsimulate/dynamic, end=1, steps=2\nstop\n")
+    assert script.model == "C:\\Users\\Ben.T\\run 1\\test"
+    assert len(script.commands) == 3
+
+
+@pytest.mark.parametrize(("hold", "rest"), [("", 1.0), (", STATIC_HOLD", 3.0)])
+def test_a_state_may_be_held_in_statics(hold, rest):
+    deck = parse_deck(
+        "held\nUNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND\nPART/1, GROUND\nMARKER/1, PART=1\n"
+        "MARKER/11, PART=1, ZP=1,0,0\nPART/2, MASS=2, CM=20, IP=1,1,1, QG=0.1,0,0\nMARKER/20, PART=2\n"
+        "MARKER/21, PART=2, ZP=1.1,0,0\nJOINT/1, TRANSLATIONAL, I=21, J=11\n"
+        f"DIFF/1, IC=3{hold}, FUNCTION=1-DIF(1)\n"
+        "SFORCE/1, TRANSLATIONAL, I=21, J=11, ACTIONONLY, FUNCTION=10*DIF(1)-10*DX(20,1)\n"
+        "REQUEST/1, F2=DX(20,1)\\F3=DIF(1)\nEND\n"
+    )
+    result = run_deck(deck, parse_script("a\nb\nSIMULATE/STATICS\nSIMULATE/DYNAMICS, END=1, STEPS=2\n"))
+    values = result.request(1)
+    assert values[0, 1:3] == pytest.approx([rest, rest], abs=1e-9)
+    assert values[-1, 2] == pytest.approx(1.0 + (rest - 1.0) * math.exp(-1.0), abs=1e-7)

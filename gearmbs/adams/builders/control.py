@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from gearmbs.adams.builders.curve_data import matrix_values
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
+
+if TYPE_CHECKING:
+    from gearmbs.adams.builders.model import AdamsModel
 
 
 class LinearSystem(NamedTuple):
@@ -149,3 +152,13 @@ def _canonical(s: st.Tfsiso, inputs: tuple[int, ...]) -> tuple[np.ndarray, np.nd
     b = np.zeros((n, 1))
     b[-1:] = 1.0
     return a, b, (above[:-1] - above[-1] * below)[None], above[-1:][None]
+
+
+def hold_states(model: AdamsModel) -> None:
+    """Make the states of statements with STATIC_HOLD keep their values, as in static analyses."""
+    deck, states = model.deck, model.mechanism.states
+    held = [d.id for d in deck.of(st.Diff).values() if d.static_hold]
+    held += [name for s, system in linear_systems(deck) if getattr(s, "static_hold", False) for name in system.names]
+    for name in held:
+        if name in states:
+            states[name].expression = "0"

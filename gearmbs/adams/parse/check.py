@@ -46,8 +46,8 @@ MEASURES = frozenset(
 MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv", "corner", "icm", "irm", "jrm", "iicm", "jicm")
 TWO_PARTS = (st.Joint, st.Jprim)
 UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
-    st.Marker: ("flex_body", "point_mass", "node_id", "curve"),
-    st.Joint: ("delta_v", "max_friction", "mu_dyn_rot", "mu_dyn_trans", "mu_stat_rot", "mu_stat_trans"),
+    st.Marker: ("flex_body", "point_mass", "node_id", "fe_part", "node_label", "curve"),
+    st.Joint: ("mu_dyn_rot", "mu_dyn_trans", "mu_stat_rot", "mu_stat_trans"),
     st.Coupler: ("function",),
     st.Field: ("function",),
     st.Spline: ("data_file",),
@@ -68,13 +68,15 @@ WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
     st.Part: ("exact",),
     st.Friction: ("formulation",),
     st.Variable: ("ic",),
-    st.Contact: ("augmented", "max_deformation", "flip_i", "flip_j"),
-    st.Graphics: ("xmin", "xmax", "ymin", "ymax"),
+    st.Contact: ("augmented", "stiction_law", "max_deformation", "flip_i", "flip_j"),
+    st.Graphics: ("xmin", "xmax", "ymin", "ymax", "faceting"),
+    st.Joint: tuple(
+        """delta_v max_deformation max_friction max_fric_rot max_fric_trans preload_axial preload_radial preload_x
+        preload_y inner_radius outer_radius pin_radius height width""".split()
+    ),
     st.CurveStatement: ("minpar", "maxpar"),
     st.Cvcv: ("ivel", "jvel"),
     st.Sensor: ("angular", "bisection", "codgen"),
-    st.Lse: ("static_hold",),
-    st.Tfsiso: ("static_hold",),
 }
 """Arguments that are read and change nothing: each is remarked on."""
 WHY = {
@@ -84,11 +86,10 @@ WHY = {
     st.Friction: "friction follows one law, see the documentation",
     st.Variable: "variables need no starting value",
     st.Contact: "solids press by depth and rub by speed alone",
-    st.Graphics: "a plane touches everywhere",
+    st.Graphics: "a plane touches everywhere, and a mesh is as fine as its file",
+    st.Joint: "they shape the friction of MU_STAT and MU_DYN; write FRICTION",
     st.CurveStatement: "the points alone say how far the curve goes",
     st.Cvcv: "the speeds follow from those of the parts",
-    st.Lse: "at an equilibrium its states settle as those of DIFF do",
-    st.Tfsiso: "at an equilibrium its states settle as those of DIFF do",
     st.Sensor: "the time is found to the last digits, and every analysis chooses its pivots anew",
 }
 
@@ -115,7 +116,7 @@ def check(deck: Deck) -> list[Diagnostic]:
     for statement in deck:
         cls = type(statement)
         required = REQUIRED.get(cls, ())
-        if cls is st.Marker and (statement.flex_body or statement.point_mass):  # type: ignore[attr-defined]
+        if cls is st.Marker and (statement.flex_body or statement.point_mass or statement.fe_part):  # type: ignore[attr-defined]
             required = ()
         if getattr(statement, "data_file", None) or (cls is st.CurveStatement and "function" in statement.given):
             # not supported, which is said below

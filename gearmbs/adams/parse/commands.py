@@ -16,6 +16,7 @@ from gearmbs.adams.parse.grammar import (
     ID,
     IDS,
     INT,
+    PATH,
     REAL,
     TEXT,
     ArgumentReader,
@@ -72,9 +73,9 @@ class Switch(Command):
 class FileCommand(Command):
     """FILE: the model to read and the prefix of the output files."""
 
-    model: str | None = arg("MODEL", TEXT)
-    output_prefix: str | None = arg("OUTPUT_PREFIX", TEXT)
-    command: str | None = arg("COMMAND", TEXT)
+    model: str | None = arg("MODEL", PATH)
+    output_prefix: str | None = arg("OUTPUT_PREFIX", PATH)
+    command: str | None = arg("COMMAND", PATH)
     users: bool = arg("USERS", FLAG, False)
 
 

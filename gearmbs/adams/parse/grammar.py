@@ -15,8 +15,8 @@ from typing import Any
 from gearmbs.adams.parse.source import CONTINUED, RawStatement
 from gearmbs.mechanism.expression_syntax import ExpressionError, parse
 
-REALS, REAL, INT, ID, IDS, FLAG, CHOICE, EXPRESSION, TEXT, WORD, WORDS, STRINGS, TABLE = range(13)
-"""Kinds of arguments."""
+REALS, REAL, INT, ID, IDS, FLAG, CHOICE, EXPRESSION, TEXT, WORD, WORDS, STRINGS, TABLE, PATH = range(14)
+"""Kinds of arguments; a PATH is a text in which a backslash is part of the name."""
 
 _KEY = re.compile(r"\s*([A-Za-z][A-Za-z0-9_]*)\s*(=)?")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?\Z")
@@ -174,18 +174,18 @@ class ArgumentReader:
         start, depth = self.at, 0
         quote = ""
         at = start
-        nested = spec.kind not in (TEXT, STRINGS)
+        nested = spec.kind not in (TEXT, STRINGS, PATH)
         while at < n:
             ch = text[at]
             if quote:
                 quote = "" if ch == quote else quote
-            elif ch in "\"'" and spec.kind in (STRINGS, TEXT, WORDS) and text.find(ch, at + 1) > 0:
+            elif ch in "\"'" and spec.kind in (STRINGS, TEXT, PATH, WORDS) and text.find(ch, at + 1) > 0:
                 quote = ch
             elif nested and ch == "(":
                 depth += 1
             elif nested and ch == ")":
                 depth -= 1
-            elif depth <= 0 and ch == "\\":
+            elif depth <= 0 and ch == "\\" and spec.kind != PATH:
                 break
             elif depth <= 0 and ch in _SEPARATORS and self._argument_follows(at + 1):
                 break
@@ -317,7 +317,7 @@ def convert(spec: Spec, raw: str) -> Any:
         text = joined_expression(raw)
         parse(text)
         return text
-    if kind == TEXT:
+    if kind in (TEXT, PATH):
         return _unquoted(" ".join(raw.replace(CONTINUED, ",").split()))
     if kind == STRINGS:
         return tuple(_unquoted(p) for p in _outside_quotes(" ".join(raw.replace(CONTINUED, ",").split())))

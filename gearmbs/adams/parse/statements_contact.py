@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gearmbs.adams.parse.grammar import CHOICE, FLAG, ID, IDS, INT, REAL, TEXT, WORD, arg
+from gearmbs.adams.parse.grammar import CHOICE, FLAG, ID, IDS, INT, PATH, REAL, TEXT, WORD, arg
 from gearmbs.adams.parse.statement import Statement
 
 SOLIDS = "BOX CYLINDER ELLIPSOID EXTERNAL EXTRUSION FRUSTUM PLANE POINT REVOLUTION TORUS"
@@ -41,8 +41,9 @@ class Graphics(Statement):
     rangle: float | None = arg("RANGLE", REAL, dimension="angle")
     sides: int | None = arg("SIDES", INT)
     seg: int | None = arg("SEG", INT)
-    data_file: str | None = arg("FILE", TEXT)
+    data_file: str | None = arg("FILE", PATH)
     element: str | None = arg("ELEMENT", TEXT)
+    faceting: float | None = arg("FACETING_TOLERANCE", REAL)
 
     @property
     def marker(self) -> int | None:
@@ -54,6 +55,7 @@ class Graphics(Statement):
 class Contact(Statement):
     """CONTACT: solids that touch and rub."""
 
+    kind: str | None = arg("TYPE", WORD)
     igeom: tuple[int, ...] = arg("IGEOM", IDS, (), count=(1, 1000))
     jgeom: tuple[int, ...] = arg("JGEOM", IDS, (), count=(1, 1000))
     law: str | None = arg("law", CHOICE, choices="IMPACT POISSON")
@@ -70,6 +72,7 @@ class Contact(Statement):
     mu_dynamic: float = arg("MU_DYNAMIC", REAL, 0.0)
     stiction: float | None = arg("STICTION_TRANSITION_VELOCITY", REAL, dimension="velocity")
     transition: float | None = arg("FRICTION_TRANSITION_VELOCITY", REAL, dimension="velocity")
+    stiction_law: str | None = arg("STICTION", WORD, choices="ON OFF")
     max_deformation: float | None = arg("MAX_STICTION_DEFORMATION", REAL, dimension="length")
     normal_function: str | None = arg("NORMAL_FUNCTION", TEXT)
     friction_function: str | None = arg("FRICTION_FUNCTION", TEXT)

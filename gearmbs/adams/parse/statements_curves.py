@@ -33,6 +33,7 @@ class CurveStatement(Statement, keyword="CURVE"):
     order: int = arg("ORDER", INT, 4)
     matrix: int | None = arg("MATRIX", ID)
     function: str | None = arg("FUNCTION", TEXT)
+    routine: str | None = arg("ROUTINE", TEXT)
     minpar: float | None = arg("MINPAR", REAL)
     maxpar: float | None = arg("MAXPAR", REAL)
 

@@ -42,6 +42,7 @@ class Diff(Statement):
     ic: Vector = arg("IC", REALS, (0.0,), count=(1, 2))
     function: str | None = arg("FUNCTION", EXPRESSION)
     implicit: bool = arg("IMPLICIT", FLAG, False)
+    static_hold: bool = arg("STATIC_HOLD", FLAG, False)
     routine: str | None = arg("ROUTINE", TEXT)
 
 
@@ -110,6 +111,7 @@ class Request(Statement):
     title: tuple[str, ...] = arg("TITLE", STRINGS, ())
     cnames: tuple[str, ...] = arg("CNAMES", STRINGS, ())
     cunits: tuple[str, ...] = arg("CUNITS", STRINGS, ())
+    clabels: tuple[str, ...] = arg("CLABELS", STRINGS, ())
     results_name: str | None = arg("RESULTS_NAME", TEXT)
 
     def functions(self) -> tuple[str | None, ...]:
@@ -182,6 +184,7 @@ class Output(Statement):
 
     reqsave: bool = arg("REQSAVE", FLAG, False)
     grsave: bool = arg("GRSAVE", FLAG, False)
+    gr521sav: bool = arg("GR521SAV", FLAG, False)
     separator: str | None = arg("separator", CHOICE, choices="SEPARATOR NOSEPARATOR")
     teletype: bool = arg("TELETYPE", FLAG, False)
     osformat: bool = arg("OSFORMAT", FLAG, False)
@@ -214,5 +217,8 @@ class Results(Statement):
     nodatastructures: bool = arg("NODATASTRUCTURES", FLAG, False)
     nosystemelements: bool = arg("NOSYSTEMELEMENTS", FLAG, False)
     nolinear: bool = arg("NOLINEAR", FLAG, False)
+    nofloatingmarkers: bool = arg("NOFLOATINGMARKERS", FLAG, False)
+    nocontacts: bool = arg("NOCONTACTS", FLAG, False)
+    notires: bool = arg("NOTIRES", FLAG, False)
     norequests: bool = arg("NOREQUESTS", FLAG, False)
     comment: str | None = arg("COMMENT", TEXT)

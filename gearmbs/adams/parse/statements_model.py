@@ -63,6 +63,8 @@ class Marker(Statement):
     flex_body: int | None = arg("FLEX_BODY", ID)
     point_mass: int | None = arg("POINT_MASS", ID)
     node_id: int | None = arg("NODE_ID", ID)
+    fe_part: int | None = arg("FE_PART", ID)
+    node_label: int | None = arg("NODE_LABEL", ID)
     curve: int | None = arg("CURVE", ID)
 
 
@@ -82,12 +84,23 @@ class Joint(Statement):
     ictran: Vector | None = arg("ICTRAN", REALS, count=(1, 2))
     icrot: Vector | None = arg("ICROT", REALS, count=(1, 2))
     delta_v: float | None = arg("DELTA_V", REAL)
+    max_deformation: float | None = arg("MAXIMUM_DEFORMATION", REAL)
     max_friction: float | None = arg("MAX_FRICTION", REAL)
+    max_fric_rot: float | None = arg("MAX_FRIC_ROT", REAL)
+    max_fric_trans: float | None = arg("MAX_FRIC_TRANS", REAL)
     mu_dyn_rot: float | None = arg("MU_DYN_ROT", REAL)
     mu_dyn_trans: float | None = arg("MU_DYN_TRANS", REAL)
     mu_stat_rot: float | None = arg("MU_STAT_ROT", REAL)
     mu_stat_trans: float | None = arg("MU_STAT_TRANS", REAL)
+    preload_axial: float | None = arg("PRELOAD_AXIAL", REAL)
+    preload_radial: float | None = arg("PRELOAD_RADIAL", REAL)
+    preload_x: float | None = arg("PRELOAD_X", REAL)
+    preload_y: float | None = arg("PRELOAD_Y", REAL)
+    inner_radius: float | None = arg("INNER_RADIUS", REAL)
+    outer_radius: float | None = arg("OUTER_RADIUS", REAL)
     pin_radius: float | None = arg("PIN_RADIUS", REAL)
+    height: float | None = arg("HEIGHT", REAL)
+    width: float | None = arg("WIDTH", REAL)
 
 
 @dataclass(frozen=True)

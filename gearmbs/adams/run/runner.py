@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gearmbs.adams.builders.control import hold_states
 from gearmbs.adams.builders.initial import part_states, with_initial_motions
 from gearmbs.adams.builders.mechanism import build_model
 from gearmbs.adams.builders.model import AdamsModel
@@ -271,6 +272,7 @@ def _part(
         options, note = _settings(session, tol)
         if kind == "STATICS":
             note = _frozen(session, model)
+            hold_states(model)
         if watch.first_step is not None:
             options["first_step"] = watch.first_step * session.deck.units.time
         solution, equilibrium = _solve(session, command, kind, model, times, options, progress, watch.stops())
