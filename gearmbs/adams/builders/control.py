@@ -157,7 +157,7 @@ def _canonical(s: st.Tfsiso, inputs: tuple[int, ...]) -> tuple[np.ndarray, np.nd
 def hold_states(model: AdamsModel) -> None:
     """Make the states of statements with STATIC_HOLD keep their values, as in static analyses."""
     deck, states = model.deck, model.mechanism.states
-    held = [d.id for d in deck.of(st.Diff).values() if d.static_hold]
+    held: list[int | str] = [d.id for d in deck.of(st.Diff).values() if d.static_hold]
     held += [name for s, system in linear_systems(deck) if getattr(s, "static_hold", False) for name in system.names]
     for name in held:
         if name in states:
