@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -34,7 +35,7 @@ def rolling_bearing(value: Any) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bearing(Part):
+class Bearing(Part, ABC):
     """What all bearings share.
 
     Parameters
@@ -76,6 +77,7 @@ class Bearing(Part):
         """
         return np.eye(5)[:3]
 
+    @abstractmethod
     def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
         """Add the bearing to a mechanism.
 
@@ -87,7 +89,6 @@ class Bearing(Part):
         role : str
             Of an ideal bearing: the joint it is, so that several on a shaft are not redundant.
         """
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)

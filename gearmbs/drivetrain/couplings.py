@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
@@ -19,7 +20,7 @@ ROTATIONAL_STIFFNESS, ROTATIONAL_DAMPING = "N*m/rad", "N*m*s/rad"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Coupling(Part):
+class Coupling(Part, ABC):
     """What all couplings share.
 
     Parameters
@@ -49,9 +50,9 @@ class Coupling(Part):
         """Torsional damping at small twist, N m s/rad."""
         return 0.0
 
+    @abstractmethod
     def add(self, at: Attached) -> None:
         """Add the coupling to a mechanism: I on the second shaft, J on the first."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)

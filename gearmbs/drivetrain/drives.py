@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -26,7 +27,7 @@ SLIP = (Diagnostic("slip", "1"),)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive(Part):
+class Drive(Part, ABC):
     """What all drives share.
 
     Parameters
@@ -49,9 +50,9 @@ class Drive(Part):
     station: Quantity = None
     on: str | None = None
 
+    @abstractmethod
     def add(self, at: Attached) -> None:
         """Add the drive to a mechanism."""
-        raise NotImplementedError
 
     def damping(self) -> float:
         """Return the drive's torsional damping at the operating point, -dT/dw, N m s/rad."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -21,7 +22,7 @@ from gearmbs.units import Quantity
 
 
 @dataclass(frozen=True, kw_only=True)
-class Load(Part):
+class Load(Part, ABC):
     """What all loads share.
 
     Parameters
@@ -41,13 +42,13 @@ class Load(Part):
     station: Quantity = None
     on: str | None = None
 
+    @abstractmethod
     def nominal(self, speed: float) -> float:
         """Return the torque that resists at the operating speed (rad/s, not negative), N m."""
-        raise NotImplementedError
 
+    @abstractmethod
     def add(self, at: Attached) -> None:
         """Add the load to a mechanism."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)

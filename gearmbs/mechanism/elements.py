@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -48,7 +49,7 @@ class Compiled:
 
 
 @dataclass(eq=False)
-class ForceElement:
+class ForceElement(ABC):
     """A force element with a kernel of its own. A subclass says how it is compiled.
 
     Attributes
@@ -87,9 +88,9 @@ class ForceElement:
         """The element's own states."""
         return ()
 
+    @abstractmethod
     def compiled(self) -> Compiled:
         """Return what is handed to the equations; kernels are imported here."""
-        raise NotImplementedError
 
 
 @dataclass(eq=False, repr=False)
