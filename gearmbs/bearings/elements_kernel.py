@@ -22,6 +22,7 @@ from gearmbs.bearings.laws_kernel import (
     hertz_energy,
     roller_law,
     roller_law_at_speed,
+    write_ball_law,
 )
 from gearmbs.bearings.profile_kernel import place_of, profile_curvature, profile_slope, profile_value
 from gearmbs.dae.compiled.views import matrix_at, vector_at
@@ -52,63 +53,87 @@ def element_sums(ints, reals, states, want, work):
     if ints[B.CENTRIFUGAL]:
         cage = work[B.S_SPIN] + work[B.S_CAGE] * spin
         load = reals[B.MASS_RADIUS] * cage * cage
-    plain = ints[B.KIND] == B.BALL and ints[B.PATHS] == 1 and not ints[B.CENTRIFUGAL]
-    plain = plain and ints[B.OUTER_NODES] + ints[B.INNER_NODES] + ints[B.SPIN_NODES] == 0
+    if is_plain(ints, reals):
+        # most bearings
+        plain_balls(ints, reals, cosine, sine, want, work)
+        return
     for j in range(ints[B.ELEMENTS]):
         at = ints[B.AT_ELEMENTS] + B.ELEMENT_COLUMNS * j
         c = cosine * reals[at + B.ELEMENT_COSINE] - sine * reals[at + B.ELEMENT_SINE]
         s = sine * reals[at + B.ELEMENT_COSINE] + cosine * reals[at + B.ELEMENT_SINE]
-        if plain:
-            # most balls of most bearings carry nothing
-            p = ints[B.AT_PATHS]
-            phi = work[B.S_TILT] * c + work[B.S_TILT + 1] * s
-            x = reals[p + B.PATH_RADIAL] + work[0] * c + work[1] * s + reals[p + B.PATH_HEIGHT] * phi
-            y = reals[p + B.PATH_AXIAL] + work[2] - reals[p + B.PATH_RADIUS] * phi
-            reach = reals[B.DISTANCE] - reals[at + B.ELEMENT_OVERSIZE] - reals[B.SMOOTH]
-            if x * x + y * y <= reach * reach:
-                continue
-            if want == 0 and reals[B.SMOOTH] == 0.0:
-                plain_ball(reals, work, p, c, s, x, y, reach)
-                continue
         for path in range(ints[B.PATHS]):
             one_path(ints, reals, states, want, work, j, path, c, s, load)
 
 
 @njit(cache=True, error_model="numpy")
-def plain_ball(reals, work, p, c, s, x, y, reach):
-    """Add the forces of a loaded ball without profile, centrifugal load and smooth transition: what `one_path` adds.
+def is_plain(ints, reals):
+    """Return whether elements are balls with one path, without profiles, centrifugal load and smooth transition."""
+    plain = ints[B.KIND] == B.BALL and ints[B.PATHS] == 1 and not ints[B.CENTRIFUGAL] and reals[B.SMOOTH] == 0.0
+    return plain and ints[B.OUTER_NODES] + ints[B.INNER_NODES] + ints[B.SPIN_NODES] == 0
+
+
+@njit(cache=True, error_model="numpy")
+def plain_balls(ints, reals, cosine, sine, want, work):
+    """Write the forces of plain balls and their sums: what `one_path` adds, with all sums in registers.
 
     Parameters
     ----------
-    reals, work : ndarray
+    ints, reals, want, work
         As in `element_sums`.
-    p : int
-        Place of the path among the reals.
-    c, s : float
-        Cosine and sine of the element's angle.
-    x, y : float
-        From the groove centre of the outer to that of the inner ring, m.
-    reach : float
-        Their distance at which the ball begins to carry, m.
+    cosine, sine : float
+        Of the cage's angle.
     """
-    length = np.sqrt(x * x + y * y)
-    delta, nx, ny = length - reach, x / length, y / length
-    lever = nx * reals[p + B.PATH_HEIGHT] - ny * reals[p + B.PATH_RADIUS]
-    along = nx * (work[1] * c - work[0] * s) + lever * (work[B.S_TILT + 1] * c - work[B.S_TILT] * s)
-    rate = nx * (work[B.S_V] * c + work[B.S_V + 1] * s) + ny * work[B.S_V + 2]
-    rate += lever * (work[B.S_TILT + 2] * c + work[B.S_TILT + 3] * s) + along * work[B.S_CAGE] * work[B.S_W + 2]
-    factor = 1.0 + reals[B.DAMPING] * rate
-    if factor <= 0.0:
-        return
-    f = reals[B.STIFFNESS] * delta * np.sqrt(delta) * factor
-    across, turning = f * nx, f * lever
-    work[B.S_LOCAL] -= across * c
-    work[B.S_LOCAL + 1] -= across * s
-    work[B.S_LOCAL + 2] -= f * ny
-    work[B.S_LOCAL + 3] -= turning * c
-    work[B.S_LOCAL + 4] -= turning * s
-    work[B.S_LOCAL + B.PSI] -= f * along
-    work[B.S_SUMS] += f
+    p, at = ints[B.AT_PATHS], ints[B.AT_ELEMENTS]
+    radius, height = reals[p + B.PATH_RADIUS], reals[p + B.PATH_HEIGHT]
+    stiffness, chi = reals[B.STIFFNESS], reals[B.DAMPING]
+    radial, axial, distance = reals[p + B.PATH_RADIAL], reals[p + B.PATH_AXIAL] + work[2], reals[B.DISTANCE]
+    d0, d1, a0, a1 = work[0], work[1], work[B.S_TILT], work[B.S_TILT + 1]
+    v0, v1, v2 = work[B.S_V], work[B.S_V + 1], work[B.S_V + 2]
+    rate0, rate1 = work[B.S_TILT + 2], work[B.S_TILT + 3]
+    turn = work[B.S_CAGE] * work[B.S_W + 2]
+    law, profile = vector_at(work, B.S_LAW, B.LAW), vector_at(work, B.S_LOCAL + B.BETA * (12 + 2 * B.BETA), 8)
+    for k in range(8):
+        profile[k] = 0.0
+    f0 = f1 = f2 = f3 = f4 = by_cage = normal = 0.0
+    energy = damping = largest = loaded = deepest = 0.0
+    for _ in range(ints[B.ELEMENTS]):
+        own_c, own_s = reals[at + B.ELEMENT_COSINE], reals[at + B.ELEMENT_SINE]
+        reach = distance - reals[at + B.ELEMENT_OVERSIZE]
+        at += B.ELEMENT_COLUMNS
+        c, s = cosine * own_c - sine * own_s, sine * own_c + cosine * own_s
+        phi = a0 * c + a1 * s
+        x, y = radial + d0 * c + d1 * s + height * phi, axial - radius * phi
+        square = x * x + y * y
+        if square <= reach * reach:
+            continue
+        length = np.sqrt(square)
+        delta, nx, ny = length - reach, x / length, y / length
+        lever = nx * height - ny * radius
+        along = nx * (d1 * c - d0 * s) + lever * (a1 * c - a0 * s)
+        rate = nx * (v0 * c + v1 * s) + ny * v2 + lever * (rate0 * c + rate1 * s) + along * turn
+        elastic = stiffness * delta * np.sqrt(delta)
+        factor = 1.0 + chi * rate
+        energy += 0.4 * elastic * delta
+        if factor <= 0.0:
+            # it parts faster than the surfaces follow: nothing is given back
+            damping -= elastic * rate
+            continue
+        f = elastic * factor
+        across, turning = f * nx, f * lever
+        f0, f1, f2 = f0 - across * c, f1 - across * s, f2 - f * ny
+        f3, f4, by_cage, normal = f3 - turning * c, f4 - turning * s, by_cage - f * along, normal + f
+        damping += elastic * chi * rate * rate
+        loaded += 1.0
+        largest, deepest = max(largest, f), max(deepest, delta)
+        if want & DERIVATIVES:
+            write_ball_law(elastic, 1.5 * elastic / delta, nx, ny, length, law)
+            path_slopes(ints, reals, work, c, s, 0, -1, f, factor)
+    work[B.S_LOCAL], work[B.S_LOCAL + 1], work[B.S_LOCAL + 2] = f0, f1, f2
+    work[B.S_LOCAL + 3], work[B.S_LOCAL + 4], work[B.S_LOCAL + B.PSI] = f3, f4, by_cage
+    work[B.S_SUMS] = normal
+    if want & DIAGNOSTICS:
+        work[B.S_SUMS + 1], work[B.S_SUMS + 2], work[B.S_SUMS + 3] = energy, damping, largest
+        work[B.S_SUMS + 4], work[B.S_SUMS + 5] = loaded, deepest
 
 
 @njit(cache=True, error_model="numpy")

@@ -122,6 +122,8 @@ def cage_rate(ints, reals, psi, work):
 @njit(cache=True, error_model="numpy")
 def friction_torque(reals, total, speed):
     """Return the friction torque about z at a sum of normal forces and a speed, its slope by either."""
+    if reals[B.ROLLING] == 0.0 and reals[B.VISCOUS] == 0.0:
+        return 0.0, 0.0, 0.0
     square = speed * speed + reals[B.SLOW] ** 2
     root = np.sqrt(square)
     even = reals[B.ROLLING] * speed / root
@@ -188,41 +190,29 @@ def vary_locally(ints, reals, frames, work, by_total, by_speed):
     spins = ints[B.SPINS]
     n, m, states = B.BETA + spins, B.VARIATIONS, 1 + spins
     base = B.S_LOCAL
-    stiff, damp = matrix_at(work, base + n, n, n), matrix_at(work, base + n + n * n, n, n)
-    by_load = vector_at(work, base + n + 2 * n * n, n)
-    sum_q, sum_v = vector_at(work, base + 2 * n + 2 * n * n, n), vector_at(work, base + 3 * n + 2 * n * n, n)
-    at = base + n * (12 + 2 * n) + 8
-    dq, dr = matrix_at(work, at, n, m), matrix_at(work, at + n * m, n, m)
-    force = matrix_at(work, at + 2 * n * m, n + 1, m + states)
-    at += 2 * n * m + (n + 1) * (m + states)
-    out = matrix_at(work, at, 6, m + states)
-    bend = vector_at(work, at + 6 * (m + states), 9)
-    coordinates_by_variations(ints, reals, frames, work, dq, dr, bend)
+    columns, first = m + states, base + n * (12 + 2 * n) + 8
+    force, out = matrix_at(work, first, n + 1, columns), matrix_at(work, first + (n + 1) * columns, 6, columns)
+    bend = vector_at(work, first + (n + 7) * columns, 9)
+    for k in range(9):
+        bend[k] = 0.0
+    if ints[B.INNER_NODES]:
+        inner_angle_bend(frames, work, bend)
     cage = 0.0
     if ints[B.CENTRIFUGAL]:
         cage = 2.0 * reals[B.MASS_RADIUS] * (work[B.S_SPIN] + work[B.S_CAGE] * work[B.S_W + 2])
-    # with the cage's angle its rate changes
-    swing = work[B.S_CAGE_SLOPE] * work[B.S_W + 2]
-    sum_by_load = work[base + n * (12 + 2 * n) + 6]
+    stiff, damp = base + n, base + n + n * n
+    by_load = damp + n * n
     for r in range(n + 1):
-        # the last row is the sum of the normal forces
-        for c in range(m):
-            total = 0.0
-            for k in range(n):
-                if r < n:
-                    total += stiff[r, k] * dq[k, c] + damp[r, k] * dr[k, c]
-                else:
-                    total += sum_q[k] * dq[k, c] + sum_v[k] * dr[k, c]
-            force[r, c] = total
-        effect = by_load[r] if r < n else sum_by_load
-        force[r, 11] += effect * cage * work[B.S_CAGE]
-        force[r, 12] += effect * cage
-        for k in range(states):
-            column = B.PSI if k == 0 else B.BETA + k - 1
-            force[r, m + k] = stiff[r, column] if r < n else sum_q[column]
-        force[r, m] += swing * ((damp[r, B.PSI] if r < n else sum_v[B.PSI]) + effect * cage)
+        by_q, by_rate, effect = stiff + n * r, damp + n * r, work[by_load + r]
+        if r == n:
+            # the sum of the normal forces
+            by_q, by_rate, effect = by_load + n, by_load + 2 * n, work[first - 2]
+        by_variations(
+            ints, reals, work, vector_at(work, by_q, n), vector_at(work, by_rate, n), effect * cage, bend,
+            vector_at(work, first + columns * r, columns),
+        )  # fmt: skip
     ax, ay, az = work[B.S_A], work[B.S_A + 1], work[B.S_A + 2]
-    for c in range(m + states):
+    for c in range(columns):
         for k in range(3):
             out[k, c] = force[k, c]
             out[3 + k, c] = force[B.THETA, c] * work[B.S_TURN + k]
@@ -243,34 +233,48 @@ def vary_locally(ints, reals, frames, work, by_total, by_speed):
         out[5, 3 + k] += turn * bend[6 + k] + dx * q4 - dy * q3
 
 
-@njit(cache=True, error_model="numpy")
-def coordinates_by_variations(ints, reals, frames, work, dq, dr, bend):
-    """Write the derivatives of q and q' by the local variations."""
-    for r in range(dq.shape[0]):
-        for c in range(dq.shape[1]):
-            dq[r, c] = dr[r, c] = 0.0
-    for k in range(9):
-        bend[k] = 0.0
+@njit(cache=True, error_model="numpy", forceinline=True)
+def by_variations(ints, reals, work, by_q, by_rate, by_cage, bend, out):
+    """Write the derivatives of one generalised force by the local variations and the states.
+
+    With a turn p of the inner ring da = p x a and da' = w x (p x a), with its angular velocity da' = dw x a.
+
+    Parameters
+    ----------
+    ints, reals, work
+        As in `bearing_force`.
+    by_q, by_rate : ndarray, shape (n,)
+        Its derivatives by q and q'.
+    by_cage : float
+        Its derivative by the speed of the cage, through the centrifugal load.
+    bend : ndarray, shape (9,)
+        Derivatives of g, see `inner_angle_bend`.
+    out : ndarray, shape (13 + states,)
+    """
     ax, ay, az = work[B.S_A], work[B.S_A + 1], work[B.S_A + 2]
     wx, wy, wz = work[B.S_W], work[B.S_W + 1], work[B.S_W + 2]
+    q3, q4, r3, r4 = by_q[3], by_q[4], by_rate[3], by_rate[4]
+    cage_speed, spins = work[B.S_CAGE], ints[B.SPINS]
     for k in range(3):
-        dq[k, k] = 1.0
-        dr[k, 6 + k] = 1.0
-        px, py, pz = (1.0 if k == 0 else 0.0), (1.0 if k == 1 else 0.0), (1.0 if k == 2 else 0.0)
-        dx, dy, dz = py * az - pz * ay, pz * ax - px * az, px * ay - py * ax
-        dq[3, 3 + k], dq[4, 3 + k] = dx, dy
-        # a' = w x a: by a, then by w
-        dr[3, 3 + k], dr[4, 3 + k] = wy * dz - wz * dy, wz * dx - wx * dz
-        dr[3, 9 + k], dr[4, 9 + k] = dx, dy
-    dr[B.PSI, 11] = work[B.S_CAGE]
-    for k in range(ints[B.SPINS]):
-        dr[B.BETA + k, 11] = reals[B.SPIN]
+        out[k], out[6 + k] = by_q[k], by_rate[k]
+    out[3] = -q4 * az + r3 * (wy * ay + wz * az) - r4 * wx * ay
+    out[4] = q3 * az - r3 * wy * ax + r4 * (wz * az + wx * ax)
+    out[5] = q4 * ax - q3 * ay - wz * (r3 * ax + r4 * ay)
+    out[9], out[10], out[11] = -r4 * az, r3 * az, r4 * ax - r3 * ay + by_rate[B.PSI] * cage_speed
     if ints[B.INNER_NODES]:
-        inner_angle_bend(frames, work, bend)
         for k in range(3):
-            dq[B.THETA, 3 + k] = work[B.S_TURN + k]
-            dr[B.THETA, 9 + k] = work[B.S_TURN + k]
-            dr[B.THETA, 3 + k] = wx * bend[k] + wy * bend[3 + k] + wz * bend[6 + k]
+            turn = work[B.S_TURN + k]
+            swung = wx * bend[k] + wy * bend[3 + k] + wz * bend[6 + k]
+            out[3 + k] += by_q[B.THETA] * turn + by_rate[B.THETA] * swung
+            out[9 + k] += by_rate[B.THETA] * turn
+    # with the cage's angle its rate changes
+    swing = work[B.S_CAGE_SLOPE] * wz
+    out[11] += by_cage * cage_speed
+    out[12] = by_cage
+    out[13] = by_q[B.PSI] + swing * (by_rate[B.PSI] + by_cage)
+    for k in range(spins):
+        out[11] += by_rate[B.BETA + k] * reals[B.SPIN]
+        out[14 + k] = by_q[B.BETA + k]
 
 
 @njit(cache=True, error_model="numpy")
@@ -278,7 +282,7 @@ def spread(ints, reals, frames, work, wrench, jac):
     """Turn the local derivatives into those by the variations of both frames, in global components."""
     spins = ints[B.SPINS]
     n, m, states = B.BETA + spins, B.VARIATIONS, 1 + spins
-    at = B.S_LOCAL + n * (12 + 2 * n) + 8 + 2 * n * m + (n + 1) * (m + states)
+    at = B.S_LOCAL + n * (12 + 2 * n) + 8 + (n + 1) * (m + states)
     local = matrix_at(work, at, 6, m + states)
     at += 6 * (m + states) + 9
     turned = vector_at(work, at, m)
@@ -298,12 +302,12 @@ def spread(ints, reals, frames, work, wrench, jac):
                 frames[1, FRAME_A + 3 * row + 2],
             )
             for group in range(0, 12, 3):
+                x = e0 * local[b, group] + e1 * local[b + 1, group] + e2 * local[b + 2, group]
+                y = e0 * local[b, group + 1] + e1 * local[b + 1, group + 1] + e2 * local[b + 2, group + 1]
+                z = e0 * local[b, group + 2] + e1 * local[b + 1, group + 2] + e2 * local[b + 2, group + 2]
                 for c in range(3):
-                    total = 0.0
-                    for k in range(3):
-                        entry = e0 * local[b, group + k] + e1 * local[b + 1, group + k] + e2 * local[b + 2, group + k]
-                        total += entry * frames[1, FRAME_A + 3 * c + k]
-                    turned[group + c] = total
+                    axes = FRAME_A + 3 * c
+                    turned[group + c] = x * frames[1, axes] + y * frames[1, axes + 1] + z * frames[1, axes + 2]
             turned[12] = e0 * local[b, 12] + e1 * local[b + 1, 12] + e2 * local[b + 2, 12]
             for c in range(3):
                 c1, c2 = (c + 1) % 3, (c + 2) % 3

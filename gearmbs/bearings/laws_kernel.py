@@ -103,12 +103,16 @@ def ball_law(stiffness, exponent, distance, width, x, y, h, law):
     force, slope = hertz_force(stiffness, exponent, part)
     if force <= 0.0:
         return length - distance - h
-    slope *= part_slope
-    nx, ny = x / length, y / length
+    write_ball_law(force, slope * part_slope, x / length, y / length, length, law)
+    return length - distance - h
+
+
+@njit(cache=True, error_model="numpy")
+def write_ball_law(force, slope, nx, ny, length, law):
+    """Write the contact of a ball without inertia, of a force, its slope, a normal and a distance of the centres."""
     law[0], law[1], law[2] = force, nx, ny
     law[3], law[4], law[5], law[6] = slope * nx, slope * ny, -slope, 0.0
     law[7], law[8], law[9], law[10] = -ny / length, nx / length, 0.0, 0.0
-    return length - distance - h
 
 
 @njit(cache=True, error_model="numpy")

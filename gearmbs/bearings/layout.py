@@ -119,6 +119,6 @@ VARIATIONS = 13
 def scratch(spins: int) -> int:
     """Return the length of the scratch of a bearing with so many spins."""
     n = BETA + spins
-    # generalised forces, their derivatives, vectors of one contact, its profiles; then the variations of q and q',
-    # of the forces, of F and N locally and turned, and the angle's derivatives
-    return S_LOCAL + n * (12 + 2 * n) + 8 + (3 * n + 12) * (VARIATIONS + 1 + spins) + 32
+    # generalised forces, their derivatives, vectors of one contact, its profiles; then the variations of the forces,
+    # of F and N locally and turned, and the angle's derivatives
+    return S_LOCAL + n * (12 + 2 * n) + 8 + (n + 7) * (VARIATIONS + 1 + spins) + 32
