@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from gearmbs.adams.commands import adams
+from gearmbs.adams.commands import adams, plant
 from gearmbs.campaigns.commands import app as campaign
 from gearmbs.identify.commands import identify
 from gearmbs.signals.commands import analyse, compare, trend
@@ -26,7 +26,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-for command in (paper, run, bench, gearbox, resonance, analyse, trend, compare, identify, adams):
+for command in (paper, run, bench, gearbox, resonance, analyse, trend, compare, identify, adams, plant):
     app.command()(command)
 app.add_typer(campaign)
 

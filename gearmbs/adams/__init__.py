@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from gearmbs.adams.parse.deck import Deck
     from gearmbs.adams.parse.reader import parse_deck, read_deck
     from gearmbs.adams.results.result import AdamsResult
+    from gearmbs.adams.run.deck_plant import linear_plant
     from gearmbs.adams.run.runner import run_deck
     from gearmbs.adams.write.deck_writer import write_deck
 
@@ -21,6 +22,7 @@ __all__ = [
     "Diagnostic",
     "RoutineCall",
     "Script",
+    "linear_plant",
     "load_routines",
     "parse_deck",
     "parse_script",
@@ -39,6 +41,7 @@ late(
         "Diagnostic": ".errors",
         "RoutineCall": ".builders.routines",
         "Script": ".parse.commands",
+        "linear_plant": ".run.deck_plant",
         "load_routines": ".builders.routines",
         "parse_deck": ".parse.reader",
         "parse_script": ".parse.commands",

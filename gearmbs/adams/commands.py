@@ -59,3 +59,34 @@ def adams(
         if not result.success:
             fail(f"{model}: the analysis did not finish; see {prefix}.msg")
         typer.echo(f"wrote {prefix}.req, .res, .msg, .nc")
+
+
+def plant(
+    model: Annotated[Path, typer.Argument(help="ADAMS/Solver deck (.adm) with PINPUT and POUTPUT.")],
+    script: Annotated[Path | None, typer.Argument(help="Commands (.acf) to carry out before.")] = None,
+    pinput: Annotated[int | None, typer.Option(help="Id of the PINPUT, where there are several.")] = None,
+    poutput: Annotated[int | None, typer.Option(help="Id of the POUTPUT, where there are several.")] = None,
+    equilibrium: Annotated[bool, typer.Option("--equilibrium", help="Look for an equilibrium first.")] = False,
+    skip_unsupported: Annotated[bool, typer.Option(help="Leave out what is not supported.")] = False,
+    routines: Annotated[Path | None, typer.Option(help="Python file with functions for USER(...).")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="File for A, B, C, D: .mat or .npz; default: MODEL_plant.mat.")
+    ] = None,
+) -> None:
+    """Linearise an ADAMS deck from its PINPUT to its POUTPUT; write A, B, C and D."""
+    with guarded():
+        from gearmbs.adams import linear_plant, load_routines
+        from gearmbs.dae.analyses.plant import check_format
+
+        path = check_format(out or model.with_name(f"{model.stem}_plant.mat"))
+        found = linear_plant(
+            model,
+            script,
+            pinput=pinput,
+            poutput=poutput,
+            at="equilibrium" if equilibrium else "initial",
+            allow_unsupported=skip_unsupported,
+            routines=None if routines is None else load_routines(routines),
+        )
+        typer.echo(found.table())
+        typer.echo(f"wrote {found.save(path)}")

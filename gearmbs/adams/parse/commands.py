@@ -81,11 +81,17 @@ class FileCommand(Command):
 
 @dataclass(frozen=True)
 class Linear(Command):
-    """LINEAR/EIGENSOL: eigenvalues at the present configuration."""
+    """LINEAR/EIGENSOL or STATEMAT: eigenvalues, or the plant from PINPUT to POUTPUT, at the present configuration."""
 
     eigensol: bool = arg("EIGENSOL", FLAG, False)
+    statemat: bool = arg("STATEMAT", FLAG, False)
     novector: bool = arg("NOVECTOR", FLAG, False)
     coordinates: str | None = arg("COORDS", TEXT)
+    pinput: int | None = arg("PINPUT", ID)
+    poutput: int | None = arg("POUTPUT", ID)
+    data_file: str | None = arg("FILE", PATH)
+    original: bool = arg("ORIGINAL", FLAG, False)
+    form: str | None = arg("format", CHOICE, choices="MATLAB MATRIXX FSAVE")
 
 
 @dataclass(frozen=True)

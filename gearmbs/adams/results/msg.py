@@ -7,6 +7,7 @@ import numpy as np
 from gearmbs.adams.parse.commands import Command, Simulate
 from gearmbs.adams.results.record import NEWTON, RunRecord, Segment
 from gearmbs.adams.results.rows import row_text
+from gearmbs.dae.analyses.plant import LinearPlant
 
 RULE = "-" * 79
 TITLES = {"KINEMATICS": "Kinematic", "STATICS": "Static", "INITIAL_CONDITIONS": "Initial Conditions"}
@@ -28,6 +29,8 @@ def message_text(result: RunRecord) -> str:
         out += [f" command: {_echo(command)}", ""]
         if isinstance(outcome, Segment):
             out += _segment(result, outcome)
+        elif isinstance(outcome, LinearPlant):
+            out += ["", "  S T A T E  M A T R I C E S", "", *outcome.table().splitlines(), ""]
         elif outcome is not None:
             out += ["", "  E I G E N  A N A L Y S I S", "", *outcome.table().splitlines(), ""]
     for d in result.errors:

@@ -17,6 +17,7 @@ from gearmbs.adams.parse.units import RESULT_NAMES, unit_names
 from gearmbs.adams.results.assembly import Assembly
 from gearmbs.adams.results.requests import RequestSeries
 from gearmbs.dae.analyses.modes import Modes
+from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.analyses.statics import StaticResult
 from gearmbs.dae.results.solution import Solution
 
@@ -79,7 +80,7 @@ class RunRecord:
     ----------
     deck : Deck
     script : Script
-    log : list of (Command, Segment or Modes or None)
+    log : list of (Command, Segment, Modes, LinearPlant or None)
         The commands that were carried out, with what they gave.
     errors : list of Diagnostic
         What ended the script.
@@ -87,7 +88,7 @@ class RunRecord:
 
     deck: Deck
     script: Script
-    log: list[tuple[Command, Segment | Modes | None]] = field(default_factory=list)
+    log: list[tuple[Command, Segment | Modes | LinearPlant | None]] = field(default_factory=list)
     errors: list[Diagnostic] = field(default_factory=list)
 
     @property
@@ -99,6 +100,11 @@ class RunRecord:
     def modes(self) -> list[Modes]:
         """What each LINEAR/EIGENSOL gave, in rad/s and Hz."""
         return [outcome for _, outcome in self.log if isinstance(outcome, Modes)]
+
+    @property
+    def plants(self) -> list[LinearPlant]:
+        """What each LINEAR/STATEMAT gave, in the deck's units."""
+        return [outcome for _, outcome in self.log if isinstance(outcome, LinearPlant)]
 
     @property
     def success(self) -> bool:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+from gearmbs.adams.parse.commands import Linear
 from gearmbs.adams.results.msg import message_text
 from gearmbs.adams.results.record import RunRecord
 from gearmbs.adams.results.req import request_text
 from gearmbs.adams.results.res import results_text
+from gearmbs.dae.analyses.plant import FORMATS, LinearPlant
 
 
 class AdamsResult(RunRecord):
@@ -17,7 +20,7 @@ class AdamsResult(RunRecord):
     ----------
     deck : Deck
     script : Script
-    log : list of (Command, Segment or Modes or None)
+    log : list of (Command, Segment, Modes, LinearPlant or None)
         The commands that were carried out, with what they gave.
     errors : list of Diagnostic
         What ended the script.
@@ -25,6 +28,8 @@ class AdamsResult(RunRecord):
 
     def write(self, prefix: str | Path) -> list[Path]:
         """Write .req, .res, .msg and .nc files; the message file alone when no analysis was carried out.
+
+        The plants of LINEAR/STATEMAT go to the .mat files that the commands name, or to PREFIX_plant1.mat and so on.
 
         Parameters
         ----------
@@ -47,4 +52,12 @@ class AdamsResult(RunRecord):
             files.append(prefix.with_name(prefix.name + ".nc"))
             # in memory first: the format's library ends the program where the disk is full
             files[-1].write_bytes(self.to_dataset().to_netcdf(engine="h5netcdf"))
+        return files + self._write_plants(prefix)
+
+    def _write_plants(self, prefix: Path) -> list[Path]:
+        found = [(c, p) for c, p in self.log if isinstance(c, Linear) and isinstance(p, LinearPlant)]
+        files = []
+        for k, (command, plant) in enumerate(found, 1):
+            name = re.split(r"[\\/]", command.data_file)[-1] if command.data_file else f"{prefix.name}_plant{k}"
+            files.append(plant.save(prefix.with_name(name if name.endswith(FORMATS) else f"{name}.mat")))
         return files

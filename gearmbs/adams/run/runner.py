@@ -22,15 +22,18 @@ from gearmbs.adams.results.assembly import assembly_of
 from gearmbs.adams.results.record import NEWTON, Segment
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.results.result import AdamsResult
+from gearmbs.adams.run.plant import plant_of
 from gearmbs.adams.run.script_check import check_linear, check_script, is_sequence
 from gearmbs.adams.run.sensors import MOST, Watch, act, after, up_to
 from gearmbs.adams.run.session import Session, active_sensors, change, output_times, switch
 from gearmbs.dae.analyses.kinematic_analysis import kinematic
 from gearmbs.dae.analyses.modes import Modes
+from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.analyses.quasi_static import initial_conditions, quasi_static
 from gearmbs.dae.analyses.statics import StaticResult, static_equilibrium
 from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.errors import ModelError
+from gearmbs.dae.model.system import System
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.analyses import frozen_friction, linear_modes
@@ -155,8 +158,7 @@ def _carry_out(
     elif isinstance(command, Switch):
         switch(session, command)
     elif isinstance(command, Linear):
-        modes = _linear(session, command, allow_unsupported)
-        result.log[-1] = (command, modes)
+        result.log[-1] = (command, _linear(session, command, allow_unsupported))
     elif isinstance(command, Simulate):
         return _simulate(session, command, result, tol, allow_unsupported, progress)
     return True
@@ -371,13 +373,21 @@ def _solve(
     return solution, None
 
 
-def _linear(session: Session, command: Linear, allow_unsupported: bool) -> Modes:
-    """Carry out LINEAR/EIGENSOL at the present position."""
+def _linear(session: Session, command: Linear, allow_unsupported: bool) -> Modes | LinearPlant:
+    """Carry out LINEAR at the present position."""
     check_linear(command)
     model = None
+    time = session.time * session.deck.units.time
+
+    def build(given: Session) -> tuple[AdamsModel, System]:
+        made = _model(given, allow_unsupported, (session.time, session.time))
+        return made, made.mechanism.compile(time)
+
     try:
+        if command.statemat:
+            return plant_of(session, command, build)
         model = _model(session, allow_unsupported, (session.time, session.time))
-        return linear_modes(model.mechanism, t=session.time * session.deck.units.time)
+        return linear_modes(model.mechanism, t=time)
     except (ModelError, ArithmeticError) as error:
         raise _failed(session, command, model, error) from error
 

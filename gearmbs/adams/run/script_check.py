@@ -76,8 +76,8 @@ def check_linear(command: Linear) -> None:
     ------
     DeckError
     """
-    if not command.eigensol:
-        raise unsupported(command, "LINEAR without EIGENSOL is not supported")
+    if command.eigensol == command.statemat:
+        raise unsupported(command, "LINEAR takes one of EIGENSOL and STATEMAT; more is not supported")
 
 
 def is_sequence(command: Simulate) -> bool:

@@ -90,6 +90,7 @@ def reduce(instant: Instant) -> Reduced:
         (stiffness, stiffness_terms), (damping, damping_terms) = eliminate(force, q), eliminate(force, v)
         state_force = eliminate(force, z)[0]
         state_q, state_v, state_z = (-eliminate(z, columns)[0] for columns in (q, v, z))
+        force_reaction, state_reaction = eliminate(force, rows)[0], -eliminate(z, rows)[0]
     except np.linalg.LinAlgError as error:
         raise ModelError("the applied loads and variables depend on each other in a singular way") from error
     # delta p' = d/dt of -(dG_eps/d theta) delta theta - ...: its velocity part is a damping
@@ -113,20 +114,56 @@ def reduce(instant: Instant) -> Reduced:
         state_force = to.T @ state_force
         state_q, state_v = state_q @ to + state_v @ rate, state_v @ to
         constraint = constraint @ to
-    arm = max(min(instant.system.length, 1.0), 1e-3)
-    sizes = instant.system.model.modal_sizes()[:, 0]
-    weight = np.concatenate([np.ones(half), np.full(half, arm), arm / sizes])
-    basis = allowed_motions(constraint / weight) / weight[:, None]
+        force_reaction = to.T @ force_reaction
+    basis = _free(instant, constraint)
     absolute = np.abs(basis)
+    projected = [basis.T @ force for force in (stiffness, damping, state_force)]
+    # what constraints exert themselves does no work along the basis; loads that follow the reactions do
+    felt = basis.T @ force_reaction
+    felt[np.abs(felt) <= DEPENDENT * (absolute.T @ np.abs(force_reaction))] = 0.0
+    if felt.any() or state_reaction.any():
+        changes = _reactions(mass, constraint, force_reaction, (stiffness, damping, state_force))
+        projected = [force + felt @ change for force, change in zip(projected, changes)]
+        rates = zip((state_q, state_v, state_z), changes)
+        state_q, state_v, state_z = (rate + state_reaction @ change for rate, change in rates)
     return Reduced(
         basis if turn is None else turn.transform @ basis,
         absolute.T @ stiffness_terms @ absolute,
         absolute.T @ damping_terms @ absolute,
         basis.T @ mass @ basis,
-        basis.T @ damping @ basis,
-        basis.T @ stiffness @ basis,
-        basis.T @ state_force,
+        projected[1] @ basis,
+        projected[0] @ basis,
+        projected[2],
         state_q @ basis,
         state_v @ basis,
         state_z,
     )
+
+
+def _free(instant: Instant, constraint: np.ndarray) -> np.ndarray:
+    """Return a basis of the motions that constraints allow, lengths and angles weighed against each other."""
+    arm = max(min(instant.system.length, 1.0), 1e-3)
+    sizes = instant.system.model.modal_sizes()[:, 0]
+    half = (constraint.shape[1] - sizes.size) // 2
+    weight = np.concatenate([np.ones(half), np.full(half, arm), arm / sizes])
+    return allowed_motions(constraint / weight) / weight[:, None]
+
+
+def _reactions(
+    mass: np.ndarray, constraint: np.ndarray, force_reaction: np.ndarray, forces: tuple[np.ndarray, ...]
+) -> list[np.ndarray]:
+    """Return how the multipliers change with positions, velocities and states.
+
+    Of M q'' + f + L lambda = 0 and Phi_q q'' = 0 they are what q'' leaves of f, at a position of equilibrium; f are
+    the forces' derivatives and L those by the multipliers, Phi_q^T and what loads make of reactions.
+    """
+    m, n = constraint.shape
+    if m == 0:
+        return [np.zeros((0, force.shape[1])) for force in forces]
+    whole = np.block([[mass, force_reaction], [constraint, np.zeros((m, m))]])
+    size = np.sqrt(np.maximum(np.abs(whole).max(axis=1), np.finfo(float).tiny))
+    scaled = whole / size[:, None] / size
+    given = np.zeros((n + m, sum(force.shape[1] for force in forces)))
+    given[:n] = -np.hstack(forces)
+    solved = np.linalg.lstsq(scaled, given / size[:, None], rcond=None)[0] / size[:, None]
+    return np.split(solved[n:], np.cumsum([force.shape[1] for force in forces])[:-1], axis=1)

@@ -1,0 +1,163 @@
+"""Linear plants of decks against plants known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearmbs.adams import DeckError, linear_plant, parse_deck, parse_script, run_deck
+
+MASS, STIFFNESS, DAMPING = 2.0, 50.0, 3.0
+SPRING = f"""mass, spring and damper
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/1, PART=1
+MARKER/11, PART=1, ZP=1,0,0
+PART/2, MASS={MASS}, CM=20, IP=1,1,1
+MARKER/20, PART=2
+MARKER/21, PART=2, ZP=1,0,0
+JOINT/1, TRANSLATIONAL, I=21, J=11
+VARIABLE/1, FUNCTION=0
+VARIABLE/2, FUNCTION=DX(20,1)
+VARIABLE/3, FUNCTION=VX(20,1)
+VARIABLE/4, FUNCTION=ACCX(20,1)
+PINPUT/1, VARIABLES=1
+POUTPUT/1, VARIABLES=2,3,4
+SFORCE/1, TRANSLATIONAL, I=21, J=11, ACTIONONLY
+, FUNCTION=VARVAL(1)-{STIFFNESS}*DX(20,1)-{DAMPING}*VX(20,1)
+END
+"""
+
+
+def in_other_units(text: str) -> str:
+    """Return the deck with lengths in mm and times in ms; forces stay in N."""
+    text = text.replace("LENGTH=METER, TIME=SECOND", "LENGTH=MILLIMETER, TIME=MILLISECOND").replace("1,0,0", "1E3,0,0")
+    return text.replace(f"{STIFFNESS}*DX", f"{STIFFNESS / 1e3}*DX").replace(f"{DAMPING}*VX", f"{DAMPING}*VX")
+
+
+@pytest.mark.parametrize("s", [0.3j, 5.0j, 1.0 + 2.0j, 100.0])
+def test_a_mass_on_a_spring_has_its_transfer_function(s):
+    plant = linear_plant(parse_deck(SPRING))
+    exact = np.array([1.0, s, s**2]) / (MASS * s**2 + DAMPING * s + STIFFNESS)
+    assert plant.transfer(s)[:, 0] == pytest.approx(exact, rel=1e-8)
+    assert plant.poles == pytest.approx(np.roots([MASS, DAMPING, STIFFNESS]), rel=1e-8)
+
+
+def test_the_plant_is_in_the_units_of_the_deck():
+    # DX in mm, VX in mm/ms = m/s: the damping stays as it is
+    plant = linear_plant(parse_deck(in_other_units(SPRING)))
+    s = 5.0j
+    exact = np.array([1e3, s, s**2 * 1e-3]) / (MASS * s**2 + DAMPING * s + STIFFNESS)
+    assert plant.transfer(s * 1e-3)[:, 0] == pytest.approx(exact, rel=1e-8)
+    assert plant.time_unit == 1e-3
+
+
+def test_a_step_of_the_plant_is_that_of_the_deck():
+    plant = linear_plant(parse_deck(SPRING))
+    driven = parse_deck(SPRING.replace("VARIABLE/1, FUNCTION=0", "VARIABLE/1, FUNCTION=1").replace(
+        "END\n", "REQUEST/1, F2=VARVAL(2)\\F3=VARVAL(3)\\F4=VARVAL(4)\nEND\n"))  # fmt: skip
+    result = run_deck(driven, parse_script("a\nb\nsimulate/dynamics, end=3, steps=60\n"), tol=1e-10)
+    found, simulated = plant.step(result.t), result.request(1)[:, 1:4]
+    natural = np.sqrt(STIFFNESS / MASS)
+    ratio = DAMPING / (2.0 * MASS * natural)
+    damped = natural * np.sqrt(1.0 - ratio**2)
+    decay = np.exp(-ratio * natural * result.t)
+    turned = np.cos(damped * result.t) + ratio * natural / damped * np.sin(damped * result.t)
+    assert found[:, 0] == pytest.approx((1.0 - decay * turned) / STIFFNESS, abs=1e-12)
+    assert simulated == pytest.approx(found, abs=1e-7)
+
+
+PENDULUM = """a pendulum driven at its hinge
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+ACCGRAV/JGRAV=-9.81
+PART/1, GROUND
+MARKER/1, PART=1
+PART/2, MASS=1.5, CM=20, IP=0.1,0.1,0.2, QG={x},{y},0
+MARKER/20, PART=2
+MARKER/21, PART=2, QP={mx},{my},0
+JOINT/1, REVOLUTE, I=21, J=1
+VARIABLE/1, FUNCTION={torque}
+VARIABLE/2, FUNCTION=AZ(21,1)
+PINPUT/1, VARIABLES=1
+PINPUT/2, VARIABLES=1
+POUTPUT/1, VARIABLES=2
+SFORCE/1, ROTATIONAL, I=21, J=1, ACTIONONLY, FUNCTION=VARVAL(1)
+END
+"""
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi])
+def test_a_pendulum_hanging_or_standing(angle):
+    length = 0.8
+    x, y = length * np.sin(angle), -length * np.cos(angle)
+    deck = parse_deck(PENDULUM.format(x=x, y=y, mx=-x, my=-y, torque=0))
+    plant = linear_plant(deck, pinput=1)
+    inertia = 0.2 + 1.5 * length**2
+    s = 0.7 + 2.0j
+    exact = 1.0 / (inertia * s**2 + 1.5 * 9.81 * length * np.cos(angle))
+    assert plant.transfer(s)[0, 0] == pytest.approx(exact, rel=1e-8)
+    assert (plant.poles.real.max() > 1.0) == (angle > 0.0)
+
+
+def test_a_pendulum_at_the_equilibrium_under_its_torque():
+    torque, length = 5.0, 0.8
+    deck = parse_deck(PENDULUM.format(x=0, y=-length, mx=0, my=length, torque=torque))
+    plant = linear_plant(deck, pinput=2, at="equilibrium")
+    angle = np.arcsin(torque / (1.5 * 9.81 * length))
+    exact = 1.0 / (1.5 * 9.81 * length * np.cos(angle))
+    assert plant.transfer(0.0)[0, 0] == pytest.approx(exact, rel=1e-8)
+
+
+def test_a_script_writes_the_plant(tmp_path):
+    script = parse_script("a\nb\nsimulate/statics\nlinear/statemat, pinput=1, poutput=1, file=arm\n")
+    result = run_deck(parse_deck(SPRING), script, tmp_path / "run")
+    from scipy.io import loadmat
+
+    found = loadmat(tmp_path / "arm.mat")
+    (plant,) = result.plants
+    assert np.array_equal(found["A"], plant.a)
+    assert "S T A T E" in (tmp_path / "run.msg").read_text()
+    with np.load(plant.save(tmp_path / "arm.npz")) as again:
+        assert again["outputs"].tolist() == ["VARIABLE/2", "VARIABLE/3", "VARIABLE/4"]
+
+
+@pytest.mark.parametrize(
+    ("deck", "options", "message"),
+    [
+        (SPRING.replace("PINPUT/1, VARIABLES=1\n", ""), {}, "the deck has no PINPUT; add PINPUT/1"),
+        (SPRING, {"poutput": 4}, "there is no POUTPUT/4; the deck has POUTPUT 1"),
+        (PENDULUM.format(x=0, y=-1, mx=0, my=1, torque=0), {}, "the deck has several; give PINPUT = 1, 2"),
+        (SPRING, {"at": "rest"}, "at = 'rest'; choose initial or equilibrium"),
+    ],
+)
+def test_what_is_missing_is_named(deck, options, message):
+    with pytest.raises(DeckError, match=message):
+        linear_plant(parse_deck(deck), **options)
+
+
+def test_a_force_that_follows_the_acceleration_counts_in_the_modes():
+    added = 1.3
+    text = SPRING.replace(f"-{DAMPING}*VX(20,1)", f"-{added}*ACCX(20,1)")
+    deck = parse_deck(text)
+    (modes,) = run_deck(deck, parse_script("a\nb\nlinear/eigensol\n")).modes
+    natural = np.sqrt(STIFFNESS / (MASS + added))
+    assert modes.eigenvalues.imag == pytest.approx([natural], rel=1e-9)
+    s = 2.0 + 3.0j
+    exact = np.array([1.0, s, s**2]) / ((MASS + added) * s**2 + STIFFNESS)
+    assert linear_plant(deck).transfer(s)[:, 0] == pytest.approx(exact, rel=1e-8)
+
+
+def test_the_command_writes_the_plant(tmp_path):
+    from typer.testing import CliRunner
+
+    from gearmbs.cli import app
+
+    (tmp_path / "mass.adm").write_text(SPRING)
+    runner = CliRunner()
+    done = runner.invoke(app, ["plant", str(tmp_path / "mass.adm"), "--equilibrium", "-o", str(tmp_path / "m.npz")])
+    assert done.exit_code == 0, done.output
+    with np.load(tmp_path / "m.npz") as found:
+        assert found["A"].shape == (2, 2)
+    done = runner.invoke(app, ["plant", str(tmp_path / "mass.adm"), "-o", str(tmp_path / "m.txt")])
+    assert done.exit_code == 1
+    assert "a plant is written as .mat or .npz" in done.output
