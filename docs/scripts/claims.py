@@ -148,7 +148,11 @@ def deciding(data: pd.DataFrame, component: str = "line_of_action") -> pd.DataFr
 
 
 def totals(data: pd.DataFrame, component: str = "line_of_action") -> pd.DataFrame:
-    """Return first and total indices of the ratios' logarithms, in percent, and what the surrogate explains."""
+    """Return first and total indices of the ratios' logarithms, in percent, and what the surrogate explains.
+
+    ``within`` is where the total index of the ratio itself must lie, whatever the part is like that the surrogate does
+    not explain: the parts of the variance add up.
+    """
     found = {}
     for ratio in ("misaligned", "distance", "load"):
         fitted = chaos(data, ratio, component)
@@ -156,6 +160,9 @@ def totals(data: pd.DataFrame, component: str = "line_of_action") -> pd.DataFram
         for kind in ("first", "total"):
             text = [f"{100 * v:.0f} ± {100 * c:.0f}" for v, c in zip(table[kind], table[f"{kind}_confidence"])]
             found[NAMES[ratio], kind] = [*text, f"{100 * fitted.q_squared:.0f}"]
+        low = 100 * fitted.q_squared * table["total"]
+        rest = 100 * (1.0 - fitted.q_squared)
+        found[NAMES[ratio], "within"] = [*(f"{v:.0f} to {v + rest:.0f}" for v in low), ""]
     return pd.DataFrame(found, index=[*SETTINGS, "explained of points left out"])
 
 

@@ -7,6 +7,7 @@ import random
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -306,12 +307,9 @@ class _shown:
 
 
 def _needed() -> None:
-    """Say what to install if it is missing."""
-    try:
-        import pyarrow
-        import zarr  # noqa: F401
-    except ImportError as error:
+    """Say what to install if it is missing; looked for, not imported, since it is not always used."""
+    missing = [name for name in ("pyarrow", "zarr") if find_spec(name) is None]
+    if missing:
         raise CampaignError(
-            f"campaigns need pyarrow and zarr ({error}); install the extra: pip install 'gearmbs[campaigns]'"
-        ) from None
-    del pyarrow
+            f"campaigns need {' and '.join(missing)}; install the extra: pip install 'gearmbs[campaigns]'"
+        )

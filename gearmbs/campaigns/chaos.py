@@ -62,12 +62,12 @@ class PolynomialChaos:
 
     def predict(self, u: np.ndarray) -> np.ndarray:
         """Return the sum at points of the unit cube, shape (n, d)."""
-        return _columns(np.atleast_2d(u), self.degrees, self.levels) @ self.coefficients
+        return chaos_columns(np.atleast_2d(u), self.degrees, self.levels) @ self.coefficients
 
     @property
     def indices(self) -> np.ndarray:
         """First and total Sobol' indices, shape (2, d)."""
-        return _indices(self.degrees, self.coefficients)
+        return chaos_indices(self.degrees, self.coefficients)
 
     def interaction(self, one: str, other: str) -> float:
         """Return the part of the variance that two factors explain together beyond each alone."""
@@ -132,26 +132,45 @@ def fit_chaos(
     few = tuple(levels or [0] * len(names))
     if y.size < 2 or np.ptp(y) == 0.0:
         raise CampaignError("polynomial chaos: the result is the same everywhere; it depends on none of the factors")
-    best = None
-    for highest in range(1, HIGHEST + 1) if degree is None else (degree,):
-        degrees = _terms(few, highest, together)
-        if best is not None and POINTS_A_TERM * len(degrees) > y.size:
-            break
-        if len(degrees) >= y.size:
-            raise CampaignError(f"polynomial chaos: {y.size} points for {len(degrees)} coefficients; draw more points")
-        x = _columns(u, degrees, few)
-        coefficients, r_squared, q_squared = _least_squares(x, y)
-        if best is None or q_squared > best[3]:
-            best = degrees, coefficients, r_squared, q_squared, x
-    assert best is not None
-    degrees, coefficients, r_squared, q_squared, x = best
+    best = best_chaos(u, y, few, degree=degree, together=together)
+    x = chaos_columns(u, best.degrees, few)
     generator, drawn = np.random.default_rng(seed), []
     for _ in range(RESAMPLES):
         # weights of a Bayesian bootstrap, under which no coefficient is left undetermined
         weight = np.sqrt(generator.exponential(size=y.size))
-        drawn.append(_indices(degrees, np.linalg.lstsq(x * weight[:, None], y * weight, rcond=None)[0]))
+        drawn.append(chaos_indices(best.degrees, np.linalg.lstsq(x * weight[:, None], y * weight, rcond=None)[0]))
     confidence = 1.96 * np.std(drawn, axis=0, ddof=1)
-    return PolynomialChaos(list(names), few, degrees, coefficients, r_squared, q_squared, confidence, y.size)
+    return PolynomialChaos(
+        list(names), few, best.degrees, best.coefficients, best.r_squared, best.q_squared, confidence, y.size
+    )
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Terms and coefficients of a sum, and what it explains; see `PolynomialChaos`."""
+
+    degrees: np.ndarray
+    coefficients: np.ndarray
+    r_squared: float
+    q_squared: float
+
+
+def best_chaos(
+    u: np.ndarray, y: np.ndarray, levels: Sequence[int], *, degree: int | None = None, together: int = 2
+) -> Fitted:
+    """Return the sum of the least errors at points left out; see `fit_chaos`, without confidence."""
+    best: Fitted | None = None
+    for highest in range(1, HIGHEST + 1) if degree is None else (degree,):
+        degrees = _terms(levels, highest, together)
+        if best is not None and POINTS_A_TERM * len(degrees) > y.size:
+            break
+        if len(degrees) >= y.size:
+            raise CampaignError(f"polynomial chaos: {y.size} points for {len(degrees)} coefficients; draw more points")
+        found = Fitted(degrees, *_least_squares(chaos_columns(u, degrees, levels), y))
+        if best is None or found.q_squared > best.q_squared:
+            best = found
+    assert best is not None
+    return best
 
 
 def _least_squares(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float, float]:
@@ -165,7 +184,8 @@ def _least_squares(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float, flo
     return coefficients, 1.0 - float(rest @ rest) / spread, 1.0 - float(out @ out) / spread
 
 
-def _indices(degrees: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+def chaos_indices(degrees: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+    """Return first and total indices of a sum, shape (2, d)."""
     active = degrees > 0
     part = coefficients**2
     whole = part[1:].sum()
@@ -188,7 +208,7 @@ def _terms(levels: Sequence[int], degree: int, together: int) -> np.ndarray:
     return np.array(rows)
 
 
-def _columns(u: np.ndarray, degrees: np.ndarray, levels: Sequence[int]) -> np.ndarray:
+def chaos_columns(u: np.ndarray, degrees: np.ndarray, levels: Sequence[int]) -> np.ndarray:
     """Return the products of the polynomials at points, shape (n, t)."""
     found = np.ones((len(u), len(degrees)))
     for k, count in enumerate(levels):

@@ -11,6 +11,7 @@ References
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     from gearmbs.campaigns.campaign import Campaign
     from gearmbs.campaigns.chaos import PolynomialChaos
+    from gearmbs.campaigns.plan import Plan
 
 RESAMPLES = 200
 CONFIDENCE = 0.95
@@ -44,6 +46,9 @@ class SobolIndices:
         Base points used, and those left out since one of their cases has no result.
     mean, variance : float
         Of the result.
+    explained : float
+        Part of the variance that the polynomials explain at points left out, whose indices are known and not sampled;
+        0 without.
     """
 
     names: list[str]
@@ -55,6 +60,7 @@ class SobolIndices:
     left_out: int
     mean: float
     variance: float
+    explained: float = 0.0
 
     def table(self) -> pd.DataFrame:
         """Return the indices by factor, the most important first."""
@@ -72,11 +78,21 @@ class SobolIndices:
         return table.sort_values("total", ascending=False)
 
 
-def sobol_indices(values: np.ndarray, names: list[str], *, resamples: int = RESAMPLES, seed: int = 0) -> SobolIndices:
+def sobol_indices(
+    values: np.ndarray,
+    names: list[str],
+    *,
+    points: np.ndarray | None = None,
+    levels: Sequence[int] | None = None,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
+) -> SobolIndices:
     """Return first and total Sobol' indices of results on a Saltelli design.
 
     With A, B and AB_i, A with coordinate i of B, standardised together: first index the mean of f_B (f_AB - f_A)
-    (Saltelli 2010), total index half the mean of (f_A - f_AB)^2 (Jansen 1999), over the variance of f_A and f_B.
+    (Saltelli 2010), total index half the mean of (f_A - f_AB)^2 (Jansen 1999), over the variance of f_A and f_B. With
+    the points, polynomials serve as control variates, which narrows the intervals and leaves the expectation; see
+    `gearmbs.campaigns.control_variates`.
 
     Parameters
     ----------
@@ -84,6 +100,10 @@ def sobol_indices(values: np.ndarray, names: list[str], *, resamples: int = RESA
         In the order of `gearmbs.campaigns.designs.saltelli`; NaN where there is none.
     names : list of str
         The d factors' coordinates.
+    points : ndarray, shape (n (d + 2), d), optional
+        The design.
+    levels : sequence of int, optional
+        Number of values of each coordinate that has but a few, 0 for a range.
 
     Returns
     -------
@@ -100,14 +120,31 @@ def sobol_indices(values: np.ndarray, names: list[str], *, resamples: int = RESA
     if variance == 0.0:
         raise CampaignError("sobol: the result is the same everywhere; it depends on none of the factors")
     blocks = (blocks - blocks.mean()) / blocks.std()
-    first, total = _indices(blocks)
+    controlled = None
+    if points is not None:
+        from gearmbs.campaigns.control_variates import control_variates
+
+        controlled = control_variates(blocks, np.reshape(points, (-1, d + 2, d))[good], levels or [0] * d, seed=seed)
+    estimate = (lambda rows: _indices(blocks[rows])) if controlled is None else controlled.indices
+    first, total = estimate(np.arange(len(blocks)))
     generator = np.random.default_rng(seed)
-    drawn = [_indices(blocks[generator.integers(len(blocks), size=len(blocks))]) for _ in range(resamples)]
+    drawn = [estimate(generator.integers(len(blocks), size=len(blocks))) for _ in range(resamples)]
     spread = np.std(np.array(drawn), axis=0, ddof=1)
     from scipy.stats import norm
 
     q = norm.ppf(0.5 + 0.5 * CONFIDENCE)
-    return SobolIndices(names, first, total, q * spread[0], q * spread[1], len(blocks), left_out, mean, variance)
+    return SobolIndices(
+        names,
+        first,
+        total,
+        q * spread[0],
+        q * spread[1],
+        len(blocks),
+        left_out,
+        mean,
+        variance,
+        0.0 if controlled is None else controlled.explained,
+    )
 
 
 def _indices(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -242,7 +279,6 @@ def results_in_order(campaign: Campaign, result: str) -> np.ndarray:
 def campaign_chaos(campaign: Campaign, result: str, degree: int | None = None) -> PolynomialChaos:
     """Return the polynomial chaos of a campaign's result over the coordinates of its plan."""
     from gearmbs.campaigns.chaos import fit_chaos
-    from gearmbs.campaigns.factors import Choice, Factor
 
     plan = campaign.plan
     if plan.variants > 1 or plan.constraints:
@@ -250,11 +286,18 @@ def campaign_chaos(campaign: Campaign, result: str, degree: int | None = None) -
             "polynomial chaos: not of crossed choices or constraints; fit the table's columns by fit_chaos"
         )
     names, points = coordinates(campaign)
+    return fit_chaos(points, results_in_order(campaign, result), names, levels=_levels(plan), degree=degree)
+
+
+def _levels(plan: Plan) -> list[int]:
+    """Return the number of values of each coordinate that has but a few, 0 for a range."""
+    from gearmbs.campaigns.factors import Choice, Factor
+
     levels: list[int] = []
     for factor in plan.factors:
         few = len(factor.values) if isinstance(factor, Factor) else factor.count if isinstance(factor, Choice) else 0
         levels += [few] + [0] * (factor.width - 1)
-    return fit_chaos(points, results_in_order(campaign, result), names, levels=levels, degree=degree)
+    return levels
 
 
 def sensitivity(campaign: Campaign, result: str) -> Any:
@@ -276,7 +319,7 @@ def sensitivity(campaign: Campaign, result: str) -> Any:
             "sensitivity: not of crossed choices; make the choice a factor, or ask for one option's cases"
         )
     if plan.design == "saltelli":
-        return sobol_indices(values, names)
+        return sobol_indices(values, names, points=points, levels=_levels(plan))
     if plan.design == "morris":
         return morris_effects(values, points, names)
     if plan.design in ("factorial", "plackett burman"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import time
 from dataclasses import dataclass
 from functools import lru_cache
@@ -76,8 +77,9 @@ def _duration(seconds: float) -> str:
 
 
 @lru_cache(maxsize=200_000)
-def _counts(path: Path) -> tuple[int, int, int, float, float, float, float] | None:
-    entry = read_ledger(path)
+def _counts(path: str, written: int) -> tuple[int, int, int, float, float, float, float] | None:
+    """Return what is counted of a ledger that was written at a time; a ledger may be taken away and written again."""
+    entry = read_ledger(Path(path))
     if entry is None:
         return None
     names = ("cases", "failed", "reused", "processor_seconds", "simulation_seconds", "started", "finished")
@@ -94,10 +96,24 @@ def read_ledger(path: Path) -> dict[str, Any] | None:
 
 def read_status(folder: Folder) -> CampaignStatus:
     """Return how far a campaign is."""
-    done = folder.done()
-    rows = [row for row in (_counts(folder.ledger(unit)) for unit in done) if row is not None]
-    claims = [int(p.stem) for p in (folder.path / "units").glob("*.claim") if p.stem.isdigit()]
-    at_work = [u for u in claims if u not in set(done) and owner(folder.claim(u))]
+    rows, done, claims = [], set(), []
+    with os.scandir(folder.path / "units") as files:
+        for file in files:
+            stem, _, kind = file.name.partition(".")
+            if not stem.isdigit():
+                continue
+            if kind == "claim":
+                claims.append(int(stem))
+            elif kind == "json":
+                try:
+                    row = _counts(file.path, file.stat().st_mtime_ns)
+                except OSError:
+                    # taken away at this moment
+                    continue
+                if row is not None:
+                    done.add(int(stem))
+                    rows.append(row)
+    at_work = [u for u in claims if u not in done and owner(folder.claim(u))]
     finished = sum(row[0] for row in rows)
     return CampaignStatus(
         cases=folder.case_count,

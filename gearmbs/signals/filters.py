@@ -7,6 +7,7 @@ the rest.
 
 from __future__ import annotations
 
+import functools
 import math
 from fractions import Fraction
 from typing import Literal
@@ -25,10 +26,11 @@ DECIMATE_STOP = 0.5
 BLOCK = 1 << 16
 
 
+@functools.lru_cache(maxsize=64)
 def kaiser_taps(
     cutoffs: float | tuple[float, float], width: float, rate: float, kind: str, attenuation: float
 ) -> np.ndarray:
-    """Symmetric FIR filter of odd length.
+    """Symmetric FIR filter of odd length, read-only: the same array for the same settings.
 
     Parameters
     ----------
@@ -51,7 +53,9 @@ def kaiser_taps(
     .. [1] J. F. Kaiser, Nonrecursive digital filter design using the I0-sinh window function, ISCAS 1974.
     """
     count, beta = kaiser_order(attenuation, width / (0.5 * rate))
-    return windowed_sinc(count | 1, cutoffs, kind, rate, beta)
+    taps = windowed_sinc(count | 1, cutoffs, kind, rate, beta)
+    taps.flags.writeable = False
+    return taps
 
 
 def apply_zero_phase(values: np.ndarray, taps: np.ndarray, edges: Edges, step: int = 1) -> tuple[np.ndarray, int]:

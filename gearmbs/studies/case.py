@@ -351,7 +351,18 @@ class Case(Section, Shown):
                 f"{1e3 * f.backlash:g} mm: negative backlash, the teeth overlap by {1e3 * overlap:.4g} mm on both "
                 f"flanks; give at least {1e3 * (f.backlash + overlap):.4g} mm of backlash"
             )
+        if not f.teeth:
+            self._pairs[self._sections_key] = self._sections, sound
         return self
+
+    @property
+    def _sections(self) -> tuple:
+        """The sections that a pair is built of."""
+        return self.gears, self.fault, self.contact, self.friction, self.operation
+
+    @property
+    def _sections_key(self) -> tuple[int, ...]:
+        return tuple(map(id, self._sections))
 
     @cached_property
     def _pairs(self) -> dict[tuple[int, ...], tuple[tuple, GearPair]]:
@@ -362,12 +373,11 @@ class Case(Section, Shown):
         """Return the gear pair of the case."""
         from gearmbs.studies.tooth_faults import tooth_fault
 
-        sections = (self.gears, self.fault, self.contact, self.friction, self.operation)
-        key = tuple(map(id, sections))
+        key = self._sections_key
         if key not in self._pairs:
             faults = tuple(tooth_fault(table) for table in self.fault.teeth)
             self._pairs.clear()
-            self._pairs[key] = sections, self._pair(faults)
+            self._pairs[key] = self._sections, self._pair(faults)
         return self._pairs[key][1]
 
     def _pair(self, faults: tuple) -> GearPair:

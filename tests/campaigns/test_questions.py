@@ -70,6 +70,42 @@ def qmc_free(n, seed):
     return np.stack(rows, axis=1).reshape(-1, 3)
 
 
+def test_control_variates_narrow_the_intervals_around_the_same_truth():
+    """Over independent designs: a fraction of the width, no bias, and intervals that cover."""
+    truth = np.array([FIRST, TOTAL])
+    errors, inside, widths = [], [], []
+    for seed in range(30):
+        points = qmc_free(128, seed)
+        y = _values(points)
+        plain, found = (sobol_indices(y, NAMES, points=given, seed=seed) for given in (None, points))
+        half = np.array([found.first_confidence, found.total_confidence])
+        errors.append(np.array([found.first, found.total]) - truth)
+        inside.append(np.abs(errors[-1]) <= half)
+        widths.append(half.max() / max(plain.first_confidence.max(), plain.total_confidence.max()))
+    assert found.explained > 0.9
+    assert np.median(widths) < 0.35
+    assert np.mean(inside) > 0.88
+    # four standard errors of the mean
+    assert (np.abs(np.mean(errors, axis=0)) < 4.0 * np.std(errors, axis=0) / np.sqrt(len(errors))).all()
+
+
+def test_control_variates_that_follow_nothing_do_no_harm():
+    points = saltelli(128, 3, 0)
+    y = np.sign(np.sin(97.0 * points @ [1.0, 3.0, 7.0]))
+    plain, found = (sobol_indices(y, NAMES, points=given) for given in (None, points))
+    assert found.explained < 0.1
+    np.testing.assert_allclose(found.total, plain.total, atol=0.1)
+    np.testing.assert_allclose(found.total_confidence, plain.total_confidence, rtol=0.2)
+
+
+def test_control_variates_need_some_points():
+    """With too few to fit anything the plain estimate stands."""
+    points = saltelli(4, 3, 0)
+    plain, found = (sobol_indices(_values(points), NAMES, points=given) for given in (None, points))
+    np.testing.assert_array_equal(found.total, plain.total)
+    assert found.explained == 0.0
+
+
 def test_points_without_results_are_left_out_as_blocks():
     y = _values(saltelli(1024, 3, 0))
     y[7] = np.nan
@@ -112,7 +148,8 @@ def test_from_campaign_to_report(tmp_path):
     campaign = Campaign(tmp_path / "c", make_plan(function(), ranges(), "saltelli", n=256, unit=512))
     campaign.run(workers=0)
     found = campaign.sensitivity("y")
-    np.testing.assert_allclose(found.total, TOTAL, atol=0.12)
+    np.testing.assert_allclose(found.total, TOTAL, atol=0.05)
+    assert found.total_confidence.max() < 0.05
     page = campaign.report(tmp_path / "report.html").read_text()
     assert "Sobol' indices" in page
     assert "data:image/png;base64" in page

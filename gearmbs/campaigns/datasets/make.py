@@ -36,6 +36,10 @@ SLICES = 11
 """Slices along the face: enough for chipped corners and pits of the widths above, at a third of the time of the
 default."""
 
+TOLERANCE = 1e-6
+"""Tolerance of the integrator: on twelve records harmonics within 1 %, RMS within 0.5 % and kurtosis within 0.4 % of
+those at 1e-7, far below the noise that sensors add, in 0.54 of the time."""
+
 GRADES = [
     {"kind": "manufacturing grade", "grade": 6, "lead": False, "seed": "drawn", "wheel": wheel}
     for wheel in ("driver", "driven")
@@ -68,7 +72,7 @@ def data_set_plan(
 
     base = Case(
         operation={"duration": duration, "run_up": 0.05, "settling": 0.05},
-        solver={"signal_rate": 12800, "output_rate": 51200},
+        solver={"signal_rate": 12800, "output_rate": 51200, "tolerance": TOLERANCE, "lump": True},
         contact={"slices": SLICES},
     )
     eccentric = {"kind": "eccentricity", "amount": (0.0, 2e-5), "phase": (0.0, 6.283)}
