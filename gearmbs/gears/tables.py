@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import weakref
 
 import numpy as np
 
@@ -42,6 +43,31 @@ def _pack_wheel(gear: GearSpec, table: np.void) -> None:
     table["twist"] = -sign * gear.twist_tangent
 
 
+class _Latest:
+    """The tables of the pair that was packed last: setting a simulation up asks for the same ones several times."""
+
+    def __init__(self) -> None:
+        self._kept: tuple[weakref.ref, int | None, tuple[np.ndarray, np.ndarray, int]] | None = None
+
+    def find(self, pair: Mesh, slices: int | None) -> tuple[np.ndarray, np.ndarray, int] | None:
+        """Return copies of the pair's tables, or None."""
+        kept = self._kept
+        if kept is None or kept[0]() is not pair or kept[1] != slices:
+            return None
+        gi, gr, size = kept[2]
+        return gi.copy(), gr.copy(), size
+
+    def keep(self, pair: Mesh, slices: int | None, tables: tuple[np.ndarray, np.ndarray, int]) -> None:
+        """Keep copies of tables of a pair that cannot change."""
+        parameters = getattr(type(pair), "__dataclass_params__", None)
+        if parameters is not None and parameters.frozen:
+            gi, gr, size = tables
+            self._kept = (weakref.ref(pair), slices, (gi.copy(), gr.copy(), size))
+
+
+_latest = _Latest()
+
+
 def pack(pair: Mesh, slices: int | None = None) -> tuple[np.ndarray, np.ndarray, int]:
     """Tables ``gi``, ``gr`` and the length of the work array for ``gear_contact``.
 
@@ -51,6 +77,14 @@ def pack(pair: Mesh, slices: int | None = None) -> tuple[np.ndarray, np.ndarray,
     slices : int, optional
         Slices along the face, default the pair's own.
     """
+    tables = _latest.find(pair, slices)
+    if tables is None:
+        tables = _pack(pair, slices)
+        _latest.keep(pair, slices, tables)
+    return tables
+
+
+def _pack(pair: Mesh, slices: int | None) -> tuple[np.ndarray, np.ndarray, int]:
     geometry, model, point = pair.geometry, pair.contact_model, pair.operating_point
     slices = model.face_slices(geometry, pair.faults) if slices is None else slices
     options, table = np.zeros(1, L.OPTIONS), np.zeros(1, L.PAIR)
@@ -113,8 +147,10 @@ def tooth_deviations(pair: Mesh) -> tuple[ToothDeviations, ToothDeviations]:
 
 def _numbered(rows: np.ndarray, plain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Number of the distinct row for each row, -1 where it is the plain one, and the distinct rows."""
-    distinct, number = np.unique(rows, axis=0, return_inverse=True)
-    number = number.reshape(-1)
+    # by their bytes: sorting whole rows takes longer than many a simulation's set-up
+    known: dict[bytes, int] = {}
+    number = np.array([known.setdefault(row.tobytes(), len(known)) for row in rows])
+    distinct = rows[np.unique(number, return_index=True)[1]]
     return np.where((rows == plain).all(axis=1), -1, number), distinct
 
 

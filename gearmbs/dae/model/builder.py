@@ -144,8 +144,8 @@ class TableBuilder:
         """Append a force element's own tables; return their offsets and lengths are stored in front."""
         i, r = len(self.extra_i), len(self.extra_r)
         self.extra_i.extend([len(integers), len(reals)])
-        self.extra_i.extend(int(v) for v in integers)
-        self.extra_r.extend(float(v) for v in reals)
+        self.extra_i.extend(np.asarray(integers, dtype=np.int64).tolist())
+        self.extra_r.extend(np.asarray(reals, dtype=np.float64).tolist())
         return i, r
 
     def add_force(
