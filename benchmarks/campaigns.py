@@ -110,7 +110,8 @@ def overhead(folder: Path, n: int = 400, workers: int = 2) -> None:
     inside = status.simulation_seconds - late
     print(
         f"{status}; {spent:.1f} s of processor time in driver ({time.process_time():.1f} s) and workers, "
-        f"{inside:.1f} s inside simulations and their evaluation, less {late:.1f} s of imports in first cases: {inside / spent:.2%}; "
+        f"{inside:.1f} s inside simulations and their evaluation, less {late:.1f} s of imports in first cases: "
+        f"{inside / spent:.2%}; "
         f"{status.simulation_seconds / status.processor_seconds:.2%} of the units' own"
     )
     rows = [row for row in memory if row[0] >= 100]
