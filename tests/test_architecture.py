@@ -64,6 +64,7 @@ EXCEPTIONS = {
     ("mechanism", "dae.compiled"): "kernels of force elements: views of tables, calls through addresses",
     ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
     ("adams", "gears"): "pairs are written as the contact forces of a deck",
+    ("adams", "view"): "the wheels of a pair that is written as solids are those of the 3-D scenes",
     ("studies", "gearmbs"): "a result says which version made it",
     ("studies", "dae.analyses"): "the modes of a drivetrain; the type alone",
     ("campaigns", "gearmbs"): "the card of a data set says which version made it",

@@ -1,4 +1,4 @@
-"""Mutated, truncated and random decks give a deck or an error with a line; nothing else."""
+"""Mutated, truncated and random decks give a deck, a result or an error with a line; nothing else."""
 
 from __future__ import annotations
 
@@ -11,35 +11,9 @@ from hypothesis import strategies as st
 from gearmbs.adams import Deck, DeckError, Script, parse_deck, parse_script
 from gearmbs.adams.parse.source import read_text
 
+from . import fuzz
 from .decks import EVERYTHING, PENDULUM, SCRIPT
-
-SPICE = ["/", ",", "=", "\\", "(", ")", "!", "&", ";", "\n", "\n,", "D", "E", "90D", "1E400", "-", "0", "\x00", "\t",
-         "'", '"', ":", "**", "PART/", "END", "é", "\x01", "9" * 30, "FUNCTION=", "I=", " "]  # fmt: skip
-
-
-def mutated(text: str, rng: random.Random) -> str:
-    """Return the text after a few random edits."""
-    for _ in range(rng.randint(1, 6)):
-        at = rng.randrange(len(text) + 1)
-        to = min(len(text), at + rng.randint(1, 12))
-        kind = rng.randrange(6)
-        if kind == 0:
-            text = text[:at] + text[to:]
-        elif kind == 1:
-            text = text[:at] + rng.choice(SPICE) + text[at:]
-        elif kind == 2:
-            text = text[:at] + "".join(chr(rng.randint(1, 255)) for _ in range(3)) + text[to:]
-        elif kind == 3:
-            text = text[: rng.randrange(len(text) + 1)]
-        elif kind == 4:
-            lines = text.split("\n")
-            i, j = rng.randrange(len(lines)), rng.randrange(len(lines))
-            lines[i], lines[j] = lines[j], lines[i]
-            text = "\n".join(lines)
-        else:
-            piece = text[at:to]
-            text = text[:at] + piece * rng.randint(2, 4) + text[to:]
-    return text
+from .mutations import SPICE, characters, mutated
 
 
 def outcome(parser, text: str) -> None:
@@ -59,8 +33,11 @@ def outcome(parser, text: str) -> None:
 def run(cases: int, seed: int) -> None:
     rng = random.Random(seed)
     for _ in range(cases):
-        outcome(parse_deck, mutated(PENDULUM if rng.random() < 0.7 else EVERYTHING, rng))
-        outcome(parse_script, mutated(SCRIPT, rng))
+        text = PENDULUM if rng.random() < 0.7 else EVERYTHING
+        for _ in range(rng.randint(1, 6)):
+            text = characters(text, rng)
+        outcome(parse_deck, text)
+        outcome(parse_script, mutated(SCRIPT, rng, 6))
 
 
 def test_mutated_decks():
@@ -70,6 +47,18 @@ def test_mutated_decks():
 @pytest.mark.slow
 def test_mutated_decks_in_tens_of_thousands():
     run(40_000, 2)
+
+
+@pytest.mark.parametrize("seeds", [range(0, 200), range(200, 400), range(400, 600)], ids=str)
+def test_mutated_decks_are_built_or_refused(seeds):
+    """A slice of what ``python -m tests.adams.fuzz`` carries through."""
+    failed = {seed: found for seed in seeds if (found := fuzz.outcome(seed, 0.0)).startswith("failed")}
+    assert not failed
+
+
+def test_mutated_decks_run_or_end_with_an_error():
+    failed = {seed: found for seed in range(1000, 1030) if (found := fuzz.outcome(seed, 1.0)).startswith("failed")}
+    assert not failed
 
 
 def test_every_truncation_of_a_deck():

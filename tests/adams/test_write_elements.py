@@ -97,12 +97,7 @@ def test_curves_are_written_as_the_constraints_that_keep_to_them(kind):
         np.testing.assert_allclose(b, a, atol=1e-8)
 
 
-def test_contacts_of_solids_are_refused_by_name():
-    with pytest.raises(ModelError, match=r"contact 'CONTACT_7'.* has no form in an ADAMS deck"):
-        write_deck(parse_deck(model(PARTS + STATEMENTS["contact"])).to_mechanism())
-
-
-@pytest.mark.parametrize("kind", [k for k in STATEMENTS if k not in ("joint", "gear", "contact", "ptcv", "cvcv")])
+@pytest.mark.parametrize("kind", [k for k in STATEMENTS if k not in ("joint", "gear", "ptcv", "cvcv")])
 def test_decks_of_every_element_are_written_with_it(kind):
     """A GEAR is a coupler of its joints."""
     deck = parse_deck(model(PARTS + STATEMENTS[kind]))

@@ -5,6 +5,7 @@ The mechanism keeps the deck's units in its expressions (``Mechanism.units``); i
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace as replaced
 from typing import Any
@@ -38,6 +39,24 @@ def sensor_state(number: int) -> str:
     return f"SENSOR_{number}"
 
 
+class LeftOutError(LookupError):
+    """An element needs what was left out, since it is not supported."""
+
+
+class Markers(dict[int, Marker]):
+    """The markers of a deck that were built, by id."""
+
+    def __missing__(self, ref: int) -> Marker:
+        raise LeftOutError(f"with MARKER/{ref}, whose part is left out,")
+
+
+def joints_of(s: st.Statement) -> tuple[int, ...]:
+    """Return the joints without which an element cannot act."""
+    if isinstance(s, (st.Motion, st.Friction)) and s.joint is not None:
+        return (s.joint,)
+    return s.joints if isinstance(s, (st.Coupler, st.Gear)) else ()
+
+
 class Builder:
     """Adds a deck's statements to a mechanism one by one; use :func:`build_model`."""
 
@@ -62,9 +81,10 @@ class Builder:
         self.mechanism.redundancy = "adams"
         self.model = AdamsModel(self.mechanism, deck, sensed=sensed)
         self.accelerations = Accelerations(self)
-        self.markers: dict[int, Marker] = {}
+        self.markers = Markers()
         self.joints: dict[int, Joint] = {}
         self.problems: list[Diagnostic] = []
+        self.left_out: set[tuple[str, int]] = set()
         self._taken: set[str] = {"ground"}
 
     def add_bodies(self) -> bool:
@@ -88,24 +108,32 @@ class Builder:
 
     def resting_joint(self, s: st.Statement) -> int | None:
         """Return an inactive joint without which an element cannot act, None when there is none."""
-        refs: tuple[int, ...] = ()
-        if isinstance(s, (st.Motion, st.Friction)) and s.joint is not None:
-            refs = (s.joint,)
-        elif isinstance(s, (st.Coupler, st.Gear)):
-            refs = s.joints
-        return next((ref for ref in refs if ("JOINT", ref) in self.inactive), None)
+        return next((ref for ref in joints_of(s) if ("JOINT", ref) in self.inactive), None)
 
     def attempt(self, statement: st.Statement, add: Callable[[Any], None]) -> None:
-        """Add one statement; what is wrong with it gets its line."""
-        try:
-            add(statement)
-        except (ModelError, ValueError) as error:
-            message = f"{statement.label()}: {error}"
-            self.problems.append(Diagnostic(ERROR, message, self.deck.file, statement.line))
+        """Add one statement; what is wrong with it gets its line, and so does what it warns of."""
+        with warnings.catch_warnings(record=True) as warned, np.errstate(over="raise"):
+            warnings.simplefilter("always")
+            try:
+                missing = [ref for ref in joints_of(statement) if ("JOINT", ref) in self.left_out]
+                if missing:
+                    raise LeftOutError(f"with JOINT/{missing[0]}, which is left out,")
+                add(statement)
+            except (ModelError, ValueError) as error:
+                self.remark(ERROR, statement, str(error))
+            except LeftOutError as error:
+                self.left_out.add((st.KEYWORD_OF[type(statement)], statement.id))
+                self.unsupported(statement, str(error))
+            except ArithmeticError:
+                self.remark(ERROR, statement, "its numbers are too large or too small to compute with")
+        for warning in warned:
+            self.remark(WARNING, statement, str(warning.message))
+
+    def remark(self, severity: str, statement: st.Statement, what: str, joiner: str = ": ") -> None:
+        self.problems.append(Diagnostic(severity, f"{statement.label()}{joiner}{what}", self.deck.file, statement.line))
 
     def unsupported(self, statement: st.Statement, what: str) -> None:
-        message = f"{statement.label()}: {what} is not supported"
-        self.problems.append(Diagnostic(UNSUPPORTED, message, self.deck.file, statement.line))
+        self.remark(UNSUPPORTED, statement, f"{what} is not supported")
 
     def claim(self, statement: st.Statement, kind: str) -> str:
         """Return a unique name for a statement and remember it."""
@@ -127,8 +155,7 @@ class Builder:
                 self.model.pairs[kind, statement.id] = self.marker_pair(statement)
                 joint = self.resting_joint(statement)
                 if joint is not None and (st.KEYWORD_OF[cls], statement.id) not in self.inactive:
-                    message = f"{statement.label()} rests while JOINT/{joint} is inactive"
-                    self.problems.append(Diagnostic(WARNING, message, self.deck.file, statement.line))
+                    self.remark(WARNING, statement, f"rests while JOINT/{joint} is inactive", " ")
 
     def marker_pair(self, s: Any) -> tuple[int, int | None]:
         if isinstance(s, st.Motion) and s.joint is not None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from gearmbs.adams.builders.builder import Builder
 from gearmbs.adams.builders.curve_data import curve_points
+from gearmbs.adams.errors import WARNING
 from gearmbs.adams.parse import statements as st
 from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson
 from gearmbs.mechanism.contacts.mesh_files import READERS, read_mesh
@@ -34,7 +35,10 @@ ROUND = 1e-9
 
 
 def add_contact(b: Builder, s: st.Contact) -> None:
-    """CONTACT between the solids of two parts."""
+    """CONTACT between the solids of two parts; of wheels that were written here, that of their pair."""
+    if s.pair:
+        _add_gears(b, s)
+        return
     sides: list[tuple[Marker, list[Shape]]] = []
     for refs in (s.igeom, s.jgeom):
         graphics = [b.deck.of(st.Graphics)[ref] for ref in refs]
@@ -52,6 +56,21 @@ def add_contact(b: Builder, s: st.Contact) -> None:
         sides.append((first, solids))
     (i, solids_i), (j, solids_j) = sides
     b.mechanism.contact(b.model.names["contact", s.id], i, solids_i, j, solids_j, law_of(b, s), friction_of(b, s))
+
+
+def _add_gears(b: Builder, s: st.Contact) -> None:
+    """Build the contact of a gear pair again, with the laws that the statement has now."""
+    from gearmbs.adams.pairs import pair_of, with_laws
+
+    pair = pair_of(s.pair)
+    law, friction = law_of(b, s), friction_of(b, s)
+    if not isinstance(law, Impact):
+        raise ValueError("POISSON between gears is not computed; give IMPACT")
+    changed = with_laws(pair, law, friction)
+    if changed is not pair:
+        b.remark(WARNING, s, "its laws are no longer those of the pair in the comments before it; its own are taken")
+    i, j = (b.markers[b.deck.of(st.Graphics)[refs[0]].marker or 0] for refs in (s.igeom, s.jgeom))
+    b.mechanism.gear_contact(b.model.names["contact", s.id], i, j, changed)
 
 
 def law_of(b: Builder, s: st.Contact) -> Impact | Poisson:

@@ -89,7 +89,8 @@ class AdamsModel:
                 for d in deck.of(st.Diff).values()
             }
             | {name: text for _, system in linear_systems(deck) for name, text in zip(system.names, system.rates())},
-            splines={s.id: spline_data(s) for s in deck.of(st.Spline).values()} | _curves(self.mechanism),
+            splines={s.id: spline_data(s) for s in deck.of(st.Spline).values() if s.data_file is None}
+            | _curves(self.mechanism),
             arrays=self.mechanism.arrays,
             functions=self.mechanism.functions,
             plants=self.mechanism.plants,

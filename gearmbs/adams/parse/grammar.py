@@ -21,6 +21,8 @@ REALS, REAL, INT, ID, IDS, FLAG, CHOICE, EXPRESSION, TEXT, WORD, WORDS, STRINGS,
 _KEY = re.compile(r"\s*([A-Za-z][A-Za-z0-9_]*)\s*(=)?")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?\Z")
 _SEPARATORS = "," + CONTINUED
+LARGEST = 1e100
+"""Number of an argument: squares and cubes of it can still be computed."""
 
 
 class StatementError(ValueError):
@@ -247,7 +249,7 @@ def real(text: str) -> float:
     if not _NUMBER.match(body):
         raise StatementError(f"{text.strip()[:40]!r} is not a number")
     value = float(re.sub("[dD]", "E", body))
-    if not math.isfinite(value) or abs(value) > 1e300:
+    if not math.isfinite(value) or abs(value) > LARGEST:
         raise StatementError(f"{text.strip()[:40]!r} is too large")
     return value * math.pi / 180.0 if degree else value
 

@@ -165,7 +165,7 @@ def read_statement(name: str, number: int, raw: RawStatement, start: int, file: 
         raise StatementError(f"an id is missing; write {name}/1")
     reader = ArgumentReader(raw, start, GRAMMARS[cls])
     values = reader.read()
-    return cls(id=number, file=file, line=raw.line, name=raw.view_name, given=reader.lines, **values)
+    return cls(id=number, file=file, line=raw.line, name=raw.view_name, given=reader.lines, pair=raw.pair, **values)
 
 
 def unknown_statement(word: str, names: Iterable[str]) -> str:

@@ -17,6 +17,7 @@ from gearmbs.adams.errors import ERROR, DeckError, Diagnostic
 
 CONTINUED = "\x01"
 _VIEW_NAME = re.compile(r"(?:adams_)?view_name\s*=\s*['\"]([^'\"]*)['\"]", re.IGNORECASE)
+_PAIR = re.compile(r"\s*gearmbs pair:(.*)")
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
 
 
@@ -34,12 +35,15 @@ class RawStatement:
         The source line numbers.
     view_name : str or None
         Name from an ``adams_view_name`` comment in front.
+    pair : str
+        What comments in front say of a gear pair.
     """
 
     text: str
     starts: tuple[int, ...]
     lines: tuple[int, ...]
     view_name: str | None = None
+    pair: str = ""
 
     @property
     def line(self) -> int:
@@ -97,13 +101,14 @@ def statements(text: str, first_line: int = 1, skip: int = 0) -> Iterator[RawSta
     length = 0
     name: str | None = None
     pending: str | None = None
+    pair = pending_pair = ""
     open_end = False
 
     def flush() -> Iterator[RawStatement]:
-        nonlocal pieces, starts, lines, length, name
+        nonlocal pieces, starts, lines, length, name, pair
         if pieces and "".join(pieces).strip(" \t," + CONTINUED):
-            yield RawStatement("".join(pieces), tuple(starts), tuple(lines), name)
-        pieces, starts, lines, length, name = [], [], [], 0, None
+            yield RawStatement("".join(pieces), tuple(starts), tuple(lines), name, pair)
+        pieces, starts, lines, length, name, pair = [], [], [], 0, None, ""
 
     def add(piece: str, number: int) -> None:
         nonlocal length
@@ -120,6 +125,9 @@ def statements(text: str, first_line: int = 1, skip: int = 0) -> Iterator[RawSta
         found = _VIEW_NAME.search(comment) if comment else None
         if found:
             pending = found.group(1)
+        more = _PAIR.match(comment) if comment else None
+        if more:
+            pending_pair += more.group(1).strip()
         body = _CONTROL.sub(" ", body).replace("\t", " ").rstrip()
         stripped = body.lstrip()
         if not stripped:
@@ -130,7 +138,7 @@ def statements(text: str, first_line: int = 1, skip: int = 0) -> Iterator[RawSta
             add(" " + stripped, number)
         else:
             yield from flush()
-            name, pending = pending, None
+            name, pending, pair, pending_pair = pending, None, pending_pair, ""
             add(stripped, number)
         open_end = pieces[-1].endswith("&")
         if open_end:

@@ -22,6 +22,8 @@ class Statement:
         From an ``adams_view_name`` comment.
     given : mapping of str to int
         Source line of every argument that was given.
+    pair : str
+        A gear pair in comments in front, see `gearmbs.adams.pairs`.
     """
 
     keyword: ClassVar[str] = ""
@@ -32,6 +34,7 @@ class Statement:
     line: int = 0
     name: str | None = None
     given: dict[str, int] = field(default_factory=dict, compare=False)
+    pair: str = ""
 
     def __init_subclass__(cls, keyword: str | None = None, **options: Any) -> None:
         super().__init_subclass__(**options)

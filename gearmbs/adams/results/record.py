@@ -16,10 +16,12 @@ from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.units import RESULT_NAMES, unit_names
 from gearmbs.adams.results.assembly import Assembly
 from gearmbs.adams.results.requests import RequestSeries
+from gearmbs.adams.results.tracks import TRACK_COLUMNS, TRACK_DIMENSIONS, track_table
 from gearmbs.dae.analyses.modes import Modes
 from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.analyses.statics import StaticResult
 from gearmbs.dae.results.solution import Solution
+from gearmbs.mechanism.contacts import ContactTracks
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,6 +54,8 @@ class Segment:
         Values in the deck's units.
     wrenches : dict
         (kind, id) -> force and torque on the I side, global components, SI, shape (m, 6).
+    tracks : dict of int to ContactTracks
+        What happened where the solids of a CONTACT touched, by id, SI.
     """
 
     command: Simulate
@@ -62,6 +66,7 @@ class Segment:
     note: str | None = None
     requests: dict[int, RequestSeries] = field(default_factory=dict)
     wrenches: dict[tuple[str, int], np.ndarray] = field(default_factory=dict)
+    tracks: dict[int, ContactTracks] = field(default_factory=dict)
     equilibrium: StaticResult | None = None
     assembly: Assembly | None = None
     passage: tuple[float, str] | None = None
@@ -179,6 +184,21 @@ class RunRecord:
         rows = [s.wrenches.get((kind, number), np.zeros((s.solution.t.size, 6))) for s in self.segments]
         return np.concatenate(rows or [np.zeros((0, 6))]) / scale
 
+    def tracks(self, number: int) -> np.ndarray:
+        """Return where and how the solids of CONTACT/number touched, shape (m, tracks, 28), deck units.
+
+        Points that share one load are one track, which goes on from one output time to the next; zero while it does not
+        touch. Columns: `TRACK_COLUMNS`, as ADAMS's postprocessor names them, such as "I_Point.X" and "Slip_Velocity.Z",
+        global components, at last "Penetration.Depth".
+        """
+        parts = [(s.solution.t.size, s.tracks.get(number)) for s in self.segments]
+        return track_table(parts, self.deck.units)
+
+    @property
+    def track_units(self) -> tuple[str, ...]:
+        """The units of the columns of tracks."""
+        return tuple(self.unit(d) for d in TRACK_DIMENSIONS)
+
     @property
     def elements(self) -> list[tuple[str, int]]:
         """Kind and id of everything whose force is known."""
@@ -244,6 +264,10 @@ class RunRecord:
         for kind, number in self.elements:
             along = columns("force", FORCE_COLUMNS, (self.unit("force"),) * 3 + (self.unit("torque"),) * 3)
             data[f"{kind}_{number}"] = (along, self.force(kind, number), {"long_name": f"{kind.upper()}/{number}"})
+            tracks = self.tracks(number) if kind == "contact" else np.zeros((0, 0, 0))
+            if tracks.size:
+                time, component = columns("track", TRACK_COLUMNS, self.track_units)
+                data[f"contact_{number}_tracks"] = ((time, f"contact_{number}_track", component), tracks)
         out = xr.Dataset(data, coords=coords)
         out.attrs["title"] = self.deck.title
         out.attrs["units"] = ", ".join(f"{d}: {self.unit(d)}" for d in ("length", "mass", "time", "force", "angle"))

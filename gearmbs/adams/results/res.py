@@ -12,6 +12,7 @@ import numpy as np
 from gearmbs.adams.builders.model import KINDS
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.results.record import FORCE_COLUMNS, PART_COLUMNS, PART_DIMENSIONS, RunRecord
+from gearmbs.adams.results.tracks import TRACK_COLUMNS
 
 NAMESPACE = "http://www.mscsoftware.com/:xrf10"
 ENTITY_TYPES = {
@@ -51,11 +52,26 @@ def _entities(result: RunRecord) -> Iterator[_Entity]:
             f'name={quoteattr(name)} entity={quoteattr(name)} entType="{ENTITY_TYPES[kind]}" objectId="{number}"'
         )
         yield _Entity(attributes, FORCE_COLUMNS, wrench_units, result.force(kind, number))
+        if kind == "contact":
+            yield from _tracks(result, number, name)
     for number, request in deck.of(st.Request).items():
         name = request.results_name or request.name or f"REQUEST_{number}"
         names = result.segments[0].requests[number].names if result.segments else ()
         attributes = f'name={quoteattr(name)} entity={quoteattr(name)} entType="Request" objectId="{number}"'
         yield _Entity(attributes, names, result.request_units(number), result.request(number))
+
+
+def _tracks(result: RunRecord, number: int, contact: str) -> Iterator[_Entity]:
+    """Yield the sets of components of every track of a contact: CONTACT_1.Track_1.I_Point and so on."""
+    table, units = result.tracks(number), result.track_units
+    names = [column.split(".") for column in TRACK_COLUMNS]
+    for track in range(table.shape[1]):
+        for first in dict.fromkeys(name for name, _ in names):
+            at = [k for k, (name, _) in enumerate(names) if name == first]
+            full = quoteattr(f"{contact}.Track_{track + 1}.{first}")
+            attributes = f'name={full} entity={quoteattr(contact)} entType="Contact" objectId="{number}"'
+            components = tuple(names[k][1] for k in at)
+            yield _Entity(attributes, components, tuple(units[k] for k in at), table[:, track, at])
 
 
 def _package_version() -> str:

@@ -22,6 +22,7 @@ from gearmbs.adams.results.assembly import assembly_of
 from gearmbs.adams.results.record import NEWTON, Segment
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.results.result import AdamsResult
+from gearmbs.adams.results.tracks import tracks_of
 from gearmbs.adams.run.plant import plant_of
 from gearmbs.adams.run.script_check import check_linear, check_script, is_sequence
 from gearmbs.adams.run.sensors import MOST, Watch, act, after, up_to
@@ -294,6 +295,7 @@ def _part(
             raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, request.line)]) from error
     for kind_id in model.pairs:
         segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
+    segment.tracks = tracks_of(model, solution)
     if kind not in ("STATICS", "INITIAL_CONDITIONS"):
         segment.passage = singular_passage(solution)
     _remember(session, model, segment, evaluator)

@@ -21,6 +21,8 @@ AT_START: dict[type, frozenset[str]] = {
     st.Diff: frozenset(["ic"]),
 }
 """Arguments that say how the first analysis starts."""
+MOST_OUTPUTS = 10_000_000
+"""Output steps of an analysis: more would not fit into memory."""
 
 
 @dataclass
@@ -150,6 +152,10 @@ def output_times(session: Session, command: Simulate) -> np.ndarray:
         message = f"END = {end}, but the model is at time {session.time} already"
         raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
     span = end - session.time
+    asked = (command.steps or 100) if command.dtout is None else span / command.dtout
+    if asked > MOST_OUTPUTS:
+        message = f"{asked:.3g} output steps are asked for; more than {MOST_OUTPUTS:.0e} are not kept: give fewer"
+        raise DeckError([Diagnostic(ERROR, message, command.file, command.line)])
     if command.dtout is None:
         return session.time + span * np.arange((command.steps or 100) + 1) / (command.steps or 100)
     count = int(np.floor(span / command.dtout * (1.0 + 1e-12) + 1e-9))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -20,6 +21,8 @@ class WriterContext(Protocol):
     mechanism : Mechanism
     units : Units
         SI values of the units that are written.
+    path : path or None
+        Of the deck.
     markers, centers : dict of int to int
         Marker ids by ``id(marker)``, and of the marker at the centre of mass by ``id(body)``.
     elements : dict of (str, str) to int
@@ -28,6 +31,7 @@ class WriterContext(Protocol):
 
     mechanism: Mechanism
     units: Units
+    path: str | Path | None
     markers: dict[int, int]
     centers: dict[int, int]
     elements: dict[tuple[str, str], int]
@@ -40,6 +44,9 @@ class WriterContext(Protocol):
 
     def new_marker(self, body: Body, position: np.ndarray, axes: np.ndarray, floating: bool = False) -> int:
         """Write a marker on a body and return its id."""
+
+    def graphics(self, arguments: Iterable[str], name: str) -> int:
+        """Write a GRAPHICS and return its id."""
 
     def expression(self, text: str) -> str:
         """Return an expression with names replaced by ids."""

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from gearmbs.adams.builders.constraints import JOINT_KINDS, JPRIM_KINDS
 from gearmbs.adams.parse.units import TABLES
+from gearmbs.adams.write.contacts import contact_statements
 from gearmbs.adams.write.elements import KEYWORDS, as_expressions, element_arguments, hidden, kept, states_of
+from gearmbs.adams.write.gear_solids import gear_solid_statements
 from gearmbs.adams.write.gears import gear_statements, is_gear_contact
 from gearmbs.adams.write.output import integrator_statement, request_statements
 from gearmbs.adams.write.text import listed, number, wrapped
@@ -19,6 +21,7 @@ from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations.rotation import euler_from_matrix
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism, Torque
+from gearmbs.mechanism.contacts import SolidContact
 from gearmbs.mechanism.elements import AXIS_FORCE, AXIS_TORQUE, LINE, Load
 from gearmbs.mechanism.elements import COMPONENTS as COMPONENT_MODE
 from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
@@ -47,11 +50,13 @@ def write_deck(
     formulation: str = "SI2",
     tol: float | None = None,
     max_step: float | None = None,
+    gears: Literal["expressions", "solids"] = "expressions",
 ) -> str:
     """Write a mechanism as an .adm file, in the mechanism's units.
 
-    Contacts of gears with parallel axes become GFORCEs of IMPACT expressions along both lines of action; their
-    friction and the contact of tooth corners beyond the path of contact are left out, as comments say.
+    Contacts of solids become GRAPHICS and CONTACTs, meshes .obj files beside the deck. Contacts of gears with parallel
+    axes become GFORCEs of IMPACT expressions along both lines of action; their friction and the contact of tooth
+    corners beyond the path of contact are left out, as comments say. Or they become CONTACTs of solids.
 
     Parameters
     ----------
@@ -71,6 +76,9 @@ def write_deck(
         Its ERROR.
     max_step : float, optional
         Its HMAX, s.
+    gears : {"expressions", "solids"}
+        ``solids``: gear contacts become CONTACTs between meshes of the wheels, in .obj files beside the deck. Comments
+        hold the whole pair, so that the deck, read back here, has the exact contact again, with friction and faults.
 
     Returns
     -------
@@ -82,7 +90,9 @@ def write_deck(
     ModelError
         Naming what cannot be written.
     """
-    writer = DeckWriter(mechanism)
+    if gears not in ("expressions", "solids"):
+        raise ModelError(f"gears = {gears!r}; choose 'expressions' or 'solids'")
+    writer = DeckWriter(mechanism, path, gears)
     writer.model(title)
     request_statements(writer, requests or {}, output)
     if output:
@@ -98,8 +108,10 @@ def write_deck(
 class DeckWriter:
     """Numbers the parts of a mechanism and writes their statements."""
 
-    def __init__(self, mechanism: Mechanism) -> None:
+    def __init__(self, mechanism: Mechanism, path: str | Path | None = None, gears: str = "expressions") -> None:
         self.mechanism = mechanism
+        self.path = path
+        self.gears = gears
         self.units = mechanism.units
         self.lines: list[str] = []
         self.bodies: dict[int, int] = {}
@@ -116,6 +128,7 @@ class DeckWriter:
         self.arrays = {_upper(k): n for n, k in enumerate(mechanism.arrays, 1)}
         self.plants = {(kind, _upper(k)): n for n, (kind, k) in enumerate(mechanism.plants, 1)}
         self._next_marker = 1
+        self._solids = 0
 
     def _numbered(self, table: Iterable[Any]) -> dict[Any, int]:
         """Number variables or states, without those that a statement stands for."""
@@ -161,6 +174,12 @@ class DeckWriter:
             arguments += self._frame("QP", position, axes)
         self.statement(f"MARKER/{number_}", arguments)
         return number_
+
+    def graphics(self, arguments: Iterable[str], name: str) -> int:
+        """Write a GRAPHICS and return its id."""
+        self._solids += 1
+        self.statement(f"GRAPHICS/{self._solids}", arguments, name)
+        return self._solids
 
     def _frame(self, keyword: str, position: np.ndarray, axes: np.ndarray) -> list[str]:
         out = []
@@ -246,7 +265,8 @@ class DeckWriter:
         for name in self.mechanism.constraints:
             yield name, "gcon"
         for name, element in self.mechanism.elements.items():
-            yield name, self.kept.get(name) or load_statement(as_expressions(element)).lower()
+            solid = isinstance(element, SolidContact) or (self.gears == "solids" and is_gear_contact(element))
+            yield name, "contact" if solid else self.kept.get(name) or load_statement(as_expressions(element)).lower()
 
     def _parts(self) -> None:
         for body in (self.mechanism.ground, *self.mechanism.bodies.values()):
@@ -387,6 +407,10 @@ class DeckWriter:
         elif isinstance(element, Torque):
             text = self.expression(function_text(element.function, self.units.time, self.units.factor("torque")))
             self._gforce(name, element.i, element.j, element.axis, {"TZ": text})
+        elif isinstance(element, SolidContact):
+            contact_statements(self, name, element)
+        elif is_gear_contact(element) and self.gears == "solids":
+            gear_solid_statements(self, name, element)
         elif is_gear_contact(element):
             gear_statements(self, name, element)
         else:

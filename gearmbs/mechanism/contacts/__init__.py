@@ -20,9 +20,11 @@ if TYPE_CHECKING:
         extruded,
         revolved,
     )
+    from gearmbs.mechanism.contacts.tracks import ContactTracks, contact_tracks
 
 __all__ = [
     "Box",
+    "ContactTracks",
     "Coulomb",
     "Cylinder",
     "Ellipsoid",
@@ -35,6 +37,7 @@ __all__ = [
     "SolidContact",
     "Sphere",
     "Torus",
+    "contact_tracks",
     "extruded",
     "read_mesh",
     "revolved",
@@ -49,5 +52,6 @@ late(
             ("Box", "Cylinder", "Ellipsoid", "Frustum", "HalfSpace", "Mesh", "Shape", "Sphere", "Torus"), ".shapes"
         ),
         **dict.fromkeys(("extruded", "revolved"), ".shapes"),
+        **dict.fromkeys(("ContactTracks", "contact_tracks"), ".tracks"),
     },
 )

@@ -218,6 +218,20 @@ def table_sizes(shape: Shape) -> tuple[int, np.ndarray]:
     return fields.MESH, np.r_[0.5 * np.ptp(shape.vertices, axis=0), 0.0]
 
 
+def vertex_weights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the weight of each vertex: of the triangles around it, the area times the angle there.
+
+    The corners of a rectangle so have the same weight whichever way its diagonal runs.
+    """
+    weights = np.zeros(len(vertices))
+    for k in range(3):
+        here, ahead, behind = (vertices[triangles[:, (k + q) % 3]] for q in range(3))
+        one, other = ahead - here, behind - here
+        area = np.linalg.norm(np.cross(one, other), axis=1)
+        np.add.at(weights, triangles[:, k], area * np.arctan2(area, np.sum(one * other, axis=1)))
+    return weights
+
+
 class _Tables:
     """The tables of a contact as they grow."""
 
@@ -250,12 +264,7 @@ class _Tables:
             # the origin goes to the middle of the box that holds it
             middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
             offset, vertices = offset + shape.axes @ middle, vertices - middle
-        weights = np.zeros(len(vertices))
-        if len(triangles):
-            a, b, c = (vertices[triangles[:, k]] for k in range(3))
-            areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-            for k in range(3):
-                np.add.at(weights, triangles[:, k], areas)
+        weights = vertex_weights(vertices, triangles)
         at, points, faces = self.n_reals, self.n_reals + kernel.SOLID_REALS, self.n_triangles
         self._append(np.concatenate([shape.axes.ravel(), offset, sizes, vertices.ravel(), weights]))
         self.triangles.append(triangles.ravel())

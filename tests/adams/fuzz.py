@@ -1,0 +1,190 @@
+"""Carry mutated decks through everything that a user's deck goes through: ``python -m tests.adams.fuzz``.
+
+Each deck is read, built and its expressions compiled, as before every run; one in a few is run, too. It must end in a
+result or in an error with a line, within its time. What does not is printed with its seed, from which
+``--only SEED`` makes it again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import random
+import signal
+import sys
+import time
+import traceback
+import warnings
+from collections.abc import Iterator
+from functools import cache
+
+from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
+from gearmbs.adams.builders.routines import bound
+from gearmbs.adams.run.script_check import check_script
+
+from . import (
+    test_accelerations,
+    test_contacts,
+    test_curves,
+    test_linear_systems,
+    test_passages,
+    test_redundancy,
+    test_routines,
+    test_sensors,
+)
+from .decks import EVERYTHING, PENDULUM, SCRIPT
+from .mutations import mutated
+
+SECONDS = 60
+"""In which a deck must be done."""
+CHECKED = "m\no\nSIMULATE/DYNAMICS, END=0.002, STEPS=2\n"
+RUNS = [
+    CHECKED, "m\no\nSIMULATE/KINEMATICS, END=0.002, STEPS=2\n", "m\no\nSIMULATE/STATICS\n", "m\no\nLINEAR/EIGENSOL\n",
+    "m\no\nSIMULATE/STATICS, END=0.002, STEPS=2\n", "m\no\nSIMULATE/INITIAL_CONDITIONS\n",
+    "m\no\nSIM/DYN, END=0.001, STEPS=1\nDEACT/JOINT, RANGE=1,3\nSIM/DYN, END=0.002, STEPS=1\n",
+]  # fmt: skip
+
+
+class Slow(Exception):
+    """A deck took too long."""
+
+
+def without(deck: str, *heads: str) -> str:
+    """Return a deck without some of its statements."""
+    whole = deck.replace("\n,", "\r,").split("\n")
+    kept = [line for line in whole if not line.startswith(tuple(f"{h}," for h in heads))]
+    return "\n".join(kept).replace("\r,", "\n,")
+
+
+@cache
+def corpus() -> list[str]:
+    """Return decks that run, of all kinds of statements."""
+    curves = test_curves
+    cam = "CURVE/1, CLOSED, CURVE_POINTS, MATRIX=1\nPTCV/1, I=30, CURVE=1, RM=20, JFLOAT=32"
+    turned = {"height": 50.0, "mass": curves.MASS, "speed": curves.SPEED, "g": curves.G}
+    unbuilt = "TFSISO/1", "JOINT/6", "JOINT/10", "JPRIM/4", "GEAR/1", "TIRE/1"
+    built = without(EVERYTHING, *unbuilt)
+    locked = *(f"JOINT/{k}" for k in range(2, 12)), "JPRIM/1", "JPRIM/2", "JPRIM/3", "COUPLER/1", "GCON/1", "MOTION/1"
+    runs = without(built, *locked, "PTCV/1", "CVCV/1")
+    solids = [
+        "GRAPHICS/2, BOX, CORNER=21, X=20, Y=40, Z=60", "GRAPHICS/2, CYLINDER, CM=22, LENGTH=30, RADIUS=10",
+        "GRAPHICS/2, FRUSTUM, CM=22, LENGTH=30, TOP=5, BOTTOM=10", "GRAPHICS/2, TORUS, CM=20, MAJOR=20, MINOR=5",
+    ]  # fmt: skip
+    rubbing = test_contacts.IMPACT + (
+        ", COULOMB_FRICTION=ON, MU_STATIC=0.2, MU_DYNAMIC=0.2, STICTION_TRANSITION_VELOCITY=0.5, "
+        "FRICTION_TRANSITION_VELOCITY=1"
+    )
+    sensors = [
+        "SENSOR/1, LE, VALUE=9.99999, FUNCTION=DZ(20), EVALUATE=50 + 0*DZ(20), RETURN",
+        "SENSOR/1, GE, VALUE=0.001, FUNCTION=TIME, CODGEN, RESTART, STEPSIZE=1E-5, YYDUMP, PRINT, DT=1E-4",
+    ]
+    return [
+        *[PENDULUM] * 4, EVERYTHING, *[built] * 4, *[runs] * 3, test_contacts.deck(),
+        test_contacts.deck(contact=rubbing),
+        *(test_contacts.deck(solids=f"{test_contacts.PLANE}\n{s}") for s in solids),
+        curves.DECK.format(touch=cam, matrices=curves.matrix(1, curves.circle(50.0, 20.0)), **turned),
+        test_linear_systems.HEAD + test_linear_systems.SYSTEM + "END\n",
+        test_linear_systems.HEAD + test_linear_systems.LOOP.format(force="ARYVAL(3,1)") + "END\n",
+        test_accelerations.DECK.format(extra=test_accelerations.ASKED),
+        test_passages.DECK.format(x=0.8, y=0.6, end=1.6, rod=1.0, start=1.6, stroke=1.0),
+        test_redundancy.DOOR, test_redundancy.PARALLEL,
+        test_routines.DECK.format(force=test_routines.PULLED.format("USER(0.3, 0.01, 2)")),
+        *(test_sensors.DECK.format(sensor=s, start=", QG=0,0,10") for s in sensors),
+    ]  # fmt: skip
+
+
+def carried_through(deck: str, script: str, rng: random.Random, run: bool) -> str:
+    """Read, build and perhaps run; return what came of it.
+
+    Raises
+    ------
+    AssertionError
+        If an error names no place.
+    """
+    skip = rng.random() < 0.7
+    routines = {"SFOSUB": test_routines.pull}
+    try:
+        parsed = bound(parse_deck(deck, "fuzz"), routines, skip)
+        commands = parse_script(script, "fuzz")
+        if run:
+            result = run_deck(parsed, commands, allow_unsupported=skip, routines=routines)
+            assert result.success or result.messages
+            return "ran" if result.success else "stopped"
+        check_script(parsed, commands, skip)
+        return "built"
+    except DeckError as error:
+        placed = [d.message and d.line >= 0 for d in error.diagnostics]
+        if not placed or not all(placed):
+            raise AssertionError(f"an error without a place: {error.diagnostics}") from error
+        return "refused"
+
+
+def case(seed: int, share: float) -> tuple[str, str, random.Random, bool]:
+    """Return deck, script, generator and whether it is run, of a seed."""
+    rng = random.Random(seed)
+    deck = mutated(rng.choice(corpus()), rng)
+    run = rng.random() < share
+    if rng.random() < 0.1:
+        return deck, mutated(SCRIPT, rng), rng, False
+    return deck, rng.choice(RUNS) if run else CHECKED, rng, run
+
+
+@contextlib.contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """Raise `Slow` after some time."""
+
+    def late(*_: object) -> None:
+        raise Slow(f"longer than {seconds} s")
+
+    signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+def outcome(seed: int, share: float, seconds: float = SECONDS) -> str:
+    """Carry the deck of a seed through; return what came of it, a traceback if it failed."""
+    deck, script, rng, run = case(seed, share)
+    try:
+        with limited(seconds), contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+            warnings.simplefilter("error")
+            return carried_through(deck, script, rng, run)
+    except Exception:
+        return "failed\n" + traceback.format_exc()
+
+
+def main() -> None:
+    """Carry many decks through; print what failed, and how many ended how."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--first", type=int, default=0, help="first seed")
+    parser.add_argument("--share", type=float, default=0.1, help="share of the decks that are run")
+    parser.add_argument("--only", type=int, help="carry one seed through, and print its deck")
+    given = parser.parse_args()
+    if given.only is not None:
+        deck, script, _, run = case(given.only, given.share)
+        print(deck, script, f"run: {run}", outcome(given.only, given.share), sep="\n")
+        return
+    for deck in corpus():
+        for script in RUNS:
+            # what is compiled now takes no deck's time
+            carried_through(deck, script, random.Random(0), True)
+    counts: dict[str, int] = {}
+    began = time.process_time()
+    for seed in range(given.first, given.first + given.count):
+        print(seed, file=sys.stderr, end="\r", flush=True)
+        found = outcome(seed, given.share)
+        word = found.split("\n", 1)[0]
+        counts[word] = counts.get(word, 0) + 1
+        if word == "failed":
+            print(f"seed {seed}: {found.strip()}\n", flush=True)
+        if (seed + 1 - given.first) % 1000 == 0:
+            print(seed + 1, counts, f"{time.process_time() - began:.0f} s", flush=True)
+    print("end", counts, f"{time.process_time() - began:.0f} s of processor time", flush=True)
+
+
+if __name__ == "__main__":
+    main()
