@@ -17,9 +17,12 @@ import numpy as np
 from gearmbs._jit import njit
 from gearmbs.bearings import layout as B
 from gearmbs.bearings.laws_kernel import (
+    ball_centre,
     ball_law,
     ball_law_at_speed,
+    ball_potential,
     hertz_energy,
+    positive_part,
     roller_law,
     roller_law_at_speed,
     write_ball_law,
@@ -53,7 +56,7 @@ def element_sums(ints, reals, states, want, work):
     if ints[B.CENTRIFUGAL]:
         cage = work[B.S_SPIN] + work[B.S_CAGE] * spin
         load = reals[B.MASS_RADIUS] * cage * cage
-    if is_plain(ints, reals):
+    if is_plain(ints):
         # most bearings
         plain_balls(ints, reals, cosine, sine, want, work)
         return
@@ -66,9 +69,9 @@ def element_sums(ints, reals, states, want, work):
 
 
 @njit(cache=True, error_model="numpy")
-def is_plain(ints, reals):
-    """Return whether elements are balls with one path, without profiles, centrifugal load and smooth transition."""
-    plain = ints[B.KIND] == B.BALL and ints[B.PATHS] == 1 and not ints[B.CENTRIFUGAL] and reals[B.SMOOTH] == 0.0
+def is_plain(ints):
+    """Return whether elements are balls with one path, without profiles and centrifugal load."""
+    plain = ints[B.KIND] == B.BALL and ints[B.PATHS] == 1 and not ints[B.CENTRIFUGAL]
     return plain and ints[B.OUTER_NODES] + ints[B.INNER_NODES] + ints[B.SPIN_NODES] == 0
 
 
@@ -87,6 +90,7 @@ def plain_balls(ints, reals, cosine, sine, want, work):
     radius, height = reals[p + B.PATH_RADIUS], reals[p + B.PATH_HEIGHT]
     stiffness, chi = reals[B.STIFFNESS], reals[B.DAMPING]
     radial, axial, distance = reals[p + B.PATH_RADIAL], reals[p + B.PATH_AXIAL] + work[2], reals[B.DISTANCE]
+    width = reals[B.SMOOTH]
     d0, d1, a0, a1 = work[0], work[1], work[B.S_TILT], work[B.S_TILT + 1]
     v0, v1, v2 = work[B.S_V], work[B.S_V + 1], work[B.S_V + 2]
     rate0, rate1 = work[B.S_TILT + 2], work[B.S_TILT + 3]
@@ -98,7 +102,7 @@ def plain_balls(ints, reals, cosine, sine, want, work):
     energy = damping = largest = loaded = deepest = 0.0
     for _ in range(ints[B.ELEMENTS]):
         own_c, own_s = reals[at + B.ELEMENT_COSINE], reals[at + B.ELEMENT_SINE]
-        reach = distance - reals[at + B.ELEMENT_OVERSIZE]
+        reach = distance - reals[at + B.ELEMENT_OVERSIZE] - width
         at += B.ELEMENT_COLUMNS
         c, s = cosine * own_c - sine * own_s, sine * own_c + cosine * own_s
         phi = a0 * c + a1 * s
@@ -107,13 +111,18 @@ def plain_balls(ints, reals, cosine, sine, want, work):
         if square <= reach * reach:
             continue
         length = np.sqrt(square)
-        delta, nx, ny = length - reach, x / length, y / length
+        delta, nx, ny = length - reach - width, x / length, y / length
+        part, part_slope = delta, 1.0
+        if width > 0.0:
+            part, part_slope = positive_part(delta, width)
         lever = nx * height - ny * radius
         along = nx * (d1 * c - d0 * s) + lever * (a1 * c - a0 * s)
         rate = nx * (v0 * c + v1 * s) + ny * v2 + lever * (rate0 * c + rate1 * s) + along * turn
-        elastic = stiffness * delta * np.sqrt(delta)
+        root = stiffness * np.sqrt(part)
+        elastic = root * part
         factor = 1.0 + chi * rate
-        energy += 0.4 * elastic * delta
+        if want & DIAGNOSTICS:
+            energy += hertz_energy(stiffness, 1.5, delta, width, reals[B.SMOOTH_WORK])
         if factor <= 0.0:
             # it parts faster than the surfaces follow: nothing is given back
             damping -= elastic * rate
@@ -126,7 +135,7 @@ def plain_balls(ints, reals, cosine, sine, want, work):
         loaded += 1.0
         largest, deepest = max(largest, f), max(deepest, delta)
         if want & DERIVATIVES:
-            write_ball_law(elastic, 1.5 * elastic / delta, nx, ny, length, law)
+            write_ball_law(elastic, 1.5 * root * part_slope, nx, ny, length, law)
             path_slopes(ints, reals, work, c, s, 0, -1, f, factor)
     work[B.S_LOCAL], work[B.S_LOCAL + 1], work[B.S_LOCAL + 2] = f0, f1, f2
     work[B.S_LOCAL + 3], work[B.S_LOCAL + 4], work[B.S_LOCAL + B.PSI] = f3, f4, by_cage
@@ -168,7 +177,7 @@ def one_path(ints, reals, states, want, work, j, path, c, s, load):
     if ints[B.KIND] == B.BALL:
         x, y = reals[p + B.PATH_RADIAL] + lift, reals[p + B.PATH_AXIAL] + axial
         if ints[B.CENTRIFUGAL]:
-            delta, energy = ball_law_at_speed(reals, x, y, h, load, law)
+            delta, energy = shared_centre(ints, reals, want, work, path, x, y, u_r, phi, h, load, law)
         else:
             delta = ball_law(
                 share * reals[B.STIFFNESS], reals[B.EXPONENT], reals[B.DISTANCE], reals[B.SMOOTH], x, y, h, law
@@ -182,7 +191,9 @@ def one_path(ints, reals, states, want, work, j, path, c, s, load):
             roller_law(share * reals[B.STIFFNESS], reals[B.EXPONENT], reals[B.SMOOTH], nx, ny, delta, law)
     if want & DIAGNOSTICS:
         if not ints[B.CENTRIFUGAL]:
-            energy = hertz_energy(share * reals[B.STIFFNESS], reals[B.EXPONENT], delta, reals[B.SMOOTH])
+            energy = hertz_energy(
+                share * reals[B.STIFFNESS], reals[B.EXPONENT], delta, reals[B.SMOOTH], reals[B.SMOOTH_WORK]
+            )
         work[B.S_SUMS + 1] += energy
     if law[0] <= 0.0:
         return
@@ -219,6 +230,45 @@ def one_path(ints, reals, states, want, work, j, path, c, s, load):
         work[B.S_SUMS + 5] = max(work[B.S_SUMS + 5], delta)
     if want & DERIVATIVES:
         path_slopes(ints, reals, work, c, s, path, spin, f, factor)
+
+
+@njit(cache=True, error_model="numpy")
+def shared_centre(ints, reals, want, work, path, x, y, u_r, phi, h, load, law):
+    """Write a path's contact of a ball with centrifugal load; return its deflection and, with the first path, energy.
+
+    The centre of a four-point bearing's ball is found with the first path and kept in the scratch for the second.
+
+    Parameters
+    ----------
+    ints, reals, want, work
+        As in `element_sums`.
+    path : int
+    x, y : float
+        From the groove centre of the outer to that of the inner ring, m.
+    u_r, phi : float
+        Radial displacement and tilt of the inner ring at the ball.
+    h, load : float
+        Missing material, m, and centrifugal load, N.
+    law : ndarray
+        See `ball_law_at_speed`.
+    """
+    p = ints[B.AT_PATHS] + B.PATH_COLUMNS * path
+    other = ints[B.AT_PATHS] + B.PATH_COLUMNS * (ints[B.PATHS] - 1 - path)
+    height = reals[other + B.PATH_HEIGHT]
+    other_x = reals[other + B.PATH_RADIAL] + u_r + height * phi
+    other_y = reals[other + B.PATH_AXIAL] + work[2] - reals[other + B.PATH_RADIUS] * phi
+    energy, apart = 0.0, reals[B.OUTER_APART]
+    vz = work[B.S_CENTRE + 1] - apart
+    if path == 0:
+        vr, vz = ball_centre(reals, x, y, other_x, other_y, h, load)
+        work[B.S_CENTRE], work[B.S_CENTRE + 1] = vr, vz
+        if want & DIAGNOSTICS:
+            energy = ball_potential(reals, x, y, other_x, other_y, h, load, vr, vz)
+    else:
+        apart = -apart
+    twist = height - reals[p + B.PATH_HEIGHT]
+    delta = ball_law_at_speed(reals, x, y, other_x, other_y, apart, twist, h, work[B.S_CENTRE], vz, law)
+    return delta, energy
 
 
 @njit(cache=True, error_model="numpy")
@@ -320,8 +370,9 @@ def path_slopes(ints, reals, work, c, s, path, spin, f, factor):
         bent[B.BETA + spin] = -profile[5] * rates[B.BETA + spin]
     chi = law[0] * reals[B.DAMPING]
     for k in range(n):
-        push = law[3] * gx[k] + law[4] * gy[k] + law[5] * gh[k]
-        veer = law[7] * gx[k] + law[8] * gy[k] + law[9] * gh[k]
+        tilt = c if k == 3 else (s if k == 4 else (phi_t if k == B.PSI else 0.0))
+        push = law[3] * gx[k] + law[4] * gy[k] + law[5] * gh[k] + law[11] * tilt
+        veer = law[7] * gx[k] + law[8] * gy[k] + law[9] * gh[k] + law[12] * tilt
         slope[k] = factor * push + chi * (sweep * veer + bent[k])
         sum_q[k] += slope[k]
         sum_v[k] += chi * g[k]

@@ -45,14 +45,23 @@ def hertz_force(stiffness, exponent, delta):
 
 
 @njit(cache=True, error_model="numpy")
-def hertz_energy(stiffness, exponent, delta, width):
-    """Return the work stored at a deflection: the integral of K s(delta)^n."""
+def hertz_energy(stiffness, exponent, delta, width, transition):
+    """Return the work stored at a deflection: the integral of K s(delta)^n.
+
+    Parameters
+    ----------
+    stiffness, exponent : float
+        K and n.
+    delta, width : float
+        m.
+    transition : float
+        Work of the whole transition by K.
+    """
     if delta >= width:
-        stored = stiffness * delta ** (exponent + 1.0) / (exponent + 1.0)
+        stored = hertz_force(stiffness, exponent, delta)[0] * delta
         if width > 0.0:
-            stored += hertz_energy_within(stiffness, exponent, width, width)
-            stored -= stiffness * width ** (exponent + 1.0) / (exponent + 1.0)
-        return stored
+            stored -= hertz_force(stiffness, exponent, width)[0] * width
+        return stored / (exponent + 1.0) + stiffness * transition
     return hertz_energy_within(stiffness, exponent, delta, width)
 
 
@@ -90,8 +99,9 @@ def ball_law(stiffness, exponent, distance, width, x, y, h, law):
         From the groove centre of the outer to that of the inner ring, m.
     h : float
         Missing material, m.
-    law : ndarray, shape (11,)
-        Out: Q, n (2), dQ by x, y, h, F, d(alpha) by x, y, h, F. Only Q where there is no contact.
+    law : ndarray, shape (13,)
+        Out: Q, n (2), dQ by x, y, h, F, d(alpha) by x, y, h, F, then zeros, see `layout.LAW`. Only Q where there is no
+        contact.
     """
     law[0] = 0.0
     reach = distance + h - width
@@ -113,6 +123,7 @@ def write_ball_law(force, slope, nx, ny, length, law):
     law[0], law[1], law[2] = force, nx, ny
     law[3], law[4], law[5], law[6] = slope * nx, slope * ny, -slope, 0.0
     law[7], law[8], law[9], law[10] = -ny / length, nx / length, 0.0, 0.0
+    law[11] = law[12] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -126,112 +137,178 @@ def roller_law(stiffness, exponent, width, nx, ny, delta, law):
     slope *= part_slope
     law[0], law[1], law[2] = force, nx, ny
     law[3], law[4], law[5] = slope * nx, slope * ny, -slope
-    for k in range(6, 11):
+    for k in range(6, B.LAW):
         law[k] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def ball_potential(reals, x, y, h, load, vr, vz):
-    """Return the potential of a ball's centre at v: both contacts less the work of the centrifugal load."""
-    outer = np.sqrt(vr * vr + vz * vz) - reals[B.OUTER_REACH]
-    inner = np.sqrt((x - vr) ** 2 + (y - vz) ** 2) - reals[B.INNER_REACH] - h
-    total = -load * vr
-    if outer > 0.0:
-        total += 0.4 * reals[B.OUTER_STIFFNESS] * outer**2.5
-    if inner > 0.0:
-        total += 0.4 * reals[B.INNER_STIFFNESS] * inner**2.5
+def ball_potential(reals, x, y, other_x, other_y, h, load, vr, vz):
+    """Return the potential of a ball's centre at v: all contacts less the work of the centrifugal load.
+
+    Parameters
+    ----------
+    reals : ndarray
+    x, y : float
+        From the groove centre of the outer to that of the inner ring, m.
+    other_x, other_y : float
+        The same of the other path of a four-point bearing.
+    h : float
+        Missing material, m.
+    load : float
+        Centrifugal load, N.
+    vr, vz : float
+        From the groove centre of the outer ring to the ball's, m.
+    """
+    total = contact_work(reals[B.OUTER_STIFFNESS], vr, vz, reals[B.OUTER_REACH]) - load * vr
+    total += contact_work(reals[B.INNER_STIFFNESS], x - vr, y - vz, reals[B.INNER_REACH] + h)
+    apart = reals[B.OUTER_APART]
+    if apart > 0.0:
+        total += contact_work(reals[B.OUTER_STIFFNESS], vr, vz - apart, reals[B.OUTER_REACH])
+        far_y = other_y + apart - vz
+        total += contact_work(reals[B.INNER_STIFFNESS], other_x - vr, far_y, reals[B.INNER_REACH] + h)
     return total
 
 
 @njit(cache=True, error_model="numpy")
-def contact_block(stiffness, ex, ey, length, delta):
-    """Return force and stiffness (xx, xy, yy) of a contact along e, and its slope."""
-    force, slope = hertz_force(stiffness, 1.5, delta)
-    across = force / length
-    return (
-        force,
-        slope * ex * ex + across * ey * ey,
-        (slope - across) * ex * ey,
-        slope * ey * ey + across * ex * ex,
-        slope,
-    )
+def contact_work(stiffness, x, y, reach):
+    """Return the work stored in a contact whose centres are (x, y) apart and touch at a distance."""
+    delta = np.sqrt(x * x + y * y) - reach
+    return 0.4 * hertz_force(stiffness, 1.5, delta)[0] * delta if delta > 0.0 else 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def ball_centre(reals, x, y, h, load):
-    """Return the centre of a ball in equilibrium between both races and its centrifugal load, and if I is touched."""
-    k_o, k_i, r_o, r_i = reals[B.OUTER_STIFFNESS], reals[B.INNER_STIFFNESS], reals[B.OUTER_REACH], reals[B.INNER_REACH]
-    rest = r_o + (max(load, 0.0) / k_o) ** (2.0 / 3.0)
-    if np.sqrt((x - rest) ** 2 + y * y) - r_i - h <= 0.0:
-        return rest, 0.0, False
+def contact_block(stiffness, x, y, reach):
+    """Return of a contact whose centres are (x, y) apart: force, its slope, stiffness (xx, xy, yy) and direction."""
     length = np.sqrt(x * x + y * y)
-    free = max(length - r_o - r_i - h, 1e-9)
+    nx, ny = x / length, y / length
+    force, slope = hertz_force(stiffness, 1.5, length - reach)
+    across = force / length
+    xx, yy = slope * nx * nx + across * ny * ny, slope * ny * ny + across * nx * nx
+    return force, slope, xx, (slope - across) * nx * ny, yy, nx, ny
+
+
+@njit(cache=True, error_model="numpy")
+def ball_start(reals, x, y, other_x, other_y, h, load):
+    """Return a first guess of a ball's centre: at rest in the outer ring, or on the line of a path's groove centres."""
+    k_o, k_i, r_o, r_i = reals[B.OUTER_STIFFNESS], reals[B.INNER_STIFFNESS], reals[B.OUTER_REACH], reals[B.INNER_REACH]
+    middle = 0.5 * reals[B.OUTER_APART]
+    lean = np.sqrt(1.0 - (middle / r_o) ** 2)
+    paths = 2.0 if middle > 0.0 else 1.0
+    sunk = r_o + (max(load, 0.0) / (paths * lean * k_o)) ** (2.0 / 3.0)
+    rest_r, rest_z = np.sqrt(sunk * sunk - middle * middle), middle
+    best_r, best_z = rest_r, rest_z
+    least = ball_potential(reals, x, y, other_x, other_y, h, load, rest_r, rest_z)
     share = 1.0 / (1.0 + (k_o / k_i) ** (2.0 / 3.0))
-    start = (r_o + share * free + (load / k_o) ** (2.0 / 3.0)) / length
-    vr, vz = start * x, start * y
-    value = ball_potential(reals, x, y, h, load, vr, vz)
+    for path in range(int(paths)):
+        ax, ay, from_z = (x, y, 0.0) if path == 0 else (other_x, other_y, 2.0 * middle)
+        length = np.sqrt(ax * ax + ay * ay)
+        free = max(length - r_o - r_i - h, 1e-9)
+        start = (r_o + share * free + (load / k_o) ** (2.0 / 3.0)) / length
+        value = ball_potential(reals, x, y, other_x, other_y, h, load, start * ax, from_z + start * ay)
+        if value < least:
+            least, best_r, best_z = value, start * ax, from_z + start * ay
+    return rest_r, rest_z, best_r, best_z
+
+
+@njit(cache=True, error_model="numpy")
+def ball_centre(reals, x, y, other_x, other_y, h, load):
+    """Return the centre of a ball in equilibrium between both races and its centrifugal load.
+
+    Arguments as of `ball_potential`, which is convex and is minimised by damped Newton steps.
+    """
+    k_o, k_i, r_o, r_i = reals[B.OUTER_STIFFNESS], reals[B.INNER_STIFFNESS], reals[B.OUTER_REACH], reals[B.INNER_REACH]
+    apart = reals[B.OUTER_APART]
+    rest_r, rest_z, vr, vz = ball_start(reals, x, y, other_x, other_y, h, load)
+    touched = np.hypot(x - rest_r, y - rest_z) > r_i + h
+    if apart > 0.0:
+        touched = touched or np.hypot(other_x - rest_r, other_y + apart - rest_z) > r_i + h
+    if not touched:
+        return rest_r, rest_z
+    value = ball_potential(reals, x, y, other_x, other_y, h, load, vr, vz)
+    soft = 1e-9 * (k_o + k_i) * np.sqrt(1e-6)
+    length = np.sqrt(x * x + y * y)
     for _ in range(ITERATIONS):
-        lo, li = np.sqrt(vr * vr + vz * vz), np.sqrt((x - vr) ** 2 + (y - vz) ** 2)
-        ox, oy, ix, iy = vr / lo, vz / lo, (x - vr) / li, (y - vz) / li
-        f_o, oxx, oxy, oyy, _ = contact_block(k_o, ox, oy, lo, max(lo - r_o, 0.0))
-        f_i, ixx, ixy, iyy, _ = contact_block(k_i, ix, iy, li, max(li - r_i - h, 0.0))
-        gx, gy = f_o * ox - f_i * ix - load, f_o * oy - f_i * iy
-        sxx, sxy, syy = oxx + ixx, oxy + ixy, oyy + iyy
-        soft = 1e-9 * (k_o + k_i) * np.sqrt(1e-6)
-        sxx, syy = sxx + soft, syy + soft
+        f_o, _, sxx, sxy, syy, nx, ny = contact_block(k_o, vr, vz, r_o)
+        f_i, _, xx, xy, yy, mx, my = contact_block(k_i, x - vr, y - vz, r_i + h)
+        gx, gy, size = f_o * nx - f_i * mx - load, f_o * ny - f_i * my, f_o + f_i + load
+        sxx, sxy, syy = sxx + xx + soft, sxy + xy, syy + yy + soft
+        if apart > 0.0:
+            f_o, _, xx, xy, yy, nx, ny = contact_block(k_o, vr, vz - apart, r_o)
+            gx, gy, sxx, sxy, syy, size = gx + f_o * nx, gy + f_o * ny, sxx + xx, sxy + xy, syy + yy, size + f_o
+            f_i, _, xx, xy, yy, mx, my = contact_block(k_i, other_x - vr, other_y + apart - vz, r_i + h)
+            gx, gy, sxx, sxy, syy, size = gx - f_i * mx, gy - f_i * my, sxx + xx, sxy + xy, syy + yy, size + f_i
         det = sxx * syy - sxy * sxy
         dx, dy = -(syy * gx - sxy * gy) / det, -(sxx * gy - sxy * gx) / det
         step, way = 1.0, gx * dx + gy * dy
         for _ in range(HALVINGS):
-            there = ball_potential(reals, x, y, h, load, vr + step * dx, vz + step * dy)
+            there = ball_potential(reals, x, y, other_x, other_y, h, load, vr + step * dx, vz + step * dy)
             if there <= value + 1e-4 * step * way or abs(step * way) <= 1e-15 * abs(value):
                 break
             step *= 0.5
         vr, vz, value = vr + step * dx, vz + step * dy, there
-        if abs(dx) + abs(dy) <= 1e-16 * length or abs(gx) + abs(gy) <= 1e-13 * (f_o + load):
+        if abs(dx) + abs(dy) <= 1e-16 * length or abs(gx) + abs(gy) <= 1e-13 * size:
             break
-    return vr, vz, True
+    return vr, vz
 
 
 @njit(cache=True, error_model="numpy")
-def ball_law_at_speed(reals, x, y, h, load, law):
-    """Write the contact of a ball in equilibrium with its centrifugal load; return deflection and energy.
+def ball_law_at_speed(reals, x, y, other_x, other_y, apart, twist, h, vr, vz, law):
+    """Write the contact of a ball in equilibrium with its centrifugal load; return its deflection.
 
-    The centre v balances Q_o v/|v| = Q_i (A - v)/|A - v| + F e_r; what is written is the contact with the inner ring,
-    see `ball_law`. Its potential, both contacts less F v_r, is returned as energy.
+    The centre v balances all contacts and the load, with one path Q_o v/|v| = Q_i (A - v)/|A - v| + F e_r; what is
+    written is this path's contact with the inner ring, see `ball_law`.
+
+    Parameters
+    ----------
+    reals : ndarray
+    x, y : float
+        From the groove centre of the outer to that of the inner ring, m.
+    other_x, other_y : float
+        The same of the other path of a four-point bearing.
+    apart : float
+        Place of the other groove centre of the outer ring along the axis, seen from this one, m; 0: there is none.
+    twist : float
+        By how much a tilt phi moves the other groove centre of the inner ring radially beyond this one, m.
+    h : float
+        Missing material, m.
+    vr, vz : float
+        From the groove centre of the outer ring to the ball's, see `ball_centre`, m.
+    law : ndarray, shape (13,)
+        Out.
     """
     law[0] = 0.0
-    vr, vz, touched = ball_centre(reals, x, y, h, load)
-    energy = ball_potential(reals, x, y, h, load, vr, vz)
-    if not touched:
-        return -h, energy
-    lo, li = np.sqrt(vr * vr + vz * vz), np.sqrt((x - vr) ** 2 + (y - vz) ** 2)
-    inner = li - reals[B.INNER_REACH] - h
+    inner = np.hypot(x - vr, y - vz) - reals[B.INNER_REACH] - h
     if inner <= 0.0:
-        return inner, energy
-    nx, ny = (x - vr) / li, (y - vz) / li
-    force, ixx, ixy, iyy, slope = contact_block(reals[B.INNER_STIFFNESS], nx, ny, li, inner)
-    _, oxx, oxy, oyy, _ = contact_block(
-        reals[B.OUTER_STIFFNESS], vr / lo, vz / lo, lo, max(lo - reals[B.OUTER_REACH], 0.0)
-    )
-    sxx, sxy, syy = oxx + ixx, oxy + ixy, oyy + iyy
+        return inner
+    k_o, k_i, r_o, r_i = reals[B.OUTER_STIFFNESS], reals[B.INNER_STIFFNESS], reals[B.OUTER_REACH], reals[B.INNER_REACH]
+    force, slope, ixx, ixy, iyy, nx, ny = contact_block(k_i, x - vr, y - vz, r_i + h)
+    _, _, sxx, sxy, syy, _, _ = contact_block(k_o, vr, vz, r_o)
+    sxx, sxy, syy = sxx + ixx, sxy + ixy, syy + iyy
+    far = fxx = fxy = fyy = mx = my = 0.0
+    if apart != 0.0:
+        _, _, xx, xy, yy, _, _ = contact_block(k_o, vr, vz - apart, r_o)
+        _, far, fxx, fxy, fyy, mx, my = contact_block(k_i, other_x - vr, other_y + apart - vz, r_i + h)
+        sxx, sxy, syy = sxx + xx + fxx, sxy + xy + fxy, syy + yy + fyy
     det = sxx * syy - sxy * sxy
     law[0], law[1], law[2] = force, nx, ny
-    for k in range(4):
-        # what pulls the centre: K_i dA, -Q_i' n dh, e_r dF; then df = K_i (dA - dv) - Q_i' n dh
-        ax, ay = (1.0, 0.0) if k == 0 else ((0.0, 1.0) if k == 1 else (0.0, 0.0))
-        px, py = ixx * ax + ixy * ay, ixy * ax + iyy * ay
+    for k in range(5):
+        # moved groove centres of the inner ring by X, Y, h, F, phi; then what pulls the ball's centre, K_i dA of both
+        # paths, -Q_i' n dh, e_r dF, and df = K_i (dA - dv) - Q_i' n dh
+        ax, ay = (1.0 if k == 0 else 0.0), (1.0 if k == 1 else 0.0)
+        bx = twist if k == 4 else ax
+        px, py = ixx * ax + ixy * ay + fxx * bx + fxy * ay, ixy * ax + iyy * ay + fxy * bx + fyy * ay
         if k == 2:
-            px, py = -slope * nx, -slope * ny
+            px, py = -slope * nx - far * mx, -slope * ny - far * my
         elif k == 3:
             px, py = 1.0, 0.0
         vx, vy = (syy * px - sxy * py) / det, (sxx * py - sxy * px) / det
         fx, fy = ixx * (ax - vx) + ixy * (ay - vy), ixy * (ax - vx) + iyy * (ay - vy)
         if k == 2:
             fx, fy = fx - slope * nx, fy - slope * ny
-        law[3 + k] = nx * fx + ny * fy
-        law[7 + k] = (-ny * fx + nx * fy) / force
-    return inner, energy
+        by_force, by_angle = (3 + k, 7 + k) if k < 4 else (11, 12)
+        law[by_force] = nx * fx + ny * fy
+        law[by_angle] = (-ny * fx + nx * fy) / force
+    return inner
 
 
 @njit(cache=True, error_model="numpy")
@@ -253,7 +330,7 @@ def roller_law_at_speed(reals, share, nx, ny, delta, load, law):
         Approach of the rings there, m.
     load : float
         Centrifugal load of the roller, N.
-    law : ndarray, shape (11,)
+    law : ndarray, shape (13,)
     """
     n, k_i, k_o = reals[B.EXPONENT], share * reals[B.INNER_STIFFNESS], share * reals[B.OUTER_STIFFNESS]
     push = share * load * nx
@@ -283,7 +360,7 @@ def roller_law_at_speed(reals, share, nx, ny, delta, load, law):
     slope, by_push = s_i * s_o / (s_i + s_o), -s_i / (s_i + s_o)
     law[0], law[1], law[2] = q_i, nx, ny
     law[3], law[4], law[5], law[6] = slope * nx, slope * ny, -slope, by_push * share * nx
-    for k in range(7, 11):
+    for k in range(7, B.LAW):
         law[k] = 0.0
     energy = (k_i * inner ** (n + 1.0) + k_o * outer ** (n + 1.0)) / (n + 1.0) - push * outer
     return delta - rest, energy

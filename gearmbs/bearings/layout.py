@@ -62,7 +62,11 @@ INNER_REACH = 18
 OUTER_REACH = 19
 SLIP_TURNS = 20
 """Turns of the cage after which its random slip repeats."""
-REALS = 21
+SMOOTH_WORK = 21
+"""Work of the whole smooth transition by K, m^(n + 1)."""
+OUTER_APART = 22
+"""Distance of the two groove centres of a four-point bearing's outer ring along the axis, m; else 0."""
+REALS = 23
 
 PATH_RADIAL = 0
 """Reals of a path: radial and axial distance of the groove centres, rings centred; of a roller the normal."""
@@ -104,12 +108,15 @@ S_SUMS = 22
 """Sums over the elements: normal forces, energy, damping power, largest force, number loaded, largest deflection."""
 SUMS = 6
 S_LAW = 28
-"""Of one contact: Q, n, derivatives of Q and of its direction by X, Y, h and the centrifugal load."""
-LAW = 11
-S_CAGE = 39
+"""Of one contact: Q, n, derivatives of Q and of its direction by X, Y, h and the centrifugal load, then of both by the
+tilt phi, as far as it moves the other path of the element against this one."""
+LAW = 13
+S_CENTRE = 41
+"""Centre of a four-point bearing's ball, whose two paths share it, and whether the inner ring is touched."""
+S_CAGE = 44
 """d psi' / d Omega at the cage's angle, and its slope by it."""
-S_CAGE_SLOPE = 40
-S_LOCAL = 41
+S_CAGE_SLOPE = 45
+S_LOCAL = 46
 """From here: generalised forces, then what the derivatives need; see `scratch`."""
 
 VARIATIONS = 13

@@ -61,7 +61,6 @@ class BearingSettings:
         require(1 <= self.slices <= 99, f"RollingBearing.slices is {self.slices!r}; give 1 to 99")
         require(self.stiffness is None or self.stiffness > 0.0, f"RollingBearing.stiffness is {self.stiffness}")
         if self.centrifugal:
-            require(self.bearing.kind != "four point", "RollingBearing.centrifugal: four-point bearings have none here")
             require(self.smooth == 0.0, "RollingBearing.smooth: not together with the centrifugal load; leave it 0")
             require(self.stiffness is None, "RollingBearing.stiffness: with centrifugal load each contact has its own")
         self.defects = tuple(self.defects) if isinstance(self.defects, Sequence) else (self.defects,)

@@ -101,6 +101,12 @@ def _random_slip(settings: BearingSettings) -> np.ndarray:
     return np.take(inner, np.arange(inner.size + MARGIN), mode="wrap")
 
 
+def transition_work(exponent: float) -> float:
+    """Return the integral of s(delta)^n over a transition of half width one, see `laws_kernel.positive_part`."""
+    x, weights = np.polynomial.legendre.leggauss(40)
+    return float(weights @ ((x + 1.0) ** 3 * (3.0 - x) / 16.0) ** exponent)
+
+
 def _scalars(settings: BearingSettings) -> np.ndarray:
     bearing = settings.bearing
     reals = np.zeros(B.REALS)
@@ -111,7 +117,7 @@ def _scalars(settings: BearingSettings) -> np.ndarray:
     reals[B.CAGE] = bearing.ftf * (1.0 - settings.cage_slip)
     reals[B.SPIN], reals[B.SLIP_TURNS] = bearing.bsf, SLIP_TURNS
     reals[B.DISTANCE] = 0.0 if bearing.rollers else bearing.groove_distance
-    reals[B.SMOOTH] = settings.smooth
+    reals[B.SMOOTH], reals[B.SMOOTH_WORK] = settings.smooth, settings.smooth ** (n + 1.0) * transition_work(n)
     reals[B.ROLLING] = settings.rolling_friction * 0.5 * bearing.pitch_diameter
     # 1e-7 f_0 (nu n)^(2/3) D^3 in N mm, 1/min and mm
     reals[B.VISCOUS] = 1e-10 * settings.viscous_friction * (1e3 * bearing.pitch_diameter) ** 3
@@ -135,6 +141,8 @@ def _scalars(settings: BearingSettings) -> np.ndarray:
             (bearing.inner_curvature - 0.5) * d,
             (bearing.outer_curvature - 0.5) * d,
         )
+        if bearing.kind == "four point":
+            reals[B.OUTER_APART] = 2.0 * reals[B.OUTER_REACH] * math.sin(bearing.contact_angle)
     return reals
 
 

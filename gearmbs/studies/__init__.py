@@ -22,7 +22,13 @@ if TYPE_CHECKING:
     from gearmbs.studies.resonance import ResonanceSettings, resonance_rig, sweep_resonance
     from gearmbs.studies.resonance_study import ResonanceStudy, run_resonance, separation_load
     from gearmbs.studies.rig import gear_rig
-    from gearmbs.studies.simulation import SimulationFailed, SimulationInterrupted, run_case, simulate_case
+    from gearmbs.studies.simulation import (
+        SimulationFailed,
+        SimulationInterrupted,
+        case_mechanism,
+        run_case,
+        simulate_case,
+    )
     from gearmbs.studies.sweep import Sweep, sweep
     from gearmbs.studies.train_figure import train_spectrum
     from gearmbs.studies.train_modes import train_campbell, train_modes
@@ -49,6 +55,7 @@ __all__ = [
     "bearing_rig",
     "bench_choices",
     "bench_train",
+    "case_mechanism",
     "flexible_rig",
     "gear_rig",
     "gearbox_choices",
@@ -134,6 +141,7 @@ late(
         "paper_cases": ".preset",
         "record_signal": "gearmbs.signals.simulated",
         "rolling_rig": ".bearing_rig",
+        "case_mechanism": ".simulation",
         "run_case": ".simulation",
         "run_cases": ".parallel",
         "run_paper": ".paper",

@@ -7,7 +7,7 @@ import json
 import platform
 from collections.abc import Callable, Collection
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -22,6 +22,10 @@ from gearmbs.studies.drive import drive_angle
 from gearmbs.studies.evaluation import check_variables, evaluate, time_series
 from gearmbs.studies.limits import check_record, edge, remarks, slip
 from gearmbs.studies.measured import Measured, Recorder, measure, rows_of_record
+
+if TYPE_CHECKING:
+    from gearmbs.bearings import Bearing
+    from gearmbs.mechanism import Mechanism
 
 ADVICE = {
     Status.STEP_TOO_SMALL: "Loosen solver.tolerance, raise contact.depth, or try another solver.integrator.",
@@ -70,9 +74,26 @@ class SimulationInterrupted(SimulationFailed):
 
 
 def simulate_case(
-    case: Case, progress: bool | Callable[[float], None] | None = None, *, every_step: bool = False, **options
+    case: Case,
+    progress: bool | Callable[[float], None] | None = None,
+    *,
+    mechanism: Mechanism | None = None,
+    every_step: bool = False,
+    **options,
 ) -> Solution:
     """Integrate the mechanism of a case from rest to the end of its record.
+
+    Parameters
+    ----------
+    case : Case
+    progress : bool or callable, optional
+        Show a bar, or ``progress(t)`` with the time reached, s.
+    mechanism : Mechanism, optional
+        Integrate this one; default `case_mechanism` with joints as bearings.
+    every_step : bool
+        Outputs at the integrator's own steps instead of the case's output rate.
+    **options
+        Handed to the integrator.
 
     Returns
     -------
@@ -80,7 +101,7 @@ def simulate_case(
         Sampled at the case's output rate, or at the integrator's own steps, from which :func:`record` makes signals
         without aliases; see its ``status``.
     """
-    mechanism = case_mechanism(case)
+    mechanism = case_mechanism(case) if mechanism is None else mechanism
     operation, solver = case.operation, case.solver
     t_end = operation.run_up + operation.settling + operation.duration + edge(case)
     # up to a whole sample
@@ -101,25 +122,47 @@ def simulate_case(
     )
 
 
-def case_mechanism(case: Case):
-    """Return the mechanism of a case."""
+def case_mechanism(case: Case, bearing: Bearing | str | None = None, **settings: Any) -> Mechanism:
+    """Return the mechanism of a case.
+
+    Parameters
+    ----------
+    case : Case
+    bearing : Bearing or str, optional
+        Rolling bearing of which two stand on each shaft, see `rolling_rig`, or its designation; default joints.
+    **settings
+        Of all four bearings, as of `gearmbs.bearings.RollingBearing`.
+
+    Examples
+    --------
+    >>> from gearmbs.studies import Case
+    >>> sorted(case_mechanism(Case(), "6206/CN").elements)
+    ['bearing 1 a', 'bearing 1 b', 'bearing 2 a', 'bearing 2 b', 'load', 'mesh']
+    """
     operation, shafts = case.operation, case.shafts
-    return rig.gear_rig(
-        case.pair(),
-        speed=operation.speed,
-        torque=operation.torque,
-        run_up=operation.run_up,
-        start=operation.run_up + operation.settling,
-        shaft_radius=shafts.radius,
-        shaft_length=shafts.length,
-        shaft_density=shafts.density,
-    )
+    rigged: dict[str, Any] = {
+        "speed": operation.speed,
+        "torque": operation.torque,
+        "run_up": operation.run_up,
+        "start": operation.run_up + operation.settling,
+        "shaft_radius": shafts.radius,
+        "shaft_length": shafts.length,
+        "shaft_density": shafts.density,
+    }
+    if bearing is None:
+        return rig.gear_rig(case.pair(), **rigged)
+    from gearmbs.bearings import Bearing
+    from gearmbs.studies.bearing_rig import rolling_rig
+
+    one = Bearing.from_designation(bearing) if isinstance(bearing, str) else bearing
+    return rolling_rig(case.pair(), one, settings=settings, **rigged)
 
 
 def run_case(
     case: Case,
     progress: bool | Callable[[float], None] | None = None,
     *,
+    mechanism: Mechanism | None = None,
     variables: Collection[str] | None = None,
 ) -> xr.Dataset:
     """Simulate a case and return its record: a pure function of the case.
@@ -129,6 +172,9 @@ def run_case(
     case : Case
     progress : bool or callable, optional
         Show a bar, or ``progress(t)`` with the time reached, s.
+    mechanism : Mechanism, optional
+        Simulate this one, such as ``case_mechanism(case, "6206/CN")`` with rolling bearings; it has the case's wheels,
+        seats and mesh by their names. Default: the case's own.
     variables : collection of str, optional
         Evaluate only these of the variables below, with the same values; default all.
 
@@ -152,7 +198,7 @@ def run_case(
     check_record(case)
     check_variables(variables)
     recorder = Recorder(case)
-    solution = simulate_case(case, progress, every_step=True, consumer=recorder.take)
+    solution = simulate_case(case, progress, mechanism=mechanism, every_step=True, consumer=recorder.take)
     if not solution.success:
         kind = SimulationInterrupted if solution.status is Status.INTERRUPTED else SimulationFailed
         raise kind(f"case '{case.name}': {solution.message}", solution, case, _partial(case, solution, recorder))

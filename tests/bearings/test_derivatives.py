@@ -38,6 +38,8 @@ CASES = {
     "cylindrical": (CYLINDRICAL, {"slices": 5}),
     "tapered": (TAPERED, {"preload": 300.0, "sense": -1, "defects": RINGS, "slices": 5}),
     "centrifugal": (ANGULAR, {"preload": 200.0, "centrifugal": True}),
+    "centrifugal four point": (FOUR, {"centrifugal": True}),
+    "centrifugal four point with defects": (FOUR, {"centrifugal": True, "defects": ALL}),
     "random slip": (DEEP, {"slip_scatter": 0.02, "slip_memory": 0.3, "defects": RINGS, "rolling_friction": 0.01}),
     "random slip, centrifugal": (ANGULAR, {"preload": 200.0, "centrifugal": True, "slip_scatter": 0.02}),
     "centrifugal rollers": (CYLINDRICAL, {"centrifugal": True, "slices": 5}),

@@ -126,6 +126,62 @@ def test_centrifugal_load_parts_the_contact_angles():
     assert fast.contact_angles[0] > still.contact_angles[0] + 0.05
 
 
+FOUR = ANGULAR.changed(kind="four point", contact_angle="35 deg", clearance="10 um")
+
+
+@pytest.mark.parametrize("place", [[12e-6, -3e-6, 2e-6], [4e-6, 0.0, 10e-6, 1e-4, -2e-4], [1e-6, 0.0, -12e-6]])
+def test_balls_of_a_fast_four_point_bearing_touch_up_to_four_grooves(place):
+    """The load agrees with the sum over balls whose equilibrium in all four grooves is solved alone."""
+    from scipy.optimize import minimize
+
+    b, speed = FOUR, 2500.0
+    state = BearingStatics(b, centrifugal=True, speed=speed, damping=0.0).at(place)
+    flung = b.element_mass * 0.5 * b.pitch_diameter * (b.ftf * speed) ** 2
+    d, (k_i, k_o), angle = b.element_diameter, b.contact_stiffness, b.contact_angle
+    x, y, z, tilt_x, tilt_y = np.pad(place, (0, 5 - len(place)))
+    # the axis of the inner ring leans by (tilt_y, -tilt_x), to first order
+    total, touching = np.zeros(3), set()
+    for j in range(b.elements):
+        c, s = np.cos(2 * np.pi * j / b.elements), np.sin(2 * np.pi * j / b.elements)
+        phi = tilt_y * c - tilt_x * s
+        outer, inner = [], []
+        for sign in (1.0, -1.0):
+            outer.append(-0.025 * d * np.array([np.cos(angle), sign * np.sin(angle)]))
+            height, radius = sign * 0.015 * d * np.sin(angle), 0.5 * b.pitch_diameter + 0.015 * d * np.cos(angle)
+            inner.append(
+                outer[-1] + b.groove_distance * np.array([np.cos(angle), sign * np.sin(angle)])
+                + np.array([x * c + y * s - 0.5 * b.clearance + height * phi, z - radius * phi])
+            )  # fmt: skip
+
+        def pressed(v, outer=outer, inner=inner):
+            return [max(np.linalg.norm(v - o) - 0.025 * d, 0.0) for o in outer] + [
+                max(np.linalg.norm(i - v) - 0.015 * d, 0.0) for i in inner
+            ]
+
+        def potential(u, pressed=pressed):
+            deltas = pressed(1e-5 * u)
+            stored = sum(0.4 * k * delta**2.5 for k, delta in zip((k_o, k_o, k_i, k_i), deltas))
+            return 1e3 * (stored - flung * 1e-5 * u[0])
+
+        found = minimize(potential, [0.5, 0.1 * np.sign(z)], method="Nelder-Mead",
+                         options={"xatol": 1e-9, "fatol": 1e-16, "maxiter": 4000, "maxfev": 4000})  # fmt: skip
+        v = 1e-5 * found.x
+        deltas = pressed(v)
+        touching.add(sum(delta > 0.0 for delta in deltas))
+        for i, delta in zip(inner, deltas[2:]):
+            force = k_i * delta**1.5 * (i - v) / np.linalg.norm(i - v)
+            total += [force[0] * c, force[0] * s, force[1]]
+    assert max(touching) > 2
+    np.testing.assert_allclose(state.load[:3], total, rtol=2e-5, atol=2e-5 * np.abs(total).max())
+
+
+def test_slow_four_point_bearing_is_the_one_without_centrifugal_load():
+    for place in ([0.0, 0.0, 60e-6], [0.0, 0.0, -60e-6]):
+        still = BearingStatics(FOUR).at(place).load
+        slow = BearingStatics(FOUR, centrifugal=True, speed=1.0).at(place).load
+        np.testing.assert_allclose(slow, still, rtol=1e-4, atol=1e-6 * np.abs(still).max())
+
+
 def test_four_point_bearing_carries_both_ways():
     statics = BearingStatics(ANGULAR.changed(kind="four point", contact_angle="35 deg"))
     up, down = statics.under([0.0, 0.0, 400.0]), statics.under([0.0, 0.0, -400.0])
