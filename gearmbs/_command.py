@@ -9,6 +9,8 @@ from contextlib import contextmanager
 
 import typer
 
+from gearmbs.progress import alone
+
 UNWRITABLE = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
 """What is wrong with the place and not with the file."""
 
@@ -53,7 +55,7 @@ def case_bars(names: list[str]) -> Iterator[Callable[[str, float], None]]:
 
     columns = (TextColumn("{task.description:>24}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
     console = Console(stderr=True)
-    with Progress(*columns, TimeElapsedColumn(), console=console, refresh_per_second=4) as progress:
+    with alone(), Progress(*columns, TimeElapsedColumn(), console=console, refresh_per_second=4) as progress:
         tasks = {name: progress.add_task(name, total=1.0) for name in names}
         yield lambda name, fraction: progress.update(tasks[name], completed=fraction)
 
@@ -66,8 +68,7 @@ def stage_bar(name: str) -> Iterator[Callable[[float, str], None]]:
 
     console = Console(stderr=True)
     columns = (TextColumn("{task.description:>24}"), BarColumn(), TextColumn("{task.fields[stage]}"))
-    with Progress(
-        *columns, TimeElapsedColumn(), console=console, transient=True, disable=not console.is_terminal
-    ) as progress:
+    shown = Progress(*columns, TimeElapsedColumn(), console=console, transient=True, disable=not console.is_terminal)
+    with alone(), shown as progress:
         task = progress.add_task(name, total=1.0, stage="reading")
         yield lambda fraction, stage: progress.update(task, completed=fraction, stage=stage)

@@ -22,6 +22,9 @@ PATIENCE = 2.0
 INTERVAL = 0.2
 """Shortest time between two pictures, s."""
 
+TICK = 1.0
+"""Longest time between two pictures, s: the seconds go on where nothing is told."""
+
 F = TypeVar("F", bound=Callable)
 
 SHOWN_ROWS = 8
@@ -42,7 +45,7 @@ _open = False
 
 
 class Bars:
-    """Bars by name, drawn where somebody watches.
+    """Bars by name, drawn where somebody watches, by themselves once a second.
 
     Parameters
     ----------
@@ -50,16 +53,20 @@ class Bars:
     where : {"notebook", "terminal"}
     patience : float
         Seconds before they appear.
+    known : bool
+        Whether it is known from the beginning how far the jobs are; a job of which nothing was told shows its seconds.
     """
 
-    def __init__(self, names: Sequence[str], where: str, patience: float = PATIENCE) -> None:
-        self.done = dict.fromkeys(names, 0.0)
+    def __init__(self, names: Sequence[str], where: str, patience: float = PATIENCE, known: bool = True) -> None:
+        self.done: dict[str, float | None] = dict.fromkeys(names, 0.0 if known else None)
         self.begun = time.monotonic()
         self.patience = patience
         self.where = where
         self._last = 0.0
         self._lock = threading.Lock()
         self._picture: Any = None
+        self._ended = threading.Event()
+        threading.Thread(target=self._watch, name="progress", daemon=True).start()
 
     def move(self, name: str, fraction: float) -> None:
         """Note how far a job is, from 0 to 1; draw now and then."""
@@ -68,11 +75,11 @@ class Bars:
         if now - self.begun < self.patience or now - self._last < INTERVAL:
             return
         with self._lock:
-            self._last = now
-            self._draw(now - self.begun)
+            self._draw(now)
 
     def close(self) -> None:
         """Take the bars away."""
+        self._ended.set()
         with self._lock:
             if self._picture is None:
                 return
@@ -84,11 +91,21 @@ class Bars:
                 self._picture[0].stop()
             self._picture = None
 
-    def _draw(self, seconds: float) -> None:
+    def _watch(self) -> None:
+        """Draw now and then, also where the work says nothing."""
+        wait = max(self.patience, INTERVAL)
+        while not self._ended.wait(wait):
+            with self._lock:
+                if not self._ended.is_set():
+                    self._draw(time.monotonic())
+            wait = TICK
+
+    def _draw(self, now: float) -> None:
+        self._last = now
         if self.where == "notebook":
             from IPython.display import HTML, display
 
-            page = HTML(self.to_html(seconds))
+            page = HTML(self.to_html(now - self.begun))
             if self._picture is None:
                 self._picture = display(page, display_id=True)
             else:
@@ -98,42 +115,72 @@ class Bars:
             self._picture = _terminal_bars(list(self.done))
         progress, tasks = self._picture
         for name, fraction in self.done.items():
-            progress.update(tasks[name], completed=fraction)
+            if fraction is not None:
+                progress.update(tasks[name], total=1.0, completed=fraction)
 
     def to_html(self, seconds: float) -> str:
         """Return the bars as a table; of many jobs those at work, and how many are done."""
-        finished = sum(fraction >= 1.0 for fraction in self.done.values())
+        finished = sum(fraction is not None and fraction >= 1.0 for fraction in self.done.values())
         rows = list(self.done.items())
         if len(rows) > SHOWN_ROWS:
-            rows = [(name, fraction) for name, fraction in rows if 0.0 < fraction < 1.0][: SHOWN_ROWS - 1]
-            rows.insert(0, (f"{finished} of {len(self.done)} done", sum(self.done.values()) / len(self.done)))
+            at_work = [(name, fraction) for name, fraction in rows if fraction is None or 0.0 < fraction < 1.0]
+            rows = [(f"{finished} of {len(self.done)} done", _share(self.done)), *at_work[: SHOWN_ROWS - 1]]
         cells = "".join(
-            f'<tr><td style="text-align:right">{html.escape(name)}</td><td><progress max="1" value="{fraction:.4f}" '
-            f'style="width:18em"></progress></td><td style="text-align:right">{100.0 * fraction:.0f} %</td></tr>'
+            f'<tr><td style="text-align:right">{html.escape(name)}</td><td><progress max="1" {_value(fraction)}'
+            f'style="width:18em"></progress></td><td style="text-align:right">{_percent(fraction)}</td></tr>'
             for name, fraction in rows
         )
         return f"<table>{cells}<tr><td></td><td>{seconds:.0f} s{_left(self.done, seconds)}</td><td></td></tr></table>"
 
 
-def _left(done: dict[str, float], seconds: float) -> str:
-    share = sum(done.values()) / max(len(done), 1)
+def _share(done: dict[str, float | None]) -> float:
+    return sum(fraction or 0.0 for fraction in done.values()) / max(len(done), 1)
+
+
+def _value(fraction: float | None) -> str:
+    """Return how far a bar is as an attribute; without one it moves to and fro."""
+    return "" if fraction is None else f'value="{fraction:.4f}" '
+
+
+def _percent(fraction: float | None) -> str:
+    return "" if fraction is None else f"{100.0 * fraction:.0f} %"
+
+
+def _left(done: dict[str, float | None], seconds: float) -> str:
+    share = _share(done)
     return f", about {seconds * (1.0 - share) / share:.0f} s left" if 0.02 < share < 1.0 else ""
 
 
 def _terminal_bars(names: list[str]) -> tuple[Any, dict[str, Any]]:
     """Return rich's bars, started, and their tasks by name."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description:>24}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
+    columns = (TextColumn("{task.description:>24}"), BarColumn(), TaskProgressColumn())
     console = Console(stderr=True)
     progress = Progress(*columns, TimeElapsedColumn(), console=console, refresh_per_second=4, transient=True)
     progress.start()
-    return progress, {name: progress.add_task(name, total=1.0) for name in names}
+    return progress, {name: progress.add_task(name, total=None) for name in names}
 
 
 @contextmanager
-def bars(progress: bool | Callable[[str, float], None] | None, names: Sequence[str]) -> Iterator[Any]:
+def alone() -> Iterator[bool]:
+    """Let no other bars appear inside; yield whether there are none already: work inside other work is part of it."""
+    global _open
+    if _open:
+        yield False
+        return
+    _open = True
+    try:
+        yield True
+    finally:
+        _open = False
+
+
+@contextmanager
+def bars(
+    progress: bool | Callable[[str, float], None] | None, names: Sequence[str], *, known: bool = True
+) -> Iterator[Any]:
     """Yield a function ``move(name, fraction)`` that follows jobs as ``progress`` asks, or None where nobody watches.
 
     Parameters
@@ -142,25 +189,37 @@ def bars(progress: bool | Callable[[str, float], None] | None, names: Sequence[s
         None, True, False or a callable, see `gearmbs.progress`.
     names : sequence of str
         Of all jobs.
+    known : bool
+        Whether jobs that have told nothing are at their beginning; else it is not known how far they are.
     """
-    global _open
     if callable(progress):
         yield progress
         return
     where = watched()
     if progress is True and where is None:
         where = "terminal"
-    # work inside other work is part of its bar
-    if progress is False or where is None or _open:
+    if progress is False or where is None:
         yield None
         return
-    shown = Bars(names, where, 0.0 if progress is True else PATIENCE)
-    _open = True
-    try:
-        yield shown.move
-    finally:
-        _open = False
-        shown.close()
+    with alone() as first:
+        if not first:
+            yield None
+            return
+        shown = Bars(names, where, 0.0 if progress is True else PATIENCE, known)
+        try:
+            yield shown.move
+        finally:
+            shown.close()
+
+
+@contextmanager
+def waiting(name: str) -> Iterator[Callable[[float], None]]:
+    """Show that work goes on if it takes longer than two seconds, as a block or as a decorator.
+
+    Yields a function that is told the fraction done, if it is known; until then the bar moves to and fro.
+    """
+    with bars(None, [name], known=False) as move:
+        yield (lambda fraction: None) if move is None else (lambda fraction: move(name, fraction))
 
 
 def staged(title: str) -> Callable[[F], F]:
@@ -171,7 +230,7 @@ def staged(title: str) -> Callable[[F], F]:
         def called(*args: Any, progress: Any = None, **settings: Any) -> Any:
             if callable(progress):
                 return function(*args, progress=progress, **settings)
-            with bars(progress, [title]) as move:
+            with bars(progress, [title], known=False) as move:
                 report = None if move is None else lambda fraction, stage: move(title, fraction)
                 return function(*args, progress=report, **settings)
 
@@ -194,8 +253,8 @@ def time_bar(
 
 def told_of_span(
     progress: Callable[[str, float], None] | None, name: str, span: float
-) -> Callable[[float], None] | bool:
-    """Return what tells the progress of a named run that it has reached a time of its span (s); False for nobody."""
+) -> Callable[[float], None] | None:
+    """Return what tells the progress of a named run that it has reached a time of its span (s); None: its own bar."""
     if progress is None:
-        return False
+        return None
     return lambda t: progress(name, min(t / span, 1.0))

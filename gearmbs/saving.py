@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from gearmbs.progress import waiting
+
 WRITERS: dict[str, dict[str, str]] = {
     "Case": {".toml": "gearmbs.studies.case_file:write_case"},
     "GearSpec": {
@@ -72,6 +74,11 @@ def save(thing: Any, path: str | Path) -> Path | list[Path]:
     ValueError: path is 'wheel.pdf'; a GearSpec is saved as .dxf, .step, .stp or .stl
     """
     path = Path(path)
+    with waiting(f"saving {path.name}"):
+        return _saved(thing, path)
+
+
+def _saved(thing: Any, path: Path) -> Path | list[Path]:
     kinds = [kind.__name__ for kind in type(thing).__mro__]
     name = next((kind for kind in kinds if kind in WRITERS), "")
     if name:

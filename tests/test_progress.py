@@ -6,11 +6,14 @@ from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from gearmbs import progress
+from gearmbs._command import case_bars
 from gearmbs.mechanism import Mechanism
 from gearmbs.signals import analyse, make_signal
 from gearmbs.studies import Case, run_cases
+from gearmbs.view.film import write_film
 
 
 @pytest.fixture
@@ -131,3 +134,46 @@ def test_a_terminal_has_them_on_the_error_stream(monkeypatch, clock):
     with progress.bars(True, ["a case"]) as move:
         move("a case", 0.5)
     assert "a case" in screen.getvalue()
+
+
+def test_work_of_unknown_length_shows_its_seconds_and_then_its_fraction(notebook, monkeypatch):
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    monkeypatch.setattr(progress, "INTERVAL", 0.01)
+    appeared = progress.threading.Event()
+    draw = progress.Bars._draw
+    monkeypatch.setattr(progress.Bars, "_draw", lambda self, now: (draw(self, now), appeared.set()))
+    with progress.waiting("thinking") as tell:
+        # nothing is told: the bar comes by itself
+        assert appeared.wait(20.0)
+        assert "thinking" in notebook[0]
+        assert "value=" not in notebook[0]
+        tell(0.5)
+        deadline = progress.time.monotonic() + 20.0
+        while 'value="0.5000"' not in notebook[-1] and progress.time.monotonic() < deadline:
+            tell(0.5)
+        assert 'value="0.5000"' in notebook[-1]
+    assert notebook[-1] == ""
+
+
+def test_films_show_how_far_they_are(notebook, monkeypatch, tmp_path):
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    monkeypatch.setattr(progress, "INTERVAL", 0.0)
+    buffer = io.BytesIO()
+    Image.new("RGB", (8, 8)).save(buffer, format="PNG")
+    written = write_film(tmp_path / "film.gif", [buffer.getvalue()] * 3, 3, rate=10)
+    with Image.open(written) as film:
+        assert film.format == "GIF"
+    assert "saving film.gif" in notebook[0]
+    assert any('value="0.2500"' in page for page in notebook)
+    assert notebook[-1] == ""
+    with pytest.raises(ValueError, match=r"film\.avi"):
+        write_film(tmp_path / "film.avi", [], 0)
+
+
+def test_commands_show_one_bar_only(notebook, monkeypatch):
+    """What a command does inside its own bar opens no second one."""
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    with case_bars(["a"]) as move, progress.waiting("inside") as tell:
+        tell(0.5)
+        move("a", 1.0)
+    assert notebook == []

@@ -96,7 +96,7 @@ def test_films_play(tmp_path):
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_what_ffmpeg_refuses_is_told(tmp_path):
     with pytest.raises(RuntimeError, match="ffmpeg failed: "):
-        film.write_film(tmp_path / "broken.mp4", [b"no picture"])
+        film.write_film(tmp_path / "broken.mp4", [b"no picture"], 1)
     assert not list(tmp_path.iterdir())
 
 

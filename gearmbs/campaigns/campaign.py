@@ -7,6 +7,7 @@ import random
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from gearmbs.campaigns.folder import Folder, extend_folder, make_folder
 from gearmbs.campaigns.plan import Plan
 from gearmbs.campaigns.status import CampaignStatus, read_status
 from gearmbs.campaigns.work import ALREADY, CLAIMED, DIED, STOPPED, UnitReport
+from gearmbs.progress import alone, bars, watched
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,7 +77,7 @@ class Campaign:
         workers: int | None = None,
         *,
         client: Any = None,
-        progress: bool | Callable[[CampaignStatus], None] = False,
+        progress: bool | Callable[[CampaignStatus], None] | None = None,
         minutes: float | None = None,
     ) -> CampaignStatus:
         """Work on what is not done yet, until all is.
@@ -86,8 +88,8 @@ class Campaign:
             Processes of this machine; default the cores. 0: in this process.
         client : distributed.Client, optional
             Work on its cluster instead.
-        progress : bool or callable
-            Show a bar, or ``progress(status)`` after every unit.
+        progress : bool or callable, optional
+            A bar, see `gearmbs.progress`, or ``progress(status)`` after every unit.
         minutes : float, optional
             Start no unit after so long.
 
@@ -143,7 +145,7 @@ class Campaign:
             while queue and (end is None or time.monotonic() < end):
                 yield queue.popleft()
 
-        with _shown(progress, self.status) as tell:
+        with _shown(progress, self.folder.path.name, self.status) as tell:
             while queue or elsewhere:
                 # a runner ends when there is nothing to take; what came back meanwhile is taken up by the next round
                 for report in runner(str(self.path), ahead()):
@@ -273,37 +275,43 @@ def _driven(folder: Folder, units: list[int]) -> bool:
 class _shown:
     """A bar on a terminal or in a notebook, or calls of a function, about once a second."""
 
-    def __init__(self, progress: Any, status: Callable[[], CampaignStatus]) -> None:
-        self._progress, self._status, self._last = progress, status, -1e9
-        self._bar: Any = None
+    def __init__(self, progress: Any, name: str, status: Callable[[], CampaignStatus]) -> None:
+        self._progress, self._name, self._status, self._last = progress, name, status, -1e9
+        self._around = ExitStack()
+        self._tell: Callable[[CampaignStatus], Any] | None = None
 
     def __enter__(self) -> Callable[[], None]:
-        if self._progress is True:
-            from rich.console import Console
-            from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+        if callable(self._progress):
+            self._tell = self._progress
+        elif self._progress is True and watched() != "notebook":
+            self._tell = self._status_bar()
+        else:
+            move = self._around.enter_context(bars(self._progress, [self._name]))
+            self._tell = None if move is None else lambda status: move(self._name, status.fraction)
+        self._look(force=True)
+        return self._look
 
-            columns = (BarColumn(), TextColumn("{task.percentage:>3.0f} %  {task.description}"), TimeElapsedColumn())
-            self._bar = Progress(*columns, console=Console(stderr=True), refresh_per_second=2)
-            self._bar.start()
-            self._task = self._bar.add_task("", total=1.0)
-        self._tell(force=True)
-        return self._tell
+    def _status_bar(self) -> Callable[[CampaignStatus], None]:
+        """Open a bar with the campaign's status beside it."""
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    def _tell(self, force: bool = False) -> None:
+        columns = (BarColumn(), TextColumn("{task.percentage:>3.0f} %  {task.description}"), TimeElapsedColumn())
+        self._around.enter_context(alone())
+        bar = self._around.enter_context(Progress(*columns, console=Console(stderr=True), refresh_per_second=2))
+        task = bar.add_task("", total=1.0)
+        return lambda status: bar.update(task, completed=status.fraction, description=str(status))
+
+    def _look(self, force: bool = False) -> None:
         # reading many ledgers is not free
-        if not self._progress or (not force and time.monotonic() - self._last < 1.0):
+        if self._tell is None or (not force and time.monotonic() - self._last < 1.0):
             return
         self._last = time.monotonic()
-        status = self._status()
-        if self._bar is not None:
-            self._bar.update(self._task, completed=status.fraction, description=str(status))
-        else:
-            self._progress(status)
+        self._tell(self._status())
 
     def __exit__(self, *_error: object) -> None:
-        self._tell(force=True)
-        if self._bar is not None:
-            self._bar.stop()
+        self._look(force=True)
+        self._around.close()
 
 
 def _needed() -> None:

@@ -15,6 +15,7 @@ from gearmbs.dae.integrators.wstiff import solve_wstiff
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, Status
 from gearmbs.dae.user_problem import as_problem
+from gearmbs.progress import time_bar
 
 IDA_DEFAULT_OUTPUTS = 201
 DEFAULT_RTOL = 1e-6
@@ -119,11 +120,13 @@ def solve_dae(
         problem = _checked_problem(fun, t0, y0, events, of_equations)
     else:
         problem, chosen = _posed(fun, (t0, t_end), y0, yp0, rtol, atol, events, of_equations, chosen, options)
-    if not chosen.uses_ida:
-        return solve_wstiff(problem, t_eval, chosen, t_end=t_end)
-    if chosen.dense_output or problem.n_events:
+    if chosen.uses_ida and (chosen.dense_output or problem.n_events):
         raise ValueError("method='IDA' has neither dense output nor events here; use WSTIFF or GSTIFF")
-    return _run_ida(problem, chosen, (t0, t_end), t_eval)
+    with time_bar(chosen.progress, "solving", t0, t_end) as told:
+        chosen = replace(chosen, progress=told)
+        if chosen.uses_ida:
+            return _run_ida(problem, chosen, (t0, t_end), t_eval)
+        return solve_wstiff(problem, t_eval, chosen, t_end=t_end)
 
 
 def _checked_problem(

@@ -18,6 +18,7 @@ from gearmbs.flexible.fe_model import MassProperties
 from gearmbs.flexible.mnf_bytes import Reader, floats_bytes, ints_bytes, record_bytes, text_bytes
 from gearmbs.flexible.modal_model import ModalModel, Seat
 from gearmbs.mechanism import ShapeIntegrals
+from gearmbs.progress import waiting
 from gearmbs.units import to_si
 
 VERSION = b"\x00\x00\x01\x3c"
@@ -203,6 +204,7 @@ class ModalNeutralFile:
         return out
 
 
+@waiting("reading the modes")
 def read_mnf(path: str | Path) -> ModalNeutralFile:
     """Read a modal neutral file of version 6.
 

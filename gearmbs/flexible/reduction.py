@@ -23,6 +23,7 @@ from gearmbs.flexible.integrals import lumps, shape_integrals
 from gearmbs.flexible.interfaces import Interface, Resolved, resolve
 from gearmbs.flexible.modal_model import ModalModel, Seat
 from gearmbs.mechanism.quantities import quantity
+from gearmbs.progress import waiting
 from gearmbs.units import Quantity
 
 DENSE = 900
@@ -40,6 +41,7 @@ GROUNDED = 1e-6
 """Largest share of stiffness, against its diagonal, that rigid motions may meet."""
 
 
+@waiting("reducing the model")
 def reduce_model(
     model: FiniteElementModel,
     interfaces: Iterable[str | Interface] | None = None,

@@ -20,6 +20,7 @@ from gearmbs.flexible.beam import DOFS
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.shaft import Shaft
 from gearmbs.mechanism.quantities import quantities, quantity
+from gearmbs.progress import waiting
 from gearmbs.units import Quantity
 
 DIRECTIONS = {"lateral": (0, 1, 3, 4), "torsional": (5,), "axial": (2,), "all": (0, 1, 2, 3, 4, 5)}
@@ -219,6 +220,7 @@ class Rotor:
         shapes = self._at_stations(vectors[:n, chosen].T)
         return WhirlModes(speed, values.imag.copy(), -values.real / np.abs(values), [_whirl(s) for s in shapes], shapes)
 
+    @waiting("modes at each speed")
     def campbell(self, speeds: Sequence[Quantity], count: int = 8) -> Campbell:
         """Return natural frequencies over speeds, rad/s or text."""
         found = [self.modes(speed, count) for speed in speeds]

@@ -12,6 +12,7 @@ import numpy as np
 from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.tables import pack
+from gearmbs.progress import waiting
 
 SIDE, TOOTH_1, TOOTH_2, GAP = (GAP_COLUMNS.index(name) for name in ("side", "tooth_1", "tooth_2", "gap"))
 NORMAL_FORCE, PAIRS_DRIVE = layout.place(layout.TOTALS, "normal_force"), layout.place(layout.TOTALS, "pairs_drive")
@@ -277,6 +278,7 @@ def _driver_angle(mesh: StaticMesh, phase: float) -> float:
     return phase * (mesh.rotation * 2 * math.pi / mesh.geometry.driver.teeth)
 
 
+@waiting("transmission error")
 def _over_phases(mesh: StaticMesh, phase: np.ndarray, at: Callable[[float], tuple[float, ...]]) -> np.ndarray:
     """Columns of what a function of the driver's angle returns, at each phase."""
     return np.array([at(_driver_angle(mesh, step)) for step in phase]).T

@@ -16,12 +16,14 @@ from gearmbs.dae.analyses.statics import StaticResult
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.modal import ModalBody
+from gearmbs.progress import waiting
 
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism.mechanism import Mechanism
 
 
+@waiting("equilibrium")
 def static_equilibrium(
     mechanism: Mechanism, *, t: float = 0.0, tol: float = 1e-10, max_iterations: int = 200, move: bool = False
 ) -> StaticResult:
@@ -75,7 +77,7 @@ def frozen_friction(mechanism: Mechanism) -> str | None:
 def _warn_of_friction(mechanism: Mechanism) -> None:
     remark = frozen_friction(mechanism)
     if remark is not None:
-        warnings.warn(remark, stacklevel=3)
+        warnings.warn(remark, stacklevel=4)
 
 
 def place(mechanism: Mechanism, equilibrium: StaticResult) -> None:
@@ -98,6 +100,7 @@ def place(mechanism: Mechanism, equilibrium: StaticResult) -> None:
         state.start = float(value)
 
 
+@waiting("equilibrium")
 def quasi_static(mechanism: Mechanism, t_eval: np.ndarray, *, tol: float = 1e-10) -> Solution:
     """Follow the position in which a mechanism rests while its functions of time change slowly.
 
@@ -126,6 +129,7 @@ def quasi_static(mechanism: Mechanism, t_eval: np.ndarray, *, tol: float = 1e-10
     return _sequence.quasi_static(mechanism.compile(float(times[0])), times, tol=tol)
 
 
+@waiting("modes")
 def linear_modes(mechanism: Mechanism, *, t: float = 0.0, at: StaticResult | str = "initial") -> Modes:
     """Linearise a mechanism and return its eigenvalues and mode shapes.
 
@@ -156,6 +160,7 @@ def linear_modes(mechanism: Mechanism, *, t: float = 0.0, at: StaticResult | str
     return _modes.linear_modes(at.solution.system)
 
 
+@waiting("kinematics")
 def kinematic(mechanism: Mechanism, t_eval: np.ndarray) -> Solution:
     """Solve positions, velocities, accelerations and reactions of a mechanism whose motion is all prescribed.
 

@@ -10,6 +10,9 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
+from gearmbs.progress import staged, waiting
+
+from .any_data import takes_data
 from .errors import SignalError
 from .filters import apply_zero_phase, decimation_taps
 from .interpolation import interpolate
@@ -26,13 +29,16 @@ BLOCK_STEPS = 64
 TURN = 2.0 * math.pi
 
 
+@takes_data()
+@waiting("resampling in angle")
 def angular_resample(signal: xr.DataArray, phase: xr.DataArray, *, samples_per_rev: int | None = None) -> xr.DataArray:
     """Order tracking: resample to equal steps of the shaft's angle.
 
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel).
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
     phase : xarray.DataArray
         Shaft angle in rad, dimension (time,), covering all or part of the record (`phase_from_tacho`,
         `phase_from_line`, `phase_from_speed`). It may rest, as before a run-up, but not turn back.
@@ -58,6 +64,8 @@ def angular_resample(signal: xr.DataArray, phase: xr.DataArray, *, samples_per_r
     return _angular(signal, values, angle, clock.per_rev, {"mean_speed": clock.mean_speed})
 
 
+@takes_data()
+@staged("averaging")
 def time_synchronous_average(
     signal: xr.DataArray,
     phase: xr.DataArray,

@@ -13,12 +13,12 @@ import xarray as xr
 from gearmbs.progress import staged
 from gearmbs.units import to_si
 
+from .any_data import takes_data
 from .bearing_envelopes import envelope_spectra
 from .bearing_evidence import HARMONICS, SLIP, EnvelopeSpectrum
-from .bearing_judgement import NONE, Judged, judge
+from .bearing_judgement import CLEAR, SIGNS, Judged, judge
 from .bearing_lines import BearingLines, bearing_lines
 from .bearing_report import BearingReport, PartFinding
-from .door import to_signal
 from .errors import MissingMetadataError, SignalError
 from .phase import phase_from_speed
 from .signal import rate_of, require, units_of
@@ -26,6 +26,7 @@ from .signal import rate_of, require, units_of
 LEAST_TURNS = 20
 
 
+@takes_data(band="frequency")
 @staged("diagnosing bearings")
 def diagnose_bearing(
     signal: Any,
@@ -48,14 +49,16 @@ def diagnose_bearing(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel), or whatever `to_signal` makes a signal of by itself.
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
     bearing : Bearing, str, mapping, BearingLines, or a sequence of these
         See `bearing_lines`; a mapping from names to (bearing, ratio) gives bearings on shafts of other speeds.
     speed : float, str or curve, optional
         Of the inner ring's shaft, rad/s or text; default the signal's. Of a curve, as for `speed_curve`, the angle is
         taken, see ``phase``.
-    band : (float, float), optional
-        Hz; default: the band of the kurtogram that is wide enough for the lines and lies below the filter's edge.
+    band : pair of float or str, optional
+        Hz or texts; default: the band of the kurtogram that is wide enough for the lines and lies below the filter's
+        edge.
     phase : xarray.DataArray, optional
         Angle of the shaft over time, rad, where the speed varies: envelopes are then followed in angle.
     shafts : sequence of float, optional
@@ -80,7 +83,6 @@ def diagnose_bearing(
     SignalError
         If a bearing cannot be read, or the record is too short for its lines.
     """
-    signal = to_signal(signal)
     known = _all_lines(bearing)
     if not 0.0 < slip < 0.2:
         raise SignalError(f"slip: must lie between 0 and 0.2, got {slip!r}")
@@ -181,7 +183,7 @@ def _finding(channel: str, judged: Judged, spectra: Sequence[EnvelopeSpectrum], 
     sides = _sidebands(spectrum, evidence.found, lines.sidebands[part] * shaft * lines.ratio)
     return PartFinding(
         lines.name, part, channel, evidence.kinematic, evidence.found, evidence.ratios, evidence.log_chance, sides,
-        evidence.where, judged.grade, judged.beside, judged.stronger, judged.places,
+        evidence.where, judged.grade, judged.beside, judged.stronger, judged.places, judged.fraction,
     )  # fmt: skip
 
 
@@ -199,7 +201,7 @@ def _sidebands(spectrum: EnvelopeSpectrum, line: float, spacing: float) -> float
 
 def _shown(spectra: Sequence[EnvelopeSpectrum], judged: Sequence[Judged]) -> EnvelopeSpectrum:
     """Return the spectrum with the clearest of the lines that were named, without any the first."""
-    named = [one.evidence for one in judged if one.grade != NONE]
+    named = [one.evidence for one in judged if one.grade in (CLEAR, SIGNS)]
     if not named:
         return spectra[0]
     where = min(named, key=lambda evidence: evidence.log_chance).where

@@ -9,7 +9,10 @@ and some of them lie where a bearing's would. So a part is named only if
 * hardly any other place of the record holds a family as strong: the orders from a third of a turn to beyond the highest
   line are looked at in windows as wide as slip makes the part's own. The share of places that beat it is the
   probability with which a family of any other cause would have been taken for the part;
-* they are not just every second to sixth line of a slower family, nor the cage's multiple among its neighbours.
+* they are not just every second to sixth line of a slower family, nor the cage's multiple among its neighbours;
+* they are not just some of the multiples of a half to a sixth of the shaft's turns. Loose parts answer every second to
+  sixth turn only, and a cage may fall in step: at 2/5 of the turns an outer race with nine elements is passed 18/5
+  times a turn, near its kinematic 3.58.
 
 The strongest part is named first; its lines and sidebands are then taken out, and the rest is judged again.
 """
@@ -22,12 +25,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .bearing_evidence import EnvelopeSpectrum, Evidence, find_lines
+from .bearing_evidence import LINE_BINS, EnvelopeSpectrum, Evidence, find_lines
 from .bearing_lines import CAGE, ELEMENT, OUTER, BearingLines
 
-CLEAR, SIGNS, OPEN, NONE = "clear", "signs", "open", "none"
-CLEAR_CHANCE, SIGNS_CHANCE = -12.0, -6.0
-"""Decimal logarithm of the chance from which lines are no noise."""
+CLEAR, SIGNS, OPEN, FAINT, NONE = "clear", "signs", "open", "faint", "none"
+CLEAR_CHANCE, SIGNS_CHANCE, FAINT_CHANCE = -12.0, -6.0, -2.0
+"""Decimal logarithm of the chance from which lines are no noise; from the last on they are told but accuse nothing."""
 LEAST_RATIO = 10.0
 """Least power of the fundamental by its neighbourhood, as rare as 5e-5 in noise."""
 MOST_SHARE = 0.025
@@ -54,7 +57,10 @@ WIDTH_SHARE = 2e-3
 
 @dataclass(frozen=True)
 class Judged:
-    """One part of one bearing: its evidence, grade, and how many of the other places are as strong."""
+    """One part of one bearing: its evidence, grade, and how many of the other places are as strong.
+
+    `beside` tells lines of another cause; `fraction` is (k, m) if these are k/m of the shaft's turns.
+    """
 
     lines: BearingLines
     part: str
@@ -63,6 +69,7 @@ class Judged:
     stronger: int
     places: int
     beside: bool = False
+    fraction: tuple[int, int] | None = None
 
 
 def without_shafts(spectrum: EnvelopeSpectrum, shafts: Sequence[float]) -> EnvelopeSpectrum:
@@ -136,11 +143,16 @@ def judge(
         named[key] = Judged(*key, evidence, grade, stronger, places)
         spectra = [_without_family(s, key, evidence.found, turns) for s in spectra]
         look = _Look(spectra, parts, turns, slip, harmonics)
-    out = []
-    for key in parts:
-        beside = _stands_out(first.of(key), SIGNS_CHANCE - trials)
-        out.append(named.get(key) or Judged(*key, first.of(key), NONE, *first.rivals(key), beside))
-    return out
+    return [named.get(key) or _not_named(first, key, trials) for key in parts]
+
+
+def _not_named(first: _Look, key: tuple[BearingLines, str], trials: float) -> Judged:
+    """Return what is told of a part that is not named."""
+    evidence, (stronger, places) = first.of(key), first.rivals(key)
+    if _stands_out(evidence, SIGNS_CHANCE - trials):
+        return Judged(*key, evidence, NONE, stronger, places, True, first.fraction_of_turns(key))
+    faint = key[1] != CAGE and stronger == 0 and evidence.log_chance <= FAINT_CHANCE - trials
+    return Judged(*key, evidence, FAINT if faint else NONE, stronger, places)
 
 
 class _Look:
@@ -197,8 +209,29 @@ class _Look:
 
         if key[1] == OUTER and heard([(elements + k) / elements for k in (-2, -1, 1, 2)], HALF):
             return True
+        if self.fraction_of_turns(key) is not None:
+            return True
         counted = [m for m in range(2, PARENTS + 1) if math.gcd(m, elements) == 1 and (key[1] != ELEMENT or m % 2)]
         return any(heard([k / m for k in range(1, 2 * m) if k % m], OWN) for m in counted)
+
+    def fraction_of_turns(self, key: tuple[BearingLines, str]) -> tuple[int, int] | None:
+        """Return (k, m) if a part's lines are k/m of its shaft's turns and most multiples of 1/m comparably strong."""
+        own, turns = self.of(key), key[0].ratio * self.turns
+        if key[1] == CAGE:
+            # one turn in two and a half is what a cage does
+            return None
+        spectrum = next(s for s in self.spectra if s.where == own.where)
+        for m in range(2, PARENTS + 1):
+            k = round(m * own.found / turns)
+            if math.gcd(k, m) > 1 or abs(own.found - k * turns / m) > LINE_BINS * spectrum.step:
+                continue
+            # to one and a half times the part's fundamental; neither whole turns nor the part's own lines
+            others = [j for j in range(1, math.ceil(1.5 * k)) if j % m and j % k]
+            places = [round(j * turns / m / spectrum.step) for j in others]
+            levels = [float(spectrum.ratio[max(p - 1, 0) : p + 2].max(initial=0.0)) for p in places]
+            if levels and float(np.median(levels)) >= COMPARABLE * own.ratios[0]:
+                return k, m
+        return None
 
 
 def _same_place(look: _Look, first: _Look, key: tuple[BearingLines, str]) -> bool:

@@ -36,12 +36,15 @@ class PartFinding:
         Power of the first sidebands by that of the line; NaN for parts that have none.
     where : str
         Band in which they are clearest.
-    grade : {"clear", "signs", "open", "none"}
-        "open": lines that may also be another shaft's, and accuse nothing.
+    grade : {"clear", "signs", "open", "faint", "none"}
+        "open": lines that may also be another shaft's; "faint": hardly above noise, but as strong at no other place of
+        the record. Neither accuses.
     beside : bool
         Whether there are lines, but another part, or another cause, explains more of them.
     stronger, places : int
         At how many of the other places of the record a family of lines stands as strong, and how many places there are.
+    fraction : (int, int), optional
+        (k, m) if the lines are k/m of the shaft's turns and the other multiples of 1/m comparably strong.
     """
 
     bearing: str
@@ -57,6 +60,7 @@ class PartFinding:
     beside: bool = False
     stronger: int = 0
     places: int = 0
+    fraction: tuple[int, int] | None = None
 
     @property
     def slip(self) -> float:
@@ -73,7 +77,8 @@ class PartFinding:
         strength = "Clear lines" if self.grade == "clear" else "Signs"
         heard = sum(r >= 10.0 for r in self.ratios)
         text = (
-            f"{strength} of a defect of {WORDS[self.part]} of bearing {self.bearing} in channel {self.channel}: "
+            f"{strength} such as a defect of {WORDS[self.part]} of bearing {self.bearing} makes, in channel "
+            f"{self.channel}: "
             f"{self.found:.2f} Hz, {100 * self.slip:+.2f} % beside the kinematic {self.kinematic:.2f} Hz, "
             f"{self.level:.0f} dB above its neighbourhood, {heard} of {len(self.ratios)} harmonics "
             f"({self.where}); in noise with a probability of {_chance(self.log_chance)}, and families as strong "
@@ -83,6 +88,30 @@ class PartFinding:
             kind = "the shaft's turns, as an inner race has them" if self.part != ELEMENT else "the cage's turns"
             text += f"; sidebands at {kind}"
         return text + "."
+
+    def remark(self) -> str | None:
+        """Return what is to be told of lines that accuse nothing, if there is anything."""
+        place = f"in channel {self.channel}"
+        if self.grade == "open":
+            return (
+                f"A modulation at {self.found:.2f} Hz {place} is where the cage of bearing {self.bearing} turns "
+                f"({self.kinematic:.2f} Hz), but so might another shaft, or a mating wheel: say which shafts there are "
+                "(shafts=, --shaft) to have it judged."
+            )
+        if self.grade == "faint":
+            return (
+                f"A faint line at {self.found:.2f} Hz {place} is {100 * self.slip:+.2f} % beside that of "
+                f"{WORDS[self.part]} of bearing {self.bearing} and stronger than at {self.places} other places, but "
+                f"noise has such with a probability of {_chance(self.log_chance)}: take a longer record."
+            )
+        if self.fraction is not None:
+            k, m = self.fraction
+            return (
+                f"Lines at {self.found:.2f} Hz {place}, near those of {WORDS[self.part]} of bearing {self.bearing} "
+                f"({self.kinematic:.2f} Hz), are {k}/{m} of the shaft's turns, and other multiples of 1/{m} of these "
+                "stand beside them: something is loose, or the cage runs in step with the shaft, and they name no part."
+            )
+        return None
 
 
 def _chance(log_chance: float) -> str:
@@ -161,13 +190,7 @@ class BearingReport:
     @property
     def remarks(self) -> list[str]:
         """What stands in the record but accuses nothing, in words."""
-        return [
-            f"A modulation at {f.found:.2f} Hz in channel {f.channel} is where the cage of bearing {f.bearing} turns "
-            f"({f.kinematic:.2f} Hz), but so might another shaft, or a mating wheel: say which shafts there are "
-            "(shafts=, --shaft) to have it judged."
-            for f in self.findings
-            if f.grade == "open"
-        ]
+        return [remark for finding in self.findings if (remark := finding.remark()) is not None]
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """The numbers as tables: bearing_evidence, bearing_lines, bearing_levels."""

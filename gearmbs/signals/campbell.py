@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from gearmbs.progress import waiting
 from gearmbs.units import to_si
 
 from .errors import SignalError
@@ -133,7 +134,12 @@ def _orders(orders: Sequence[float] | Mapping[str, float]) -> tuple[list[str], n
 def _frequencies(modes: Any, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
     """Frequencies (Hz) and, where known, damping ratios, each of shape (speeds, modes); short rows end in NaN."""
     if callable(modes):
-        modes = [_modes_of(modes(float(speed))) for speed in omega]
+        found = []
+        with waiting("modes at each speed") as tell:
+            for i, speed in enumerate(omega):
+                found.append(_modes_of(modes(float(speed))))
+                tell((i + 1) / omega.size)
+        modes = found
     modes = _modes_of(modes)
     if hasattr(modes, "frequencies"):
         modes = [modes] * omega.size

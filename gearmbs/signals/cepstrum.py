@@ -7,12 +7,17 @@ import scipy.fft
 import scipy.signal as ss
 import xarray as xr
 
+from gearmbs.progress import waiting
+
+from .any_data import takes_data
 from .errors import SignalError
 from .signal import rate_of
 
 FLOOR = 1e-12
 
 
+@takes_data(segment="time")
+@waiting("cepstrum")
 def power_cepstrum(
     signal: xr.DataArray, *, segment: int | float | None = None, window: str | tuple = "boxcar", overlap: float = 0.5
 ) -> xr.DataArray:
@@ -24,7 +29,8 @@ def power_cepstrum(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel).
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
     segment : int or float, optional
         Samples (int) or seconds (float) per segment; default the whole record.
     window : str or tuple

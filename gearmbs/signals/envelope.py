@@ -17,6 +17,9 @@ import scipy.fft
 import scipy.signal as ss
 import xarray as xr
 
+from gearmbs.progress import staged, waiting
+
+from .any_data import takes_data
 from .errors import SignalError
 from .filters import bandpass
 from .phase import analytic
@@ -27,6 +30,8 @@ Progress = Callable[[float, str], None]
 BLOCK = 1 << 17
 
 
+@takes_data(band="frequency", transition="frequency")
+@waiting("envelope")
 def envelope(
     signal: xr.DataArray, band: tuple[float, float] | None = None, *, transition: float | None = None
 ) -> xr.DataArray:
@@ -35,11 +40,12 @@ def envelope(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel).
-    band : (float, float), optional
-        Pass band in Hz.
-    transition : float, optional
-        Width of the transitions in Hz; default a tenth of the band, at most what fits below and above it.
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
+    band : pair of float or str, optional
+        Pass band, Hz or texts.
+    transition : float or str, optional
+        Width of the transitions, Hz or text; default a tenth of the band, at most what fits below and above it.
 
     Returns
     -------
@@ -57,6 +63,8 @@ def envelope(
     return like(signal, np.stack(columns, axis=1))
 
 
+@takes_data(band="frequency", segment="time")
+@waiting("envelope spectrum")
 def envelope_spectrum(
     signal: xr.DataArray,
     band: tuple[float, float] | None = None,
@@ -68,6 +76,8 @@ def envelope_spectrum(
     return spectrum(envelope(signal, band), scaling=scaling, segment=segment)
 
 
+@takes_data()
+@waiting("spectral kurtosis")
 def spectral_kurtosis(signal: xr.DataArray, *, segment: int = 256, overlap: float = 0.75) -> xr.DataArray:
     """Spectral kurtosis from the short-time Fourier transform X(t, f).
 
@@ -77,7 +87,8 @@ def spectral_kurtosis(signal: xr.DataArray, *, segment: int = 256, overlap: floa
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel).
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
     segment : int
         Window length in samples: shorter than the time between bursts, longer than a burst's decay.
     overlap : float
@@ -121,6 +132,8 @@ def spectral_kurtosis(signal: xr.DataArray, *, segment: int = 256, overlap: floa
     )
 
 
+@takes_data()
+@staged("kurtogram")
 def kurtogram(signal: xr.DataArray, *, levels: int = 7, progress: Progress | None = None) -> xr.Dataset:
     """Kurtosis of the complex envelope in bands that halve, and are split in three, level by level.
 
@@ -131,7 +144,8 @@ def kurtogram(signal: xr.DataArray, *, levels: int = 7, progress: Progress | Non
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel).
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
     levels : int
         Halvings; the narrowest bands are rate / 2 / 2^levels wide.
     progress : callable, optional

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
+from .any_data import takes_data
 from .errors import SignalError
 from .fir import convolve_valid, kaiser_order, windowed_sinc
 from .signal import check_rate, like, rate_of
@@ -114,6 +115,7 @@ def _valid(source: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:
     return out
 
 
+@takes_data(low="frequency", high="frequency", transition="frequency")
 def bandpass(
     signal: xr.DataArray,
     low: float,
@@ -128,7 +130,8 @@ def bandpass(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel).
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
     low, high : float
         Pass band in Hz.
     transition : float

@@ -14,6 +14,8 @@ from typing import Any
 
 import xarray as xr
 
+from gearmbs.progress import staged
+
 from .errors import SignalError, SignalFileError
 from .gaps import checked_gaps
 from .given import given_rate, given_speed, with_speed
@@ -121,6 +123,7 @@ HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 HEAD_BYTES = 4096
 
 
+@staged("reading")
 def read_signal(
     path: str | Path,
     *,
@@ -198,6 +201,7 @@ def damage_named(path: Path, format: str) -> Iterator[None]:
         ) from exc
 
 
+@staged("writing")
 def write_signal(
     signal: xr.DataArray | xr.Dataset, path: str | Path, *, format: str | None = None, progress: Progress | None = None
 ) -> Path:

@@ -12,7 +12,10 @@ import scipy.fft
 import scipy.signal as ss
 import xarray as xr
 
+from gearmbs.progress import waiting
+
 from .angular import angular_resample
+from .any_data import takes_data
 from .errors import SignalError
 from .shaft import shaft_phase
 from .signal import common_unit, rate_of
@@ -24,6 +27,7 @@ KEPT = 0.4
 LEAST_TURNS = 4.0
 
 
+@takes_data()
 def order_track(
     signal: Any,
     speed: Any = None,
@@ -46,7 +50,8 @@ def order_track(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel), measured or simulated, or whatever `to_signal` makes a signal of by itself.
+        Measured or simulated, dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``,
+        ``units``, ``channels`` and ``gaps`` as there.
     speed : optional
         Speed of the shaft in any shape that `speed_curve` reads; default what the signal knows of it.
     orders : float or sequence of float
@@ -83,19 +88,22 @@ def order_track(
         gaps = np.diff(np.concatenate(([0.0], np.sort(wanted))))
         gaps = gaps[gaps > 1e-9]
         revolutions = max(LEAST_TURNS, 2.0 / float(gaps.min())) if gaps.size else LEAST_TURNS
-    windows = _Windows(signal, speed, revolutions, overlap, float(wanted.max()), shaft)
-    out = np.empty((windows.starts.size, wanted.size, windows.angular.sizes["channel"]))
-    turns = windows.angular["angle"].values
-    carriers = [np.exp(-2j * np.pi * order * turns)[:, None] * windows.angular.values for order in wanted]
-    for i, start in enumerate(windows.starts):
-        for k, carried in enumerate(carriers):
-            piece = windows.weights @ carried[start : start + windows.length]
-            out[i, k] = 2.0 * np.abs(piece) / windows.weights.sum()
+    with waiting("tracking orders") as tell:
+        windows = _Windows(signal, speed, revolutions, overlap, float(wanted.max()), shaft)
+        out = np.empty((windows.starts.size, wanted.size, windows.angular.sizes["channel"]))
+        turns = windows.angular["angle"].values
+        for k, order in enumerate(wanted):
+            carried = np.exp(-2j * np.pi * order * turns)[:, None] * windows.angular.values
+            for i, start in enumerate(windows.starts):
+                piece = windows.weights @ carried[start : start + windows.length]
+                out[i, k] = 2.0 * np.abs(piece) / windows.weights.sum()
+            tell((k + 1) / wanted.size)
     if scaling == "rms":
         out /= math.sqrt(2.0)
     return windows.labelled(out, "order", wanted, scaling)
 
 
+@takes_data()
 def order_map(
     signal: Any,
     speed: Any = None,
@@ -132,12 +140,14 @@ def order_map(
     """
     if scaling not in SCALINGS:
         raise SignalError(f"scaling: must be one of {', '.join(SCALINGS)}, got {scaling!r}")
-    windows = _Windows(signal, speed, revolutions, overlap, maximum, shaft, window)
-    power = np.empty((windows.starts.size, windows.length // 2 + 1, windows.angular.sizes["channel"]))
-    for i, start in enumerate(windows.starts):
-        piece = windows.angular.values[start : start + windows.length]
-        line = scipy.fft.rfft((piece - piece.mean(axis=0)) * windows.weights[:, None], axis=0)
-        power[i] = line.real**2 + line.imag**2
+    with waiting("order map") as tell:
+        windows = _Windows(signal, speed, revolutions, overlap, maximum, shaft, window)
+        power = np.empty((windows.starts.size, windows.length // 2 + 1, windows.angular.sizes["channel"]))
+        for i, start in enumerate(windows.starts):
+            piece = windows.angular.values[start : start + windows.length]
+            line = scipy.fft.rfft((piece - piece.mean(axis=0)) * windows.weights[:, None], axis=0)
+            power[i] = line.real**2 + line.imag**2
+            tell((i + 1) / windows.starts.size)
     power[:, 1 : (-1 if windows.length % 2 == 0 else None)] *= 2.0
     if scaling == "density":
         values = power / (windows.per_rev * (windows.weights**2).sum())
@@ -155,7 +165,7 @@ class _Windows:
 
     def __init__(
         self,
-        signal: Any,
+        signal: xr.DataArray,
         speed: Any,
         revolutions: float | None,
         overlap: float,
@@ -165,11 +175,6 @@ class _Windows:
     ) -> None:
         if not 0.0 <= overlap < 1.0:
             raise SignalError(f"overlap: must lie in [0, 1), got {overlap!r}")
-        if not isinstance(signal, xr.DataArray):
-            # readers of files are not loaded for a simulated record
-            from .door import to_signal
-
-            signal = to_signal(signal)
         phase = shaft_phase(signal, speed, **shaft)
         turns = (phase.values - phase.values[0]) / TURN
         fastest = float(np.percentile(np.gradient(turns, phase["time"].values), 99.0)) if phase.size > 1 else 0.0

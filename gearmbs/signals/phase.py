@@ -11,6 +11,7 @@ import scipy.interpolate
 import scipy.signal as ss
 import xarray as xr
 
+from .any_data import takes_data
 from .errors import SignalError
 from .filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kaiser_taps
 from .monotone_cubic import monotone_cubic
@@ -21,6 +22,7 @@ LINE_ATTENUATION_DB = 60.0
 PULSE_HYSTERESIS = 0.2
 
 
+@takes_data()
 def phase_from_speed(signal: xr.DataArray, speed: Any) -> xr.DataArray:
     """Angle of a shaft whose speed is known, zero at the first sample.
 
@@ -55,6 +57,7 @@ def phase_from_speed(signal: xr.DataArray, speed: Any) -> xr.DataArray:
     return _phase(times[inside], curve.angle(times[inside]), "speed curve")
 
 
+@takes_data()
 def phase_from_tacho(
     signal: xr.DataArray, channel: str | None = None, *, pulses_per_rev: float = 1.0, threshold: float | None = None
 ) -> xr.DataArray:
@@ -67,7 +70,8 @@ def phase_from_tacho(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel).
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
     channel : str, optional
         The tacho's channel; may be left out if there is only one.
     pulses_per_rev : float
@@ -121,6 +125,7 @@ def phase_from_tacho(
     return _phase(times[inside], phase, "tacho")
 
 
+@takes_data(frequency="frequency", half_bandwidth="frequency")
 def phase_from_line(
     signal: xr.DataArray, frequency: float, order: float, *, half_bandwidth: float | None = None
 ) -> xr.DataArray:
@@ -133,7 +138,8 @@ def phase_from_line(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel).
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
     frequency : float
         Mean frequency of the line in Hz.
     order : float

@@ -26,8 +26,10 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
+from gearmbs.progress import waiting
+
 from .angular import angular_resample
-from .door import to_signal
+from .any_data import takes_data
 from .errors import MissingMetadataError, SignalError
 from .given import given_speed
 from .phase import phase_from_speed
@@ -59,6 +61,8 @@ LEAST_SHARE = 1e-3
 """Least RMS of what is judged, by that of the whole record: 60 dB below it nothing is named."""
 
 
+@takes_data()
+@waiting("diagnosing the planetary set")
 def diagnose_planetary(
     signal: Any,
     planetary: Any,
@@ -74,7 +78,8 @@ def diagnose_planetary(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel), or whatever `to_signal` makes a signal of by itself, of a sensor at the ring.
+        Of a sensor at the ring, dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``,
+        ``units``, ``channels`` and ``gaps`` as there.
     planetary : PlanetarySet, PlanetaryLines or (int, int, int)
         The set, or the teeth of sun, planet and ring.
     speed : float or str, optional
@@ -100,7 +105,6 @@ def diagnose_planetary(
     SignalError
         If the record holds too few turns of the carrier, or is sampled too slowly for the mesh.
     """
-    signal = to_signal(signal)
     lines = planetary_lines(planetary, planets)
     if sensor_angle is None and phase is None and speed is None and "angle" in signal.coords:
         sensor_angle = 0.0

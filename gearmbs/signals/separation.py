@@ -27,7 +27,10 @@ import scipy.fft
 import scipy.signal as ss
 import xarray as xr
 
+from gearmbs.progress import waiting
+
 from .angular import time_synchronous_average
+from .any_data import takes_data
 from .errors import SignalError
 from .signal import like, rate_of
 
@@ -35,13 +38,16 @@ FLOOR = 1e-12
 """Least magnitude of a line, of the largest, whose logarithm is taken."""
 
 
+@takes_data()
+@waiting("parting lines and noise")
 def remove_average(signal: xr.DataArray, phase: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
     """Part a record into what repeats with every turn of a shaft and the rest.
 
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel).
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
     phase : xarray.DataArray
         Angle of the shaft, rad, of dimension (time,).
 
@@ -73,6 +79,8 @@ def _periodic(values: np.ndarray, at: np.ndarray) -> np.ndarray:
     return spline(np.mod(at, n))
 
 
+@takes_data(delay="time")
+@waiting("parting lines and noise")
 def discrete_random(
     signal: xr.DataArray, *, delay: float | None = None, segment: int | None = None
 ) -> tuple[xr.DataArray, xr.DataArray]:
@@ -84,7 +92,8 @@ def discrete_random(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel).
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
     delay : float, optional
         s; longer than the memory of what is random, some turns of the shaft. Default: one segment.
     segment : int, optional
@@ -122,6 +131,8 @@ def discrete_random(
     return like(signal, discrete), like(signal, signal.values - discrete)
 
 
+@takes_data()
+@waiting("parting lines and noise")
 def prewhiten(signal: xr.DataArray) -> xr.DataArray:
     """Give all lines of the spectrum the same magnitude and keep their phases.
 
@@ -139,13 +150,16 @@ def prewhiten(signal: xr.DataArray) -> xr.DataArray:
     return like(signal, np.stack(columns, axis=1))
 
 
+@takes_data(width="frequency")
+@waiting("parting lines and noise")
 def level_lines(signal: xr.DataArray, width: float, most: float = 10.0) -> xr.DataArray:
     """Flatten a spectrum over neighbourhoods, and cut its lines to a multiple of what is round them.
 
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel).
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
     width : float
         Of a neighbourhood, Hz.
     most : float
@@ -172,6 +186,8 @@ def level_lines(signal: xr.DataArray, width: float, most: float = 10.0) -> xr.Da
     return like(signal, np.stack(columns, axis=1))
 
 
+@takes_data(frequencies="frequency", keep_below="time")
+@waiting("parting lines and noise")
 def edit_cepstrum(
     signal: xr.DataArray, frequencies: Sequence[float] | float, *, width: float = 0.02, keep_below: float | None = None
 ) -> xr.DataArray:
@@ -180,7 +196,8 @@ def edit_cepstrum(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel).
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
     frequencies : float or sequence of float
         Spacings of the families, Hz: shafts and mesh frequencies.
     width : float

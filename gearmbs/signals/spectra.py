@@ -11,6 +11,7 @@ import scipy.fft
 import scipy.signal as ss
 import xarray as xr
 
+from .any_data import takes_data
 from .errors import SignalError
 from .signal import rate_of, units_of
 
@@ -19,6 +20,7 @@ Progress = Callable[[float, str], None]
 SCALINGS = ("amplitude", "rms", "power", "density")
 
 
+@takes_data(segment="time")
 def spectrum(
     signal: xr.DataArray,
     *,
@@ -34,7 +36,8 @@ def spectrum(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel), units U.
+        Dimensions (time, channel), units U, or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
     scaling : {"amplitude", "rms", "power", "density"}
         "amplitude": a sine A sin(2 pi f t) on a line gives A, in U; "rms": A / sqrt(2), in U; "power": A^2 / 2, in U^2;
         "density": power spectral density in U^2/Hz, whose integral over frequency is the mean square.

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from .any_data import takes_data
 from .errors import SignalError
 from .phase import phase_from_line
 from .signal import rate_of, require
@@ -67,6 +68,7 @@ class SpeedEstimate:
     score: float = math.nan
 
 
+@takes_data(speed_range="angular speed")
 def estimate_speed(
     signal: xr.DataArray,
     teeth: int | Sequence[int] | None = None,
@@ -86,7 +88,8 @@ def estimate_speed(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel), at nearly constant speed.
+        At nearly constant speed, dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``,
+        ``units``, ``channels`` and ``gaps`` as there.
     teeth : int or sequence, optional
         Tooth count of the wheel whose speed is wanted (first); default the signal's.
     speed_range : (float, float), optional

@@ -11,7 +11,9 @@ import scipy.fft
 import scipy.signal as ss
 import xarray as xr
 
-from .door import to_signal
+from gearmbs.progress import waiting
+
+from .any_data import as_given, in_si, takes_data
 from .errors import MissingMetadataError, SignalError
 from .shaft import REMEDY, shaft_phase
 from .signal import common_unit, rate_of
@@ -23,14 +25,15 @@ SLICES = 200
 """So many windows a spectrogram has by default, about."""
 
 
+@takes_data(segment="time", maximum="frequency")
 def spectrogram(
     signal: Any,
     *,
-    segment: float | None = None,
+    segment: float | str | None = None,
     overlap: float = 0.75,
     scaling: Scaling = "amplitude",
     window: str | tuple = "hann",
-    maximum: float | None = None,
+    maximum: float | str | None = None,
     speed: Any = None,
     **shaft: Any,
 ) -> xr.DataArray:
@@ -39,15 +42,16 @@ def spectrogram(
     Parameters
     ----------
     signal : xarray.DataArray
-        Dimensions (time, channel), or the record of a simulated case.
-    segment : float, optional
-        Length of a window, s; default what gives some 200 of them, with 64 samples or more.
+        Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
+        ``channels`` and ``gaps`` as there.
+    segment : float or str, optional
+        Length of a window, s or text; default what gives some 200 of them, with 64 samples or more.
     overlap : float
         Fraction of overlap, 0 <= overlap < 1.
     scaling, window
         As for `spectrum`.
-    maximum : float, optional
-        Highest frequency kept, Hz.
+    maximum : float or str, optional
+        Highest frequency kept, Hz or text.
     speed, **shaft : optional
         As for `order_track`; adds the coordinate `speed`. Without it the signal's own is used, if it has one.
 
@@ -61,7 +65,6 @@ def spectrogram(
     SignalError
         If the window does not fit, or the speed that is given cannot be read.
     """
-    signal = to_signal(signal)
     rate, n = rate_of(signal), signal.sizes["time"]
     if scaling not in SCALINGS:
         raise SignalError(f"scaling: must be one of {', '.join(SCALINGS)}, got {scaling!r}")
@@ -76,15 +79,17 @@ def spectrogram(
     step = max(1, round(length * (1.0 - overlap)))
     starts = np.arange(0, n - length + 1, step)
     frequency = scipy.fft.rfftfreq(length, 1.0 / rate)
-    shown = frequency <= (math.inf if maximum is None else maximum)
+    shown = frequency <= (math.inf if maximum is None else float(maximum))
     if shown.sum() < 2:
         raise SignalError(f"maximum: {maximum!r} Hz leaves no lines; they lie {frequency[1]:g} Hz apart")
     weights = ss.get_window(window, length)
     out = np.empty((starts.size, int(shown.sum()), signal.sizes["channel"]))
-    for i, start in enumerate(starts):
-        piece = signal.values[start : start + length]
-        line = scipy.fft.rfft((piece - piece.mean(axis=0)) * weights[:, None], axis=0)
-        out[i] = _scaled(line.real**2 + line.imag**2, weights, rate, scaling)[shown]
+    with waiting("spectrogram") as tell:
+        for i, start in enumerate(starts):
+            piece = signal.values[start : start + length]
+            line = scipy.fft.rfft((piece - piece.mean(axis=0)) * weights[:, None], axis=0)
+            out[i] = _scaled(line.real**2 + line.imag**2, weights, rate, scaling)[shown]
+            tell((i + 1) / starts.size)
     times = signal["time"].values[0] + (starts + 0.5 * (length - 1)) / rate
     result = xr.DataArray(
         out,
@@ -111,14 +116,19 @@ def spectrogram(
     return result.assign_coords(speed=("time", values, {"units": "rad/s", "long_name": "speed"}))
 
 
+@waiting("waterfall")
 def waterfall(
     signals: Any,
     speed: Any = None,
     *,
-    segment: float | None = None,
+    segment: float | str | None = None,
     steps: int | None = None,
     scaling: Scaling = "amplitude",
-    maximum: float | None = None,
+    maximum: float | str | None = None,
+    rate: float | str | None = None,
+    units: Any = None,
+    channels: Sequence[str] | None = None,
+    gaps: str | None = None,
     **shaft: Any,
 ) -> xr.DataArray:
     """Spectra against speed: of one run-up, or of records taken each at its own speed.
@@ -130,16 +140,18 @@ def waterfall(
         that know their speeds, or a mapping of speed (rad/s, or text such as "1500 rpm") to record.
     speed : optional
         Of one record: in any shape that `speed_curve` reads. Of several: a speed for each.
-    segment : float, optional
-        Length of the spectra's windows, s. Default: the whole record for records of constant speed of one length, a
-        fiftieth of the record for a run-up.
+    segment : float or str, optional
+        Length of the spectra's windows, s or text. Default: the whole record for records of constant speed of one
+        length, a fiftieth of the record for a run-up.
     steps : int, optional
         Of one record: the number of spectra, each the mean over an equal interval of speed. Default: as the windows
         come, in the order of time.
     scaling : str
         As for `spectrum`.
-    maximum : float, optional
-        Highest frequency kept, Hz.
+    maximum : float or str, optional
+        Highest frequency kept, Hz or text.
+    rate, units, channels, gaps : optional
+        As for `to_signal`, where records are arrays, tables or files.
     **shaft
         As for `order_track`, for one record.
 
@@ -156,17 +168,20 @@ def waterfall(
     SignalError
         If channels differ, or a window does not fit.
     """
-    if isinstance(signals, Mapping) and not isinstance(signals, xr.Dataset):
+    if isinstance(signals, Mapping) and not isinstance(signals, xr.Dataset) and (speed is None or rate is None):
         if speed is not None:
             raise SignalError("speed: the mapping names the speeds already; leave speed out")
         speed, signals = list(signals), list(signals.values())
-    if isinstance(signals, Sequence):
-        return _of_sweep(list(signals), speed, segment, scaling, maximum)
-    signal = to_signal(signals)
+    length: float | None = in_si(segment, "time", "segment")
+    top: float | None = in_si(maximum, "frequency", "maximum")
+    given = {"rate": rate, "units": units, "channels": channels, "gaps": gaps}
+    samples = isinstance(signals, str) or (isinstance(signals, Sequence) and all(np.isscalar(v) for v in signals[:2]))
+    if isinstance(signals, Sequence) and (not samples or not signals):
+        return _of_sweep([as_given(record, given) for record in signals], speed, length, scaling, top)
+    signal = as_given(signals, given)
     duration = signal.sizes["time"] / rate_of(signal)
-    short = duration / 50.0 if segment is None else float(segment)
-    short = max(short, 64 / rate_of(signal)) if segment is None else short
-    slices = spectrogram(signal, segment=short, overlap=0.5, scaling=scaling, maximum=maximum, speed=speed, **shaft)
+    short = max(duration / 50.0, 64 / rate_of(signal)) if length is None else float(length)
+    slices = spectrogram(signal, segment=short, overlap=0.5, scaling=scaling, maximum=top, speed=speed, **shaft)
     if "speed" not in slices.coords:
         raise MissingMetadataError("speed", "a waterfall", REMEDY)
     slices = slices.isel(time=np.flatnonzero(np.isfinite(slices["speed"].values)))
@@ -177,11 +192,10 @@ def waterfall(
 
 
 def _of_sweep(
-    records: list[Any], speeds: Any, segment: float | None, scaling: Scaling, maximum: float | None
+    signals: list[xr.DataArray], speeds: Any, segment: float | None, scaling: Scaling, maximum: float | None
 ) -> xr.DataArray:
-    if not records:
+    if not signals:
         raise SignalError("signals: is empty; give at least one record")
-    signals = [to_signal(record) for record in records]
     if speeds is None:
         speeds = [signal.attrs.get("speed") for signal in signals]
     if len(speeds) != len(signals):

@@ -17,6 +17,7 @@ import xarray as xr
 from gearmbs.drivetrain import Drivetrain, GearMesh, IdealBearing, Shaft, SpeedDrive, TorqueLoad, Wheel
 from gearmbs.drivetrain.backlash import BacklashOscillator
 from gearmbs.gears import GearSpec
+from gearmbs.progress import waiting
 
 MODELS = ("equivalent", "torsional", "frequency", "multibody")
 """One degree of freedom; rigid wheels that only turn; linear, in the frequency domain; the whole mechanism."""
@@ -152,6 +153,7 @@ def rattle(model: str, settings: RattleSettings | None = None, cycles: int = 3, 
     return ways[model](s, cycles, settling)
 
 
+@waiting("rattle")
 def rattle_table(settings: RattleSettings, levels: Sequence[float], models: Sequence[str] = MODELS) -> xr.Dataset:
     """Return amplitudes over their level times T_D/J, and impacts a cycle, dims (model, level)."""
     found = [[rattle(model, replace(settings, level=level)) for level in levels] for model in models]
@@ -164,6 +166,7 @@ def rattle_table(settings: RattleSettings, levels: Sequence[float], models: Sequ
     return xr.Dataset(data, coords={"model": list(models), "level": list(levels)})
 
 
+@waiting("rattle")
 def rattle_map(
     settings: RattleSettings, levels: Sequence[float], frequencies: Sequence[float], cycles: int = 20
 ) -> xr.DataArray:

@@ -259,7 +259,7 @@ def sweep_resonance(
     direction: Direction = "up",
     model: str = "multibody",
     *,
-    progress: bool | Callable[[float], None] = False,
+    progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
     """Sweep the mesh frequency through the resonance in one direction.
 
@@ -268,7 +268,7 @@ def sweep_resonance(
     settings : ResonanceSettings, optional
     direction : {"up", "down"}
     model : {"multibody", "one degree"}
-    progress : bool or callable
+    progress : bool or callable, optional
         Of the multibody model, see `gearmbs.mechanism.simulate`.
 
     Returns

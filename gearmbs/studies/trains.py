@@ -50,7 +50,7 @@ def run_train(
     run: RunSettings | None = None,
     *,
     mechanism: Mechanism | None = None,
-    progress: bool | Callable[[float], None] = False,
+    progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
     """Simulate a drivetrain and return its record.
 
@@ -60,7 +60,7 @@ def run_train(
     run : RunSettings, optional
     mechanism : Mechanism, optional
         What is simulated instead of ``train.build()``: that, with parts added or changed.
-    progress : bool or callable
+    progress : bool or callable, optional
 
     Returns
     -------

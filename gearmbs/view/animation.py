@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.gears import GearPair
+from gearmbs.progress import waiting
 from gearmbs.view.contacts import ContactPoints, ContactProbe, mean_frame
 from gearmbs.view.figure_style import png_bytes
-from gearmbs.view.files import whole_file
-from gearmbs.view.film import write_film
+from gearmbs.view.film import ENDINGS, write_film
 from gearmbs.view.motion import (
     PairMotion,
     chosen_times,
@@ -56,28 +55,20 @@ class MeshAnimation(Page):
         self, motion: PairMotion, title: str = "Gear mesh", width: float | None = None, section: float = 0.0
     ) -> None:
         self.motion = motion
-        self.points = ContactProbe(motion.pair).over(motion)
         self.span = 7.0 * motion.pair.driver.module if width is None else float(width)
         self.section = section
         if not self.span > 0.0:
             raise ValueError(f"width is {width} m; give a positive width of the detail")
+        self.points = ContactProbe(motion.pair).over(motion)
         data = _page_data(motion, self.points, self.span, section)
         super().__init__(title, f"{len(motion)} instants", ("player.js", "transverse.js"), data)
 
     def save(self, path: str | Path) -> Path:
         """Write the animation as ``.html`` (stands alone), ``.gif``, or where ffmpeg is installed ``.mp4``."""
         ending = Path(path).suffix.lower()
-        if ending == ".mp4":
-            return write_film(path, self._pictures(dpi=120))
-        if ending != ".gif":
-            return super().save(path)
-        from PIL import Image
-
-        palette = Image.Palette.ADAPTIVE
-        images = [Image.open(io.BytesIO(p)).convert("P", palette=palette) for p in self._pictures(dpi=80)]
-        with whole_file(path) as part:
-            images[0].save(part, format="GIF", save_all=True, append_images=images[1:], duration=60, loop=0)
-        return Path(path)
+        if ending in ENDINGS:
+            return write_film(path, self._pictures(dpi=120 if ending == ".mp4" else 80), len(self.motion))
+        return super().save(path)
 
     def _pictures(self, dpi: float) -> Iterator[bytes]:
         """Yield each instant as a PNG image."""
@@ -136,13 +127,14 @@ def mesh_animation(
     >>> len(animation.points)
     4
     """
-    if isinstance(source, GearPair):
-        motion = static_motion(source, torque=torque, pitches=2.0, frames=frames)
-        return MeshAnimation(motion, title or "Gear mesh at rest under load", width, section)
-    if start is None:
-        start = _last_cycles(source, element, stop)
-    motion = solution_motion(source, element=element, start=start, stop=stop, frames=frames)
-    return MeshAnimation(motion, title or "Gear mesh, simulated", width, section)
+    with waiting("finding contacts"):
+        if isinstance(source, GearPair):
+            motion = static_motion(source, torque=torque, pitches=2.0, frames=frames)
+            return MeshAnimation(motion, title or "Gear mesh at rest under load", width, section)
+        if start is None:
+            start = _last_cycles(source, element, stop)
+        motion = solution_motion(source, element=element, start=start, stop=stop, frames=frames)
+        return MeshAnimation(motion, title or "Gear mesh, simulated", width, section)
 
 
 def _last_cycles(solution: Solution, element: str | None, stop: float | None, cycles: float = 3.0) -> float:

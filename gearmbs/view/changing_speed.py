@@ -13,6 +13,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from gearmbs.signals import campbell, order_map, order_track, spectrogram, waterfall
+from gearmbs.signals.any_data import in_si
 from gearmbs.view.figure_style import COLOURS, GREY, VERMILLION, drawn_on, label, legend_below, look
 
 RPM = 30.0 / math.pi
@@ -29,7 +30,7 @@ def spectrogram_plot(
     channel: str | None = None,
     orders: Sequence[float] = (),
     decibels: float = RANGE_DB,
-    maximum: float | None = None,
+    maximum: float | str | None = None,
     title: str | None = None,
     ax: Axes | None = None,
     **settings: Any,
@@ -46,8 +47,8 @@ def spectrogram_plot(
         Multiples of the shaft's frequency to mark, where the speed is known.
     decibels : float
         Range of the colours below the largest value.
-    maximum : float, optional
-        Highest frequency shown, Hz.
+    maximum : float or str, optional
+        Highest frequency shown, Hz or text.
     title : str, optional
     ax : matplotlib axes, optional
     **settings
@@ -128,7 +129,7 @@ def waterfall_plot(
     orders: Sequence[float] = (),
     style: str = "lines",
     decibels: float | None = None,
-    maximum: float | None = None,
+    maximum: float | str | None = None,
     title: str | None = None,
     ax: Axes | None = None,
     **settings: Any,
@@ -148,8 +149,8 @@ def waterfall_plot(
         One line for each speed, or colours.
     decibels : float, optional
         Range of the map's colours (default 60), or of lines drawn in dB (default: linear).
-    maximum : float, optional
-        Highest frequency shown, Hz.
+    maximum : float or str, optional
+        Highest frequency shown, Hz or text.
     title : str, optional
     ax : matplotlib axes, optional
     **settings
@@ -240,7 +241,7 @@ def campbell_plot(
     orders: Sequence[float] | Mapping[str, float] = (1.0,),
     measured: xr.DataArray | None = None,
     channel: str | None = None,
-    maximum: float | None = None,
+    maximum: float | str | None = None,
     title: str | None = None,
     ax: Axes | None = None,
 ) -> Figure:
@@ -254,8 +255,8 @@ def campbell_plot(
         A waterfall to lay beneath, measured or simulated: what is excited shows as bright spots on the lines.
     channel : str, optional
         Its channel; default the first.
-    maximum : float, optional
-        Highest frequency shown, Hz; default a tenth above the highest mode.
+    maximum : float or str, optional
+        Highest frequency shown, Hz or text; default a tenth above the highest mode.
     title : str, optional
     ax : matplotlib axes, optional
 
@@ -269,7 +270,8 @@ def campbell_plot(
             raise ValueError("speeds: give the speeds of the diagram, or what campbell(modes, speeds, orders) returns")
         diagram = campbell(diagram, speeds, orders)
     rpm = diagram["speed"].values * RPM
-    top = 1.1 * float(np.nanmax(diagram["frequency"].values)) if maximum is None else float(maximum)
+    highest = in_si(maximum, "frequency", "maximum")
+    top = 1.1 * float(np.nanmax(diagram["frequency"].values)) if highest is None else float(highest)
     with look():
         figure, panel = drawn_on(ax, 7.2, 4.6)
         if measured is not None:
@@ -306,10 +308,11 @@ def campbell_plot(
     return figure
 
 
-def _upto(data: xr.DataArray, dim: str, maximum: float | None) -> xr.DataArray:
+def _upto(data: xr.DataArray, dim: str, maximum: float | str | None) -> xr.DataArray:
     if maximum is None:
         return data
-    kept = np.flatnonzero(data[dim].values <= maximum)
+    top = in_si(maximum, "frequency", "maximum") if dim == "frequency" else maximum
+    kept = np.flatnonzero(data[dim].values <= top)
     if kept.size < 2:
         raise ValueError(
             f"maximum: {maximum!r} leaves nothing of the {dim} axis, which begins at {data[dim].values[0]:g}"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gearmbs.gears import GearPair, GearSpec
+from gearmbs.progress import waiting
 from gearmbs.view.edges import Arc, Edge, Spline, profile_edges, turn
 from gearmbs.view.files import write_whole
 
@@ -17,6 +18,7 @@ LAYERS = {"PROFILE": 7, "BORE": 7, "PITCH": 4, "BASE": 3, "LINE_OF_ACTION": 1}
 """Layers and their colour numbers."""
 
 
+@waiting("writing the drawing")
 def write_dxf(gears: GearSpec | GearPair, path: str | Path, *, tolerance: float = TOLERANCE) -> Path:
     """Write the profile of a wheel, or of a pair in mesh, as DXF (release 12, millimetres).
 

@@ -11,12 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from gearmbs.gears import GearPair, GearSpec
+from gearmbs.progress import waiting
 from gearmbs.view.edges import backwards, bore_edges, profile_edges
 from gearmbs.view.files import write_whole
 from gearmbs.view.solid import title_of
 from gearmbs.view.step_faces import DOWN, UP, Frame, Sweep, Writer, refs, walls
 
 
+@waiting("writing the solids")
 def write_step(gears: GearSpec | GearPair, path: str | Path, *, driver_angle: float = 0.0) -> Path:
     """Write a wheel, or a placed pair as two solids, as a STEP file (AP214, millimetres).
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gearmbs.gears import GearPair, GearSpec
+from gearmbs.progress import waiting
 from gearmbs.view.files import whole_file
 from gearmbs.view.mesh import Mesh, joined
 from gearmbs.view.outline import TOLERANCE
@@ -16,6 +17,7 @@ RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute
 LENGTH_UNITS = {"mm": 1e3, "m": 1.0, "cm": 1e2, "in": 1.0 / 0.0254}
 
 
+@waiting("writing the mesh")
 def write_stl(
     solid: GearSpec | GearPair | Mesh,
     path: str | Path,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,6 @@ from matplotlib.figure import Figure
 from gearmbs.dae.results.solution import Solution
 from gearmbs.flexible import Campbell, ModalModel
 from gearmbs.view.figure_style import COLOURS, drawn_on, label, legend_below, look, new_figure, png_bytes
-from gearmbs.view.files import whole_file
 from gearmbs.view.film import RATE, write_film
 
 SHOWN = 0.1
@@ -127,19 +125,7 @@ class BodyAnimation:
         ValueError
             For another ending.
         """
-        path = Path(path)
-        if path.suffix == ".mp4":
-            return write_film(path, self.pictures(), rate)
-        if path.suffix != ".gif":
-            raise ValueError(f"path is {str(path)!r}; give a name that ends in .gif or .mp4")
-        from PIL import Image
-
-        frames = [Image.open(io.BytesIO(picture)).convert("P") for picture in self.pictures()]
-        with whole_file(path) as part:
-            frames[0].save(
-                part, format="GIF", save_all=True, append_images=frames[1:], duration=round(1000 / rate), loop=0
-            )
-        return path
+        return write_film(path, self.pictures(), len(self.coordinates), rate)
 
 
 def mode_animation(model: ModalModel, mode: int, *, factor: float | None = None) -> BodyAnimation:

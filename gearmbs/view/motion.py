@@ -10,6 +10,7 @@ import numpy as np
 
 from gearmbs.gears import GearPair
 from gearmbs.gears.pair import Placement
+from gearmbs.progress import waiting
 
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
@@ -50,6 +51,7 @@ class PairMotion:
         return Placement(self.origins[0, k], self.axes[0, k], self.origins[1, k], self.axes[1, k])
 
 
+@waiting("finding contacts")
 def static_motion(pair: GearPair, *, torque: float | None = None, pitches: float = 1.0, frames: int = 60) -> PairMotion:
     """Return the wheels rolling through the mesh at rest under load.
 

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from gearmbs.progress import waiting
 from gearmbs.signals import AnalysisReport, ComparisonReport, VibrationReport, spectrum
 from gearmbs.view.bars import comparison_bars
 from gearmbs.view.figure_style import COLOURS, label, legend_below, look, new_figure
@@ -19,6 +20,7 @@ SEGMENT = 2.0
 """Length of the averaged spectra's segments, s."""
 
 
+@waiting("drawing figures")
 def analysis_figures(report: AnalysisReport | VibrationReport, signal: xr.DataArray | None = None) -> dict[str, Figure]:
     """Return the figures of an analysed record.
 
@@ -76,6 +78,7 @@ def _average(report: AnalysisReport) -> Figure:
     )
 
 
+@waiting("drawing figures")
 def report_plot(
     report: AnalysisReport | VibrationReport | ComparisonReport,
     signal: xr.DataArray | None = None,
@@ -143,6 +146,7 @@ def _vibration_figures(report: VibrationReport) -> dict[str, Figure]:
     return figures
 
 
+@waiting("drawing figures")
 def comparison_figures(report: ComparisonReport) -> dict[str, Figure]:
     """Return the bars of a comparison: "bars", or "bars CHANNEL" for each channel where there are several."""
     data = report.data

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,10 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
+from gearmbs.progress import waiting
 from gearmbs.view.figure_style import DPI, VERMILLION, look, new_figure, png_bytes
 from gearmbs.view.files import whole_file
-from gearmbs.view.film import write_film
+from gearmbs.view.film import ENDINGS, write_film
 from gearmbs.view.page import Page
 from gearmbs.view.plotly_scene import plotly_figure
 from gearmbs.view.render import Camera, render
@@ -110,7 +112,7 @@ class Scene(SceneData):
         return figure
 
     def save(self, path: str | Path, **options: Any) -> Path:
-        """Write the scene: ``.html`` to turn and play, ``.png`` of one instant, ``.mp4`` of all where ffmpeg is there.
+        """Write the scene: ``.html`` to turn and play, ``.png`` of one instant, ``.gif``, ``.mp4`` (by ffmpeg) of all.
 
         Parameters
         ----------
@@ -119,16 +121,21 @@ class Scene(SceneData):
             Of `still`, for pictures and films: the direction of view.
         """
         ending = Path(path).suffix.lower()
-        if ending == ".mp4":
-            # all of one size
-            options.setdefault("height", float(self.still(**options).get_figheight()))
-            return write_film(path, (png_bytes(self.still(instant=k, **options), dpi=110) for k in range(len(self))))
+        if ending in ENDINGS:
+            return write_film(path, self._pictures(110 if ending == ".mp4" else 70, options), len(self))
         if ending == ".png":
-            with whole_file(path) as part:
+            with waiting(f"saving {Path(path).name}"), whole_file(path) as part:
                 self.still(**options).savefig(part, dpi=DPI)
             return Path(path)
         return self.page().save(path)
 
+    def _pictures(self, dpi: float, options: dict[str, Any]) -> Iterator[bytes]:
+        """Yield each instant as a PNG image, all of one size."""
+        options.setdefault("height", float(self.still(**options).get_figheight()))
+        for k in range(len(self)):
+            yield png_bytes(self.still(instant=k, **options), dpi=dpi)
+
+    @waiting("preparing the page")
     def page(self) -> Page:
         """Return the scene as a page to turn, zoom and play, which stands alone as an HTML file."""
         return scene_page(self)
@@ -137,6 +144,7 @@ class Scene(SceneData):
         """Write the page; it opens in any browser without a network."""
         return self.page().save(path)
 
+    @waiting("preparing the figure")
     def plotly(self, frames: int = 24) -> Any:
         """Return a plotly figure (needs the extra ``view``), animated over at most so many instants."""
         return plotly_figure(self, frames)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.gears import GearPair
+from gearmbs.progress import waiting
 from gearmbs.view.contacts import ContactProbe
 from gearmbs.view.figure_style import BLUE, COLOURS, GREY, ORANGE
 from gearmbs.view.mesh import Mesh, ball, box, cylinder, joined, rod
@@ -122,6 +123,7 @@ def pair_forces(motion: PairMotion) -> list[np.ndarray]:
     return [np.array(r).reshape(-1, 2, 3) for r in rows]
 
 
+@waiting("drawing the scene")
 def mechanism_scene(
     mechanism: Mechanism,
     *,
@@ -152,6 +154,7 @@ def mechanism_scene(
     return scene
 
 
+@waiting("drawing the scene")
 def solution_scene(
     solution: Solution,
     *,

@@ -86,6 +86,30 @@ def test_accuses_nothing_in_gears_and_noise(seed):
     assert "No lines of a defect of bearing 6205 stand out" in report.verdict
 
 
+def test_blows_in_step_with_the_shaft_name_no_part():
+    """Every fifth turn, as of loose parts: 18/5 turns are near an outer race's 3.585, 27/5 near an inner's 5.415."""
+    report = diagnose_bearing(record(2.0 * pulses(SHAFT / 5, jitter=0.002), MESH), "6205", f"{SHAFT} Hz", shafts=[])
+    outer = next(f for f in report.findings if f.part == "outer race")
+    assert outer.found / SHAFT == pytest.approx(18 / 5, abs=2e-3)
+    assert outer.log_chance < -20.0
+    assert report.fault is None
+    assert (outer.beside, outer.fraction) == (True, (18, 5))
+    assert "are 18/5 of the shaft's turns" in report.verdict
+    # a defect that happens to stand there is named by its strength
+    both = record(4.0 * pulses(SHAFT * 18 / 5), 0.3 * pulses(SHAFT / 5, jitter=0.002), MESH)
+    assert diagnose_bearing(both, "6205", f"{SHAFT} Hz", shafts=[]).fault == "outer race"
+
+
+def test_a_faint_line_is_told_and_accuses_nothing():
+    report = diagnose_bearing(record(0.35 * pulses(LINES.bpfo * SHAFT)), "6205", f"{SHAFT} Hz", shafts=[])
+    outer = next(f for f in report.findings if f.part == "outer race")
+    assert outer.grade == "faint"
+    assert outer.stronger == 0
+    assert outer.slip == pytest.approx(0.0, abs=2e-3)
+    assert report.fault is None
+    assert f"A faint line at {outer.found:.2f} Hz" in report.verdict
+
+
 def test_chance_is_the_share_of_noise_that_reaches_it():
     """Of envelopes of noise, the share with a chance below p is about p."""
     rng = np.random.default_rng(3)
@@ -282,7 +306,7 @@ def test_one_command_names_the_race(tmp_path):
     options = ("--speed", f"{60 * SHAFT} rpm", "--bearing", "6205", "--bearing", "6206@0.345")
     result = run("analyse", path, *options, "--tables", tmp_path / "tables")
     assert result.exit_code == 0, result.output
-    assert "Clear lines of a defect of the inner race of bearing 6205" in result.output
+    assert "Clear lines such as a defect of the inner race of bearing 6205 makes" in result.output
     assert (tmp_path / "tables" / "bearing_evidence.csv").exists()
     banded = run("analyse", path, *options[:4], "--band", "2 kHz, 4 kHz")
     assert "Band for case: 2000 to 4000 Hz" in banded.output
@@ -330,7 +354,7 @@ def test_bearings_and_shafts_of_a_drivetrain(tmp_path):
     (tmp_path / "train.toml").write_text(TRAIN)
     result = run("analyse", path, "--train", tmp_path / "train.toml", "--speed", f"{60 * SHAFT} rpm")
     assert result.exit_code == 0, result.output
-    assert "Clear lines of a defect of the inner race of bearing left" in result.output
+    assert "Clear lines such as a defect of the inner race of bearing left makes" in result.output
     assert "| right | case | outer race |" in result.output
 
 

@@ -1,6 +1,4 @@
 import re
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
@@ -14,11 +12,8 @@ from gearmbs.view.render import Camera, render
 from gearmbs.view.scene import Part
 from gearmbs.view.scenes import body_mesh
 from gearmbs.view.shading import corner_normals, feature_edges
+from tests.browser import browsed, needs_browser
 from tests.view.looking import assert_readable
-
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-BROWSER = next((path for path in map(shutil.which, BROWSERS) if path), None)
-needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium is installed")
 
 
 @pytest.fixture(scope="module")
@@ -210,29 +205,11 @@ def opened(page, tmp_path, query=""):
     from PIL import Image
 
     shot = tmp_path / "shot.png"
-    quiet = ["--no-first-run", "--disable-background-networking", "--disable-sync", "--hide-scrollbars"]
-    common = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", *quiet, "--window-size=800,600"]
-    texts = []
-    for k, action in enumerate(("--dump-dom", f"--screenshot={shot}")):
-        # a browser now and then hangs at its start on a busy machine, whatever the page
-        for attempt in (1, 2, 3):
-            profile = tmp_path / f"profile{k}{len(query)}{attempt}"
-            profile.mkdir()
-            command = [
-                *common,
-                f"--user-data-dir={profile}",
-                "--virtual-time-budget=1500",
-                action,
-                f"{page.as_uri()}{query}",
-            ]
-            try:
-                texts.append(subprocess.run(command, capture_output=True, text=True, timeout=60, check=False).stdout)
-                break
-            except subprocess.TimeoutExpired:
-                if attempt == 3:
-                    raise
+    text, _ = (
+        browsed(f"{page.as_uri()}{query}", action, tmp_path) for action in ("--dump-dom", f"--screenshot={shot}")
+    )
     with Image.open(shot) as image:
-        return texts[0], np.asarray(image.convert("RGB")).astype(int)
+        return text, np.asarray(image.convert("RGB")).astype(int)
 
 
 @needs_browser

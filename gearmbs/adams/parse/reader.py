@@ -13,12 +13,14 @@ from gearmbs.adams.parse.check import check
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import ArgumentReader, Grammar, StatementError
 from gearmbs.adams.parse.source import RawStatement, read_file, statements
+from gearmbs.progress import waiting
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
 GRAMMARS: dict[type, Grammar] = {cls: Grammar(cls) for cls in st.STATEMENTS.values()}
 _NAMES = (*st.STATEMENTS, *sorted(st.IGNORED), *sorted(st.UNSUPPORTED), "END")
 
 
+@waiting("reading the deck")
 def read_deck(path: str | Path) -> Deck:
     """Read an .adm file.
 

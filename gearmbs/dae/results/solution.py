@@ -21,6 +21,7 @@ from gearmbs.dae.model import evaluator as outputs
 from gearmbs.dae.model.configuration import Configuration
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.evaluated import Evaluated
+from gearmbs.progress import waiting
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -426,6 +427,7 @@ class Solution(Shown):
             f"{self.status.name}; {self.stats})" + (f"\n{self.remark}" if self.remark else "")
         )
 
+    @waiting("gathering results")
     def to_dataset(self) -> xr.Dataset:
         """Return everything as an :class:`xarray.Dataset` with units in the attributes."""
         import xarray as xr
