@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +12,8 @@ UNSUPPORTED = "unsupported"
 IGNORED = "ignored"
 WARNING = "warning"
 
+_LABELLED = re.compile(r"([A-Z_]+)/(\d+)(?!\d)(.*)", re.DOTALL)
+SHOWN_LABELS = 4
 SHOWN = 20
 """Messages a DeckError prints; the others are counted."""
 
@@ -41,6 +44,34 @@ class Diagnostic:
         return f"{place}{self.severity}: {self.message}"
 
 
+def folded(diagnostics: Sequence[Diagnostic]) -> list[Diagnostic]:
+    """Return remarks with those of one that say the same of several statements of a kind; errors stay as they are."""
+    groups: dict[Any, list[tuple[str, Diagnostic]]] = {}
+    for k, d in enumerate(diagnostics):
+        match = _LABELLED.match(d.message)
+        if match is None or d.severity == ERROR:
+            groups[k] = [("", d)]
+        else:
+            key = (d.severity, d.file, match.group(1), match.group(3))
+            groups.setdefault(key, []).append((f"{match.group(1)}/{match.group(2)}", d))
+    found = []
+    for key, group in groups.items():
+        first = group[0][1]
+        if len(group) > 1:
+            first = Diagnostic(
+                first.severity, f"{labels_of([label for label, _ in group])}{key[3]}", first.file, first.line
+            )
+        found.append(first)
+    return found
+
+
+def labels_of(labels: Sequence[str]) -> str:
+    """Return the names of statements, the first few of many."""
+    shown = ", ".join(labels[:SHOWN_LABELS])
+    more = len(labels) - SHOWN_LABELS
+    return f"{shown} and {more} more" if more > 0 else shown
+
+
 class DeckError(ValueError):
     """A deck or script that cannot be read or run.
 
@@ -56,7 +87,8 @@ class DeckError(ValueError):
 
     def __init__(self, diagnostics: Sequence[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)
-        lines = [str(d) for d in self.diagnostics[:SHOWN]]
-        if len(self.diagnostics) > SHOWN:
-            lines.append(f"... and {len(self.diagnostics) - SHOWN} more")
+        shown = folded(self.diagnostics)
+        lines = [str(d) for d in shown[:SHOWN]]
+        if len(shown) > SHOWN:
+            lines.append(f"... and {len(shown) - SHOWN} more")
         super().__init__("\n".join(lines))

@@ -96,7 +96,8 @@ def test_a_function_that_only_an_unread_variable_uses_stops_nothing():
     result = run_deck(deck, parse_script(script))
     assert result.success
     told = [m for m in result.messages if "nothing that is computed here reads it" in str(m)]
-    assert len(told) == 2
+    assert len(told) == 1
+    assert "VARIABLE/1, VARIABLE/2: FUNCTION" in told[0]
     assert "VARIABLE/1" in str(told[0])
     for reader in ("REQUEST/9, F2=VARVAL(2)\n", "SFORCE/1, I=0201, J=0101, ROTATIONAL, FUNCTION=POUVAL(1,2)\n"):
         deck = parse_deck(with_lines(VARIABLES + reader))
@@ -165,3 +166,40 @@ def test_a_state_may_be_held_in_statics(hold, rest):
     values = result.request(1)
     assert values[0, 1:3] == pytest.approx([rest, rest], abs=1e-9)
     assert values[-1, 2] == pytest.approx(1.0 + (rest - 1.0) * math.exp(-1.0), abs=1e-7)
+
+
+def test_what_is_not_modelled_can_be_switched_and_requests_stay():
+    deck = parse_deck(PENDULUM)
+    script = parse_script("m\no\ndeactivate/tire, id=1\ndeact/request, id=1\nsimulate/dynamics, end=0.01, steps=1\n")
+    result = run_deck(deck, script)
+    assert result.success
+    assert any("DEACTIVATE of REQUEST has no effect here" in m for m in result.messages)
+    for kind in ("variable", "lse"):
+        lines = f"m\no\nactivate/{kind}, id=1\nsimulate/dynamics, end=0.01, steps=1\n"
+        with pytest.raises(DeckError, match=f"ACTIVATE of {kind.upper()} is not supported; it stays as it is"):
+            run_deck(deck, parse_script(lines))
+        assert run_deck(deck, parse_script(lines), allow_unsupported=True).success
+
+
+def test_one_remark_for_many_of_a_kind():
+    """Thirty variables that nothing reads, with a function that is not there; thirty markers on deformable bodies."""
+    lines = "".join(f"VARIABLE/{n}, FUNCTION=RANDOM(1,2,3)\n" for n in range(1, 31))
+    found = [m for m in run_deck(parse_deck(with_lines(lines)), end=0.01, steps=1).messages if "RANDOM" in m]
+    assert len(found) == 1
+    assert "VARIABLE/1, VARIABLE/2, VARIABLE/3, VARIABLE/4 and 26 more: FUNCTION" in found[0]
+    lines = "".join(f"MARKER/{n}, FLEX_BODY=1, NODE_ID={n}\n" for n in range(5001, 5031))
+    with pytest.raises(DeckError) as refused:
+        run_deck(parse_deck(with_lines(lines)), end=0.01, steps=1)
+    assert len(refused.value.diagnostics) == 60
+    assert len(str(refused.value).splitlines()) == 2
+    assert "MARKER/5004 and 26 more: FLEX_BODY is not supported" in str(refused.value)
+
+
+def test_friction_takes_any_word_for_when_it_rests():
+    for word, remarked in (("STATIC_EQUILIBRIUM", False), ("NEVER", True)):
+        line = (
+            "FRICTION/1, JOINT=1, MU_STATIC=0.3, MU_DYNAMIC=0.2, PIN_RADIUS=0.01, INPUTS=NONE, "
+            f"FRICTION_TORQUE_PRELOAD=1, INACTIVE_DURING={word}\n"
+        )
+        result = run_deck(parse_deck(with_lines(line)), parse_script("m\no\nsimulate/statics\n"))
+        assert any("friction" in m.lower() for m in result.messages) == remarked

@@ -224,3 +224,22 @@ END
         run_deck(deck, parse_script("a\nb\nSIMULATE/DYNAMICS, END=0.1, STEPS=5\n"))
     remark = next(d for d in deck.diagnostics if "principal moments" in d.message)
     assert (remark.severity, remark.line) == ("warning", 5)
+
+
+def test_turns_are_counted_from_the_ground_on():
+    """AZ(0, 21) of a pin that turns on: the angle of the ground in the pin's frame, over two analyses."""
+    text = """turning
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/1, PART=1
+PART/2, MASS=2, CM=20, IP=1,1,1, WZ=20
+MARKER/20, PART=2
+JOINT/1, REVOLUTE, I=20, J=1
+REQUEST/1, F2=AZ(0,20)\\F3=AZ(20)
+SFORCE/1, ROTATIONAL, ACTIONONLY, I=20, J=1, FUNCTION=0*AZ(0,20)
+END
+"""
+    script = parse_script("a\nb\nSIM/DYN, END=0.5, STEPS=10\nSIM/DYN, END=1, STEPS=10\n")
+    result = run_deck(parse_deck(text), script)
+    assert result.request(1)[:, 1] == pytest.approx(-20 * result.t, abs=1e-6)
+    assert result.request(1)[:, 2] == pytest.approx(20 * result.t, abs=1e-6)

@@ -127,3 +127,57 @@ def test_stops_of_a_mechanism():
         m.simulate(1.0, stops=[StopAt("depth")])
     with pytest.raises(ModelError, match="WSTIFF or GSTIFF"):
         m.simulate(1.0, stops=[StopAt("height")], integrator="IDA")
+
+
+SPRING = """pulled
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/1, PART=1
+MARKER/2, PART=1, FLOATING
+PART/2, MASS=2, CM=20, IP=1,1,1
+MARKER/20, PART=2
+JOINT/1, TRANSLATIONAL, I=20, J=1
+SPRINGDAMPER/1, TRANSLATION, I=21, J=3, K=100, C=1, LENGTH=1
+MARKER/21, PART=2, QP=0,0,1
+MARKER/3, PART=1, QP=0,0,2
+VFORCE/1, I=20, JFLOAT=2, RM=1, FZ=10*TIME**2 + SENVAL(1)
+{sensor}
+REQUEST/1, F2=DZ(20)\\F3=SENVAL(1)
+END
+"""
+"""A body between a wall and a spring of 100 N/m that is free at a length of 1 m; at rest z = (force)/100."""
+
+
+def pulled(sensor, commands="SIMULATE/STATICS, END=2, STEPS=20\n"):
+    return run_deck(parse_deck(SPRING.format(sensor=sensor)), parse_script("m\no\n" + commands))
+
+
+@pytest.mark.parametrize("relation", ["GE", "EQ"])
+def test_sequences_of_equilibria_are_watched(relation):
+    """z = 0.1 t^2 passes 0.1234 m at t = sqrt(1.234)."""
+    result = pulled(f"SENSOR/1, {relation}, VALUE=0.1234, FUNCTION=DZ(20), EVALUATE=-10, PRINT")
+    when = np.sqrt(1.234)
+    t, z = result.t, result.request(1)[:, 1]
+    assert t[12:14] == pytest.approx([when, when], abs=1e-8)
+    before = np.arange(t.size) <= 12
+    assert z == pytest.approx(np.where(before, 0.1 * t**2, 0.1 * t**2 - 0.1), abs=1e-8)
+    assert result.request(1)[:, 2] == pytest.approx(np.where(before, 0.0, -10.0))
+    # what it evaluates throws the body back below the value, which it passes once more
+    again = np.sqrt(2.234)
+    assert np.count_nonzero(np.abs(t - again) < 1e-8) == 2
+    assert message_text(result).count(f"is {relation} 0.1234") == 2
+
+
+def test_a_sequence_of_equilibria_returns_and_halts():
+    two = "SIMULATE/STATICS, END=2, STEPS=20\nSIM/DYN, DUR=0.1, STEPS=1\n"
+    result = pulled("SENSOR/1, GE, VALUE=0.1, FUNCTION=DZ(20), RETURN", two)
+    assert len(result.segments) == 2
+    assert result.segments[0].solution.t[-1] == pytest.approx(1.0, abs=1e-8)
+    halted = pulled("SENSOR/1, LE, VALUE=-1, FUNCTION=-TIME, HALT", two)
+    assert len(halted.segments) == 1
+    assert halted.t[-1] == pytest.approx(1.0)
+
+
+def test_a_sensor_that_is_met_at_the_first_equilibrium_fires_there():
+    result = pulled("SENSOR/1, LE, VALUE=0.5, FUNCTION=DZ(20), RETURN")
+    assert list(result.t) == [0.0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
+from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic, labels_of
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
@@ -147,8 +147,6 @@ def check(deck: Deck) -> list[Diagnostic]:
 
 Fail = Callable[..., None]
 
-SHOWN_LABELS = 4
-
 
 def _remark_idle(deck: Deck) -> None:
     """Remark on arguments without effect, once for all statements of a kind that have the same ones."""
@@ -172,10 +170,7 @@ def _remark_idle(deck: Deck) -> None:
 
 
 def _labels(group: Sequence[st.Statement]) -> str:
-    """Return the names of statements, the first few of many."""
-    shown = ", ".join(s.label() for s in group[:SHOWN_LABELS])
-    more = len(group) - SHOWN_LABELS
-    return f"{shown} and {more} more" if more > 0 else shown
+    return labels_of([s.label() for s in group])
 
 
 def _choices(cls: type, name: str) -> str:

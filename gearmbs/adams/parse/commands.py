@@ -33,6 +33,10 @@ ELEMENTS = (
     "ACCGRAV BEAM BUSHING CONTACT COUPLER CVCV DIFF FIELD FRICTION GCON GEAR GFORCE JOINT JPRIM MOTION PTCV SENSOR "
     "SFORCE SPRINGDAMPER VFORCE VTORQUE"
 )
+LEFT_ON = "GSE LSE REQUEST TFSISO VARIABLE"
+"""What ADAMS can switch, too, and stays on here."""
+NOT_MODELLED = "CLEARANCE FE_LOAD FE_PART FLEX_BODY MFORCE NFORCE POINT_MASS TIRE UCON"
+"""What ADAMS can switch and is not there: to switch it changes nothing."""
 DEEPEST = 10
 """Command files that may call each other."""
 
@@ -63,7 +67,7 @@ class Simulate(Command):
 class Switch(Command):
     """ACTIVATE or DEACTIVATE of an element, or of all of a kind whose ids lie in a range."""
 
-    element: str | None = arg("element", CHOICE, choices=ELEMENTS)
+    element: str | None = arg("element", CHOICE, choices=f"{ELEMENTS} {LEFT_ON} {NOT_MODELLED}")
     id: int | None = arg("ID", ID)
     range: tuple[int, ...] = arg("RANGE", IDS, (), count=2)
     on: bool = True
@@ -272,7 +276,7 @@ def _read(script: Script, raw: RawStatement, errors: list[Diagnostic]) -> Comman
         return None
 
 
-def _typed(name: str, match: re.Match[str], raw: RawStatement, script: Script) -> Command:
+def _typed(name: str, match: re.Match[str], raw: RawStatement, script: Script) -> Command | None:
     file, line = script.file, raw.line
     text = " ".join(raw.text.replace(CONTINUED, ",").split())
     if name == "STOP":
@@ -292,6 +296,12 @@ def _typed(name: str, match: re.Match[str], raw: RawStatement, script: Script) -
     values = reader.read()
     if name == "DEACTIVATE":
         values["on"] = False
+    if values.get("element") in LEFT_ON.split():
+        severity, why = UNSUPPORTED, "is not supported; it stays as it is"
+        if values["element"] == "REQUEST":
+            severity, why = IGNORED, "has no effect here: requests are always written"
+        script.diagnostics.append(Diagnostic(severity, f"{name} of {values['element']} {why}", file, line))
+        return None
     command = cls(file, line, reader.lines, text=text, **values)
     _check(command)
     return command

@@ -103,7 +103,7 @@ WITHOUT_ID = frozenset("ACCGRAV EQUILIBRIUM IC INTEGRATOR KINEMATICS OUTPUT RESU
 ON_DEMAND = frozenset(["GRAPHICS"])
 """Statements that are read only as far as others name them."""
 
-IGNORED = frozenset("MATERIAL PREFERENCES DEBUG LSOLVER".split())
+IGNORED = frozenset("MATERIAL PREFERENCES DEBUG FEMDATA LSOLVER".split())
 """Statements without effect on the numbers computed here."""
 
 UNSUPPORTED = frozenset(

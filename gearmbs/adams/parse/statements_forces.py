@@ -154,7 +154,7 @@ class Friction(Statement):
     overlap: float = arg("INITIAL_OVERLAP", REAL, 1000.0, dimension="length")
     overlap_delta: str = arg("OVERLAP_DELTA", WORD, "CONSTANT", choices="CONSTANT INCREASING DECREASING")
     yoke: str = arg("YOKE", WORD, "I_YOKE", choices="I_YOKE J_YOKE")
-    inactive: str | None = arg("INACTIVE", WORD, choices="STATIC", aliases="INACTIVE_DURING")
+    inactive: str | None = arg("INACTIVE", WORD, aliases="INACTIVE_DURING")
     formulation: str | None = arg("FORMULATION", WORD, choices="ORIGINAL LUGRE")
     max_force: float | None = arg("MAX_FRICTION_FORCE", REAL, dimension="force")
     max_torque: float | None = arg("MAX_FRICTION_TORQUE", REAL, dimension="torque")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gearmbs.adams.errors import folded
 from gearmbs.adams.parse.commands import Command, Simulate
 from gearmbs.adams.results.record import NEWTON, RunRecord, Segment
 from gearmbs.adams.results.rows import row_text
@@ -23,7 +24,7 @@ INDEX = {"I3": "INDEX-3", "SI2": "stabilized INDEX-2", "SI1": "stabilized INDEX-
 def message_text(result: RunRecord) -> str:
     """Return the content of the message file: remarks on the model, then the commands in their order."""
     out = [RULE, f"|{'Model Title':^77}|", f"|{'=' * 77}|", f"|{result.deck.title[:75]:^77}|", RULE, ""]
-    for d in (*result.deck.diagnostics, *result.script.diagnostics):
+    for d in folded((*result.deck.diagnostics, *result.script.diagnostics)):
         out += _block("ERROR" if d.severity == "unsupported" else "WARNING", str(d))
     for command, outcome in result.log:
         out += [f" command: {_echo(command)}", ""]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.adams.builders.model import AdamsModel
-from gearmbs.adams.errors import Diagnostic
+from gearmbs.adams.errors import Diagnostic, folded
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Command, Script, Simulate
 from gearmbs.adams.parse.deck import Deck
@@ -119,7 +119,7 @@ class RunRecord:
     @property
     def messages(self) -> list[str]:
         """What was left out, ignored or went wrong, one sentence each."""
-        found = [str(d) for d in (*self.deck.diagnostics, *self.script.diagnostics)]
+        found = [str(d) for d in folded((*self.deck.diagnostics, *self.script.diagnostics))]
         for segment in self.segments:
             found.extend(self.remarks(segment))
             if not segment.success:

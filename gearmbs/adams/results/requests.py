@@ -157,9 +157,9 @@ class RequestEvaluator:
         """Return where the angles counted so far between markers of the deck end, rad."""
         numbered = {m.name for m in markers_of(self.model.mechanism) if m.number is not None}
         found = {}
-        for function, i, j in self._counted:
+        for function, i, j in list(self._counted):
             if {i, j} <= numbered | {""}:
-                arguments = ", ".join(f'"{name}"' for name in (i, j) if name)
+                arguments = ", ".join(f'"{name}"' if name else "0" for name in (i, j))
                 found[function, i, j] = float(self.expression(f"{function}({arguments})")[-1])
         return found
 

@@ -23,6 +23,7 @@ from gearmbs.adams.results.record import NEWTON, Segment
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.results.result import AdamsResult
 from gearmbs.adams.results.tracks import tracks_of
+from gearmbs.adams.run.equilibria import equilibria_to_passage
 from gearmbs.adams.run.plant import plant_of
 from gearmbs.adams.run.script_check import check_linear, check_script, is_sequence
 from gearmbs.adams.run.sensors import MOST, Watch, act, after, up_to
@@ -50,8 +51,8 @@ FIRST_STEP = 0.05
 STATIC_TOLERANCE = 1e-10
 """Unbalanced load allowed at an equilibrium, relative to the heaviest weight or largest load."""
 
-WATCHED = (None, "DYNAMICS", "TRANSIENT", "KINEMATICS")
-"""Analyses in which sensors watch."""
+WATCHED = (None, "DYNAMICS", "TRANSIENT", "KINEMATICS", "STATICS")
+"""Analyses in which sensors watch, where they go through a span of time."""
 
 METHODS = {"GSTIFF": "GSTIFF", "WSTIFF": "WSTIFF", "SI2_GSTIFF": "GSTIFF"}
 
@@ -279,6 +280,8 @@ def _part(
         if watch.first_step is not None:
             options["first_step"] = watch.first_step * session.deck.units.time
         solution, equilibrium = _solve(session, command, kind, model, times, options, progress, watch.stops())
+        if watch.turned_round(RequestEvaluator(model, solution)):
+            solution, equilibrium = _solve(session, command, kind, model, times, options, False, watch.stops())
         if watch.sensors:
             solution, fired = _to_passage(session, command, watch, model, times, options, solution)
     except (ModelError, ArithmeticError) as error:
@@ -317,6 +320,8 @@ def _to_passage(
     met = watch.true_at_start(solution, RequestEvaluator(model, solution))
     if met:
         return initial_conditions(model.mechanism.compile(float(times[0]) * scale)), met
+    if command.kind == "STATICS":
+        return equilibria_to_passage(watch, model, times * scale, solution, STATIC_TOLERANCE)
     if solution.result.status != Status.TERMINAL_EVENT:
         return solution, []
     end, fired = watch.passed(solution)
@@ -330,7 +335,9 @@ def _to_passage(
 def _frozen(session: Session, model: AdamsModel) -> str | None:
     """Return a remark on friction in a static analysis, unless the deck itself leaves it out there."""
     active = [f for f in session.deck.of(st.Friction).values() if ("friction", f.id) in model.names]
-    return frozen_friction(model.mechanism) if any(f.inactive != "STATIC" for f in active) else None
+    return (
+        frozen_friction(model.mechanism) if not all((f.inactive or "").startswith("STATIC") for f in active) else None
+    )
 
 
 def _solve(

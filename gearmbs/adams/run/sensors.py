@@ -73,6 +73,35 @@ class Watch:
         end = max(last)
         return float(end), [s for s, t in zip(self.sensors, last) if t == end]
 
+    def crossing(self, evaluator: RequestEvaluator, k: int) -> list[st.Sensor]:
+        """Return the sensors that pass between output ``k - 1`` and output ``k``."""
+        found = []
+        for stop, sensor in zip(self.stops(), self.sensors):
+            before, now = evaluator.state(sensor_state(sensor.id))[k - 1 : k + 1] - sensor.value
+            up, down = before < 0.0 <= now, before > 0.0 >= now
+            if (up and stop.direction >= 0) or (down and stop.direction <= 0):
+                found.append(sensor)
+        return found
+
+    def turned_round(self, evaluator: RequestEvaluator) -> bool:
+        """Whether sensors that wait for their functions to come back find them back at once; they wait no longer.
+
+        What a sensor evaluates may throw another's function back, or its own, without a passage.
+        """
+        found = False
+        for sensor in self.sensors:
+            waits = self.waits.get(sensor.id)
+            if waits is None:
+                continue
+            off = float(evaluator.state(sensor_state(sensor.id))[0]) - sensor.value
+            if off * waits > sensor.error:
+                found = True
+                if sensor.relation == "EQ":
+                    self.waits[sensor.id] = -waits
+                else:
+                    del self.waits[sensor.id]
+        return found
+
     def note_passage(self, sensor: st.Sensor, evaluator: RequestEvaluator) -> None:
         """Expect a sensor's function back from where it went."""
         values = evaluator.state(sensor_state(sensor.id)) - sensor.value
