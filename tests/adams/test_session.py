@@ -108,7 +108,7 @@ def test_a_sequence_of_equilibria():
 @pytest.mark.parametrize(
     ("commands", "line", "message"),
     [
-        (("SIM/DYN, END=1, STEPS=2", "LINEAR/NOVECTOR"), 4, "LINEAR without EIGENSOL is not supported"),
+        (("SIM/DYN, END=1, STEPS=2", "LINEAR/NOVECTOR"), 4, "LINEAR takes one of EIGENSOL and STATEMAT"),
         (("MOTION/7, FUNCTION=TIME",), 3, "there is no MOTION/7 to change"),
         (("SIM/DYN, END=1, STEPS=2", "SIM/DYN, END=1, STEPS=2"), 4, "the model is at time 1.0 already"),
         (("SIM/KIN, END=1, STEPS=2",), 3, "needs zero degrees of freedom; the model has 1"),
