@@ -81,7 +81,15 @@ CLEARANCES = (
     (40, (1, 11), (6, 20), (15, 33), (28, 46), (40, 64)), (50, (1, 11), (6, 23), (18, 36), (30, 51), (45, 73)),
     (65, (1, 15), (8, 28), (23, 43), (38, 61), (55, 90)), (80, (1, 15), (10, 30), (25, 51), (46, 71), (65, 105)),
 )  # fmt: skip
-"""Up to a bore, mm: least and largest radial clearance of the classes C2, CN, C3, C4, C5 by ISO 5753-1, um."""
+"""Of deep groove bearings up to a bore, mm: least and largest radial clearance of the classes C2, CN, C3, C4, C5 by
+ISO 5753-1, um."""
+ROLLER_CLEARANCES = (
+    (24, (0, 25), (20, 45), (35, 60), (50, 75), (65, 90)), (30, (0, 25), (20, 45), (35, 60), (50, 75), (70, 95)),
+    (40, (5, 30), (25, 50), (45, 70), (60, 85), (80, 105)), (50, (5, 35), (30, 60), (50, 80), (70, 100), (95, 125)),
+    (65, (10, 40), (40, 70), (60, 90), (80, 110), (110, 140)),
+    (80, (10, 45), (40, 75), (65, 100), (90, 125), (130, 165)),
+)  # fmt: skip
+"""The same of cylindrical roller bearings with a cylindrical bore."""
 SUFFIX = re.compile(
     r"(?:N|E|ET|A|B|K|M|MA|J|T|TN9|ETN9|TVH|TVP2?|2?Z|ZZ|2?RS[1HLR]?|2?RSR|2?RZ|LL[BUH]|L[BUH]|DDU?|DU|VV|EE|NR|ZNR|2?ZNR"
     r"|CM|CN|C[2345]|P[456])+"
@@ -156,7 +164,7 @@ def _asked(designation: str, fixed: Known, changes: dict[str, Any]) -> Bearing:
     from gearmbs.bearings.geometry import Bearing
     from gearmbs.bearings.ratings import roller_length_for
 
-    own = {**fixed.fields, "designation": designation.strip(), **changes}
+    own = {**fixed.fields, **_class_of(designation, fixed, changes), "designation": designation.strip(), **changes}
     missing = [name for name in fixed.asked if own.get(name) is None]
     if missing == ["roller_length"] and own.get("dynamic_rating") is not None:
         return roller_length_for(Bearing(**{**own, "roller_length": own["element_diameter"]}))
@@ -178,13 +186,30 @@ def _asked(designation: str, fixed: Known, changes: dict[str, Any]) -> Bearing:
     )
 
 
-def _clearance(designation: str, boundary: dict[str, float]) -> dict[str, float]:
+def _class_of(designation: str, fixed: Known, changes: dict[str, Any]) -> dict[str, float]:
+    """Return the mean clearance of a class that is named; refuse it of bearings that have no radial classes."""
+    kind = fixed.fields["kind"]
+    if kind == "cylindrical roller":
+        return _clearance(designation, fixed.fields, ROLLER_CLEARANCES)
+    named = CLASSES.search(designation.upper())
+    if named is not None and "clearance" not in changes:
+        told = (
+            "it is one of axial clearance" if kind == "four point" else "their clearance is set when they are mounted"
+        )
+        raise BearingError(
+            f"designation {designation!r}: {named[1]} says nothing of the radial clearance of {kind} bearings, {told}; "
+            "give clearance= (diametral)"
+        )
+    return {}
+
+
+def _clearance(designation: str, boundary: dict[str, Any], classes: tuple = CLEARANCES) -> dict[str, float]:
     """Return the mean clearance of the class that a designation names; empty without one."""
     named = CLASSES.search(designation.upper())
     if named is None or not boundary:
         return {}
     bore = 1e3 * boundary["bore"]
-    for top, *limits in CLEARANCES:
+    for top, *limits in classes:
         if bore <= top + 1e-6:
             low, high = limits[("C2", "CN", "C3", "C4", "C5").index(named[1])]
             return {"clearance": 0.5e-6 * (low + high)}

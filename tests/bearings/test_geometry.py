@@ -181,3 +181,23 @@ def test_contact_angles_of_tapered_bearings_give_the_makers_load_factors(designa
 def test_asks_for_what_designations_leave_open(designation, asked):
     with pytest.raises(BearingError, match=re.escape(asked)):
         Bearing.from_designation(designation)
+
+
+@pytest.mark.parametrize(
+    ("text", "clearance"), [("NU206", 0.0), ("NU206/CN", 32.5e-6), ("NJ 308 ECP/C3", 57.5e-6), ("N210 C5", 110e-6)]
+)
+def test_classes_of_cylindrical_rollers_are_wider(text, clearance):
+    bearing = Bearing.from_designation(text, elements=13, roller_length=9e-3)
+    assert bearing.clearance == pytest.approx(clearance, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"), [("QJ206/C3", "axial clearance"), ("7206 B/C3", "mounted"), ("30206/CN", "mounted")]
+)
+def test_classes_that_say_nothing_of_a_radial_clearance_are_asked_for(text, told):
+    with pytest.raises(BearingError, match=told):
+        Bearing.from_designation(text, elements=12, element_diameter=9e-3)
+    counted = {"elements": 12, "element_diameter": 9e-3, "clearance": "20 um"}
+    if text.startswith("30"):
+        counted["roller_length"] = 10e-3
+    assert Bearing.from_designation(text, **counted).clearance == pytest.approx(20e-6)
