@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from gearmbs.bearings.errors import BearingError
     from gearmbs.bearings.geometry import Bearing
     from gearmbs.bearings.hertz import PointContact, groove_contact
+    from gearmbs.bearings.life import bearing_lives
     from gearmbs.bearings.loose import add_bearing
     from gearmbs.bearings.profiles import spall_depth
     from gearmbs.bearings.ratings import equivalent_load, mean_load, rating_life
@@ -44,6 +45,7 @@ __all__ = [
     "UnevenSpacing",
     "Waviness",
     "add_bearing",
+    "bearing_lives",
     "equivalent_load",
     "groove_contact",
     "mean_load",
@@ -72,6 +74,7 @@ late(
         "UnevenSpacing": ".defects",
         "Waviness": ".defects",
         "add_bearing": ".loose",
+        "bearing_lives": ".life",
         "equivalent_load": ".ratings",
         "groove_contact": ".hertz",
         "mean_load": ".ratings",

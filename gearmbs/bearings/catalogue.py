@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from gearmbs.bearings.errors import BearingError
@@ -110,6 +111,13 @@ def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
 
     if not isinstance(designation, str) or not designation.strip():
         raise BearingError(f"designation is {designation!r}; give a text such as '6205'")
+    designation, given = _with_fields(designation)
+    changes = {**given, **changes}
+    if not designation:
+        missing = {"elements", "element_diameter", "pitch_diameter"} - changes.keys()
+        if missing:
+            raise BearingError(f"a bearing without a designation needs {', '.join(f'{m}=' for m in sorted(missing))}")
+        return Bearing(**changes)
     plain = re.sub(r"[^A-Z0-9]", "", designation.upper())
     if plain in ALIASES:
         return Bearing(**{**RECORDINGS[ALIASES[plain]], **changes})
@@ -146,6 +154,28 @@ def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
         f"designation {designation!r} is not in the catalogue ({', '.join(known())}); give elements=, element_diameter="
         " and pitch_diameter=, and contact_angle= if it is not 0"
     )
+
+
+def _with_fields(text: str) -> tuple[str, dict[str, Any]]:
+    """Return a designation and the fields written behind it, "6305, elements=7, element_diameter=13.49 mm"."""
+    from gearmbs.bearings.geometry import Bearing
+
+    head, *parts = [part.strip() for part in text.split(",")]
+    if "=" in head:
+        head, parts = "", [head, *parts]
+    names, found = [field.name for field in fields(Bearing)], {}
+    for part in parts:
+        name, _, value = (piece.strip() for piece in part.partition("="))
+        if name not in names or not value:
+            raise BearingError(
+                f"designation {text!r}: {part!r} is no field of a bearing; write name=value, such as 'elements=9', "
+                f"with one of {', '.join(names)}"
+            )
+        try:
+            found[name] = int(value) if name == "elements" else float(value)
+        except ValueError:
+            found[name] = value
+    return head, found
 
 
 def _check_suffix(designation: str, rest: str) -> None:

@@ -151,7 +151,8 @@ class Bearing(Written):
         ----------
         designation : str
             Suffixes are understood, "6205-2RS/C3"; a class of clearance, CN or C2 to C5, sets the clearance to the
-            middle of its range, without one it is 0.
+            middle of its range, without one it is 0. Fields may stand behind it, with commas:
+            "6305, elements=7, element_diameter=13.49 mm".
         **changes
             Fields that differ, or that the catalogue does not know.
 

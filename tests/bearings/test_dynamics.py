@@ -8,6 +8,7 @@ from scipy.optimize import minimize_scalar
 
 from gearmbs.bearings import (
     Bearing,
+    BearingError,
     BearingStatics,
     Misalignment,
     OffSize,
@@ -188,3 +189,22 @@ def test_outer_ring_may_turn():
     solution = m.simulate(0.1, rate=1000, tol=1e-8)
     assert solution.state("b.cage")[-1] == pytest.approx(0.0, abs=1e-9)
     assert solution.angular_velocity("inner")[-1, 2] == pytest.approx(50.0, rel=1e-9)
+
+
+def test_lives_follow_from_the_loads_of_a_run():
+    """A bearing that turns under one load lives as ISO 281 says of that load; the share of slower turns counts less."""
+    from gearmbs.bearings import bearing_lives, equivalent_load, rating_life
+
+    rig = bearing_rig(DEEP, speed=SPEED, radial_load=1400.0, axial_load=500.0, mount_damping=1.0)
+    solution = rig.simulate(0.2, rate=4000)
+    lives = bearing_lives(rig, solution, start=0.1, reliability=0.99).sel(bearing="bearing")
+    # the mounts take a part of what draws the housing
+    x, y, z = solution.load("bearing")[0][solution.t >= 0.1].mean(axis=0)
+    load = equivalent_load(DEEP, float(np.hypot(x, y)), float(z))
+    assert float(lives.equivalent_load) == pytest.approx(load, rel=1e-2)
+    assert float(lives.largest_load) >= float(lives.equivalent_load)
+    turns = rating_life(DEEP, float(lives.equivalent_load), reliability=0.99)
+    assert float(lives.life_turns) == pytest.approx(turns)
+    assert float(lives.life_hours) == pytest.approx(turns / 30.0 / 3600.0, rel=1e-4)
+    with pytest.raises(BearingError, match="start is 9 s"):
+        bearing_lives(rig, solution, start=9.0)

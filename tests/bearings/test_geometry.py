@@ -201,3 +201,20 @@ def test_classes_that_say_nothing_of_a_radial_clearance_are_asked_for(text, told
     if text.startswith("30"):
         counted["roller_length"] = 10e-3
     assert Bearing.from_designation(text, **counted).clearance == pytest.approx(20e-6)
+
+
+def test_fields_behind_a_designation():
+    bearing = Bearing.from_designation("6305, elements=7, element_diameter=13.49 mm, inner_curvature=0.515")
+    assert (bearing.elements, bearing.designation) == (7, "6305")
+    assert bearing.element_diameter == pytest.approx(13.49e-3)
+    assert bearing.inner_curvature == 0.515
+    own = Bearing.from_designation("elements=7, element_diameter=13.49 mm, pitch_diameter=44 mm")
+    assert own.bpfo == pytest.approx(7 * 0.5 * (1 - 13.49 / 44))
+    # what is given by name counts before the text
+    assert Bearing.from_designation("6205, clearance=10 um", clearance=0.0).clearance == 0.0
+    with pytest.raises(BearingError, match="'balls=7' is no field of a bearing"):
+        Bearing.from_designation("6305, balls=7")
+    with pytest.raises(BearingError, match="needs pitch_diameter="):
+        Bearing.from_designation("elements=7, element_diameter=13.49 mm")
+    with pytest.raises(BearingError, match="elements is 'seven'"):
+        Bearing.from_designation("6305, elements=seven, element_diameter=13 mm")
