@@ -59,6 +59,7 @@ EXCEPTIONS = {
     ("signals", "bearings"): "the kinematic lines of a bearing by its designation",
     ("signals", "drivetrain"): "its commands take bearings and shafts from the description of a drivetrain",
     ("bearings", "dae.compiled"): "its kernels: views of flat tables",
+    ("bearings", "dae.results"): "lives of bearings follow from the loads of a run",
     ("drivetrain", "dae.equations"): "the same door: torques about an axis hand their kernels to the mechanism",
     ("drivetrain", "dae.compiled"): "its kernels: views of tables, calls of laws through addresses",
     ("mechanism", "dae.compiled"): "kernels of force elements: views of tables, calls through addresses",

@@ -163,7 +163,8 @@ def _with_fields(text: str) -> tuple[str, dict[str, Any]]:
     head, *parts = [part.strip() for part in text.split(",")]
     if "=" in head:
         head, parts = "", [head, *parts]
-    names, found = [field.name for field in fields(Bearing)], {}
+    names = [field.name for field in fields(Bearing)]
+    found: dict[str, Any] = {}
     for part in parts:
         name, _, value = (piece.strip() for piece in part.partition("="))
         if name not in names or not value:
