@@ -66,6 +66,9 @@ class DAEProblem:
         ``restart_rates(t, y, yp, idata, rdata)`` returns y' consistent with y after ``hook`` has rewritten y.
     jacobian_residuals : int
         Calls of ``residual`` that one of ``jacobian`` takes, if that takes differences.
+    small_entries : bool
+        Whether many entries of the Jacobian are small beside others, as second derivatives by modal coordinates beside
+        the stiffness of the modes, so that a corrector converges without them.
     advice : mapping of Status to str
         What to try after a failure, in the words of whoever states the problem; default: in those of `solve_dae`.
     """
@@ -92,4 +95,5 @@ class DAEProblem:
     hook_interval: Callable[[np.ndarray], float] | None = None
     restart_rates: Callable | None = None
     jacobian_residuals: int = 0
+    small_entries: bool = False
     advice: Mapping[Any, str] = field(default_factory=dict)

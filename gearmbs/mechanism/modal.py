@@ -140,11 +140,11 @@ class ShapeIntegrals:
 
     @classmethod
     def _of_turning(cls, inertias: npt.ArrayLike, rotations: npt.ArrayLike | None) -> ShapeIntegrals:
-        """Return what the inertias of points add, whose rotations are successive as those of markers are.
+        """Return what the inertias of points add, whose rotations about x, y and z are successive as those of markers.
 
-        To second order the rotations make B = 1 + theta~ + 1/2 sum_kl q_k q_l psi_min~ psi_max~ (~: cross product
-        matrix, min: the mode that comes first), the inertia B J B^T, and the angular velocity
-        sum_k (psi_k + sum_(l<k) q_l psi_l x psi_k) v_k.
+        To second order the rotations make B = 1 + theta~ + 1/2 sum_kl q_k q_l sum_mn psi_k,m psi_l,n e_min~ e_max~
+        (~: cross product matrix, min: the axis that comes first), the inertia B J B^T, and the angular velocity
+        sum_k (psi_k + sum_l q_l sum_(m<n) psi_l,m psi_k,n e_m x e_n) v_k.
         """
         if rotations is None:
             raise ModelError("ShapeIntegrals.of_points: inertias need the rotations of their points; give rotations=")
@@ -159,12 +159,13 @@ class ShapeIntegrals:
         for l in range(n):
             tilde_j = np.einsum("pia,paj->pij", tilde[l], j)
             for k in range(n):
-                relative = np.einsum("pij,pj->i", j, np.cross(psi[l], psi[k]))
-                cross[l, k] = np.cross(psi[l], spun[k]).sum(axis=0) - (0.0 if l < k else 1.0) * relative
+                # psi_l x psi_k less what the axes of mode k turn by mode l: the products of a later with an earlier one
+                early = np.cross(psi[l], psi[k]) - _turned_axis(psi[l], psi[k])
+                cross[l, k] = np.cross(psi[l], spun[k]).sum(axis=0) - np.einsum("pij,pj->i", j, early)
                 if k < l:
                     continue
                 quadratic = -np.einsum("pia,paj->ij", tilde_j, tilde[k])
-                ordered = np.einsum("pia,pab,pbj->ij", tilde[l], tilde[k], j, optimize=True)
+                ordered = np.einsum("pij,pjk->ik", _ordered_products(psi[l], psi[k]), j)
                 total = quadratic + ordered
                 second[l, k] = second[k, l] = total + total.T
         mass = np.einsum("kpi,lpi->kl", psi, spun)
@@ -222,6 +223,20 @@ class ShapeIntegrals:
             self.first,
             self.second - (2.0 * squares[:, :, None, None] * np.eye(3) - products - np.swapaxes(products, 2, 3)),
         )
+
+
+def _turned_axis(before: np.ndarray, psi: np.ndarray) -> np.ndarray:
+    """Return sum_(m<n) before_m psi_n e_m x e_n: the change of the axis ``psi`` by turns ``before``, shape (p, 3)."""
+    x, y = before[:, 0], before[:, 1]
+    return np.column_stack([y * psi[:, 2], -x * psi[:, 2], x * psi[:, 1]])
+
+
+def _ordered_products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return sum_mn one_m other_n e_min~ e_max~, shape (p, 3, 3); e_m~ e_n~ = e_n e_m^T - (e_m . e_n) 1."""
+    products = one[:, :, None] * other[:, None, :]
+    trace = np.einsum("pii->p", products)
+    out = np.tril(products + np.swapaxes(products, 1, 2), -1)
+    return out + np.einsum("pii->pi", products)[:, :, None] * np.eye(3) - trace[:, None, None] * np.eye(3)
 
 
 @dataclass(eq=False)

@@ -17,21 +17,21 @@ from gearmbs.dae.equations.elastic_coordinates import (
     is_idle,
     place,
 )
-from gearmbs.dae.equations.elastic_frames import DP, DX, PARTIALS, is_elastic, partials
+from gearmbs.dae.equations.elastic_frames import BIAS, DP, DX, is_elastic, partials, tail_of
 from gearmbs.dae.equations.entries import put, put_pair
 from gearmbs.dae.equations.rotation import KIN_R
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def has_second(i, j, same, linear, side):
-    """Return whether a row may have a second derivative by coordinates i, j of its sides; see `put_row`.
+def seconds_with(i, same, linear, side, count):
+    """Return first and last, plus one, of the coordinates by which, and by coordinate i, a row has second derivatives.
 
     Of a side that is linear in the displacement only angles, with angles or modes, have some. A row whose sides are all
-    linear is their sum.
+    linear is their sum; see `put_row`. ``count`` is the number of coordinates of the other side.
     """
     if same and (linear >> side) & 1:
-        return i >= 3 and j >= 3 and (i < 6 or j < 6)
-    return same or linear != 3
+        return 3, 3 if i < 3 else count if i < 6 else 6
+    return 0, count if same or linear != 3 else 0
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -102,8 +102,9 @@ def put_row(
             k = put(mode, slot, vals, k, force, row[0], factor * slope)
             for a2 in range(n_frames):
                 b2 = frames[a2]
-                for j in range(coordinates(b2, at)):
-                    if not has_second(i, j, a == a2, linear, a) or is_idle(b2, j, (linear >> a2) & 1 == 1, at, partial):
+                begin, end = seconds_with(i, a == a2, linear, a, coordinates(b2, at))
+                for j in range(begin, end):
+                    if is_idle(b2, j, (linear >> a2) & 1 == 1, at, partial):
                         continue
                     value = 0.0
                     if curved:
@@ -154,5 +155,5 @@ def put_spatial(mode, slot, vals, k, row, f, g, h, coef, at, kin, partial):
 @njit(cache=True, error_model="numpy")
 def bias_rate(f, g, h, at, partial):
     """Return what a frame's acceleration without those of the coordinates adds to the second rate of a constraint."""
-    first = at[f, T.AT_PARTIAL] + PARTIALS * (3 + at[f, T.AT_MODES])
+    first = tail_of(f, at) + BIAS
     return dot3(g, h, partial, first) + dot3(g, h + 3, partial, first + 3)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from gearmbs._jit import njit
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3, dot3
-from gearmbs.dae.equations.elastic_frames import DP, DX, is_elastic, partials
+from gearmbs.dae.equations.elastic_frames import DP, DX, PAIRS, PSI, is_elastic, partials, tail_of
 
 POSITION, VELOCITY, FORCE = 0, 1, 2
 
@@ -72,8 +72,11 @@ def curvature(b, i, j, g, k, at, partial, s):
     if lo < 3:
         cross3(d[lo], DX, d[hi], DP, s, 0)
         total += dot3(g, k, s, 0)
-    cross3(d[lo], DX, d[hi], DX, s, 0)
     x, y = d[lo], d[hi]
+    if lo < 3:
+        cross3(x, DX, y, DX, s, 0)
+    else:
+        turned_twice(b, x, y, at, partial, s)
     s[0] -= x[DX + 1] * y[DX + 2] + x[DX + 2] * y[DX + 1]
     s[1] += x[DX] * y[DX + 2] + x[DX + 2] * y[DX]
     s[2] -= x[DX] * y[DX + 1] + x[DX + 1] * y[DX]
@@ -81,9 +84,34 @@ def curvature(b, i, j, g, k, at, partial, s):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
+def turned_twice(b, x, y, at, partial, s):
+    """Write sum_mn psi_k,m psi_l,n Y_min x Y_max to ``s[0:3]``, given the rows of modes k and l."""
+    pairs = tail_of(b, at) + PAIRS
+    xy = x[PSI] * y[PSI + 1] + x[PSI + 1] * y[PSI]
+    xz = x[PSI] * y[PSI + 2] + x[PSI + 2] * y[PSI]
+    yz = x[PSI + 1] * y[PSI + 2] + x[PSI + 2] * y[PSI + 1]
+    for c in range(3):
+        s[c] = xy * partial[pairs + c] + xz * partial[pairs + 3 + c] + yz * partial[pairs + 6 + c]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def turns(d):
     """Return whether a mode turns a frame, given its row of the partial derivatives."""
-    return d[DX] != 0.0 or d[DX + 1] != 0.0 or d[DX + 2] != 0.0
+    return d[PSI] != 0.0 or d[PSI + 1] != 0.0 or d[PSI + 2] != 0.0
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def turns_axis_of(x, y):
+    """Return whether one mode turns an axis of rotation of another, given their rows of the partial derivatives."""
+    return (x[PSI] != 0.0 and (y[PSI + 1] != 0.0 or y[PSI + 2] != 0.0)) or (x[PSI + 1] != 0.0 and y[PSI + 2] != 0.0)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def axis_change(b, x, y, g, k, at, partial):
+    """Return g . dX/dq, g in ``g[k:k+3]``: the axis of the mode with row ``y`` changed by the mode with row ``x``."""
+    pairs = tail_of(b, at) + PAIRS
+    total = x[PSI] * y[PSI + 1] * dot3(g, k, partial, pairs) + x[PSI] * y[PSI + 2] * dot3(g, k, partial, pairs + 3)
+    return total + x[PSI + 1] * y[PSI + 2] * dot3(g, k, partial, pairs + 6)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

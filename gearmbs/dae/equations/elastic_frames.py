@@ -6,17 +6,20 @@ a rigid body is the body. Each marker of a modal body has an elastic frame of it
 and rotation shapes psi_k in body components:
 
     P   = R + A (s0 + sum_k phi_k q_k)
-    A_P = A E_1 E_2 .. E_n,     E_k = rotation by psi_k q_k
+    A_P = A R_x(alpha_x) R_y(alpha_y) R_z(alpha_z),     alpha = sum_k psi_k q_k
 
-The rotations are successive, so that Euler angles and modal coordinates follow one rule: with X_c the axis of
-coordinate c (a_c for an angle, A E_1 .. E_(k-1) psi_k for mode k), a vector fixed in the frame has the derivatives
-X_c x v and X_min x (X_max x v), min the coordinate that comes first. The points have P_c = a_c x s or A phi_k, and the
-second derivatives X_min x P_max where min is an angle, else 0.
+The three rotations are successive about the axes Y_c = A e_x, A R_x e_y, A R_x R_y e_z, so that Euler angles and modal
+coordinates follow one rule: with X_c the axis of coordinate c (a_c for an angle, sum_m psi_k,m Y_m for mode k), a
+vector fixed in the frame has the derivatives X_c x v and, if one of two coordinates is an angle, X_min x (X_max x v),
+min the coordinate that comes first; of modes k and l it has sum_mn psi_k,m psi_l,n Y_min x (Y_max x v). The points have
+P_c = a_c x s or A phi_k, and the second derivatives X_min x P_max where min is an angle, else 0.
 
 As its own coordinates a frame has P and three successive rotations about the global axes, from its present orientation
 on: then X_c = e_c. From Hessians in these those in the body's coordinates follow, with g the spatial gradient:
 
     H_cd = T_c H T_d + g_P . P_cd + g_a . 1/2 (X_min x X_max - sum_mn X_c,m X_d,n e_min x e_max),   T_c = (P_c, X_c)
+
+with sum_mn psi_k,m psi_l,n Y_min x Y_max in place of X_min x X_max for two modes.
 """
 
 from __future__ import annotations
@@ -35,11 +38,14 @@ DP = 0
 DX = 3
 DV = 6
 DW = 9
-DB = 12
-"""X_c of a mode in body components."""
+PSI = 12
+"""Rotation shape psi_k of a mode, body components."""
 PARTIALS = 15
-BIAS = 6
-"""After the rows: the accelerations of P and of the rotation without those of the coordinates."""
+
+BIAS, AXES, PAIRS = 0, 6, 15
+"""After the rows: the accelerations of P and of the rotation without those of the coordinates; the axes Y_c in body
+components; Y_x x Y_y, Y_x x Y_z and Y_y x Y_z."""
+TAIL = 24
 
 SMALL_TURN = 1e-3
 """Angle below which the series of cosine and sine, three terms each, are exact to rounding."""
@@ -47,7 +53,7 @@ SMALL_TURN = 1e-3
 
 def partials_size(modes: int) -> int:
     """Return how many numbers the partial derivatives of an elastic frame take."""
-    return PARTIALS * (3 + modes) + BIAS
+    return PARTIALS * (3 + modes) + TAIL
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -76,74 +82,74 @@ def partials(f, at, partial):
     return matrix_at(partial, at[f, T.AT_PARTIAL], 3 + at[f, T.AT_MODES], PARTIALS)
 
 
-@njit(cache=True, error_model="numpy")
-def deform(n, q, v, y, shape, modal, axes, partial, s):
-    """Write where a marker has moved in its body, and the modes' axes of rotation X_k in body components.
+@njit(cache=True, error_model="numpy", forceinline=True)
+def tail_of(f, at):
+    """Return where in the table of partial derivatives that begins which follows the rows of elastic frame f."""
+    return at[f, T.AT_PARTIAL] + PARTIALS * (3 + at[f, T.AT_MODES])
 
-    The turns E_1 E_2 .. E_n are composed as Euler parameters.
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def shapes_of(f, at, modal):
+    """Return phi_k and psi_k of elastic frame f: x, y and z of both, six rows with an entry for each mode."""
+    return matrix_at(modal, at[f, T.AT_SHAPE] + 3, 6, at[f, T.AT_MODES])
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def sine_and_cosine(angle):
+    """Return sine and cosine, of small angles by their series."""
+    if abs(angle) >= SMALL_TURN:
+        return np.sin(angle), np.cos(angle)
+    square = angle * angle
+    return angle * (1.0 - square * (1.0 / 6.0 - square / 120.0)), 1.0 - square * (0.5 - square / 24.0)
+
+
+@njit(cache=True, error_model="numpy")
+def deform(f, y, at, modal, axes, partial, s):
+    """Write where a marker has moved and turned in its body, and the axes of its rotation.
 
     Parameters
     ----------
-    n, q, v : int
-        Number of modes, and where the coordinates and their rates are in y.
+    f : int
+        Row of the frame.
     y
         Unknowns.
-    shape, modal : int, ndarray
-        Place of the marker's shapes, and the table they are in.
+    at, modal : ndarray
+        Places, and the table with the marker's shapes.
     axes, partial : int, ndarray
-        Place of the first mode's ``DB``, and the table of partial derivatives.
+        Place of the axes Y_c, and the table of partial derivatives.
     s : ndarray
-        Written: arm in ``s[0:3]``, its rate in ``s[3:6]``, the modes' angular velocity in ``s[6:9]``, E_1 E_2 .. E_n by
+        Written: arm in ``s[0:3]``, its rate in ``s[3:6]``, the rates of the angles in ``s[6:9]``, R_x R_y R_z by
         rows in ``s[9:18]``; body components.
     """
-    x, y_, z = modal[shape], modal[shape + 1], modal[shape + 2]
-    vx = vy = vz = wx = wy = wz = 0.0
-    e0, e1, e2, e3 = 1.0, 0.0, 0.0, 0.0
+    n, first = at[f, T.AT_MODES], at[f, T.AT_SHAPE]
+    shape = shapes_of(f, at, modal)
+    amounts, rates = vector_at(y, at[f, T.AT_QF], n), vector_at(y, at[f, T.AT_VF], n)
+    x, y_, z = modal[first], modal[first + 1], modal[first + 2]
+    vx = vy = vz = ax = ay = az = wx = wy = wz = 0.0
     for k in range(n):
-        amount, rate, p, b = y[q + k], y[v + k], shape + 3 + 3 * k, axes + PARTIALS * k
-        x += modal[p] * amount
-        y_ += modal[p + 1] * amount
-        z += modal[p + 2] * amount
-        vx += modal[p] * rate
-        vy += modal[p + 1] * rate
-        vz += modal[p + 2] * rate
-        p += 3 * n
-        px, py, pz = modal[p], modal[p + 1], modal[p + 2]
-        if px == 0.0 and py == 0.0 and pz == 0.0:
-            partial[b] = partial[b + 1] = partial[b + 2] = 0.0
-            continue
-        cx, cy, cz = 2.0 * (e2 * pz - e3 * py), 2.0 * (e3 * px - e1 * pz), 2.0 * (e1 * py - e2 * px)
-        bx = px + e0 * cx + e2 * cz - e3 * cy
-        by = py + e0 * cy + e3 * cx - e1 * cz
-        bz = pz + e0 * cz + e1 * cy - e2 * cx
-        partial[b], partial[b + 1], partial[b + 2] = bx, by, bz
-        wx += bx * rate
-        wy += by * rate
-        wz += bz * rate
-        half = 0.5 * amount
-        square = half * half * (px * px + py * py + pz * pz)
-        if square < SMALL_TURN**2:
-            sine, cosine = 1.0 - square * (1.0 / 6.0 - square / 120.0), 1.0 - square * (0.5 - square / 24.0)
-        else:
-            turn = np.sqrt(square)
-            sine, cosine = np.sin(turn) / turn, np.cos(turn)
-        half *= sine
-        px, py, pz = half * px, half * py, half * pz
-        e0, e1, e2, e3 = (
-            e0 * cosine - e1 * px - e2 * py - e3 * pz,
-            e0 * px + e1 * cosine + e2 * pz - e3 * py,
-            e0 * py - e1 * pz + e2 * cosine + e3 * px,
-            e0 * pz + e1 * py - e2 * px + e3 * cosine,
-        )
+        amount, rate = amounts[k], rates[k]
+        x += shape[0, k] * amount
+        y_ += shape[1, k] * amount
+        z += shape[2, k] * amount
+        vx += shape[0, k] * rate
+        vy += shape[1, k] * rate
+        vz += shape[2, k] * rate
+        ax += shape[3, k] * amount
+        ay += shape[4, k] * amount
+        az += shape[5, k] * amount
+        wx += shape[3, k] * rate
+        wy += shape[4, k] * rate
+        wz += shape[5, k] * rate
     s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8] = x, y_, z, vx, vy, vz, wx, wy, wz
-    s[9], s[13], s[17] = (
-        1.0 - 2.0 * (e2 * e2 + e3 * e3),
-        1.0 - 2.0 * (e1 * e1 + e3 * e3),
-        1.0 - 2.0 * (e1 * e1 + e2 * e2),
-    )
-    s[10], s[12] = 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e2 + e0 * e3)
-    s[11], s[15] = 2.0 * (e1 * e3 + e0 * e2), 2.0 * (e1 * e3 - e0 * e2)
-    s[14], s[16] = 2.0 * (e2 * e3 - e0 * e1), 2.0 * (e2 * e3 + e0 * e1)
+    sx, cx = sine_and_cosine(ax)
+    sy, cy = sine_and_cosine(ay)
+    sz, cz = sine_and_cosine(az)
+    partial[axes], partial[axes + 1], partial[axes + 2] = 1.0, 0.0, 0.0
+    partial[axes + 3], partial[axes + 4], partial[axes + 5] = 0.0, cx, sx
+    partial[axes + 6], partial[axes + 7], partial[axes + 8] = sy, -sx * cy, cx * cy
+    s[9], s[10], s[11] = cy * cz, -cy * sz, sy
+    s[12], s[13], s[14] = cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, -sx * cy
+    s[15], s[16], s[17] = sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy
 
 
 @njit(cache=True, error_model="numpy")
@@ -155,23 +161,27 @@ def update_frame(f, y, at, modal, kin, partial, scratch, derivatives):
     f : int
         Row of the frame.
     at, modal : ndarray
-        Places of the unknowns; shapes: s0, then phi_k, then psi_k.
+        Places of the unknowns; shapes: s0, then those of `shapes_of`.
     kin, partial : ndarray
         Kinematics table, in which the body's row is up to date; table of partial derivatives.
     scratch : ndarray
         36 places.
     derivatives : bool
-        Whether the partial derivatives are wanted: the residual needs none but ``DB``.
+        Whether the partial derivatives are wanted: the residual needs none but ``AXES``.
     """
-    n, q, v = at[f, T.AT_MODES], at[f, T.AT_QF], at[f, T.AT_VF]
     body, row, s, own = kin[at[f, T.AT_BODY]], kin[f], vector_at(scratch, 0, 18), vector_at(scratch, 18, 18)
-    deform(n, q, v, y, at[f, T.AT_SHAPE], modal, at[f, T.AT_PARTIAL] + 3 * PARTIALS + DB, partial, own)
+    axes = tail_of(f, at) + AXES
+    deform(f, y, at, modal, axes, partial, own)
+    for c in range(3):
+        s[15 + c] = own[6] * partial[axes + c] + own[7] * partial[axes + 3 + c] + own[8] * partial[axes + 6 + c]
     for c in range(3):
         a = KIN_A + 3 * c
         x, y_, z = body[a], body[a + 1], body[a + 2]
         for j in range(3):
             row[a + j] = x * own[9 + j] + y_ * own[12 + j] + z * own[15 + j]
+        for j in range(2):
             s[3 * j + c] = x * own[3 * j] + y_ * own[3 * j + 1] + z * own[3 * j + 2]
+        s[6 + c] = x * s[15] + y_ * s[16] + z * s[17]
     # s[0:3] arm, s[3:6] its elastic rate, s[6:9] the modes' angular velocity
     cross3(body, KIN_W, s, 0, s, 9)
     for c in range(3):
@@ -180,37 +190,64 @@ def update_frame(f, y, at, modal, kin, partial, scratch, derivatives):
         row[KIN_W + c] = body[KIN_W + c] + s[6 + c]
     own_axes(row)
     if derivatives:
-        d = partials(f, at, partial)
-        for k in range(n):
-            to_global(body, modal, at[f, T.AT_SHAPE] + 3 + 3 * k, d[3 + k], DP)
-            to_global(body, d[3 + k], DB, d[3 + k], DX)
-        for c in range(3):
-            a = KIN_AXES + 3 * c
-            cross3(body, a, s, 0, d[c], DP)
-            for m in range(3):
-                d[c, DX + m] = body[a + m]
-        update_rates(n, v, y, body, d, s)
-        bias(f, n, v, y, at, body, partial, d, s)
+        turned_axes(f, at, body, partial, own)
+        update_positions(f, at, modal, body, partial, s, own)
+        update_rates(f, at, body, partial, s, own)
+        bias(f, at, body, partial, s, own)
 
 
 @njit(cache=True, error_model="numpy")
-def update_rates(n, v, y, body, d, s):
-    """Fill the derivatives of a frame's velocities; ``s[0:9]``: arm, its elastic rate, angular velocity of the modes.
+def turned_axes(f, at, body, partial, own):
+    """Write the axes Y_c in global components to ``own[9:18]``, and their products after the partial derivatives."""
+    axes, pairs = tail_of(f, at) + AXES, tail_of(f, at) + PAIRS
+    for c in range(3):
+        to_global(body, partial, axes + 3 * c, own, 9 + 3 * c)
+    cross3(own, 9, own, 12, partial, pairs)
+    cross3(own, 9, own, 15, partial, pairs + 3)
+    cross3(own, 12, own, 15, partial, pairs + 6)
+
+
+@njit(cache=True, error_model="numpy")
+def update_positions(f, at, modal, body, partial, s, own):
+    """Fill P_c and X_c of elastic frame f; the arm is in ``s[0:3]``, the axes Y_c are in ``own[9:18]``."""
+    shape, d = shapes_of(f, at, modal), partials(f, at, partial)
+    for c in range(3):
+        a = KIN_AXES + 3 * c
+        cross3(body, a, s, 0, d[c], DP)
+        for m in range(3):
+            d[c, DX + m] = body[a + m]
+    for k in range(at[f, T.AT_MODES]):
+        row = d[3 + k]
+        for m in range(3):
+            row[PSI + m] = shape[m, k]
+        to_global(body, row, PSI, row, DP)
+        for m in range(3):
+            row[PSI + m] = shape[3 + m, k]
+        for m in range(3):
+            row[DX + m] = row[PSI] * own[9 + m] + row[PSI + 1] * own[12 + m] + row[PSI + 2] * own[15 + m]
+
+
+@njit(cache=True, error_model="numpy")
+def update_rates(f, at, body, partial, s, own):
+    """Fill the derivatives of a frame's velocities.
 
     Parameters
     ----------
-    n, v : int
-        Number of modes, and where their rates are in y.
-    y
-        Unknowns.
-    body, d : ndarray
-        The body's row of the kinematics table; the frame's partial derivatives.
+    f : int
+        The frame, whose positions' derivatives are up to date.
+    at, partial : ndarray
+        Places, and the table of partial derivatives.
+    body : ndarray
+        The body's row of the kinematics table.
     s : ndarray
-        18 places, the last nine of them scratch.
+        Arm, its elastic rate, angular velocity of the modes; then nine places of scratch.
+    own : ndarray
+        Rates of the angles in ``own[6:9]``.
     """
+    d, pairs = partials(f, at, partial), tail_of(f, at) + PAIRS
     for c in range(3):
         a = KIN_AXES + 3 * c
-        # d(w x s + s')/dtheta_c = dw x s + w x (a x s) + a x s',  d(w + sum b v)/dtheta_c = dw + a x sum b v
+        # d(w x s + s')/dtheta_c = dw x s + w x (a x s) + a x s',  d(w + sum X v)/dtheta_c = dw + a x sum X v
         cross3(body, KIN_DW + 3 * c, s, 0, s, 9)
         cross3(body, KIN_W, d[c], DP, s, 12)
         cross3(body, a, s, 3, s, 15)
@@ -219,14 +256,14 @@ def update_rates(n, v, y, body, d, s):
         cross3(body, a, s, 6, s, 9)
         for m in range(3):
             d[c, DW + m] = body[KIN_DW + 3 * c + m] + s[9 + m]
-    for c in range(3):
-        s[9 + c] = 0.0
-    for k in range(n - 1, -1, -1):
-        # s[9:12] is the angular velocity of the modes after k
-        cross3(body, KIN_W, d[3 + k], DP, d[3 + k], DV)
-        cross3(d[3 + k], DX, s, 9, d[3 + k], DW)
-        for c in range(3):
-            s[9 + c] += y[v + k] * d[3 + k, DX + c]
+    for m in range(3):
+        s[9 + m] = own[7] * partial[pairs + m] + own[8] * partial[pairs + 3 + m]
+        s[12 + m] = own[8] * partial[pairs + 6 + m]
+    for k in range(3, 3 + at[f, T.AT_MODES]):
+        row = d[k]
+        cross3(body, KIN_W, row, DP, row, DV)
+        for m in range(3):
+            row[DW + m] = row[PSI] * s[9 + m] + row[PSI + 1] * s[12 + m]
 
 
 @njit(cache=True, error_model="numpy")
@@ -243,28 +280,26 @@ def own_axes(row):
 
 
 @njit(cache=True, error_model="numpy")
-def bias(f, n, v, y, at, body, partial, d, s):
+def bias(f, at, body, partial, s, own):
     """Write the accelerations of a frame without those of the coordinates after its partial derivatives.
 
-    They are w x (w x s) + 2 w x s' of the point and sum_k v_k b_k' of the rotation, the axis b_k of mode k turning with
-    the body and the modes before it. ``s[0:6]`` holds the arm and its elastic rate.
+    They are w x (w x s) + 2 w x s' of the point and sum_c alpha_c' Y_c' of the rotation, each axis Y_c turning with the
+    body and the rotations before it.
 
     Parameters
     ----------
-    f, n, v : int
-        The frame, its number of modes, and where their rates are in y.
-    y
-        Unknowns.
+    f : int
+        The frame.
     at, partial : ndarray
         Places, and the table of partial derivatives.
     body : ndarray
         The body's row of the kinematics table.
-    d : ndarray
-        The frame's partial derivatives.
     s : ndarray
         Arm and elastic rate in the first six places, then scratch.
+    own : ndarray
+        Rates of the angles in ``own[6:9]``, axes Y_c in ``own[9:18]``.
     """
-    first = at[f, T.AT_PARTIAL] + PARTIALS * (3 + n)
+    first = tail_of(f, at) + BIAS
     cross3(body, KIN_W, s, 0, s, 9)
     for c in range(3):
         s[9 + c] += 2.0 * s[3 + c]
@@ -273,8 +308,8 @@ def bias(f, n, v, y, at, body, partial, d, s):
         partial[first + c] = s[12 + c]
         partial[first + 3 + c] = 0.0
         s[9 + c] = body[KIN_W + c]
-    for k in range(n):
-        cross3(s, 9, d[3 + k], DX, s, 12)
+    for axis in range(3):
+        cross3(s, 9, own, 9 + 3 * axis, s, 12)
         for c in range(3):
-            partial[first + 3 + c] += y[v + k] * s[12 + c]
-            s[9 + c] += y[v + k] * d[3 + k, DX + c]
+            partial[first + 3 + c] += own[6 + axis] * s[12 + c]
+            s[9 + c] += own[6 + axis] * own[9 + 3 * axis + c]

@@ -8,8 +8,17 @@ from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3, dot3
-from gearmbs.dae.equations.elastic_coordinates import FORCE, POSITION, VELOCITY, coordinates, is_idle, place, turns
-from gearmbs.dae.equations.elastic_frames import DB, DP, DV, DW, DX, PARTIALS, is_elastic, partials
+from gearmbs.dae.equations.elastic_coordinates import (
+    FORCE,
+    POSITION,
+    VELOCITY,
+    axis_change,
+    coordinates,
+    is_idle,
+    place,
+    turns_axis_of,
+)
+from gearmbs.dae.equations.elastic_frames import AXES, DP, DV, DW, DX, is_elastic, partials, shapes_of, tail_of
 from gearmbs.dae.equations.entries import put
 from gearmbs.dae.equations.modal_inertia import to_body
 from gearmbs.dae.equations.rotation import KIN_AXES, KIN_FORCE, KIN_MOMENT, KIN_R, KIN_SHIFT, KIN_TURN
@@ -65,8 +74,8 @@ def bring_to_body(f, at, modal, kin, partial, scratch, out):
     """Bring the forces added up for elastic frame f to its body and to the modes: eq. (5), and mu in eq. (6)."""
     row, body, n = kin[f], kin[at[f, T.AT_BODY]], at[f, T.AT_MODES]
     x, y, z = row[KIN_R] - body[KIN_R], row[KIN_R + 1] - body[KIN_R + 1], row[KIN_R + 2] - body[KIN_R + 2]
-    shape, axes = at[f, T.AT_SHAPE] + 3, at[f, T.AT_PARTIAL] + 3 * PARTIALS + DB
-    s = vector_at(scratch, 0, 6)
+    shape, axes = shapes_of(f, at, modal), vector_at(partial, tail_of(f, at) + AXES, 9)
+    s = vector_at(scratch, 0, 9)
     for pair in range(2):
         # forces with moments, then mu's displacements with its rotations
         along, about = (KIN_FORCE, KIN_MOMENT) if pair == 0 else (KIN_SHIFT, KIN_TURN)
@@ -79,11 +88,13 @@ def bring_to_body(f, at, modal, kin, partial, scratch, out):
         body[about + 2] += x * row[along + 1] - y * row[along]
         to_body(body, row, along, s, 0)
         to_body(body, row, about, s, 3)
-        fx, fy, fz, tx, ty, tz = sign * s[0], sign * s[1], sign * s[2], sign * s[3], sign * s[4], sign * s[5]
+        for c in range(3):
+            s[6 + c] = sign * dot3(axes, 3 * c, s, 3)
+        fx, fy, fz, tx, ty, tz = sign * s[0], sign * s[1], sign * s[2], s[6], s[7], s[8]
+        total = vector_at(out, first, n)
         for k in range(n):
-            p, b = shape + 3 * k, axes + PARTIALS * k
-            push = modal[p] * fx + modal[p + 1] * fy + modal[p + 2] * fz
-            out[first + k] += push + partial[b] * tx + partial[b + 1] * ty + partial[b + 2] * tz
+            push = shape[0, k] * fx + shape[1, k] * fy + shape[2, k] * fz
+            total[k] += push + shape[3, k] * tx + shape[4, k] * ty + shape[5, k] * tz
 
 
 @njit(cache=True, error_model="numpy")
@@ -137,18 +148,20 @@ def put_load(mode, slot, vals, k, f, sign, force, torque, point, s, at, marker_b
                 k = put(mode, slot, vals, k, row, torque + m, -sign * d[c, DX + m])
         for j in range(3, coordinates(f, at)):
             e = j - 3
-            if e >= c >= 3 or is_idle(f, j, False, at, partial):
-                # two modes turn one after the other; displacements are linear
-                continue
-            if c > e >= 3 and not (turns(d[c]) and turns(d[e])):
+            if is_idle(f, j, False, at, partial):
                 continue
             value = 0.0
-            if min(c, e) < 3:
+            if min(c, e) >= 3:
+                # displacements are linear
+                if not turns_axis_of(d[e], d[c]):
+                    continue
+                value = axis_change(f, d[e], d[c], s, 6, at, partial)
+            else:
                 cross3(d[min(c, e)], DX, d[max(c, e)], DP, s, 12)
-                value += dot3(s, 12, s, 3)
-            if e < c:
-                cross3(d[e], DX, d[c], DX, s, 12)
-                value += dot3(s, 12, s, 6)
+                value = dot3(s, 12, s, 3)
+                if e < c:
+                    cross3(d[e], DX, d[c], DX, s, 12)
+                    value += dot3(s, 12, s, 6)
             k = put(mode, slot, vals, k, row, place(f, j, POSITION, at), -value)
         if force >= 0 and owner != f:
             cross3(s, 3, d[c], DX, s, 9)

@@ -217,7 +217,7 @@ def add_listed(y, q, v, listed, turns, entries, state):
     """
     for e in range(listed + turns):
         first = q if e < listed else v
-        state[int(entries[e, 0])] += y[first + int(entries[e, 1])] * entries[e, 2]
+        state[np.uint64(int(entries[e, 0]))] += y[np.uint64(first + int(entries[e, 1]))] * entries[e, 2]
 
 
 @njit(cache=True, error_model="numpy")
@@ -242,16 +242,26 @@ def update_inertia(y, at, modal, partial, body_row):
                 both[k] += amount * row[k]
             for k in range(3 * n):
                 gyro[k] += rate * other[k]
-    i = 0
-    for r in range(3):
-        for c in range(r, 3):
-            total = 0.0
-            for k in range(n):
-                total += y[q + k] * (first[i * n + k] + both[i * n + k])
-            total = j0[3 * r + c] + 0.5 * total
-            body_row[T.BODY_INERTIA + 3 * r + c] = total
-            body_row[T.BODY_INERTIA + 3 * c + r] = total
-            i += 1
+    add_inertia_change(vector_at(y, q, n), matrix_at(first, 0, 6, n), matrix_at(both, 0, 6, n), j0, body_row)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_inertia_change(q_f, j1, change, j0, body_row):
+    """Write J(q) = J0 + 1/2 sum_k q_k (J1_k + dJ/dq_k) to a body's row; all six sums advance together."""
+    xx = xy = xz = yy = yz = zz = 0.0
+    for k in range(q_f.size):
+        amount = 0.5 * q_f[k]
+        xx += amount * (j1[0, k] + change[0, k])
+        xy += amount * (j1[1, k] + change[1, k])
+        xz += amount * (j1[2, k] + change[2, k])
+        yy += amount * (j1[3, k] + change[3, k])
+        yz += amount * (j1[4, k] + change[4, k])
+        zz += amount * (j1[5, k] + change[5, k])
+    i = T.BODY_INERTIA
+    body_row[i], body_row[i + 4], body_row[i + 8] = j0[0] + xx, j0[4] + yy, j0[8] + zz
+    body_row[i + 1] = body_row[i + 3] = j0[1] + xy
+    body_row[i + 2] = body_row[i + 6] = j0[2] + xz
+    body_row[i + 5] = body_row[i + 7] = j0[5] + yz
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

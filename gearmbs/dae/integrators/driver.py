@@ -22,9 +22,16 @@ from gearmbs.dae.integrators.records import Records
 from gearmbs.dae.integrators.rounding import rounding_level
 from gearmbs.dae.integrators.stall import StallWatch
 from gearmbs.dae.integrators.step import advance
-from gearmbs.dae.linalg.counted_entries import FEWEST_ENTRIES, LEAVING_PLANS
+from gearmbs.dae.linalg.counted_entries import (
+    FEWEST_ENTRIES,
+    LEAVING_PLANS,
+    NEGLIGIBLE,
+    NEGLIGIBLE_IN_NEWTON,
+    RATE_ALLOWED,
+    STEPS_A_PLAN,
+)
 from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse
-from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, LUFactors, factor, new_factors
+from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, LUFactors, factor, new_factors, solve
 from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 
@@ -89,9 +96,13 @@ class Run:
         self.plan: LUPlan | None = None
         self.factors: LUFactors | None = None
 
-    def repivot(self) -> tuple[Status, str] | None:
-        """Choose new pivots for the current Newton matrix; return a failure or None."""
+    def repivot(self, exactly: bool = False) -> tuple[Status, str] | None:
+        """Choose new pivots for the current Newton matrix; return a failure or None.
+
+        Unless it has to be ``exactly`` that matrix, entries without which the corrector converges are left out.
+        """
         st, problem = self.state, self.problem
+        negligible = NEGLIGIBLE_IN_NEWTON if st.left_out and not exactly else NEGLIGIBLE
         t = st.t
         self.repivots += 1
         bad = np.flatnonzero(~np.isfinite(st.matrix))
@@ -105,7 +116,9 @@ class Run:
             )
         try:
             drop = DROP_TOLERANCES[st.drop_level]
-            self.plan = analyse(self.indptr, self.indices, st.matrix, self.scale, drop, self._entries_to_leave())
+            self.plan = analyse(
+                self.indptr, self.indices, st.matrix, self.scale, drop, self._entries_to_leave(), negligible
+            )
             st.gamma_planned = st.gamma
         except SingularMatrixError as error:
             if st.steps > 0 and st.drop_rounds < DROP_ROUNDS_ALLOWED:
@@ -120,11 +133,32 @@ class Run:
         growth = factor(self.plan, self.factors, st.matrix)
         st.factorizations += 1
         st.growth_limit = max(GROWTH_LIMIT, 100.0 * growth)
+        if negligible > NEGLIGIBLE and not self._converges_without(self.plan, self.factors):
+            return self.repivot(exactly=True)
         return None
+
+    def _converges_without(self, plan: LUPlan, factors: LUFactors) -> bool:
+        """Return whether the corrector converges as well without the entries that a plan leaves out.
+
+        Of an error e of the unknowns it leaves M^-1 (M - A) e, here of one with equal parts of all scaled unknowns.
+        """
+        left = plan.left_src
+        if left.size == 0:
+            return True
+        columns = np.searchsorted(self.indptr, left, side="right") - 1
+        scale = np.empty(self.problem.n)
+        scale[plan.col_to] = plan.col_scale
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], self.problem.n)
+        res = np.zeros(self.problem.n)
+        np.add.at(res, self.indices[left], self.state.matrix[left] * (scale * signs)[columns])
+        solve(plan, factors, res, res)
+        return bool(np.abs(res / scale).max() <= RATE_ALLOWED)
 
     def _entries_to_leave(self) -> np.ndarray | None:
         """Return which entries of the matrix have counted so far, if the others may be left out of a plan."""
-        if self.state.drop_level > 0 or len(self.counted) < FEWEST_ENTRIES or self.repivots > LEAVING_PLANS:
+        st = self.state
+        plans = LEAVING_PLANS + st.steps // STEPS_A_PLAN
+        if st.drop_level > 0 or len(self.counted) < FEWEST_ENTRIES or self.repivots > plans:
             return None
         return self.counted
 

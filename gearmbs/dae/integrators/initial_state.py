@@ -84,6 +84,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.since_refused = KINK_MEMORY
     st.n_past = 1
     st.gamma_factored = 1.0
+    st.left_out = problem.small_entries
     st.matrix_wanted = True
     st.slope_age = SLOPE_MAX_AGE
     st.window_t[st.newest] = t0

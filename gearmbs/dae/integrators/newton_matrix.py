@@ -62,6 +62,11 @@ def form_matrix(functions, st, plan, factors):
     code : int
         RUNNING, or REPIVOT where pivots have to be chosen anew.
     """
+    if st.left_out and st.noise_run > 0:
+        # at the level of rounding every entry counts
+        st.left_out = False
+        st.h = st.h_wanted
+        return REPIVOT
     drift = st.gamma / st.gamma_factored
     allowed = 1.0 + (GAMMA_DRIFT_AT_KINKS if meets_kinks(st) else GAMMA_DRIFT)
     whole_again = st.drop_level > 0 and st.drop_age >= DROPPED_STEPS

@@ -139,6 +139,8 @@ class RunState(Struct):
     drop_level: int  # how large pivots may be to be left out near a singular position
     drop_age: int
     drop_rounds: int
+    left_out: bool  # whether entries larger than rounding may be left out of the matrix
+    doubts: int  # failures of the corrector for which the entries left out of the matrix were suspected
     # steps limited by rounding
     noise: float  # passed on to the history, in units of the tolerance
     noise_left: int  # steps until it has left the history

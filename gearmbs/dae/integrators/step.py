@@ -37,6 +37,8 @@ RESTART_SHRINK = 0.1
 RESTART_AFTER = 6
 DROP_AFTER = 3
 DROP_LEVELS = 3
+DOUBTS = 3
+"""Failures of the corrector after which entries left out are looked at; if harmless so often, they are."""
 RENEWALS = 3
 SAME_ERROR = 0.1
 JUMP_LIMIT = 50.0
@@ -181,7 +183,7 @@ def refuse_by_newton(st, code):
     Returns
     -------
     code : int
-        RUNNING to try again, REPIVOT to leave small pivots out first.
+        RUNNING to try again, REPIVOT to leave small pivots out, or have fewer entries left out, first.
     """
     st.matrix_wanted = True
     if code != NOT_FINITE and not st.matrix_fresh:
@@ -206,6 +208,9 @@ def refuse_by_newton(st, code):
             st.drop_age = 0
             st.h = st.h_first
             return s.REPIVOT
+    if st.left_out and st.doubts < DOUBTS:
+        st.doubts += 1
+        return s.REPIVOT
     return s.RUNNING
 
 

@@ -11,7 +11,14 @@ from numba import boolean, float64, int64, types, uint32
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.structs import IndexVector, IntVector, Struct, Vector
-from gearmbs.dae.linalg.counted_entries import limits, part_entries, scaled_entries, taken_pattern
+from gearmbs.dae.linalg.counted_entries import (
+    NEGLIGIBLE,
+    WHEN_PLANNED,
+    limits,
+    part_entries,
+    scaled_entries,
+    taken_pattern,
+)
 from gearmbs.dae.linalg.nodes import nodes
 from gearmbs.dae.linalg.pivoting import (
     CANCELLED,
@@ -178,24 +185,24 @@ def _upper_by_columns(u_ptr, u_cols, col_place):
             _UVEC,
             _VEC,
         )
-    )(_IVEC, _IVEC, _VEC, _VEC, float64, _MASK, LINES_TYPE, LINES_TYPE),
+    )(_IVEC, _IVEC, _VEC, _VEC, float64, _MASK, float64, LINES_TYPE, LINES_TYPE),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def _plan(all_ptr, all_indices, vals, scale, drop, counted, columns, rows_left):
+def _plan(all_ptr, all_indices, vals, scale, drop, counted, negligible, columns, rows_left):
     """Return the rank and the fields of an `LUPlan`, in their order.
 
     Parameters
     ----------
-    all_ptr, all_indices, vals, scale, drop, counted
+    all_ptr, all_indices, vals, scale, drop, counted, negligible
         As the pattern and the others of `analyse`.
     columns, rows_left
         As in `choose_pivots`.
     """
     n = all_ptr.shape[0] - 1
     row_scale, col_scale, all_scaled = scaled_entries(all_ptr, all_indices, vals, scale)
-    taken, left = part_entries(all_scaled, counted)
+    taken, left = part_entries(all_scaled, counted, WHEN_PLANNED * negligible)
     indptr, indices, scaled = taken_pattern(all_ptr, all_indices, all_scaled, taken)
     growth = np.inf
     for threshold in THRESHOLDS:
@@ -247,7 +254,7 @@ def _plan(all_ptr, all_indices, vals, scale, drop, counted, columns, rows_left):
         col_scale[cols],
         kept,
         left,
-        limits(all_ptr, all_indices, left, row_scale, col_scale),
+        limits(all_ptr, all_indices, left, row_scale, col_scale, negligible),
     )
 
 
@@ -258,6 +265,7 @@ def analyse(
     scale: np.ndarray,
     drop: float = 0.0,
     counted: np.ndarray | None = None,
+    negligible: float = NEGLIGIBLE,
 ) -> LUPlan:
     """Choose pivots for a matrix and lay down the plan to factor every matrix of its pattern.
 
@@ -275,6 +283,8 @@ def analyse(
     counted : ndarray of bool, optional
         Entries of the pattern that have counted in any matrix before; those that count in this one are marked. The
         others are left out of the plan, if they are many. Default: no entry is left out.
+    negligible : float
+        Size of an entry of the equilibrated matrix up to which it may stay left out.
 
     Returns
     -------
@@ -296,7 +306,7 @@ def analyse(
     while rank < 0:
         lines = new_lines(n, size, True), new_lines(n, size, False)
         rank, *plan = _plan(
-            indptr, indices, vals, np.asarray(scale, dtype=float), max(drop, CANCELLED), counted, *lines
+            indptr, indices, vals, np.asarray(scale, dtype=float), max(drop, CANCELLED), counted, negligible, *lines
         )
         size *= 2
     if rank < n and not counted.all():

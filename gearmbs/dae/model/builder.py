@@ -82,7 +82,7 @@ class TableBuilder:
             # a modal body's marker is the origin of an elastic frame
             self.frame_body.append(body)
             self.shape_at.append(len(self.modal))
-            self.modal.extend(np.concatenate([position, *(np.ravel(part) for part in shape)]).tolist())
+            self.modal.extend(np.concatenate([position, *(np.ravel(np.transpose(part)) for part in shape)]).tolist())
             body, position = len(self.bodies) + len(self.frame_body) - 1, np.zeros(3)
         self.marker_body.append(body)
         self.marker_frame.append(np.concatenate([position, np.asarray(orientation, dtype=float).ravel()]))

@@ -194,6 +194,7 @@ def make_problem(system: PosedModel, formulation: str, rate_scale: float) -> DAE
         hook=hook,
         hook_interval=_hook_interval(model, at),
         restart_rates=restart_rates,
+        small_entries=sum(model.modes) > 0,
     )
 
 

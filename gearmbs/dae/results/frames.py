@@ -39,7 +39,7 @@ def frame_motion(found: Evaluated, model: Model | None = None) -> tuple[np.ndarr
     for k, body in enumerate(model.frame_body):
         n = model.modes[body]
         shapes = model.modal[model.shape_at[k] : model.shape_at[k] + 3 + 6 * n]
-        parts = shapes[:3], shapes[3 : 3 + 3 * n].reshape(n, 3), shapes[3 + 3 * n :].reshape(n, 3)
+        parts = shapes[:3], shapes[3 : 3 + 3 * n].reshape(3, n).T, shapes[3 + 3 * n :].reshape(3, n).T
         f = 1 + bodies + k
         kin[:, f], acc[:, f] = elastic_motion(kin[:, body], acc[:, body], found.modal(body), *parts)
     return kin, acc
@@ -92,13 +92,14 @@ def elastic_motion(
     accelerations[:, ACC_A : ACC_A + 3] = (
         acc[:, ACC_A : ACC_A + 3] + np.cross(alpha, arm) + np.cross(w, spin + 2.0 * rate) + push
     )
-    turned, spun, spun_up = axes.copy(), w.copy(), alpha.copy()
-    for i in range(len(psi)):
-        axis = turned @ psi[i]
-        spun_up += axis * a[:, i : i + 1] + np.cross(spun, axis) * v[:, i : i + 1]
-        spun += axis * v[:, i : i + 1]
-        turned = Rotation.from_rotvec(axis * q[:, i : i + 1]).as_matrix() @ turned
-    frame[:, KIN_A : KIN_A + 9] = turned.reshape(-1, 9)
+    turned, spun, spun_up = Rotation.from_matrix(axes), w.copy(), alpha.copy()
+    turns, rates, pushes = q @ psi, v @ psi, a @ psi
+    for c in range(3):
+        axis = turned.apply(np.eye(3)[c])
+        spun_up += axis * pushes[:, c : c + 1] + np.cross(spun, axis) * rates[:, c : c + 1]
+        spun += axis * rates[:, c : c + 1]
+        turned = turned * Rotation.from_rotvec(np.outer(turns[:, c], np.eye(3)[c]))
+    frame[:, KIN_A : KIN_A + 9] = turned.as_matrix().reshape(-1, 9)
     frame[:, KIN_W : KIN_W + 3] = spun
     accelerations[:, ACC_ALPHA : ACC_ALPHA + 3] = spun_up
     return frame, accelerations

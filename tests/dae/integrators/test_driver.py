@@ -7,10 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numba import njit
 
 from gearmbs.dae.integrators import driver as run
 from gearmbs.dae.integrators import initial_state
+from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.wstiff import resume, solve_wstiff
+from gearmbs.dae.problem import JACOBIAN_SIG, RESIDUAL_SIG, DAEProblem
 from gearmbs.dae.result import Status
 from tests.dae.integrators.problems import pendulum, rotor
 
@@ -220,3 +223,48 @@ def test_wrong_output_times(t_eval):
 def test_no_end_is_an_error():
     with pytest.raises(ValueError, match="t_end"):
         solve_wstiff(pendulum())
+
+
+@njit(RESIDUAL_SIG, error_model="numpy")
+def driven_residual(t, y, yp, out, idata, rdata, work):
+    """y_0' = cos t, and B z = y_0 for the others; B by columns in ``rdata``."""
+    n = out.size
+    out[0] = yp[0] - np.cos(t)
+    for i in range(n - 1):
+        out[1 + i] = -y[0]
+        for j in range(n - 1):
+            out[1 + i] += rdata[(n - 1) * j + i] * y[1 + j]
+
+
+@njit(JACOBIAN_SIG, error_model="numpy")
+def driven_jacobian(t, y, yp, cj, vals, idata, rdata, work):
+    """The first column is full, the others have all rows but the first."""
+    n = y.size
+    vals[0] = cj
+    vals[1:n] = -1.0
+    vals[n:] = rdata
+
+
+@pytest.mark.parametrize("stiff", [True, False])
+def test_small_entries_stay_out_of_the_newton_matrix_only_where_the_corrector_converges_without(stiff):
+    """Pairs of equations that are nearly the same make entries of 1e-7 count."""
+    n = 24
+    b = np.eye(n) if stiff else np.kron(np.eye(n // 2), [[1.0, 1.0], [1.0, 1.0 + 1e-7]])
+    small = 1e-7 * np.cos(np.arange(n * n)).reshape(n, n)
+    b = np.where(b == 0.0, small, b)
+    differential = np.arange(n + 1) == 0
+    problem = DAEProblem(
+        n=n + 1, residual=driven_residual, jacobian=driven_jacobian,
+        indptr=np.concatenate([[0], n + 1 + n * np.arange(n + 1)]),
+        indices=np.concatenate([np.arange(n + 1), np.tile(np.arange(1, n + 1), n)]),
+        idata=np.zeros(1, dtype=np.int64), rdata=np.ravel(b, "F"), work_size=1,
+        y0=np.zeros(n + 1), yp0=np.concatenate([[1.0], np.linalg.solve(b, np.ones(n))]), error_mask=differential,
+        atol_scale=np.ones(n + 1), scale=np.ones(n + 1), differential=differential,
+        small_entries=True,
+    )  # fmt: skip
+    driven = run.Run(problem, np.array([0.0, 2.0]), 2.0, Options(tol=1e-8))
+    result = driven.drive()
+    assert result.success
+    assert (driven.plan.left_src.size > 0) == stiff
+    np.testing.assert_allclose(result.y[-1, 1:], np.linalg.solve(b, np.full(n, result.y[-1, 0])), rtol=1e-5)
+    np.testing.assert_allclose(result.y[-1, 0], np.sin(2.0), atol=1e-6)
