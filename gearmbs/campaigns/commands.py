@@ -161,13 +161,17 @@ def check(
 def export(
     folder: Place,
     out: Annotated[Path, typer.Option("--out", "-o", help="File, or folder for parquet.")],
-    format: Annotated[str, typer.Option("--as", help="csv, netcdf, matlab or parquet.")] = "parquet",
+    format: Annotated[str, typer.Option("--as", help="csv, netcdf, matlab, parquet or hf.")] = "parquet",
+    split_by: Annotated[
+        str | None, typer.Option(help="Column, as specimen, whose values each are in one split only (parquet, hf).")
+    ] = None,
+    test: Annotated[float, typer.Option(help="Part of its values that is for the test.")] = 0.2,
 ) -> None:
     """Write the results for others."""
     with guarded():
         from gearmbs.campaigns import Campaign
 
-        for path in Campaign(folder).export(out, format):
+        for path in Campaign(folder).export(out, format, split_by=split_by, test=test):
             typer.echo(f"wrote {path}")
 
 
@@ -192,6 +196,10 @@ def sensitivity(folder: Place, result: Annotated[str, typer.Argument(help="Colum
 
         found = Campaign(folder).sensitivity(result)
         typer.echo((found.table() if hasattr(found, "table") else found).to_string(float_format="%.4g"))
+        if getattr(found, "explained", 0.0) > 0.0:
+            typer.echo(
+                f"polynomials as control variates explain {found.explained:.1%} of the variance of points left out"
+            )
         if hasattr(found, "q_squared"):
             typer.echo(f"from a polynomial that explains {found.q_squared:.1%} of the variance of points left out")
 

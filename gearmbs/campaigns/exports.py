@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from gearmbs.view.files import whole_file, write_whole
 if TYPE_CHECKING:
     from gearmbs.campaigns.campaign import Campaign
 
-FORMATS = ("csv", "netcdf", "matlab", "parquet")
+FORMATS = ("csv", "netcdf", "matlab", "parquet", "hf")
 ROWS_A_FILE = 2000
 
 
@@ -24,6 +24,8 @@ def export(
     format: str,
     *,
     split: np.ndarray | None = None,
+    split_by: str | None = None,
+    test: float = 0.2,
     add: Mapping[str, Any] | None = None,
 ) -> list[Path]:
     """Write a campaign for others; return the files.
@@ -32,9 +34,14 @@ def export(
     ----------
     target : path-like
         File for CSV (the table alone), NetCDF and MATLAB; folder for parquet.
-    format : {"csv", "netcdf", "matlab", "parquet"}
+    format : {"csv", "netcdf", "matlab", "parquet", "hf"}
+        "hf" is parquet with the README.md by which Hugging Face's hub and `datasets` find the splits.
     split : ndarray of str, optional
         For parquet the name of each row's split, in the order of the table; default all are "train".
+    split_by : str, optional
+        Instead the column, as "specimen", whose values each are in one split only: "train" or "test".
+    test : float
+        Part of its values that is for the test.
     add : mapping, optional
         Further columns for parquet, by row.
 
@@ -53,8 +60,11 @@ def export(
         return [target]
     if format == "matlab":
         return [_matlab(campaign, target)]
-    if format == "parquet":
-        return _parquet(campaign, target, split, add or {})
+    if format in ("parquet", "hf"):
+        if split_by is not None:
+            split = _split_by(campaign, split_by, test)
+        files = _parquet(campaign, target, split, add or {})
+        return files if format == "parquet" else [*files, _readme(campaign, target, files)]
     raise CampaignError(f"format {format!r} is unknown; choose one of {', '.join(FORMATS)}")
 
 
@@ -109,3 +119,39 @@ def _parquet(campaign: Campaign, target: Path, split: np.ndarray | None, add: Ma
                 pq.write_table(pa.table(columns), part, compression="zstd")
             written.append(path)
     return written
+
+
+def _split_by(campaign: Campaign, column: str, test: float) -> np.ndarray:
+    """Return the split of each row, all rows of equal value in a column being in the same."""
+    from gearmbs.campaigns.datasets.splits import split_by_group
+
+    table = campaign.table
+    if column not in table.columns:
+        raise CampaignError(f"split by {column!r}: the table has no such column; it has {', '.join(table.columns)}")
+    groups = np.unique(table[column].to_numpy(), return_inverse=True)[1]
+    return split_by_group(groups, test=test, validation=0.0, seed=campaign.plan.seed)
+
+
+def front_matter(files: Sequence[Path], rows: int) -> list[str]:
+    """Return the lines by which a hub finds the splits of a folder of parquet files, and how large it is."""
+    limits = ((1000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
+    size = next((name for limit, name in limits if rows < limit), "n>1M")
+    lines = [f"size_categories:\n- {size}", "configs:", "- config_name: default", "  data_files:"]
+    splits = dict.fromkeys(path.name.split("-")[0] for path in files)
+    return [*lines, *(f"  - split: {name}\n    path: data/{name}-*.parquet" for name in splits)]
+
+
+def _readme(campaign: Campaign, target: Path, files: Sequence[Path]) -> Path:
+    """Write what the hub shows of a campaign: its splits and what its columns are."""
+    plan, table = campaign.plan, campaign.table
+    done = int((table["status"] == "done").sum())
+    lines = ["---", *front_matter(files, done), "---", "", f"# {campaign.path.stem}", ""]
+    lines += [
+        f"{done} cases simulated by gearmbs, subject {plan.subject.kind}, design {plan.design}, seed {plan.seed}; a "
+        "row is a case with its settings, results in SI units, and signals as lists.",
+        "",
+    ]
+    lines += [f"* `{factor.name}`: varied" for factor in plan.factors]
+    for spec in campaign.folder.specs:
+        lines.append(f"* `signal.*` of {spec.name}: {spec.rate:g} Hz, {spec.units}, {', '.join(spec.channels)}")
+    return write_whole(target / "README.md", "\n".join(lines) + "\n")

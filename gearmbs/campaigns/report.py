@@ -115,7 +115,8 @@ def _decides(campaign: Campaign, result: str) -> str:
         heading = "<h3>Sobol' indices from a polynomial chaos</h3>"
         return _at_hand(campaign, result) + heading + _table(found.table()) + note + _surface(campaign, result)
     if isinstance(found, SobolIndices):
-        note = f"<p><small>{found.base_points} base points, {found.left_out} left out for want of results.</small></p>"
+        note = f"<p><small>{found.base_points} base points, {found.left_out} left out for want of results; "
+        note += f"control variates explain {found.explained:.1%} of the variance of points left out.</small></p>"
         return "<h3>Sobol' indices</h3>" + _table(found.table()) + note
     if campaign.plan.design == "one at a time":
         return "<h3>One factor after the other</h3>" + _table(found)

@@ -194,6 +194,15 @@ def test_exports(tmp_path):
     (file,) = campaign.export(tmp_path / "hf", "parquet")
     rows = pd.read_parquet(file)
     np.testing.assert_array_equal(rows["signal.wave"][3], campaign.open().wave.values[3, 0])
+    *files, card = campaign.export(tmp_path / "shared", "hf", split_by="point", test=0.25)
+    parts = {path.name.split("-")[0]: set(pd.read_parquet(path).point) for path in files}
+    assert {name: len(points) for name, points in parts.items()} == {"train": 12, "test": 4}
+    assert not parts["train"] & parts["test"]
+    front = card.read_text().split("---")[1]
+    assert front.count("split:") == 2
+    assert "  - split: test\n    path: data/test-*.parquet" in front
+    with pytest.raises(CampaignError, match="no such column"):
+        campaign.export(tmp_path / "y", "hf", split_by="specimen")
     with pytest.raises(CampaignError, match="choose one of csv"):
         campaign.export(tmp_path / "x", "xml")
 

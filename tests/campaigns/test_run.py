@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gearmbs.campaigns import Campaign, CampaignError, Choice, Factor, make_plan
+from gearmbs.view.files import write_whole
 from tests.campaigns.support import digest, function, ranges, small
 
 
@@ -166,8 +167,15 @@ def test_damage_is_found_and_mended(tmp_path, undisturbed):
 def test_failed_cases_may_be_tried_again(tmp_path):
     campaign = moody(tmp_path, fails=1)
     campaign.run(workers=0)
+    assert campaign.status().failed == 1
     assert campaign.retry() == 1
     assert not campaign.status().complete
+    # a ledger that was written anew counts as it is now
+    campaign.run(workers=0)
+    for unit in campaign.folder.done():
+        ledger = campaign.folder.ledger(unit)
+        write_whole(ledger, json.dumps(json.loads(ledger.read_text()) | {"failed": 0}))
+    assert campaign.status().failed == 0
 
 
 def test_minutes_and_progress(tmp_path):

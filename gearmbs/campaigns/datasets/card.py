@@ -5,10 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from datetime import date
 from pathlib import Path
 from typing import Any
 
 import gearmbs
+from gearmbs.campaigns.exports import front_matter
 
 TYPES = {
     "double": "sc:Float",
@@ -45,11 +47,8 @@ def write_card(
     """Write README.md with the front matter that hubs read."""
     from gearmbs.view.files import write_whole
 
-    splits = dict.fromkeys(p.name.split("-")[0] for p in files)
     lines = ["---", "license: cc0-1.0", "task_categories:", "- time-series-classification", "tags:", "- vibration"]
-    lines += ["- gears", "- simulation", f"size_categories:\n- {_size(int(facts['signals']))}", "configs:"]
-    lines += ["- config_name: default", "  data_files:"]
-    lines += [f"  - split: {name}\n    path: data/{name}-*.parquet" for name in splits]
+    lines += ["- gears", "- simulation", *front_matter(files, int(facts["signals"]))]
     lines += [
         "---",
         "",
@@ -97,8 +96,9 @@ def write_card(
     return write_whole(folder / "README.md", "\n".join(lines))
 
 
-def write_croissant(folder: Path, title: str, files: Sequence[Path]) -> Path:
-    """Write croissant.json: files with their digests, and the columns as fields of a record set."""
+def write_croissant(folder: Path, title: str, files: Sequence[Path], url: str | None = None) -> Path:
+    """Write croissant.json: files with their digests, and the columns as fields of a record set; where it is published,
+    if it is."""
     from gearmbs.view.files import write_whole
 
     fields = []
@@ -121,9 +121,8 @@ def write_croissant(folder: Path, title: str, files: Sequence[Path]) -> Path:
         "description": "Simulated vibration of a spur gear pair with faults of known kind, size and tooth.",
         "conformsTo": "http://mlcommons.org/croissant/1.0",
         "license": "https://creativecommons.org/publicdomain/zero/1.0/",
-        "url": "https://example.org/" + title.replace(" ", "-").lower(),
         "version": gearmbs.__version__,
-        "datePublished": "1970-01-01",
+        "datePublished": date.today().isoformat(),
         "citeAs": "simulated by gearmbs",
         "distribution": [
             *(
@@ -148,6 +147,8 @@ def write_croissant(folder: Path, title: str, files: Sequence[Path]) -> Path:
         ],
         "recordSet": [{"@type": "cr:RecordSet", "@id": "records", "name": "records", "field": fields}],
     }
+    if url is not None:
+        tree["url"] = url
     return write_whole(folder / "croissant.json", json.dumps(tree, indent=1))
 
 
@@ -156,13 +157,6 @@ def _columns(files: Sequence[Path]) -> dict[str, str]:
 
     schema = pq.ParquetFile(files[0]).schema_arrow
     return {f.name: str(f.type) for f in schema}
-
-
-def _size(count: int) -> str:
-    for limit, name in ((1000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M")):
-        if count < limit:
-            return name
-    return "n>1M"
 
 
 CONTEXT: dict[str, Any] = {

@@ -109,6 +109,7 @@ def write_data_set(
     validation: float = 0.1,
     withheld: tuple[float, float] = (0.45, 0.6),
     seed: int = 0,
+    url: str | None = None,
 ) -> list[Path]:
     """Write a campaign as a data set: parquet by split, README.md, croissant.json, plan.json.
 
@@ -122,6 +123,8 @@ def write_data_set(
         Parts of the specimens.
     withheld : tuple of float
         Range of severities that training specimens keep for the split "withheld".
+    url : str, optional
+        Where it will be published, for the metadata.
 
     Raises
     ------
@@ -156,7 +159,7 @@ def write_data_set(
         "specimens in two splits": max(shared_groups(split, groups).values()),
         "processor time of the simulations, core hours": f"{campaign.status().processor_seconds / 3600:.3g}",
     }
-    paths = [write_card(out, title, files, facts, layers.as_dict()), write_croissant(out, title, files)]
+    paths = [write_card(out, title, files, facts, layers.as_dict()), write_croissant(out, title, files, url)]
     shutil.copy(campaign.path / "plan.json", out / "plan.json")
     return [*files, *paths, out / "plan.json"]
 
