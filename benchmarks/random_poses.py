@@ -21,18 +21,24 @@ DEEP = 0.5e-3
 
 HELIX = {"helix_angle": "15 deg"}
 SIZES = {"module": "3 mm"}
+SHALLOW = {"dedendum": "3.3 mm", "fillet_radius": "0.3 mm"}
 KINDS = {
     "spur": (GearSpec(23, **SIZES), GearSpec(37, **SIZES), 11),
     "internal": (GearSpec(23, **SIZES), GearSpec.ring(70, **SIZES), 11),
     "helical": (GearSpec(23, **SIZES, **HELIX), GearSpec(37, **SIZES, hand="left", **HELIX), 11),
     "internal helical": (GearSpec(23, **SIZES, **HELIX), GearSpec.ring(70, **SIZES, **HELIX), 11),
+    "spur, roots": (GearSpec(23, **SIZES, **SHALLOW), GearSpec(37, **SIZES, **SHALLOW), 1),
+    "internal, roots": (GearSpec(23, **SIZES, **SHALLOW), GearSpec.ring(70, **SIZES, **SHALLOW), 1),
 }
+"""Wheels and slices; those called roots let tips meet roots, 0.3 mm off them on average."""
 
 
 def pair_of(kind: str) -> tuple[GearPair, int]:
     """Return the pair of a kind, with friction and damping, and its slices."""
     one, two, slices = KINDS[kind]
-    return GearPair(one, two, backlash="0.3 mm", contact=ContactLaw.impact(), friction=FlankFriction()), slices
+    roots = "roots" in kind
+    settings = {"contact": ContactLaw.impact(), "friction": FlankFriction(), "root_contact": roots or None}
+    return GearPair(one, two, backlash="1.4 mm" if roots else "0.3 mm", **settings), slices
 
 
 def rotations(vectors: np.ndarray) -> np.ndarray:
@@ -55,13 +61,16 @@ def _sweep(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, turned, worst, work):
     zero = np.zeros(3)
     force, near = np.zeros(6), np.zeros(6)
     jac = np.zeros((6, 24))
-    bad = pulling = touching = 0
+    bad = pulling = pulling_deep = touching = 0
     for k in range(R2.shape[0]):
         gear_contact(gi, gr, R1, A1[k], v1[k], w1[k], R2[k], A2[k], v2[k], w2[k], force, jac, diag, 1, work)
         if not (np.isfinite(force).all() and np.isfinite(jac).all()):
             bad += 1
         if diag[7] < 0.0 or diag[0] < 0.0:
-            pulling += 1
+            if max(diag[3], diag[4]) < worst[3]:
+                pulling += 1
+            else:
+                pulling_deep += 1
         if diag[0] > 0.0:
             touching += 1
         gear_contact(gi, gr, R1, A1[k], zero, zero, R2[k], A2[k], zero, zero, force, jac, diag, 0, work)
@@ -71,7 +80,7 @@ def _sweep(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, turned, worst, work):
             allowed = worst[1] * max(depth, 1e-6) ** worst[2]
             jump = np.sqrt(((near[:3] - force[:3]) ** 2).sum())
             worst[0] = max(worst[0], jump / allowed)
-    return bad, pulling, touching
+    return bad, pulling, pulling_deep, touching
 
 
 def sweep(pair: GearPair, slices: int, count: int, seed: int = 2, lean: float = 0.01) -> dict[str, float]:
@@ -87,7 +96,7 @@ def sweep(pair: GearPair, slices: int, count: int, seed: int = 2, lean: float = 
     Returns
     -------
     dict
-        ``poses``, ``touching``, ``not_finite``, ``pulling``, and ``jump``, the largest change of force between
+        ``poses``, ``touching``, ``not_finite``, ``pulling``, ``pulling_deep`` (beyond `DEEP`), and ``jump``, the largest change of force between
         neighbours relative to what the law allows.
     """
     gi, gr, size = pair.contact_tables(slices)
@@ -95,7 +104,7 @@ def sweep(pair: GearPair, slices: int, count: int, seed: int = 2, lean: float = 
     place = pair.placement(0.0)
     moved = NEIGHBOUR * 5 * pair.driven.tip_radius
     worst = np.array([0.0, 12 * moved * law.exponent * law.stiffness, law.exponent - 1, DEEP])
-    totals = np.zeros(3, dtype=np.int64)
+    totals = np.zeros(4, dtype=np.int64)
     for start in range(0, count, BLOCK):
         n = min(BLOCK, count - start)
         A1 = rotations(rng.normal(size=(n, 3)) * [lean, lean, 3]) @ place.axes_1
@@ -105,8 +114,8 @@ def sweep(pair: GearPair, slices: int, count: int, seed: int = 2, lean: float = 
         turned = rotations(rng.normal(size=(n, 3)) * NEIGHBOUR) @ A2
         A1, A2, turned = (np.ascontiguousarray(a) for a in (A1, A2, turned))
         totals += _sweep(gi, gr, place.origin_1, A1, v1, w1, R2, A2, v2, w2, turned, worst, work)
-    bad, pulling, touching = (int(total) for total in totals)
-    return {"poses": count, "touching": touching, "not_finite": bad, "pulling": pulling, "jump": float(worst[0])}
+    names = ("not_finite", "pulling", "pulling_deep", "touching")
+    return {"poses": count, **dict(zip(names, totals.tolist(), strict=True)), "jump": float(worst[0])}
 
 
 def main() -> None:

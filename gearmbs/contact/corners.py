@@ -8,6 +8,7 @@ from gearmbs.contact import layout as L
 from gearmbs.contact.corner_sections import corner_normals, corner_sections, corner_starts
 from gearmbs.contact.helical_sections import edge_normals, edge_sections
 from gearmbs.contact.jit import kernel
+from gearmbs.contact.level import level, level_corner
 from gearmbs.contact.lines import corner_on_plane
 from gearmbs.contact.sections import NEAR_BASE, normal_turns
 
@@ -66,6 +67,8 @@ def corner_gaps(side, wheels, corner, strip, n, kind, f_mate, normal, want):
     """
     rb = side.base_2 if kind == 1 else side.base_1
     start = f_mate + (wheels.wheel_2.half_angle if kind == 1 else wheels.wheel_1.half_angle)
+    if level(side, strip, n, want) and level_corner(side, corner, strip, kind, start):
+        return
     corner_starts(side, corner, strip, n, rb, normal)
     if side.twist_1 != 0.0:
         edge_normals(side, corner, strip, n, kind == 1, rb * start, rb)

@@ -12,9 +12,11 @@ from gearmbs.contact.pair import side_contacts
 from gearmbs.contact.pose import pose_columns, pose_rate_slopes, pose_rates, pose_wrench, relative_pose
 from gearmbs.contact.records import options_at, pair_at, scratch_at
 from gearmbs.contact.root import root_contacts
-from gearmbs.contact.search import set_twist
+from gearmbs.contact.search import open_side, set_twist
 from gearmbs.contact.sums import clear_sums, mirror
 
+COUPLED = 1e-10
+"""Of the largest entry of a block of derivatives, the part up to which others are rounding."""
 VEC = types.float64[::1]
 MAT = types.float64[:, ::1]
 GEAR_CONTACT_SIG = types.void(
@@ -176,6 +178,25 @@ def mate_columns(R1, v1, w1, R2, v2, w2, wrench, jac):
 
 
 @kernel
+def clear_rounding(jac):
+    """Set to nothing what is rounding beside the largest entry of its 3 x 3 block.
+
+    Wheels that joints hold parallel lean by rounding errors, through which directions couple that have nothing to do
+    with each other. A Newton matrix without these couplings is as good, and sparser.
+    """
+    for b in range(0, 6, 3):
+        for c in range(0, 24, 3):
+            largest = 0.0
+            for i in range(b, b + 3):
+                for j in range(c, c + 3):
+                    largest = max(largest, abs(jac[i, j]))
+            least = COUPLED * largest
+            for i in range(b, b + 3):
+                for j in range(c, c + 3):
+                    jac[i, j] = jac[i, j] if abs(jac[i, j]) > least else 0.0
+
+
+@kernel
 def both_sides(options, wheels, scratch, want):
     """Sum up the contacts of both sides of the teeth, the second seen in a mirror."""
     totals = scratch.totals
@@ -185,6 +206,8 @@ def both_sides(options, wheels, scratch, want):
     clear_sums(sums, want)
     for i in range(6):
         side.x[i], side.xd[i], side.twist[i] = motion.x[i], motion.xd[i], motion.twist[i]
+    if not open_side(wheels, side):
+        return
     set_twist(wheels, side, 1.0)
     side_contacts(options, wheels, scratch, 1, totals, want)
     if root:
@@ -288,3 +311,4 @@ def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want
     own_columns(motion, w2, L.PADDED)
     turn_to_global(motion, jac)
     mate_columns(R1, v1, w1, R2, v2, w2, wrench, jac)
+    clear_rounding(jac)

@@ -18,7 +18,6 @@ from gearmbs.contact.search import (
     facing_teeth,
     flank_strips,
     middle_section,
-    open_side,
     pair_reach,
     path_excess,
     reach_of_face,
@@ -39,7 +38,7 @@ def side_contacts(options, wheels, scratch, sign, totals, want):
     options, wheels, scratch : record
         Tables of the pair of wheels, and scratch.
     sign : int
-        +1 or -1, for the tables that name teeth and flanks; the pose in ``scratch.side`` is already mirrored for -1.
+        +1 or -1, for the tables that name teeth and flanks; ``scratch.side`` is open, its pose mirrored for -1.
     totals : record
         Diagnostics.
     want : int
@@ -51,8 +50,6 @@ def side_contacts(options, wheels, scratch, sign, totals, want):
         Whether the sums were mirrored to match, which is done for -1 once something may touch.
     """
     side, middle = scratch.side, scratch.middle
-    if not open_side(wheels, side):
-        return False
     facing_teeth(options, wheels, side)
     single = options.slices == 1
     middle_section(options, wheels, side, middle, want if single else 0)

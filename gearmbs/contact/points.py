@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact.jit import kernel
+from gearmbs.contact.level import level, level_point
 from gearmbs.contact.support import corner_curvatures, corner_slopes, involute_curvatures, involute_slopes, tilt_of
 
 
@@ -30,6 +31,9 @@ def contact_points(side, corner, strip, loads, n, f, corners, want):
     want : int
         Nonzero to fill derivatives.
     """
+    if level(side, strip, n, want):
+        level_point(side, corner, strip, loads, f)
+        return
     tilt = tilt_of(side)
     p, q, i_w = tilt.p, tilt.q, tilt.i_w
     rb, half_h = side.base_1, 0.5 * side.x[1]

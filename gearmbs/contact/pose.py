@@ -26,9 +26,10 @@ def relative_pose(R1, A1, R2, A2, internal, motion):
     norm = np.sqrt(zx * zx + zy * zy + zz * zz)
     if not norm > 1.0:
         return False
-    zx /= norm
-    zy /= norm
-    zz /= norm
+    inverse = 1.0 / norm
+    zx *= inverse
+    zy *= inverse
+    zz *= inverse
     dx = R2[0] - R1[0]
     dy = R2[1] - R1[1]
     dz = R2[2] - R1[2]
@@ -41,9 +42,10 @@ def relative_pose(R1, A1, R2, A2, internal, motion):
         return False
     if internal:
         a = -a
-    ex /= a
-    ey /= a
-    ez /= a
+    inverse = 1.0 / a
+    ex *= inverse
+    ey *= inverse
+    ez *= inverse
     fx = zy * ez - zz * ey
     fy = zz * ex - zx * ez
     fz = zx * ey - zy * ex
@@ -57,6 +59,7 @@ def relative_pose(R1, A1, R2, A2, internal, motion):
     p = ux * ex + uy * ey + uz * ez
     q = ux * fx + uy * fy + uz * fz
     w = np.sqrt(1.0 - p * p - q * q)
+    i1w = 1.0 / (1.0 + w)
     x = motion.x
     x[0], x[1], x[2], x[3] = a, h, p, q
     for k in range(2):
@@ -65,7 +68,7 @@ def relative_pose(R1, A1, R2, A2, internal, motion):
         vx = A[0, 0] * ex + A[1, 0] * ey + A[2, 0] * ez
         vy = A[0, 0] * fx + A[1, 0] * fy + A[2, 0] * fz
         vz = A[0, 0] * zx + A[1, 0] * zy + A[2, 0] * zz
-        back = (p * vx + q * vy) / (1.0 + w) + sign * vz
+        back = (p * vx + q * vy) * i1w + sign * vz
         facing = 1.0 if internal else sign
         x[4 + k] = np.arctan2(facing * (vy - q * back), facing * (vx - p * back))
     return True

@@ -2,10 +2,16 @@
 
 Only used when the tip clearance is small. These contacts push, and damp, but carry no friction.
 
+Of the parts only the circle is damped, as flanks are: what replaces it or is taken away depends on the pose alone, so
+that no rates make the sum pull.
+
 A tip meets the root circle with its land while that crosses the line of centres, else with its nearer corner. Where a
 corner stands over a root arc, the arc's force replaces that of the circle beneath it and that of the flank's extension
 behind it: both are taken away again. Arc and circle agree at one end of the arc, arc and flank at the other, so forces
 do not jump.
+
+Radii and angles of an internal wheel are negative, see `layout.WHEEL`: its root circle is hollow, its root arcs are
+where its flanks go out to it, and the same sums hold.
 """
 
 from __future__ import annotations
@@ -20,9 +26,9 @@ from gearmbs.contact.loads import strip_forces
 from gearmbs.contact.pair import count_pair, set_limits
 from gearmbs.contact.pair_strips import strip_count
 from gearmbs.contact.records import strip_at
-from gearmbs.contact.search import facing_teeth, open_side
+from gearmbs.contact.search import facing_teeth
 from gearmbs.contact.sections import gap_rates
-from gearmbs.contact.slices import law_of, plane_force
+from gearmbs.contact.slices import elastic_law, law_of, plane_force
 from gearmbs.contact.sums import add_normal, total_force
 
 FAR = 1.0  # a gap, m, for parts that do not face each other
@@ -72,12 +78,13 @@ def root_gap(side, own, mate, corner, part, tip, f_tip, f_root, strip, j, want):
     strip.gap[j] = FAR
     clear_slopes(strip, j)
     if part == ON_CIRCLE:
+        inside = np.copysign(1.0, side.x[L.A])  # -1: one wheel is within the other
         dx, dy = line_offset(side, 0.0, 0.0, zeta)
-        off = f_tip - np.arctan2(dy, dx)
-        psi = own.corner_angle
+        off = f_tip - np.arctan2(inside * dy, inside * dx)
+        psi = abs(own.corner_angle)
         if abs(off) <= psi:
             line_distance(side, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, zeta)
-            distance_gap(side, strip, j, tip, 1.0, own.tip_radius + mate.root_radius, want)
+            distance_gap(side, strip, j, tip, inside, inside * (own.tip_radius + mate.root_radius), want)
             return
         nearer = f_tip - psi if off > 0.0 else f_tip + psi
         se, ce = np.sin(nearer), np.cos(nearer)
@@ -91,10 +98,12 @@ def root_gap(side, own, mate, corner, part, tip, f_tip, f_root, strip, j, want):
     elif part == ON_FLANK:
         rf, rc = mate.fillet_radius, mate.fillet_centre_radius
         end = f_root + mate.fillet_angle - np.arcsin(rf / rc)
-        corner_on_plane(side, corner, strip, j, tip == 1, end, np.sqrt(rc * rc - rf * rf), 0.0, want)
+        at = np.copysign(np.sqrt(rc * rc - rf * rf), rc)
+        corner_on_plane(side, corner, strip, j, tip == 1, end, at, 0.0, want)
     else:
+        hollow = np.copysign(1.0, mate.root_radius)
         line_distance(side, -r * ce, -r * se, r * se, -r * ce, 0.0, 0.0, zeta)
-        distance_gap(side, strip, j, tip, 1.0, mate.root_radius + corner.rounding[0], want)
+        distance_gap(side, strip, j, tip, hollow, hollow * (mate.root_radius + corner.rounding[0]), want)
 
 
 @kernel
@@ -152,6 +161,8 @@ def root_part(options, wheels, scratch, part, tip, f_tip, f_root, totals, want):
     slices, loads, sums, pair = options.slices, scratch.loads, scratch.sums, scratch.pair
     share = -1.0 if part == ON_FLANK or part == UNDER_ARC else 1.0
     law = law_of(options, wheels, 1.0)
+    if part != ON_CIRCLE:
+        law = elastic_law(law)
     depth = 0.0
     if slices == 1:
         strip = strip_at(scratch, 1)
@@ -182,8 +193,6 @@ def root_part(options, wheels, scratch, part, tip, f_tip, f_root, totals, want):
 def root_contacts(options, wheels, scratch, sign, totals, want):
     """Add the contacts of all tips near the line of centres with the mate's root, on one side of the teeth."""
     side = scratch.side
-    if not open_side(wheels, side):
-        return
     facing_teeth(options, wheels, side)
     side.step = (wheels.face_high - wheels.face_low) / options.slices
     side.slices = float(options.slices)
@@ -191,8 +200,8 @@ def root_contacts(options, wheels, scratch, sign, totals, want):
         own = wheels.wheel_1 if tip == 1 else wheels.wheel_2
         corner = scratch.corner_1 if tip == 1 else scratch.corner_2
         place_tip, place_root = (L.F1, L.F2) if tip == 1 else (L.F2, L.F1)
-        pitch_tip = 2.0 * np.pi / options.teeth[1 - tip]
-        pitch_root = 2.0 * np.pi / options.teeth[tip]
+        turn_1 = 2.0 * np.pi / options.teeth[0]
+        pitch_tip, pitch_root = (turn_1, side.turn_2) if tip == 1 else (side.turn_2, turn_1)
         middle = -np.floor(side.x[place_tip] / pitch_tip + 0.5)
         for k in range(-NEIGHBOURS, NEIGHBOURS + 1):
             f_tip = side.x[place_tip] + (middle + k) * pitch_tip

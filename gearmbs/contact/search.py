@@ -7,6 +7,7 @@ import numpy as np
 from gearmbs.contact import layout as L
 from gearmbs.contact.helical_sections import helical_flanks, helical_normals
 from gearmbs.contact.jit import kernel
+from gearmbs.contact.level import level, level_flanks
 from gearmbs.contact.records import strip_at
 from gearmbs.contact.sections import flank_normals, flank_sections, gap_rates, set_sections
 from gearmbs.contact.support import GENTLE
@@ -22,7 +23,7 @@ UNBOUNDED = 1e9  # curvature of a corner gap, 1/m, where the tip reaches beyond 
 
 @kernel
 def open_side(wheels, side):
-    """Fill what a side's pose implies; False when the base circles meet.
+    """Fill what the pose implies, the same for both sides of the teeth; False when the base circles meet.
 
     With an internal wheel 2 its base radius, the centre distance and the length of the line of action are negative;
     all that follows holds for both.
@@ -108,6 +109,9 @@ def middle_section(options, wheels, side, strip, want):
     strip.zeta[0] = 0.0 if single else 0.5 * (wheels.face_low + wheels.face_high)
     strip.alpha[0], strip.sin[0], strip.cos[0] = side.alpha_0, side.sin_0, side.cos_0
     strip.step[0] = 0.0
+    if single and level(side, strip, 1, want):
+        level_flanks(side, strip)
+        return
     if side.twist_1 != 0.0:
         helical_normals(side, strip, 1)
         helical_flanks(side, strip, 1, want)

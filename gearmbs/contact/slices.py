@@ -52,6 +52,12 @@ def law_of(options, wheels, soft):
     )
 
 
+@inlined
+def elastic_law(law):
+    """Return the law without its damping."""
+    return Law(law.kind, law.k, law.e, 0.0, law.d)
+
+
 @kernel
 def plane_force(law, width, strip, loads, totals, want):
     """Force of a pair described by a single section: the pressure there times the common face width.

@@ -95,7 +95,7 @@ class ContactModel(Written):
         """Whether contact of tips with roots is looked for."""
         if self.root_contact is not None:
             return self.root_contact
-        spur = geometry.driver.helix_angle == 0 and geometry.sign > 0
+        spur = geometry.driver.helix_angle == 0
         return spur and geometry.tip_clearance < BOTTOMING_CLEARANCE * geometry.driver.module
 
     def penetration(self, force: float, pairs: int = 1) -> float:

@@ -104,6 +104,9 @@ def planetary_mechanism(
     -----
     Joints form a tree: meshes are forces, and supports springs. So no constraint is redundant and each reaction has one
     answer, however many planets there are.
+
+    The mechanism's ``lump`` is set: a member that is held is integrated as ground, and results are about all bodies as
+    without it.
     """
     supports, speeds, torques = dict(supports or {}), dict(speeds or {}), dict(torques or {})
     _check(held, speeds, torques, supports)
@@ -117,6 +120,7 @@ def planetary_mechanism(
     known = {**drives, **({held: 0.0} if held else {})}
     turning = gears.speeds(**known) if over == 0 and len(known) == 2 else dict.fromkeys((*MEMBERS, "planet"), 0.0)
     m = Mechanism(gears.name, gravity=gravity)
+    m.lump = True
     start = gears.start_angles()
     masses = _masses(gears, masses or {})
     turns = {"sun": 0.0, "carrier": 0.0, "ring": start["ring"]}

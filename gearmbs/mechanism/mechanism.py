@@ -62,6 +62,8 @@ class Mechanism(JointMethods, LoadMethods, Shown):
     redundancy : {"declared", "adams"}
         Which of redundant constraint rows are kept: those added first, or as in ADAMS, see
         `gearmbs.mechanism.redundancy`. Only their reactions depend on it.
+    lump : bool
+        Whether `simulate` integrates bodies fixed to each other as one unless told otherwise; default False.
     turns : dict of (str, str, str) to float
         About which angle, in rad, AX, AY and AZ start to count, by function and names of the markers:
         ``m.turns["AZ", "shaft.I", "shaft.J"] = 4 * np.pi`` winds a torsion spring twice. Default: 0.
@@ -86,6 +88,7 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         self.units = Units()
         self.reads_units = True
         self.redundancy = "declared"
+        self.lump = False
         self.turns: dict[tuple[str, str, str], float] = {}
         self.given: dict[str, dict[str, Any]] = {}
 

@@ -70,7 +70,7 @@ def simulate(
     progress: bool | Callable[[float], None] | None = None,
     advice: Mapping[Status, str] | None = None,
     consumer: Callable[[Solution], None] | None = None,
-    lump: bool = False,
+    lump: bool | None = None,
     stops: Sequence[StopAt] = (),
     **options,
 ) -> Solution:
@@ -107,9 +107,10 @@ def simulate(
         With ``every_step``: called as ``consumer(part)`` with solutions of some steps at a time, in the order of time
         and each valid during the call only, instead of keeping all steps in memory; see
         `gearmbs.dae.results.stream.Stream`. The solution returned then holds nothing but the last step.
-    lump : bool
-        Integrate bodies that fixed joints connect, or fix to the ground, as one. Results are about all bodies and
-        joints as without it; reactions inside are recovered exactly. Where that is not possible, as with any body that
+    lump : bool, optional
+        Integrate bodies that fixed joints connect, or fix to the ground, as one; default the mechanism's ``lump``,
+        which only some presets set, and not with ``stops``. Results are about all bodies and joints as without it;
+        reactions inside are recovered exactly. Where that is not possible, as with any body that
         deforms, all bodies are integrated, and the solution's ``message`` says why. See
         `gearmbs.mechanism.lumping.lumped`.
     stops : sequence of StopAt
@@ -133,6 +134,7 @@ def simulate(
     t_start = quantity(t_start, "time", "t_start")
     t_eval = _output_times(t_start, quantity(t_end, "time", "t_end"), rate, t_eval, every_step)
     name = _checked(integrator, tol, options)
+    asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
     with raised_errors(mechanism.functions.values()):
         system, problem, members = _prepared(mechanism, t_start, lump, formulation, rate_scale)
     if stops:
@@ -141,7 +143,7 @@ def simulate(
         problem = with_stops(problem, mechanism.state_names, int(problem.idata[tables.H_Z]), stops)
         options.update(stop_options(stops))
     problem.advice = {**ADVICE, **(advice or {})}
-    remarks = [locking_remark(mechanism, system), why_not_lumped(mechanism) if lump and members is None else ""]
+    remarks = [locking_remark(mechanism, system), why_not_lumped(mechanism) if asked and members is None else ""]
     remark = " ".join(text for text in remarks if text)
     stream = None if consumer is None else Stream(system, problem, float(t_eval[-1]), consumer, members)
     bar = time_bar(progress, mechanism.name, float(t_eval[0]), float(t_eval[-1]))

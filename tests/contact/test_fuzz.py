@@ -11,6 +11,8 @@ def run(pair, slices, count, seed=2):
     found = sweep(pair, slices, count, seed)
     assert found["touching"] > 0.5 * count
     assert found["not_finite"] == found["pulling"] == 0
+    # tips millimetres deep in a root arc: what is taken away for the arc may outweigh it
+    assert pair.root_contact or found["pulling_deep"] == 0
     assert found["jump"] <= 1
 
 

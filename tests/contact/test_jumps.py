@@ -210,9 +210,14 @@ def test_deviating_flanks_kink_where_a_corner_takes_over(fault, slope):
 
 
 @pytest.mark.parametrize(("slices", "bound"), [(1, 1e-4), (9, 5e-2)])
-def test_tips_in_roots(slices, bound):
+@pytest.mark.parametrize("internal", [False, True])
+def test_tips_in_roots(internal, slices, bound):
     # leaning 1.6 degrees, slices hand the tip from land to corner one by one
-    pair = GearPair.paper(root_contact=True, centre_distance_error="-0.7 mm", backlash="1.5 mm", **ELASTIC)
+    settings = {"root_contact": True, "backlash": "1.5 mm", **ELASTIC}
+    pair = GearPair.paper(centre_distance_error="-0.7 mm", **settings)
+    if internal:
+        ring = GearSpec.ring(70, "3 mm", dedendum="3.3 mm", fillet_radius="0.3 mm")
+        pair = GearPair(GearSpec(23, "3 mm"), ring, centre_distance_error="0.3 mm", **settings)
     jump, touched = worst_jump(pair, slices, 600)
     assert touched >= 10
     assert jump < bound

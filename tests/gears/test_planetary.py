@@ -241,6 +241,17 @@ def test_willis_and_torques_with_ideal_meshes():
     assert forces["planet {}-ring"] * gears.ring.base_radius == pytest.approx(60 * 84 / 108, rel=1e-6)
 
 
+def test_a_held_ring_is_integrated_as_ground():
+    gears = small_set(ideal=(3e8, 4e8), ideal_damping=3000.0)
+    m = mechanism_of(gears, speeds={"sun": "300 rpm"}, torques={"carrier": "-60 N m"}, run_up="5 ms")
+    own, all_bodies = (m.simulate(0.01, rate=1000, tol=1e-9, **how) for how in ({}, {"lump": False}))
+    assert own.problem.n < all_bodies.problem.n
+    for body in ("sun", "carrier", "ring", "planet 2"):
+        np.testing.assert_allclose(own.angular_velocity(body), all_bodies.angular_velocity(body), atol=1e-5)
+    seat, whole = (np.hstack(s.reaction("ring seat")) for s in (own, all_bodies))
+    np.testing.assert_allclose(seat, whole, atol=1e-4 * abs(whole).max())
+
+
 def test_torques_of_ideal_meshes_are_exact():
     gears = small_set(ideal=(3e8, 4e8))
     m = mechanism_of(gears, speeds={"sun": 0.0}, torques={"carrier": -90.0}, run_up=0)
