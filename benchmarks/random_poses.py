@@ -96,8 +96,8 @@ def sweep(pair: GearPair, slices: int, count: int, seed: int = 2, lean: float = 
     Returns
     -------
     dict
-        ``poses``, ``touching``, ``not_finite``, ``pulling``, ``pulling_deep`` (beyond `DEEP`), and ``jump``, the largest change of force between
-        neighbours relative to what the law allows.
+        ``poses``, ``touching``, ``not_finite``, ``pulling``, ``pulling_deep`` (beyond `DEEP`), and ``jump``, the
+        largest change of force between neighbours relative to what the law allows.
     """
     gi, gr, size = pair.contact_tables(slices)
     law, rng, work = pair.contact, np.random.default_rng(seed), np.zeros(size)
