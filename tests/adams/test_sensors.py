@@ -181,3 +181,27 @@ def test_a_sequence_of_equilibria_returns_and_halts():
 def test_a_sensor_that_is_met_at_the_first_equilibrium_fires_there():
     result = pulled("SENSOR/1, LE, VALUE=0.5, FUNCTION=DZ(20), RETURN")
     assert list(result.t) == [0.0]
+
+
+def test_a_routine_evaluates_what_a_sensor_senses():
+    """50 N from the passage on, as by an expression."""
+    calls = []
+
+    def sevsub(call):
+        calls.append(call.id)
+        return call.parameters[0] + 0.0 * call.sysfnc("DZ", 20)
+
+    sensor = "SENSOR/1, LE, VALUE=5, FUNCTION=DZ(20), EVALUATE=USER(50)"
+    script = parse_script("m\no\n" + ONE)
+    for text, name in (
+        (sensor, "sevsub"),
+        (f"{sensor}\\EVALUATE_ROUTINE=lib::HOLD", "hold"),
+        (sensor, "SENSOR/1/EVALUATE"),
+    ):
+        deck = parse_deck(DECK.format(sensor=text, start=", QG=0,0,10"))
+        result = run_deck(deck, script, routines={name: sevsub})
+        assert result.request(1)[-1, 3] == 50.0
+        assert result.request(1)[-1, 1] == pytest.approx(5 - 10 + 7.5, abs=1e-8)
+        with pytest.raises(DeckError, match=r"SENSOR/1: its routine .* is missing"):
+            run_deck(deck, script)
+    assert set(calls) == {1}

@@ -36,6 +36,8 @@ ROUTINES: dict[type, tuple[str, tuple[str, ...]]] = {
     st.Request: ("REQSUB", ("f1", "f2", "f3", "f4", "f5", "f6", "f7", "f8")),
 }
 """ADAMS's name of the routine of a statement, and where its results go."""
+EVALUATED = "SEVSUB"
+"""That of what a SENSOR evaluates when it fires."""
 
 SYSARY = {
     "DISP": ("DX", "DY", "DZ", "PSI", "THETA", "PHI"),
@@ -113,22 +115,25 @@ def bound(deck: Deck, routines: Mapping[str, Routine] | None = None, allow_missi
         Naming all routines that are missing, and what is wrong with the others.
     """
     known = {name.upper(): routine for name, routine in (routines or {}).items()}
-    users = [(s, call) for s in deck for call in [_user_call(s)] if call is not None]
+    users = [use for s in deck for use in _uses(s)]
     if not users:
         return deck
     made = replace(deck, items={kind: dict(group) for kind, group in deck.items.items()})
     made.diagnostics, made.functions = list(deck.diagnostics), dict(deck.functions)
     problems = []
-    for statement, call in users:
-        kind = type(statement)
-        routine = next((known[name] for name in _names(statement) if name in known), None)
+    for use in users:
+        statement, group = use.statement, made.items[type(use.statement)]
+        routine = next((known[name] for name in use.names() if name in known), None)
         if routine is None:
-            message = f"{statement.label()}: its routine {_names(statement)[1]} is missing; give it in routines"
+            message = f"{statement.label()}: its routine {use.names()[1]} is missing; give it in routines"
             problems.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.line))
-            del made.items[kind][statement.id]
+            group.pop(statement.id, None)
+            continue
+        if statement.id not in group:
+            # another routine of it is missing
             continue
         try:
-            made.items[kind][statement.id] = _with_function(made, statement, call, routine)
+            group[statement.id] = _with_function(made, group[statement.id], use, routine)
         except ValueError as error:
             message = f"{statement.label()}: its routine {error}"
             problems.append(Diagnostic(ERROR, message, deck.file, statement.line))
@@ -160,37 +165,59 @@ def load_routines(path: str | Path) -> dict[str, Routine]:
     return found
 
 
-def _names(s: st.Statement) -> list[str]:
-    """Return the names under which the routine of a statement is looked for."""
-    given = getattr(s, "routine", None)
-    own = [given.strip("\"' ").rpartition("::")[2].upper()] if given else []
-    return [s.label(), *own, ROUTINES[type(s)][0]]
+@dataclass(frozen=True)
+class _Use:
+    """One USER(...) of a statement: ADAMS's name of its routine, where its results go, where the user's name stands."""
+
+    statement: st.Statement
+    call: Call
+    routine: str
+    fields: tuple[str, ...]
+    given: str | None
+
+    def names(self) -> list[str]:
+        """Return the names under which the routine is looked for."""
+        own = [self.given.strip("\"' ").rpartition("::")[2].upper()] if self.given else []
+        label = self.statement.label()
+        return [f"{label}/EVALUATE" if self.routine == EVALUATED else label, *own, self.routine]
 
 
-def _user_call(s: st.Statement) -> Call | None:
-    if type(s) not in ROUTINES or not isinstance(getattr(s, "function", None), str):
+def _uses(s: st.Statement) -> Iterator[_Use]:
+    """Yield what a statement calls of the user."""
+    if type(s) in ROUTINES:
+        name, fields = ROUTINES[type(s)]
+        call = _user_call(getattr(s, "function", None))
+        if call is not None:
+            yield _Use(s, call, name, fields, getattr(s, "routine", None))
+    if isinstance(s, st.Sensor):
+        call = _user_call(s.evaluate)
+        if call is not None:
+            yield _Use(s, call, EVALUATED, ("evaluate",), s.evaluate_routine)
+
+
+def _user_call(text: str | None) -> Call | None:
+    if not isinstance(text, str):
         return None
     try:
-        node = parse(s.function)  # type: ignore[attr-defined]
+        node = parse(text)
     except ValueError:
         return None
     return node if isinstance(node, Call) and node.name == "USER" else None
 
 
-def _with_function(deck: Deck, s: st.Statement, call: Call, routine: Routine) -> Any:
+def _with_function(deck: Deck, s: st.Statement, use: _Use, routine: Routine) -> Any:
     """Return a statement whose results are calls of functions that the deck then has."""
-    fields = ROUTINES[type(s)][1]
-    caller = _Caller(s, tuple(_number(a) for a in call.args), routine, len(fields))
+    caller = _Caller(s, tuple(_number(a) for a in use.call.args), routine, len(use.fields))
     arguments = ", ".join(["TIME", *caller.asked])
     if isinstance(s, st.Motion) and caller.asked:
         raise ValueError(f"asks for {caller.asked[0]}; a motion depends on TIME only")
-    texts = {}
-    for component, name in enumerate(fields):
-        key = f"USER_{s.label().replace('/', '_')}_{component + 1}"
+    texts: dict[str, str | None] = {} if use.routine == EVALUATED else {"function": None}
+    for component, name in enumerate(use.fields):
+        key = f"{use.routine}_{s.label().replace('/', '_')}_{component + 1}"
         count = 1 + len(caller.asked)
         deck.functions[key] = UserFunction(f"{s.label()}: USER", caller.component(component), count=count)
         texts[name] = f"{key}({arguments})"
-    return replace(s, **{"function": None, **texts})  # type: ignore[arg-type]
+    return replace(s, **texts)  # type: ignore[arg-type]
 
 
 def _number(node: Node) -> float:
