@@ -15,8 +15,10 @@ from gearmbs.adams.commands import adams, plant
 from gearmbs.campaigns.commands import app as campaign
 from gearmbs.identify.commands import identify
 from gearmbs.signals.commands import analyse, compare, trend
+from gearmbs.signals.speed_commands import waterfall
 from gearmbs.studies.commands import bench, gearbox, resonance
 from gearmbs.studies.run_commands import paper, run
+from gearmbs.studies.speed_commands import campbell, sweep
 
 app = typer.Typer(
     name="gearmbs",
@@ -26,7 +28,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-for command in (paper, run, bench, gearbox, resonance, analyse, trend, compare, identify, adams, plant):
+of_records = (analyse, waterfall, trend, compare)
+for command in (paper, run, sweep, bench, gearbox, resonance, campbell, *of_records, identify, adams, plant):
     app.command()(command)
 app.add_typer(campaign)
 

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from gearmbs._command import guarded, stage_bar
-
-Rate = Annotated[str | None, typer.Option(help='Sampling rate, Hz or "12.8 kHz", if the file does not name it.')]
-Speed = Annotated[
-    str | None,
-    typer.Option(help='Shaft speed, e.g. "1780 rpm", or a file with the speed over time; default: from the GMF line.'),
-]
-Gaps = Annotated[str | None, typer.Option(help='Missing samples: "refuse", "interpolate" or "longest" stretch.')]
-ReportFile = Annotated[Path | None, typer.Option("--out", "-o", help="Write the report here instead of printing it.")]
+from gearmbs.signals.command_parts import (
+    Gaps,
+    Rate,
+    ReportFile,
+    Speed,
+    bearings_asked,
+    hand_over,
+    pair_of,
+    save_figures,
+    save_tables,
+    tooth_counts,
+)
 
 
 def analyse(
@@ -37,9 +43,11 @@ def analyse(
     band: Annotated[
         str | None, typer.Option(help='Band of the envelope, e.g. "1 kHz, 5 kHz"; default: kurtogram.')
     ] = None,
-    shaft: Annotated[
+    shaft_texts: Annotated[
         list[str] | None,
-        typer.Option(help='Speed of another shaft by that given, e.g. 0.345; "none" if there is no other; repeat.'),
+        typer.Option(
+            "--shaft", help='Speed of another shaft by that given, e.g. 0.345; "none" if there is no other; repeat.'
+        ),
     ] = None,
     train: Annotated[
         Path | None, typer.Option(help="Drivetrain (TOML) whose bearings with rolling are looked for, with its shafts.")
@@ -57,7 +65,6 @@ def analyse(
 ) -> None:
     """Analyse a record, measured or simulated: of gears, of bearings, of a planetary set, or of any machine."""
     with guarded(), stage_bar(file.name) as move:
-        from gearmbs.signals import analyse as analyse_signal
         from gearmbs.signals.simulated import read_any
         from gearmbs.signals.speed_file import parse_speed
 
@@ -72,55 +79,82 @@ def analyse(
             teeth=None if teeth is None else tooth_counts(teeth),
             progress=lambda f, s: move(0.3 * f, s),
         )
-        known = parse_speed(speed)
+        shaft = {
+            "speed": parse_speed(speed),
+            "tacho": tacho,
+            "speed_channel": speed_channel,
+            "pulses_per_rev": pulses,
+        }
         if planetary is not None or (teeth is None and "planetary" in signal.attrs):
-            own: dict[str, Any] = {"planetary": None}
-            if planetary is not None:
-                own = {"planetary": tooth_counts(planetary), "planets": planets, "member": member}
-            of_set = analyse_signal(
-                signal, speed=known, speed_channel=speed_channel, tacho=tacho, pulses_per_rev=pulses, **own
-            )
-            files = _save_tables(of_set.tables(), tables)
-            if figures is not None:
-                files += _save_figures({"planetary": of_set.plot()}, figures)
-            _hand_over(of_set.to_markdown(), out, files)
-            return
-        report = analyse_signal(
-            signal,
-            speed=known,
-            speed_channel=speed_channel,
-            tacho=tacho,
-            pulses_per_rev=pulses,
-            wheel=wheel,
-            harmonics=harmonics,
-            progress=lambda f, s: move(0.3 + 0.7 * f, s),
-        )
-        found = report.tables()
-        text = report.to_markdown()
-        if bearing or train is not None:
-            from gearmbs.signals import diagnose_bearing, shaft_phase
-
-            asked = bearings_asked(bearing or [], shaft, train)
-            turns = known if isinstance(known, float) else report.speed
-            if tacho is not None or speed_channel is not None or not isinstance(known, float | None):
-                asked["phase"] = shaft_phase(
-                    signal, known, tacho=tacho, pulses_per_rev=pulses, speed_channel=speed_channel
-                )
-            asked["speed"] = asked.get("speed") if turns is None else turns
-            one = signal.sel(channel=report.levels["channel"].values)
-            bearings = diagnose_bearing(one, band=None if band is None else pair_of(band), **asked)
-            found |= bearings.tables()
-            text = f"{bearings.to_markdown()}\n\n{text}"
+            done = _of_set(signal, shaft, planetary, planets, member)
+        else:
+            done = _of_record(signal, shaft, wheel, harmonics, lambda f, s: move(0.3 + 0.7 * f, s))
+        if not done.of_set and (bearing or train is not None):
+            done = _with_bearings(done, bearings_asked(bearing or [], shaft_texts, train), band)
         try:
-            files = _save_tables(found, tables)
+            files = save_tables(done.tables, tables)
             if figures is not None:
-                from gearmbs.view import analysis_figures
-
-                files += _save_figures(analysis_figures(report, signal), figures)
+                files += save_figures(done.draw(), figures)
         except OSError:
-            typer.echo(text)
+            typer.echo(done.text)
             raise
-    _hand_over(text, out, files)
+    hand_over(done.text, out, files)
+
+
+@dataclass(frozen=True)
+class Analysed:
+    """What a record said: a report in words, its tables, and its figures, drawn when they are asked for."""
+
+    signal: Any
+    shaft: dict[str, Any]
+    report: Any
+    text: str
+    tables: dict[str, Any]
+    draw: Callable[[], dict[str, Any]]
+    of_set: bool = False
+
+
+def _of_record(
+    signal: Any, shaft: dict[str, Any], wheel: int, harmonics: int, progress: Callable[[float, str], None]
+) -> Analysed:
+    """Analyse a record of gears or of any machine."""
+    from gearmbs.signals import analyse as analyse_signal
+
+    report = analyse_signal(signal, wheel=wheel, harmonics=harmonics, progress=progress, **shaft)
+
+    def draw() -> dict[str, Any]:
+        from gearmbs.view import analysis_figures
+
+        return analysis_figures(report, signal, **shaft)
+
+    return Analysed(signal, shaft, report, report.to_markdown(), report.tables(), draw)
+
+
+def _of_set(signal: Any, shaft: dict[str, Any], teeth: str | None, planets: int, member: str) -> Analysed:
+    """Analyse the record of a planetary set, given by its teeth or known to the record."""
+    from gearmbs.signals import analyse as analyse_signal
+
+    own: dict[str, Any] = {"planetary": None}
+    if teeth is not None:
+        own = {"planetary": tooth_counts(teeth), "planets": planets, "member": member}
+    report = analyse_signal(signal, **shaft, **own)
+    draw = lambda: {"planetary": report.plot()}  # noqa: E731
+    return Analysed(signal, shaft, report, report.to_markdown(), report.tables(), draw, True)
+
+
+def _with_bearings(done: Analysed, asked: dict[str, Any], band: str | None) -> Analysed:
+    """Put the diagnosis of bearings before the report of a record."""
+    from gearmbs.signals import diagnose_bearing, shaft_phase
+
+    known = done.shaft["speed"]
+    turns = known if isinstance(known, float) else done.report.speed
+    varies = done.shaft["tacho"] is not None or done.shaft["speed_channel"] is not None
+    if varies or not isinstance(known, float | None):
+        asked["phase"] = shaft_phase(done.signal, **done.shaft)
+    asked["speed"] = asked.get("speed") if turns is None else turns
+    one = done.signal.sel(channel=done.report.levels["channel"].values)
+    bearings = diagnose_bearing(one, band=None if band is None else pair_of(band), **asked)
+    return replace(done, text=f"{bearings.to_markdown()}\n\n{done.text}", tables=done.tables | bearings.tables())
 
 
 def trend(
@@ -224,103 +258,9 @@ def compare(
             wheel=wheel,
             progress=move,
         )
-        files = _save_tables(report.tables(), tables)
+        files = save_tables(report.tables(), tables)
         if figures is not None:
             from gearmbs.view import comparison_figures
 
-            files += _save_figures(comparison_figures(report), figures)
-    _hand_over(report.to_markdown(), out, files)
-
-
-def bearings_asked(texts: list[str], shafts: list[str] | None, train: Path | None) -> dict[str, Any]:
-    """Return bearings, ratios of other shafts and, of a drivetrain, the speed, as `diagnose_bearing` takes them."""
-    asked: dict[str, Any] = {"bearing": {}, "shafts": None}
-    if train is not None:
-        from gearmbs.drivetrain.description import read_description
-
-        asked = read_description(train).train.kinematics.for_bearings()
-    asked["bearing"] = {**asked["bearing"], **bearing_list(texts)}
-    if shafts is not None:
-        asked["shafts"] = [*(asked["shafts"] or ()), *shaft_ratios(shafts)]
-    return asked
-
-
-def bearing_list(texts: list[str]) -> dict[str, tuple[str, float]]:
-    """Return bearings and the ratios of their shafts, given as "6205" or "6205@0.345"."""
-    found: dict[str, tuple[str, float]] = {}
-    for text in texts:
-        name, _, ratio = text.partition("@")
-        try:
-            value = float(ratio) if ratio else 1.0
-        except ValueError:
-            raise ValueError(f"--bearing {text!r}: {ratio!r} is no number; write for example 6205@0.345") from None
-        key = name.strip() if name.strip() not in found else text
-        found[key] = (name.strip(), value)
-    return found
-
-
-def shaft_ratios(texts: list[str]) -> list[float]:
-    """Return the ratios of other shafts, none for the word "none"."""
-    try:
-        return [] if [text.strip().lower() for text in texts] == ["none"] else [float(text) for text in texts]
-    except ValueError:
-        raise ValueError(f"--shaft {' '.join(texts)!r}: give ratios such as 0.345, or none") from None
-
-
-def pair_of(text: str) -> tuple[float, float]:
-    """Return a band in Hz given as "1000, 5000" or "1 kHz, 5 kHz"."""
-    from gearmbs.units import to_si
-
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) != 2:
-        raise ValueError(f"--band {text!r}: give two frequencies such as '1 kHz, 5 kHz'")
-    low, high = (
-        to_si(p if any(c.isalpha() for c in p.replace("e", "")) else f"{p} Hz", "frequency", "--band") for p in parts
-    )
-    return low, high
-
-
-def tooth_counts(text: str) -> tuple[int, ...]:
-    """Return the counts of a text such as "32" or "32,80"."""
-    try:
-        return tuple(int(part) for part in text.split(","))
-    except ValueError:
-        raise ValueError(f"--teeth is {text!r}; give a count, or both with a comma, for instance 32,80") from None
-
-
-def _save_tables(tables: dict[str, Any], folder: Path | None) -> list[Path]:
-    """Write each table as CSV into the folder, if one is given."""
-    from gearmbs.view.files import write_whole
-
-    written = []
-    for name, table in tables.items() if folder is not None else ():
-        assert folder is not None
-        path = folder / f"{name}.csv"
-        write_whole(path, table.to_csv(index=False))
-        written.append(path)
-    return written
-
-
-def _save_figures(figures: dict[str, Any], folder: Path) -> list[Path]:
-    """Write each figure as PNG and SVG into the folder."""
-    from gearmbs.view import save_figure
-
-    return [path for name, figure in figures.items() for path in save_figure(figure, folder / name.replace(" ", "_"))]
-
-
-def _hand_over(report: str, out: Path | None, files: list[Path]) -> None:
-    """Print a report or write it, and name the files written; print it, too, where it cannot be written."""
-    if out is None:
-        typer.echo(report)
-    else:
-        from gearmbs.view.files import write_whole
-
-        with guarded():
-            try:
-                write_whole(out, report)
-            except OSError:
-                typer.echo(report)
-                raise
-        files = [out, *files]
-    if files:
-        typer.echo("\n".join(f"wrote {path}" for path in files), err=out is None)
+            files += save_figures(comparison_figures(report), figures)
+    hand_over(report.to_markdown(), out, files)

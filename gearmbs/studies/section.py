@@ -99,13 +99,16 @@ class Section(BaseModel, metaclass=_OneError):
         Raises
         ------
         CaseError
-            Always for fields, which do not change.
+            For fields, which do not change, and for names that are none.
         """
-        if name in type(self).model_fields:
+        fields = type(self).model_fields
+        if name in fields:
             raise CaseError(
                 f"{self.section or 'case'}.{name}: a case does not change once it is made; "
                 "case.changed(...) makes another one"
             )
+        if not name.startswith("_"):
+            raise CaseError(f"{self.section or 'case'}.{name}: {_unknown((name,), type(self))}")
         super().__setattr__(name, value)
 
     @model_validator(mode="wrap")
@@ -172,35 +175,75 @@ def _remark(field: str, value: Any, measure: Measure) -> None:
         )
 
 
+WORDS = {
+    **dict.fromkeys(("int_type", "int_from_float", "int_parsing"), "give a whole number"),
+    **dict.fromkeys(("float_type", "float_parsing"), "give a number"),
+    **dict.fromkeys(("bool_type", "bool_parsing"), "give true or false"),
+    **dict.fromkeys(("tuple_type", "list_type"), "give a list"),
+    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type", "dataclass_type"), "give a table of keys"),
+    "string_type": "give a text",
+    "finite_number": "give a finite number",
+    "missing": "is missing",
+    "literal_error": "choose {expected}",
+    "enum": "choose {expected}",
+    "greater_than": "give more than {gt}",
+    "greater_than_equal": "give {ge} or more",
+    "less_than": "give less than {lt}",
+    "less_than_equal": "give {le} or less",
+    "too_short": "give {min_length} or more values",
+    "too_long": "give {max_length} values at most",
+}
+"""What is said of kinds of faults; all others are told in the words of our own checks."""
+
+OWN = ("value_error", "assertion_error")
+WAYS = ("function-", "tuple[", "float", "constrained", "is-instance", "union[")
+"""How ways to read one value begin in the place of a fault; they name no field."""
+
+
 def explained(error: ValidationError, kind: Any, source: str) -> str:
     """Return what is wrong, each fault in a line of its own that begins with ``source``."""
-    items: dict[Any, Any] = {}
+    found: dict[tuple[str, str], list[Any]] = {}
     for item in error.errors(include_url=False):
-        loc = item["loc"]
-        # one value given for both wheels is one fault
-        of_both = (loc[:-1], item["type"], repr(item["input"])) if loc and isinstance(loc[-1], int) else len(items)
-        items[of_both] = {**item, "loc": loc[:-1]} if of_both in items else item
-    return "\n".join(_line(item, kind, source) for item in items.values())
+        # one value given for both wheels is one fault, and so is one that can be read in none of several ways
+        place = [part for part in item["loc"] if not str(part).startswith(WAYS)]
+        both = bool(place) and isinstance(place[-1], int)
+        wide = ".".join(map(str, place[:-1] if both else place))
+        found.setdefault((wide, repr(item["input"])), []).append({**item, "loc": tuple(place)})
+    lines = []
+    for items in found.values():
+        if len({item["loc"] for item in items}) > 1:
+            items = [{**item, "loc": item["loc"][:-1]} for item in items]
+        lines.append(_line(items, kind, source))
+    return "\n".join(lines)
 
 
-def _line(item: Any, kind: Any, source: str) -> str:
+def _line(items: list[Any], kind: Any, source: str) -> str:
+    """Return what is wrong with one value, which may be read in several ways."""
+    item = items[0]
     loc = item["loc"]
-    parts = [str(part) for part in loc if not str(part).startswith(("function-", "tuple[", "float", "constrained"))]
+    parts = [str(part) for part in loc]
     field = re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", ".".join([*([kind.section] if kind.section else []), *parts]))
-    message = item["msg"].removeprefix("Value error, ")
-    if item["type"] in ("int_type", "int_from_float", "int_parsing"):
-        message = "give a whole number"
     if item["type"] == "extra_forbidden":
         return f"{source}: {field}: {_unknown(loc, kind)}"
     if item["type"] in ("model_type", "model_attributes_type", "dataclass_type"):
         return f"{source}: {field} = {item['input']!r}: give its keys, {', '.join(_owner(loc, kind).model_fields)}"
+    message = " or ".join(dict.fromkeys(_said(one) for one in items)).replace(" or give ", " or ")
     if message.startswith("["):
         # one of several, named by its place
         return f"{source}: {field}{message}"
     # what is wrong with a section as a whole begins with the name of the field
-    if isinstance(item["input"], (dict, BaseModel)):
+    if isinstance(item["input"], (dict, BaseModel)) and item["type"] in OWN:
         return f"{source}: {field}.{message}" if field else f"{source}: {message}"
+    if item["type"] == "missing":
+        return f"{source}: {field} {message}"
     return f"{source}: {field} = {item['input']!r}: {message}"
+
+
+def _said(item: Any) -> str:
+    """Return what is wrong in our words."""
+    if item["type"] in OWN:
+        return str(item["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, ")
+    return WORDS.get(item["type"], "cannot be read").format(**item.get("ctx", {}))
 
 
 def _owner(loc: tuple, kind: Any) -> Any:

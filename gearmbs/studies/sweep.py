@@ -171,6 +171,13 @@ def sweep(
     >>> study = sweep(Case(), "operation.speed", speeds, folder="speeds")  # doctest: +SKIP
     >>> study.plot()  # doctest: +SKIP
     """
+    cases = cases_of_sweep(case, field, values)
+    results = run_cases(cases, workers=workers, progress=progress, errors=errors, folder=folder)
+    return Sweep(case, field, cases, results)
+
+
+def cases_of_sweep(case: Case, field: str, values: Sequence[Any]) -> list[Case]:
+    """Return the cases of `sweep`; CaseError if there is no such setting, or a value is impossible."""
     section, _, name = field.partition(".")
     _check_field(case, field)
     if isinstance(values, str) or not len(values):
@@ -187,8 +194,24 @@ def sweep(
     if case.solver.signal_rate is None and case.solver.output_rate is None:
         cases = [c.changed(solver=rates) for c in cases]
     cases = [c.changed(name=f"{case.name}, {name} {readable(getattr(c, section), name)}") for c in cases]
-    results = run_cases(cases, workers=workers, progress=progress, errors=errors, folder=folder)
-    return Sweep(case, field, cases, results)
+    return cases
+
+
+def between(ends: Sequence[str], count: int, case: Case, field: str) -> list[Any]:
+    """Return values evenly from the first to the second of two texts, in SI."""
+    if len(ends) != 2 or count < 2:
+        raise CaseError(f"values: {', '.join(ends)} with a count of {count}; give two values and a count from 2 up")
+    _check_field(case, field)
+    low, high = (_plain(one, field) for one in cases_of_sweep(case, field, ends))
+    return list(np.linspace(low, high, count))
+
+
+def _plain(case: Case, field: str) -> float:
+    section, _, name = field.partition(".")
+    value = getattr(getattr(case, section), name)
+    if not isinstance(value, (int, float)):
+        raise CaseError(f"{field} is {value!r}, no number: give its values one by one, without a count")
+    return float(value)
 
 
 def _is_record(result: Any) -> bool:

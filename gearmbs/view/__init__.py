@@ -12,8 +12,9 @@ from gearmbs._lazy import late
 if TYPE_CHECKING:
     from gearmbs.view.animation import MeshAnimation, mesh_animation
     from gearmbs.view.bars import comparison_bars, gmf_bars
+    from gearmbs.view.campbell_figure import campbell_plot
     from gearmbs.view.changing_speed import (
-        campbell_plot,
+        changing_speed_figures,
         order_map_plot,
         order_track_plot,
         spectrogram_plot,
@@ -65,6 +66,7 @@ __all__ = [
     "analysis_figures",
     "average_plot",
     "campbell_plot",
+    "changing_speed_figures",
     "comparison_bars",
     "comparison_figures",
     "contact_pattern_plot",
@@ -130,7 +132,8 @@ late(
         "Scene": ".scene",
         "analysis_figures": ".reports",
         "average_plot": ".revolution",
-        "campbell_plot": ".changing_speed",
+        "campbell_plot": ".campbell_figure",
+        "changing_speed_figures": ".changing_speed",
         "comparison_bars": ".bars",
         "comparison_figures": ".reports",
         "contact_pattern_plot": ".curves",

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from gearmbs.progress import waiting
-from gearmbs.signals import AnalysisReport, ComparisonReport, VibrationReport, spectrum
+from gearmbs.signals import AnalysisReport, ComparisonReport, VibrationReport, shaft_phase, spectrum
 from gearmbs.view.bars import comparison_bars
+from gearmbs.view.changing_speed import changing_speed_figures
 from gearmbs.view.figure_style import COLOURS, label, legend_below, look, new_figure
 from gearmbs.view.revolution import average_plot
 from gearmbs.view.signals import spectrum_plot
@@ -21,7 +23,9 @@ SEGMENT = 2.0
 
 
 @waiting("drawing figures")
-def analysis_figures(report: AnalysisReport | VibrationReport, signal: xr.DataArray | None = None) -> dict[str, Figure]:
+def analysis_figures(
+    report: AnalysisReport | VibrationReport, signal: xr.DataArray | None = None, **shaft: Any
+) -> dict[str, Figure]:
     """Return the figures of an analysed record.
 
     Parameters
@@ -31,12 +35,16 @@ def analysis_figures(report: AnalysisReport | VibrationReport, signal: xr.DataAr
     signal : xarray.DataArray, optional
         The record it was made of, dimensions (time, channel); channels that the report left out are left out. Not
         needed for a report without teeth.
+    **shaft
+        How the speed is known if it changes and the signal does not say it: ``speed``, ``phase``, ``tacho`` or
+        ``speed_channel``, as for `gearmbs.signals.order_track`.
 
     Returns
     -------
     dict of str to Figure
         "spectrum" with the mesh lines and their first sidebands, and "average" over one revolution if there is one; of
-        a report without teeth "spectrum" and, if there is one, "envelope".
+        a report without teeth "spectrum" and, if there is one, "envelope". Where the speed changes, and the record is
+        given, instead of the spectrum those of `gearmbs.view.changing_speed_figures`.
 
     Raises
     ------
@@ -44,11 +52,20 @@ def analysis_figures(report: AnalysisReport | VibrationReport, signal: xr.DataAr
         If the signal is needed and not given.
     """
     if isinstance(report, VibrationReport):
-        return _vibration_figures(report)
+        figures = _vibration_figures(report)
+        if report.speed_range is not None and signal is not None:
+            kept = signal.sel(channel=report.levels["channel"].values)
+            changing = changing_speed_figures(kept, title=report.source, phase=shaft_phase(signal, **shaft))
+            figures = changing | {name: figures[name] for name in figures if name != "spectrum"}
+        return figures
     if signal is None:
         raise ValueError("signal: the figures of a report with teeth need the record it was made of")
-    shaft = report.speed / (2.0 * math.pi)
+    turns = report.speed / (2.0 * math.pi)
     kept = signal.sel(channel=report.harmonics["channel"].values)
+    if report.speed_range is not None:
+        meshes = [float(h) * report.gmf / turns for h in report.harmonics["harmonic"].values]
+        figures = changing_speed_figures(kept, orders=meshes, title=report.source, phase=shaft_phase(signal, **shaft))
+        return figures if report.average is None else figures | {"average": _average(report)}
     lines = spectrum(kept, segment=SEGMENT)
     count = report.harmonics.sizes["harmonic"]
     figures = {
@@ -56,7 +73,7 @@ def analysis_figures(report: AnalysisReport | VibrationReport, signal: xr.DataAr
             lines,
             gmf=report.gmf,
             harmonics=count,
-            sideband=shaft,
+            sideband=turns,
             maximum=min((count + 0.6) * report.gmf, float(lines["frequency"][-1])),
             title=f"{report.source}: GMF {report.gmf:.2f} Hz",
         )

@@ -273,3 +273,31 @@ def test_speed_and_torque_as_curves(tmp_path):
     assert case.pair().torque == 100.0
     assert make_case(json.loads(case.model_dump_json())) == case
     assert case.changed(operation={"speed": [[0, 0], [3, "3000 rpm"]]}).operation.duration == 3.0
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ({"name": 3}, "case: name = 3: give a text"),
+        ({"solver": {"integrator": "X"}}, "solver.integrator = 'X': choose 'WSTIFF', 'GSTIFF' or 'IDA'"),
+        ({"solver": {"tolerance": "abc"}}, "solver.tolerance = 'abc': give a number"),
+        ({"solver": {"lump": "maybe"}}, "solver.lump = 'maybe': give true or false"),
+        ({"fault": {"plane": "up"}}, "fault.plane = 'up': choose 'skew' or 'inclination'"),
+        ({"operation": {"speed": None}}, "operation.speed = None: give a number or a list"),
+        ({"gears": {"teeth": {}}}, "gears.teeth = {}: give a whole number"),
+        ({"gears": {"teeth": 20.5}}, "give a whole number"),
+    ],
+)
+def test_faults_are_told_in_our_own_words_in_one_line(data, words):
+    with pytest.raises(CaseError) as found:
+        Case(**data)
+    assert words in str(found.value)
+    assert "\n" not in str(found.value)
+
+
+def test_names_that_are_no_fields_are_refused_like_keys():
+    case = Case()
+    with pytest.raises(CaseError, match=r"case\.bogus: unknown key; known ones are name"):
+        case.bogus = 3
+    with pytest.raises(CaseError, match=r"gears\.tooth: unknown key.*did you mean teeth"):
+        case.gears.tooth = 3

@@ -1,0 +1,112 @@
+"""What the commands on records share: options, readers of their texts, and how results are handed over."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from gearmbs._command import guarded
+
+Rate = Annotated[str | None, typer.Option(help='Sampling rate, Hz or "12.8 kHz", if the file does not name it.')]
+Speed = Annotated[
+    str | None,
+    typer.Option(help='Shaft speed, e.g. "1780 rpm", or a file with the speed over time; default: from the GMF line.'),
+]
+Gaps = Annotated[str | None, typer.Option(help='Missing samples: "refuse", "interpolate" or "longest" stretch.')]
+ReportFile = Annotated[Path | None, typer.Option("--out", "-o", help="Write the report here instead of printing it.")]
+
+
+def bearings_asked(texts: list[str], shafts: list[str] | None, train: Path | None) -> dict[str, Any]:
+    """Return bearings, ratios of other shafts and, of a drivetrain, the speed, as `diagnose_bearing` takes them."""
+    asked: dict[str, Any] = {"bearing": {}, "shafts": None}
+    if train is not None:
+        from gearmbs.drivetrain.description import read_description
+
+        asked = read_description(train).train.kinematics.for_bearings()
+    asked["bearing"] = {**asked["bearing"], **bearing_list(texts)}
+    if shafts is not None:
+        asked["shafts"] = [*(asked["shafts"] or ()), *shaft_ratios(shafts)]
+    return asked
+
+
+def bearing_list(texts: list[str]) -> dict[str, tuple[str, float]]:
+    """Return bearings and the ratios of their shafts, given as "6205" or "6205@0.345"."""
+    found: dict[str, tuple[str, float]] = {}
+    for text in texts:
+        name, _, ratio = text.partition("@")
+        try:
+            value = float(ratio) if ratio else 1.0
+        except ValueError:
+            raise ValueError(f"--bearing {text!r}: {ratio!r} is no number; write for example 6205@0.345") from None
+        key = name.strip() if name.strip() not in found else text
+        found[key] = (name.strip(), value)
+    return found
+
+
+def shaft_ratios(texts: list[str]) -> list[float]:
+    """Return the ratios of other shafts, none for the word "none"."""
+    try:
+        return [] if [text.strip().lower() for text in texts] == ["none"] else [float(text) for text in texts]
+    except ValueError:
+        raise ValueError(f"--shaft {' '.join(texts)!r}: give ratios such as 0.345, or none") from None
+
+
+def pair_of(text: str) -> tuple[float, float]:
+    """Return a band in Hz given as "1000, 5000" or "1 kHz, 5 kHz"."""
+    from gearmbs.units import to_si
+
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 2:
+        raise ValueError(f"--band {text!r}: give two frequencies such as '1 kHz, 5 kHz'")
+    low, high = (
+        to_si(p if any(c.isalpha() for c in p.replace("e", "")) else f"{p} Hz", "frequency", "--band") for p in parts
+    )
+    return low, high
+
+
+def tooth_counts(text: str) -> tuple[int, ...]:
+    """Return the counts of a text such as "32" or "32,80"."""
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise ValueError(f"--teeth is {text!r}; give a count, or both with a comma, for instance 32,80") from None
+
+
+def save_tables(tables: dict[str, Any], folder: Path | None) -> list[Path]:
+    """Write each table as CSV into the folder, if one is given."""
+    from gearmbs.view.files import write_whole
+
+    written = []
+    for name, table in tables.items() if folder is not None else ():
+        assert folder is not None
+        path = folder / f"{name}.csv"
+        write_whole(path, table.to_csv(index=False))
+        written.append(path)
+    return written
+
+
+def save_figures(figures: dict[str, Any], folder: Path) -> list[Path]:
+    """Write each figure as PNG and SVG into the folder."""
+    from gearmbs.view import save_figure
+
+    return [path for name, figure in figures.items() for path in save_figure(figure, folder / name.replace(" ", "_"))]
+
+
+def hand_over(report: str, out: Path | None, files: list[Path]) -> None:
+    """Print a report or write it, and name the files written; print it, too, where it cannot be written."""
+    if out is None:
+        typer.echo(report)
+    else:
+        from gearmbs.view.files import write_whole
+
+        with guarded():
+            try:
+                write_whole(out, report)
+            except OSError:
+                typer.echo(report)
+                raise
+        files = [out, *files]
+    if files:
+        typer.echo("\n".join(f"wrote {path}" for path in files), err=out is None)

@@ -1,0 +1,82 @@
+"""``gearmbs waterfall``: what changes with the speed of records, as figures."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from gearmbs._command import guarded, stage_bar
+from gearmbs.signals.command_parts import Gaps, Rate, hand_over, save_figures
+
+Orders = Annotated[str | None, typer.Option(help='Orders of the shaft to mark, e.g. "1,29,58".')]
+Maximum = Annotated[str | None, typer.Option(help='Highest frequency shown, e.g. "6 kHz".')]
+Folder = Annotated[Path, typer.Option("--out", "-o", help="Folder for the figures.")]
+
+
+def waterfall(
+    files: Annotated[list[Path], typer.Argument(help="One run-up or coast-down, or records of constant speed.")],
+    speed: Annotated[
+        list[str] | None,
+        typer.Option(help='Speed, e.g. "1500 rpm", or a file with it over time; repeat, one for each file.'),
+    ] = None,
+    speed_channel: Annotated[str | None, typer.Option(help="Channel that holds the speed.")] = None,
+    tacho: Annotated[str | None, typer.Option(help="Channel with the tacho pulses.")] = None,
+    pulses: Annotated[float, typer.Option(help="Tacho pulses a revolution.")] = 1.0,
+    channel: Annotated[str | None, typer.Option(help="Channel to draw; default: the first.")] = None,
+    orders: Orders = None,
+    steps: Annotated[int | None, typer.Option(help="Spectra over equal intervals of the speed of a run-up.")] = None,
+    style: Annotated[str, typer.Option(help="lines or map.")] = "lines",
+    maximum: Maximum = None,
+    rate: Rate = None,
+    units: Annotated[str | None, typer.Option(help='Units of the samples, e.g. "m/s^2".')] = None,
+    gaps: Gaps = None,
+    out: Folder = Path("waterfall"),
+) -> None:
+    """Draw spectra over speed; of a run-up spectrogram, order map and tracked orders, too."""
+    with guarded(), stage_bar(files[0].name) as move:
+        from gearmbs.signals import waterfall as spectra_over_speed
+        from gearmbs.signals.simulated import read_any
+        from gearmbs.signals.speed_file import parse_speed
+        from gearmbs.view import changing_speed_figures, waterfall_plot
+
+        helpers = [name for name in (tacho, speed_channel) if name]
+        chosen = None if channel is None else [channel, *helpers]
+        known = [parse_speed(text) for text in speed or []]
+        if known and len(known) != len(files):
+            raise ValueError(f"--speed is given {len(known)} times for {len(files)} files; give one for each")
+        signals = []
+        for k, file in enumerate(files):
+            signals.append(read_any(file, rate=rate, units=units, channels=chosen, gaps=gaps))
+            move(0.5 * (k + 1) / len(files), "reading")
+        marked = numbers(orders, "--orders")
+        shown: dict[str, Any] = {"style": style, "maximum": maximum, "channel": channel}
+        if len(signals) > 1:
+            data = spectra_over_speed(signals, known or None, maximum=maximum)
+            figures = {"waterfall": waterfall_plot(data, orders=marked, **shown)}
+        else:
+            shaft: dict[str, Any] = {"speed": known[0]} if known else {}
+            shaft |= {"tacho": tacho, "pulses_per_rev": pulses} if tacho else {}
+            shaft |= {"speed_channel": speed_channel} if speed_channel else {}
+            # the speed itself is no vibration
+            kept = signals[0].drop_sel(channel=[n for n in helpers if n in signals[0]["channel"].values])
+            if helpers:
+                from gearmbs.signals import shaft_phase
+
+                shaft = {"phase": shaft_phase(signals[0], **shaft)}
+            data = spectra_over_speed(kept, steps=steps, maximum=maximum, **shaft)
+            figures = changing_speed_figures(kept, orders=marked or None, title=files[0].name, **shaft)
+            figures["waterfall"] = waterfall_plot(data, orders=marked, **shown)
+        files_written = save_figures(figures, out)
+    low, high = (float(data["speed"][k]) * 30.0 / math.pi for k in (0, -1))
+    hand_over(f"{data.sizes['speed']} spectra from {low:.4g} to {high:.4g} rpm", None, files_written)
+
+
+def numbers(text: str | None, option: str) -> list[float]:
+    """Return the numbers of a text such as "1,29,58", none of None."""
+    try:
+        return [] if text is None else [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ValueError(f"{option} is {text!r}; give numbers with commas, for instance 1,29,58") from None

@@ -1,0 +1,125 @@
+"""Commands for what changes with the speed: analyse of a run-up, waterfall, sweep and Campbell diagram."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import gearmbs as gm
+from gearmbs.cli import app
+from gearmbs.signals import analyse, write_signal
+from gearmbs.view import analysis_figures, changing_speed_figures
+from gearmbs.view.changing_speed import strongest_orders
+from tests.drivetrain.test_description import TEXT
+from tests.view.looking import assert_readable
+
+RATE = 6400.0
+TIME = np.arange(int(4 * RATE)) / RATE
+SPEED = 5.0 + 3.0 * TIME
+ANGLE = 2 * np.pi * np.cumsum(SPEED) / RATE
+NAMES = {"spectrogram", "order map", "waterfall", "orders"}
+
+
+@pytest.fixture(scope="module")
+def run_up():
+    """A mesh of 23 teeth and its second harmonic in noise, the speed in a channel of its own."""
+    values = 2.0 * np.cos(23 * ANGLE) + np.cos(46 * ANGLE) + 0.02 * np.random.default_rng(1).standard_normal(TIME.size)
+    return gm.make_signal({"housing": values, "n": 60.0 * SPEED}, RATE, units={"housing": "m/s^2", "n": "rpm"})
+
+
+def invoked(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.mark.parametrize("teeth", [None, 23])
+def test_a_run_up_is_drawn_over_time_speed_and_order(run_up, teeth):
+    report = analyse(run_up, teeth=teeth, speed_channel="n")
+    figures = analysis_figures(report, run_up, speed_channel="n")
+    assert set(figures) >= NAMES
+    assert "spectrum" not in figures
+    for name in NAMES:
+        assert_readable(figures[name])
+    assert [line.get_label() for line in figures["orders"].axes[0].lines][:2] == ["order 23", "order 46"]
+
+
+def test_strongest_orders_are_those_of_the_record(run_up):
+    kept = run_up.sel(channel=["housing"])
+    phase = gm.signals.shaft_phase(run_up, speed_channel="n")
+    found = strongest_orders(gm.order_map(kept, phase=phase), 2)
+    np.testing.assert_allclose(found, [23.0, 46.0], atol=0.1)
+    assert set(changing_speed_figures(kept, phase=phase)) == NAMES
+
+
+def test_analyse_and_waterfall_draw_a_run_up(run_up, tmp_path):
+    record = write_signal(run_up, tmp_path / "up.csv") or tmp_path / "up.csv"
+    result = invoked("analyse", record, "--speed-channel", "n", "--figures", tmp_path / "one")
+    assert result.exit_code == 0, result.output
+    wanted = {f"{name.replace(' ', '_')}.png" for name in NAMES}
+    assert wanted <= {path.name for path in (tmp_path / "one").iterdir()}
+    result = invoked("waterfall", record, "--speed-channel", "n", "--orders", "23,46", "--steps", "20",
+                     "--maximum", "1 kHz", "--out", tmp_path / "two")  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert "20 spectra from" in result.output
+    assert wanted <= {path.name for path in (tmp_path / "two").iterdir()}
+
+
+def test_waterfall_of_records_of_constant_speed(tmp_path):
+    files = []
+    for k, turns in enumerate((10.0, 20.0)):
+        signal = gm.make_signal(np.cos(2 * np.pi * 23 * turns * TIME), RATE, units="m/s^2", channels=["x"])
+        write_signal(signal, tmp_path / f"{k}.csv")
+        files.append(tmp_path / f"{k}.csv")
+    speeds = ("--speed", "600 rpm", "--speed", "1200 rpm")
+    result = invoked("waterfall", *files, *speeds, "--style", "map", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert "2 spectra from 600 to 1200 rpm" in result.output
+    assert [path.name for path in (tmp_path / "out").iterdir() if path.suffix == ".png"] == ["waterfall.png"]
+    result = invoked("waterfall", *files, "--speed", "600 rpm", "--out", tmp_path / "no")
+    assert result.exit_code == 1
+    assert "--speed is given 1 times for 2 files; give one for each" in result.output
+    assert "--orders is '1,x'; give numbers" in invoked("waterfall", files[0], "--orders", "1,x").output
+
+
+def test_sweep_writes_records_table_and_figure_and_is_taken_up(tmp_path):
+    case = tmp_path / "case.toml"
+    case.write_text('name = "one"\n[operation]\nduration = "0.1 s"\nrun_up = "0.02 s"\nsettling = "0 s"\n')
+    values = ("900 rpm", "1500 rpm", "--count", 2)
+    result = invoked("sweep", case, "operation.speed", *values, "--workers", 1, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    files = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert files == ["figure.png", "figure.svg", "one_speed 1500 rpm.nc", "one_speed 900 rpm.nc", "table.csv"]
+    stamp = (tmp_path / "out" / "one_speed 900 rpm.nc").stat().st_mtime_ns
+    record = gm.signals.simulated.read_any(tmp_path / "out" / "one_speed 900 rpm.nc")
+    assert record.attrs["speed"] == pytest.approx(30 * np.pi)
+    again = invoked("sweep", case, "operation.speed", "900 rpm", "--workers", 1, "--out", tmp_path / "out")
+    assert again.exit_code == 0, again.output
+    assert stamp <= (tmp_path / "out" / "one_speed 900 rpm.nc").stat().st_mtime_ns
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("operation.sped", "1 rpm"), "speed"),
+        (("operation.speed", "900 rpm", "15 mm"), "value 2 of operation.speed"),
+        (("operation.speed", "900 rpm", "--count", "3"), "give two values and a count from 2 up"),
+        (("solver.integrator", "WSTIFF", "GSTIFF", "--count", "3"), "give its values one by one"),
+    ],
+)
+def test_sweep_refuses_in_one_line(tmp_path, arguments, words):
+    case = tmp_path / "case.toml"
+    case.write_text('name = "one"\n')
+    result = invoked("sweep", case, *arguments, "--out", tmp_path / "out")
+    assert result.exit_code == 1
+    assert words in result.output
+    assert len(result.output.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_campbell_of_a_drivetrain(tmp_path):
+    train = tmp_path / "train.toml"
+    train.write_text(TEXT.partition("[housings.box]")[0])
+    speeds = ("--speeds", "3000 rpm", "--maximum", "3 kHz", "--harmonics", 1)
+    result = invoked("campbell", train, *speeds, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert "speed_rpm" in result.output
+    assert (tmp_path / "out" / "campbell.png").is_file()
+    assert "is in mm where" in invoked("campbell", train, "--speeds", "1 mm").output
