@@ -72,7 +72,7 @@ def campbell(
         limits = [to_si(text, "angular speed", "--speeds") for text in speeds or []]
         if len(limits) > 2:
             raise ValueError(f"--speeds is given {len(limits)} times; give the highest, or the lowest and the highest")
-        turned = np.linspace(0.0 if len(limits) == 1 else limits[0], limits[-1], 13) if limits else None
+        turned = np.linspace(0.0 if len(limits) == 1 else limits[0], limits[-1], 13).tolist() if limits else None
         move(0.1, "modes")
         diagram = train_campbell(read_description(train).train, turned, harmonics=harmonics, maximum=top)
         measured = None

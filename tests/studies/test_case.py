@@ -298,6 +298,6 @@ def test_faults_are_told_in_our_own_words_in_one_line(data, words):
 def test_names_that_are_no_fields_are_refused_like_keys():
     case = Case()
     with pytest.raises(CaseError, match=r"case\.bogus: unknown key; known ones are name"):
-        case.bogus = 3
+        setattr(case, "bogus", 3)  # noqa: B010
     with pytest.raises(CaseError, match=r"gears\.tooth: unknown key.*did you mean teeth"):
-        case.gears.tooth = 3
+        setattr(case.gears, "tooth", 3)  # noqa: B010
