@@ -59,6 +59,7 @@ class RollingBearing(ForceElement):
     stiffness : float, optional
         K of both contacts of an element in series, N/m^n, instead of Hertz's.
     defects : sequence of Defect
+        Or tables of a file, see `gearmbs.bearings.defect_tables.as_defects`.
 
     Raises
     ------

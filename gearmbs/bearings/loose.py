@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.bearings.clearance import ClearanceForce
+from gearmbs.bearings.defect_tables import as_defects
 from gearmbs.bearings.defects import INNER, OUTER, LooseFit
 from gearmbs.bearings.element import RollingBearing
 from gearmbs.bearings.errors import BearingError, require
@@ -61,8 +62,7 @@ def add_bearing(
     >>> sorted(m.bodies)
     ['A.outer ring', 'shaft']
     """
-    given = settings.pop("defects", ())
-    defects = list(given) if isinstance(given, (list, tuple)) else [given]
+    defects = as_defects(settings.pop("defects", ()))
     fits = {defect.part: defect for defect in defects if isinstance(defect, LooseFit)}
     rest = [defect for defect in defects if not isinstance(defect, LooseFit)]
     require(

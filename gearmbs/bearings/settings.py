@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from gearmbs.bearings.defect_tables import as_defects
 from gearmbs.bearings.defects import Defect, LooseFit
 from gearmbs.bearings.errors import BearingError, require
 from gearmbs.bearings.geometry import Bearing
@@ -63,11 +64,8 @@ class BearingSettings:
         if self.centrifugal:
             require(self.smooth == 0.0, "RollingBearing.smooth: not together with the centrifugal load; leave it 0")
             require(self.stiffness is None, "RollingBearing.stiffness: with centrifugal load each contact has its own")
-        self.defects = tuple(self.defects) if isinstance(self.defects, Sequence) else (self.defects,)
+        self.defects = as_defects(self.defects)
         for defect in self.defects:
-            require(
-                isinstance(defect, Defect), f"RollingBearing.defects holds {defect!r}; give defects of gearmbs.bearings"
-            )
             require(
                 not isinstance(defect, LooseFit),
                 "RollingBearing.defects holds a LooseFit: such a ring is a body; use gearmbs.bearings.add_bearing",

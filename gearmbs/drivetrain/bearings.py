@@ -239,7 +239,7 @@ class RollingContactBearing(Bearing):
     rolling : gearmbs.bearings.Bearing, str or mapping
     settings : mapping
         Keywords of `gearmbs.bearings.RollingBearing`: damping, preload, sense, defects, ... A `LooseFit` among the
-        defects makes the ring a body of its own.
+        defects makes the ring a body of its own; in files defects are tables with their ``kind``.
     """
 
     kind: ClassVar[str] = "rolling"
@@ -249,6 +249,13 @@ class RollingContactBearing(Bearing):
     def __post_init__(self) -> None:
         super().__post_init__()
         require(self.rolling is not None, f"{self.label}: rolling is missing; give a designation such as '6205'")
+        from gearmbs.bearings import LooseFit
+        from gearmbs.bearings.defect_tables import as_defects
+        from gearmbs.bearings.settings import BearingSettings
+
+        with told_of(f"{self.label}: settings"):
+            on_rings = [d for d in as_defects(self.settings.get("defects", ())) if not isinstance(d, LooseFit)]
+            BearingSettings(bearing=self.rolling, **{**self.settings, "defects": on_rings})
 
     def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:
         from gearmbs.bearings.loose import add_bearing

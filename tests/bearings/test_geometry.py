@@ -218,3 +218,20 @@ def test_fields_behind_a_designation():
         Bearing.from_designation("elements=7, element_diameter=13.49 mm")
     with pytest.raises(BearingError, match="elements is 'seven'"):
         Bearing.from_designation("6305, elements=seven, element_diameter=13 mm")
+
+
+def test_defects_may_be_tables():
+    from gearmbs.bearings import RollingBearing, Spall, Waviness
+    from gearmbs.mechanism import Mechanism
+
+    m = Mechanism("one")
+    tables = [{"kind": "spall", "part": "inner", "width": "1 mm"}, {"kind": "waviness", "order": 7}]
+    made = RollingBearing("a", m.ground.marker(), m.ground.marker(), Bearing.from_designation("6205"), defects=tables)
+    assert made.defects == (Spall(part="inner", width=1e-3), Waviness(order=7))
+    for wrong, told in (
+        ({"kind": "hole"}, "kind 'hole' is unknown; choose one of spall"),
+        ({"kind": "spall", "size": 1.0}, "spall: .*'size'"),
+        ("spall", "give defects of gearmbs.bearings, or tables"),
+    ):
+        with pytest.raises(BearingError, match=told):
+            RollingBearing("b", m.ground.marker(), m.ground.marker(), Bearing.from_designation("6205"), defects=wrong)

@@ -107,3 +107,23 @@ def test_mistakes_are_named_in_one_line(tmp_path, old, new, words):
 def test_a_file_that_is_not_there():
     with pytest.raises(DrivetrainError, match=r"nowhere\.toml: cannot be read"):
         read_description("nowhere.toml")
+
+
+def test_rolling_bearings_have_their_defects_in_the_file(tmp_path):
+    from gearmbs.bearings import Spall
+
+    rolling = """
+kind = "rolling"
+rolling = { designation = "6206", clearance = "10 um" }
+settings = { cage_slip = 0.004, defects = [{ kind = "spall", part = "outer", width = "1 mm" }] }
+shaft = "out"
+"""
+    path = tmp_path / "train.toml"
+    path.write_text(TEXT.replace("[drives.motor]", f"[bearings.c]{rolling}[drives.motor]"))
+    element = Drivetrain.from_file(path).build().elements["c"]
+    assert element.defects == (Spall(part="outer", width=1e-3),)
+    assert element.settings.cage_slip == 0.004
+    assert element.bearing.clearance == pytest.approx(1e-5)
+    path.write_text(path.read_text().replace('"spall"', '"hole"'))
+    with pytest.raises(DrivetrainError, match=r"bearing 'c': settings: .*kind 'hole' is unknown"):
+        Drivetrain.from_file(path)

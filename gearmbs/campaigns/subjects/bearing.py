@@ -58,7 +58,8 @@ class BearingSubject(TablesSubject):
 
     def made(self, tables: dict[str, Any]) -> BearingCase:
         """Return the bearing and all about it; the rig is built once, which checks it."""
-        from gearmbs.bearings import DEFECTS, Bearing
+        from gearmbs.bearings import Bearing
+        from gearmbs.bearings.defect_tables import as_defects
 
         known = ("name", "bearing", "rig", "defects", "run")
         for key in tables:
@@ -69,18 +70,11 @@ class BearingSubject(TablesSubject):
             if key not in RUN:
                 raise ValueError(f"run.{key}: unknown; known ones are {', '.join(RUN)}")
             run[key] = float(to_si(value, UNITS[key], f"run.{key}"))
-        defects = []
-        for one in tables.get("defects", ()):
-            given = dict(one)
-            label = str(given.pop("kind", ""))
-            if label not in DEFECTS:
-                raise ValueError(f"defects: kind {label!r} is unknown; choose one of {', '.join(DEFECTS)}")
-            try:
-                defects.append(DEFECTS[label](**given))
-            except TypeError as error:
-                raise ValueError(f"defects: {label}: {error}") from None
         case = BearingCase(
-            Bearing.from_designation(str(tables.get("bearing", ""))), tuple(defects), dict(tables.get("rig", {})), run
+            Bearing.from_designation(str(tables.get("bearing", ""))),
+            as_defects(tables.get("defects", ())),
+            dict(tables.get("rig", {})),
+            run,
         )
         case.mechanism()
         return case
