@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from gearmbs.adams.results.result import AdamsResult
     from gearmbs.adams.run.deck_plant import linear_plant
     from gearmbs.adams.run.runner import run_deck
+    from gearmbs.adams.support import support_table
     from gearmbs.adams.write.deck_writer import write_deck
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "read_deck",
     "read_script",
     "run_deck",
+    "support_table",
     "write_deck",
 ]
 
@@ -48,6 +50,7 @@ late(
         "read_deck": ".parse.reader",
         "read_script": ".parse.commands",
         "run_deck": ".run.runner",
+        "support_table": ".support",
         "write_deck": ".write.deck_writer",
     },
 )

@@ -156,7 +156,7 @@ def test_a_list_of_variables_is_read_by_place():
         ("CURVE/1, CLOSED, MATRIX=1\nPTCV/1, I=30, CURVE=1", "RM is missing"),
         ("CURVE/1, CLOSED, MATRIX=1\nPTCV/1, I=30, CURVE=1, RM=31", "both markers are on body"),
         ("MATRIX/2, FULL=RORDER, ROWS=2, COLUMNS=2, VALUES=1,2,3", "need as many values, got 3"),
-        ("CURVE/1, CLOSED, FUNCTION=USER(1)\nPTCV/1, I=30, CURVE=1, RM=20", "FUNCTION is not supported"),
+        ("CURVE/1, CLOSED, FUNCTION=USER(1)\nPTCV/1, I=30, CURVE=1, RM=20", "its routine CURSUB is missing"),
     ],
 )
 def test_mistakes_are_named(touch, message):

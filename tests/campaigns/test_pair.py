@@ -89,3 +89,28 @@ def test_a_deck_with_parameters(tmp_path):
     np.testing.assert_allclose(campaign.table["request_1.F2.last"], last, atol=2e-3)
     with pytest.raises(CampaignError, match="the places mass"):
         DeckSubject(deck, {}, end=1.0)
+
+
+def test_variables_of_a_deck_as_factors(tmp_path):
+    """A constant VARIABLE, by its id and by its name, and a place in the script."""
+    deck = DECK.replace("I=2, J=4", "I=5, J=4").replace("${mass}", "2").replace(
+        "SPRINGDAMPER/1, TRANSLATIONAL, I=2, J=1, K=100, LENGTH=0.5",
+        "VARIABLE/7, FUNCTION=100\n! adams_view_name='rest'\nVARIABLE/8, FUNCTION=0.5\nVARIABLE/9, FUNCTION=2*TIME\n"
+        "SFORCE/1, TRANSLATIONAL, I=2, J=1, FUNCTION=-VARVAL(7)*(DM(2,1)-VARVAL(8))",
+    )  # fmt: skip
+    script = "a\nb\nsimulate/dynamics, end=${end}, steps=200\n"
+    subject = DeckSubject(deck, {"VARIABLE/7": 100.0, "rest": 0.55, "end": 1.0}, script=script)
+    factors = [Factor("VARIABLE/7", 50.0, 200.0), Factor("rest", 0.55, 0.6), Factor("end", 0.5, 1.0)]
+    campaign = Campaign(tmp_path / "c", make_plan(subject, factors, "grid", options={"levels": 2}, unit=2))
+    assert campaign.run(workers=0).failed == 0, campaign.failed().message.tolist()
+    table = campaign.table
+    stiffness, rest, end = (table[name].to_numpy() for name in ("VARIABLE/7", "rest", "end"))
+    exact = rest + (1.0 - rest) * np.cos(np.sqrt(stiffness / 2.0) * end)
+    np.testing.assert_allclose(table["request_1.F2.last"], exact, atol=1e-6)
+    again = DeckSubject.from_settings(subject.settings())
+    assert again.settings() == subject.settings()
+    for name in ("VARIABLE/9", "VARIABLE/10", "other"):
+        with pytest.raises(CampaignError, match="VARIABLEs whose FUNCTION is a number"):
+            DeckSubject(deck, {name: 1.0}, end=1.0)
+    with pytest.raises(CampaignError, match="either the end of the analysis or a script"):
+        DeckSubject(deck, {"rest": 1.0})

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.adams.builders.accelerations import FUNCTIONS, Accelerations
-from gearmbs.adams.builders.control import linear_system
+from gearmbs.adams.builders.control import state_system
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.builders.data_calls import translated
 from gearmbs.adams.builders.frames import inertia_about_cm, marker_orientation, part_orientation
@@ -24,6 +24,7 @@ from gearmbs.adams.parse.check import measured_markers
 from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.readers import read_variables
+from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.curves import add_curve
@@ -292,21 +293,32 @@ class Builder:
             if spline.data_file is None:
                 m.splines[spline.id] = spline_data(spline)
         for curve in self.deck.of(st.CurveStatement).values():
-            if curve.matrix in self.deck.of(st.Matrix):
-                self.attempt(curve, lambda c: add_curve(m, f"CURVE_{c.id}", curve_points(self.deck, c.id)))
+            if curve.sampled or curve.matrix in self.deck.of(st.Matrix):
+                self.attempt(curve, self.add_curve)
         for diff in self.active(st.Diff):
             if diff.implicit:
                 self.unsupported(diff, "IMPLICIT")
                 continue
             text = f"({self.text(diff.function)})/{self.units.time!r}"
             m.states[diff.id] = State(f"DIFF_{diff.id}", text, diff.ic[0])
-        for system in (*self.active(st.Lse), *self.active(st.Tfsiso)):
-            self.attempt(system, self.add_linear_system)
+        for system in (*self.active(st.Lse), *self.active(st.Tfsiso), *self.active(st.Gse)):
+            self.attempt(system, self.add_state_system)
         for sensor in self.active(st.Sensor):
             m.algebraic_state(sensor_state(sensor.id), self.text(sensor.function or "0"))
 
-    def add_linear_system(self, statement: st.Lse | st.Tfsiso) -> None:
-        """Add the states of an LSE or TFSISO."""
-        system = linear_system(self.deck, statement)
+    def add_curve(self, curve: st.CurveStatement) -> None:
+        """Add a curve by its length, and one by a routine by its own parameter, too."""
+        add_curve(self.mechanism, f"CURVE_{curve.id}", curve_points(self.deck, curve.id))
+        if curve.sampled:
+            alpha, *rows = np.array(curve.sampled).T
+            for axis, values in zip("XYZ", rows):
+                self.mechanism.splines[f"CURVE_{curve.id}.BY.{axis}"] = SplineData(tuple(alpha), (tuple(values),))
+
+    def add_state_system(self, statement: st.Lse | st.Tfsiso | st.Gse) -> None:
+        """Add the states of an LSE, TFSISO or GSE."""
+        if isinstance(statement, st.Gse) and statement.implicit:
+            self.unsupported(statement, "IMPLICIT")
+            return
+        system = state_system(self.deck, statement)
         for name, rate, start in zip(system.names, system.rates(), system.start):
             self.mechanism.states[name] = State(name, f"({self.text(rate)})/{self.units.time!r}", float(start))

@@ -9,6 +9,7 @@ import numpy as np
 
 from gearmbs.adams.builders.builder import Builder
 from gearmbs.adams.parse import statements as st
+from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.mechanism.functions import expression
 from gearmbs.mechanism.joints import JOINTS, Joint, Prescribed
 from gearmbs.mechanism.parts import Marker
@@ -101,6 +102,9 @@ def add_coupler(b: Builder, s: st.Coupler) -> None:
     if s.function is not None:
         return
     joints = _coupled(b, s, s.joints)
+    if s.tables:
+        _add_user_coupler(b, s, joints)
+        return
     scales = s.scales if len(s.scales) == len(joints) else (1.0, *s.scales)
     types = s.type or tuple("TRANSLATIONAL" if j.kind == "translational" else "ROTATIONAL" for j in joints)
     terms = []
@@ -112,6 +116,28 @@ def add_coupler(b: Builder, s: st.Coupler) -> None:
             raise ValueError(f"TYPE is {kind}, but {joint.name} is {joint.kind}")
         terms.append((joint, scale / b.units.length if kind == "TRANSLATIONAL" else scale))
     b.mechanism.coupler(b.model.names["coupler", s.id], terms)
+
+
+def coupled_text(joint: Joint) -> str:
+    """Return the displacement of a joint as an expression of the deck."""
+    i, j = joint.i.number, joint.j.number
+    return f"DZ({i},{j},{j})" if joint.kind == "translational" else f"AZ({i},{j})"
+
+
+def _add_user_coupler(b: Builder, s: st.Coupler, joints: list[Joint]) -> None:
+    """COUPLER by a routine: the terms it was divided into add up to zero."""
+    terms = []
+    for k, (joint, table) in enumerate(zip(joints, s.tables), 1):
+        shown = coupled_text(joint)
+        if len(table) == 1:
+            terms.append(f"({table[0][0]!r})*{shown}")
+            continue
+        name = f"COUPLER_{s.id}.Q{k}"
+        b.mechanism.splines[name] = SplineData(table[0], (table[1],))
+        terms.append(f'CUBSPL({shown}, 0, "{name}")')
+        b.model.ranges.append((s, shown, table[0][0], table[0][-1]))
+    text = " + ".join(terms)
+    b.mechanism.general_constraint(b.model.names["coupler", s.id], f"{text} + ({s.constant!r})")
 
 
 def add_gear(b: Builder, s: st.Gear) -> None:

@@ -1,4 +1,4 @@
-"""Linear systems of a deck as states and expressions: LSE and TFSISO."""
+"""Systems of a control loop as states and expressions: LSE and TFSISO here, GSE by state equations."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gearmbs.adams.builders.curve_data import matrix_values
+from gearmbs.adams.builders.state_equations import StateEquations, of_array, state_equations
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
 
@@ -55,16 +56,29 @@ class LinearSystem(NamedTuple):
         return " + ".join(f"({t})" for t in terms) or "0"
 
 
-def linear_systems(deck: Deck) -> Iterator[tuple[st.Statement, LinearSystem]]:
-    """Yield the LSE and TFSISO statements of a deck that hold together, each with what it stands for."""
-    for statement in (*deck.of(st.Lse).values(), *deck.of(st.Tfsiso).values()):
-        if isinstance(statement, (st.Lse, st.Tfsiso)):
-            try:
-                system = linear_system(deck, statement)
-            except ValueError:
-                # whoever adds it to a mechanism says so
-                continue
-            yield statement, system
+def state_systems(deck: Deck) -> Iterator[tuple[st.Statement, LinearSystem | StateEquations]]:
+    """Yield the LSE, TFSISO and GSE statements of a deck that hold together, each with what it stands for."""
+    for statement in (*deck.of(st.Lse).values(), *deck.of(st.Tfsiso).values(), *deck.of(st.Gse).values()):
+        try:
+            system = state_system(deck, statement)
+        except ValueError:
+            # whoever adds it to a mechanism says so
+            continue
+        yield statement, system
+
+
+def state_system(deck: Deck, s: st.Statement) -> LinearSystem | StateEquations:
+    """Return what an LSE, TFSISO or GSE stands for.
+
+    Raises
+    ------
+    ValueError
+        If arrays, matrices or routines are missing or do not fit.
+    """
+    if isinstance(s, st.Gse):
+        return state_equations(deck, s)
+    assert isinstance(s, (st.Lse, st.Tfsiso))
+    return linear_system(deck, s)
 
 
 def linear_system(deck: Deck, s: st.Lse | st.Tfsiso) -> LinearSystem:
@@ -75,7 +89,7 @@ def linear_system(deck: Deck, s: st.Lse | st.Tfsiso) -> LinearSystem:
     ValueError
         If arrays or matrices are missing or do not fit.
     """
-    inputs = deck.of(st.Array)[_array(deck, s, "U", s.u)].variables if s.u is not None else ()
+    inputs = deck.of(st.Array)[of_array(deck, s, "U", s.u)].variables if s.u is not None else ()
     if isinstance(s, st.Tfsiso):
         a, b, c, d = _canonical(s, inputs)
         start = np.zeros(len(a))
@@ -83,28 +97,18 @@ def linear_system(deck: Deck, s: st.Lse | st.Tfsiso) -> LinearSystem:
         a, b, c, d = _matrices(deck, s, inputs)
         start = np.zeros(len(a))
         if s.ic is not None:
-            start = np.array(deck.of(st.Array)[_array(deck, s, "IC", s.ic)].numbers)
+            start = np.array(deck.of(st.Array)[of_array(deck, s, "IC", s.ic)].numbers)
             if start.size != len(a):
                 raise ValueError(f"IC = {s.ic} holds {start.size} numbers for {len(a)} states")
     for name, ref, size in (("X", s.x, len(a)), ("Y", s.y, len(c))):
         if ref is None:
             continue
-        given = deck.of(st.Array)[_array(deck, s, name, ref)].size
+        given = deck.of(st.Array)[of_array(deck, s, name, ref)].size
         if given is not None and given != size:
             raise ValueError(f"{name} = {ref} has SIZE = {given}, it must be {size}")
     keyword = "LSE" if isinstance(s, st.Lse) else "TFSISO"
     names = tuple(f"{keyword}_{s.id}.X{k + 1}" for k in range(len(a)))
     return LinearSystem(names, inputs, a, b, c, d, start, s.x, s.y)
-
-
-def _array(deck: Deck, s: st.Lse | st.Tfsiso, name: str, ref: int | None) -> int:
-    array = deck.of(st.Array).get(ref or 0)
-    if array is None:
-        raise ValueError(f"there is no ARRAY/{ref} for {name}")
-    kind = (array.type or "IC").upper()
-    if kind != name:
-        raise ValueError(f"{name} = {ref}, but ARRAY/{ref} is of type {kind}")
-    return array.id
 
 
 def _matrices(deck: Deck, s: st.Lse, inputs: tuple[int, ...]) -> list[np.ndarray]:
@@ -158,7 +162,7 @@ def hold_states(model: AdamsModel) -> None:
     """Make the states of statements with STATIC_HOLD keep their values, as in static analyses."""
     deck, states = model.deck, model.mechanism.states
     held: list[int | str] = [d.id for d in deck.of(st.Diff).values() if d.static_hold]
-    held += [name for s, system in linear_systems(deck) if getattr(s, "static_hold", False) for name in system.names]
+    held += [name for s, system in state_systems(deck) if getattr(s, "static_hold", False) for name in system.names]
     for name in held:
         if name in states:
             states[name].expression = "0"

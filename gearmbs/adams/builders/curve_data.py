@@ -18,12 +18,16 @@ def curve_points(deck: Deck, number: int | None) -> Curve:
         If it has no points, or its matrix does not hold them.
     """
     statement = deck.of(st.CurveStatement)[number or 0]
-    points = matrix_values(deck.of(st.Matrix)[statement.matrix or 0])
+    closed = statement.ends == "CLOSED"
+    if statement.sampled:
+        return Curve(np.array(statement.sampled)[:, 1:], closed)
+    if statement.matrix not in deck.of(st.Matrix):
+        raise ValueError("it has no points")
+    points = matrix_values(deck.of(st.Matrix)[statement.matrix])
     if points.shape[1] != 3 or len(points) < 4:
         raise ValueError(
             f"MATRIX/{statement.matrix} is {points.shape[0]} by {points.shape[1]}; a curve has rows x, y, z"
         )
-    closed = statement.ends == "CLOSED"
     if statement.points == "CONTROL_POINTS":
         points = from_control_points(points, statement.order)
     return Curve(points, closed)

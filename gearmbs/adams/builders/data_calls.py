@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 
-from gearmbs.adams.builders.control import linear_systems
+from gearmbs.adams.builders.control import state_systems
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
@@ -37,11 +37,13 @@ def data_call(deck: Deck, sensed: Mapping[int, float], call: Call) -> Node:
 
 
 def _of_system(deck: Deck, call: Call, array: int, place: int) -> Node:
-    """Return a state or an output of the linear system that an array belongs to."""
-    for _, system in linear_systems(deck):
+    """Return a state or an output of the system that an array belongs to."""
+    for statement, system in state_systems(deck):
+        if isinstance(statement, st.Gse) and array == statement.xd and 1 <= place <= statement.nd:
+            return Number(statement.held[place - 1], call.at)
         if array == system.x and 1 <= place <= len(system.names):
             return Call("DIF", (Name(system.names[place - 1], call.at),), call.at)
-        if array == system.y and 1 <= place <= len(system.c):
+        if array == system.y and 1 <= place <= len(system.outputs()):
             return parsed(system.outputs()[place - 1])
     return call
 
@@ -50,6 +52,12 @@ def _curve(deck: Deck, call: Call, numbers: list[int | None]) -> Node:
     order, component, number = numbers[1], numbers[2], numbers[3]
     if order not in (0, 1, 2) or component not in (1, 2, 3):
         return call
+    if deck.of(st.CurveStatement)[number or 0].sampled:
+        # by its own parameter, not by its length
+        own = Name(f"CURVE_{number}.BY.{'XYZ'[component - 1]}", call.at)
+        return Call(
+            "CUBSPL", (call.args[0], Number(0.0, call.at, 0), own, Number(float(order), call.at, order)), call.at
+        )
     half = 0.5 * curve_points(deck, number).length
     at = call.at
     travel = Chain(Chain(call.args[0], (("+", Number(1.0, at, 1)),), at), (("*", Number(half, at)),), at)

@@ -92,6 +92,11 @@ def add_bushing(b: Builder, s: st.Bushing) -> None:
 
 def add_field(b: Builder, s: st.Field) -> None:
     """FIELD: full matrices, stored by columns; CRATIO makes the damping proportional to the stiffness."""
+    if s.components:
+        given = {c: b.text(text) for c, text in zip(COMPONENTS, s.components)}
+        i, j = b.markers[s.i or 0], b.markers[s.j or 0]
+        b.mechanism.load(b.model.names["field", s.id], i, j, rm=j, kind="field", **given)
+        return
     if s.function is not None:
         return
     k = np.zeros((6, 6)) if s.kmatrix is None else np.reshape(s.kmatrix, (6, 6)).T

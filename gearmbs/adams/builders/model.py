@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearmbs.adams.builders.control import linear_systems
+from gearmbs.adams.builders.control import state_systems
 from gearmbs.adams.builders.data_calls import translated
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
@@ -61,6 +61,8 @@ class AdamsModel:
         What sensors have evaluated.
     initial_motions : list
         Joints with initial conditions: joint, "rotation" or "translation", displacement and velocity in deck units.
+    ranges : list
+        What routines were tabulated for: statement, expression, least and largest value.
     """
 
     mechanism: Mechanism
@@ -70,6 +72,7 @@ class AdamsModel:
     sources: dict[str, st.Statement] = field(default_factory=dict)
     sensed: Mapping[int, float] = field(default_factory=dict)
     initial_motions: list[tuple[Joint, str, tuple[float, ...]]] = field(default_factory=list)
+    ranges: list[tuple[st.Statement, str, float, float]] = field(default_factory=list)
 
     def scope(self, marker_index: dict[int, int], marker_body: list[int]) -> Scope:
         """Return what the deck's expressions may name, for requests."""
@@ -88,7 +91,7 @@ class AdamsModel:
                 d.id: None if d.implicit else translated(deck, self.sensed, d.function or "0")
                 for d in deck.of(st.Diff).values()
             }
-            | {name: text for _, system in linear_systems(deck) for name, text in zip(system.names, system.rates())},
+            | {name: text for _, system in state_systems(deck) for name, text in zip(system.names, system.rates())},
             splines={s.id: spline_data(s) for s in deck.of(st.Spline).values() if s.data_file is None}
             | _curves(self.mechanism),
             arrays=self.mechanism.arrays,

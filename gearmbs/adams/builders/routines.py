@@ -1,28 +1,21 @@
-"""Routines of the user: USER(...) in the functions of a deck, bound to Python functions.
-
-A routine is called with a `RoutineCall`, which holds what ADAMS hands to its subroutines: id, time, parameters, and the
-utility calls by name. It is called some times beforehand, with numbers of no meaning, to learn which quantities it asks
-for, as ADAMS does with IFLAG; what it asks for becomes the arguments of a function in the deck's expressions, so that a
-force by a routine has its derivatives, and stands in statics, modes and results as any other.
-"""
+"""Routines of the user: USER(...) in the functions of a deck, bound to Python functions."""
 
 from __future__ import annotations
 
 import inspect
-import itertools
 import runpy
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall
+from gearmbs.adams.builders.user_elements import bind_coupler, bind_curve, bind_field, bind_gse, gse_parts
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.readers import without_readers
 from gearmbs.mechanism.expression_syntax import Call, Negative, Node, Number, parse
-from gearmbs.mechanism.user_functions import UserFunction
 
 ROUTINES: dict[type, tuple[str, tuple[str, ...]]] = {
     st.Sforce: ("SFOSUB", ("function",)),
@@ -36,78 +29,33 @@ ROUTINES: dict[type, tuple[str, tuple[str, ...]]] = {
     st.Request: ("REQSUB", ("f1", "f2", "f3", "f4", "f5", "f6", "f7", "f8")),
 }
 """ADAMS's name of the routine of a statement, and where its results go."""
+
+BINDERS: dict[type, tuple[str, Callable]] = {
+    st.Coupler: ("COUSUB", bind_coupler),
+    st.Field: ("FIESUB", bind_field),
+    st.CurveStatement: ("CURSUB", bind_curve),
+    st.Gse: ("GSE_DERIV", bind_gse),
+}
+"""Likewise, with what makes of a routine what the statement needs."""
+
 EVALUATED = "SEVSUB"
 """That of what a SENSOR evaluates when it fires."""
 
-SYSARY = {
-    "DISP": ("DX", "DY", "DZ", "PSI", "THETA", "PHI"),
-    "TDISP": ("DX", "DY", "DZ"),
-    "RDISP": ("PSI", "THETA", "PHI"),
-    "VEL": ("VX", "VY", "VZ", "WX", "WY", "WZ"),
-    "TVEL": ("VX", "VY", "VZ"),
-    "RVEL": ("WX", "WY", "WZ"),
-    "FORCE": ("FX", "FY", "FZ", "TX", "TY", "TZ"),
-    "TFORCE": ("FX", "FY", "FZ"),
-    "RFORCE": ("TX", "TY", "TZ"),
-}
-"""Functions of a set of values that SYSARY returns by its name."""
-
-REHEARSALS = 16
-Routine = Callable[["RoutineCall"], Any]
+LEFT_OUT = (st.Variable, st.Diff, st.Gse, st.CurveStatement)
+"""Statements that others read: these are left out with them."""
 
 
-@dataclass
-class RoutineCall:
-    """What a routine is given.
-
-    Attributes
-    ----------
-    id : int
-        Of the statement.
-    label : str
-        The statement, for instance "SFORCE/3".
-    parameters : tuple of float
-        Those of USER(...).
-    time : float
-        In the deck's unit.
-    rehearsal : bool
-        Whether this call only finds out what the routine asks for; numbers then have no meaning.
-    """
-
-    id: int
-    label: str
-    parameters: tuple[float, ...]
-    time: float = 0.0
-    rehearsal: bool = False
-    _values: dict[str, float] = field(default_factory=dict)
-    _draw: np.random.Generator = field(default_factory=np.random.default_rng)
-
-    def sysfnc(self, name: str, *ids: int) -> float:
-        """Return a function of the deck's expressions by its name, for instance ``sysfnc("DX", 12, 10, 10)``."""
-        text = f"{name.upper()}({','.join(str(int(i)) for i in _flat(ids))})"
-        if self.rehearsal:
-            self._values.setdefault(text, float(self._draw.uniform(0.1, 1.0)))
-        elif text not in self._values:
-            raise ValueError(f"asks for {text} only in some cases; ask for all it may need before the first branch")
-        return self._values[text]
-
-    def sysary(self, name: str, *ids: int) -> tuple[float, ...]:
-        """Return a set of values by its name, for instance ``sysary("TDISP", 12, 10, 10)``: DX, DY, DZ."""
-        if name.upper() not in SYSARY:
-            raise ValueError(f"SYSARY has no {name!r}; it has {', '.join(SYSARY)}")
-        return tuple(self.sysfnc(one, *ids) for one in SYSARY[name.upper()])
-
-
-def bound(deck: Deck, routines: Mapping[str, Routine] | None = None, allow_missing: bool = False) -> Deck:
+def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: bool = False) -> Deck:
     """Return a deck in which the functions USER(...) call Python functions.
 
     Parameters
     ----------
     deck : Deck
     routines : mapping, optional
-        By statement ("SFORCE/3"), by the name in ROUTINE= behind any library's, or by ADAMS's name (SFOSUB, ...).
+        By statement ("SFORCE/3"), by the name in ROUTINE= or INTERFACE= behind any library's, or by ADAMS's name
+        (SFOSUB, ...). Those of a GSE also as one mapping of "deriv", "output" and "update".
     allow_missing : bool
-        Leave out statements whose routine is missing instead of refusing.
+        Leave out statements whose routine is missing, and those that read them, instead of refusing.
 
     Raises
     ------
@@ -121,27 +69,32 @@ def bound(deck: Deck, routines: Mapping[str, Routine] | None = None, allow_missi
     made = replace(deck, items={kind: dict(group) for kind, group in deck.items.items()})
     made.diagnostics, made.functions = list(deck.diagnostics), dict(deck.functions)
     problems = []
+    gone: list[st.Statement] = []
     for use in users:
         statement, group = use.statement, made.items[type(use.statement)]
-        routine = next((known[name] for name in use.names() if name in known), None)
-        if routine is None:
-            message = f"{statement.label()}: its routine {use.names()[1]} is missing; give it in routines"
+        refused = f"{statement.label()}: FUNCTION is not supported"
+        made.diagnostics = [d for d in made.diagnostics if d.message != refused]
+        found, missing = _found(use, known)
+        if missing:
+            word, are = ("routine", "is") if len(missing) == 1 else ("routines", "are")
+            message = f"{statement.label()}: its {word} {', '.join(missing)} {are} missing; give it in routines"
             problems.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.line))
-            group.pop(statement.id, None)
+            if group.pop(statement.id, None) is not None:
+                gone.append(statement)
             continue
         if statement.id not in group:
             # another routine of it is missing
             continue
         try:
-            group[statement.id] = _with_function(made, group[statement.id], use, routine)
+            group[statement.id] = _with_function(made, group[statement.id], use, found)
         except ValueError as error:
             message = f"{statement.label()}: its routine {error}"
             problems.append(Diagnostic(ERROR, message, deck.file, statement.line))
-        refused = f"{statement.label()}: FUNCTION is not supported"
-        made.diagnostics = [d for d in made.diagnostics if d.message != refused]
     if any(d.severity == ERROR for d in problems) or (problems and not allow_missing):
         raise DeckError(problems)
     made.diagnostics.extend(problems)
+    if any(isinstance(s, LEFT_OUT) for s in gone):
+        made.diagnostics.extend(without_readers(made, gone))
     return made
 
 
@@ -158,11 +111,16 @@ def load_routines(path: str | Path) -> dict[str, Routine]:
         space = runpy.run_path(str(path))
     except Exception as error:
         raise ValueError(f"{path}: {type(error).__name__}: {error}") from error
-    found: dict[str, Routine] = {}
-    found |= {k: v for k, v in space.items() if inspect.isfunction(v) and v.__module__ == "<run_path>" and k[0] != "_"}
+    found: dict[str, Routine] = {k: v for k, v in space.items() if k[0] != "_" and _defined_here(v)}
     if not found:
         raise ValueError(f"{path}: it defines no functions; write for example def sfosub(call): ...")
     return found
+
+
+def _defined_here(value: Any) -> bool:
+    """Whether a file that is run defines a function itself, plain or compiled by numba."""
+    value = getattr(value, "py_func", value)
+    return inspect.isfunction(value) and value.__module__ == "<run_path>"
 
 
 @dataclass(frozen=True)
@@ -184,8 +142,8 @@ class _Use:
 
 def _uses(s: st.Statement) -> Iterator[_Use]:
     """Yield what a statement calls of the user."""
-    if type(s) in ROUTINES:
-        name, fields = ROUTINES[type(s)]
+    if type(s) in ROUTINES or type(s) in BINDERS:
+        name, fields = ROUTINES.get(type(s)) or (BINDERS[type(s)][0], ())
         call = _user_call(getattr(s, "function", None))
         if call is not None:
             yield _Use(s, call, name, fields, getattr(s, "routine", None))
@@ -205,18 +163,36 @@ def _user_call(text: str | None) -> Call | None:
     return node if isinstance(node, Call) and node.name == "USER" else None
 
 
-def _with_function(deck: Deck, s: st.Statement, use: _Use, routine: Routine) -> Any:
+def _found(use: _Use, known: Mapping[str, Any]) -> tuple[dict[str, Routine], list[str]]:
+    """Return the routines of a statement by part ("" for the only one), and the names of those that are missing."""
+    found: dict[str, Routine] = {}
+    missing = []
+    s = use.statement
+    wanted: Iterable[tuple[str, list[str]]] = [("", use.names())]
+    own = known.get(s.label())
+    if isinstance(s, st.Gse):
+        wanted = gse_parts(s)
+        if isinstance(own, Mapping):
+            known = {**known, **{f"{s.label()}.{part}".upper(): routine for part, routine in own.items()}}
+    for part, names in wanted:
+        routine = next((known[name] for name in names if name in known), None)
+        if callable(routine):
+            found[part] = routine
+        else:
+            missing.append(names[1])
+    return found, missing
+
+
+def _with_function(deck: Deck, s: st.Statement, use: _Use, found: Mapping[str, Routine]) -> Any:
     """Return a statement whose results are calls of functions that the deck then has."""
-    caller = _Caller(s, tuple(_number(a) for a in use.call.args), routine, len(use.fields))
-    arguments = ", ".join(["TIME", *caller.asked])
+    parameters = tuple(_number(a) for a in use.call.args)
+    if type(s) in BINDERS:
+        return BINDERS[type(s)][1](deck, s, parameters, found)
+    caller = Caller(deck, s, parameters, found[""], len(use.fields))
     if isinstance(s, st.Motion) and caller.asked:
         raise ValueError(f"asks for {caller.asked[0]}; a motion depends on TIME only")
     texts: dict[str, str | None] = {} if use.routine == EVALUATED else {"function": None}
-    for component, name in enumerate(use.fields):
-        key = f"{use.routine}_{s.label().replace('/', '_')}_{component + 1}"
-        count = 1 + len(caller.asked)
-        deck.functions[key] = UserFunction(f"{s.label()}: USER", caller.component(component), count=count)
-        texts[name] = f"{key}({arguments})"
+    texts |= dict(zip(use.fields, caller.texts(deck.functions, f"{use.routine}_{s.label().replace('/', '_')}")))
     return replace(s, **texts)  # type: ignore[arg-type]
 
 
@@ -228,46 +204,4 @@ def _number(node: Node) -> float:
     raise ValueError("has parameters that are no numbers")
 
 
-class _Caller:
-    """Calls a routine with the values of what it asks for, once for all of its results."""
-
-    def __init__(self, s: st.Statement, parameters: tuple[float, ...], routine: Routine, count: int) -> None:
-        self.statement, self.parameters, self.routine, self.count = s, parameters, routine, count
-        self.asked = list(dict.fromkeys(itertools.chain(*self._rehearsed())))
-        self._last: tuple[tuple[float, ...], tuple[float, ...]] | None = None
-
-    def _rehearsed(self) -> Iterator[list[str]]:
-        for seed in range(REHEARSALS):
-            draw = np.random.default_rng(seed)
-            time = float(draw.uniform(0.0, 1.0))
-            call = RoutineCall(self.statement.id, self.statement.label(), self.parameters, time, True, {}, draw)
-            try:
-                self._results(call)
-            except (ArithmeticError, ValueError) as error:
-                # numbers of no meaning may have no root; what it asked for before counts
-                if seed == REHEARSALS - 1 and not call._values:
-                    raise ValueError(f"fails: {error}") from error
-            yield list(call._values)
-
-    def _results(self, call: RoutineCall) -> tuple[float, ...]:
-        found = self.routine(call)
-        values = tuple(float(v) for v in np.atleast_1d(np.asarray(found, dtype=float)))
-        if len(values) != self.count:
-            raise ValueError(f"returns {len(values)} numbers, it must return {self.count}")
-        return values
-
-    def component(self, which: int) -> Callable[..., float]:
-        """Return the function of time and the quantities asked for that gives one of the results."""
-
-        def value(*arguments: float) -> float:
-            if self._last is None or self._last[0] != arguments:
-                s, given = self.statement, dict(zip(self.asked, arguments[1:]))
-                call = RoutineCall(s.id, s.label(), self.parameters, arguments[0], False, given)
-                self._last = arguments, self._results(call)
-            return self._last[1][which]
-
-        return value
-
-
-def _flat(ids: Sequence[Any]) -> list[Any]:
-    return [one for given in ids for one in (given if isinstance(given, (tuple, list)) else (given,))]
+__all__ = ["BINDERS", "ROUTINES", "RoutineCall", "bound", "load_routines"]

@@ -37,6 +37,7 @@ REQUIRED: dict[type, tuple[str, ...]] = {
     st.Ptcv: ("i", "curve", "rm"),
     st.Cvcv: ("icurve", "jcurve", "irm", "jrm"),
     st.Sensor: ("function",),
+    st.Gse: ("function",),
 }
 MEASURES = frozenset(
     """DX DY DZ DM AX AY AZ INCANG PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
@@ -76,6 +77,7 @@ WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
     ),
     st.CurveStatement: ("minpar", "maxpar"),
     st.Cvcv: ("ivel", "jvel"),
+    st.Gse: ("xxflag", "xuflag", "yxflag", "yuflag"),
     st.Sensor: ("angular", "bisection", "codgen"),
 }
 """Arguments that are read and change nothing: each is remarked on."""
@@ -88,6 +90,7 @@ WHY = {
     st.Contact: "solids press by depth and rub by speed alone",
     st.Graphics: "a plane touches everywhere, and a mesh is as fine as its file",
     st.Joint: "they shape the friction of MU_STAT and MU_DYN; write FRICTION",
+    st.Gse: "derivatives are made by differences",
     st.CurveStatement: "the points alone say how far the curve goes",
     st.Cvcv: "the speeds follow from those of the parts",
     st.Sensor: "the time is found to the last digits, and every analysis chooses its pivots anew",

@@ -1,9 +1,11 @@
-"""Which VARIABLEs of a deck matter."""
+"""Which statements of a deck others read."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
+from gearmbs.adams.errors import UNSUPPORTED, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
@@ -44,3 +46,64 @@ def read_variables(deck: Deck, requests: bool = True) -> set[int]:
                     read.add(member)
                     waiting.append(variable.function or "0")
     return read
+
+
+def without_readers(deck: Deck, gone: Sequence[st.Statement]) -> list[Diagnostic]:
+    """Take out of a deck what reads statements that were left out, and return a remark on each.
+
+    Lists of a control program merely lose those members.
+    """
+    remarks = []
+    absent = {(type(s), s.id): s.label() for s in gone}
+    for s in gone:
+        if isinstance(s, st.Gse):
+            absent |= {(st.Array, ref): f"ARRAY/{ref}" for ref in (s.x, s.y, s.xd) if ref is not None}
+    found = True
+    while found:
+        found = False
+        for statement in list(deck):
+            need = next((label for key, label in absent.items() if _needs(statement, key)), None)
+            if need is None:
+                continue
+            found = True
+            del deck.items[type(statement)][statement.id]
+            absent[type(statement), statement.id] = statement.label()
+            message = f"{statement.label()}: it needs {need}, which is left out"
+            remarks.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.line))
+    lists: tuple[type[st.Plant], ...] = (st.PlantInput, st.PlantOutput)
+    for kind in lists:
+        group = deck.items.get(kind, {})
+        for number, plant in group.items():
+            kept = tuple(v for v in plant.variables if (st.Variable, v) not in absent)
+            group[number] = replace(plant, variables=kept)
+    return remarks
+
+
+READ_BY: dict[str, type] = {
+    "VARVAL": st.Variable, "DIF": st.Diff, "DIF1": st.Diff, "ARYVAL": st.Array, "CURVE": st.CurveStatement,
+    "SENVAL": st.Sensor,
+}  # fmt: skip
+"""Statements that functions read by id; of CURVE it is the last argument."""
+
+
+def _needs(statement: st.Statement, key: tuple[type, int]) -> bool:
+    """Whether a statement reads another in an expression, or by its id."""
+    kind, number = key
+    if kind is st.Variable and isinstance(statement, st.Array) and number in statement.variables:
+        return True
+    if kind is st.Array and isinstance(statement, (st.Lse, st.Tfsiso, st.Gse)) and number == statement.u:
+        return True
+    if kind is st.CurveStatement and number in (
+        getattr(statement, name, None) for name in ("curve", "icurve", "jcurve")
+    ):
+        return True
+    for name, spec in specs_of(type(statement)).items():
+        text = getattr(statement, name)
+        if spec.kind != EXPRESSION or text is None:
+            continue
+        for node in walk(parse(text)):
+            if isinstance(node, Call) and READ_BY.get(node.name) is kind and node.args:
+                which = node.args[-1 if node.name == "CURVE" else 0]
+                if isinstance(which, Number) and which.integer == number:
+                    return True
+    return False

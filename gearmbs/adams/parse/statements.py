@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from gearmbs.adams.parse.statement import Statement
 from gearmbs.adams.parse.statements_contact import Contact, Graphics
-from gearmbs.adams.parse.statements_control import Lse, Tfsiso
+from gearmbs.adams.parse.statements_control import Gse, Lse, Tfsiso
 from gearmbs.adams.parse.statements_curves import CurveStatement, Cvcv, Matrix, Ptcv
 from gearmbs.adams.parse.statements_data import (
     Array,
@@ -68,6 +68,7 @@ STATEMENTS: dict[str, type[Statement]] = {
     "GEAR": Gear,
     "GFORCE": Gforce,
     "GRAPHICS": Graphics,
+    "GSE": Gse,
     "IC": InitialConditions,
     "INTEGRATOR": Integrator,
     "JOINT": Joint,
@@ -107,7 +108,7 @@ IGNORED = frozenset("MATERIAL PREFERENCES DEBUG FEMDATA LSOLVER".split())
 """Statements without effect on the numbers computed here."""
 
 UNSUPPORTED = frozenset(
-    """CLEARANCE EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART FLEX_BODY GSE MFORCE MREQUEST
+    """CLEARANCE EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART FLEX_BODY MFORCE MREQUEST
     NFORCE NODE NORMAL_MODE_ANALYSIS POINT_MASS PSTATE SECTION SURFACE TIRE UCON""".split()
 )
 """Statements of ADAMS that change the motion and are not modelled here."""
@@ -135,6 +136,7 @@ __all__ = [
     "Gear",
     "Gforce",
     "Graphics",
+    "Gse",
     "InitialConditions",
     "Integrator",
     "Joint",

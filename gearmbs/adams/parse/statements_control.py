@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
-from gearmbs.adams.parse.grammar import FLAG, ID, REALS, arg
+from gearmbs.adams.parse.grammar import EXPRESSION, FLAG, ID, INT, REAL, REALS, TEXT, WORD, arg
 from gearmbs.adams.parse.statement import Statement, Vector
 
 
@@ -38,3 +39,35 @@ class Tfsiso(_System):
 
     numerator: Vector = arg("NUMERATOR", REALS, (), count=(1, 30))
     denominator: Vector = arg("DENOMINATOR", REALS, (), count=(1, 30))
+
+
+@dataclass(frozen=True)
+class Gse(_System):
+    """GSE: x' = f(t, x, xd, u), y = g(t, x, xd, u) and at samples xd_next = h(t, x, xd, u), by routines of the user.
+
+    Attributes
+    ----------
+    callers : mapping
+        Of the parts "deriv", "output" and "update", once they are bound.
+    held : tuple of float
+        Discrete states as they are.
+    """
+
+    ns: int = arg("NS", INT, 0)
+    nd: int = arg("ND", INT, 0)
+    no: int = arg("NO", INT, 0)
+    xd: int | None = arg("XD", ID)
+    ic: int | None = arg("IC", ID)
+    icd: int | None = arg("ICD", ID)
+    sample_period: str | None = arg("SAMPLE_PERIOD", EXPRESSION)
+    sample_offset: float = arg("SAMPLE_OFFSET", REAL, 0.0, dimension="time")
+    function: str | None = arg("FUNCTION", EXPRESSION)
+    routine: str | None = arg("ROUTINE", TEXT)
+    interface: str | None = arg("INTERFACE", TEXT)
+    implicit: bool = arg("IMPLICIT", FLAG, False)
+    xxflag: str | None = arg("XXFLAG", WORD)
+    xuflag: str | None = arg("XUFLAG", WORD)
+    yxflag: str | None = arg("YXFLAG", WORD)
+    yuflag: str | None = arg("YUFLAG", WORD)
+    callers: Any = field(default=None, kw_only=True, compare=False)
+    held: Vector = field(default=(), kw_only=True)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from gearmbs.adams.parse.grammar import CHOICE, FLAG, ID, INT, REAL, REALS, TEXT, WORD, arg
 from gearmbs.adams.parse.statement import Statement, Vector
@@ -34,6 +34,7 @@ class CurveStatement(Statement, keyword="CURVE"):
     matrix: int | None = arg("MATRIX", ID)
     function: str | None = arg("FUNCTION", TEXT)
     routine: str | None = arg("ROUTINE", TEXT)
+    sampled: tuple[Vector, ...] = field(default=(), kw_only=True)
     minpar: float | None = arg("MINPAR", REAL)
     maxpar: float | None = arg("MAXPAR", REAL)
 

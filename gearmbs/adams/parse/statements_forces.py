@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from gearmbs.adams.parse.grammar import CHOICE, EXPRESSION, FLAG, ID, REAL, REALS, TEXT, WORD, WORDS, arg
 from gearmbs.adams.parse.statement import Statement, Vector
@@ -100,6 +100,8 @@ class Field(Statement):
     length: Vector | None = arg("LENGTH", REALS, count=6)
     force: Vector | None = arg("FORCE", REALS, count=6)
     function: str | None = arg("FUNCTION", TEXT)
+    routine: str | None = arg("ROUTINE", TEXT)
+    components: tuple[str, ...] = field(default=(), kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from gearmbs.adams.parse.grammar import CHOICE, EXPRESSION, FLAG, ID, IDS, REAL, REALS, TEXT, WORD, WORDS, arg
 from gearmbs.adams.parse.statement import Statement, Vector
@@ -120,6 +120,9 @@ class Coupler(Statement):
     type: tuple[str, ...] = arg("TYPE", WORDS, (), choices="ROTATIONAL TRANSLATIONAL")
     scales: Vector = arg("SCALES", REALS, (), count=(1, 3))
     function: str | None = arg("FUNCTION", TEXT)
+    routine: str | None = arg("ROUTINE", TEXT)
+    tables: tuple[tuple[Vector, ...], ...] = field(default=(), kw_only=True, compare=False)
+    constant: float = field(default=0.0, kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from gearmbs.adams.results.result import AdamsResult
 from gearmbs.adams.results.tracks import tracks_of
 from gearmbs.adams.run.equilibria import equilibria_to_passage
 from gearmbs.adams.run.plant import plant_of
+from gearmbs.adams.run.samples import parts, renew, take_samples
 from gearmbs.adams.run.script_check import check_linear, check_script, is_sequence
 from gearmbs.adams.run.sensors import MOST, Watch, act, after, up_to
 from gearmbs.adams.run.session import Session, active_sensors, change, output_times, switch
@@ -233,6 +234,31 @@ def _simulate(
     """Carry out one SIMULATE, in parts where sensors fire; return whether the next command may follow."""
     times = output_times(session, command) if is_sequence(command) else np.array([session.time])
     watch = Watch(active_sensors(session) if command.kind in WATCHED and times.size > 1 else [])
+    for span in parts(session, times) if command.kind in WATCHED and times.size > 1 else (times,):
+        success, ended = _span(session, command, watch, span, result, tol, allow_unsupported, progress)
+        if not success or ended:
+            return success
+        renew(session)
+    return True
+
+
+def _span(
+    session: Session,
+    command: Simulate,
+    watch: Watch,
+    times: np.ndarray,
+    result: AdamsResult,
+    tol: float | None,
+    allow_unsupported: bool,
+    progress: bool | Callable[[float], None] | None,
+) -> tuple[bool, bool]:
+    """Carry out an analysis between samples of discrete states.
+
+    Returns
+    -------
+    success, ended : bool
+        Whether the next command may follow, and whether a sensor has ended this one.
+    """
     while True:
         segment, fired = _part(session, command, watch, times, tol, allow_unsupported, progress)
         if result.log[-1][1] is None:
@@ -240,15 +266,15 @@ def _simulate(
             result.log.pop()
         result.log.append((command, segment))
         if not segment.success:
-            return False
+            return False, True
         loud = [s for s in fired if not watch.silent(s)]
         for sensor in fired:
             watch.note_passage(sensor, RequestEvaluator(segment.model, segment.solution))
         if any(s.halt for s in loud):
-            return False
+            return False, True
         times = after(times, session.time, loud)
         if not fired or times.size < 2 or any(s.back for s in loud):
-            return True
+            return True, any(s.back for s in loud)
         watch.parts += 1
         if watch.parts > MOST:
             message = f"{fired[0].label()}: it fired {MOST} times in one analysis; its function chatters"
@@ -288,6 +314,7 @@ def _part(
         raise _failed(session, command, model, error) from error
 
     evaluator = RequestEvaluator(model, solution)
+    _check_ranges(session, model, evaluator)
     segment = Segment(command, kind, model, solution, options, note, equilibrium=equilibrium)
     if kind != "STATICS":
         segment.assembly = assembly_of(model, solution)
@@ -303,7 +330,26 @@ def _part(
         segment.passage = singular_passage(solution)
     _remember(session, model, segment, evaluator)
     act(session, watch, segment, fired, evaluator)
+    if kind not in ("STATICS", "INITIAL_CONDITIONS"):
+        take_samples(session, evaluator, float(times[0]))
     return segment, fired
+
+
+def _check_ranges(session: Session, model: AdamsModel, evaluator: RequestEvaluator) -> None:
+    """Refuse a motion that leaves what routines were tabulated for.
+
+    Raises
+    ------
+    DeckError
+    """
+    for statement, text, low, high in model.ranges:
+        values = evaluator.expression(text)
+        if values.min() < low or values.max() > high:
+            message = (
+                f"{statement.label()}: {text} went from {values.min():.4g} to {values.max():.4g}; its routine is known "
+                f"from {low:.4g} to {high:.4g} only"
+            )
+            raise DeckError([Diagnostic(ERROR, message, session.deck.file, statement.line)])
 
 
 def _to_passage(

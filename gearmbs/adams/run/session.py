@@ -42,6 +42,8 @@ class Session:
         (statement class, id, argument) -> (file, line) of the command that gave it.
     sensed : dict of int to float
         What sensors have evaluated, by id.
+    pending : dict
+        Of GSEs by id: number of the next sample and the discrete states from then on.
     redundancy : str
         Which redundant rows are kept, see `gearmbs.mechanism.redundancy`.
     """
@@ -54,6 +56,7 @@ class Session:
     time: float = 0.0
     places: dict[tuple[type, int, str], tuple[str, int]] = field(default_factory=dict)
     sensed: dict[int, float] = field(default_factory=dict)
+    pending: dict[int, tuple[int, tuple[float, ...]]] = field(default_factory=dict)
     redundancy: str = "adams"
 
     @classmethod

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import re
-import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -18,7 +18,9 @@ PLACE = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)\}")
 
 
 class DeckSubject(Subject):
-    """A deck whose text holds ``${name}`` where a parameter goes, in the deck's own units.
+    """A deck whose text holds ``${name}`` where a parameter goes, or whose constant VARIABLEs are parameters.
+
+    Numbers are in the deck's own units.
 
     Keeps ``requests``: of every column of the requests the last, mean, RMS about the mean, least and largest value, as
     ``NAME.COLUMN.max``.
@@ -28,34 +30,68 @@ class DeckSubject(Subject):
     text : str
         The deck.
     parameters : dict of float
-        Values of its places.
-    end : float
-        End of the analysis, in the deck's unit of time.
+        Values of its places, and of VARIABLEs by "VARIABLE/3" or by their names in ADAMS/View; these must be constants.
+    end : float, optional
+        End of the analysis, in the deck's unit of time, without a script.
     steps : int
         Output steps.
+    script : str, optional
+        Text of a command script (.acf) to carry out instead, which may have places, too.
+
+    Raises
+    ------
+    CampaignError
+        If places have no value, or a value has no place.
     """
 
     kind: ClassVar[str] = "deck"
     keeps: ClassVar[tuple[str, ...]] = ("requests",)
 
-    def __init__(self, text: str, parameters: dict[str, float], *, end: float, steps: int = 100) -> None:
-        places = set(PLACE.findall(text))
-        if places != set(parameters):
+    def __init__(
+        self,
+        text: str,
+        parameters: dict[str, float],
+        *,
+        end: float | None = None,
+        steps: int = 100,
+        script: str | None = None,
+    ) -> None:
+        places = set(PLACE.findall(text)) | set(PLACE.findall(script or ""))
+        others = set(parameters) - places
+        self.variables: dict[str, int] = {}
+        if others and places <= set(parameters):
+            filled = PLACE.sub(lambda match: f"{float(parameters[match[1]]):.17G}", text)
+            self.variables = _constant_variables(filled, others)
+        if not places <= set(parameters) or others - set(self.variables):
             raise CampaignError(
                 f"deck: it has the places {', '.join(sorted(places)) or 'none'}, parameters are given for "
-                f"{', '.join(sorted(parameters)) or 'none'}; give a value to each place ${{name}}"
+                f"{', '.join(sorted(parameters)) or 'none'}; give a value to each place ${{name}}, and else only to "
+                "VARIABLEs whose FUNCTION is a number"
             )
+        if (end is None) == (script is None):
+            raise CampaignError("deck: give either the end of the analysis or a script")
         self.text, self.parameters = text, {k: float(v) for k, v in parameters.items()}
-        self.end, self.steps = float(end), int(steps)
+        self.end, self.steps, self.script = None if end is None else float(end), int(steps), script
 
     @classmethod
-    def from_file(cls, path: str | Path, parameters: dict[str, float], *, end: float, steps: int = 100) -> DeckSubject:
-        """Return the subject of a deck in a file."""
-        return cls(Path(path).read_text(encoding="utf-8", errors="replace"), parameters, end=end, steps=steps)
+    def from_file(
+        cls,
+        path: str | Path,
+        parameters: dict[str, float],
+        *,
+        end: float | None = None,
+        steps: int = 100,
+        script: str | Path | None = None,
+    ) -> DeckSubject:
+        """Return the subject of a deck in a file, with a script in another."""
+        commands = None if script is None else Path(script).read_text(encoding="utf-8", errors="replace")
+        text = Path(path).read_text(encoding="utf-8", errors="replace")
+        return cls(text, parameters, end=end, steps=steps, script=commands)
 
     def settings(self) -> dict[str, Any]:
         """Return the text and the values."""
-        return {"text": self.text, "parameters": self.parameters, "end": self.end, "steps": self.steps}
+        found: dict[str, Any] = {"text": self.text, "parameters": self.parameters, "steps": self.steps}
+        return found | ({"end": self.end} if self.script is None else {"script": self.script})
 
     @classmethod
     def from_settings(cls, settings: dict[str, Any]) -> DeckSubject:
@@ -79,25 +115,32 @@ class DeckSubject(Subject):
         """Return the deck's text with the values in their places, and the values."""
         values = {key: float(value) for key, value in data.items()}
         text = PLACE.sub(lambda match: f"{values[match[1]]:.17G}", self.text)
-        return {"text": text, "values": values}
+        script = None if self.script is None else PLACE.sub(lambda match: f"{values[match[1]]:.17G}", self.script)
+        return {"text": text, "script": script, "values": values}
 
     def canonical(self, thing: dict[str, Any]) -> Any:
         """Return the digest of the template, the values and the span."""
         digest = hashlib.sha256(self.text.encode()).hexdigest()
-        return {"deck": digest, "values": thing["values"], "end": self.end, "steps": self.steps}
+        found = {"deck": digest, "values": thing["values"], "end": self.end, "steps": self.steps}
+        if self.script is not None:
+            found["script"] = hashlib.sha256(self.script.encode()).hexdigest()
+        return found
 
     def run(self, thing: dict[str, Any], progress: Callable[[float], None], keep: Sequence[str]) -> Any:
         """Run the deck and return its requests: arrays by name and column."""
-        from gearmbs.adams import run_deck
+        from gearmbs.adams import parse_deck, parse_script, run_deck
 
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "model.adm"
-            path.write_text(thing["text"], encoding="utf-8")
-            result = run_deck(path, None, Path(folder) / "out", end=self.end, steps=self.steps)
-            progress(1.0)
-            if not result.success:
-                raise RuntimeError("; ".join(str(m) for m in result.messages)[-2000:])
-            return requests_of(result)
+        deck = parse_deck(thing["text"], "model.adm")
+        for name, number in self.variables.items():
+            set_variable(deck, number, thing["values"][name])
+        if thing["script"] is not None:
+            result = run_deck(deck, parse_script(thing["script"], "model.acf"))
+        else:
+            result = run_deck(deck, end=self.end, steps=self.steps)
+        progress(1.0)
+        if not result.success:
+            raise RuntimeError("; ".join(str(m) for m in result.messages)[-2000:])
+        return requests_of(result)
 
     def reduce(self, thing: dict[str, Any], record: dict[str, np.ndarray], keep: Sequence[str]) -> Kept:
         """Return numbers of every column of the requests."""
@@ -108,6 +151,43 @@ class DeckSubject(Subject):
                 found = {"last": x[-1], "mean": x.mean(), "rms": x.std(), "min": x.min(), "max": x.max()}
                 kept.numbers |= {f"{name}.{what}": float(value) for what, value in found.items()}
         return kept
+
+
+def _constant_variables(text: str, names: set[str]) -> dict[str, int]:
+    """Return those names that stand for VARIABLEs with a number for their FUNCTION, with the ids."""
+    from gearmbs.adams import DeckError, parse_deck
+
+    try:
+        deck = parse_deck(text, "model.adm")
+    except DeckError as error:
+        raise CampaignError(f"deck: {error}") from error
+    found = {}
+    for variable in variables_of(deck).values():
+        for name in (variable.label(), variable.name):
+            if name in names and variable.function is not None and _number(variable.function):
+                found[name] = variable.id
+    return found
+
+
+def variables_of(deck: Any) -> dict[int, Any]:
+    """Return the VARIABLE statements of a deck by id."""
+    from gearmbs.adams.parse.statements import Variable
+
+    return deck.of(Variable)
+
+
+def set_variable(deck: Any, number: int, value: float) -> None:
+    """Give a VARIABLE of a deck a constant value."""
+    group = variables_of(deck)
+    group[number] = replace(group[number], function=f"{value:.17G}")
+
+
+def _number(text: str) -> bool:
+    try:
+        float(text.replace("D", "E").replace("d", "e"))
+    except ValueError:
+        return False
+    return True
 
 
 def requests_of(result: Any) -> dict[str, np.ndarray]:

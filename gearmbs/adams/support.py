@@ -1,0 +1,112 @@
+"""What of ADAMS is read, made from the program itself: ``support_table``.
+
+The statements, their arguments and the functions are those of the reader; only what to do instead of what is not there
+is written down here.
+"""
+
+from __future__ import annotations
+
+from gearmbs.adams.parse import commands as acf
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.check import UNSUPPORTED_ARGUMENTS, WITHOUT_EFFECT
+from gearmbs.adams.parse.grammar import CHOICE, specs_of
+from gearmbs.mechanism.expression_functions import BINARY, ELEMENT_FORCES, UNARY
+from gearmbs.mechanism.expression_functions import UNSUPPORTED as REFUSED_FUNCTIONS
+from gearmbs.mechanism.expression_library import FUNCTIONS
+
+READ, OVER, REFUSED = "read", "read over", "refused"
+
+INSTEAD: dict[str, str] = {
+    "CLEARANCE": "a REQUEST with DM between two markers; CONTACT tells how deep solids press",
+    "EXTERNAL_SYSTEM": "a GSE with routines in Python",
+    "FE_LOAD": "an SFORCE or GFORCE at markers of a chain of PARTs and BEAMs",
+    "FE_NODE": "a PART of a chain of PARTs and BEAMs",
+    "FE_PART": "a chain of PARTs joined by BEAMs, or a body with modes in Python (`gearmbs.flexible`)",
+    "FLEX_BODY": "a body with modes in Python (`gearmbs.flexible`)",
+    "MFORCE": "it acts on a FLEX_BODY; in Python a force element on a body with modes",
+    "MREQUEST": "a REQUEST for each marker",
+    "NFORCE": "BEAM or FIELD between neighbouring PARTs",
+    "NODE": "it belongs to a FLEX_BODY",
+    "NORMAL_MODE_ANALYSIS": "LINEAR/EIGENSOL in the script",
+    "POINT_MASS": "a PART with small moments of inertia",
+    "PSTATE": "none needed: LINEAR chooses the coordinates",
+    "SECTION": "the areas and moments of BEAM",
+    "SURFACE": "a mesh in an EXTERNAL solid of GRAPHICS",
+    "TIRE": "a GFORCE with a routine in Python",
+    "UCON": "a GCON with an expression, or a COUPLER with a routine",
+}
+"""What to do instead of statements that are refused."""
+
+INSTEAD_OF_ARGUMENTS: dict[tuple[str, str], str] = {
+    ("CONTACT", "NORMAL_FUNCTION"): "IMPACT or POISSON",
+    ("CONTACT", "FRICTION_FUNCTION"): "COULOMB_FRICTION",
+    ("CONTACT", "IFLEX"): "a solid on a rigid PART",
+    ("CONTACT", "JFLEX"): "a solid on a rigid PART",
+    ("CURVE", "FUNCTION"): "USER with a routine, or points in a MATRIX",
+    ("COUPLER", "FUNCTION"): "USER with a routine, or SCALES",
+    ("FIELD", "FUNCTION"): "USER with a routine, or KMATRIX and CMATRIX",
+    ("REQUEST", "FUNCTION"): "USER with a routine, or F1 to F8",
+    ("SPLINE", "FILE"): "X and Y in the deck",
+    ("MATRIX", "FILE"): "VALUES in the deck",
+    ("JOINT", "MU_DYN_ROT"): "FRICTION",
+    ("JOINT", "MU_DYN_TRANS"): "FRICTION",
+    ("JOINT", "MU_STAT_ROT"): "FRICTION",
+    ("JOINT", "MU_STAT_TRANS"): "FRICTION",
+    ("PART", "PLANAR"): "JOINT/PLANAR to the ground",
+}
+"""What to do instead of arguments that are refused."""
+
+INSTEAD_OF_FUNCTIONS: dict[str, str] = {
+    "ARYSUM": "the sum of ARYVALs",
+    "CURVE": "read where a CURVE has its id",
+    "CVCV": "a FORCE request at the IRM marker",
+    "DELAY": "a TFSISO that approximates the delay",
+    "INTERP": "CUBSPL or AKISPL of a SPLINE",
+    "INVPSD": "a SPLINE of the signal",
+    "NFORCE": "the forces of BEAM or FIELD",
+    "PTCV": "a FORCE request at the I marker",
+    "RANDOM": "a SPLINE of the signal",
+    "SENVAL": "read where a SENSOR has its id",
+    "USER": "the routine in Python alone in the FUNCTION",
+}
+"""What to do instead of functions that are refused; of bodies with modes there is none in a deck."""
+
+
+def statement_rows() -> list[tuple[str, str, str, str, str]]:
+    """Return name, whether it is read, arguments without effect, arguments refused, and what to do instead."""
+    rows = []
+    for name, cls in st.STATEMENTS.items():
+        keyword = {field: "/".join(s.choices) if s.kind == CHOICE else s.keyword for field, s in specs_of(cls).items()}
+        idle = [keyword[field] for field in WITHOUT_EFFECT.get(cls, ())]
+        refused = [keyword[field] for field in UNSUPPORTED_ARGUMENTS.get(cls, ())]
+        ways = dict.fromkeys(INSTEAD_OF_ARGUMENTS.get((name, one), "") for one in refused)
+        rows.append((name, READ, ", ".join(idle), ", ".join(refused), "; ".join(way for way in ways if way)))
+    rows += [(name, OVER, "", "", "") for name in st.IGNORED]
+    rows += [(name, REFUSED, "", "", INSTEAD.get(name, "")) for name in st.UNSUPPORTED]
+    return sorted(rows)
+
+
+def command_rows() -> list[tuple[str, str]]:
+    """Return the commands of a script, each with whether it is read."""
+    rows = [(name, READ) for name in acf.COMMANDS]
+    rows += [(name, "read, with new values of the statement") for name in acf.CHANGEABLE]
+    rows += [(name, OVER) for name in acf.IGNORED_COMMANDS] + [(name, REFUSED) for name in acf.UNSUPPORTED_COMMANDS]
+    return sorted(rows)
+
+
+def function_rows() -> list[tuple[str, str, str]]:
+    """Return name, whether it is read and what to do instead, of the functions of expressions."""
+    read = {*UNARY, *BINARY, *ELEMENT_FORCES, *FUNCTIONS}
+    rows = [(name, READ, "") for name in read]
+    rows += [(name, REFUSED, INSTEAD_OF_FUNCTIONS.get(name, "")) for name in REFUSED_FUNCTIONS - read]
+    return sorted(rows)
+
+
+def support_table() -> str:
+    """Return as Markdown which statements, commands and functions of ADAMS are read, and what to do instead of others."""
+    lines = ["| statement | | without effect | refused | instead |", "|---|---|---|---|---|"]
+    lines += [f"| {name} | {how} | {idle} | {refused} | {way} |" for name, how, idle, refused, way in statement_rows()]
+    lines += ["", "| command | |", "|---|---|", *(f"| {name} | {how} |" for name, how in command_rows())]
+    lines += ["", "| function | | instead |", "|---|---|---|"]
+    lines += [f"| {name} | {how} | {way} |" for name, how, way in function_rows()]
+    return "\n".join(lines)
