@@ -103,7 +103,7 @@ def function_rows() -> list[tuple[str, str, str]]:
 
 
 def support_table() -> str:
-    """Return as Markdown which statements, commands and functions of ADAMS are read, and what to do instead of others."""
+    """Return as Markdown what of ADAMS is read: statements, commands, functions; and what to do instead of others."""
     lines = ["| statement | | without effect | refused | instead |", "|---|---|---|---|---|"]
     lines += [f"| {name} | {how} | {idle} | {refused} | {way} |" for name, how, idle, refused, way in statement_rows()]
     lines += ["", "| command | |", "|---|---|", *(f"| {name} | {how} |" for name, how in command_rows())]

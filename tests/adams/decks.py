@@ -114,6 +114,7 @@ ARRAY/12, X
 MATRIX/2, FULL = RORDER, ROWS = 1, COLUMNS = 1, VALUES = -1
 LSE/1, X = 11, A = 2
 TFSISO/1, X = 12, U = 2, NUMERATOR = 1, DENOMINATOR = 1, 2
+GSE/1, NS = 1, NO = 1, X = 13, U = 2, Y = 14, FUNCTION = USER(1, 2)\\INTERFACE = lib::rates, lib::results
 CVCV/1, ICURVE = 1, IRM = 20, JCURVE = 1, JRM = 10
 END
 """
