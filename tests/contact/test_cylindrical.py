@@ -90,14 +90,44 @@ def surface_point(gear, side, tooth, string, z):
     return np.array([radius * math.cos(angle), radius * math.sin(angle), z])
 
 
-def section_point(gear, side, tooth, string, frame, centre, normal, zeta):
-    """Where a flank's curve of constant length of roll pierces the section plane."""
+def rounding_point(gear, side, tooth, around, z):
+    """Point of the rounding of a spur tooth's tip edge, ``around`` (rad) its axis from the direction of the tip on."""
+    angle = side * gear.corner_half_angle + 2 * math.pi * tooth / gear.teeth
+    c, s = gear.tip_rounding * math.cos(angle + around), gear.tip_rounding * math.sin(angle + around)
+    return np.array([gear.corner_radius * math.cos(angle) + c, gear.corner_radius * math.sin(angle) + s, z])
+
+
+def section_point(gear, side, tooth, at, frame, centre, normal, zeta, surface=surface_point):
+    """Where a flank's curve of constant length of roll, or a line of a rounding, pierces the section plane."""
     origin, axes = frame
     z = 0.0
     for _ in range(12):
-        point = origin + axes @ surface_point(gear, side, tooth, string, z)
+        point = origin + axes @ surface(gear, side, tooth, at, z)
         z -= (normal @ (point - centre) - zeta) / (normal @ axes[:, 2])
-    return origin + axes @ surface_point(gear, side, tooth, string, z)
+    return origin + axes @ surface(gear, side, tooth, at, z)
+
+
+def gap_of_rounding(pair, place, row, bounds, section):
+    """Distance of a rounded tip edge from the mate's flank in a section, m, by search; ``row`` is that of the gap."""
+    side, i, j, _, _, kind = row[:6]
+    corner = int(kind) - 1
+    teeth, sides = (i, j), (side, side * pair.wheels[1].sign)
+
+    def point(wheel, at):
+        surface = rounding_point if wheel == corner else surface_point
+        scale = 1.0 if wheel == corner else 1e-3
+        gear = pair.wheels[wheel]
+        return section_point(gear, sides[wheel], teeth[wheel], at * scale, place.frames[wheel], *section, surface)
+
+    def distance(s):
+        return 1e3 * np.linalg.norm(point(corner, s[0]) - point(1 - corner, s[1]))
+
+    start = np.clip(abs(row[7 - corner]) * 1e3, *bounds[1 - corner])
+    around = min(np.linspace(-math.pi, math.pi, 73), key=lambda angle: distance((angle, start)))
+    limits = [(around - 0.5, around + 0.5), bounds[1 - corner]]
+    found = minimize(distance, (around, start), bounds=limits, method="L-BFGS-B", options={"ftol": 1e-16, "gtol": 1e-13})
+    options = {"xatol": 1e-11, "fatol": 1e-13, "maxiter": 2000}
+    return 1e-3 * minimize(distance, found.x, bounds=limits, method="Nelder-Mead", options=options).fun
 
 
 @pytest.mark.parametrize("name", PAIRS)
@@ -130,7 +160,8 @@ def test_section_gap_against_search(name):
                 return 1e3 * np.linalg.norm(p - q)
 
             if one.tip_rounding and kind:
-                continue  # the search knows sharp corners
+                worst = max(worst, abs(gap_of_rounding(pair, place, row, bounds, (centre, normal, zeta)) - gap))
+                continue
             start = [np.clip(abs(r) * 1e3, *b) for r, b in zip(row[6:8], bounds)]
             found = minimize(distance, start, bounds=bounds, method="L-BFGS-B", options={"ftol": 1e-16, "gtol": 1e-13})
             options = {"xatol": 1e-10, "fatol": 1e-13}
@@ -261,3 +292,55 @@ def test_random_poses_are_finite_and_never_pull(name):
         assert np.isfinite(contact.jac).all()
         assert contact.diag[7] >= 0
         assert contact.diag[0] >= 0
+
+
+CORNERS = {
+    "external": GearPair.paper(centre_distance_error="5 mm", contact=LINEAR),
+    "ring": GearPair(
+        GearSpec(23, "3 mm"),
+        GearSpec.ring(70, "3 mm", addendum="2 mm"),
+        centre_distance_error="-3.5 mm",
+        backlash="0.2 mm",
+        contact=LINEAR,
+    ),
+}
+"""Wheels that mesh so little that often the corner of one alone bears."""
+
+
+@pytest.mark.parametrize("name", CORNERS)
+def test_friction_on_tip_corners(name):
+    pair = CORNERS[name]
+    contact, smooth = Contact(pair, 1), Contact(pair.with_changes(friction=FRICTIONLESS), 1)
+    depth, kinds = 20e-6, set()
+    for angle in np.linspace(0, 2 * math.pi / pair.driver.teeth, 25):
+        state = contact.state(angle, depth, 1500.0)
+        driven = contact.mesh.touching_angle(angle) + pair.sign * pair.rotation * depth / pair.driven.base_radius
+        rows = contact.mesh.gaps(angle, driven, np.zeros(1)).copy()
+        touching = rows[rows[:, 4] < 0]
+        if len(touching) != 1 or not touching[0, 5] or not smooth(state).any():
+            continue
+        side, *teeth = touching[0, :3]
+        bears = int(touching[0, 5]) - 1
+        gear, tooth = pair.wheels[bears], teeth[bears]
+        corner_side = side * (gear.sign if bears else 1)
+        polar = corner_side * gear.corner_half_angle + 2 * math.pi * tooth / gear.teeth
+        corner = gear.corner_radius * np.array([math.cos(polar), math.sin(polar), 0.0])
+        point = state[4 * bears] + state[4 * bears + 1] @ corner
+        pressing = smooth(state)
+        load = contact(state)[:3] - pressing[:3]
+        normal = pressing[:3] / np.linalg.norm(pressing[:3])
+        sliding = np.cross(state[3], point - state[0]) - np.cross(state[7], point - state[4])
+        sliding -= normal * (normal @ sliding)
+        speed = np.linalg.norm(sliding)
+        if speed < pair.friction.dynamic_speed:
+            continue
+        kinds.add(bears)
+        expected = -pair.friction.dynamic * np.linalg.norm(pressing[:3]) * sliding / speed
+        np.testing.assert_allclose(load, expected, atol=1e-9 * np.linalg.norm(pressing[:3]))
+        # the force acts half-way between the surfaces, half the depth from the corner
+        turn = contact(state)[3:] - pressing[3:] - np.cross(point - state[0], load)
+        assert np.linalg.norm(turn) < 0.51 * depth * np.linalg.norm(load)
+        # and slides slower or faster by what the wheels turn against each other
+        slack = 0.51 * depth * np.linalg.norm(state[3] - state[7])
+        assert contact.diag[2] == pytest.approx(np.linalg.norm(load) * speed, abs=np.linalg.norm(load) * slack)
+    assert kinds == {0, 1}
