@@ -112,6 +112,12 @@ class PlanetarySet(Written):
         require(self.ring.internal, f"PlanetarySet.ring ({self.ring.name}) is external; make it with GearSpec.ring")
         for wheel in (self.sun, self.planet):
             require(not wheel.internal, f"PlanetarySet: {wheel.name} is internal; only the ring may be")
+        inner = self.planet_at_ring or self.planet
+        require(
+            self.ring.teeth > inner.teeth,
+            f"PlanetarySet.ring has {self.ring.teeth} teeth and {inner.name} {inner.teeth}: they do not fit into it; "
+            "give the ring more teeth",
+        )
         require(self.rotation in (1, -1), f"PlanetarySet.rotation is {self.rotation!r}; give 1 or -1")
         if self.carrier_radius is None:
             object.__setattr__(self, "carrier_radius", PairGeometry(self.sun, self.planet).nominal_centre_distance)

@@ -17,16 +17,17 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
+from gearmbs.gears.rim import SHEAR, rim_compliance
 from gearmbs.gears.spec import GearSpec
 from gearmbs.gears.tooth_deviations import COMPLIANCE_POINTS
 
 POINTS = 200  # stations of the beam from root to tip
-SHEAR = 1.2  # shear correction of a rectangular section
 # Sainsot's fits: coefficients of 1/theta^2, h^2, h/theta, 1/theta, h, 1
 SAINSOT = {
     "L": (-5.574e-5, -1.9986e-3, -2.3015e-4, 4.7702e-3, 0.0271, 6.8045),
@@ -103,6 +104,8 @@ class ToothCompliance:
     roll_length : ndarray
         Length of roll of the loaded point, m.
     bending, shear, axial, foundation : ndarray
+    rim : ndarray
+        Of a ring's rim between its bolts, 0 where it is held all around; see `gearmbs.gears.rim`.
     """
 
     roll_length: np.ndarray
@@ -110,14 +113,17 @@ class ToothCompliance:
     shear: np.ndarray
     axial: np.ndarray
     foundation: np.ndarray
+    rim: np.ndarray
 
     @property
     def total(self) -> np.ndarray:
         """Sum of all components, m/N."""
-        return self.bending + self.shear + self.axial + self.foundation
+        return self.bending + self.shear + self.axial + self.foundation + self.rim
 
 
-def tooth_compliance(gear: GearSpec, crack: Crack | None = None, root_angle: float | None = None) -> ToothCompliance:
+def tooth_compliance(
+    gear: GearSpec, crack: Crack | None = None, root_angle: float | None = None, rim_supports: int | None = None
+) -> ToothCompliance:
     """Compliance of one tooth by the potential-energy method, from the start of its involute to its tip.
 
     Parameters
@@ -127,6 +133,8 @@ def tooth_compliance(gear: GearSpec, crack: Crack | None = None, root_angle: flo
         A crack in the root; sections above it keep the part of the tooth that still carries.
     root_angle : float, optional
         Half angle of the root for the foundation, default `root_half_angle`.
+    rim_supports : int, optional
+        Bolts that hold the rim of an internal wheel; default: it is held all around and does not bend.
 
     Returns
     -------
@@ -170,7 +178,8 @@ def tooth_compliance(gear: GearSpec, crack: Crack | None = None, root_angle: flo
         foundation = half_plane_foundation(gear, beta, lever / cos, 2 * half[0])
     else:
         foundation = _disc_foundation(gear, beta, from_axis, root_angle)
-    parts = (roll_length, bending, shear, axial, foundation)
+    rim = np.zeros_like(beta) if rim_supports is None else rim_compliance(gear, rim_supports, beta, lever / cos)
+    parts = (roll_length, bending, shear, axial, foundation, rim)
     # by rising length of roll, which is from the tip to the root of an internal wheel
     return ToothCompliance(*(part[::sign] for part in parts))
 
@@ -226,6 +235,7 @@ def pair_stiffness(
     roll_length: np.ndarray,
     cracks: tuple[Crack | None, Crack | None] = (None, None),
     root_angles: tuple[float | None, float | None] = (None, None),
+    rim_supports: int | None = None,
 ) -> np.ndarray:
     """Stiffness of one tooth pair by the potential-energy method, N/m.
 
@@ -236,11 +246,14 @@ def pair_stiffness(
         Contact on wheel 1, as length of roll, m; beyond the profiles' ends the end values are used.
     cracks, root_angles : tuple
         Per wheel, see `tooth_compliance`.
+    rim_supports : int, optional
+        Of an internal wheel 2, see `tooth_compliance`.
     """
     mate = pair.mate_roll_length(0, roll_length)
     total = np.full(np.shape(roll_length), 1 / hertz_stiffness(pair))
-    for wheel, at, crack, angle in zip(pair.wheels, (roll_length, mate), cracks, root_angles):
-        tooth = tooth_compliance(wheel, crack, angle)
+    held = (None, rim_supports)
+    for wheel, at, crack, angle, bolts in zip(pair.wheels, (roll_length, mate), cracks, root_angles, held):
+        tooth = tooth_compliance(wheel, crack, angle, bolts)
         total = total + np.interp(at, tooth.roll_length, tooth.total)
     return 1 / total
 
@@ -281,8 +294,11 @@ def mesh_stiffness(
     pair: Mesh,
     points: int = 400,
     root_angles: tuple[float | None, float | None] = (None, None),
+    rim_supports: int | None = None,
 ) -> MeshStiffness:
     """Time-varying mesh stiffness of perfect wheels by the potential-energy method.
+
+    ``rim_supports`` bolts hold the rim of an internal wheel, see `tooth_compliance`.
 
     Warns
     -----
@@ -301,12 +317,13 @@ def mesh_stiffness(
     pitch, ratio = geometry.driver.base_pitch, geometry.contact_ratio
     phase = np.arange(points) / points
     stiffness = np.zeros(points)
+    bodies: dict[str, Any] = {"root_angles": root_angles, "rim_supports": rim_supports}
     for k in range(math.ceil(ratio)):
         travel = phase + k
         on_path = travel <= ratio
-        stiffness[on_path] += pair_stiffness(geometry, begin + travel[on_path] * pitch, root_angles=root_angles)
+        stiffness[on_path] += pair_stiffness(geometry, begin + travel[on_path] * pitch, **bodies)
     single_phase = np.linspace(0, ratio, points)
-    single = pair_stiffness(geometry, begin + single_phase * pitch, root_angles=root_angles)
+    single = pair_stiffness(geometry, begin + single_phase * pitch, **bodies)
     return MeshStiffness(phase, stiffness, single, single_phase)
 
 

@@ -125,7 +125,9 @@ def gap_of_rounding(pair, place, row, bounds, section):
     start = np.clip(abs(row[7 - corner]) * 1e3, *bounds[1 - corner])
     around = min(np.linspace(-math.pi, math.pi, 73), key=lambda angle: distance((angle, start)))
     limits = [(around - 0.5, around + 0.5), bounds[1 - corner]]
-    found = minimize(distance, (around, start), bounds=limits, method="L-BFGS-B", options={"ftol": 1e-16, "gtol": 1e-13})
+    found = minimize(
+        distance, (around, start), bounds=limits, method="L-BFGS-B", options={"ftol": 1e-16, "gtol": 1e-13}
+    )
     options = {"xatol": 1e-11, "fatol": 1e-13, "maxiter": 2000}
     return 1e-3 * minimize(distance, found.x, bounds=limits, method="Nelder-Mead", options=options).fun
 
