@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from gearmbs.adams.parse.commands import Script, parse_script, read_script
     from gearmbs.adams.parse.deck import Deck
     from gearmbs.adams.parse.reader import parse_deck, read_deck
+    from gearmbs.adams.results.res_file import ResultSet, ResultsFile, read_results
     from gearmbs.adams.results.result import AdamsResult
     from gearmbs.adams.run.deck_plant import linear_plant
     from gearmbs.adams.run.runner import run_deck
@@ -21,6 +22,8 @@ __all__ = [
     "Deck",
     "DeckError",
     "Diagnostic",
+    "ResultSet",
+    "ResultsFile",
     "RoutineCall",
     "Script",
     "linear_plant",
@@ -28,6 +31,7 @@ __all__ = [
     "parse_deck",
     "parse_script",
     "read_deck",
+    "read_results",
     "read_script",
     "run_deck",
     "support_table",
@@ -38,6 +42,8 @@ late(
     __name__,
     {
         "AdamsResult": ".results.result",
+        "ResultSet": ".results.res_file",
+        "ResultsFile": ".results.res_file",
         "Deck": ".parse.deck",
         "DeckError": ".errors",
         "Diagnostic": ".errors",
@@ -48,6 +54,7 @@ late(
         "parse_deck": ".parse.reader",
         "parse_script": ".parse.commands",
         "read_deck": ".parse.reader",
+        "read_results": ".results.res_file",
         "read_script": ".parse.commands",
         "run_deck": ".run.runner",
         "support_table": ".support",

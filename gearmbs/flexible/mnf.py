@@ -133,6 +133,13 @@ class ModalNeutralFile:
             "I9": np.einsum("lpij,kpjm->klim", weighted, skew_phi, optimize=True),
         }
 
+    @property
+    def elastic(self) -> np.ndarray:
+        """Places of the shapes that are no rigid motions, among all."""
+        masses = self.nodal_masses
+        arm = self.positions - masses @ self.positions / masses.sum()
+        return np.flatnonzero(~_rigid(masses, arm, self.shapes[:, :, :3]))
+
     def modal_model(self, name: str = "body", modes: int | None = None) -> ModalModel:
         """Return the modal body, in SI, without the shapes that are rigid motions: the frame carries them.
 
@@ -156,7 +163,7 @@ class ModalNeutralFile:
         about += inertias.sum(axis=0)
         # a unit of a mode moves the nodes by the numbers of the file, in its length; rotations are numbers
         moved, turned = self.shapes[:, :, :3] * length, self.shapes[:, :, 3:]
-        kept = np.flatnonzero(~_rigid(masses, position - com, moved))
+        kept = self.elastic
         if modes is not None:
             kept = kept[np.argsort(self.eigenvalues[kept, 1], kind="stable")][:modes]
         if kept.size == 0:

@@ -187,12 +187,12 @@ def test_one_remark_for_many_of_a_kind():
     found = [m for m in run_deck(parse_deck(with_lines(lines)), end=0.01, steps=1).messages if "RANDOM" in m]
     assert len(found) == 1
     assert "VARIABLE/1, VARIABLE/2, VARIABLE/3, VARIABLE/4 and 26 more: FUNCTION" in found[0]
-    lines = "".join(f"MARKER/{n}, FLEX_BODY=1, NODE_ID={n}\n" for n in range(5001, 5031))
+    lines = "".join(f"MARKER/{n}, FE_PART=1, NODE_LABEL={n}\n" for n in range(5001, 5031))
     with pytest.raises(DeckError) as refused:
         run_deck(parse_deck(with_lines(lines)), end=0.01, steps=1)
     assert len(refused.value.diagnostics) == 60
     assert len(str(refused.value).splitlines()) == 2
-    assert "MARKER/5004 and 26 more: FLEX_BODY is not supported" in str(refused.value)
+    assert "MARKER/5004 and 26 more: FE_PART is not supported" in str(refused.value)
 
 
 def test_friction_takes_any_word_for_when_it_rests():

@@ -8,7 +8,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace as replaced
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from gearmbs.adams.builders.accelerations import FUNCTIONS, Accelerations
 from gearmbs.adams.builders.control import state_system
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.builders.data_calls import translated
+from gearmbs.adams.builders.flexible import add_flex_body, add_flexible_marker
 from gearmbs.adams.builders.frames import inertia_about_cm, marker_orientation, part_orientation
 from gearmbs.adams.builders.model import KINDS, AdamsModel, BodyState
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
@@ -32,7 +34,10 @@ from gearmbs.mechanism.elements import State
 from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
 from gearmbs.mechanism.expression_syntax import Call, Name, Node, Number
 from gearmbs.mechanism.joints import Joint
-from gearmbs.mechanism.parts import Marker
+from gearmbs.mechanism.parts import Body, Marker
+
+if TYPE_CHECKING:
+    from gearmbs.flexible import ModalModel
 
 
 def sensor_state(number: int) -> str:
@@ -65,7 +70,7 @@ class Builder:
         self,
         deck: Deck,
         inactive: frozenset[tuple[str, int]],
-        state: Mapping[int, BodyState],
+        state: Mapping[tuple[str, int], BodyState],
         span: tuple[float, float],
         sensed: Mapping[int, float],
     ) -> None:
@@ -84,6 +89,7 @@ class Builder:
         self.accelerations = Accelerations(self)
         self.markers = Markers()
         self.joints: dict[int, Joint] = {}
+        self.flexible: dict[int, ModalModel] = {}
         self.problems: list[Diagnostic] = []
         self.left_out: set[tuple[str, int]] = set()
         self._taken: set[str] = {"ground"}
@@ -96,6 +102,8 @@ class Builder:
             self.mechanism.gravity = scale * np.array([gravity.igrav, gravity.jgrav, gravity.kgrav])
         for part in self.deck.of(st.Part).values():
             self.attempt(part, self.add_part)
+        for flexible in self.deck.of(st.FlexBody).values():
+            self.attempt(flexible, partial(add_flex_body, self))
         for marker in self.deck.of(st.Marker).values():
             self.attempt(marker, self.add_marker)
         return not any(d.severity == ERROR for d in self.problems)
@@ -230,7 +238,7 @@ class Builder:
         if part.vm is not None:
             velocity = self.direction(part.vm, part, axes, cm) @ velocity
         velocity = units.factor("velocity") * velocity
-        start = self.state.get(part.id)
+        start = self.state.get(("PART", part.id))
         if start is None:
             position = units.length * np.array(part.qg)
             start = BodyState(position, axes, velocity - np.cross(spin, axes @ com), spin)
@@ -246,16 +254,20 @@ class Builder:
         )
         self.model.sources[body.name] = part
 
-    def direction(self, ref: int | None, part: st.Part, axes: np.ndarray, cm: st.Marker | None) -> np.ndarray:
+    def direction(
+        self, ref: int | None, part: st.Part | st.FlexBody, axes: np.ndarray, cm: st.Marker | None
+    ) -> np.ndarray:
         """Return the axes along which an initial velocity is given: a marker's, by default the CM marker's."""
         marker = self.deck.of(st.Marker)[ref] if ref is not None else cm
         if marker is None:
             return np.eye(3)
         owner = self.deck.of(st.Part)[marker.part or 0]
-        own = np.eye(3) if owner.ground else (axes if owner.id == part.id else part_orientation(owner))
+        own = np.eye(3) if owner.ground else (axes if owner is part else part_orientation(owner))
         return own @ marker_orientation(marker)
 
     def add_marker(self, statement: st.Marker) -> None:
+        if statement.flex_body is not None:
+            add_flexible_marker(self, statement)
         if statement.part is None:
             return
         owner = self.model.names["part", statement.part]
@@ -263,9 +275,12 @@ class Builder:
         if body is None:
             # its part could not be built, which is reported
             return
-        position = self.units.length * np.array(statement.qp)
+        self.put_marker(statement, body, self.units.length * np.array(statement.qp), marker_orientation(statement))
+
+    def put_marker(self, statement: st.Marker, body: Body, position: np.ndarray, axes: np.ndarray) -> None:
+        """Put a marker on a body, m in its frame, and remember its number."""
         name = self.claim(statement, "marker")
-        marker = body.marker(position, marker_orientation(statement), name=name)
+        marker = body.marker(position, axes, name=name)
         marker.number = statement.id
         self.markers[statement.id] = marker
 

@@ -38,7 +38,7 @@ def build_model(
     deck: Deck,
     allow_unsupported: bool = False,
     inactive: frozenset[tuple[str, int]] = frozenset(),
-    state: Mapping[int, BodyState] | None = None,
+    state: Mapping[tuple[str, int], BodyState] | None = None,
     span: tuple[float, float] = (0.0, 1.0),
     sensed: Mapping[int, float] | None = None,
 ) -> AdamsModel:
@@ -51,8 +51,8 @@ def build_model(
         Build it without what is not supported instead of refusing.
     inactive : set of (statement name, id)
         Elements a script has deactivated.
-    state : mapping of int to BodyState, optional
-        Where the parts are and how they move, by part id, instead of the deck's initial conditions.
+    state : mapping to BodyState, optional
+        Where the parts are and how they move, by the statement's name and id, instead of the deck's initial conditions.
     span : tuple of float
         Start of the analysis and about its end, in the deck's unit; motions given by their velocity or acceleration
         start from it.

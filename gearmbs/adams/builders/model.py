@@ -35,12 +35,16 @@ class BodyState(NamedTuple):
     ----------
     position, velocity, angular_velocity : ndarray, shape (3,)
     orientation : ndarray, shape (3, 3)
+    q_f, v_f : ndarray, shape (n,)
+        Modal coordinates and their rates; empty of a rigid part, and where they are zero.
     """
 
     position: np.ndarray
     orientation: np.ndarray
     velocity: np.ndarray
     angular_velocity: np.ndarray
+    q_f: np.ndarray = np.zeros(0)
+    v_f: np.ndarray = np.zeros(0)
 
 
 @dataclass

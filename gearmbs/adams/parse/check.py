@@ -47,7 +47,8 @@ MEASURES = frozenset(
 MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv", "corner", "icm", "irm", "jrm", "iicm", "jicm")
 TWO_PARTS = (st.Joint, st.Jprim)
 UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
-    st.Marker: ("flex_body", "point_mass", "node_id", "fe_part", "node_label", "curve"),
+    st.Marker: ("point_mass", "fe_part", "node_label", "curve"),
+    st.FlexBody: ("db_file", "bdf_file", "index_in_database", "dmode", "vmode"),
     st.Joint: ("mu_dyn_rot", "mu_dyn_trans", "mu_stat_rot", "mu_stat_trans"),
     st.Coupler: ("function",),
     st.Field: ("function",),
@@ -67,6 +68,7 @@ WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
     st.Output: ("dscale", "vscale", "ascale", "fscale", "dzero", "vzero", "azero", "fzero", "chart"),
     st.Results: tuple(n for n in specs_of(st.Results) if n.startswith("no")),
     st.Part: ("exact",),
+    st.FlexBody: ("exact", "char_len"),
     st.Friction: ("formulation",),
     st.Variable: ("ic",),
     st.Contact: ("augmented", "stiction_law", "max_deformation", "flip_i", "flip_j"),
@@ -84,6 +86,7 @@ WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
 WHY = {
     st.Output: "values are written as they are",
     st.Results: "everything is written",
+    st.FlexBody: "bodies are moved as little as the joints allow, and deform linearly",
     st.Part: "the parts are moved as little as the joints allow",
     st.Friction: "friction follows one law, see the documentation",
     st.Variable: "variables need no starting value",
@@ -128,6 +131,8 @@ def check(deck: Deck) -> list[Diagnostic]:
             if getattr(statement, name) in (None, ()):
                 keyword = _choices(cls, name) if specs_of(cls)[name].kind == CHOICE else name.upper()
                 fail(statement, f"{keyword} is missing")
+        if cls is st.Matrix and statement.id in _matrices_beside_files(deck):
+            continue
         for name in UNSUPPORTED_ARGUMENTS.get(cls, ()):
             if name in statement.given:
                 message = f"{statement.label()}: {name.upper()} is not supported"
@@ -139,6 +144,10 @@ def check(deck: Deck) -> list[Diagnostic]:
     for marker in deck.of(st.Marker).values():
         if marker.part is not None and marker.part not in deck.of(st.Part):
             fail(marker, f"there is no PART/{marker.part}", "part")
+        if marker.flex_body is not None and marker.flex_body not in deck.of(st.FlexBody):
+            fail(marker, f"there is no FLEX_BODY/{marker.flex_body}", "flex_body")
+        if marker.flex_body is None and marker.node_id is not None:
+            fail(marker, "NODE_ID is for markers of a FLEX_BODY", "node_id")
     _check_constraints(deck, fail)
     _check_forces(deck, fail)
     _check_contacts(deck, fail)
@@ -146,6 +155,11 @@ def check(deck: Deck) -> list[Diagnostic]:
     _check_data(deck, fail)
     _check_floating(deck, fail)
     return errors
+
+
+def _matrices_beside_files(deck: Deck) -> set[int]:
+    """Return the matrices of flexible bodies that come from a file: what they hold is in the file, too."""
+    return {ref for body in deck.of(st.FlexBody).values() if body.mnf_file for ref in body.matrices}
 
 
 Fail = Callable[..., None]
@@ -209,8 +223,10 @@ def _check_markers(deck: Deck, statement: st.Statement, fail: Fail) -> None:
         if ref not in markers:
             fail(statement, f"there is no MARKER/{ref} for {name.upper()}", name)
     if isinstance(statement, TWO_PARTS) and statement.i in markers and statement.j in markers:
-        if markers[statement.i].part == markers[statement.j].part:
-            fail(statement, f"I and J are both on PART/{markers[statement.i].part}; it must join two parts")
+        i, j = markers[statement.i], markers[statement.j]
+        if (i.part, i.flex_body) == (j.part, j.flex_body):
+            owner = f"PART/{i.part}" if i.flex_body is None else f"FLEX_BODY/{i.flex_body}"
+            fail(statement, f"I and J are both on {owner}; it must join two parts")
 
 
 def _check_part(deck: Deck, part: st.Part, fail: Fail) -> None:

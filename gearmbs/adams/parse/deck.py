@@ -14,6 +14,7 @@ from gearmbs.adams.parse.units import deck_units
 from gearmbs.mechanism.expression_syntax import Units
 
 if TYPE_CHECKING:
+    from gearmbs.flexible import ModalNeutralFile
     from gearmbs.mechanism import Mechanism
     from gearmbs.mechanism.user_functions import UserFunction
 
@@ -36,6 +37,8 @@ class Deck:
         (name, id) -> text of statements that are read only as far as others name them.
     functions : dict
         Functions that routines of the user have become, by name.
+    modal_files : dict
+        Modal neutral files that have been read, by path.
     """
 
     title: str = ""
@@ -44,6 +47,7 @@ class Deck:
     diagnostics: list[Diagnostic] = field(default_factory=list)
     unread: dict[tuple[str, int], RawStatement] = field(default_factory=dict)
     functions: dict[str, UserFunction] = field(default_factory=dict)
+    modal_files: dict[str, ModalNeutralFile] = field(default_factory=dict)
 
     def of(self, kind: type[S]) -> dict[int, S]:
         """Return the statements of one class by id."""

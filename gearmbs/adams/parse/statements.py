@@ -27,6 +27,7 @@ from gearmbs.adams.parse.statements_data import (
     Variable,
 )
 from gearmbs.adams.parse.statements_events import Sensor, String
+from gearmbs.adams.parse.statements_flexible import FlexBody
 from gearmbs.adams.parse.statements_forces import (
     Accgrav,
     Beam,
@@ -63,6 +64,7 @@ STATEMENTS: dict[str, type[Statement]] = {
     "DIFF": Diff,
     "EQUILIBRIUM": Equilibrium,
     "FIELD": Field,
+    "FLEX_BODY": FlexBody,
     "FRICTION": Friction,
     "GCON": Gcon,
     "GEAR": Gear,
@@ -108,7 +110,7 @@ IGNORED = frozenset("MATERIAL PREFERENCES DEBUG FEMDATA LSOLVER".split())
 """Statements without effect on the numbers computed here."""
 
 UNSUPPORTED = frozenset(
-    """CLEARANCE EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART FLEX_BODY MFORCE MREQUEST
+    """CLEARANCE EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART MFORCE MREQUEST
     NFORCE NODE NORMAL_MODE_ANALYSIS POINT_MASS PSTATE SECTION SURFACE TIRE UCON""".split()
 )
 """Statements of ADAMS that change the motion and are not modelled here."""
@@ -131,6 +133,7 @@ __all__ = [
     "Diff",
     "Equilibrium",
     "Field",
+    "FlexBody",
     "Friction",
     "Gcon",
     "Gear",

@@ -62,7 +62,7 @@ class Marker(Statement):
     floating: bool = arg("FLOATING", FLAG, False)
     flex_body: int | None = arg("FLEX_BODY", ID)
     point_mass: int | None = arg("POINT_MASS", ID)
-    node_id: int | None = arg("NODE_ID", ID)
+    node_id: int | None = arg("NODE_ID", ID, aliases="NODE")
     fe_part: int | None = arg("FE_PART", ID)
     node_label: int | None = arg("NODE_LABEL", ID)
     curve: int | None = arg("CURVE", ID)

@@ -56,9 +56,7 @@ def assembly_of(model: AdamsModel, solution: Solution) -> Assembly:
             # a runner on a curve, which is no part
             continue
         label = model.sources[name].label()
-        distances[label] = float(
-            np.linalg.norm(solution.com_position(name)[0] - body.position - body.orientation @ body.com)
-        )
+        distances[label] = float(np.linalg.norm(solution.com_position(name)[0] - body.centre_of_mass()[0]))
         # |A - B| = 2 sqrt(2) sin(angle/2)
         apart = float(np.linalg.norm(solution.orientation(name)[0] - body.orientation))
         angles[label] = 2.0 * float(np.arcsin(min(1.0, apart / np.sqrt(8.0))))

@@ -22,6 +22,7 @@ from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.analyses.statics import StaticResult
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.contacts import ContactTracks
+from gearmbs.mechanism.modal import ModalBody
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -168,6 +169,24 @@ class RunRecord:
         """
         return np.concatenate([part_motion(s, number) for s in self.segments] or [np.zeros((0, 18))])
 
+    def flexible(self, number: int) -> np.ndarray:
+        """Return the motion of the frame of FLEX_BODY/number, shape (m, 18), as of `part`."""
+        rows = [part_motion(s, number, "flex_body") for s in self.segments]
+        return np.concatenate(rows or [np.zeros((0, 18))])
+
+    def modal(self, number: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the modal coordinates of FLEX_BODY/number and their rates (1/time), each of shape (m, modes).
+
+        The modes are those of the file without rigid motions, a unit of each what the file has, in its units.
+        """
+        rows = []
+        for s in self.segments:
+            name = s.model.names["flex_body", number]
+            rates = s.solution.modal_velocities(name) * self.deck.units.time
+            rows.append(np.stack([s.solution.modal_coordinates(name), rates]))
+        found = np.concatenate(rows, axis=1) if rows else np.zeros((2, 0, 0))
+        return found[0], found[1]
+
     def force(self, kind: str, number: int) -> np.ndarray:
         """Return what an element exerts on the part of its I marker, shape (m, 6), deck units.
 
@@ -261,6 +280,13 @@ class RunRecord:
             if not part.ground:
                 along = columns("part", PART_COLUMNS, tuple(self.unit(d) for d in PART_DIMENSIONS))
                 data[f"part_{number}"] = (along, self.part(number), {"long_name": part.name or part.label()})
+        for number, body in self.deck.of(st.FlexBody).items() if self.segments else ():
+            along = columns("part", PART_COLUMNS, tuple(self.unit(d) for d in PART_DIMENSIONS))
+            data[f"flex_body_{number}"] = (along, self.flexible(number), {"long_name": body.name or body.label()})
+            q_f, v_f = self.modal(number)
+            modes = ("time", f"flex_body_{number}_mode")
+            data[f"flex_body_{number}_modal"] = (modes, q_f, {"long_name": "modal coordinates", "units": "1"})
+            data[f"flex_body_{number}_modal_rate"] = (modes, v_f, {"units": f"1/{self.unit('time')}"})
         for kind, number in self.elements:
             along = columns("force", FORCE_COLUMNS, (self.unit("force"),) * 3 + (self.unit("torque"),) * 3)
             data[f"{kind}_{number}"] = (along, self.force(kind, number), {"long_name": f"{kind.upper()}/{number}"})
@@ -302,24 +328,30 @@ def unique(names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def part_motion(segment: Segment, number: int) -> np.ndarray:
-    """Return the 18 columns of a part's frame over an analysis, in the deck's units."""
+def part_motion(segment: Segment, number: int, kind: str = "part") -> np.ndarray:
+    """Return the 18 columns of the frame of a part, or of a ``"flex_body"``, over an analysis, in the deck's units."""
     from gearmbs.dae.equations.rotation import euler_from_matrix
 
     s = segment.solution
-    name = segment.model.names["part", number]
+    name = segment.model.names[kind, number]
     body = segment.model.mechanism.bodies[name]
     axes = s.orientation(name)
-    arm = axes @ body.com
+    arm, push, pushed = axes @ body.com, 0.0, 0.0
+    if isinstance(body, ModalBody):
+        # the centre of mass moves in the body as this deforms
+        q_f, v_f, a_f = s.modal_motion(name)
+        arm = arm + np.einsum("tij,tj->ti", axes, q_f @ body.mean)
+        push = np.einsum("tij,tj->ti", axes, v_f @ body.mean)
+        pushed = np.einsum("tij,tj->ti", axes, a_f @ body.mean)
     spin, alpha = s.angular_velocity(name), s.angular_acceleration(name)
     tip = np.cross(spin, arm)
     motion = np.hstack(
         [
             s.com_position(name) - arm,
             np.array([euler_from_matrix(a) for a in axes]),
-            s.com_velocity(name) - tip,
+            s.com_velocity(name) - tip - push,
             spin,
-            s.com_acceleration(name) - np.cross(alpha, arm) - np.cross(spin, tip),
+            s.com_acceleration(name) - np.cross(alpha, arm) - np.cross(spin, tip + 2.0 * push) - pushed,
             alpha,
         ]
     )

@@ -44,6 +44,7 @@ def _entities(result: RunRecord) -> Iterator[_Entity]:
         attributes = f'name={quoteattr(name + "_XFORM")} entity={quoteattr(name)} entType="Part" objectId="{number}"'
         units = tuple(result.unit(d) for d in PART_DIMENSIONS)
         yield _Entity(attributes, PART_COLUMNS, units, result.part(number))
+    yield from _flexible_entities(result)
     wrench_units = (result.unit("force"),) * 3 + (result.unit("torque"),) * 3
     kinds = {kind: cls for cls, kind in KINDS.items()}
     for kind, number in result.elements:
@@ -72,6 +73,20 @@ def _tracks(result: RunRecord, number: int, contact: str) -> Iterator[_Entity]:
             attributes = f'name={full} entity={quoteattr(contact)} entType="Contact" objectId="{number}"'
             components = tuple(names[k][1] for k in at)
             yield _Entity(attributes, components, tuple(units[k] for k in at), table[:, track, at])
+
+
+def _flexible_entities(result: RunRecord) -> Iterator[_Entity]:
+    """Frames of flexible bodies as those of parts, then their modal coordinates and the rates of these."""
+    for number, body in result.deck.of(st.FlexBody).items():
+        name = body.name or f"FLEX_BODY_{number}"
+        kind = f'entity={quoteattr(name)} entType="Flexible_Body" objectId="{number}"'
+        units = tuple(result.unit(d) for d in PART_DIMENSIONS)
+        yield _Entity(f"name={quoteattr(name + '_XFORM')} {kind}", PART_COLUMNS, units, result.flexible(number))
+        q_f, v_f = result.modal(number)
+        names = tuple(f"{letter}{k + 1}" for letter in ("Q", "QDOT") for k in range(q_f.shape[1]))
+        rates = (f"1/{result.unit('time')}",) * q_f.shape[1]
+        modal = ("no_units",) * q_f.shape[1] + rates
+        yield _Entity(f"name={quoteattr(name + '_Q')} {kind}", names, modal, np.hstack([q_f, v_f]))
 
 
 def _package_version() -> str:

@@ -40,6 +40,7 @@ from gearmbs.dae.model.system import System
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.analyses import frozen_friction, linear_modes
+from gearmbs.mechanism.modal import ModalBody
 from gearmbs.mechanism.passages import singular_passage
 from gearmbs.mechanism.stops import StopAt
 
@@ -493,7 +494,12 @@ def _remember(session: Session, model: AdamsModel, segment: Segment, evaluator: 
         )
         for n in names
     ]
-    session.state = part_states(model, np.array(last))
+    modal = {
+        b.name: (s.modal_coordinates(b.name)[-1].copy(), s.modal_velocities(b.name)[-1].copy())
+        for b in model.mechanism.bodies.values()
+        if isinstance(b, ModalBody)
+    }
+    session.state = part_states(model, np.array(last), modal)
     session.turns = evaluator.turns()
     for name in model.mechanism.state_names:
         session.states[name] = float(evaluator.state(name)[-1])

@@ -16,6 +16,7 @@ from gearmbs.adams.parse.deck import Deck
 
 AT_START: dict[type, frozenset[str]] = {
     st.Part: frozenset("qg reuler zg xg vx vy vz wx wy wz vm wm exact".split()),
+    st.FlexBody: frozenset("qg reuler zg xg vx vy vz wx wy wz vm wm exact".split()),
     st.Joint: frozenset(["ic", "ictran", "icrot"]),
     st.Motion: frozenset(["icdisp", "icvel"]),
     st.Diff: frozenset(["ic"]),
@@ -35,7 +36,8 @@ class Session:
         As commands have left it.
     inactive : set of (statement name, id)
     state, states, turns
-        Where the last analysis ended: parts by id, DIFFs by id, counted angles; ``state`` is None before the first.
+        Where the last analysis ended: parts by statement name and id, DIFFs by id, counted angles; ``state`` is None
+        before the first.
     time : float
         In the deck's unit.
     places : dict
@@ -50,7 +52,7 @@ class Session:
 
     deck: Deck
     inactive: set[tuple[str, int]] = field(default_factory=set)
-    state: dict[int, BodyState] | None = None
+    state: dict[tuple[str, int], BodyState] | None = None
     states: dict[str, float] = field(default_factory=dict)
     turns: dict[tuple[str, str, str], float] = field(default_factory=dict)
     time: float = 0.0

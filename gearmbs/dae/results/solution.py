@@ -321,14 +321,14 @@ class Solution(Shown):
 
     def modal_coordinates(self, body: str) -> np.ndarray:
         """Return the modal coordinates of a body over time, shape (m, modes)."""
-        return self._modal(body)[0]
+        return self.modal_motion(body)[0]
 
     def modal_velocities(self, body: str) -> np.ndarray:
         """Return the rates of the modal coordinates of a body over time, shape (m, modes), 1/s."""
-        return self._modal(body)[1]
+        return self.modal_motion(body)[1]
 
-    def _modal(self, body: str) -> np.ndarray:
-        """Return q_f, v_f and their accelerations of a body, shape (3, m, modes)."""
+    def modal_motion(self, body: str) -> np.ndarray:
+        """Return the modal coordinates of a body, their rates (1/s) and accelerations (1/s^2), shape (3, m, modes)."""
         model, number = self.system.model, self._body(body) + 1
         if not model.modes[number]:
             raise KeyError(f"body {body!r} is rigid: it has no modal coordinates")

@@ -1,0 +1,148 @@
+"""FLEX_BODY of a deck as a modal body, and the markers on its nodes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearmbs.adams.builders.frames import marker_orientation, part_orientation
+from gearmbs.adams.builders.model import BodyState
+from gearmbs.adams.errors import WARNING
+from gearmbs.adams.parse import statements as st
+from gearmbs.mechanism.expression_compiler import compile_expression
+from gearmbs.mechanism.expression_syntax import Scope
+
+if TYPE_CHECKING:
+    from gearmbs.adams.builders.builder import Builder
+    from gearmbs.flexible import ModalModel, ModalNeutralFile
+    from gearmbs.flexible.damping import Damping
+
+COUPLINGS = {"T" * 9: "full", "TTTTFTTTF": "partial"}
+"""Levels of coupling by the inertia invariants that are kept; without a choice it is the second."""
+FREQUENCY, NUMBER = (re.compile(rf"\b{name}\b(\s*\(\s*\w*\s*\))?", re.IGNORECASE) for name in ("FXFREQ", "FXMODE"))
+"""What CRATIO may ask for: the frequency of a mode in Hz, and its number."""
+ON_NODE = 1e-6
+"""Distance from its node, in sizes of the body, up to which a marker is on it."""
+
+
+def add_flex_body(b: Builder, s: st.FlexBody) -> None:
+    """FLEX_BODY: a modal body from its MNF, with the damping and the coupling of the statement."""
+    mnf, model = _model(b, s)
+    name = b.claim(s, "flex_body")
+    level = _coupling(s)
+    numbers = mnf.mode_ids[mnf.elastic]
+    ratios: Damping = "adams"
+    if s.cratio is not None:
+        ratios = modal_ratios(s.cratio, model.frequencies, numbers).tolist()
+    start = b.state.get(("FLEX_BODY", s.id))
+    if start is None:
+        start = _start(b, s, model)
+    body = model.add_to(
+        b.mechanism, name, damping=ratios, coupling=level, start=start.q_f.tolist() or None,
+        position=start.position, orientation=start.orientation, velocity=start.velocity,
+        angular_velocity=start.angular_velocity,
+    )  # fmt: skip
+    if start.v_f.size:
+        body.rate[:] = start.v_f
+    b.model.sources[body.name] = s
+    b.flexible[s.id] = model
+    if s.matrices:
+        b.remark(
+            WARNING,
+            s,
+            f"all {model.modes} elastic modes of the MNF are taken; which of them MATRICES select is not read",
+        )
+
+
+def add_flexible_marker(b: Builder, statement: st.Marker) -> None:
+    """MARKER with FLEX_BODY: at a node, by NODE_ID or by QP."""
+    model = b.flexible.get(statement.flex_body or 0)
+    if model is None:
+        # its body could not be built, which is reported
+        return
+    body = b.mechanism.bodies[b.model.names["flex_body", statement.flex_body or 0]]
+    given = b.units.length * np.array(statement.qp)
+    node = statement.node_id
+    if node is None:
+        node = int(model.ids[np.argmin(np.linalg.norm(model.positions - given, axis=1))])
+    place = model.place(node)
+    off = float(np.linalg.norm(given - place))
+    if (statement.node_id is None or "qp" in statement.given) and off > ON_NODE * model.size:
+        raise ValueError(
+            f"QP is {off / b.units.length:.4g} from node {node}; put the marker on a node, or on a PART fixed to one"
+        )
+    b.put_marker(statement, body, place, marker_orientation(statement))
+
+
+def modal_ratios(text: str, frequencies: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """Return the damping ratio that CRATIO gives each mode.
+
+    Parameters
+    ----------
+    text : str
+        An expression in FXFREQ (Hz) and FXMODE, the number of the mode in its file.
+    frequencies, numbers : ndarray, shape (n,)
+        Of the modes.
+
+    Raises
+    ------
+    ValueError
+        If it asks for anything else.
+    """
+    out = []
+    for frequency, number in zip(frequencies, numbers):
+        of_mode = FREQUENCY.sub(f"({float(frequency)!r})", text)
+        value = compile_expression(NUMBER.sub(f"({float(number)!r})", of_mode), Scope()).constant
+        if value is None:
+            raise ValueError(f"CRATIO = {text} changes with time; it may depend on FXFREQ and FXMODE alone")
+        out.append(value)
+    return np.array(out)
+
+
+def _model(b: Builder, s: st.FlexBody) -> tuple[ModalNeutralFile, ModalModel]:
+    """Read the body's MNF, once a deck."""
+    from gearmbs.flexible import FlexibleError, read_mnf
+
+    if s.mnf_file is None:
+        raise ValueError("MNF_FILE is missing; bodies from MATRICES alone, MD DB and BDF files are not read")
+    path = Path(s.mnf_file.replace("\\", "/"))
+    if "://" in s.mnf_file:
+        raise ValueError(f"MNF_FILE = {s.mnf_file}: no database of ADAMS/Car is looked up; give the path of the file")
+    if not path.is_absolute():
+        path = Path(b.deck.file).parent / path
+    key = str(path)
+    if key not in b.deck.modal_files:
+        try:
+            b.deck.modal_files[key] = read_mnf(path)
+        except FlexibleError as error:
+            raise ValueError(str(error)) from error
+        except OSError as error:
+            raise ValueError(f"MNF_FILE = {s.mnf_file}: {error.strerror}; looked for {path}") from error
+    mnf = b.deck.modal_files[key]
+    return mnf, mnf.modal_model(s.name or s.label())
+
+
+def _coupling(s: st.FlexBody) -> str:
+    """Return the level of coupling that a pattern of invariants asks for."""
+    if not s.invariants:
+        return "partial"
+    pattern = "".join(word[0] for word in s.invariants)
+    if pattern not in COUPLINGS:
+        known = ", ".join(f"{':'.join(p)} ({level})" for p, level in COUPLINGS.items())
+        raise ValueError(f"INVARIANTS = {':'.join(pattern)} is not supported; choose one of {known}")
+    return COUPLINGS[pattern]
+
+
+def _start(b: Builder, s: st.FlexBody, model: ModalModel) -> BodyState:
+    """Return where the deck puts the body: QG and its angles, velocities of its centre of mass."""
+    units = b.units
+    axes = part_orientation(s)
+    com = model.properties.com
+    own = np.eye(3)
+    spin = units.factor("angular_velocity") * (b.direction(s.wm, s, axes, None) @ np.array([s.wx, s.wy, s.wz]))
+    push = b.direction(s.vm, s, axes, None) if s.vm is not None else own
+    velocity = units.factor("velocity") * (push @ np.array([s.vx, s.vy, s.vz]))
+    return BodyState(units.length * np.array(s.qg), axes, velocity - np.cross(spin, axes @ com), spin)

@@ -1,0 +1,40 @@
+"""Statements of a deck as typed records: flexible bodies."""
+
+# `arg` returns a dataclass field; the linter takes it for a default value
+# ruff: noqa: RUF009
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gearmbs.adams.parse.grammar import EXPRESSION, ID, IDS, INT, PATH, REAL, REALS, WORDS, arg
+from gearmbs.adams.parse.statement import Statement, Vector
+
+
+@dataclass(frozen=True)
+class FlexBody(Statement, keyword="FLEX_BODY"):
+    """FLEX_BODY: a body with modes, from a modal neutral file."""
+
+    mnf_file: str | None = arg("MNF_FILE", PATH)
+    db_file: str | None = arg("DB_FILE", PATH)
+    bdf_file: str | None = arg("BDF_FILE", PATH)
+    index_in_database: int | None = arg("INDEX_IN_DATABASE", INT)
+    matrices: tuple[int, ...] = arg("MATRICES", IDS, (), count=(1, 100))
+    qg: Vector = arg("QG", REALS, (0.0, 0.0, 0.0), count=3, dimension="length")
+    reuler: Vector | None = arg("REULER", REALS, count=3, dimension="angle")
+    zg: Vector | None = arg("ZG", REALS, count=3, dimension="length")
+    xg: Vector | None = arg("XG", REALS, count=3, dimension="length")
+    vx: float = arg("VX", REAL, 0.0, dimension="velocity")
+    vy: float = arg("VY", REAL, 0.0, dimension="velocity")
+    vz: float = arg("VZ", REAL, 0.0, dimension="velocity")
+    wx: float = arg("WX", REAL, 0.0, dimension="angular_velocity")
+    wy: float = arg("WY", REAL, 0.0, dimension="angular_velocity")
+    wz: float = arg("WZ", REAL, 0.0, dimension="angular_velocity")
+    vm: int | None = arg("VM", ID)
+    wm: int | None = arg("WM", ID)
+    exact: tuple[str, ...] = arg("EXACT", WORDS, (), choices="X Y Z PSI THETA PHI")
+    invariants: tuple[str, ...] = arg("INVARIANTS", WORDS, (), choices="TRUE FALSE")
+    dmode: Vector = arg("DMODE", REALS, (), count=(1, 10000))
+    vmode: Vector = arg("VMODE", REALS, (), count=(1, 10000))
+    char_len: float | None = arg("CHAR_LEN", REAL, dimension="length")
+    cratio: str | None = arg("CRATIO", EXPRESSION)

@@ -1,0 +1,142 @@
+"""FLEX_BODY: bodies from modal neutral files in decks, their markers, damping and results."""
+
+import numpy as np
+import pytest
+
+from gearmbs.adams import DeckError, parse_deck, parse_script, read_deck, read_results, run_deck
+from gearmbs.adams.builders.flexible import modal_ratios
+from gearmbs.flexible import Shaft, ShaftSection, mnf_of, read_mnf, reduce_model, write_mnf
+from gearmbs.mechanism import Mechanism
+
+DECK = """\
+bar that swings
+UNITS/FORCE=NEWTON,MASS=KILOGRAM,LENGTH=MILLIMETER,TIME=SECOND
+PART/1,GROUND
+MARKER/10,PART=1,REULER=0,90D,0
+MARKER/11,PART=1
+FLEX_BODY/1,MATRICES=1,2,MNF_FILE=bar.mnf,REULER=90D,90D,0,CRATIO=STEP(FXFREQ,1000,0.02,20000,0.5)\\
+MATRIX/1,FILE=bar.mtx,NAME=GENSTIFF
+MATRIX/2,FILE=bar.mtx,NAME=INVAR1
+MARKER/100,FLEX_BODY=1,NODE_ID=1,REULER={pivot}
+MARKER/101,FLEX_BODY=1,QP=0,0,400
+MARKER/102,FLEX_BODY=1,NODE=3
+JOINT/1,REVOLUTE,I=100,J=11
+ACCGRAV/JGRAV=-9806.65
+REQUEST/1,DISPLACEMENT,I=101,J=11
+END
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with the file of a bar of 0.4 m along z and a deck that names it."""
+    path = tmp_path_factory.mktemp("flexible")
+    bar = Shaft([ShaftSection(0.4, 0.004)], seats={"A": 0.0, "B": 0.4}, elements=4, name="bar").model()
+    write_mnf(path / "bar.mnf", mnf_of(reduce_model(bar, modes=8)))
+    (path / "bar.adm").write_text(DECK.format(pivot="0,90D,0"))
+    return path
+
+
+def by_hand(folder, coupling="partial"):
+    """The mechanism of the deck in Python."""
+    mnf = read_mnf(folder / "bar.mnf")
+    model = mnf.modal_model("bar")
+    m = Mechanism("bar", gravity=(0, -9.80665, 0))
+    ratios = modal_ratios("STEP(FXFREQ,1000,0.02,20000,0.5)", model.frequencies, mnf.mode_ids[mnf.elastic])
+    # z of the body along x, x along y
+    axes = np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]])
+    body = model.add_to(m, "bar", damping=ratios, coupling=coupling, orientation=axes)
+    turned = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    pivot, tip = body.marker(model.place(1), turned, name="pivot"), body.marker(model.place(5), name="tip")
+    m.joint("revolute", "pin", pivot, m.ground.marker())
+    return m, tip
+
+
+def test_a_bar_from_a_file_swings_as_the_same_bar_in_python(folder):
+    result = run_deck(read_deck(folder / "bar.adm"), end=0.1, steps=20)
+    assert result.success
+    assert any("all 8 elastic modes of the MNF are taken" in text for text in result.messages)
+    m, tip = by_hand(folder)
+    expected = m.simulate(0.1, t_eval=np.linspace(0, 0.1, 21), tol=1e-9)
+    np.testing.assert_allclose(result.request(1)[:, 1:4], 1e3 * expected.marker_position(tip), atol=2e-4)
+    q_f, v_f = result.modal(1)
+    np.testing.assert_allclose(q_f, expected.modal_coordinates("bar"), atol=1e-6 * np.abs(q_f).max() + 1e-9)
+    assert np.abs(q_f).max() > 0
+    assert v_f.shape == q_f.shape == (21, 8)
+
+
+def test_velocity_and_acceleration_of_the_frame_are_those_of_its_place(folder):
+    result = run_deck(read_deck(folder / "bar.adm"), end=0.01, steps=500)
+    frame = result.flexible(1)
+    np.testing.assert_allclose(frame[0, :3], 0, atol=1e-9)
+    for place, rate in ((0, 6), (6, 12)):
+        found = np.gradient(frame[:, place : place + 3], result.t, axis=0)[250:-1]
+        np.testing.assert_allclose(frame[250:-1, rate : rate + 3], found, atol=0.02 * np.abs(found).max())
+
+
+def test_an_analysis_goes_on_from_the_deformed_body(folder):
+    deck = read_deck(folder / "bar.adm")
+    one = run_deck(deck, parse_script("SIM/DYN,END=0.08,STEPS=8\n"))
+    two = run_deck(deck, parse_script("SIM/DYN,END=0.04,STEPS=4\nSIM/DYN,END=0.08,STEPS=4\n"))
+    np.testing.assert_allclose(two.request(1)[-1], one.request(1)[-1], atol=5e-3)
+    np.testing.assert_allclose(two.modal(1)[0][-1], one.modal(1)[0][-1], atol=1e-3 * np.abs(one.modal(1)[0]).max())
+
+
+def test_results_file_and_data_set_have_the_modal_coordinates(folder, tmp_path):
+    result = run_deck(read_deck(folder / "bar.adm"), end=0.02, steps=4)
+    result.write(tmp_path / "bar")
+    found = read_results(tmp_path / "bar.res")
+    np.testing.assert_array_equal(found.t, result.t)
+    assert found.units["length"] == "mm"
+    modal = found["FLEX_BODY_1_Q"]
+    assert modal.components[:2] == ("Q1", "Q2")
+    assert modal.components[8] == "QDOT1"
+    np.testing.assert_array_equal(modal.values, np.hstack(result.modal(1)))
+    np.testing.assert_array_equal(found["FLEX_BODY_1_XFORM"]["X"], result.flexible(1)[:, 0])
+    with pytest.raises(KeyError, match="there is no result set 'PART_9'; the file has"):
+        found["PART_9"]
+    data = result.to_dataset()
+    np.testing.assert_array_equal(data.flex_body_1_modal, result.modal(1)[0])
+    whole = (tmp_path / "bar.res").read_text()
+    for text, message in (
+        (whole[: len(whole) // 2], "cut off"),
+        (whole.replace("<Step type", "<Step kind", 1).replace("</Step>", "1.0</Step>", 1), "numbers for"),
+        ("<a></a>", "no StepMap"),
+    ):
+        (tmp_path / "bad.res").write_text(text)
+        with pytest.raises(DeckError, match=message):
+            read_results(tmp_path / "bad.res")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("bar.mnf", "none.mnf", "MNF_FILE = none.mnf: No such file"),
+        ("bar.mnf", "mdids://x/bar.mnf", "give the path of the file"),
+        ("MNF_FILE=bar.mnf,", "", "MATRIX/2: DATA_FILE is not supported"),
+        ("NODE=3", "NODE=77", "there is no node 77"),
+        ("NODE=3", "NODE=3,QP=0,0,150", "QP is 50 from node 3"),
+        ("NODE=3", "QP=0,0,170", "QP is 30 from node 3"),
+        ("STEP(FXFREQ,1000,0.02,20000,0.5)", "0.1*TIME", "changes with time"),
+        ("STEP(FXFREQ,1000,0.02,20000,0.5)", "0.1*FREQ", "FREQ"),
+        (",CRATIO", ",INVARIANTS=T:T:F:F:F:T:T:F:F,CRATIO", "is not supported; choose one of"),
+        ("102,FLEX_BODY=1", "102,FLEX_BODY=7", "there is no FLEX_BODY/7"),
+        ("I=100,J=11", "I=100,J=102", "both on FLEX_BODY/1"),
+    ],
+)
+def test_what_a_deck_cannot_have_is_named_with_its_line(folder, old, new, message):
+    text = DECK.format(pivot="0,90D,0").replace(old, new, 1)
+
+    def built():
+        return parse_deck(text, str(folder / "other.adm")).to_mechanism()
+
+    with pytest.raises(DeckError, match=message) as caught:
+        built()
+    assert "other.adm:" in str(caught.value)
+
+
+def test_damping_by_frequency_and_number_of_the_mode():
+    numbers = np.array([7, 8, 9])
+    found = modal_ratios("IF(FXFREQ-100:0.01,0.02,0.1)", np.array([50.0, 100.0, 500.0]), numbers)
+    np.testing.assert_allclose(found, [0.01, 0.02, 0.1])
+    np.testing.assert_allclose(modal_ratios("0.01*FXMODE(1)", np.ones(3), numbers), [0.07, 0.08, 0.09])
