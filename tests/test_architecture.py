@@ -65,6 +65,7 @@ EXCEPTIONS = {
     ("mechanism", "dae.compiled"): "kernels of force elements: views of tables, calls through addresses",
     ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
     ("adams", "gears"): "pairs are written as the contact forces of a deck",
+    ("adams", "flexible"): "FLEX_BODY is read from its modal neutral file",
     ("adams", "view"): "the wheels of a pair that is written as solids are those of the 3-D scenes",
     ("studies", "gearmbs"): "a result says which version made it",
     ("studies", "dae.analyses"): "the modes of a drivetrain; the type alone",
@@ -86,8 +87,8 @@ CIRCLES = {
         "methods of Mechanism, and the functions that carry them out",
     ("adams.builders.accelerations", "adams.builders.builder", "adams.builders.constraints", "adams.builders.contacts",
      "adams.builders.control", "adams.builders.curve_data", "adams.builders.curves", "adams.builders.data_calls",
-     "adams.builders.forces", "adams.builders.initial", "adams.builders.mechanism", "adams.builders.model",
-     "adams.builders.routine_calls", "adams.builders.routines", "adams.builders.state_equations",
+     "adams.builders.flexible", "adams.builders.forces", "adams.builders.initial", "adams.builders.mechanism",
+     "adams.builders.model", "adams.builders.routine_calls", "adams.builders.routines", "adams.builders.state_equations",
      "adams.builders.user_elements", "adams.parse.check", "adams.parse.deck", "adams.parse.readers"):
         "a deck builds its mechanism; types only, and one method",
     ("campaigns.campaign", "campaigns.exports", "campaigns.report", "campaigns.response", "campaigns.sensitivity"):

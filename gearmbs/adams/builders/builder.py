@@ -17,7 +17,6 @@ from gearmbs.adams.builders.accelerations import FUNCTIONS, Accelerations
 from gearmbs.adams.builders.control import state_system
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.builders.data_calls import translated
-from gearmbs.adams.builders.flexible import add_flex_body, add_flexible_marker
 from gearmbs.adams.builders.frames import inertia_about_cm, marker_orientation, part_orientation
 from gearmbs.adams.builders.model import KINDS, AdamsModel, BodyState
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
@@ -38,6 +37,10 @@ from gearmbs.mechanism.parts import Body, Marker
 
 if TYPE_CHECKING:
     from gearmbs.flexible import ModalModel
+
+
+Maker = Callable[["Builder", Any], None]
+"""What adds a statement of one kind to a builder's mechanism."""
 
 
 def sensor_state(number: int) -> str:
@@ -94,8 +97,14 @@ class Builder:
         self.left_out: set[tuple[str, int]] = set()
         self._taken: set[str] = {"ground"}
 
-    def add_bodies(self) -> bool:
-        """Add gravity, parts and markers; return whether elements may follow."""
+    def add_bodies(self, add_flex_body: Maker, add_flexible_marker: Maker) -> bool:
+        """Add gravity, parts, flexible bodies and markers; return whether elements may follow.
+
+        Parameters
+        ----------
+        add_flex_body, add_flexible_marker : callable
+            What adds a FLEX_BODY, and a marker on one.
+        """
         gravity = self.deck.only(st.Accgrav)
         if gravity is not None and ("ACCGRAV", 0) not in self.inactive:
             scale = self.units.factor("acceleration")
@@ -105,7 +114,8 @@ class Builder:
         for flexible in self.deck.of(st.FlexBody).values():
             self.attempt(flexible, partial(add_flex_body, self))
         for marker in self.deck.of(st.Marker).values():
-            self.attempt(marker, self.add_marker)
+            on_node = marker.flex_body is not None
+            self.attempt(marker, partial(add_flexible_marker, self) if on_node else self.add_marker)
         return not any(d.severity == ERROR for d in self.problems)
 
     # --- helpers ------------------------------------------------------------------------------------
@@ -266,8 +276,6 @@ class Builder:
         return own @ marker_orientation(marker)
 
     def add_marker(self, statement: st.Marker) -> None:
-        if statement.flex_body is not None:
-            add_flexible_marker(self, statement)
         if statement.part is None:
             return
         owner = self.model.names["part", statement.part]

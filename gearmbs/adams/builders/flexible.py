@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gearmbs.adams.builders.builder import Builder
 from gearmbs.adams.builders.frames import marker_orientation, part_orientation
 from gearmbs.adams.builders.model import BodyState
 from gearmbs.adams.errors import WARNING
@@ -16,7 +17,6 @@ from gearmbs.mechanism.expression_compiler import compile_expression
 from gearmbs.mechanism.expression_syntax import Scope
 
 if TYPE_CHECKING:
-    from gearmbs.adams.builders.builder import Builder
     from gearmbs.flexible import ModalModel, ModalNeutralFile
     from gearmbs.flexible.damping import Damping
 

@@ -9,6 +9,7 @@ from gearmbs.adams.builders.builder import Builder
 from gearmbs.adams.builders.constraints import CONSTRAINTS
 from gearmbs.adams.builders.contacts import CONTACTS
 from gearmbs.adams.builders.curves import CURVES
+from gearmbs.adams.builders.flexible import add_flex_body, add_flexible_marker
 from gearmbs.adams.builders.forces import FORCES
 from gearmbs.adams.builders.initial import with_initial_motions
 from gearmbs.adams.builders.model import AdamsModel, BodyState
@@ -71,7 +72,7 @@ def build_model(
     if deck.unsupported and not allow_unsupported:
         raise DeckError(deck.unsupported)
     builder = Builder(deck, inactive, state or {}, span, sensed or {})
-    if builder.add_bodies():
+    if builder.add_bodies(add_flex_body, add_flexible_marker):
         builder.name_elements()
         builder.add_data()
         for kind, make in (CONSTRAINTS | CURVES | FORCES | CONTACTS).items():
