@@ -45,7 +45,7 @@ INSTEAD_OF_ARGUMENTS: dict[tuple[str, str], str] = {
     ("COUPLER", "FUNCTION"): "USER with a routine, or SCALES",
     ("FIELD", "FUNCTION"): "USER with a routine, or KMATRIX and CMATRIX",
     ("FLEX_BODY", "DB_FILE"): "MNF_FILE, a modal neutral file",
-    ("FLEX_BODY", "BDF_FILE"): "MNF_FILE, a modal neutral file; large deflection in Python (`gearmbs.flexible.add_beam`)",
+    ("FLEX_BODY", "BDF_FILE"): "MNF_FILE; beams of large motion in Python (`gearmbs.flexible.add_beam`)",
     ("FLEX_BODY", "INDEX_IN_DATABASE"): "MNF_FILE, a modal neutral file",
     ("FLEX_BODY", "DMODE"): "SIMULATE/STATICS first: it deforms the body under its loads",
     ("FLEX_BODY", "VMODE"): "an SFORCE that acts for a moment",
