@@ -201,6 +201,34 @@ def test_a_stool_of_two_legs_has_two_patches():
     assert wrench[2] == pytest.approx(2 * 1e6 * 1e-3**1.5)
 
 
+FAR = {
+    "cylinder and box": (Cylinder(0.1, 0.3), Box((1, 1, 1))),
+    "torus and cylinder": (Torus(0.3, 0.05), Cylinder(0.2, 0.4)),
+    "mesh and plane": (Mesh(*Box((0.2, 0.3, 0.4)).facets(), offset=(0.5, 0, 0)), HalfSpace()),
+    "mesh and frustum": (Mesh(*Box((0.2, 0.3, 0.4)).facets()), Frustum(0.2, 0.1, 0.4)),
+    "ball and mesh": (Sphere(0.1), Mesh(*Box((0.2, 0.3, 0.4)).facets())),
+}
+
+
+@pytest.mark.parametrize("name", FAR)
+def test_what_is_passed_over_from_afar_does_not_touch(name):
+    """Anywhere: the contact is that of the same solids whose ball reaches everywhere."""
+    a, b = FAR[name]
+    rng = np.random.default_rng(11)
+    culled, whole = Pair(a, b), Pair(a, b)
+    for solid in (2, 8):
+        whole.tables[1][whole.tables[0][1 + solid + 1] + 15] = 1e9
+    touched = 0
+    for _ in range(300):
+        place = rng.normal(size=3)
+        place *= rng.uniform(0.0, 1.2) / np.linalg.norm(place)
+        frames = frames_at(place, turned(*rng.normal(size=3)), rng)
+        one, other = culled(frames, 0)[0], whole(frames, 0)[0]
+        assert np.array_equal(one, other)
+        touched += np.any(one != 0.0)
+    assert 20 < touched < 280
+
+
 # --- motion -----------------------------------------------------------------------------------------------------
 
 

@@ -218,6 +218,18 @@ def table_sizes(shape: Shape) -> tuple[int, np.ndarray]:
     return fields.MESH, np.r_[0.5 * np.ptp(shape.vertices, axis=0), 0.0]
 
 
+def reach_of(kind: int, sizes: np.ndarray) -> float:
+    """Return the radius of a ball about a solid's origin that holds it, m; infinite for a half-space."""
+    a, b, c, _ = sizes
+    return {
+        fields.BALL: a,
+        fields.ELLIPSOID: max(a, b, c),
+        fields.FRUSTUM: float(np.hypot(max(a, b), c)),
+        fields.TORUS: a + b,
+        fields.HALF_SPACE: np.inf,
+    }.get(kind, float(np.linalg.norm(sizes[:3])))
+
+
 def vertex_weights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Return the weight of each vertex: of the triangles around it, the area times the angle there.
 
@@ -258,6 +270,8 @@ class _Tables:
         kind, sizes = table_sizes(shape)
         if supported:
             sizes = reduced(kind, sizes)
+        if faceted:
+            sizes[3] = reach_of(kind, sizes)
         vertices, triangles = shape.facets() if faceted else (np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
         offset = shape.offset
         if kind == fields.MESH:

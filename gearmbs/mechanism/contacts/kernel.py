@@ -1,8 +1,9 @@
 """The kernel of contact between solids: which points touch, and what acts there.
 
 Integers: the number of pairs, then `PAIR` for each: family, whether the first solid is J's, and both solids. A solid is
-its kind, its place in the reals (axes, origin, sizes), number of vertices, their place (coordinates, then weights),
-number of triangles, their place in the integers. Reals begin with the law.
+its kind, its place in the reals (axes, origin, sizes; of a faceted one the last size is the radius of a ball about it),
+number of vertices, their place (coordinates, then weights), number of triangles, their place in the integers. Reals
+begin with the law.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG, FRAME_A
 from gearmbs.mechanism.contacts import points as pt
 from gearmbs.mechanism.contacts.boxes import SCRATCH, two_boxes
 from gearmbs.mechanism.contacts.facets import join_patches, vertices_below
+from gearmbs.mechanism.contacts.fields import BOX, MESH, distance
 from gearmbs.mechanism.contacts.loads import LAW_REALS, press, share_out
+from gearmbs.mechanism.contacts.points import local_point
 from gearmbs.mechanism.contacts.smooth_pairs import ball_and_solid, convex_and_plane
 
 BALL_SOLID, CONVEX_PLANE, BOXES, FACETS = 0, 1, 2, 3
@@ -38,6 +41,14 @@ def pose_of(frame, solid, out):
             for q in range(3):
                 total += frame[FRAME_A + 3 * r + q] * solid[3 * q + c]
             out[3 * r + c] = total
+
+
+@njit(cache=True, error_model="numpy")
+def far_from(kind, sizes, pose, centre, reach, work):
+    """Return whether a ball of radius ``reach`` about a global point is apart from a solid, or the box about a mesh."""
+    local, grad, hess = work[0:3], work[3:6], work[6:15]
+    local_point(pose, centre, local)
+    return distance(BOX if kind == MESH else kind, sizes, local, grad, hess) > reach
 
 
 @njit(cache=True, error_model="numpy")
@@ -72,6 +83,10 @@ def points_of(ints, reals, at, frames, rows, derivatives, work):
     if family == BOXES:
         return two_boxes(rows, pose_a, sizes_a, pose_b, sizes_b, origins, derivatives, scratch)
     if family == FACETS:
+        if far_from(ints[b], sizes_b, pose_b, pose_a[9:12], sizes_a[3], scratch):
+            return 0
+        if far_from(ints[a], sizes_a, pose_a, pose_b[9:12], sizes_b[3], scratch):
+            return 0
         na, nb = ints[a + 2], ints[b + 2]
         of_a = (
             ints[a], sizes_a, pose_a, vector_at(reals, ints[a + 3], 3 * na),
