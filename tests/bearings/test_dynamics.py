@@ -208,3 +208,23 @@ def test_lives_follow_from_the_loads_of_a_run():
     assert float(lives.life_hours) == pytest.approx(turns / 30.0 / 3600.0, rel=1e-4)
     with pytest.raises(BearingError, match="start is 9 s"):
         bearing_lives(rig, solution, start=9.0)
+
+
+def test_harmonics_of_the_pair_tend_to_those_with_joints():
+    """A whole case on bearings of growing stiffness: its mesh harmonics come near as 1/stiffness^(2/3)."""
+    from gearmbs.studies import Case, case_mechanism, run_case
+
+    case, bearing = Case(operation={"duration": 0.2}), Bearing.from_designation("6206")
+
+    def levels(factor=None):
+        m = (
+            case_mechanism(case)
+            if factor is None
+            else case_mechanism(case, bearing, stiffness=factor * bearing.stiffness)
+        )
+        return run_case(case, False, mechanism=m).gmf_rms.sel(way="orders").values
+
+    joints = levels()
+    off = [float(np.abs(levels(factor) / joints - 1.0).max()) for factor in (1e2, 1e4)]
+    assert off[0] < 0.1
+    assert off[1] < 0.1 * off[0]
