@@ -219,10 +219,7 @@ def ball_centre(reals, x, y, other_x, other_y, h, load):
     k_o, k_i, r_o, r_i = reals[B.OUTER_STIFFNESS], reals[B.INNER_STIFFNESS], reals[B.OUTER_REACH], reals[B.INNER_REACH]
     apart = reals[B.OUTER_APART]
     rest_r, rest_z, vr, vz = ball_start(reals, x, y, other_x, other_y, h, load)
-    touched = np.hypot(x - rest_r, y - rest_z) > r_i + h
-    if apart > 0.0:
-        touched = touched or np.hypot(other_x - rest_r, other_y + apart - rest_z) > r_i + h
-    if not touched:
+    if apart == 0.0 and np.hypot(x - rest_r, y - rest_z) <= r_i + h:
         return rest_r, rest_z
     value = ball_potential(reals, x, y, other_x, other_y, h, load, vr, vz)
     soft = 1e-9 * (k_o + k_i) * np.sqrt(1e-6)

@@ -112,11 +112,11 @@ S_LAW = 28
 tilt phi, as far as it moves the other path of the element against this one."""
 LAW = 13
 S_CENTRE = 41
-"""Centre of a four-point bearing's ball, whose two paths share it, and whether the inner ring is touched."""
-S_CAGE = 44
+"""Centre of a four-point bearing's ball, whose two paths share it, radially and along the axis."""
+S_CAGE = 43
 """d psi' / d Omega at the cage's angle, and its slope by it."""
-S_CAGE_SLOPE = 45
-S_LOCAL = 46
+S_CAGE_SLOPE = 44
+S_LOCAL = 45
 """From here: generalised forces, then what the derivatives need; see `scratch`."""
 
 VARIATIONS = 13
