@@ -25,6 +25,7 @@ PLOTS = {
     "AnalysisReport": "gearmbs.view:report_plot",
     "VibrationReport": "gearmbs.view:report_plot",
     "ComparisonReport": "gearmbs.view:report_plot",
+    "BearingReport": "gearmbs.view:bearing_plot",
     "PlanetaryReport": "gearmbs.view:planetary_plot",
     "PaperStudy": "gearmbs.studies.show:study_plot",
 }
@@ -35,6 +36,10 @@ TABLES = {
     "Mechanism": "gearmbs.mechanism.show:mechanism_html",
     "Solution": "gearmbs.dae.results.show:solution_html",
     "Case": "gearmbs.studies.show:case_html",
+    **dict.fromkeys(
+        ("AnalysisReport", "VibrationReport", "ComparisonReport", "BearingReport", "PlanetaryReport"),
+        "gearmbs.view.report_page:report_body",
+    ),
 }
 """What makes a table of an object for notebooks, where its class does not do so itself."""
 

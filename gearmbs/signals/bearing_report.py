@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 import pandas as pd
 
+from gearmbs._shown import Shown
+
 from .bearing_lines import CAGE, ELEMENT, BearingLines
 from .report import markdown_table, significant
 
@@ -119,7 +121,7 @@ def _chance(log_chance: float) -> str:
 
 
 @dataclass
-class BearingReport:
+class BearingReport(Shown):
     """What was found of bearings in one record.
 
     Attributes

@@ -154,7 +154,10 @@ def _with_bearings(done: Analysed, asked: dict[str, Any], band: str | None) -> A
     asked["speed"] = asked.get("speed") if turns is None else turns
     one = done.signal.sel(channel=done.report.levels["channel"].values)
     bearings = diagnose_bearing(one, band=None if band is None else pair_of(band), **asked)
-    return replace(done, text=f"{bearings.to_markdown()}\n\n{done.text}", tables=done.tables | bearings.tables())
+    draw = lambda: done.draw() | {"bearings": bearings.plot()}  # noqa: E731
+    return replace(
+        done, draw=draw, text=f"{bearings.to_markdown()}\n\n{done.text}", tables=done.tables | bearings.tables()
+    )
 
 
 def trend(

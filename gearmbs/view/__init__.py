@@ -12,6 +12,7 @@ from gearmbs._lazy import late
 if TYPE_CHECKING:
     from gearmbs.view.animation import MeshAnimation, mesh_animation
     from gearmbs.view.bars import comparison_bars, gmf_bars
+    from gearmbs.view.bearing_figure import bearing_plot
     from gearmbs.view.campbell_figure import campbell_plot
     from gearmbs.view.changing_speed import (
         changing_speed_figures,
@@ -65,6 +66,7 @@ __all__ = [
     "Scene",
     "analysis_figures",
     "average_plot",
+    "bearing_plot",
     "campbell_plot",
     "changing_speed_figures",
     "comparison_bars",
@@ -132,6 +134,7 @@ late(
         "Scene": ".scene",
         "analysis_figures": ".reports",
         "average_plot": ".revolution",
+        "bearing_plot": ".bearing_figure",
         "campbell_plot": ".campbell_figure",
         "changing_speed_figures": ".changing_speed",
         "comparison_bars": ".bars",

@@ -22,15 +22,18 @@ STYLE = (
 
 def report_html(report: Any) -> str:
     """Return a report as a page: its text, and the figure that says most where it has one."""
-    from markdown_it import MarkdownIt
-
-    text = report.to_markdown()
-    body = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
-    title = html.escape(text.partition("\n")[0].lstrip("# "))
+    title = html.escape(report.to_markdown().partition("\n")[0].lstrip("# "))
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
-        f"</head>\n<body>\n{_picture(report)}{body}</body></html>\n"
+        f"</head>\n<body>\n{report_body(report)}</body></html>\n"
     )
+
+
+def report_body(report: Any) -> str:
+    """Return what a notebook shows of a report: its figure and its text."""
+    from markdown_it import MarkdownIt
+
+    return _picture(report) + MarkdownIt("commonmark", {"html": False}).enable("table").render(report.to_markdown())
 
 
 def write_report_page(report: Any, path: str | Path) -> Path:

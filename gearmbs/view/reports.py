@@ -116,7 +116,9 @@ def report_plot(
         figure = next(iter(comparison_figures(report).values()))
     elif isinstance(report, VibrationReport) or signal is not None:
         figures = analysis_figures(report, signal)
-        figure = figures.get("envelope", figures["spectrum"]) if signal is None else figures["spectrum"]
+        # of a record whose speed changes there is no spectrum but an order map
+        whole = figures["spectrum"] if "spectrum" in figures else figures["order map"]
+        figure = figures.get("envelope", whole) if signal is None else whole
     elif report.average is not None:
         figure = _average(report)
     else:

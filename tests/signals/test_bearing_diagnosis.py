@@ -22,6 +22,7 @@ from gearmbs.signals import (
     with_metadata,
 )
 from gearmbs.signals.bearing_evidence import EnvelopeSpectrum, find_lines, log_tail, power_of
+from tests.view.looking import assert_readable
 
 RATE, SHAFT, SECONDS = 12000.0, 29.0, 5.0
 LINES = bearing_lines("6205")
@@ -374,3 +375,15 @@ def test_says_what_is_wrong(tmp_path, words, message):
     result = run("analyse", path, "--speed", f"{60 * SHAFT} rpm", *words)
     assert result.exit_code != 0
     assert message in " ".join(result.output.split())
+
+
+def test_the_report_shows_draws_and_saves_itself(tmp_path):
+    report = diagnose_bearing(record(3.0 * pulses(LINES.bpfo * SHAFT)), "6205", f"{SHAFT} Hz", shafts=[])
+    figure = report.plot()
+    assert_readable(figure, overlap=0.4)
+    drawn = [line.get_xdata()[0] for line in figure.axes[0].lines if line.get_label() == "outer race"]
+    assert drawn == [pytest.approx(report.accused[0].found)]
+    with pytest.raises(ValueError, match="there is no 'x'"):
+        report.plot(channel="x")
+    assert "<table>" in report._repr_html_()
+    assert "data:image/svg+xml" in report.save(tmp_path / "bearing.html").read_text()

@@ -111,7 +111,10 @@ def test_reports_draw_and_save_themselves(tmp_path):
     both = gm.compare({"low": {"healthy": signal, "worn": 2.0 * signal}}, teeth=teeth)
     assert_readable(both.plot(), overlap=0.4)
     for k, report in enumerate((geared, plain, both)):
-        assert report._repr_html_() is None
+        shown = report._repr_html_()
+        assert shown.count("<table>") == len(re.findall(r"^\|-", report.to_markdown(), re.MULTILINE))
+        assert "data:image/svg+xml" in shown
+        assert "<html" not in shown
         assert report._repr_markdown_()
         assert report.save(tmp_path / f"{k}.md").read_text() == report.to_markdown()
         page = report.save(tmp_path / f"{k}.html").read_text()
