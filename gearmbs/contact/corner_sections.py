@@ -16,6 +16,7 @@ from gearmbs.contact.sections import (
     steps_over,
     steps_squared,
     turned,
+    unmark_unsettled,
 )
 from gearmbs.contact.support import (
     corner_curvatures,
@@ -91,9 +92,7 @@ def corner_normals(side, corner, strip, n, s0, rb):
             strip.step[j] = step
         if steps_squared(strip, n) < NEWTON_END * NEWTON_END:
             return
-    for j in range(n):
-        if not abs(strip.step[j]) < NEWTON_END:
-            strip.good[j] = 0.0
+    unmark_unsettled(strip, n)
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gearmbs._jit import njit
+from gearmbs.contact.jit import inlined
 from gearmbs.contact.kernel import GEAR_CONTACT_SIG
 from gearmbs.dae.compiled.pointers import caller
 from gearmbs.dae.compiled.views import matrix_at, vector_at
@@ -17,6 +18,18 @@ from gearmbs.dae.equations.force_elements import (
 )
 
 contact_at = caller(GEAR_CONTACT_SIG)
+
+
+@inlined
+def wheel_frame(frames, k):
+    """Return place, axes, velocity and angular velocity of wheel 0 or 1 from the frames of a force element."""
+    at = k * FRAME_COLUMNS
+    return (
+        vector_at(frames, at + FRAME_P, 3),
+        matrix_at(frames, at + FRAME_A, 3, 3),
+        vector_at(frames, at + FRAME_V, 3),
+        vector_at(frames, at + FRAME_W, 3),
+    )
 
 
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
@@ -40,21 +53,16 @@ def contact_force(ints, reals, t, frames, states, inputs, want, work, wrench, ra
     wrench, jac, diagnostics : ndarray
         Out, as of `gear_contact`.
     """
-    other = FRAME_COLUMNS
+    R1, A1, v1, w1 = wheel_frame(frames, 0)
+    R2, A2, v2, w2 = wheel_frame(frames, 1)
     contact_at(ints[0])(
         vector_at(ints, 1, ints.size - 1),
         reals,
-        vector_at(frames, FRAME_P, 3),
-        matrix_at(frames, FRAME_A, 3, 3),
-        vector_at(frames, FRAME_V, 3),
-        vector_at(frames, FRAME_W, 3),
-        vector_at(frames, other + FRAME_P, 3),
-        matrix_at(frames, other + FRAME_A, 3, 3),
-        vector_at(frames, other + FRAME_V, 3),
-        vector_at(frames, other + FRAME_W, 3),
+        R1, A1, v1, w1,
+        R2, A2, v2, w2,
         vector_at(wrench, 0, 6),
         jac,
         diagnostics,
         want & DERIVATIVES,
         work,
-    )
+    )  # fmt: skip

@@ -32,6 +32,7 @@ from gearmbs.contact.sections import (
     steps_over,
     steps_squared,
     turned,
+    unmark_unsettled,
 )
 from gearmbs.contact.support import tilt_of
 
@@ -210,9 +211,7 @@ def edge_normals(side, corner, strip, n, first, s0, rb):
             strip.step[j] = step
         if steps_squared(strip, n) < NEWTON_END * NEWTON_END:
             return
-    for j in range(n):
-        if not abs(strip.step[j]) < NEWTON_END:
-            strip.good[j] = 0.0
+    unmark_unsettled(strip, n)
 
 
 @kernel

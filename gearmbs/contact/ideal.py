@@ -17,30 +17,17 @@ import numpy as np
 from gearmbs._jit import njit
 from gearmbs.contact import layout as L
 from gearmbs.contact.deviations import roll_of_flanks
+from gearmbs.contact.force_kernel import wheel_frame
 from gearmbs.contact.jit import kernel
-from gearmbs.contact.kernel import (
-    mate_columns,
-    own_columns,
-    relative_twist,
-    turn_to_global,
-    wrench_slopes,
-)
+from gearmbs.contact.kernel import relative_twist, slopes_of_sums, wrench_of_sums
 from gearmbs.contact.laws import normal_law
-from gearmbs.contact.pose import pose_columns, pose_rate_slopes, pose_rates, pose_wrench, relative_pose
+from gearmbs.contact.pose import pose_rates, relative_pose
 from gearmbs.contact.records import options_at, pair_at, scratch_at
 from gearmbs.contact.search import facing_teeth, middle_section, open_side, set_twist
 from gearmbs.contact.sections import gap_rates
 from gearmbs.contact.sums import clear_sums, mirror
-from gearmbs.dae.compiled.views import matrix_at, vector_at
-from gearmbs.dae.equations.force_elements import (
-    DERIVATIVES,
-    FORCE_SIG,
-    FRAME_A,
-    FRAME_COLUMNS,
-    FRAME_P,
-    FRAME_V,
-    FRAME_W,
-)
+from gearmbs.dae.compiled.views import vector_at
+from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG
 
 STIFFNESS, DAMPING, DEPTH, COSINE, BACKLASH, PLACES, TABLES = range(7)
 """Places of the element's own reals behind the pair's table: N/m, N s/m, m, cosine of the base helix angle, 1 with
@@ -243,27 +230,14 @@ def ideal_mesh(ints, reals, t, frames, states, inputs, want, work, wrench, rates
     own = vector_at(reals, behind, reals.size - behind)
     options, wheels, scratch = options_at(vector_at(ints, 1, ints.size - 1)), pair_at(reals), scratch_at(work)
     motion, sums = scratch.motion, scratch.sums
-    R1, A1 = vector_at(frames, FRAME_P, 3), matrix_at(frames, FRAME_A, 3, 3)
-    v1, w1 = vector_at(frames, FRAME_V, 3), vector_at(frames, FRAME_W, 3)
-    R2, A2 = vector_at(frames, FRAME_COLUMNS + FRAME_P, 3), matrix_at(frames, FRAME_COLUMNS + FRAME_A, 3, 3)
-    v2, w2 = vector_at(frames, FRAME_COLUMNS + FRAME_V, 3), vector_at(frames, FRAME_COLUMNS + FRAME_W, 3)
+    R1, A1, v1, w1 = wheel_frame(frames, 0)
+    R2, A2, v2, w2 = wheel_frame(frames, 1)
     if not relative_pose(R1, A1, R2, A2, wheels.wheel_2.base_radius < 0.0, motion):
         return
     relative_twist(R1, v1, w1, R2, v2, w2, motion)
     derivatives = want & DERIVATIVES
     both_springs(options, wheels, own, scratch, diagnostics, derivatives)
-    pose_wrench(motion, sums.q, derivatives)
-    frame, total = motion.frame, vector_at(wrench, 0, 6)
-    for b in range(0, 6, 3):
-        for k in range(3):
-            total[b + k] = (
-                frame[k, 0] * motion.wrench[b] + frame[k, 1] * motion.wrench[b + 1] + frame[k, 2] * motion.wrench[b + 2]
-            )
-    if derivatives == 0:
-        return
-    pose_columns(motion)
-    pose_rate_slopes(motion)
-    wrench_slopes(motion, sums, L.PADDED)
-    own_columns(motion, w2, L.PADDED)
-    turn_to_global(motion, jac)
-    mate_columns(R1, v1, w1, R2, v2, w2, total, jac)
+    total = vector_at(wrench, 0, 6)
+    wrench_of_sums(motion, sums, derivatives, total)
+    if derivatives != 0:
+        slopes_of_sums(motion, sums, (R1, v1, w1), (R2, v2, w2), total, jac)

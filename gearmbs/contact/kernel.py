@@ -196,6 +196,32 @@ def clear_rounding(jac):
                     jac[i, j] = jac[i, j] if abs(jac[i, j]) > least else 0.0
 
 
+@njit(cache=True, error_model="numpy")
+def wrench_of_sums(motion, sums, want, wrench):
+    """Fill the wrench on wheel 1 in global components; ``want`` is nonzero if derivatives follow."""
+    pose_wrench(motion, sums.q, want)
+    own, frame = motion.wrench, motion.frame
+    for i in range(6):
+        own[i] += sums.f[i]
+    for b in range(0, 6, 3):
+        for k in range(3):
+            wrench[b + k] = frame[k, 0] * own[b] + frame[k, 1] * own[b + 1] + frame[k, 2] * own[b + 2]
+
+
+@kernel
+def slopes_of_sums(motion, sums, one, two, wrench, jac):
+    """Fill the derivatives of the wrench; ``one``, ``two`` are place, velocity, angular velocity of the wheels."""
+    R1, v1, w1 = one
+    R2, v2, w2 = two
+    pose_columns(motion)
+    pose_rate_slopes(motion)
+    wrench_slopes(motion, sums, L.PADDED)
+    own_columns(motion, w2, L.PADDED)
+    turn_to_global(motion, jac)
+    mate_columns(R1, v1, w1, R2, v2, w2, wrench, jac)
+    clear_rounding(jac)
+
+
 @kernel
 def both_sides(options, wheels, scratch, want):
     """Sum up the contacts of both sides of the teeth, the second seen in a mirror."""
@@ -296,19 +322,6 @@ def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want
                 for j in range(24):
                     jac[i, j] = 0.0
         return
-    pose_wrench(motion, sums.q, want_jac)
-    own, frame = motion.wrench, motion.frame
-    for i in range(6):
-        own[i] += sums.f[i]
-    for b in range(0, 6, 3):
-        for k in range(3):
-            wrench[b + k] = frame[k, 0] * own[b] + frame[k, 1] * own[b + 1] + frame[k, 2] * own[b + 2]
-    if want_jac == 0:
-        return
-    pose_columns(motion)
-    pose_rate_slopes(motion)
-    wrench_slopes(motion, sums, L.PADDED)
-    own_columns(motion, w2, L.PADDED)
-    turn_to_global(motion, jac)
-    mate_columns(R1, v1, w1, R2, v2, w2, wrench, jac)
-    clear_rounding(jac)
+    wrench_of_sums(motion, sums, want_jac, wrench)
+    if want_jac != 0:
+        slopes_of_sums(motion, sums, (R1, v1, w1), (R2, v2, w2), wrench, jac)

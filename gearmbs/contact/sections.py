@@ -111,6 +111,14 @@ def steps_over(strip, n, limit):
 
 
 @kernel
+def unmark_unsettled(strip, n):
+    """Unmark the sections in which Newton's method has not settled."""
+    for j in range(n):
+        if not abs(strip.step[j]) < NEWTON_END:
+            strip.good[j] = 0.0
+
+
+@kernel
 def flank_normals(side, strip, n):
     """Turn the normals of a strip onto the common normals of two involutes, by Newton's method.
 

@@ -99,6 +99,10 @@ class GearPair(PairGeometry, Shown):
         super().__post_init__()
         for fault in self.faults:
             fault.check_teeth(self.wheels[fault.wheel == "driven"].teeth)
+        require(
+            not (self.root_contact and self.driver.helix_angle),
+            "GearPair.root_contact is True: tips meet roots of spur wheels only; leave it away for helical ones",
+        )
         if not self.root_contact:
             self._check_clearance(0.0)
 

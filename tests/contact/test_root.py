@@ -179,6 +179,8 @@ def test_not_looked_for_with_ample_clearance():
     assert not GearPair.paper().tips_may_bottom
     assert GearPair.paper(centre_distance_error="-0.7 mm").tips_may_bottom
     assert not GearPair(GearSpec(23, "3 mm"), GearSpec.ring(70, "3 mm")).tips_may_bottom
+    with pytest.raises(ValueError, match="root_contact is True"):
+        GearPair(GearSpec(23, "3 mm", helix_angle=0.2), GearSpec.ring(70, "3 mm", helix_angle=0.2), root_contact=True)
     shallow = GearSpec.ring(70, "3 mm", dedendum="3.2 mm", fillet_radius="0.2 mm")
     assert GearPair(GearSpec(23, "3 mm"), shallow).tips_may_bottom
     assert GearSpec(29, "3 mm").dedendum > GearSpec(29, "3 mm").addendum
