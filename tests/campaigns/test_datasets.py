@@ -17,6 +17,7 @@ from gearmbs.campaigns.datasets import (
     from_simulation_to_recordings,
     leak_and_no_leak,
     macro_auroc,
+    one_state_a_group,
     random_split,
     recording_features,
     shared_groups,
@@ -97,6 +98,15 @@ def test_macro_auroc():
     assert macro_auroc(labels, 0 * p, np.array(["a", "b"])) == pytest.approx(0.5)
 
 
+def test_each_specimen_keeps_one_state():
+    groups = np.repeat(np.arange(12), 6)
+    labels = np.tile(["a", "b", "c"], 24)
+    kept = one_state_a_group(labels, groups)
+    assert kept.sum() == 24
+    assert all(np.unique(labels[kept & (groups == g)]).size == 1 for g in range(12))
+    assert sorted(np.unique(labels[kept], return_counts=True)[1]) == [8, 8, 8]
+
+
 def test_a_leak_looks_like_skill():
     """Labels that belong to specimens by chance: nothing can be learned, and the random split seems to."""
     generator = np.random.default_rng(0)
@@ -128,6 +138,11 @@ def test_a_classifier_on_recordings():
     assert found.groups == 8
     assert alone[NAMES[1]] > 0.85
     assert max(abs(v - 0.5) for n, v in alone.items() if n != NAMES[1]) < 0.25
+    # down here where it is up there, and down in both
+    real[:, 1] -= 8.0 * (real_labels == "broken")
+    assert from_simulation_to_recordings(x, labels, real, real_labels, groups)[1][NAMES[1]] < 0.15
+    x[:, 1] -= 8.0 * (labels == "broken")
+    assert from_simulation_to_recordings(x, labels, real, real_labels, groups)[1][NAMES[1]] > 0.85
     with pytest.raises(CampaignError, match="two states or more"):
         from_simulation_to_recordings(x, labels, real, np.full(80, "broken"), groups)
 
@@ -160,3 +175,7 @@ def test_from_plan_to_files(tmp_path):
     assert len(x) == len(labels) == len(owners) == len(sizes) == 12 * 4 * 2
     tree = json.loads((tmp_path / "data" / "croissant.json").read_text())
     assert {f["name"] for f in tree["recordSet"][0]["field"]} == set(rows.columns)
+    # a set of loose files is in none of them: readers would look inside
+    assert "containedIn" not in tree["distribution"][-1]
+    named = {item["@id"] for item in tree["distribution"][:-1]}
+    assert named == {f"data/{p.name}" for p in paths if p.suffix == ".parquet"}

@@ -16,7 +16,13 @@ if TYPE_CHECKING:
     from gearmbs.campaigns.datasets.features import features, recording_features
     from gearmbs.campaigns.datasets.layers import SensorLayers
     from gearmbs.campaigns.datasets.make import data_set_plan, feature_table, write_data_set
-    from gearmbs.campaigns.datasets.splits import random_split, shared_groups, split_by_group, withhold
+    from gearmbs.campaigns.datasets.splits import (
+        one_state_a_group,
+        random_split,
+        shared_groups,
+        split_by_group,
+        withhold,
+    )
 
 __all__ = [
     "Score",
@@ -28,6 +34,7 @@ __all__ = [
     "from_simulation_to_recordings",
     "leak_and_no_leak",
     "macro_auroc",
+    "one_state_a_group",
     "random_split",
     "recording_features",
     "score",
@@ -49,6 +56,7 @@ late(
         "from_simulation_to_recordings": ".baseline",
         "leak_and_no_leak": ".baseline",
         "macro_auroc": ".baseline",
+        "one_state_a_group": ".splits",
         "random_split": ".splits",
         "recording_features": ".features",
         "score": ".baseline",

@@ -143,8 +143,8 @@ def from_simulation_to_recordings(
     Score
         Of the classifier.
     dict of float
-        Of two classes the AUROC of every single feature, as a classical indicator would give: above a half if it is
-        larger for the class that comes first in the alphabet.
+        Of two classes the AUROC of every single feature, as a classical indicator would give: above a half if it
+        differs between them in the same direction as in the simulation.
     """
     known = np.isin(labels, np.unique(real_labels))
     if np.unique(labels[known]).size < 2:
@@ -154,5 +154,8 @@ def from_simulation_to_recordings(
     alone = {}
     if classes.size == 2:
         one = classes[:1]
-        alone = {name: macro_auroc(real_labels, real[:, k : k + 1], one) for k, name in enumerate(NAMES)}
+        for k, name in enumerate(NAMES):
+            simulated = macro_auroc(labels[known], x[known, k : k + 1], one)
+            recorded = macro_auroc(real_labels, real[:, k : k + 1], one)
+            alone[name] = recorded if simulated >= 0.5 else 1.0 - recorded
     return score(model, real, real_labels, real_groups, seed), alone

@@ -141,7 +141,6 @@ def write_croissant(folder: Path, title: str, files: Sequence[Path], url: str | 
                 "@id": "parquet",
                 "name": "parquet",
                 "encodingFormat": "application/x-parquet",
-                "containedIn": [{"@id": p.relative_to(folder).as_posix()} for p in files],
                 "includes": "data/*.parquet",
             },
         ],

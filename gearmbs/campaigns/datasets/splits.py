@@ -50,6 +50,17 @@ def random_split(count: int, *, test: float = 0.2, seed: int = 0) -> np.ndarray:
     return np.where(np.random.default_rng(seed).random(count) < test, "test", "train")
 
 
+def one_state_a_group(labels: np.ndarray, groups: np.ndarray, seed: int = 0) -> np.ndarray:
+    """Return which rows are left if every group shows one state only, as where each fault is a part of its own.
+
+    States are dealt out evenly. In such data an individual is known by its state, and a split row by row leaks it;
+    where every individual is in all states, its other rows have other labels, and such a split misleads instead.
+    """
+    names, states = np.unique(groups), np.unique(labels)
+    dealt = states[np.random.default_rng(seed).permutation(np.arange(names.size) % states.size)]
+    return np.asarray(labels) == dealt[np.searchsorted(names, groups)]
+
+
 def shared_groups(split: np.ndarray, groups: np.ndarray) -> dict[tuple[str, str], int]:
     """Return how many groups each pair of splits shares: zero everywhere if nothing leaks ("withheld" belongs to
     training)."""
