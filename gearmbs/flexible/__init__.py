@@ -6,6 +6,7 @@ from gearmbs._lazy import late
 
 if TYPE_CHECKING:
     from gearmbs.flexible.beam import BeamSection, shear_coefficient
+    from gearmbs.flexible.bodies import box_housing, planet_carrier, thin_rimmed_wheel
     from gearmbs.flexible.check import ModelReport, ReductionReport, check_model, check_reduction
     from gearmbs.flexible.damping import damping_ratios
     from gearmbs.flexible.errors import FlexibleError
@@ -45,12 +46,14 @@ __all__ = [
     "WhirlModes",
     "add_beam",
     "block_mesh",
+    "box_housing",
     "check_model",
     "check_reduction",
     "damping_ratios",
     "from_matrices",
     "mnf_of",
     "nodes_where",
+    "planet_carrier",
     "read_abaqus",
     "read_calculix",
     "read_mnf",
@@ -60,6 +63,7 @@ __all__ = [
     "ring_mesh",
     "shear_coefficient",
     "solid_model",
+    "thin_rimmed_wheel",
     "write_mnf",
 ]
 
@@ -89,12 +93,14 @@ late(
         "WhirlModes": ".rotor",
         "add_beam": ".large_beam",
         "block_mesh": ".solid",
+        "box_housing": ".bodies",
         "check_model": ".check",
         "check_reduction": ".check",
         "damping_ratios": ".damping",
         "from_matrices": ".matrices",
         "mnf_of": ".mnf",
         "nodes_where": ".solid",
+        "planet_carrier": ".bodies",
         "read_abaqus": ".matrices",
         "read_calculix": ".matrices",
         "read_mnf": ".mnf",
@@ -104,6 +110,7 @@ late(
         "ring_mesh": ".solid",
         "shear_coefficient": ".beam",
         "solid_model": ".solid",
+        "thin_rimmed_wheel": ".bodies",
         "write_mnf": ".mnf",
     },
 )

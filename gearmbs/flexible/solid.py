@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,10 @@ from gearmbs.units import Quantity
 
 if TYPE_CHECKING:
     import skfem
+
+
+CORNERS = ((0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0), (0, 1, 1), (1, 0, 1), (1, 1, 0), (1, 1, 1))
+"""Corners of scikit-fem's hexahedron in its order."""
 
 
 def _skfem() -> Any:
@@ -99,32 +104,54 @@ def ring_mesh(
     divisions : tuple of 3 ints
         Elements over the thickness, round about, and over the width.
     """
-    fem = _skfem()
     a, b, w = (
         quantity(v, "length", f"ring_mesh: {n}") for v, n in ((inner, "inner"), (outer, "outer"), (width, "width"))
     )
     if not (0.0 < a < b and w > 0.0):
         raise FlexibleError(f"ring_mesh: inner {a}, outer {b}, width {w} m; give 0 < inner < outer and a width")
     radial, around, across = divisions
-    radius = np.linspace(a / 2, b / 2, radial + 1)
+    return revolved_mesh(np.linspace(a / 2, b / 2, radial + 1), np.linspace(-w / 2, w / 2, across + 1), around)
+
+
+def revolved_mesh(
+    radii: np.ndarray, heights: np.ndarray, around: int, keep: Callable[[float, float], bool] | None = None
+) -> skfem.MeshHex:
+    """Return the mesh of a body of revolution about z, whose section is made of rectangles.
+
+    Parameters
+    ----------
+    radii, heights : ndarray
+        Rising places of the corners of the elements, m.
+    around : int
+        Elements round about; their faces are flat, so that the body is a prism.
+    keep : callable, optional
+        From radius and height of an element's middle to whether it is there; default: all are.
+    """
+    radial, across = len(radii) - 1, len(heights) - 1
     angle = np.arange(around) * 2 * np.pi / around
-    z = np.linspace(-w / 2, w / 2, across + 1)
-    r, t, h = (x.ravel() for x in np.meshgrid(radius, angle, z, indexing="ij"))
+    r, t, h = (x.ravel() for x in np.meshgrid(radii, angle, heights, indexing="ij"))
     points = np.vstack([r * np.cos(t), r * np.sin(t), h])
 
     def number(i, j, k):
         return (i * around + j % around) * (across + 1) + k
 
-    # corners in the order of scikit-fem's reference element: (0,0,0) (0,0,1) (0,1,0) (1,0,0) (0,1,1) (1,0,1) (1,1,0)
-    # (1,1,1)
-    steps = [(0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0), (0, 1, 1), (1, 0, 1), (1, 1, 0), (1, 1, 1)]
+    def is_there(i, k):
+        return keep is None or keep(0.5 * (radii[i] + radii[i + 1]), 0.5 * (heights[k] + heights[k + 1]))
+
     cells = [
-        [number(i + p, j + q, k + s) for p, q, s in steps]
+        [number(i + p, j + q, k + s) for p, q, s in CORNERS]
         for i in range(radial)
         for j in range(around)
         for k in range(across)
+        if is_there(i, k)
     ]
-    return fem.MeshHex(points, np.array(cells).T)
+    return used_part(points, np.array(cells))
+
+
+def used_part(points: np.ndarray, cells: np.ndarray) -> skfem.MeshHex:
+    """Return the mesh of hexahedra, shape (m, 8), with those of the points, shape (3, n), that they use."""
+    used, numbers = np.unique(cells, return_inverse=True)
+    return _skfem().MeshHex(points[:, used], numbers.reshape(cells.shape).T)
 
 
 def nodes_where(model: FiniteElementModel, condition) -> list[int]:
