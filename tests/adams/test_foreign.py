@@ -146,6 +146,18 @@ def test_the_old_friction_of_joints_is_refused_and_its_sizes_are_remarked():
     assert [d.message for d in deck.unsupported] == ["JOINT/1: MU_DYN_ROT is not supported"]
 
 
+def test_what_stands_on_parts_that_are_left_out_is_left_out():
+    text = with_lines(
+        "FE_PART/9, TYPE=3DBEAM\nMARKER/901, FE_PART=9, NODE_LABEL=1\nJOINT/9, FIXED, I=901, J=0101\n"
+        "SFORCE/9, TRANSLATIONAL, I=901, J=0101, FUNCTION=1\nMOTION/9, JOINT=9, FUNCTION=0\n"
+    )
+    result = run_deck(parse_deck(text), end=0.01, steps=1, allow_unsupported=True)
+    told = [str(m) for m in result.messages if "which is left out" in str(m)]
+    assert result.success
+    assert sum("at MARKER/901" in text for text in told) == 2
+    assert any("with JOINT/9" in text for text in told)
+
+
 def test_paths_of_windows_are_read_in_scripts():
     script = parse_script("file/model=C:\\Users\\Ben.T\\run 1\\test\nsimulate/dynamic, end=1, steps=2\nstop\n")
     assert script.model == "C:\\Users\\Ben.T\\run 1\\test"

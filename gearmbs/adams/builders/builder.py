@@ -21,7 +21,7 @@ from gearmbs.adams.builders.frames import inertia_about_cm, marker_orientation, 
 from gearmbs.adams.builders.model import KINDS, AdamsModel, BodyState
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.check import measured_markers
+from gearmbs.adams.parse.check import MARKER_FIELDS, measured_markers
 from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.readers import read_variables
@@ -129,6 +129,12 @@ class Builder:
         """Return an inactive joint without which an element cannot act, None when there is none."""
         return next((ref for ref in joints_of(s) if ("JOINT", ref) in self.inactive), None)
 
+    def absent_marker(self, statement: st.Statement) -> int | None:
+        """Return a marker of a statement that is on no rigid part, and so is left out; None when it has all."""
+        markers = self.deck.of(st.Marker)
+        refs = [getattr(statement, name, None) for name in MARKER_FIELDS]
+        return next((ref for ref in refs if ref in markers and markers[ref].part is None), None)
+
     def attempt(self, statement: st.Statement, add: Callable[[Any], None]) -> None:
         """Add one statement; what is wrong with it gets its line, and so does what it warns of."""
         with warnings.catch_warnings(record=True) as warned, np.errstate(over="raise"):
@@ -137,6 +143,9 @@ class Builder:
                 missing = [ref for ref in joints_of(statement) if ("JOINT", ref) in self.left_out]
                 if missing:
                     raise LeftOutError(f"with JOINT/{missing[0]}, which is left out,")
+                absent = self.absent_marker(statement)
+                if absent is not None:
+                    raise LeftOutError(f"at MARKER/{absent}, which is left out,")
                 add(statement)
             except (ModelError, ValueError) as error:
                 self.remark(ERROR, statement, str(error))

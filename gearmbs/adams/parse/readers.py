@@ -58,11 +58,12 @@ def without_readers(deck: Deck, gone: Sequence[st.Statement]) -> list[Diagnostic
     for s in gone:
         if isinstance(s, st.Gse):
             absent |= {(st.Array, ref): f"ARRAY/{ref}" for ref in (s.x, s.y, s.xd) if ref is not None}
+    reads = {(type(statement), statement.id): _reads(statement) for statement in deck}
     found = True
     while found:
         found = False
         for statement in list(deck):
-            need = next((label for key, label in absent.items() if _needs(statement, key)), None)
+            need = next((label for key, label in absent.items() if key in reads[type(statement), statement.id]), None)
             if need is None:
                 continue
             found = True
@@ -86,24 +87,24 @@ READ_BY: dict[str, type] = {
 """Statements that functions read by id; of CURVE it is the last argument."""
 
 
-def _needs(statement: st.Statement, key: tuple[type, int]) -> bool:
-    """Whether a statement reads another in an expression, or by its id."""
-    kind, number = key
-    if kind is st.Variable and isinstance(statement, st.Array) and number in statement.variables:
-        return True
-    if kind is st.Array and isinstance(statement, (st.Lse, st.Tfsiso, st.Gse)) and number == statement.u:
-        return True
-    if kind is st.CurveStatement and number in (
-        getattr(statement, name, None) for name in ("curve", "icurve", "jcurve")
-    ):
-        return True
+def _reads(statement: st.Statement) -> set[tuple[type, int]]:
+    """Return what a statement reads by its id, and in its expressions."""
+    found: set[tuple[type, int]] = set()
+    if isinstance(statement, st.Array):
+        found |= {(st.Variable, ref) for ref in statement.variables}
+    if isinstance(statement, (st.Lse, st.Tfsiso, st.Gse)) and statement.u is not None:
+        found.add((st.Array, statement.u))
+    for name in ("curve", "icurve", "jcurve"):
+        ref = getattr(statement, name, None)
+        if ref is not None:
+            found.add((st.CurveStatement, ref))
     for name, spec in specs_of(type(statement)).items():
         text = getattr(statement, name)
         if spec.kind != EXPRESSION or text is None:
             continue
         for node in walk(parse(text)):
-            if isinstance(node, Call) and READ_BY.get(node.name) is kind and node.args:
+            if isinstance(node, Call) and node.name in READ_BY and node.args:
                 which = node.args[-1 if node.name == "CURVE" else 0]
-                if isinstance(which, Number) and which.integer == number:
-                    return True
-    return False
+                if isinstance(which, Number) and which.integer is not None:
+                    found.add((READ_BY[node.name], which.integer))
+    return found

@@ -192,8 +192,8 @@ class RequestEvaluator:
         i, j = self.model.pairs[kind, ref]
         out = np.zeros((self.solution.t.size, 12))
         name = self.model.names.get((kind, ref))
-        if name is None:
-            # inactive
+        if name is None or any(ref is not None and ref not in self.scope.markers for ref in (i, j)):
+            # inactive, or left out with the part it stands on
             return out
         if kind in ("ptcv", "cvcv"):
             for axis in "XYZ"[: 3 if kind == "ptcv" else 2]:
