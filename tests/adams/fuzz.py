@@ -27,11 +27,14 @@ from . import (
     test_accelerations,
     test_contacts,
     test_curves,
+    test_flexible,
     test_linear_systems,
     test_passages,
+    test_plant,
     test_redundancy,
     test_routines,
     test_sensors,
+    test_user_elements,
 )
 from .decks import EVERYTHING, PENDULUM, SCRIPT
 from .mutations import mutated
@@ -41,6 +44,7 @@ SECONDS = 60
 CHECKED = "m\no\nSIMULATE/DYNAMICS, END=0.002, STEPS=2\n"
 RUNS = [
     CHECKED, "m\no\nSIMULATE/KINEMATICS, END=0.002, STEPS=2\n", "m\no\nSIMULATE/STATICS\n", "m\no\nLINEAR/EIGENSOL\n",
+    "m\no\nLINEAR/STATEMAT, PINPUT=1, POUTPUT=1\n",
     "m\no\nSIMULATE/STATICS, END=0.002, STEPS=2\n", "m\no\nSIMULATE/INITIAL_CONDITIONS\n",
     "m\no\nSIM/DYN, END=0.001, STEPS=1\nDEACT/JOINT, RANGE=1,3\nSIM/DYN, END=0.002, STEPS=1\n",
 ]  # fmt: skip
@@ -88,6 +92,9 @@ def corpus() -> list[str]:
         test_linear_systems.HEAD + test_linear_systems.LOOP.format(force="ARYVAL(3,1)") + "END\n",
         test_accelerations.DECK.format(extra=test_accelerations.ASKED),
         test_passages.DECK.format(x=0.8, y=0.6, end=1.6, rod=1.0, start=1.6, stroke=1.0),
+        test_user_elements.HEAD + test_user_elements.CART + test_user_elements.LOOP + test_user_elements.GSE + "END\n",
+        test_plant.SPRING,
+        test_flexible.DECK.format(pivot="0,90D,0"),
         test_redundancy.DOOR, test_redundancy.PARALLEL,
         test_routines.DECK.format(force=test_routines.PULLED.format("USER(0.3, 0.01, 2)")),
         *(test_sensors.DECK.format(sensor=s, start=", QG=0,0,10") for s in sensors),
@@ -103,7 +110,11 @@ def carried_through(deck: str, script: str, rng: random.Random, run: bool) -> st
         If an error names no place.
     """
     skip = rng.random() < 0.7
-    routines = {"SFOSUB": test_routines.pull}
+    routines = {
+        "SFOSUB": test_routines.pull,
+        "GSE_DERIV": test_user_elements.deriv,
+        "GSE_OUTPUT": test_user_elements.output,
+    }
     try:
         parsed = bound(parse_deck(deck, "fuzz"), routines, skip)
         commands = parse_script(script, "fuzz")
@@ -168,7 +179,7 @@ def main() -> None:
         deck, script, _, run = case(given.only, given.share)
         print(deck, script, f"run: {run}", outcome(given.only, given.share), sep="\n")
         return
-    for deck in corpus():
+    for deck in corpus() if given.share > 0.0 else ():
         for script in RUNS:
             # what is compiled now takes no deck's time
             carried_through(deck, script, random.Random(0), True)

@@ -167,3 +167,11 @@ def test_routines_from_a_file_on_the_command_line(tmp_path):
     bad = CliRunner().invoke(app, [*arguments, "--routines", str(tmp_path / "empty.py")])
     assert bad.exit_code == 1
     assert "defines no functions" in bad.output
+
+
+def test_whatever_a_routine_raises_is_told_with_its_statement():
+    def broken(call):
+        return [1.0][call.id]
+
+    with pytest.raises(DeckError, match="SFORCE/1: its routine fails: IndexError: list index out of range"):
+        run(PULLED.format("USER(1)"), {"sfosub": broken})

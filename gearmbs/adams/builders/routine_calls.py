@@ -185,6 +185,9 @@ class Caller:
                 # numbers of no meaning may have no root; what it asked for before counts
                 if seed == REHEARSALS - 1 and not call._values:
                     raise ValueError(f"fails: {error}") from error
+            except Exception as error:
+                # whatever a user's function raises is told with its statement
+                raise ValueError(f"fails: {type(error).__name__}: {error}") from error
             yield list(call._values)
 
     def _results(self, call: RoutineCall) -> tuple[float, ...]:
