@@ -130,10 +130,11 @@ class Builder:
         return next((ref for ref in joints_of(s) if ("JOINT", ref) in self.inactive), None)
 
     def absent_marker(self, statement: st.Statement) -> int | None:
-        """Return a marker of a statement that is on no rigid part, and so is left out; None when it has all."""
+        """Return a marker of a statement that is on no part or flexible body, and so is left out; None without one."""
         markers = self.deck.of(st.Marker)
         refs = [getattr(statement, name, None) for name in MARKER_FIELDS]
-        return next((ref for ref in refs if ref in markers and markers[ref].part is None), None)
+        owned = {ref for ref, marker in markers.items() if (marker.part, marker.flex_body) != (None, None)}
+        return next((ref for ref in refs if ref in markers and ref not in owned), None)
 
     def attempt(self, statement: st.Statement, add: Callable[[Any], None]) -> None:
         """Add one statement; what is wrong with it gets its line, and so does what it warns of."""
