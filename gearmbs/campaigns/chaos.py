@@ -156,13 +156,22 @@ class Fitted:
 
 
 def best_chaos(
-    u: np.ndarray, y: np.ndarray, levels: Sequence[int], *, degree: int | None = None, together: int = 2
+    u: np.ndarray,
+    y: np.ndarray,
+    levels: Sequence[int],
+    *,
+    degree: int | None = None,
+    together: int = 2,
+    most: float = np.inf,
 ) -> Fitted:
-    """Return the sum of the least errors at points left out; see `fit_chaos`, without confidence."""
+    """Return the sum of the least errors at points left out; see `fit_chaos`, without confidence.
+
+    Of degrees that are not given only those with at most ``most`` terms are tried, the lowest in any case.
+    """
     best: Fitted | None = None
     for highest in range(1, HIGHEST + 1) if degree is None else (degree,):
         degrees = _terms(levels, highest, together)
-        if best is not None and POINTS_A_TERM * len(degrees) > y.size:
+        if best is not None and (POINTS_A_TERM * len(degrees) > y.size or len(degrees) > most):
             break
         if len(degrees) >= y.size:
             raise CampaignError(f"polynomial chaos: {y.size} points for {len(degrees)} coefficients; draw more points")

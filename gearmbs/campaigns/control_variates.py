@@ -24,6 +24,9 @@ FOLDS = 5
 TOGETHER = 3
 """Most factors in a term of the polynomial."""
 
+MOST_TERMS, MOST_POINTS = 500, 20_000
+"""Of a fit, so that it stays below some hundred megabytes however large the design is."""
+
 
 @dataclass(frozen=True)
 class ControlledBlocks:
@@ -82,7 +85,9 @@ def control_variates(
         mine, others = fold == k, fold != k
         if not mine.any() or (d + 2) * int(others.sum()) < 4 * (d + 1):
             return None
-        fitted = best_chaos(points[others].reshape(-1, d), blocks[others].ravel(), levels, together=min(d, TOGETHER))
+        some = np.flatnonzero(others)[: max(1, MOST_POINTS // (d + 2))]
+        u, y = points[some].reshape(-1, d), blocks[some].ravel()
+        fitted = best_chaos(u, y, levels, together=min(d, TOGETHER), most=MOST_TERMS)
         degrees, weights = fitted.degrees, fitted.coefficients
         values = chaos_columns(points[mine].reshape(-1, d), degrees, levels) @ weights
         surrogate[mine] = values.reshape(-1, d + 2)
