@@ -2,7 +2,7 @@
 
 numba's own ``njit`` with a signature compiles or loads at decoration, so that importing a module costs as much as using
 all of it; it compiles every helper as if Python called it; and its cache sees only the file a function stands in. A
-`Kernel` is a dispatcher that differs in these three points:
+`Kernel` is a dispatcher that differs in these four points:
 
 * A declared signature is looked at when the kernel is first called or first compiled into a caller.
 * A kernel that Python calls is an *entry*: machine code with a wrapper for Python. A kernel that kernels call is a
@@ -10,6 +10,7 @@ all of it; it compiles every helper as if Python called it; and its cache sees o
 * Entries and parts are kept in `gearmbs._kernel_cache` under a digest of all they are made of: their own code, the code
   of the kernels they call, and the constants they name. What has not changed is never compiled again, and nothing
   that has changed is ever found.
+* An index that is computed counts from the start of an array; see `gearmbs._counted_indices`.
 
 The decorator is used like numba's. Literal integers among the arguments count as plain integers, so that a helper
 without a signature is compiled once and not once a literal.
@@ -25,9 +26,11 @@ import numba
 from numba.core import bytecode, compiler, config, sigutils, typing
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NopythonTypeInference
 from numba.core.untyped_passes import ExtractByteCode
 
 from gearmbs import _kernel_cache as cache
+from gearmbs._counted_indices import CountedIndices
 from gearmbs._kernel_library import EntryLibrary, PartLibrary
 from gearmbs.compile import compile_missing
 
@@ -199,9 +202,16 @@ class Kernel(CPUDispatcher):
 
 
 class _Pipeline(compiler.Compiler):
-    """Numba's pipeline with symbols named after the content, the same in every process."""
+    """Numba's pipeline with indices counted from the start, and symbols named after the content, in every process."""
 
     name = ""
+
+    def define_pipelines(self) -> list:
+        """Return numba's passes with `CountedIndices` before the lowering."""
+        (pipeline,) = super().define_pipelines()
+        pipeline.add_pass_after(CountedIndices, NopythonTypeInference)
+        pipeline.finalize()
+        return [pipeline]
 
     def compile_extra(self, func: Callable) -> Any:
         """Compile a function; as of numba, but for the name of its symbol."""

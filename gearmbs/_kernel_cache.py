@@ -36,7 +36,7 @@ from numba.core import config, dispatcher, serialize
 FORMAT = "3"
 """To be raised when the files or what they hold change."""
 
-MAKERS = ("_jit", "_kernel_library", "_kernel_cache")
+MAKERS = ("_jit", "_counted_indices", "_kernel_library", "_kernel_cache")
 """Modules of this package that make what is kept; an edit of theirs makes all of it anew."""
 
 OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")

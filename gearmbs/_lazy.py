@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import importlib
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from types import ModuleType
 from typing import Any
+
+
+@contextlib.contextmanager
+def _uncollected() -> Iterator[None]:
+    """Pause the garbage collector: an import makes many objects that stay, which it would go through in vain."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 class _LatePackage(ModuleType):
@@ -23,7 +37,8 @@ class _LatePackage(ModuleType):
         if home is None:
             raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
         module, colon, other = home.partition(":")
-        value = importlib.import_module(module, self.__name__)
+        with _uncollected():
+            value = importlib.import_module(module, self.__name__)
         if other or not colon:
             value = getattr(value, other or name)
         ModuleType.__setattr__(self, name, value)

@@ -75,14 +75,16 @@ def windowed_sinc(length: int, cutoffs: float | Sequence[float], kind: str, rate
 
 
 def convolve_valid(values: np.ndarray, taps: np.ndarray, every: int = 1) -> np.ndarray:
-    """Return the fully supported part of a convolution, by overlapping pieces of the Fourier transform.
+    """Return the fully supported part of a convolution.
+
+    All samples are computed by overlapping pieces of the Fourier transform, each of several one by one.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
     taps : ndarray, shape (m,)
     every : int
-        Return only each of so many samples, from the first on. Where it is a power of two the others are not computed.
+        Return only each of so many samples, from the first on; the others are not computed.
 
     Returns
     -------
@@ -90,10 +92,15 @@ def convolve_valid(values: np.ndarray, taps: np.ndarray, every: int = 1) -> np.n
     """
     lap = taps.size - 1
     count = values.size - lap
+    if every > 1:
+        from .decimation import products
+
+        out = np.empty(-(-count // every))
+        products(np.ascontiguousarray(values, dtype=float), np.ascontiguousarray(taps[::-1]), every, out)
+        return out
     # about where the transforms cost least a sample
     size = 1 << (min(8 * taps.size, values.size) - 1).bit_length()
-    folded = size % every == 0 and size - lap >= every
-    step = (size - lap) // every * every if folded else size - lap
+    step = size - lap
     pieces = -(-count // step)
     padded = np.zeros((pieces - 1) * step + size)
     padded[: values.size] = values
@@ -101,16 +108,4 @@ def convolve_valid(values: np.ndarray, taps: np.ndarray, every: int = 1) -> np.n
     # the first supported sample comes first
     shifted = np.roll(np.pad(taps, (0, size - taps.size)), -lap)
     spectrum = np.fft.rfft(rows, axis=1) * np.fft.rfft(shifted)
-    if not folded:
-        return np.fft.irfft(spectrum, size, axis=1)[:, :step].ravel()[:count:every]
-    return _every_sample(spectrum, size, every)[:, : step // every].ravel()[: -(-count // every)]
-
-
-def _every_sample(spectrum: np.ndarray, size: int, every: int) -> np.ndarray:
-    """Return every so many-th of the ``size`` samples of each row of half spectra: what lies above folds down."""
-    if every == 1:
-        return np.fft.irfft(spectrum, size, axis=1)
-    short = size // every
-    whole = np.concatenate([spectrum, spectrum[:, -2:0:-1].conj()], axis=1)
-    folded = whole.reshape(-1, every, short).sum(axis=1)[:, : short // 2 + 1]
-    return np.fft.irfft(folded, short, axis=1) / every
+    return np.fft.irfft(spectrum, size, axis=1)[:, :step].ravel()[:count]

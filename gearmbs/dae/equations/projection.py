@@ -17,6 +17,9 @@ from gearmbs.dae.equations.simple_terms import OFFSET, RATE, RELATIVE, dot_motio
 ROUNDED_POSITION, ROUNDED_RATE = 1e-14, 1e-12
 """Violation of a constraint, m or rad, and its rate, m/s or rad/s, up to which no output is projected."""
 
+EPS = 2.220446049250313e-16
+"""Rounding of a prescribed motion, by which its row is off: an angle grows with the turns."""
+
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def largest_violation(phi):
@@ -28,12 +31,15 @@ def largest_violation(phi):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def are_satisfied(phi):
+def are_satisfied(phi, tab):
     """Whether Phi and its rate are zero up to rounding, so that a projection would move nothing but rounding."""
     satisfied = True
     for r in range(phi.size // ROW_RECORD):
         row = ROW_RECORD * r
-        satisfied &= abs(phi[row + ROW_PHI]) <= ROUNDED_POSITION
+        rounded, function = ROUNDED_POSITION, tab.row[r, T.ROW_FUNCTION]
+        if function >= 0:
+            rounded += EPS * abs(tab.fval[function, 0])
+        satisfied &= abs(phi[row + ROW_PHI]) <= rounded
         satisfied &= abs(phi[row + ROW_RATE]) <= ROUNDED_RATE
     return satisfied
 

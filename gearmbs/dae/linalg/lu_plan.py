@@ -19,7 +19,7 @@ from gearmbs.dae.linalg.counted_entries import (
     scaled_entries,
     taken_pattern,
 )
-from gearmbs.dae.linalg.nodes import nodes
+from gearmbs.dae.linalg.nodes import has_nodes, nodes
 from gearmbs.dae.linalg.pivoting import (
     CANCELLED,
     GROWTH_ALLOWED,
@@ -49,6 +49,11 @@ class LUPlan(Struct):
         For each column the earlier pivots that act on it, ascending.
     l_ptr, l_pos : ndarray
         For each column the rows below the pivot.
+    u_col, l_col : ndarray
+        Column of each of these entries.
+    op_ptr, op_l : ndarray
+        For each column the entries of L by which the earlier pivots act on it, one after the other; empty if there are
+        nodes.
     node_end : ndarray
         For each column the end of its node: columns in a row whose rows below the node are the same.
     row_from, col_to : ndarray
@@ -69,6 +74,10 @@ class LUPlan(Struct):
     u_pos: IndexVector
     l_ptr: IntVector
     l_pos: IndexVector
+    u_col: IndexVector
+    l_col: IndexVector
+    op_ptr: IntVector
+    op_l: IndexVector
     node_end: IntVector
     row_from: IndexVector
     col_to: IndexVector
@@ -164,27 +173,40 @@ def _upper_by_columns(u_ptr, u_cols, col_place):
     return by_col, places
 
 
+@njit(_UVEC(_IVEC), cache=True, nogil=True, error_model="numpy")
+def _columns_of(ptr):
+    """Return the column of each entry of a pattern by columns."""
+    columns = np.empty(ptr[ptr.shape[0] - 1], dtype=np.uint32)
+    for k in range(ptr.shape[0] - 1):
+        for p in range(ptr[k], ptr[k + 1]):
+            columns[p] = k
+    return columns
+
+
+@njit(types.Tuple((_IVEC, _UVEC))(_IVEC, _UVEC, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
+def _operations(u_ptr, u_pos, l_ptr, node_end):
+    """Return the fields ``op_*`` of `LUPlan`."""
+    n = u_ptr.shape[0] - 1
+    op_ptr = np.zeros(n + 1, dtype=np.int64)
+    if has_nodes(node_end):
+        return op_ptr, np.empty(0, dtype=np.uint32)
+    for k in range(n):
+        op_ptr[k + 1] = op_ptr[k]
+        for p in range(u_ptr[k], u_ptr[k + 1]):
+            op_ptr[k + 1] += l_ptr[u_pos[p] + 1] - l_ptr[u_pos[p]]
+    op_l = np.empty(op_ptr[n], dtype=np.uint32)
+    e = 0
+    for p in range(u_pos.shape[0]):
+        for q in range(l_ptr[u_pos[p]], l_ptr[u_pos[p] + 1]):
+            op_l[e] = q
+            e += 1
+    return op_ptr, op_l
+
+
 @njit(
     types.Tuple(
-        (
-            int64,
-            _IVEC,
-            _UVEC,
-            _UVEC,
-            _VEC,
-            _IVEC,
-            _UVEC,
-            _IVEC,
-            _UVEC,
-            _IVEC,
-            _UVEC,
-            _UVEC,
-            _VEC,
-            _VEC,
-            _VEC,
-            _UVEC,
-            _VEC,
-        )
+        (int64, _IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC)
+        + (_VEC, _VEC, _VEC, _UVEC, _VEC)
     )(_IVEC, _IVEC, _VEC, _VEC, float64, _MASK, float64, LINES_TYPE, LINES_TYPE),
     cache=True,
     nogil=True,
@@ -237,6 +259,8 @@ def _plan(all_ptr, all_indices, vals, scale, drop, counted, negligible, columns,
     for e in range(l_rows.shape[0]):
         l_pos[e] = row_place[l_rows[e]]
     _sort_lines(l_pos, l_ptr)
+    node_end = nodes(l_ptr, l_pos)
+    op_ptr, op_l = _operations(u_by_col, u_pos, l_ptr, node_end)
     return (
         rank,
         a_ptr,
@@ -247,7 +271,11 @@ def _plan(all_ptr, all_indices, vals, scale, drop, counted, negligible, columns,
         u_pos,
         l_ptr,
         l_pos,
-        nodes(l_ptr, l_pos),
+        _columns_of(u_by_col),
+        _columns_of(l_ptr),
+        op_ptr,
+        op_l,
+        node_end,
         row_from,
         col_to,
         row_scale[rows],
@@ -312,6 +340,6 @@ def analyse(
     if rank < n and not counted.all():
         return analyse(indptr, indices, vals, scale, drop)
     if rank < len(indptr) - 1 and drop == 0.0:
-        rows, cols = (np.asarray(plan[i], dtype=np.int64)[rank:] for i in (9, 10))
+        rows, cols = (np.asarray(plan[i], dtype=np.int64)[rank:] for i in (13, 14))
         raise SingularMatrixError(rows, cols)
     return LUPlan(**dict(zip(LUPlan.array_members, plan, strict=True)))

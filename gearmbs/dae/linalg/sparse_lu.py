@@ -13,7 +13,7 @@ from numba import float64, types
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.structs import Struct, Vector
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
-from gearmbs.dae.linalg.nodes import through_node
+from gearmbs.dae.linalg.nodes import has_nodes, through_node
 
 GROWTH_LIMIT = 1e5
 
@@ -46,6 +46,56 @@ def new_factors(plan: LUPlan) -> LUFactors:
     )
 
 
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _act(plan, factors, k):
+    """Eliminate from column k, spread out in ``factors.x``, what the earlier pivots act on it, and store U's part."""
+    x, l_vals, u_vals = factors.x, factors.l_vals, factors.u_vals
+    l_pos, l_col, u_pos, op_l = plan.l_pos, plan.l_col, plan.u_pos, plan.op_l
+    for e in range(np.uint64(plan.op_ptr[k]), np.uint64(plan.op_ptr[k + 1])):
+        q = op_l[e]
+        x[l_pos[q]] -= l_vals[q] * x[l_col[q]]
+    for p in range(np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])):
+        u_vals[p] = x[u_pos[p]]
+        x[u_pos[p]] = 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _act_by_nodes(plan, factors, k):
+    """As `_act`, the columns of a node together."""
+    x, w, l_vals, u_vals = factors.x, factors.w, factors.l_vals, factors.u_vals
+    l_ptr, l_pos, u_pos, node_end = plan.l_ptr, plan.l_pos, plan.u_pos, plan.node_end
+    p, last = np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])
+    while p < last:
+        j = np.uint64(u_pos[p])
+        end = node_end[j]
+        if end - np.int64(j) == 1:
+            u = x[j]
+            x[j] = 0.0
+            u_vals[p] = u
+            p += np.uint64(1)
+            if u != 0.0:
+                for q in range(np.uint64(l_ptr[j]), np.uint64(l_ptr[j + np.uint64(1)])):
+                    x[l_pos[q]] -= l_vals[q] * u
+            continue
+        # the column has all rows of the node from this one on
+        stop, rows = np.uint64(min(end, k)), np.uint64(end) - j
+        below = np.uint64(l_ptr[end - 1])
+        size = rows + np.uint64(l_ptr[end]) - below
+        for i in range(rows):
+            w[i] = x[j + i]
+            x[j + i] = 0.0
+        for i in range(rows, size):
+            w[i] = 0.0
+        through_node(np.int64(j), np.int64(stop), np.int64(size), l_ptr, l_vals, w)
+        for i in range(stop - j):
+            u_vals[p + i] = w[i]
+        for i in range(stop - j, rows):
+            x[j + i] = w[i]
+        for i in range(size - rows):
+            x[l_pos[below + i]] += w[rows + i]
+        p += stop - j
+
+
 @njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
 def factor(plan, factors, vals):
     """Factor the matrix with values ``vals`` along the plan.
@@ -68,58 +118,28 @@ def factor(plan, factors, vals):
     for p in range(left_src.shape[0]):
         if not abs(vals[left_src[p]]) <= left_limit[p]:
             return np.inf
-    x, w = factors.x, factors.w
-    l_vals = factors.l_vals
-    u_vals = factors.u_vals
-    l_pos = plan.l_pos
-    l_ptr, node_end = plan.l_ptr, plan.node_end
-    u_pos = plan.u_pos
+    x, l_vals, pivot_inv = factors.x, factors.l_vals, factors.pivot_inv
+    a_pos, a_src, a_scale, l_pos = plan.a_pos, plan.a_src, plan.a_scale, plan.l_pos
+    by_nodes = has_nodes(plan.node_end)
     growth = 0.0
-    n = x.shape[0]
-    for k in range(n):
+    for k in range(x.shape[0]):
         for p in range(np.uint64(plan.a_ptr[k]), np.uint64(plan.a_ptr[k + 1])):
-            x[plan.a_pos[p]] = vals[plan.a_src[p]] * plan.a_scale[p]
-        p, last = np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])
-        while p < last:
-            j = np.uint64(u_pos[p])
-            end = node_end[j]
-            if end - np.int64(j) == 1:
-                u = x[j]
-                x[j] = 0.0
-                u_vals[p] = u
-                p += np.uint64(1)
-                if u != 0.0:
-                    for q in range(np.uint64(l_ptr[j]), np.uint64(l_ptr[j + np.uint64(1)])):
-                        x[l_pos[q]] -= l_vals[q] * u
-                continue
-            # the column has all rows of the node from this one on
-            stop, rows = np.uint64(min(end, k)), np.uint64(end) - j
-            below = np.uint64(l_ptr[end - 1])
-            size = rows + np.uint64(l_ptr[end]) - below
-            for i in range(rows):
-                w[i] = x[j + i]
-                x[j + i] = 0.0
-            for i in range(rows, size):
-                w[i] = 0.0
-            through_node(np.int64(j), np.int64(stop), np.int64(size), l_ptr, l_vals, w)
-            for i in range(stop - j):
-                u_vals[p + i] = w[i]
-            for i in range(stop - j, rows):
-                x[j + i] = w[i]
-            for i in range(size - rows):
-                x[l_pos[below + i]] += w[rows + i]
-            p += stop - j
+            x[a_pos[p]] = vals[a_src[p]] * a_scale[p]
+        if by_nodes:
+            _act_by_nodes(plan, factors, k)
+        else:
+            _act(plan, factors, k)
         pivot = x[k]
         x[k] = 0.0
         if plan.kept[k] == 0.0:
-            factors.pivot_inv[k] = 0.0
+            pivot_inv[k] = 0.0
             x[:] = 0.0
             continue
         if pivot == 0.0:
             return np.inf
         inv = 1.0 / pivot
-        factors.pivot_inv[k] = inv
-        for q in range(np.uint64(l_ptr[k]), np.uint64(l_ptr[k + 1])):
+        pivot_inv[k] = inv
+        for q in range(np.uint64(plan.l_ptr[k]), np.uint64(plan.l_ptr[k + 1])):
             i = l_pos[q]
             l = x[i] * inv
             x[i] = 0.0
@@ -129,25 +149,12 @@ def factor(plan, factors, vals):
     return growth
 
 
-@njit(types.void(PLAN_TYPE, FACTORS_TYPE, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
-def solve(plan, factors, b, out):
-    """Write the solution of A out = b; ``out`` may be ``b`` itself.
-
-    Parameters
-    ----------
-    plan : LUPlan
-    factors : LUFactors
-        From `factor`.
-    b, out : ndarray, shape (n,)
-    """
-    x, w = factors.x, factors.w
-    l_vals = factors.l_vals
-    u_vals = factors.u_vals
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _forward_by_nodes(plan, factors):
+    """Solve L x = x in ``factors.x``, the columns of a node together."""
+    x, w, l_vals = factors.x, factors.w, factors.l_vals
     l_pos, l_ptr, node_end = plan.l_pos, plan.l_ptr, plan.node_end
-    u_pos = plan.u_pos
     n = x.shape[0]
-    for k in range(n):
-        x[k] = b[plan.row_from[k]] * plan.row_scale[k]
     k = 0
     while k < n:
         end = node_end[k]
@@ -169,14 +176,40 @@ def solve(plan, factors, b, out):
             for i in range(size - rows):
                 x[l_pos[below + i]] += w[rows + i]
         k = end
-    for m in range(n):
-        k = n - 1 - m
-        v = x[k] * factors.pivot_inv[k]
-        out[plan.col_to[k]] = v * plan.col_scale[k]
+
+
+@njit(types.void(PLAN_TYPE, FACTORS_TYPE, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
+def solve(plan, factors, b, out):
+    """Write the solution of A out = b; ``out`` may be ``b`` itself.
+
+    One loop over all entries does without those over columns, most of which have one or two.
+
+    Parameters
+    ----------
+    plan : LUPlan
+    factors : LUFactors
+        From `factor`.
+    b, out : ndarray, shape (n,)
+    """
+    x, l_vals, u_vals, pivot_inv = factors.x, factors.l_vals, factors.u_vals, factors.pivot_inv
+    l_pos, l_col, u_pos, u_col = plan.l_pos, plan.l_col, plan.u_pos, plan.u_col
+    row_from, row_scale, col_to, col_scale = plan.row_from, plan.row_scale, plan.col_to, plan.col_scale
+    n = x.shape[0]
+    for k in range(n):
+        x[k] = b[row_from[k]] * row_scale[k]
+    if has_nodes(plan.node_end):
+        _forward_by_nodes(plan, factors)
+    else:
+        for q in range(l_pos.shape[0]):
+            x[l_pos[q]] -= l_vals[q] * x[l_col[q]]
+    last = u_pos.shape[0] - 1
+    for m in range(u_pos.shape[0]):
+        p = last - m
+        k = u_col[p]
+        x[u_pos[p]] -= u_vals[p] * (x[k] * pivot_inv[k])
+    for k in range(n):
+        out[col_to[k]] = x[k] * pivot_inv[k] * col_scale[k]
         x[k] = 0.0
-        if v != 0.0:
-            for p in range(np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])):
-                x[u_pos[p]] -= u_vals[p] * v
 
 
 @njit(types.void(PLAN_TYPE, FACTORS_TYPE, _MAT), cache=True, nogil=True, error_model="numpy")
@@ -191,24 +224,24 @@ def solve_pair(plan, factors, pair):
     pair : ndarray, shape (4, n)
         Right-hand sides in the first two rows, overwritten by the solutions; the others are scratch.
     """
-    l_vals, u_vals = factors.l_vals, factors.u_vals
-    l_pos, u_pos = plan.l_pos, plan.u_pos
+    l_vals, u_vals, pivot_inv = factors.l_vals, factors.u_vals, factors.pivot_inv
+    l_pos, l_col, u_pos, u_col = plan.l_pos, plan.l_col, plan.u_pos, plan.u_col
     n = factors.x.shape[0]
     for k in range(n):
         row, size = plan.row_from[k], plan.row_scale[k]
         pair[2, k] = pair[0, row] * size
         pair[3, k] = pair[1, row] * size
+    for q in range(l_pos.shape[0]):
+        i, k, l = l_pos[q], l_col[q], l_vals[q]
+        pair[2, i] -= l * pair[2, k]
+        pair[3, i] -= l * pair[3, k]
+    last = u_pos.shape[0] - 1
+    for m in range(u_pos.shape[0]):
+        p = last - m
+        i, k, u = u_pos[p], u_col[p], u_vals[p]
+        pair[2, i] -= u * (pair[2, k] * pivot_inv[k])
+        pair[3, i] -= u * (pair[3, k] * pivot_inv[k])
     for k in range(n):
-        v, w = pair[2, k], pair[3, k]
-        for q in range(np.uint64(plan.l_ptr[k]), np.uint64(plan.l_ptr[k + 1])):
-            pair[2, l_pos[q]] -= l_vals[q] * v
-            pair[3, l_pos[q]] -= l_vals[q] * w
-    for m in range(n):
-        k = n - 1 - m
-        inv, size, to = factors.pivot_inv[k], plan.col_scale[k], plan.col_to[k]
-        v, w = pair[2, k] * inv, pair[3, k] * inv
-        pair[0, to] = v * size
-        pair[1, to] = w * size
-        for p in range(np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])):
-            pair[2, u_pos[p]] -= u_vals[p] * v
-            pair[3, u_pos[p]] -= u_vals[p] * w
+        size, to = plan.col_scale[k], plan.col_to[k]
+        pair[0, to] = pair[2, k] * pivot_inv[k] * size
+        pair[1, to] = pair[3, k] * pivot_inv[k] * size

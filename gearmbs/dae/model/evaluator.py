@@ -253,7 +253,7 @@ def _evaluate(
             if not projected:
                 # the factors of the row before serve while the bodies have hardly turned since
                 spin = violations(t[k], at, phi, idata, tab)
-                trusted = projected = are_satisfied(phi)
+                trusted = projected = are_satisfied(phi, tab)
                 if not projected and k > first and spin * (t[k] - t[k - 1]) <= SAME_POSITION:
                     records.strayed[k] = project(t[k], at, phi, plan, factors, pair, idata, tab)
                     projected = True
@@ -267,7 +267,7 @@ def _evaluate(
                 return last
             if passes == 0 and trusted:
                 records.strayed[k] = largest_violation(phi)
-                if not are_satisfied(phi):
+                if not are_satisfied(phi, tab):
                     trusted = projected = False
                     continue
             if passes == 0 and not unchanged(vals, factored, allowed):
