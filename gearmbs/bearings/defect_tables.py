@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gearmbs.bearings.defects import DEFECTS, Defect
-from gearmbs.bearings.errors import BearingError
+from gearmbs.bearings.errors import BearingError, require_fields
 
 
 def as_defects(given: Any) -> tuple[Defect, ...]:
@@ -40,6 +40,7 @@ def _one(given: Any) -> Defect:
     kind = str(fields.pop("kind", ""))
     if kind not in DEFECTS:
         raise BearingError(f"defects: kind {kind!r} is unknown; choose one of {', '.join(DEFECTS)}")
+    require_fields(fields, DEFECTS[kind], f"defects: {kind}")
     try:
         return DEFECTS[kind](**fields)
     except TypeError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from gearmbs.bearings.defects import Defect
-from gearmbs.bearings.errors import BearingError
+from gearmbs.bearings.errors import BearingError, require_fields
 from gearmbs.bearings.geometry import Bearing
 from gearmbs.bearings.settings import BearingSettings
 from gearmbs.bearings.tables import pack
@@ -88,6 +88,7 @@ class RollingBearing(ForceElement):
 
     def __init__(self, name: str, i: Any, j: Any, bearing: Bearing, **settings: Any) -> None:
         super().__init__(name, i, j)
+        require_fields(settings, BearingSettings, "RollingBearing")
         try:
             self.settings = BearingSettings(bearing=bearing, **settings)
         except TypeError as error:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gearmbs.bearings import layout as B
-from gearmbs.bearings.errors import BearingError, require
+from gearmbs.bearings.errors import BearingError, require, require_fields
 from gearmbs.bearings.geometry import Bearing
 from gearmbs.bearings.settings import BearingSettings
 from gearmbs.bearings.tables import BearingTables, pack
@@ -99,6 +99,7 @@ class BearingStatics:
     """
 
     def __init__(self, bearing: Bearing, *, speed: Quantity = 0.0, **settings: Any) -> None:
+        require_fields(settings, BearingSettings, "BearingStatics")
         try:
             self.settings = BearingSettings(bearing=bearing, **settings)
             self.speed = to_si(speed, "angular speed", "speed")

@@ -251,10 +251,12 @@ class RollingContactBearing(Bearing):
         require(self.rolling is not None, f"{self.label}: rolling is missing; give a designation such as '6205'")
         from gearmbs.bearings import LooseFit
         from gearmbs.bearings.defect_tables import as_defects
+        from gearmbs.bearings.errors import require_fields
         from gearmbs.bearings.settings import BearingSettings
 
         with told_of(f"{self.label}: settings"):
             on_rings = [d for d in as_defects(self.settings.get("defects", ())) if not isinstance(d, LooseFit)]
+            require_fields(self.settings, BearingSettings, "RollingBearing")
             BearingSettings(bearing=self.rolling, **{**self.settings, "defects": on_rings})
 
     def add(self, m: Mechanism, shaft: Marker, seat: Marker, role: str) -> None:

@@ -52,7 +52,8 @@ def diagnose_bearing(
         Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
         ``channels`` and ``gaps`` as there.
     bearing : Bearing, str, mapping, BearingLines, or a sequence of these
-        See `bearing_lines`; a mapping from names to (bearing, ratio) gives bearings on shafts of other speeds.
+        See `bearing_lines`; a mapping from names to (bearing, ratio) gives bearings on shafts of other speeds. Those
+        that are alike and turn alike have the same lines and are told as one, "a or b".
     speed : float, str or curve, optional
         Of the inner ring's shaft, rad/s or text; default the signal's. Of a curve, as for `speed_curve`, the angle is
         taken, see ``phase``.
@@ -83,7 +84,7 @@ def diagnose_bearing(
     SignalError
         If a bearing cannot be read, or the record is too short for its lines.
     """
-    known = _all_lines(bearing)
+    known = _told_apart(_all_lines(bearing))
     if not 0.0 < slip < 0.2:
         raise SignalError(f"slip: must lie between 0 and 0.2, got {slip!r}")
     if not 1 <= harmonics <= 20:
@@ -140,6 +141,14 @@ def _all_lines(bearing: Any) -> tuple[BearingLines, ...]:
     if isinstance(bearing, Sequence) and not isinstance(bearing, str):
         return tuple(bearing_lines(item) for item in bearing)
     return (bearing_lines(bearing),)
+
+
+def _told_apart(bearings: Sequence[BearingLines]) -> tuple[BearingLines, ...]:
+    """Return bearings with those of the same lines, as two alike on a shaft, as one: no record tells which it is."""
+    names: dict[tuple[float, ...], list[str]] = {}
+    for lines in bearings:
+        names.setdefault((lines.ftf, lines.bsf, lines.bpfo, lines.bpfi, lines.ratio), []).append(lines.name)
+    return tuple(BearingLines(" or ".join(dict.fromkeys(alike)), *lines) for lines, alike in names.items())
 
 
 def _shaft(signal: xr.DataArray, speed: Any, phase: xr.DataArray | None) -> tuple[float, list[str]]:

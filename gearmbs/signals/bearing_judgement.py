@@ -28,7 +28,7 @@ import numpy as np
 from .bearing_evidence import LINE_BINS, EnvelopeSpectrum, Evidence, find_lines
 from .bearing_lines import CAGE, ELEMENT, OUTER, BearingLines
 
-CLEAR, SIGNS, OPEN, FAINT, NONE = "clear", "signs", "open", "faint", "none"
+CLEAR, SIGNS, OPEN, FAINT, MULTIPLES, NONE = "clear", "signs", "open", "faint", "multiples", "none"
 CLEAR_CHANCE, SIGNS_CHANCE, FAINT_CHANCE = -12.0, -6.0, -2.0
 """Decimal logarithm of the chance from which lines are no noise; from the last on they are told but accuse nothing."""
 LEAST_RATIO = 10.0
@@ -151,8 +151,10 @@ def _not_named(first: _Look, key: tuple[BearingLines, str], trials: float) -> Ju
     evidence, (stronger, places) = first.of(key), first.rivals(key)
     if _stands_out(evidence, SIGNS_CHANCE - trials):
         return Judged(*key, evidence, NONE, stronger, places, True, first.fraction_of_turns(key))
-    faint = key[1] != CAGE and stronger == 0 and evidence.log_chance <= FAINT_CHANCE - trials
-    return Judged(*key, evidence, FAINT if faint else NONE, stronger, places)
+    told = key[1] != CAGE and stronger == 0 and evidence.log_chance <= FAINT_CHANCE - trials
+    # such lines are no noise, but among them the part's own is missing
+    grade = MULTIPLES if evidence.log_chance <= SIGNS_CHANCE - trials else FAINT
+    return Judged(*key, evidence, grade if told else NONE, stronger, places)
 
 
 class _Look:

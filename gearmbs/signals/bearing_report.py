@@ -38,9 +38,10 @@ class PartFinding:
         Power of the first sidebands by that of the line; NaN for parts that have none.
     where : str
         Band in which they are clearest.
-    grade : {"clear", "signs", "open", "faint", "none"}
+    grade : {"clear", "signs", "open", "faint", "multiples", "none"}
         "open": lines that may also be another shaft's; "faint": hardly above noise, but as strong at no other place of
-        the record. Neither accuses.
+        the record; "multiples": no noise, and as strong at no other place, but without the fundamental. None of these
+        accuses.
     beside : bool
         Whether there are lines, but another part, or another cause, explains more of them.
     stronger, places : int
@@ -105,6 +106,13 @@ class PartFinding:
                 f"A faint line at {self.found:.2f} Hz {place} is {100 * self.slip:+.2f} % beside that of "
                 f"{WORDS[self.part]} of bearing {self.bearing} and stronger than at {self.places} other places, but "
                 f"noise has such with a probability of {_chance(self.log_chance)}: take a longer record."
+            )
+        if self.grade == "multiples":
+            return (
+                f"Multiples of {self.found:.2f} Hz {place} stand out as those of {WORDS[self.part]} of bearing "
+                f"{self.bearing} ({self.kinematic:.2f} Hz) do, in noise with a probability of "
+                f"{_chance(self.log_chance)}, but {self.found:.2f} Hz itself does not, or is a known shaft's line: "
+                "they name no part; another band (band=, --band), direction or speed may show it."
             )
         if self.fraction is not None:
             k, m = self.fraction

@@ -101,6 +101,7 @@ def report_plot(
     signal: xr.DataArray | None = None,
     *,
     title: str | None = None,
+    **shaft: Any,
 ) -> Figure:
     """Draw the one figure that says most about a report.
 
@@ -109,13 +110,15 @@ def report_plot(
     report : AnalysisReport, VibrationReport or ComparisonReport
     signal : xarray.DataArray, optional
         The record that an `AnalysisReport` was made of: its spectrum is drawn then, else the average over a revolution,
-        or the levels of the mesh harmonics.
+        or the levels of the mesh harmonics. Where the speed changes its order map is.
     title : str, optional
+    **shaft
+        As of `analysis_figures`, with the signal.
     """
     if isinstance(report, ComparisonReport):
         figure = next(iter(comparison_figures(report).values()))
     elif isinstance(report, VibrationReport) or signal is not None:
-        figures = analysis_figures(report, signal)
+        figures = analysis_figures(report, signal, **shaft)
         # of a record whose speed changes there is no spectrum but an order map
         whole = figures["spectrum"] if "spectrum" in figures else figures["order map"]
         figure = figures.get("envelope", whole) if signal is None else whole

@@ -22,6 +22,8 @@ from gearmbs.signals import (
     with_metadata,
 )
 from gearmbs.signals.bearing_evidence import EnvelopeSpectrum, find_lines, log_tail, power_of
+from gearmbs.signals.bearing_judgement import judge
+from gearmbs.signals.bearing_report import PartFinding
 from tests.view.looking import assert_readable
 
 RATE, SHAFT, SECONDS = 12000.0, 29.0, 5.0
@@ -111,6 +113,22 @@ def test_a_faint_line_is_told_and_accuses_nothing():
     assert f"A faint line at {outer.found:.2f} Hz" in report.verdict
 
 
+def test_multiples_without_their_line_are_not_faint():
+    power = np.random.default_rng(0).exponential(size=6000)
+    line = LINES.bpfo * SHAFT
+    power[[round(k * line / 0.2) for k in (2, 3, 4)]] *= 300.0
+    found = judge([EnvelopeSpectrum.of(power, 0.2, SHAFT)], [LINES], SHAFT, [], slip=0.015, harmonics=4)
+    outer = next(one for one in found if one.part == "outer race")
+    assert (outer.grade, outer.stronger) == ("multiples", 0)
+    assert outer.evidence.log_chance < -100.0
+    finding = PartFinding(
+        "6205", "outer race", "case", line, outer.evidence.found, outer.evidence.ratios, outer.evidence.log_chance,
+        np.nan, "", outer.grade,
+    )  # fmt: skip
+    assert finding.remark().startswith(f"Multiples of {finding.found:.2f} Hz in channel case stand out")
+    assert "faint" not in finding.remark()
+
+
 def test_chance_is_the_share_of_noise_that_reaches_it():
     """Of envelopes of noise, the share with a chance below p is about p."""
     rng = np.random.default_rng(3)
@@ -128,6 +146,14 @@ def test_tail_of_a_gamma_distribution():
 
     for count in (1, 3, 4):
         assert log_tail(20.0, count) == pytest.approx(gamma.logsf(20.0, count), rel=1e-9)
+
+
+def test_bearings_with_the_same_lines_are_one():
+    data = record(pulses(LINES.bpfo * SHAFT), MESH)
+    report = diagnose_bearing(data, {"a": "6205", "b": "6205", "c": ("6205", 0.345)}, f"{SHAFT} Hz")
+    assert [lines.name for lines in report.bearings] == ["a or b", "c"]
+    assert report.accused[0].bearing == "a or b"
+    assert "of bearing a or b makes" in report.verdict
 
 
 def test_several_bearings_and_ratios():
