@@ -25,7 +25,7 @@ def as_defects(given: Any) -> tuple[Defect, ...]:
     Examples
     --------
     >>> as_defects({"kind": "spall", "part": "inner", "width": "2 mm"})
-    (Spall(part='inner', width=0.002, edge=0.0001),)
+    (Spall(part='inner', width='2 mm', edge=0.0001),)
     """
     single = not isinstance(given, Sequence) or isinstance(given, str)
     return tuple(_one(item) for item in ((given,) if single else given))
