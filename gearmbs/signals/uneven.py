@@ -9,7 +9,6 @@ import xarray as xr
 
 from .errors import SignalError
 from .filters import decimation_taps
-from .fir import convolve_valid
 from .monotone_cubic import monotone_cubic
 from .signal import check_rate, make_signal
 
@@ -67,6 +66,9 @@ def even_signal(
     SignalError
         If the times do not increase or do not cover the span.
     """
+    # whoever analyses a file does not wait for a compiler
+    from .decimation import products
+
     rate = check_rate(rate)
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     if t.ndim != 1 or values.shape[:1] != t.shape:
@@ -80,15 +82,17 @@ def even_signal(
     if first < low or last > high:
         raise SignalError(f"start, stop: {start:g} to {stop:g} s is not within the times {t[0]:g} to {t[-1]:g} s")
     columns = values.reshape(t.size, -1)
-    even = np.empty((high - low + 1, columns.shape[1]))
+    # each column on end, as the kernel takes it
+    even = np.empty((columns.shape[1], high - low + 1)).T
     taps = decimation_taps(factor, factor * rate)
+    weights = np.ascontiguousarray(taps[::-1])
     for k in range(0, len(even), BLOCK):
         rows = slice(k, min(k + BLOCK, len(even)))
         fine = _fine(t, columns, rate, factor, (low, high), (low + rows.start, low + rows.stop - 1), taps.size // 2)
         for column, source in zip(even.T, fine.T, strict=True):
-            column[rows] = convolve_valid(np.ascontiguousarray(source), taps, factor)
+            products(np.ascontiguousarray(source), weights, factor, column[rows])
     return make_signal(
-        even[first - low : last - low + 1],
+        np.ascontiguousarray(even[first - low : last - low + 1]),
         rate,
         units=units,
         channels=channels,

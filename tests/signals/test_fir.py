@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gearmbs.signals.decimation import products
 from gearmbs.signals.fir import convolve_valid
 
 
@@ -15,3 +16,6 @@ def test_every_so_many_th_sample_of_a_convolution(n, m, every):
     values, taps = rng.standard_normal(n), rng.standard_normal(m)
     found = convolve_valid(values, taps, every)
     np.testing.assert_allclose(found, np.convolve(values, taps, "valid")[::every], atol=1e-11)
+    compiled = np.empty(found.size)
+    products(values, np.ascontiguousarray(taps[::-1]), every, compiled)
+    np.testing.assert_allclose(compiled, found, atol=1e-11)
