@@ -14,6 +14,9 @@ Speed = Annotated[
     str | None,
     typer.Option(help='Shaft speed, e.g. "1780 rpm", or a file with the speed over time; default: from the GMF line.'),
 ]
+Units = Annotated[
+    str | None, typer.Option(help='Units of the samples, e.g. "m/s^2", or of channels, "acc=g, n=rpm"; default: known.')
+]
 Gaps = Annotated[str | None, typer.Option(help='Missing samples: "refuse", "interpolate" or "longest" stretch.')]
 ReportFile = Annotated[Path | None, typer.Option("--out", "-o", help="Write the report here instead of printing it.")]
 
@@ -64,6 +67,19 @@ def pair_of(text: str) -> tuple[float, float]:
         to_si(p if any(c.isalpha() for c in p.replace("e", "")) else f"{p} Hz", "frequency", "--band") for p in parts
     )
     return low, high
+
+
+def sample_units(text: str | None) -> str | dict[str, str] | None:
+    """Return the unit of a text such as "m/s^2", or those of channels, given as "acc=g, n=rpm"."""
+    if text is None or "=" not in text:
+        return text
+    found = {}
+    for part in text.split(","):
+        name, _, unit = (piece.strip() for piece in part.rpartition("="))
+        if not (name and unit):
+            raise ValueError(f"--units {text!r}: {part.strip()!r} names no channel; write for example acc=g, n=rpm")
+        found[name] = unit
+    return found
 
 
 def tooth_counts(text: str) -> tuple[int, ...]:

@@ -146,7 +146,7 @@ def read_signal(
         Sampling rate in Hz, needed if the file does not say. If both do, they must agree. It also stands in for the
         times of a text file that are so rounded that they look uneven.
     units : str, sequence or mapping, optional
-        Units of the channels; wins over the file's.
+        Units of the channels; wins over the file's. A mapping leaves channels that it does not name their own.
     speed, teeth : optional
         Speed in rad/s and tooth counts; win over the file's.
     channels : sequence of str, optional

@@ -107,7 +107,7 @@ def signal_from(
         return make_signal(
             values,
             found,
-            units=record.units if units is None else units,
+            units=_units_said(units, record),
             channels=record.names,
             t0=record.t0 + first / found,
             speed=record.speed if speed is None else speed,
@@ -118,6 +118,12 @@ def signal_from(
         raise
     except SignalError as exc:
         raise SignalFileError(path, str(exc)) from exc
+
+
+def _units_said(units: str | Sequence[str] | Mapping[str, str] | None, record: Record) -> Any:
+    """Return the units of the channels: of a mapping its own, of the other channels the file's."""
+    known = dict(zip(record.names, record.units))
+    return known | dict(units) if isinstance(units, Mapping) else record.units if units is None else units
 
 
 def metadata_json(record: Record) -> str:

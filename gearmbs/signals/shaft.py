@@ -99,7 +99,8 @@ def speed_of_channel(signal: xr.DataArray, channel: str) -> xr.DataArray:
         factor = unit_factor(unit)
     except SignalError:
         raise SignalError(
-            f"speed_channel: {channel!r} is in {unit!r}; say its unit with units={{{channel!r}: 'rpm'}} (or Hz, rad/s)"
+            f"speed_channel: {channel!r} is in {unit!r}; say its unit, rpm, Hz or rad/s, with "
+            f"units={{{channel!r}: 'rpm'}} (on the command line: --units '{channel}=rpm')"
         ) from None
     values = factor * np.asarray(signal.values[:, at], dtype=float)
     values = -values if values.mean() < 0.0 else values

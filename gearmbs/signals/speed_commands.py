@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from gearmbs._command import guarded, stage_bar
-from gearmbs.signals.command_parts import Gaps, Rate, hand_over, save_figures
+from gearmbs.signals.command_parts import Gaps, Rate, Units, hand_over, sample_units, save_figures
 
 Orders = Annotated[str | None, typer.Option(help='Orders of the shaft to mark, e.g. "1,29,58".')]
 Maximum = Annotated[str | None, typer.Option(help='Highest frequency shown, e.g. "6 kHz".')]
@@ -31,7 +31,7 @@ def waterfall(
     style: Annotated[str, typer.Option(help="lines or map.")] = "lines",
     maximum: Maximum = None,
     rate: Rate = None,
-    units: Annotated[str | None, typer.Option(help='Units of the samples, e.g. "m/s^2".')] = None,
+    units: Units = None,
     gaps: Gaps = None,
     out: Folder = Path("waterfall"),
 ) -> None:
@@ -49,7 +49,7 @@ def waterfall(
             raise ValueError(f"--speed is given {len(known)} times for {len(files)} files; give one for each")
         signals = []
         for k, file in enumerate(files):
-            signals.append(read_any(file, rate=rate, units=units, channels=chosen, gaps=gaps))
+            signals.append(read_any(file, rate=rate, units=sample_units(units), channels=chosen, gaps=gaps))
             move(0.5 * (k + 1) / len(files), "reading")
         marked = numbers(orders, "--orders")
         shown: dict[str, Any] = {"style": style, "maximum": maximum, "channel": channel}

@@ -45,5 +45,13 @@ def parse_speed(text: str | None, name: str = "--speed") -> Any:
 
 
 def _over_time(signal: xr.DataArray, name: str) -> xr.DataArray:
-    curve = speed_of_channel(signal, name)
+    try:
+        curve = speed_of_channel(signal, name)
+    except SignalError:
+        unit = str(signal["units"].values[list(signal["channel"].values).index(name)])
+        source = signal.attrs.get("source", "the file")
+        raise SignalError(
+            f"speed: {source} has {name!r} in {unit!r}; write its unit, rpm, Hz or rad/s, into its label, "
+            f"'{name} [rpm]'"
+        ) from None
     return curve.assign_coords(time=signal["time"].values)

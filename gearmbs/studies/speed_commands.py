@@ -69,7 +69,7 @@ def campbell(
         from gearmbs.view import campbell_plot
 
         top = to_si(maximum, "frequency", "--maximum")
-        limits = [to_si(text, "angular speed", "--speeds") for text in speeds or []]
+        limits = sorted(to_si(text, "angular speed", "--speeds") for text in speeds or [])
         if len(limits) > 2:
             raise ValueError(f"--speeds is given {len(limits)} times; give the highest, or the lowest and the highest")
         turned = np.linspace(0.0 if len(limits) == 1 else limits[0], limits[-1], 13).tolist() if limits else None

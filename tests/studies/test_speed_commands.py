@@ -62,6 +62,22 @@ def test_analyse_and_waterfall_draw_a_run_up(run_up, tmp_path):
     assert wanted <= {path.name for path in (tmp_path / "two").iterdir()}
 
 
+def test_units_of_single_channels(tmp_path):
+    (tmp_path / "up.csv").write_text("t,a [g],n\n" + "\n".join(f"{t:.6f},{v:.5f},{60 * s:.4f}" for t, v, s in zip(
+        TIME, np.cos(23 * ANGLE), SPEED)))  # fmt: skip
+    plain = ("waterfall", tmp_path / "up.csv", "--speed-channel", "n", "--orders", "23", "--out", tmp_path / "out")
+    result = invoked(*plain)
+    assert result.exit_code == 1
+    assert "--units 'n=rpm'" in result.output
+    result = invoked(*plain, "--units", "n=rpm")
+    assert result.exit_code == 0, result.output
+    assert list(gm.read_signal(tmp_path / "up.csv", units={"n": "rpm"})["units"].values) == ["g", "rpm"]
+    assert "names no channel" in invoked(*plain, "--units", "=rpm").output
+    (tmp_path / "n.csv").write_text("t,n\n" + "\n".join(f"{t:.6f},{60 * s:.4f}" for t, s in zip(TIME, SPEED)))
+    result = invoked(plain[0], plain[1], "--channel", "a", "--speed", tmp_path / "n.csv", "--out", tmp_path / "out")
+    assert "write its unit, rpm, Hz or rad/s, into its label, 'n [rpm]'" in result.output
+
+
 def test_waterfall_of_records_of_constant_speed(tmp_path):
     files = []
     for k, turns in enumerate((10.0, 20.0)):
