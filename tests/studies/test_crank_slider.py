@@ -36,9 +36,9 @@ def test_four_flank_changes_a_turn(tol):
     assert np.count_nonzero(np.diff(np.append(sense, sense[0]))) == 8
 
 
-def recorded(*some, duration=2.4):
+def recorded(*some, duration=2.4, tolerance=1e-6):
     slider = CrankSlider(load=20.0, backlash=3e-4, settings=(("friction", False), ("faults", some)))
-    run = RunSettings(settling=0.1, duration=duration, tolerance=1e-6)
+    run = RunSettings(settling=0.1, duration=duration, tolerance=tolerance)
     return slider, run_train(slider.train(), run, mechanism=slider.build())
 
 
@@ -56,7 +56,8 @@ def test_eccentric_wheel_has_its_first_sidebands():
     """By `analyse` on the recorded speed: the lines one crank order beside each mesh harmonic rise, no others."""
     beside = []
     for some in ((), (faults.Eccentricity(wheel="driven", amount="80 um"),)):
-        _, record = recorded(*some, duration=4.8)
+        # the first sidebands of the healthy pair are the integrator's errors alone: -52 to -58 dB at 1e-6
+        _, record = recorded(*some, duration=4.8, tolerance=3e-7)
         report = analyse(train_signal(record, "speed"), wheel=2)
         lines = report.sidebands.squeeze("channel")
         beside.append(20.0 * np.log10(lines / lines.sel(sideband=0)))
