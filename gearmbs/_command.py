@@ -6,6 +6,7 @@ import errno
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import typer
 
@@ -19,6 +20,46 @@ def fail(message: str) -> None:
     """End with a message and exit status 1."""
     typer.secho(f"gearmbs: {message}", fg="red", err=True)
     raise typer.Exit(1)
+
+
+COMMANDS = {
+    "case": "`gearmbs run` simulates it, `gearmbs sweep` runs it over values of one setting",
+    "planetary set": "`gearmbs run` simulates it",
+    "drivetrain": "`gearmbs run` simulates it, `gearmbs campbell` draws its modes over its speed",
+}
+"""What is described in TOML, and the commands that take it."""
+
+
+def kind_of(path: Path) -> str | None:
+    """Return which of `COMMANDS` a file describes, None if none; what else is wrong is found by who reads it."""
+    import tomllib
+
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError):
+        return None
+    if "planetary" in data:
+        return "planetary set"
+    # the shafts of a case are two, with one size
+    if "meshes" in data or "wheels" in data:
+        return "drivetrain"
+    return "case" if "gears" in data or "operation" in data else None
+
+
+def check_kind(path: Path, wanted: str) -> None:
+    """Refuse a file that describes something else than is wanted: a kind of `COMMANDS`, or a record.
+
+    Raises
+    ------
+    ValueError
+        Naming what the file is and the commands that take it.
+    """
+    if wanted == "record" and path.suffix.lower() != ".toml":
+        return
+    kind = kind_of(path)
+    if kind not in (None, wanted):
+        first = f"{path}: describes a {kind}, not a {wanted}"
+        raise ValueError(f"{first}; {COMMANDS[kind]}")  # type: ignore[index]
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Results that cannot be written where they were wanted are kept somewhere else, and the message says where."""
+"""Places of results: looked at before the work; what cannot be written there after all is kept somewhere else."""
 
 from __future__ import annotations
 
@@ -50,3 +50,48 @@ def keep(save: Callable[[Path], T], path: str | Path) -> T:
                 continue
             raise KeptElsewhere(f"{path}: cannot be written ({reason}); it is in {other} instead", other) from error
         raise OSError(error.errno, f"{path}: cannot be written ({reason}), nor anywhere else; it is lost") from error
+
+
+def check_place(target: str | Path, needed: float, what: str = "the result", option: str = "--out") -> None:
+    """Refuse a folder or file that cannot be written, or whose disk has not the room, before anything is computed.
+
+    Parameters
+    ----------
+    target : path
+        Folder or file to come; folders are not made yet.
+    needed : float
+        Bytes that will be written at least.
+    what : str
+        Named in the message.
+    option : str
+        Of the command line, by which another place is given.
+
+    Raises
+    ------
+    OSError
+        Naming the folder, why it will not do, and what would.
+    """
+    folder = Path(target).absolute()
+    if folder.is_file():
+        folder = folder.parent
+    while not folder.exists():
+        folder = folder.parent
+    if not folder.is_dir():
+        raise NotADirectoryError(f"{target}: {folder} is a file; write elsewhere ({option})")
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OSError(
+            f"{target}: {folder} cannot be written ({error.strerror or error}); write elsewhere ({option})"
+        ) from None
+    free = shutil.disk_usage(folder).free
+    if free < needed:
+        raise OSError(
+            f"{target}: {_size(free)} are free in {folder}, {what} takes about {_size(needed)}; make room or write "
+            f"elsewhere ({option})"
+        )
+
+
+def _size(count: float) -> str:
+    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"

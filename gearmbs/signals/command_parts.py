@@ -90,6 +90,20 @@ def tooth_counts(text: str) -> tuple[int, ...]:
         raise ValueError(f"--teeth is {text!r}; give a count, or both with a comma, for instance 32,80") from None
 
 
+def check_targets(report: Path | None = None, **folders: Path | None) -> None:
+    """Refuse, before the work, a report or folders of figures and tables, by their options, that cannot be written."""
+    from gearmbs._kept import check_place
+
+    if report is not None:
+        check_place(report.parent, 0)
+    for name, folder in folders.items():
+        if folder is None:
+            continue
+        if folder.is_file():
+            raise NotADirectoryError(f"{folder}: is a file; name a folder (--{name})")
+        check_place(folder, 0, option=f"--{name}")
+
+
 def save_tables(tables: dict[str, Any], folder: Path | None) -> list[Path]:
     """Write each table as CSV into the folder, if one is given."""
     from gearmbs.view.files import write_whole

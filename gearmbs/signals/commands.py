@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from gearmbs._command import guarded, stage_bar
+from gearmbs._command import check_kind, guarded, stage_bar
 from gearmbs.signals.command_parts import (
     Gaps,
     Rate,
@@ -17,6 +17,7 @@ from gearmbs.signals.command_parts import (
     Speed,
     Units,
     bearings_asked,
+    check_targets,
     hand_over,
     pair_of,
     sample_units,
@@ -67,6 +68,8 @@ def analyse(
 ) -> None:
     """Analyse a record, measured or simulated: of gears, of bearings, of a planetary set, or of any machine."""
     with guarded(), stage_bar(file.name) as move:
+        check_kind(file, "record")
+        check_targets(out, tables=tables, figures=figures)
         from gearmbs.signals.simulated import read_any
         from gearmbs.signals.speed_file import parse_speed
 
@@ -98,7 +101,7 @@ def analyse(
             if figures is not None:
                 files += save_figures(done.draw(), figures)
         except OSError:
-            typer.echo(done.text)
+            hand_over(done.text, out, [])
             raise
     hand_over(done.text, out, files)
 
@@ -179,6 +182,9 @@ def trend(
 ) -> None:
     """Follow features over time: of a long record piece by piece, or of many files, taken up again if interrupted."""
     with guarded(), stage_bar(files[0].name) as move:
+        for file in files:
+            check_kind(file, "record")
+        check_targets(out)
         from gearmbs.signals import series, trend_table
         from gearmbs.signals import trend as follow
         from gearmbs.signals.speed_file import parse_speed
@@ -239,6 +245,7 @@ def compare(
 ) -> None:
     """Compare measured states with each other and with the model, as in the paper's section 4."""
     with guarded(), stage_bar("comparison") as move:
+        check_targets(out, tables=tables, figures=figures)
         from gearmbs.signals import compare as compare_signals
         from gearmbs.signals.simulated import parse_models, parse_states, read_any
         from gearmbs.signals.speed_file import parse_speed

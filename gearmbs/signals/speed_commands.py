@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from gearmbs._command import guarded, stage_bar
-from gearmbs.signals.command_parts import Gaps, Rate, Units, hand_over, sample_units, save_figures
+from gearmbs._command import check_kind, guarded, stage_bar
+from gearmbs.signals.command_parts import Gaps, Rate, Units, check_targets, hand_over, sample_units, save_figures
 
 Orders = Annotated[str | None, typer.Option(help='Orders of the shaft to mark, e.g. "1,29,58".')]
 Maximum = Annotated[str | None, typer.Option(help='Highest frequency shown, e.g. "6 kHz".')]
@@ -37,6 +37,9 @@ def waterfall(
 ) -> None:
     """Draw spectra over speed; of a run-up spectrogram, order map and tracked orders, too."""
     with guarded(), stage_bar(files[0].name) as move:
+        for file in files:
+            check_kind(file, "record")
+        check_targets(out=out)
         from gearmbs.signals import waterfall as spectra_over_speed
         from gearmbs.signals.simulated import read_any
         from gearmbs.signals.speed_file import parse_speed

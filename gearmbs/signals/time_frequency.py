@@ -18,7 +18,7 @@ from .errors import MissingMetadataError, SignalError
 from .shaft import REMEDY, shaft_phase
 from .signal import common_unit, rate_of
 from .spectra import SCALINGS, spectral_unit, spectrum
-from .speed_curve import speed_curve
+from .speed_curve import STEADY, speed_curve
 
 Scaling = Literal["amplitude", "rms", "power", "density"]
 SLICES = 200
@@ -166,7 +166,7 @@ def waterfall(
     MissingMetadataError
         If a speed is not known.
     SignalError
-        If channels differ, or a window does not fit.
+        If channels differ, a window does not fit, or all is at one speed.
     """
     if isinstance(signals, Mapping) and not isinstance(signals, xr.Dataset) and (speed is None or rate is None):
         if speed is not None:
@@ -185,10 +185,20 @@ def waterfall(
     if "speed" not in slices.coords:
         raise MissingMetadataError("speed", "a waterfall", REMEDY)
     slices = slices.isel(time=np.flatnonzero(np.isfinite(slices["speed"].values)))
+    _check_spread(slices["speed"].values)
     if steps is not None:
         return _binned(slices, int(steps))
     order = np.argsort(slices["speed"].values, kind="stable")
     return slices.isel(time=order).swap_dims(time="speed")
+
+
+def _check_spread(speeds: np.ndarray) -> None:
+    """Refuse spectra all at one speed, which no axis of speed tells apart."""
+    if speeds.size and np.ptp(speeds) <= STEADY * np.abs(speeds).max():
+        raise SignalError(
+            f"speed: stays at {speeds.mean() * 30.0 / np.pi:.6g} rpm; a waterfall needs a run-up, or several records "
+            "at different speeds; of one speed draw a spectrogram, or `gearmbs analyse --figures`"
+        )
 
 
 def _of_sweep(
@@ -204,6 +214,8 @@ def _of_sweep(
     if missing:
         raise MissingMetadataError("speed", f"record {missing[0]} of a waterfall", "pass speed=[...], one for each")
     mean = [float(np.mean(speed_curve(speed, span=(0.0, 1.0)).values)) for speed in speeds]
+    if len(mean) > 1:
+        _check_spread(np.asarray(mean))
     shortest = min(signal.sizes["time"] / rate_of(signal) for signal in signals)
     length = shortest if segment is None else float(segment)
     lines = [spectrum(signal, scaling=scaling, segment=length) for signal in signals]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from gearmbs._command import case_bars, guarded
+from gearmbs._command import case_bars, guarded, kind_of
 from gearmbs.studies.commands import Out
 
 if TYPE_CHECKING:
@@ -123,10 +123,11 @@ def run(
     ] = False,
 ) -> None:
     """Simulate a case, a planetary set or a whole drivetrain, and write its record as NetCDF."""
-    if holds_planetary(case_file):
+    kind = kind_of(case_file)
+    if kind == "planetary set":
         run_planetary_set(case_file, out)
         return
-    if holds_drivetrain(case_file):
+    if kind == "drivetrain":
         run_drivetrain(case_file, out)
         return
     with guarded():
@@ -157,28 +158,6 @@ def run(
         speed, cycle = data.attrs["solver_real_time_factor"], 1e3 * data.attrs["solver_time_per_mesh_cycle"]
         typer.echo(f"solver: {speed:.3g} times real time, {cycle:.3g} ms a mesh cycle", err=True)
         typer.echo(f"wrote {target}")
-
-
-def holds_drivetrain(path: Path) -> bool:
-    """Return whether a file describes a drivetrain; whatever else is wrong with it is found by who reads it."""
-    import tomllib
-
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError):
-        return False
-    # the shafts of a case are two, with one size
-    return "meshes" in data or "wheels" in data
-
-
-def holds_planetary(path: Path) -> bool:
-    """Return whether a file describes a planetary set."""
-    import tomllib
-
-    try:
-        return "planetary" in tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError):
-        return False
 
 
 def run_planetary_set(file: Path, out: Path | None) -> None:

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from gearmbs._command import case_bars, guarded, stage_bar
-from gearmbs.signals.command_parts import hand_over, save_figures
+from gearmbs._command import case_bars, check_kind, guarded, stage_bar
+from gearmbs.signals.command_parts import check_targets, hand_over, save_figures
 
 
 def sweep(
@@ -24,6 +24,7 @@ def sweep(
     Several settings at once, samples of distributions and work of days are campaigns: gearmbs campaign.
     """
     with guarded():
+        check_kind(case_file, "case")
         from gearmbs.studies.case import load_case
         from gearmbs.studies.limits import check_record
         from gearmbs.studies.store import check_place, record_size
@@ -60,6 +61,10 @@ def campbell(
 ) -> None:
     """Draw natural frequencies of a drivetrain over its speed, with what excites them; list the critical speeds."""
     with guarded(), stage_bar(train.name) as move:
+        check_kind(train, "drivetrain")
+        if record is not None:
+            check_kind(record, "record")
+        check_targets(out=out)
         import numpy as np
 
         from gearmbs.drivetrain.description import read_description

@@ -6,14 +6,12 @@ full. Where a file cannot be written, the record is kept elsewhere, and the mess
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from pathlib import Path
 
 import xarray as xr
 
 import gearmbs
-from gearmbs._kept import KeptElsewhere, keep
+from gearmbs._kept import KeptElsewhere, check_place, keep
 from gearmbs.studies.case import Case
 from gearmbs.view.files import whole_file
 from gearmbs.view.files import write_whole as write_text
@@ -57,49 +55,6 @@ def write_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
 def keep_dataset(path: str | Path, dataset: xr.Dataset) -> Path:
     """Write a dataset, and if that is impossible somewhere else where it is possible; see `keep`."""
     return keep(lambda place: write_dataset(place, dataset), path)
-
-
-def check_place(target: str | Path, needed: float, what: str = "the result") -> None:
-    """Refuse a folder or file that cannot be written, or whose disk has not the room, before anything is computed.
-
-    Parameters
-    ----------
-    target : path
-        Folder or file to come; folders are not made yet.
-    needed : float
-        Bytes that will be written at least.
-    what : str
-        Named in the message.
-
-    Raises
-    ------
-    OSError
-        Naming the folder, why it will not do, and what would.
-    """
-    folder = Path(target).absolute()
-    if folder.is_file():
-        folder = folder.parent
-    while not folder.exists():
-        folder = folder.parent
-    if not folder.is_dir():
-        raise NotADirectoryError(f"{target}: {folder} is a file; write elsewhere (--out)")
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise OSError(
-            f"{target}: {folder} cannot be written ({error.strerror or error}); write elsewhere (--out)"
-        ) from None
-    free = shutil.disk_usage(folder).free
-    if free < needed:
-        raise OSError(
-            f"{target}: {_size(free)} are free in {folder}, {what} takes about {_size(needed)}; make room or write "
-            "elsewhere (--out)"
-        )
-
-
-def _size(count: float) -> str:
-    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"
 
 
 def record_size(case: Case) -> float:

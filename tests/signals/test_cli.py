@@ -110,7 +110,7 @@ def test_commands_for_measurements_need_no_kernels(tmp_path):
     assert (tmp_path / "x.md").exists()
 
 
-@pytest.mark.parametrize("option", ["--out", "--tables"])
+@pytest.mark.parametrize("option", ["--out", "--tables", "--figures"])
 def test_a_report_that_cannot_be_written_is_printed(tmp_path, monkeypatch, option):
     path = write(tmp_path, "x.csv")
 

@@ -139,3 +139,44 @@ def test_campbell_of_a_drivetrain(tmp_path):
     assert "speed_rpm" in result.output
     assert (tmp_path / "out" / "campbell.png").is_file()
     assert "is in mm where" in invoked("campbell", train, "--speeds", "1 mm").output
+
+
+def test_one_speed_makes_no_waterfall(tmp_path):
+    signal = gm.make_signal({"housing": np.cos(2 * np.pi * 575 * TIME)}, RATE, units="m/s^2", speed=50 * np.pi)
+    record = write_signal(signal, tmp_path / "x.csv") or tmp_path / "x.csv"
+    wanted = r"stays at 1500 rpm; a waterfall needs a run-up, or several records at different speeds"
+    for what in (signal, [signal, signal]):
+        with pytest.raises(gm.signals.SignalError, match=wanted):
+            gm.waterfall(what)
+    result = invoked("waterfall", record, "--speed", "1500 rpm", "--out", tmp_path / "out")
+    assert result.exit_code == 1
+    assert "spectrogram, or `gearmbs analyse --figures`" in " ".join(result.output.split())
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("command", ["analyse", "waterfall", "trend", "campbell"])
+def test_places_are_looked_at_before_anything_is_read(command, tmp_path):
+    (tmp_path / "file").write_text("")
+    result = invoked(command, tmp_path / "missing.csv", "--out", tmp_path / "file" / "x" / "y")
+    assert result.exit_code == 1
+    assert "is a file; write elsewhere (--out)" in " ".join(result.output.split())
+    if command == "analyse":
+        figures = invoked(command, tmp_path / "missing.csv", "--figures", tmp_path / "file")
+        assert "file: is a file; name a folder (--figures)" in " ".join(figures.output.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "text", "said"),
+    [
+        (["campbell"], "[gears]\nteeth = 23\n", "describes a case, not a drivetrain; `gearmbs run` simulates it"),
+        (["sweep", "operation.speed", "900 rpm"], TEXT, "describes a drivetrain, not a case; `gearmbs run`"),
+        (["sweep", "operation.speed", "900 rpm"], "[planetary]\n", "describes a planetary set, not a case; `gearmbs"),
+        (["analyse"], "[operation]\nspeed = 100.0\n", "describes a case, not a record; `gearmbs run` simulates it"),
+        (["trend"], TEXT, "describes a drivetrain, not a record; `gearmbs run` simulates it, `gearmbs campbell`"),
+    ],
+)
+def test_files_of_another_kind_say_what_takes_them(words, text, said, tmp_path):
+    (tmp_path / "x.toml").write_text(text)
+    result = invoked(words[0], tmp_path / "x.toml", *words[1:])
+    assert result.exit_code == 1
+    assert f"x.toml: {said}" in " ".join(result.output.split())

@@ -11,8 +11,8 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
-from gearmbs import cli
-from gearmbs.studies import Case, CaseError, SimulationFailed, run_case, run_cases, simulation, store
+from gearmbs import _kept, cli
+from gearmbs.studies import Case, CaseError, SimulationFailed, run_case, run_cases, simulation
 from gearmbs.studies.parallel import StorageWarning
 from gearmbs.studies.store import KeptElsewhere, check_place, keep_dataset, record_size, stored_record, write_dataset
 
@@ -56,7 +56,7 @@ def test_nothing_is_left_where_nothing_can_be_written(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Path, "write_bytes", refuse)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(store.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    monkeypatch.setattr(_kept.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
     with pytest.raises(OSError, match="nor anywhere else; it is lost"):
         keep_dataset(tmp_path / "r.nc", small())
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
@@ -92,7 +92,7 @@ def test_places_are_looked_at_before_the_work(tmp_path, monkeypatch):
         check_place(tmp_path / "file" / "in it", 1e3)
     with pytest.raises(OSError, match=r"are free in .*, two records takes about 1000000000.0 GB; make room"):
         check_place(tmp_path, 1e18, "two records")
-    monkeypatch.setattr(store.tempfile, "TemporaryFile", lambda dir: open("/proc/version", "x"))
+    monkeypatch.setattr(_kept.tempfile, "TemporaryFile", lambda dir: open("/proc/version", "x"))
     with pytest.raises(OSError, match=r"cannot be written .*; write elsewhere"):
         check_place(tmp_path, 1e3)
 
