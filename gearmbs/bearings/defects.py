@@ -111,6 +111,8 @@ class Spall(SurfaceDefect):
         Of the bottom, m.
     angle : float or str
         Of its middle: about z from the x axis of the ring's marker, of an element from where the inner ring touches.
+        On a ring that stands still it is heard only in the load zone, which on the outer ring is about the direction
+        opposite to the force on the shaft (`Solution.load` of the bearing).
     edge : float or str, optional
         Width over which edges are rounded, m; default a tenth of the width, at most 0.1 mm.
     roughness : float or str

@@ -16,7 +16,7 @@ from gearmbs.units import to_si
 from .any_data import takes_data
 from .bearing_envelopes import envelope_spectra
 from .bearing_evidence import HARMONICS, SLIP, EnvelopeSpectrum
-from .bearing_judgement import CLEAR, SIGNS, Judged, judge
+from .bearing_judgement import CLEAR, SIGNS, Judged, judge, needed_length
 from .bearing_lines import BearingLines, bearing_lines
 from .bearing_report import BearingReport, PartFinding
 from .errors import MissingMetadataError, SignalError
@@ -105,6 +105,7 @@ def diagnose_bearing(
             f"{5 * highest:.4g} Hz, it is {rate:g} Hz"
         )
     others = _other_shafts(signal, known, shafts)
+    turning = [shaft * ratio for ratio in sorted({1.0, *(lines.ratio for lines in known), *(others or ())})]
     bands, findings, spectra = {}, [], {}
     for c in range(signal.sizes["channel"]):
         name = str(signal["channel"].values[c])
@@ -112,7 +113,7 @@ def diagnose_bearing(
             progress((c + 0.5) / signal.sizes["channel"], name)
         bands[name], found = envelope_spectra(signal.isel(channel=[c]), shaft, highest, band=band, phase=phase)
         judged = judge(found, known, shaft, others, slip=slip, harmonics=harmonics, looks=signal.sizes["channel"])
-        findings += [_finding(name, one, found, shaft) for one in judged]
+        findings += [_finding(name, one, found, shaft, turning) for one in judged]
         spectra[name] = _table(_shown(found, judged), highest * (harmonics + 1))
     return BearingReport(
         source=str(signal.attrs.get("source", signal.name or "signal")),
@@ -186,13 +187,16 @@ def _other_shafts(
     return tuple(sorted({lines.ratio for lines in bearings} - {1.0})) or None
 
 
-def _finding(channel: str, judged: Judged, spectra: Sequence[EnvelopeSpectrum], shaft: float) -> PartFinding:
+def _finding(
+    channel: str, judged: Judged, spectra: Sequence[EnvelopeSpectrum], shaft: float, turns: Sequence[float]
+) -> PartFinding:
     lines, part, evidence = judged.lines, judged.part, judged.evidence
     spectrum = next(s for s in spectra if s.where == evidence.where)
     sides = _sidebands(spectrum, evidence.found, lines.sidebands[part] * shaft * lines.ratio)
     return PartFinding(
         lines.name, part, channel, evidence.kinematic, evidence.found, evidence.ratios, evidence.log_chance, sides,
         evidence.where, judged.grade, judged.beside, judged.stronger, judged.places, judged.fraction,
+        needed_length(evidence, spectrum, turns),
     )  # fmt: skip
 
 

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .bearing_evidence import LINE_BINS, EnvelopeSpectrum, Evidence, find_lines
+from .bearing_evidence import LINE_BINS, LOWEST, EnvelopeSpectrum, Evidence, find_lines
 from .bearing_lines import CAGE, ELEMENT, OUTER, BearingLines
 
 CLEAR, SIGNS, OPEN, FAINT, MULTIPLES, NONE = "clear", "signs", "open", "faint", "multiples", "none"
@@ -81,6 +81,11 @@ def without_shafts(spectrum: EnvelopeSpectrum, shafts: Sequence[float]) -> Envel
     shafts : sequence of float
         Turns of the known shafts, Hz.
     """
+    return spectrum.without(shaft_lines(spectrum, shafts), SPEED_SHARE)
+
+
+def shaft_lines(spectrum: EnvelopeSpectrum, shafts: Sequence[float]) -> list[float]:
+    """Return the lines that `without_shafts` leaves out, Hz."""
     known = [turns for turns in shafts if turns > 0.0]
     lines: set[float] = set()
     for turns in known:
@@ -92,7 +97,36 @@ def without_shafts(spectrum: EnvelopeSpectrum, shafts: Sequence[float]) -> Envel
             for j in range(1, SUMS):
                 for k in range(1, SUMS - j + 1):
                     lines |= {j * first + k * second, abs(j * first - k * second)}
-    return spectrum.without(sorted(lines), SPEED_SHARE)
+    return sorted(lines)
+
+
+def needed_length(evidence: Evidence, spectrum: EnvelopeSpectrum, shafts: Sequence[float]) -> float | None:
+    """Return the length of record that tells the fundamental from the lines of shafts and from the mean, s.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Of the spectrum without the lines of shafts: where these were, its ratio is one.
+    spectrum : EnvelopeSpectrum
+    shafts : sequence of float
+        Turns of the known shafts, Hz.
+
+    Returns
+    -------
+    float or None
+        None if the fundamental was measured, infinite if it is nearer to a shaft's line than that may move.
+    """
+    if not evidence.ratios or evidence.ratios[0] != 1.0:
+        return None
+    lines = shaft_lines(spectrum, shafts)
+    # where the lines slipped on to a shaft's the kinematic place may be free
+    for place in (evidence.kinematic, evidence.found):
+        room = min((abs(place - line) - SPEED_SHARE * line for line in lines), default=math.inf)
+        # a bin may lie half a bin beside the line
+        length = max((LINE_BINS + 0.5) / room if room > 0.0 else math.inf, LOWEST / place)
+        if length > 1.0 / spectrum.step:
+            return length
+    return math.inf
 
 
 def judge(

@@ -48,6 +48,9 @@ class PartFinding:
         At how many of the other places of the record a family of lines stands as strong, and how many places there are.
     fraction : (int, int), optional
         (k, m) if the lines are k/m of the shaft's turns and the other multiples of 1/m comparably strong.
+    needed : float, optional
+        If the level of the fundamental could not be measured, as it lies on a known shaft's line or at the lower end
+        of the spectrum: the length of record that tells them apart, s; infinite if none does.
     """
 
     bearing: str
@@ -64,6 +67,7 @@ class PartFinding:
     stronger: int = 0
     places: int = 0
     fraction: tuple[int, int] | None = None
+    needed: float | None = None
 
     @property
     def slip(self) -> float:
@@ -72,8 +76,10 @@ class PartFinding:
 
     @property
     def level(self) -> float:
-        """Level of the fundamental over its neighbourhood, dB."""
-        return 10.0 * math.log10(max(self.ratios[0], 1e-3)) if self.ratios else -30.0
+        """Level of the fundamental over its neighbourhood, dB; NaN if it could not be measured."""
+        if self.needed is not None or not self.ratios:
+            return math.nan
+        return 10.0 * math.log10(max(self.ratios[0], 1e-3))
 
     def sentence(self) -> str:
         """Return what it means, with its grounds."""
@@ -234,6 +240,7 @@ class BearingReport(Shown):
             "",
             self._evidence(),
             "",
+            *self._unmeasured(),
             "## Kinematic lines",
             "",
             self._lines(),
@@ -271,12 +278,29 @@ class BearingReport(Shown):
         shown = [
             [
                 f.bearing, f.channel, f.part, f"{f.kinematic:.2f}", f"{f.found:.2f}", f"{100 * f.slip:+.2f}",
-                f"{f.level:.0f}", _chance(f.log_chance), f"{f.stronger} of {f.places}",
+                "-" if math.isnan(f.level) else f"{f.level:.0f}", _chance(f.log_chance), f"{f.stronger} of {f.places}",
                 "lines of another cause" if f.beside else f.grade,
             ]
             for f in self.findings
         ]  # fmt: skip
         return markdown_table(head, shown)
+
+    def _unmeasured(self) -> list[str]:
+        """Return for what lines there is no level, and which record would have it."""
+        wanting: dict[tuple[str, str], float] = {}
+        for f in self.findings:
+            if f.needed is not None:
+                key = f.bearing, f.part
+                wanting[key] = max(f.needed, wanting.get(key, 0.0))
+        if not wanting:
+            return []
+        words = [
+            f"{part} of {bearing}: "
+            + (f"{math.ceil(10.0 * s) / 10.0:.1f} s are needed" if math.isfinite(s) else "no length tells them apart")
+            for (bearing, part), s in wanting.items()
+        ]
+        reason = "No level (-) where a line is not told from a known shaft's, or from the mean, in a record of"
+        return [f"{reason} {self.duration:.2f} s. {'; '.join(words)}.", ""]
 
     def _lines(self) -> str:
         table = pd.concat([lines.table(self.shaft, SHOWN) for lines in self.bearings], ignore_index=True)

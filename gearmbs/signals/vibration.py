@@ -29,6 +29,8 @@ LEAST_FALL = 16.0
 LEAST_BAND = 16
 """Envelopes are taken in bands of at least this part of half the sampling rate: a narrow one holds only slow lines."""
 """A band ends at least this part of its width above zero and below half the sampling rate."""
+SPEED_DIFFERS = 1e-3
+"""Share from which a report says in words that the shaft's own lines are beside the given speed."""
 NO_SPEED = "the speed is not known; give speed='1500 rpm' (--speed), a curve or a tacho"
 Progress = Callable[[float, str], None]
 
@@ -121,6 +123,12 @@ def _speed(signal: xr.DataArray, found: Shaft | float | None, notes: list[str]) 
     if refined is None:
         notes.append("No line of the shaft stands out near the given speed; orders are taken at exactly that speed.")
         return found, "as given"
+    if abs(refined / found - 1.0) > SPEED_DIFFERS:
+        notes.append(
+            f"The shaft's own lines say {refined * 30.0 / math.pi:.1f} rpm, "
+            f"{found * 30.0 / math.pi:.1f} rpm were given: orders are taken at the former, "
+            "lines of bearings, if asked for, are looked for at the speed given."
+        )
     return refined, f"from the shaft's own lines, {100 * (refined / found - 1):+.3f} % off the given speed"
 
 

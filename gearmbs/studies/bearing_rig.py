@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gearmbs.bearings import Bearing, BearingError, RollingBearing, add_bearing
+from gearmbs.bearings.errors import require
 from gearmbs.mechanism import Mechanism
 from gearmbs.studies.rig import BEARINGS, SHAFTS, gear_rig
 from gearmbs.units import Quantity, to_si
@@ -113,6 +115,7 @@ def rolling_rig(
     *,
     bearing_distance: Quantity = None,
     settings: dict[str, Any] | None = None,
+    each: Mapping[str, dict[str, Any]] | None = None,
     **rig: Any,
 ) -> Mechanism:
     """Return the mechanism of :func:`gear_rig` with two rolling bearings on each shaft instead of its joints.
@@ -125,8 +128,9 @@ def rolling_rig(
     bearing_distance : float or str, optional
         Between the bearings of a shaft, m; default: the length of the shaft.
     settings : dict, optional
-        Of all bearings, see `gearmbs.bearings.RollingBearing`. Defects of single ones are set on a rig's own
-        elements, by building it from `gear_rig` in the same way.
+        Of all bearings, see `gearmbs.bearings.RollingBearing`.
+    each : mapping of str to dict, optional
+        Settings of single bearings by name, which overrule those of all: ``{"bearing 1 a": {"defects": [...]}}``.
     **rig
         As of :func:`gear_rig`: speed, torque, run_up, shaft_radius, shaft_length, ...
 
@@ -135,6 +139,9 @@ def rolling_rig(
     Mechanism
         Bearings are named "bearing 1 a", "bearing 1 b", "bearing 2 a", "bearing 2 b".
     """
+    names = [f"{name} {end}" for name in BEARINGS for end in ENDS]
+    for given in each or {}:
+        require(given in names, f"each: there is no {given!r}; choose among {', '.join(names)}")
     made = gear_rig(pair, **rig)
     length = rig.get("shaft_length", 0.2) if bearing_distance is None else bearing_distance
     half = 0.5 * to_si(length, "length", "bearing_distance")
@@ -145,7 +152,7 @@ def rolling_rig(
             made.add(
                 RollingBearing.between(
                     f"{name} {end}", body, made.ground, bearing, at=body.position + sign * half * axis, axis=axis,
-                    **(settings or {}),
+                    **{**(settings or {}), **(each or {}).get(f"{name} {end}", {})},
                 )
             )  # fmt: skip
     return made

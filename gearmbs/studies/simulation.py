@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import platform
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -122,7 +122,13 @@ def simulate_case(
     )
 
 
-def case_mechanism(case: Case, bearing: Bearing | str | None = None, **settings: Any) -> Mechanism:
+def case_mechanism(
+    case: Case,
+    bearing: Bearing | str | None = None,
+    *,
+    each: Mapping[str, dict[str, Any]] | None = None,
+    **settings: Any,
+) -> Mechanism:
     """Return the mechanism of a case.
 
     Parameters
@@ -130,6 +136,8 @@ def case_mechanism(case: Case, bearing: Bearing | str | None = None, **settings:
     case : Case
     bearing : Bearing or str, optional
         Rolling bearing of which two stand on each shaft, see `rolling_rig`, or its designation; default joints.
+    each : mapping of str to dict, optional
+        Settings of single bearings by name, which overrule those of all.
     **settings
         Of all four bearings, as of `gearmbs.bearings.RollingBearing`.
 
@@ -138,6 +146,10 @@ def case_mechanism(case: Case, bearing: Bearing | str | None = None, **settings:
     >>> from gearmbs.studies import Case
     >>> sorted(case_mechanism(Case(), "6206/CN").elements)
     ['bearing 1 a', 'bearing 1 b', 'bearing 2 a', 'bearing 2 b', 'load', 'mesh']
+    >>> spall = {"kind": "spall", "width": "1 mm", "angle": "250 deg"}
+    >>> m = case_mechanism(Case(), "6206/CN", each={"bearing 1 a": {"defects": [spall]}})
+    >>> len(m.elements["bearing 1 a"].defects), len(m.elements["bearing 1 b"].defects)
+    (1, 0)
     """
     operation, shafts = case.operation, case.shafts
     rigged: dict[str, Any] = {
@@ -155,7 +167,7 @@ def case_mechanism(case: Case, bearing: Bearing | str | None = None, **settings:
     from gearmbs.studies.bearing_rig import rolling_rig
 
     one = Bearing.from_designation(bearing) if isinstance(bearing, str) else bearing
-    return rolling_rig(case.pair(), one, settings=settings, **rigged)
+    return rolling_rig(case.pair(), one, settings=settings, each=each, **rigged)
 
 
 def run_case(
@@ -186,7 +198,8 @@ def run_case(
         ``gmf_rms``: RMS of the first three mesh harmonics by component, by band-pass and by orders; of a run-up instead
         ``order_rms``, the same followed by order tracking over ``track_time`` and ``track_speed``, and ``speed`` and
         ``angle`` of the driver over ``signal_time``; transmission error, contact forces and penetrations; parameters,
-        versions and solver statistics in the attributes.
+        versions and solver statistics in the attributes, with ``bearings``, ``bearing_defects`` and ``bearings_json``
+        where the mechanism has rolling bearings.
 
     Raises
     ------
@@ -201,15 +214,48 @@ def run_case(
     solution = simulate_case(case, progress, mechanism=mechanism, every_step=True, consumer=recorder.take)
     if not solution.success:
         kind = SimulationInterrupted if solution.status is Status.INTERRUPTED else SimulationFailed
-        raise kind(f"case '{case.name}': {solution.message}", solution, case, _partial(case, solution, recorder))
+        known = _partial(case, solution, recorder, mechanism)
+        raise kind(f"case '{case.name}': {solution.message}", solution, case, known)
     try:
-        return _evaluated(case, solution, recorder.measured(), even=False, variables=variables)
+        dataset = _evaluated(case, solution, recorder.measured(), even=False, variables=variables)
     except SimulationFailed as failure:
-        raise SimulationFailed(str(failure), solution, case, _partial(case, solution, recorder)) from None
+        known = _partial(case, solution, recorder, mechanism)
+        raise SimulationFailed(str(failure), solution, case, known) from None
+    dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
+    return dataset
 
 
-def _partial(case: Case, solution: Solution, recorder: Recorder) -> xr.Dataset | None:
-    return None if recorder.is_empty else _partial_dataset(case, solution, recorder.everything())
+def _partial(case: Case, solution: Solution, recorder: Recorder, mechanism: Mechanism | None) -> xr.Dataset | None:
+    if recorder.is_empty:
+        return None
+    dataset = _partial_dataset(case, solution, recorder.everything())
+    dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
+    return dataset
+
+
+def bearing_attributes(mechanism: Mechanism | None, title: str = "") -> dict[str, Any]:
+    """Return what a record says of the rolling bearings of its mechanism, which its case does not know.
+
+    Returns
+    -------
+    dict
+        ``title``; ``bearings`` and ``bearing_defects`` in words; ``bearings_json``: of each by name its bearing, the
+        settings other than the defaults and its defects with labels, in SI. Empty without rolling bearings.
+    """
+    if mechanism is None or not any(e.kind == "rolling bearing" for e in mechanism.elements.values()):
+        return {}
+    from gearmbs.bearings.record import described
+
+    told = described(mechanism)
+    words = {name: [d["label"] for d in one["defects"]] for name, one in told.items()}
+    kinds = {one["bearing"]["designation"] or one["bearing"]["kind"] for one in told.values()}
+    return {
+        "title": f"{title} on rolling bearings",
+        "bearings": f"{len(told)} rolling bearings {', '.join(sorted(kinds))}",
+        "bearing_defects": "; ".join(f"{name}: {', '.join(labels)}" for name, labels in words.items() if labels)
+        or "none",
+        "bearings_json": json.dumps(told),
+    }
 
 
 def partial_record(case: Case, solution: Solution) -> xr.Dataset:

@@ -69,14 +69,16 @@ def file_stem(name: str) -> str:
 
 
 def stored_record(folder: str | Path, case: Case) -> xr.Dataset | None:
-    """Return the record of exactly this case from a folder, None if there is none made by this version."""
+    """Return the record of exactly this case on joints from a folder, None if there is none made by this version."""
     path = Path(folder) / f"{file_stem(case.name)}.nc"
     if not path.is_file():
         return None
     try:
         with xr.open_dataset(path, engine="h5netcdf") as found:
             known = found.attrs.get("case_json"), found.attrs.get("gearmbs_version")
-            return found.load() if known == (case.model_dump_json(), gearmbs.__version__) else None
+            # the case says nothing of rolling bearings, so a record on them is not that of the case alone
+            on_joints = "bearings" not in found.attrs
+            return found.load() if on_joints and known == (case.model_dump_json(), gearmbs.__version__) else None
     except (OSError, ValueError, KeyError):
         # damaged, or not one of ours: the case is computed again
         return None

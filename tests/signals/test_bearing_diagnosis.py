@@ -413,3 +413,26 @@ def test_the_report_shows_draws_and_saves_itself(tmp_path):
         report.plot(channel="x")
     assert "<table>" in report._repr_html_()
     assert "data:image/svg+xml" in report.save(tmp_path / "bearing.html").read_text()
+
+
+def test_a_level_that_cannot_be_measured_is_left_open_with_the_length_that_is_needed():
+    """The outer race's line 1.6 Hz beside a shaft's: told apart from (2.5 + 0.5)/(1.6 - 0.03) s on."""
+    order = 3.0 + 1.6 / SHAFT
+    lines = {"ftf": order / 9.0, "bsf": 2.33, "bpfo": order, "bpfi": 9.0 - order}
+    whole = record(pulses(order * SHAFT))
+    needed = 3.0 / (1.6 - 3e-4 * 3 * SHAFT)
+
+    def outer(seconds):
+        report = diagnose_bearing(whole.isel(time=slice(0, int(seconds * RATE))), lines, f"{SHAFT} Hz", slip=1e-3)
+        return report, next(f for f in report.findings if f.part == "outer race")
+
+    report, found = outer(1.2)
+    assert np.isnan(found.level)
+    assert found.needed == pytest.approx(needed, rel=1e-6)
+    row = next(line for line in report.to_markdown().splitlines() if "| outer race |" in line)
+    assert row.split("|")[7].strip() == "-"
+    assert "2.0 s are needed" in report.to_markdown()
+    longer, found = outer(1.05 * needed)
+    assert found.needed is None
+    assert found.level > 10.0
+    assert "outer race of" not in "".join(longer._unmeasured())

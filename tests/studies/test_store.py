@@ -1,6 +1,7 @@
 """Records as files: whole or not at all, kept elsewhere where a disk is full, found again by an interrupted study."""
 
 import errno
+import json
 import os
 import subprocess
 import sys
@@ -12,7 +13,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from gearmbs import _kept, cli
-from gearmbs.studies import Case, CaseError, SimulationFailed, run_case, run_cases, simulation
+from gearmbs.studies import Case, CaseError, SimulationFailed, case_mechanism, run_case, run_cases, simulation
 from gearmbs.studies.parallel import StorageWarning
 from gearmbs.studies.store import KeptElsewhere, check_place, keep_dataset, record_size, stored_record, write_dataset
 
@@ -186,3 +187,26 @@ def _refuse_in(folder):
         return write_dataset(path, dataset)
 
     return refuse
+
+
+def test_a_record_on_bearings_is_told_from_one_on_joints(tmp_path):
+    case = Case(name="one", operation=SHORT)
+    spall = {"kind": "spall", "width": "1 mm", "angle": "249 deg"}
+    m = case_mechanism(case, "6206/C3", cage_slip=0.01, each={"bearing 2 b": {"defects": [spall]}})
+    record = run_case(case, False, mechanism=m)
+    write_dataset(tmp_path / "one.nc", record)
+    assert stored_record(tmp_path, case) is None
+    with xr.open_dataset(tmp_path / "one.nc", engine="h5netcdf") as stored:
+        assert stored.attrs["title"] == "gear pair: one on rolling bearings"
+        assert stored.attrs["bearing_defects"] == "bearing 2 b: spall"
+        assert "4 rolling bearings 6206/C3" in repr(stored)
+        told = json.loads(stored.attrs["bearings_json"])
+    assert sorted(told) == [f"bearing {k} {end}" for k in (1, 2) for end in "ab"]
+    assert told["bearing 1 a"]["settings"] == {"cage_slip": 0.01}
+    assert told["bearing 1 a"]["bearing"]["clearance"] > 0.0
+    assert told["bearing 1 a"]["defects"] == []
+    assert told["bearing 2 b"]["defects"][0]["width"] == pytest.approx(1e-3)
+    write_dataset(tmp_path / "one.nc", run_case(case, False))
+    assert stored_record(tmp_path, case) is not None
+    with pytest.raises(ValueError, match="there is no 'bearing 3'; choose among bearing 1 a"):
+        case_mechanism(case, "6206", each={"bearing 3": {}})
