@@ -157,7 +157,11 @@ def _check(held: str | None, speeds: dict, torques: dict, supports: dict) -> Non
         for name in names:
             require(name in MEMBERS, f"planetary: {label} has {name!r}; choose among sun, carrier and ring")
     for name in speeds:
-        require(name != held, f"planetary: {name} is held and has a speed; give the speed of another, or held=None")
+        require(
+            name != held,
+            f"planetary: {name} is held and has a speed; give the speed of another, or let none be held "
+            "(held=None, in a file held = 'none')",
+        )
         require(
             name not in supports,
             f"planetary: {name} has a speed and a support; drive it by a torque, or guide it without a support",

@@ -26,6 +26,8 @@ from gearmbs.units import Quantity, to_si
 MEMBERS = ("sun", "carrier", "ring")
 FITTING = 1e-6
 """Part of a pitch by which planets may miss the place where they fit."""
+NEARBY = 8
+"""Teeth by which sun and planet of a set that is recommended may differ."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,8 @@ class PlanetarySet(Written):
             )
         for where, fault in self.faults:
             self._holder(where, fault)
-        _ = self.pairs_sun, self.pairs_ring
+        _ = self.pairs_sun
+        self._meshing_with_ring()
 
     def _check_angles(self) -> None:
         if self.angles is None:
@@ -154,14 +157,50 @@ class PlanetarySet(Written):
         also = ""
         if self.angles is None or np.allclose(np.diff(given), 2 * math.pi / self.planets):
             total = self.sun.teeth + self.ring.teeth
-            rings = sorted(range(self.ring.teeth - 3, self.ring.teeth + 4), key=lambda z: abs(z - self.ring.teeth))
-            ring = next((z for z in rings if (self.sun.teeth + z) % self.planets == 0), None)
-            also = f", or equally spaced with {ring} teeth on the ring" if ring and ring != self.ring.teeth else ""
+            set_that_fits = self._nearest_set()
+            also = f", or equally spaced with {set_that_fits}" if set_that_fits else ""
             teeth += f", whose sum {total} is no multiple of {self.planets}"
         raise ValueError(
             f"PlanetarySet cannot be assembled: planets fit at multiples of {math.degrees(step):.4f} deg ({teeth}); "
             f"the nearest angles are {nearest} deg{also}"
         )
+
+    def _nearest_set(self) -> str:
+        """Return the nearest teeth of wheels that mesh and stand equally spaced without profile shifts, as text."""
+        if any(w.profile_shift for w in (self.sun, self.planet, self.ring)):
+            return ""
+        teeth = self.sun.teeth, self.planet.teeth, self.ring.teeth
+        steps = range(-NEARBY, NEARBY + 1)
+        near = [(s, p, s + 2 * p) for s in (teeth[0] + k for k in steps) for p in (teeth[1] + k for k in steps)]
+        near = [found for found in near if (found[0] + found[2]) % self.planets == 0 and min(found) > 0]
+        near.sort(key=lambda found: (sum(abs(a - b) for a, b in zip(found, teeth)), found))
+        for found in near:
+            sun, planet, ring = (replace(w, teeth=z) for w, z in zip((self.sun, self.planet, self.ring), found))
+            try:
+                PlanetarySet(sun, planet, ring, self.planets, rotation=self.rotation)
+            except ValueError:
+                # neighbours touch, or the wheels are too small
+                continue
+            return f"{', '.join(str(z) for z in found)} teeth"
+        return ""
+
+    def _meshing_with_ring(self) -> None:
+        """Make the pairs with the ring; where they cannot be, say so by the teeth of the set."""
+        whole = self.sun.teeth + 2 * self.planet.teeth
+        try:
+            _ = self.pairs_ring
+        except ValueError as error:
+            if self.planet_at_ring is not None or self.ring.teeth == whole:
+                raise
+            set_that_fits = self._nearest_set()
+            instead = f", or take {set_that_fits}" if set_that_fits else ""
+            # its remedies are those of a single pair
+            why = str(error).partition(";")[0]
+            raise ValueError(
+                f"PlanetarySet: {self.sun.teeth}, {self.planet.teeth}, {self.ring.teeth} teeth do not fit between sun "
+                f"and ring: without profile shifts the ring needs z_r = z_s + 2 z_p = {whole} teeth; give profile "
+                f"shifts that fit (and their carrier_radius){instead} ({why})"
+            ) from None
 
     def _check_neighbours(self) -> None:
         if self.planets < 2:

@@ -96,7 +96,8 @@ def diagnose_bearing(
     turns = signal.sizes["time"] / rate * shaft
     if turns < LEAST_TURNS:
         raise SignalError(
-            f"signal: holds {turns:.3g} turns of the shaft, lines of a bearing need {LEAST_TURNS}; give a longer record"
+            f"signal: holds {turns:.3g} turns of the shaft, lines of a bearing need {LEAST_TURNS}; "
+            f"give a record of {LEAST_TURNS / shaft:.3g} s or more at this speed"
         )
     highest = max(order for lines in known for order in lines.orders.values()) * shaft
     if phase is None and 2.5 * highest > rate / 2:

@@ -114,7 +114,7 @@ def diagnose_planetary(
     if abs(span) < LEAST_TURNS:
         raise SignalError(
             f"signal: holds {abs(span):.3g} turns of the carrier, lines of a planetary set need {LEAST_TURNS}; "
-            "give a longer record"
+            f"give a record of {LEAST_TURNS / carrier:.3g} s or more at this speed"
         )
     rate = rate_of(signal)
     if 2.5 * lines.mesh * carrier > rate:

@@ -14,6 +14,7 @@ import xarray as xr
 
 from gearmbs.bearings import Bearing, RollingBearing
 from gearmbs.dae import Status
+from gearmbs.dae.results.solution import Solution
 from gearmbs.gears import ContactLaw, ElasticRim, FlankFriction, PlanetarySet, Support, planetary, planetary_mechanism
 from gearmbs.gears.planetary_rig import PinBearing
 from gearmbs.mechanism import Mechanism
@@ -230,29 +231,22 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
     fine = solution.t >= begin - 0.5 / run.rate / OVERSAMPLING
     kept = np.flatnonzero(fine)[::OVERSAMPLING]
     planets = range(1, gears.planets + 1)
-
-    def forces(form: str) -> np.ndarray:
-        return np.column_stack([solution.diagnostics(form.format(k))["normal_force"] for k in planets])
-
-    both = {"sun": forces("sun-planet {}")}
+    # all bodies and forces at all outputs would need far more memory than what is wanted of them
+    told = _joined([_wanted(run, mechanism, part) for part in solution.parts()])
+    both = {"sun": told["sun"], "ring": told["ring"]}
     motion: dict[str, Any] = {}
-    if run.rim is None:
-        both["ring"] = forces("planet {}-ring")
-    else:
-        told = solution.diagnostics("ring meshes")
-        both["ring"] = np.column_stack([told[f"normal_force_{k}"] for k in planets])
-        rate = mechanism.elements["ring meshes"].rim_motion(solution, 0.0)["radial_velocity"][fine]
-        told_rate = resample_poly(rate, 1, OVERSAMPLING, padtype="line")
+    if run.rim is not None:
+        told_rate = resample_poly(told["rim"][fine], 1, OVERSAMPLING, padtype="line")
         motion["rim_velocity"] = (
             "time",
             told_rate,
             {"units": "m/s", "long_name": "radial velocity of the rim at angle 0"},
         )
-    turned = np.unwrap(_angle(solution, "carrier"))
+    turned = np.unwrap(told["carrier angle"])
     heard = fixed_sensor(both["ring"][fine], turned[fine], [float(a) for a in gears.angles or ()])
     heard = resample_poly(heard, 1, OVERSAMPLING, padtype="line")
     both = {mesh: force[kept] for mesh, force in both.items()}
-    spin = {m: solution.angular_velocity(m)[kept, 2] for m in MEMBERS}
+    spin = {m: told[f"{m} speed"][kept] for m in MEMBERS}
     angle = turned[kept]
     total = both["sun"].sum(axis=1, keepdims=True)
     share = np.divide(both["sun"], total, out=np.zeros_like(both["sun"]), where=total != 0)
@@ -284,6 +278,27 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
             **{f"frequency_{name}": value for name, value in rates.items()},
         },
     )
+
+
+def _wanted(run: PlanetaryRun, mechanism: Mechanism, part: Solution) -> dict[str, np.ndarray]:
+    """Return what the record is made from, of one part of a solution."""
+    planets = range(1, run.gears.planets + 1)
+
+    def forces(form: str) -> np.ndarray:
+        return np.column_stack([part.diagnostics(form.format(k))["normal_force"] for k in planets])
+
+    found = {"sun": forces("sun-planet {}"), "carrier angle": _angle(part, "carrier")}
+    found |= {f"{m} speed": part.angular_velocity(m)[:, 2].copy() for m in MEMBERS}
+    if run.rim is None:
+        return {**found, "ring": forces("planet {}-ring")}
+    told = part.diagnostics("ring meshes")
+    found["ring"] = np.column_stack([told[f"normal_force_{k}"] for k in planets])
+    found["rim"] = mechanism.elements["ring meshes"].rim_motion(part, 0.0)["radial_velocity"].copy()
+    return found
+
+
+def _joined(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def _angle(solution: Any, body: str) -> np.ndarray:

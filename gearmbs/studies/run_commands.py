@@ -164,9 +164,15 @@ def run_planetary_set(file: Path, out: Path | None) -> None:
     """Simulate a planetary set; write its record and say how the load is shared."""
     with guarded():
         from gearmbs.studies.planetary import load_planetary, run_planetary
+        from gearmbs.studies.section import CaseError
         from gearmbs.studies.store import check_place, keep_dataset
 
         found = load_planetary(file)
+        try:
+            # what does not go together is found when the mechanism is made
+            found.mechanism()
+        except ValueError as error:
+            raise CaseError(f"{file.name}: {error}") from None
         target = out or file.with_suffix(".nc")
         check_place(target.parent, 0, "its record")
         span = found.run_up + found.settling + found.duration

@@ -1,6 +1,7 @@
 """Planetary sets: assembly, phases, Willis, modes against a published table, load sharing, faults, bad input."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -302,11 +303,20 @@ def test_ideal_mesh_of_a_pair_has_its_stiffness():
     assert mesh.stiffness == pytest.approx(3e8 * pair.contact_ratio, rel=0.1)
 
 
+@pytest.mark.parametrize(("teeth", "planets"), [((24, 30, 84), 5), ((24, 31, 84), 3), ((24, 30, 80), 3)])
+def test_the_set_that_is_recommended_fits(teeth, planets):
+    with pytest.raises(ValueError) as caught:
+        planetary(teeth, "2 mm", planets)
+    found = tuple(int(z) for z in re.findall(r"(\d+), (\d+), (\d+) teeth", str(caught.value))[-1])
+    assert planetary(found, "2 mm", planets).planets == planets
+
+
 @pytest.mark.parametrize(
     ("build", "words"),
     [
         (lambda: planetary((24, 30, 85), "2 mm", 3), "cannot be assembled.*nearest"),
-        (lambda: planetary((24, 30, 84), "2 mm", 5), "nearest angles are 0.0000, 73.3333"),
+        (lambda: planetary((24, 30, 84), "2 mm", 5), "nearest angles are 0.0000, 73.3333.*with 25, 30, 85 teeth"),
+        (lambda: planetary((24, 31, 84), "2 mm", 3), "z_r = z_s . 2 z_p = 86 teeth; .* shifts .* 24, 30, 84 teeth"),
         (lambda: planetary((24, 30, 84), "2 mm", 6), "neighbouring planets"),
         (lambda: planetary((24, 30, 28), "2 mm", 2), "inside the base circle"),
         (lambda: planetary((24, 60, 50), "2 mm", 3), "ring has 50 teeth and planet 60"),

@@ -1,5 +1,7 @@
 """Planetary sets from files, on the command line, and what backlash and a defect do together."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -157,3 +159,19 @@ def test_backlash_and_a_defect_do_more_together():
     data = interaction(differential(), "0.2 mm")
     level = data["deviation"]
     assert float(level.sel(fault="yes", backlash="yes")) > float(level.sel(fault="no", backlash="no"))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('{ sun = "600 rpm" }', '{ ring = "600 rpm" }'), r"set.toml: .*ring is held.*held = 'none'"),
+        (('{ sun = "600 rpm" }', '{ sun = "600 rpm", carrier = "100 rpm" }'), "set.toml: .*all three members"),
+        (('[[fault]]', '[support.sun]\nradial = 1e7\n[[fault]]'), "set.toml: .*a speed and a support"),
+    ],
+)  # fmt: skip
+def test_what_does_not_go_together_is_said_with_the_file(tmp_path, change, words):
+    place = tmp_path / "set.toml"
+    place.write_text(FILE.replace(*change))
+    result = CliRunner().invoke(app, ["run", str(place)])
+    assert result.exit_code == 1
+    assert re.search(words, " ".join(result.output.split()))
