@@ -268,7 +268,8 @@ def _parse(text: str, target: str, field: str) -> float:
         return float(quantity.to(target).magnitude)
     except pint.DimensionalityError:
         raise ValueError(
-            f"{field}: {text!r} is in {quantity.units:~} where a quantity in {target} is expected"
+            f"{field}: {text!r} is in {quantity.units:~} where a quantity in {target} is expected; write for example "
+            f"'1 {example}'"
         ) from None
 
 

@@ -15,6 +15,7 @@ from gearmbs.gears import ContactLaw, GearPair, GearSpec, OperatingPoint
 from gearmbs.gears.faults import RootCrack
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.given import has_quantity
+from gearmbs.studies import Case, case_mechanism, make_case, run_case
 from gearmbs.studies.section import CaseWarning
 from gearmbs.units import Given, shown, to_si
 
@@ -151,3 +152,21 @@ def test_a_speed_in_hertz_that_looks_like_rpm_is_remarked(recwarn):
     assert not recwarn
     with pytest.warns(CaseWarning, match=r"'1800 Hz' is 108000 rpm; write '1800 rpm' if that is meant"):
         gm.Case(operation={"speed": "1800 Hz"})
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: to_si("60 kg", "torque", "load"), r"is expected; write for example '1 N\*m'"),
+        (lambda: gm.GearSpec(20, "2 mm", helix_angle=15), "plain numbers: rad; write '15 deg'"),
+        (lambda: gm.planetary((19, 17, 56), "2 mm", planet=3), "'planet' is unknown; did you mean planets"),
+        (lambda: run_case({"name": "x"}), "case: is a dict; make a case of tables by make_case"),
+        (lambda: make_case({"gears": {"internal": True}}), r"unknown key; a case is an external spur pair; .*GearSpec"),
+        (lambda: make_case({"gears": {"helix_angle": "15 deg"}}), "internal and helical wheels are those of a drivetr"),
+        (lambda: make_case({"operation": {"duration": -1}}), r"give 1e-05 to 10000 s \(a plain number is in s\)$"),
+        (lambda: case_mechanism(Case(), "6206", spall=1), "'spall' is unknown; known ones are .*defects"),
+    ],
+)
+def test_what_is_given_wrongly_has_a_remedy(call, said):
+    with pytest.raises(ValueError, match=said):
+        call()

@@ -6,9 +6,10 @@ stepped planet has a wheel of its own for the ring.
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -464,6 +465,12 @@ def planetary(
     [0.0, 0.333, 0.667]
     """
     require(len(teeth) == 3, f"planetary: teeth is {teeth!r}; give those of sun, planet and ring")
+    known = [item.name for item in fields(PlanetarySet) if item.name not in ("sun", "planet", "ring", "planets")]
+    for key in settings:
+        if key not in known:
+            near = difflib.get_close_matches(key, ["planets", *known], 1)
+            hint = f"did you mean {near[0]}?" if near else f"known ones are {', '.join(known)}"
+            require(False, f"planetary: {key!r} is unknown; {hint}")
     other = {"right": "left", "left": "right"}
     require(hand in other, f"planetary: hand is {hand!r}; choose 'right' or 'left'")
     made = []

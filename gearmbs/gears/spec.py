@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 from gearmbs._shown import Shown, Written
-from gearmbs.units import Quantity, to_si
+from gearmbs.units import Given, Quantity, to_si
 
 UNDERCUT_TOLERANCE = 0.8  # share of the cutter height that must clear the base circle's normal (14 teeth at 20 deg)
 
@@ -261,7 +261,12 @@ class GearSpec(Shown, Written):
         )
         require(
             0 <= self.helix_angle <= LARGEST_HELIX,
-            f"{n}.helix_angle is {math.degrees(self.helix_angle):.3f} deg; give 0 to 45 deg and the sense as hand",
+            f"{n}.helix_angle is {math.degrees(self.helix_angle):.3f} deg; give 0 to 45 deg and the sense as hand"
+            + (
+                ""
+                if isinstance(self.helix_angle, Given)
+                else f" (plain numbers: rad; write '{self.helix_angle:g} deg')"
+            ),
         )
         require(self.hand in ("right", "left"), f"{n}.hand is {self.hand!r}; choose 'right' or 'left'")
         for name in ("face_width", "addendum", "dedendum", "fillet_radius"):

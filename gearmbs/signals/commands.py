@@ -202,8 +202,15 @@ def trend(
         pattern = any(sign in str(files[0]) for sign in "*?[") and not files[0].exists()
         if len(files) > 1 or files[0].is_dir() or pattern:
             known["speed_channel"] = speed_channel
+            chosen = files[0] if len(files) == 1 else files
+            if out is not None:
+                from gearmbs.signals.series import finished_files
+
+                done, count = finished_files(chosen, out)
+                if done:
+                    typer.echo(f"taking up {done} finished of {count} files from {out.stem}.rows.jsonl", err=True)
             table = series(
-                files[0] if len(files) == 1 else files,
+                chosen,
                 section=section,
                 store=out,
                 progress=lambda name, fraction: move(fraction, name),

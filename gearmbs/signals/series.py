@@ -112,6 +112,22 @@ def series(
     return table
 
 
+def finished_files(files: Files, store: str | Path) -> tuple[int, int]:
+    """Return how many files of a series its journal holds already, and how many there are."""
+    paths, _ = _files(files)
+    journal = _journal_path(Path(store))
+    try:
+        entries = [_entry(line) for line in journal.read_bytes().splitlines(keepends=True) if line.endswith(b"\n")]
+    except OSError:
+        return 0, len(paths)
+    keys = {entry["key"] for entry in entries if entry is not None and "key" in entry}
+    return sum(_key(path) in keys for path in paths), len(paths)
+
+
+def _journal_path(store: Path) -> Path:
+    return store.with_name(f"{store.stem}.rows.jsonl")
+
+
 class StoreWarning(UserWarning):
     """The journal of a series cannot be written any more; the series itself goes on."""
 
@@ -133,7 +149,7 @@ class Journal:
     """
 
     def __init__(self, store: Path, digest: str) -> None:
-        self.path = store.with_name(f"{store.stem}.rows.jsonl")
+        self.path = _journal_path(store)
         self.broken = False
         self.done: dict[str, list[dict[str, Any]]] = {}
         try:

@@ -62,6 +62,12 @@ def _upper(value: Any) -> Any:
     return value.upper() if isinstance(value, str) else value
 
 
+OTHER_WHEELS = (
+    "a case is an external spur pair; internal and helical wheels are those of a drivetrain ([wheels.a]) or gm.GearSpec"
+)
+"""Where keys of other wheels belong."""
+
+
 class Gears(Section):
     """The wheels: the paper's table, or numbers of one's own.
 
@@ -71,6 +77,7 @@ class Gears(Section):
     """
 
     section: ClassVar[str] = "gears"
+    elsewhere: ClassVar[dict[str, str]] = dict.fromkeys(("internal", "helix_angle", "hand"), OTHER_WHEELS)
 
     teeth: Annotated[tuple[int, int], BeforeValidator(_both)] = (29, 29)
     module: q.Module = 95e-3 / 31

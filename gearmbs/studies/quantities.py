@@ -117,6 +117,9 @@ class Measure:
         text = f"this is {number / factor:.6g} {shown}; give {span} {shown}"
         if isinstance(value, str):
             raise ValueError(text)
+        meant = float(value) * factor
+        if shown == self.unit or (low is not None and meant < low) or (high is not None and meant > high):
+            raise ValueError(f"{text} (a plain number is in {self.unit})")
         raise ValueError(f"{text} (a plain number is in {self.unit}; write '{value} {shown}' if that is meant)")
 
 

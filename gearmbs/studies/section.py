@@ -259,6 +259,9 @@ def _owner(loc: tuple, kind: Any) -> Any:
 def _unknown(loc: tuple, kind: Any) -> str:
     """Return what is known in place of an unknown key, with the nearest of them all."""
     key, owner = str(loc[-1]), _owner(loc[:-1], kind)
+    elsewhere = getattr(owner, "elsewhere", {})
+    if key in elsewhere:
+        return f"unknown key; {elsewhere[key]}"
     known = list(owner.model_fields)
     text = f"unknown key; known ones are {', '.join(known)}"
     near = difflib.get_close_matches(key, known, n=1)

@@ -17,7 +17,7 @@ from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.simulate import simulate
 from gearmbs.studies import rig
-from gearmbs.studies.case import Case, units_of_fields
+from gearmbs.studies.case import Case, CaseError, units_of_fields
 from gearmbs.studies.drive import drive_angle
 from gearmbs.studies.evaluation import check_variables, evaluate, time_series
 from gearmbs.studies.limits import check_record, edge, remarks, slip
@@ -208,6 +208,8 @@ def run_case(
     SimulationFailed
         If the integrator stops early or teeth slip past each other; the exception carries the solution so far.
     """
+    if not isinstance(case, Case):
+        raise CaseError(f"case: is a {type(case).__name__}; make a case of tables by make_case, of a file by load_case")
     check_record(case)
     check_variables(variables)
     recorder = Recorder(case)

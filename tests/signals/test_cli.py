@@ -153,8 +153,11 @@ def test_a_folder_is_one_series(tmp_path):
     table = pd.read_csv(tmp_path / "t.csv")
     assert table["file"].tolist() == ["s1.csv", "s2.csv", "s10.csv"]
     assert table["housing.rms"].nunique() == 1
-    # a second call finds everything done
+    # a second call finds everything done, one after a kill what was
     assert run("trend", folder, *options).exit_code == 0
+    journal = tmp_path / "t.rows.jsonl"
+    journal.write_text("".join(journal.read_text().splitlines(keepends=True)[:3]))
+    assert "taking up 2 finished of 3 files from t.rows.jsonl" in run("trend", folder, *options).output
     matched = run("trend", folder / "s1*.csv", "--speed", "1800 rpm", "--channel", "housing")
     assert matched.exit_code == 0, matched.output
     assert "s10.csv" in matched.output
