@@ -85,26 +85,13 @@ def diagnose_bearing(
         If a bearing cannot be read, or the record is too short for its lines.
     """
     known = _told_apart(_all_lines(bearing))
-    if not 0.0 < slip < 0.2:
-        raise SignalError(f"slip: must lie between 0 and 0.2, got {slip!r}")
-    if not 1 <= harmonics <= 20:
-        raise SignalError(f"harmonics: must lie between 1 and 20, got {harmonics!r}")
+    _check_search(slip, harmonics)
     if phase is None and speed is not None and not isinstance(speed, (int, float, str)):
         phase = phase_from_speed(signal, speed)
     shaft, notes = _shaft(signal, speed, phase)
     rate = rate_of(signal)
-    turns = signal.sizes["time"] / rate * shaft
-    if turns < LEAST_TURNS:
-        raise SignalError(
-            f"signal: holds {turns:.3g} turns of the shaft, lines of a bearing need {LEAST_TURNS}; "
-            f"give a record of {LEAST_TURNS / shaft:.3g} s or more at this speed"
-        )
     highest = max(order for lines in known for order in lines.orders.values()) * shaft
-    if phase is None and 2.5 * highest > rate / 2:
-        raise SignalError(
-            f"signal: {highest:.4g} Hz, the highest line of the bearing, needs a sampling rate above "
-            f"{5 * highest:.4g} Hz, it is {rate:g} Hz"
-        )
+    _check_record(signal.sizes["time"], rate, shaft, None if phase is not None else highest)
     others = _other_shafts(signal, known, shafts)
     turning = [shaft * ratio for ratio in sorted({1.0, *(lines.ratio for lines in known), *(others or ())})]
     bands, findings, spectra = {}, [], {}
@@ -129,6 +116,29 @@ def diagnose_bearing(
         shafts=others,
         notes=notes,
     )
+
+
+def _check_search(slip: float, harmonics: int) -> None:
+    """Refuse settings of the search that make no sense."""
+    if not 0.0 < slip < 0.2:
+        raise SignalError(f"slip: must lie between 0 and 0.2, got {slip!r}")
+    if not 1 <= harmonics <= 20:
+        raise SignalError(f"harmonics: must lie between 1 and 20, got {harmonics!r}")
+
+
+def _check_record(samples: int, rate: float, shaft: float, highest: float | None) -> None:
+    """Refuse a record that is too short for lines of a bearing, or sampled too slowly for the highest of them, Hz."""
+    turns = samples / rate * shaft
+    if turns < LEAST_TURNS:
+        raise SignalError(
+            f"signal: holds {turns:.3g} turns of the shaft, lines of a bearing need {LEAST_TURNS}; "
+            f"give a record of {LEAST_TURNS / shaft:.3g} s or more at this speed"
+        )
+    if highest is not None and 2.5 * highest > rate / 2:
+        raise SignalError(
+            f"signal: {highest:.4g} Hz, the highest line of the bearing, needs a sampling rate above "
+            f"{5 * highest:.4g} Hz, it is {rate:g} Hz"
+        )
 
 
 def _all_lines(bearing: Any) -> tuple[BearingLines, ...]:
