@@ -52,10 +52,7 @@ INSTEAD_OF_ARGUMENTS: dict[tuple[str, str], str] = {
     ("REQUEST", "FUNCTION"): "USER with a routine, or F1 to F8",
     ("SPLINE", "FILE"): "X and Y in the deck",
     ("MATRIX", "FILE"): "VALUES in the deck",
-    ("JOINT", "MU_DYN_ROT"): "FRICTION",
-    ("JOINT", "MU_DYN_TRANS"): "FRICTION",
-    ("JOINT", "MU_STAT_ROT"): "FRICTION",
-    ("JOINT", "MU_STAT_TRANS"): "FRICTION",
+    ("JOINT", "FRICTION"): "a FRICTION statement",
     ("PART", "PLANAR"): "JOINT/PLANAR to the ground",
 }
 """What to do instead of arguments that are refused."""

@@ -67,7 +67,7 @@ def test_inactive_elements_exert_nothing():
         (("JOINT/1, I=99",), 1, "JOINT/1: there is no MARKER/99 for I"),
         (("SIM/INITIAL", "MOTION/1, JOINT=9"), 2, "MOTION/1: there is no JOINT/9"),
         (("SIM/INITIAL", "PART/2, VX=3"), 2, "PART/2: VX after the first analysis"),
-        (("SIM/INITIAL", "JOINT/1, MU_DYN_ROT=1"), 2, "MU_DYN_ROT is not supported"),
+        (("SIM/INITIAL", "JOINT/1, FRICTION=ON"), 2, "FRICTION is not supported"),
         (("FILE/COMMAND=none",), 1, "COMMAND = none: there is no such file"),
     ],
 )

@@ -136,14 +136,23 @@ def test_arguments_that_only_say_how_to_draw_or_print_are_read():
     assert not parse_deck(with_lines(lines)).unsupported
 
 
-def test_the_old_friction_of_joints_is_refused_and_its_sizes_are_remarked():
-    text = PENDULUM.replace("REVOLUTE", "REVOLUTE, DELTA_V=0.01, MAXIMUM_DEFORMATION=0.01, INNER_RADIUS=1", 1)
-    deck = parse_deck(text)
+@pytest.mark.parametrize("switch", ["", ", FRICTION=OFF"])
+def test_the_old_friction_of_joints_is_off_unless_it_is_switched_on(switch):
+    """View wrote its sizes for every joint; without them the motion is the same."""
+    sizes = ", DELTA_V=0.01, MAXIMUM_DEFORMATION=0.01, MU_DYN_ROT=0.3, MU_STAT_ROT=0.4, INNER_RADIUS=1"
+    deck = parse_deck(PENDULUM.replace("REVOLUTE", f"REVOLUTE{switch}{sizes}", 1))
     (remark,) = [m for m in remarks(deck) if "INNER_RADIUS" in m]
-    assert remark.endswith("they shape the friction of MU_STAT and MU_DYN; write FRICTION")
+    assert "MU_DYN_ROT" in remark
+    assert remark.endswith("only where it says FRICTION = ON; for friction write a FRICTION statement")
     assert not deck.unsupported
-    deck = parse_deck(text.replace("INNER_RADIUS=1", "MU_DYN_ROT=0.3"))
-    assert [d.message for d in deck.unsupported] == ["JOINT/1: MU_DYN_ROT is not supported"]
+    rubbing, free = (run_deck(d, end=0.1, steps=2).part(2) for d in (deck, parse_deck(PENDULUM)))
+    np.testing.assert_array_equal(rubbing, free)
+
+
+@pytest.mark.parametrize("value", ["ON", "PRELOAD_ONLY"])
+def test_the_old_friction_of_joints_is_refused(value):
+    deck = parse_deck(PENDULUM.replace("REVOLUTE", f"REVOLUTE, FRICTION={value}, MU_DYN_ROT=0.3", 1))
+    assert [d.message for d in deck.unsupported] == ["JOINT/1: FRICTION is not supported"]
 
 
 def test_what_stands_on_parts_that_are_left_out_is_left_out():

@@ -49,7 +49,7 @@ TWO_PARTS = (st.Joint, st.Jprim)
 UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
     st.Marker: ("point_mass", "fe_part", "node_label", "curve"),
     st.FlexBody: ("db_file", "bdf_file", "index_in_database", "dmode", "vmode"),
-    st.Joint: ("mu_dyn_rot", "mu_dyn_trans", "mu_stat_rot", "mu_stat_trans"),
+    st.Joint: ("friction",),
     st.Coupler: ("function",),
     st.Field: ("function",),
     st.Spline: ("data_file",),
@@ -74,8 +74,9 @@ WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
     st.Contact: ("augmented", "stiction_law", "max_deformation", "flip_i", "flip_j"),
     st.Graphics: ("xmin", "xmax", "ymin", "ymax", "faceting"),
     st.Joint: tuple(
-        """delta_v max_deformation max_friction max_fric_rot max_fric_trans preload_axial preload_radial preload_x
-        preload_y inner_radius outer_radius pin_radius height width""".split()
+        """delta_v max_deformation max_friction max_fric_rot max_fric_trans mu_dyn_rot mu_dyn_trans mu_stat_rot
+        mu_stat_trans preload_axial preload_radial preload_x preload_y inner_radius outer_radius pin_radius height
+        width""".split()
     ),
     st.CurveStatement: ("minpar", "maxpar"),
     st.Cvcv: ("ivel", "jvel"),
@@ -92,7 +93,7 @@ WHY = {
     st.Variable: "variables need no starting value",
     st.Contact: "solids press by depth and rub by speed alone",
     st.Graphics: "a plane touches everywhere, and a mesh is as fine as its file",
-    st.Joint: "they shape the friction of MU_STAT and MU_DYN; write FRICTION",
+    st.Joint: "a joint rubs by them only where it says FRICTION = ON; for friction write a FRICTION statement",
     st.Gse: "derivatives are made by differences",
     st.CurveStatement: "the points alone say how far the curve goes",
     st.Cvcv: "the speeds follow from those of the parts",
@@ -133,10 +134,9 @@ def check(deck: Deck) -> list[Diagnostic]:
                 fail(statement, f"{keyword} is missing")
         if cls is st.Matrix and statement.id in _matrices_beside_files(deck):
             continue
-        for name in UNSUPPORTED_ARGUMENTS.get(cls, ()):
-            if name in statement.given:
-                message = f"{statement.label()}: {name.upper()} is not supported"
-                deck.diagnostics.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.given[name]))
+        for name in refused_arguments(statement):
+            message = f"{statement.label()}: {name.upper()} is not supported"
+            deck.diagnostics.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.given[name]))
         _check_markers(deck, statement, fail)
     _remark_idle(deck)
     for part in deck.of(st.Part).values():
@@ -155,6 +155,12 @@ def check(deck: Deck) -> list[Diagnostic]:
     _check_data(deck, fail)
     _check_floating(deck, fail)
     return errors
+
+
+def refused_arguments(statement: st.Statement) -> list[str]:
+    """Return the arguments of a statement that are not supported, but for those that switch something off."""
+    names = UNSUPPORTED_ARGUMENTS.get(type(statement), ())
+    return [name for name in names if name in statement.given and getattr(statement, name) != "OFF"]
 
 
 def _matrices_beside_files(deck: Deck) -> set[int]:

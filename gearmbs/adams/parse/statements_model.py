@@ -83,6 +83,7 @@ class Joint(Statement):
     ic: Vector | None = arg("IC", REALS, count=(1, 2))
     ictran: Vector | None = arg("ICTRAN", REALS, count=(1, 2))
     icrot: Vector | None = arg("ICROT", REALS, count=(1, 2))
+    friction: str | None = arg("FRICTION", WORD, choices="ON OFF PRELOAD_ONLY")
     delta_v: float | None = arg("DELTA_V", REAL)
     max_deformation: float | None = arg("MAXIMUM_DEFORMATION", REAL)
     max_friction: float | None = arg("MAX_FRICTION", REAL)

@@ -10,7 +10,7 @@ import numpy as np
 from gearmbs.adams.builders.model import BodyState
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.check import UNSUPPORTED_ARGUMENTS, check
+from gearmbs.adams.parse.check import check, refused_arguments
 from gearmbs.adams.parse.commands import Change, Simulate, Switch, apply_change
 from gearmbs.adams.parse.deck import Deck
 
@@ -118,7 +118,7 @@ def change(session: Session, command: Change, allow_unsupported: bool) -> None:
             command,
             f"{new.label()}: {what} after the first analysis; the mechanism goes on from where it is",
         )
-    refused = [n for n in UNSUPPORTED_ARGUMENTS.get(type(new), ()) if n in new.given]
+    refused = refused_arguments(new)
     if refused and not allow_unsupported:
         raise unsupported(command, f"{new.label()}: {', '.join(refused).upper()} is not supported")
     group = session.deck.items.setdefault(type(new), {})

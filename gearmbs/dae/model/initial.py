@@ -27,8 +27,9 @@ LEAST = 1e-6
 """Distance of a constraint row of length 1 from the others above which it is independent."""
 NEARLY = 1e-4
 """The same where an assembly has stopped short of its end."""
-CONFLICT = 1e-7
-"""Violation of a redundant row, in m or of 1, above which it contradicts the others."""
+CONFLICT = 1e-6
+"""Violation of a redundant row, in m or of 1, above which it contradicts the others: models are often written with nine
+decimals, and a mechanism of many parts multiplies their error."""
 MAX_POSITION_ITERATIONS = 50
 VISIBLE = 1e-3
 """Displacement, relative to the mechanism's length, above which the report mentions a correction of positions."""
@@ -38,8 +39,12 @@ DENSE_ROWS = 400
 """Rows up to which redundancy is looked for by a dense factorisation."""
 SURE = 1e-12
 """Squared distance of a row from the others, all of length 1, above which it is independent beyond rounding."""
-DOUBTFUL = 1e-6
-"""Squared distance of a row from those before it below which it is looked at again."""
+DOUBTFUL = (1e-6, 1e-3)
+"""Squared distance of a row from those before it below which it is looked at again; then the second."""
+BLURRED = 1e-8
+"""Squared distance of a kept row from the others up to which rounding may hide that it depends on them."""
+MOST_DOUBTFUL = 2000
+"""Rows up to which the second distance is tried: they are looked at densely."""
 CHUNK = 200
 """Doubtful rows that are looked at together."""
 SELECTIONS = 3
@@ -148,8 +153,17 @@ def _sparse_rows(scaled: csc_array, least: float = LEAST) -> np.ndarray:
     pivots = _pivots(csc_array(gram + diags_array(np.full(m, SURE))), "NATURAL")
     if pivots is None:
         return _greedy_rows(scaled.toarray(), min(scaled.shape), least)
-    doubtful = np.flatnonzero(pivots < DOUBTFUL)
-    sure = np.setdiff1d(np.arange(m), doubtful)
+    kept = _looked_at_again(scaled, np.flatnonzero(pivots < DOUBTFUL[0]), least)
+    among = _pivots(csc_array(gram[kept][:, kept]), "MMD_AT_PLUS_A")
+    doubtful = np.flatnonzero(pivots < DOUBTFUL[1])
+    if (among is None or among.min() <= BLURRED) and doubtful.size <= MOST_DOUBTFUL:
+        kept = _looked_at_again(scaled, doubtful, least)
+    return kept
+
+
+def _looked_at_again(scaled: csc_array, doubtful: np.ndarray, least: float) -> np.ndarray:
+    """Return all rows but the doubtful ones, and of these those that are farther than ``least`` from the rest."""
+    sure = np.setdiff1d(np.arange(scaled.shape[0]), doubtful)
     rows = csc_array(scaled[sure])
     factors = splu(csc_array(rows @ rows.T), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
     added: list[int] = []
