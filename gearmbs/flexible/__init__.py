@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
+    from gearmbs.flexible.ansys import read_ansys
     from gearmbs.flexible.beam import BeamSection, shear_coefficient
     from gearmbs.flexible.bodies import box_housing, planet_carrier, thin_rimmed_wheel
     from gearmbs.flexible.check import ModelReport, ReductionReport, check_model, check_reduction
@@ -14,9 +15,11 @@ if TYPE_CHECKING:
     from gearmbs.flexible.interfaces import Interface
     from gearmbs.flexible.large_beam import BeamChain, LargeBeam, add_beam
     from gearmbs.flexible.material import ElasticMaterial
-    from gearmbs.flexible.matrices import from_matrices, read_abaqus, read_calculix, read_nodes, read_op4
+    from gearmbs.flexible.matrices import from_matrices, read_abaqus, read_calculix, read_nodes
     from gearmbs.flexible.mnf import ModalNeutralFile, mnf_of, read_mnf, write_mnf
     from gearmbs.flexible.modal_model import ModalModel, Seat
+    from gearmbs.flexible.nastran import read_op2, read_op4
+    from gearmbs.flexible.nastran_modes import read_op2_modes
     from gearmbs.flexible.reduction import reduce_model
     from gearmbs.flexible.rotor import Campbell, Rotor, Support, UnbalanceResponse, WhirlModes
     from gearmbs.flexible.shaft import Disc, Shaft, ShaftSection
@@ -55,9 +58,12 @@ __all__ = [
     "nodes_where",
     "planet_carrier",
     "read_abaqus",
+    "read_ansys",
     "read_calculix",
     "read_mnf",
     "read_nodes",
+    "read_op2",
+    "read_op2_modes",
     "read_op4",
     "reduce_model",
     "ring_mesh",
@@ -102,10 +108,13 @@ late(
         "nodes_where": ".solid",
         "planet_carrier": ".bodies",
         "read_abaqus": ".matrices",
+        "read_ansys": ".ansys",
         "read_calculix": ".matrices",
         "read_mnf": ".mnf",
         "read_nodes": ".matrices",
-        "read_op4": ".matrices",
+        "read_op2": ".nastran",
+        "read_op2_modes": ".nastran_modes",
+        "read_op4": ".nastran",
         "reduce_model": ".reduction",
         "ring_mesh": ".solid",
         "shear_coefficient": ".beam",

@@ -10,6 +10,7 @@ integrals are exact, and those of second order are of the masses and inertias lu
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 
 from gearmbs.flexible.beam import Slices
 from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
@@ -82,14 +83,27 @@ def lumps(model: FiniteElementModel) -> tuple[np.ndarray, np.ndarray]:
     masses : ndarray, shape (N,)
     inertias : ndarray, shape (N, 3, 3)
     """
-    count = len(model.ids)
-    node, direction = model.dofs[:, 0], model.dofs[:, 1]
+    return nodal_lumps(len(model.ids), model.dofs, model.mass)
+
+
+def nodal_lumps(count: int, dofs: np.ndarray, mass: sp.csc_array) -> tuple[np.ndarray, np.ndarray]:
+    """Return masses and inertias at nodes from a mass matrix: see `lumps`.
+
+    Parameters
+    ----------
+    count : int
+        Number of nodes.
+    dofs : ndarray of int, shape (d, 2)
+        Row of the node and direction 0 to 5 of each degree of freedom; row -1 for generalised coordinates.
+    mass : sparse matrix, shape (d, d)
+    """
+    node, direction = dofs[:, 0], dofs[:, 1]
     masses, inertias = np.zeros((3, count)), np.zeros((count, 3, 3))
     for c in range(3):
         chosen = (direction == c) & (node >= 0)
-        row = (model.mass @ (chosen * 1.0)[:, None])[:, 0]
+        row = (mass @ (chosen * 1.0)[:, None])[:, 0]
         np.add.at(masses[c], node[chosen], row[chosen])
-    entries = model.mass.tocoo()
+    entries = mass.tocoo()
     same = (
         (node[entries.row] == node[entries.col])
         & (node[entries.row] >= 0)

@@ -1,8 +1,7 @@
-"""Stiffness and mass matrices of other programs: Abaqus, CalculiX, Nastran OP4, and what is in memory already."""
+"""Stiffness and mass matrices of other programs: Abaqus, CalculiX, and what is in memory already."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -155,19 +154,8 @@ def read_abaqus(
         dofs: Any = 6 if size == 6 * len(ids) else 3
     else:
         dofs, k, m = _common(k_dofs, k, m_dofs, m)
-    scale = np.ones(k.shape[0])
-    if np.ndim(dofs) or dofs == 6:
-        direction = dofs[:, 1] - 1 if np.ndim(dofs) else np.arange(k.shape[0]) % 6
-        scale[direction > 2] = length
-    turn = sp.diags_array(scale)
-    return from_matrices(
-        turn @ k @ turn * (force / length),
-        turn @ m @ turn * mass_unit,
-        positions * length,
-        ids=ids,
-        dofs=dofs,
-        name=label,
-    )
+    k, m = scaled(k, m, dofs, length, force, mass_unit)
+    return from_matrices(k, m, positions * length, ids=ids, dofs=dofs, name=label)
 
 
 def read_calculix(path: Path_, nodes: Path_, *, name: str | None = None) -> FiniteElementModel:
@@ -205,69 +193,28 @@ def read_calculix(path: Path_, nodes: Path_, *, name: str | None = None) -> Fini
     return from_matrices(stiffness, mass, positions, ids=ids, dofs=np.array(rows), name=name or base.name)
 
 
-def read_op4(
-    path: Path_,
-    positions: npt.ArrayLike,
-    dofs: Sequence[tuple[int, int]] | np.ndarray | int,
-    *,
-    ids: npt.ArrayLike | None = None,
-    stiffness: str = "kxx",
-    mass: str = "mxx",
-    name: str | None = None,
-    length: float = 1.0,
-    force: float = 1.0,
-    mass_unit: float = 1.0,
-) -> FiniteElementModel:
-    """Return a model from matrices in a Nastran OP4 file, read by pyyeti (``pip install gearmbs[fem]``).
+def scaled(
+    stiffness: Any, mass: Any, dofs: Any, length: float, force: float, mass_unit: float
+) -> tuple[sp.csc_array, sp.csc_array]:
+    """Return matrices in SI.
 
     Parameters
     ----------
-    path : str or Path
-        Text or binary, of either byte order.
-    positions, ids : array_like
-        Positions (in the file's unit of length) and numbers of the nodes.
-    dofs : array_like or int
-        As of :func:`from_matrices`: node and direction of each row, in the order of the superelement; node 0 for its
-        modal coordinates.
-    stiffness, mass : str
-        Names of the matrices.
+    stiffness, mass : sparse or dense matrix, shape (d, d)
+    dofs : int or array_like of int, shape (d, 2)
+        As of :func:`from_matrices`. Rows of node 0 have no unit.
     length, force, mass_unit : float
-        SI values of the file's units.
-
-    Raises
-    ------
-    FlexibleError
-        If pyyeti is not installed, the file cannot be read, or has no such matrices.
+        SI values of the matrices' units.
     """
-    try:
-        # it sets numpy's legacy print mode, in which text files lose digits
-        with np.printoptions():
-            from pyyeti.nastran import op4
-    except ImportError:
-        raise FlexibleError("OP4 files are read by pyyeti; install it with 'pip install gearmbs[fem]'") from None
-    file = Path(path)
-    try:
-        found = op4.read(str(file), into="dct")
-    except Exception as error:
-        raise FlexibleError(f"{file.name}: it cannot be read as OP4 ({type(error).__name__}: {error})") from None
-    for wanted in (stiffness, mass):
-        if wanted not in found:
-            raise FlexibleError(f"{file.name}: it has no matrix '{wanted}'; matrices: {', '.join(found)}")
-    k, m = sp.csc_array(found[stiffness]), sp.csc_array(found[mass])
-    if np.ndim(dofs) == 0:
-        count = k.shape[0]
-        direction = np.tile(np.arange(int(dofs)), count // int(dofs))  # type: ignore[arg-type]
-        placed = np.ones(count, dtype=bool)
-    else:
-        table = np.asarray(dofs, dtype=int)
-        direction, placed = table[:, 1] - 1, table[:, 0] != 0
+    k, m = sp.csc_array(stiffness), sp.csc_array(mass)
     scale = np.ones(k.shape[0])
-    scale[: direction.size][(direction > 2) & placed] = length
+    if np.ndim(dofs) == 0:
+        scale[np.arange(k.shape[0]) % int(dofs) > 2] = length
+    else:
+        table = np.asarray(dofs, dtype=int)[: k.shape[0]]
+        scale[: len(table)][(table[:, 1] > 3) & (table[:, 0] != 0)] = length
     turn = sp.diags_array(scale)
-    return from_matrices(
-        turn @ k @ turn * (force / length), turn @ m @ turn * mass_unit, np.asarray(positions, dtype=float) * length,
-        ids=ids, dofs=dofs, name=name or file.stem,
-    )  # fmt: skip
+    return sp.csc_array(turn @ k @ turn * (force / length)), sp.csc_array(turn @ m @ turn * mass_unit)
 
 
 def _read_triplets(path: Path_, size: int | None = None) -> tuple[np.ndarray | None, sp.csc_array]:

@@ -44,6 +44,7 @@ UNITS = {
 }  # fmt: skip
 KINDS = ("mass", "length", "time", "force")
 SYMBOLS = {"mass": "kg", "length": "m", "time": "s", "force": "N"}
+SI = ("KILOGRAM", "METER", "SECOND", "NEWTON")
 
 
 @dataclass(frozen=True, eq=False)
@@ -390,7 +391,7 @@ def mnf_of(model: ModalModel, title: str = "") -> ModalNeutralFile:
     faces = [] if model.faces is None else [np.asarray(f) for f in model.faces]
     found = ModalNeutralFile(
         np.asarray(model.ids), model.positions, p.mass, p.com, origin, np.arange(1, n + 1), eigenvalues, shapes,
-        model.masses, rows, ("KILOGRAM", "METER", "SECOND", "NEWTON"), faces, np.eye(n),
+        model.masses, rows, SI, faces, np.eye(n),
         np.array(sorted(set(seats)), dtype=int),
     )  # fmt: skip
     return replace(found, header=_header(found, title or model.name))

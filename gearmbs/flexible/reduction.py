@@ -304,13 +304,24 @@ def free_modes(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, count: int) 
     r = k.shape[0]
     wanted = min(count + rigid.shape[1], r)
     if r <= DENSE or wanted > r // 2:
-        values, vectors = scipy.linalg.eigh(k.toarray(), m.toarray(), subset_by_index=[0, wanted - 1])
+        values, vectors = _dense_modes(k.toarray(), m.toarray(), wanted)
     else:
         shift = -1e-4 * np.abs(k.diagonal()).mean() / max(np.abs(m.diagonal()).mean(), 1e-300)
         start = np.random.default_rng(0).standard_normal(r)
         values, vectors = spl.eigsh(sp.csc_matrix(k), wanted, sp.csc_matrix(m), sigma=shift, v0=start)
     order = np.argsort(values)[rigid.shape[1] :]
     return np.maximum(values[order], 0.0), vectors[:, order]
+
+
+def _dense_modes(k: np.ndarray, m: np.ndarray, wanted: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest eigenvalues and vectors; of a mass that is only semidefinite those that are finite."""
+    try:
+        return scipy.linalg.eigh(k, m, subset_by_index=[0, wanted - 1])
+    except np.linalg.LinAlgError:
+        shift = 1e-4 * np.trace(k) / np.trace(m)
+        inverse, vectors = scipy.linalg.eigh(m, k + shift * m)
+        kept = np.flatnonzero(inverse > 1e-14 * inverse[-1])[::-1][:wanted]
+        return 1.0 / inverse[kept] - shift, vectors[:, kept] / np.sqrt(inverse[kept])
 
 
 def attachment_modes(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, constraints: sp.csr_array) -> np.ndarray:

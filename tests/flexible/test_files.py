@@ -222,7 +222,7 @@ def test_op4_files_through_pyyeti(tmp_path):
     with pytest.raises(FlexibleError, match="no matrix 'kaa'; matrices: kxx, mxx"):
         read_op4(path, model.positions, 6, stiffness="kaa")
     path.write_bytes(path.read_bytes()[:100])
-    with pytest.raises(FlexibleError, match=r"it cannot be read as OP4|no matrix"):
+    with pytest.raises(FlexibleError, match=r"bar\.op4: byte \d+: a record of \d+ bytes is cut off"):
         read_op4(path, model.positions, 6)
 
 

@@ -1,0 +1,135 @@
+"""Matrices of Ansys: .full files with the nodes of a result file, read by ansys-mapdl-reader."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from gearmbs.flexible.errors import FlexibleError
+from gearmbs.flexible.fe_model import FiniteElementModel
+from gearmbs.flexible.matrices import Path_, from_matrices, read_nodes, scaled
+
+LEAST = 4 * 512
+"""Bytes of the headers of a binary file."""
+SMALL = 1e-9
+"""Mass and stiffness of a held degree of freedom against the largest: its row is empty."""
+
+
+def read_ansys(
+    full: Path_,
+    nodes: Path_ | tuple[npt.ArrayLike, npt.ArrayLike],
+    *,
+    name: str | None = None,
+    length: float = 1.0,
+    force: float = 1.0,
+    mass_unit: float = 1.0,
+) -> FiniteElementModel:
+    """Return a model from the assembled matrices of Ansys, read by ansys-mapdl-reader (``pip install gearmbs[ansys]``).
+
+    Parameters
+    ----------
+    full : str or Path
+        ``file.full`` of a modal analysis without supports, with stiffness and mass (``WRFULL,1`` is enough).
+    nodes : str or Path, or (ids, positions)
+        Result file (``.rst``) or archive (``.cdb``) of the same mesh, a table of number, x, y, z, or both arrays.
+    name : str, optional
+    length, force, mass_unit : float
+        SI values of the units: 1e-3, 1.0, 1e3 for mm, N, t.
+
+    Raises
+    ------
+    FlexibleError
+        If the reader is not installed, a file cannot be read, supports were applied, or nodes and matrices do not fit.
+    """
+    reader = _reader()
+    file = Path(full)
+    found = _opened(reader, file, ("load_km",), "file with matrices (.full)")
+    _check_end(found, file)
+    try:
+        dofs, k, m = found.load_km(sort=True)
+    except Exception as error:
+        raise FlexibleError(f"{file.name}: its matrices cannot be read ({type(error).__name__}: {error})") from None
+    if k is None or m is None:
+        raise FlexibleError(
+            f"{file.name}: it has no {'stiffness' if k is None else 'mass'}; write it in a modal analysis"
+        )
+    if dofs[:, 1].max() > 5:
+        raise FlexibleError(
+            f"{file.name}: degree of freedom {dofs[:, 1].max()} of node {dofs[np.argmax(dofs[:, 1]), 0]} is neither "
+            "displacement nor rotation; export a structural analysis"
+        )
+    k, m = _mirrored(k), _mirrored(m)
+    held = np.abs(k.diagonal()) <= SMALL * np.abs(k.diagonal()).max()
+    if held.any():
+        numbers = np.unique(dofs[held, 0])
+        raise FlexibleError(
+            f"{file.name}: {int(held.sum())} degrees of freedom of {len(numbers)} nodes ({numbers[0]} and so on) are "
+            "held; write the file without supports (DDELE,ALL,ALL)"
+        )
+    ids, positions = _nodes(reader, nodes)
+    rows = np.column_stack([dofs[:, 0], dofs[:, 1] + 1])
+    if len(ids) != len(positions):
+        raise FlexibleError(f"{file.name}: {len(ids)} numbers of nodes for {len(positions)} positions")
+    used = np.isin(ids, dofs[:, 0])
+    k, m = scaled(k, m, rows, length, force, mass_unit)
+    return from_matrices(k, m, positions[used] * length, ids=ids[used], dofs=rows, name=name or file.stem)
+
+
+def _check_end(found: Any, file: Path) -> None:
+    """Refuse a file that is shorter than its header says: the reader would end the process on it."""
+    words = int(getattr(found, "_header", {}).get("ptrEND", 0))
+    size = file.stat().st_size
+    if 4 * words > size:
+        raise FlexibleError(f"{file.name}: byte {size}: it is cut off; its header says that it has {4 * words} bytes")
+
+
+def _mirrored(matrix: Any) -> sp.csc_array:
+    """Return a matrix of which the upper triangle is there."""
+    upper = sp.triu(sp.csc_array(matrix))
+    return sp.csc_array(upper + sp.triu(upper, 1).T)
+
+
+def _nodes(reader: Any, given: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return numbers and positions of nodes."""
+    if isinstance(given, tuple):
+        return np.asarray(given[0], dtype=int), np.atleast_2d(np.asarray(given[1], dtype=float))
+    path = Path(given)
+    if path.suffix.lower() in (".rst", ".rth"):
+        mesh = _opened(reader, path, ("mesh",), "result file (.rst)").mesh
+        return np.asarray(mesh.nnum, dtype=int), np.asarray(mesh.nodes, dtype=float)[:, :3]
+    if path.suffix.lower() in (".cdb", ".dat"):
+        try:
+            archive = reader.Archive(str(path), parse_vtk=False)
+        except Exception as error:
+            raise FlexibleError(f"{path.name}: it is no archive ({type(error).__name__}: {error})") from None
+        return np.asarray(archive.nnum, dtype=int), np.asarray(archive.nodes, dtype=float)[:, :3]
+    return read_nodes(path)
+
+
+def _opened(reader: Any, path: Path, needed: tuple[str, ...], what: str) -> Any:
+    """Return a binary file of Ansys."""
+    if not path.is_file():
+        raise FlexibleError(f"{path.name}: there is no such file")
+    if path.stat().st_size < LEAST:
+        raise FlexibleError(f"{path.name}: {path.stat().st_size} bytes are no {what} of Ansys")
+    try:
+        found = reader.read_binary(str(path))
+    except Exception as error:
+        raise FlexibleError(f"{path.name}: it is no {what} of Ansys ({type(error).__name__}: {error})") from None
+    if not all(hasattr(found, part) for part in needed):
+        raise FlexibleError(f"{path.name}: it is a {type(found).__name__}, no {what}")
+    return found
+
+
+def _reader() -> Any:
+    try:
+        from ansys.mapdl import reader
+    except ImportError:
+        raise FlexibleError(
+            "files of Ansys are read by ansys-mapdl-reader; install it with 'pip install gearmbs[ansys]'"
+        ) from None
+    return reader

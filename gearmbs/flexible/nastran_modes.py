@@ -1,0 +1,207 @@
+"""Modes of Nastran's op2 files, with masses of their grid points, as the content of a modal neutral file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from gearmbs.flexible.errors import FlexibleError
+from gearmbs.flexible.integrals import nodal_lumps
+from gearmbs.flexible.matrices import Path_
+from gearmbs.flexible.mnf import SI, ModalNeutralFile
+from gearmbs.flexible.nastran_files import GridTable, op2_tables, pyyeti_module
+
+MODES = ("OUGV1", "OUGV1PAT", "OUG1")
+"""Data blocks of mode shapes, in displacement coordinate systems."""
+BASIC_MODES = ("BOUGV1",)
+"""The same in the basic coordinate system."""
+ORTHOGONAL = 1e-3
+"""How far modes may be from orthogonal in the mass matrix, whose numbers have 4 bytes."""
+LUMPED = 2.0
+"""Factor between the first generalised mass and that of lumped masses, where elements have consistent ones."""
+SAME_MASS = 1e-3
+"""Relative difference of the masses given from the mass that the file prints."""
+
+
+def read_op2_modes(
+    path: Path_,
+    masses: Any = None,
+    *,
+    inertias: npt.ArrayLike | None = None,
+    length: float = 1.0,
+    mass_unit: float = 1.0,
+) -> ModalNeutralFile:
+    """Return the modes of a Nastran op2 file as the content of a modal neutral file, in SI.
+
+    Eigenvalues and shapes alone do not tell what a body weighs where: masses of the nodes come from the mass matrix of
+    the g-set in the file (MGG), or are given. That modes are orthogonal in them, and that they sum to what the grid
+    point weight generator printed, is checked.
+
+    Parameters
+    ----------
+    path : str or Path
+        With grid points (GEOM1, BGPDT), eigenvalues (LAMA) and shapes (OUGV1), as ``PARAM,POST,-1`` writes them.
+    masses : array_like of float, shape (N,), or matrix, shape (d, d), optional
+        At the grid points in the order of their numbers, in the file's unit; or the mass matrix of the g-set in the
+        basic coordinate system. Default: MGG of the file.
+    inertias : array_like, shape (N, 3, 3), optional
+        Of the grid points.
+    length, mass_unit : float
+        SI values of the file's units. Time is in seconds.
+
+    Returns
+    -------
+    ModalNeutralFile
+        For ``modal_model``, ``invariants`` and :func:`write_mnf`. Supports that the analysis had stay in its modes.
+
+    Raises
+    ------
+    FlexibleError
+        If pyyeti is not installed, the file is cut off or lacks a block, or masses and modes do not fit.
+    """
+    file = Path(path)
+    found = op2_tables(file, ["MGG"] if masses is None else [])
+    table = GridTable.of(found["uset"])
+    lama = found.get("lama")
+    if lama is None or not len(lama):
+        raise FlexibleError(f"{file.name}: it has no table of eigenvalues (LAMA); run SOL 103 with PARAM,POST,-1")
+    shapes = _shapes(file, table, len(lama))
+    if masses is None:
+        if "mgg" not in found:
+            raise FlexibleError(
+                f"{file.name}: modes without masses of the grid points make no body; export MGG (OUTPUT2), "
+                "or give masses"
+            )
+        masses = table.in_basic(found["mgg"])
+    lumped, turning = _nodal_masses(masses, inertias, table, file)
+    weight = found.get("ogpwg")
+    printed = None if not weight else float(weight["m66"][0, 0])
+    if printed is not None and abs(lumped.sum() - printed) > SAME_MASS * printed:
+        raise FlexibleError(
+            f"{file.name}: the masses sum to {lumped.sum():.6g}, its grid point weight generator says {printed:.6g}; "
+            "they belong to other nodes or units"
+        )
+    _check_orthogonal(file, lama[:, 5], _gram(shapes, masses, lumped, turning, table))
+    return _as_mnf(table, lama, shapes, lumped, turning, (length, mass_unit))
+
+
+def _gram(shapes: np.ndarray, masses: Any, lumped: np.ndarray, turning: np.ndarray, table: GridTable) -> np.ndarray:
+    """Return products of shapes in a mass matrix, (n, n), or of the first in masses of the nodes, (1, 1)."""
+    if sp.issparse(masses) or np.ndim(masses) == 2:
+        row = {int(number): k for k, number in enumerate(table.ids)}
+        vectors = np.array([shapes[:, row[int(n)], d - 1] if n != 0 else np.zeros(len(shapes)) for n, d in table.dofs])
+        return vectors.T @ (masses @ vectors)
+    moved, turned = shapes[0, :, :3], shapes[0, :, 3:]
+    return np.array([[lumped @ (moved**2).sum(axis=1) + np.einsum("pi,pij,pj->", turned, turning, turned)]])
+
+
+def _check_orthogonal(file: Path, general: np.ndarray, gram: np.ndarray) -> None:
+    """Refuse masses in which modes are not orthogonal, or the first not as heavy as the file says.
+
+    Masses lumped at the nodes are those of the elements only for the slowest modes, so that the first is looked at.
+    """
+    general = general[: len(gram)]
+    off = np.abs(gram - np.diag(general)) / np.sqrt(np.maximum(np.outer(general, general), 1e-300))
+    i, j = np.unravel_index(int(np.argmax(off)), off.shape)
+    lumped = len(gram) == 1
+    if off[i, j] > ORTHOGONAL and not (lumped and 1.0 / LUMPED < gram[0, 0] / max(general[0], 1e-300) < LUMPED):
+        what = f"mode {i + 1} has the generalised mass" if i == j else f"modes {i + 1} and {j + 1} have the product"
+        raise FlexibleError(
+            f"{file.name}: {what} {general[i] if i == j else 0.0:.6g} in the file and {gram[i, j]:.6g} with these "
+            "masses; they belong to other nodes, another order or other units"
+        )
+
+
+def _as_mnf(
+    table: GridTable,
+    lama: np.ndarray,
+    shapes: np.ndarray,
+    masses: np.ndarray,
+    inertias: np.ndarray,
+    units: tuple[float, float],
+) -> ModalNeutralFile:
+    """Return modes and masses in SI."""
+    length, unit = units
+    place, m = table.positions * length, masses * unit
+    j = inertias * unit * length**2
+    out = shapes.copy()
+    out[:, :, :3] *= length
+    arms = np.einsum("p,pi,pj->ij", m, place, place)
+    general = lama[:, 5] * unit * length**2
+    eigen = np.column_stack([lama[:, 2], lama[:, 4], lama[:, 3], general, general * lama[:, 2]])
+    rows = [
+        (int(number), r + 4, c + 4, j[k, r, c])
+        for k, number in enumerate(table.ids)
+        for r in range(3)
+        for c in range(r, 3)
+        if j[k, r, c] != 0.0
+    ]
+    return ModalNeutralFile(
+        table.ids, place, float(m.sum()), m @ place / m.sum(), np.trace(arms) * np.eye(3) - arms + j.sum(axis=0),
+        lama[:, 0].astype(int), eigen, out, m, np.array(rows) if rows else None, SI,
+    )  # fmt: skip
+
+
+def _nodal_masses(masses: Any, inertias: Any, table: GridTable, file: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Return masses and inertias at the grid points, from numbers or from a mass matrix."""
+    count = len(table.ids)
+    if sp.issparse(masses) or np.ndim(masses) == 2:
+        if masses.shape[0] != len(table.dofs):
+            raise FlexibleError(
+                f"{file.name}: the mass matrix has {masses.shape[0]} rows, the g-set {len(table.dofs)}; give that of "
+                "all grid points"
+            )
+        row = {int(number): k for k, number in enumerate(table.ids)}
+        dofs = np.array([(row.get(int(n), -1), d - 1) for n, d in table.dofs])
+        return nodal_lumps(count, dofs, sp.csc_array(masses))
+    lumped = np.asarray(masses, dtype=float)
+    if lumped.shape != (count,) or not np.all(np.isfinite(lumped)) or lumped.min(initial=0.0) < 0.0:
+        raise FlexibleError(f"{file.name}: masses have shape {lumped.shape}; they are {count} numbers, none negative")
+    turning = np.zeros((count, 3, 3)) if inertias is None else np.asarray(inertias, dtype=float)
+    if turning.shape != (count, 3, 3):
+        raise FlexibleError(f"{file.name}: inertias have shape {turning.shape} for {count} grid points")
+    return lumped, turning
+
+
+def _shapes(file: Path, table: GridTable, count: int) -> np.ndarray:
+    """Return the shapes of an op2 file in basic coordinates, shape (n, N, 6)."""
+    op2 = pyyeti_module("op2", "op2")
+    with op2.OP2(str(file)) as opened:
+        names = [name for name in (*MODES, *BASIC_MODES) if name in opened.dbnames]
+        try:
+            frame = opened.rdop2oug(names[0]) if names else None
+        except Exception as error:
+            raise FlexibleError(
+                f"{file.name}: {names[0]} cannot be read ({type(error).__name__}); shapes are read of "
+                "little-endian files with words of 4 bytes"
+            ) from None
+    if frame is None:
+        raise FlexibleError(
+            f"{file.name}: it has no real mode shapes ({', '.join(MODES)}); ask for DISPLACEMENT(PLOT)=ALL"
+        )
+    values = frame.to_numpy(dtype=float)
+    if values.shape[1] != count:
+        raise FlexibleError(f"{file.name}: {names[0]} holds {values.shape[1]} shapes, LAMA {count} eigenvalues")
+    row = {int(number): k for k, number in enumerate(table.ids)}
+    out = np.zeros((count, len(table.ids), 6))
+    seen = np.zeros((len(table.ids), 6), dtype=bool)
+    for k, (number, direction) in enumerate(frame.index):
+        if int(direction) == 0:
+            continue
+        if int(number) not in row:
+            raise FlexibleError(f"{file.name}: {names[0]} names grid point {number}, which GEOM1 does not have")
+        out[:, row[int(number)], int(direction) - 1] = values[k]
+        seen[row[int(number)], int(direction) - 1] = True
+    if not seen.all():
+        number = table.ids[int(np.argmin(seen.all(axis=1)))]
+        raise FlexibleError(f"{file.name}: {names[0]} has no shapes of grid point {number}; ask for all points")
+    if not np.all(np.isfinite(out)):
+        raise FlexibleError(f"{file.name}: {names[0]} has numbers that are not finite")
+    if names[0] in MODES:
+        for base in (0, 3):
+            out[:, :, base : base + 3] = np.einsum("pij,npj->npi", table.axes, out[:, :, base : base + 3])
+    return out

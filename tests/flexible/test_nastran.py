@@ -1,0 +1,249 @@
+"""Nastran's files: matrices and modes of op2, superelements of OP4 with their assembly, and files that lie."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from gearmbs.flexible import (
+    FlexibleError,
+    Shaft,
+    ShaftSection,
+    check_model,
+    mnf_of,
+    read_op2,
+    read_op2_modes,
+    read_op4,
+    reduce_model,
+)
+from tests.flexible.op2_files import Op2Writer
+
+with np.printoptions():
+    op4 = pytest.importorskip("pyyeti.nastran.op4")
+
+FILES = os.environ.get("GEARMBS_NASTRAN_FILES")
+CYLINDER = (20, 2, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+"""A cylindrical coordinate system about z."""
+
+
+@pytest.fixture(scope="module")
+def bar():
+    return Shaft([ShaftSection(0.4, 0.03)], seats={"A": 0.0, "B": 0.4}, elements=4, name="bar").model()
+
+
+def in_system(model, users, angle):
+    """The degrees of freedom turned about z at some nodes, as a cylindrical system has them."""
+    turn = np.eye(len(model.dofs))
+    c, s = np.cos(angle), np.sin(angle)
+    for node in np.flatnonzero(np.isin(model.ids, users)):
+        for base in (0, 3):
+            rows = 6 * node + base + np.arange(2)
+            turn[np.ix_(rows, rows)] = [[c, s], [-s, c]]
+    return turn
+
+
+def g_set_file(path, bar, order="<", shift=(0.0, 0.0, 0.0), names=("KGG", "MGG")):
+    """An op2 file with the matrices of the bar, two of whose points have cylindrical displacements."""
+    place = bar.positions + shift
+    users = bar.ids[1:3]
+    angle = np.arctan2(shift[1], shift[0])
+    turn = in_system(bar, users, angle)
+    writer = Op2Writer(order)
+    writer.grids(bar.ids, place, (CYLINDER, users))
+    for name, matrix in zip(names, (bar.stiffness, bar.mass)):
+        writer.matrix(name, turn @ matrix.toarray() @ turn.T)
+    return writer.write(path)
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_matrices_of_op2_are_turned_into_the_basic_system(tmp_path, bar, order):
+    file = g_set_file(tmp_path / "bar.op2", bar, order, shift=(0.25, 0.5, 0.0))
+    found = read_op2(file)
+    np.testing.assert_allclose(found.stiffness.toarray(), bar.stiffness.toarray(), rtol=1e-9, atol=1e-3)
+    np.testing.assert_allclose(found.mass.toarray(), bar.mass.toarray(), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.positions, bar.positions + [0.25, 0.5, 0.0], rtol=1e-7)
+    assert check_model(found).good
+    tonnes = read_op2(file, length=1e-3, mass_unit=1e3)
+    np.testing.assert_allclose(tonnes.mass_properties().mass, 1e3 * bar.mass_properties().mass, rtol=1e-9)
+    # lengths in mm and stiffness in N/mm make frequencies of sqrt(1 N/mm / 1 t)
+    slow = reduce_model(tonnes, [], modes=1, method="free").frequencies
+    np.testing.assert_allclose(slow, reduce_model(found, [], modes=1, method="free").frequencies, rtol=1e-6)
+
+
+def modes_file(path, bar, model, weight=None, drop=None, mgg=True):
+    """An op2 file with the modes of the free bar and its mass matrix."""
+    mnf = mnf_of(model)
+    kept = mnf.elastic
+    writer = Op2Writer()
+    ids = bar.ids if drop is None else bar.ids[:drop]
+    writer.grids(bar.ids, bar.positions)
+    writer.weight(model.properties.mass if weight is None else weight)
+    shapes = mnf.shapes[kept][:, : len(ids)]
+    writer.modes(ids, shapes, (2 * np.pi * model.frequencies) ** 2, mnf.eigenvalues[kept, 3])
+    if mgg:
+        writer.matrix("MGG", bar.mass.toarray())
+    return writer.write(path)
+
+
+def test_modes_of_op2_are_those_of_the_body(tmp_path, bar):
+    model = reduce_model(bar, modes=6)
+    found = read_op2_modes(modes_file(tmp_path / "bar.op2", bar, model))
+    again = found.modal_model("bar")
+    np.testing.assert_allclose(again.frequencies, model.frequencies, rtol=1e-6)
+    np.testing.assert_allclose(again.moved, model.moved, atol=1e-6 * np.abs(model.moved).max())
+    np.testing.assert_allclose(again.properties.com, model.properties.com, atol=1e-9)
+    # masses lumped at the nodes, as in a file of ADAMS
+    own = mnf_of(model).modal_model("bar")
+    np.testing.assert_allclose(again.properties.inertia, own.properties.inertia, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(again.integrals.second, own.integrals.second, rtol=1e-4, atol=1e-4)
+    assert found.units == ("KILOGRAM", "METER", "SECOND", "NEWTON")
+
+
+def test_modes_and_masses_must_fit(tmp_path, bar):
+    model = reduce_model(bar, modes=6)
+    own = mnf_of(model)
+    without = modes_file(tmp_path / "a.op2", bar, model, mgg=False)
+    with pytest.raises(FlexibleError, match="modes without masses of the grid points make no body; export MGG"):
+        read_op2_modes(without)
+    found = read_op2_modes(without, own.nodal_masses, inertias=own.inertias())
+    np.testing.assert_allclose(found.eigenvalues[:, 1], model.frequencies, rtol=1e-6)
+    with pytest.raises(FlexibleError, match="its grid point weight generator says"):
+        read_op2_modes(without, 2 * own.nodal_masses)
+    with pytest.raises(FlexibleError, match="mode 1 has the generalised mass 1 in the file and"):
+        read_op2_modes(without, np.eye(5)[0] * own.nodal_masses.sum())
+    with pytest.raises(FlexibleError, match="they are 5 numbers, none negative"):
+        read_op2_modes(without, own.nodal_masses[:3])
+    with pytest.raises(FlexibleError, match="has no shapes of grid point 4; ask for all points"):
+        read_op2_modes(modes_file(tmp_path / "b.op2", bar, model, drop=3))
+    with pytest.raises(FlexibleError, match=r"no table of eigenvalues \(LAMA\)"):
+        read_op2_modes(g_set_file(tmp_path / "c.op2", bar))
+    with pytest.raises(FlexibleError, match="grid point weight generator says"):
+        read_op2_modes(modes_file(tmp_path / "d.op2", bar, model, weight=1e-3 * model.properties.mass))
+
+
+def test_op2_files_that_lie_are_named(tmp_path, bar):
+    file = g_set_file(tmp_path / "bar.op2", bar)
+    data = file.read_bytes()
+    cut = tmp_path / "cut.op2"
+    for share in np.linspace(0.02, 0.999, 25):
+        cut.write_bytes(data[: int(share * len(data))])
+        with pytest.raises(FlexibleError, match=r"cut\.op2: byte \d+: .*(cut off|within a data block)"):
+            read_op2(cut)
+    for text, message in ((b"\x07\x00\x00\x00" + data[4:], "byte 0: 07000000 begins no op2"), (b"", "begins no op2")):
+        cut.write_bytes(text)
+        with pytest.raises(FlexibleError, match=message):
+            read_op2(cut)
+    at = data.index(b"BGPDT") - 4
+    cut.write_bytes(data[:at] + b"\x0a\x00\x00\x00" + data[at + 4 :])
+    with pytest.raises(FlexibleError, match=rf"byte {at}: a record of 10 bytes does not end where it says"):
+        read_op2(cut)
+    with pytest.raises(FlexibleError, match=r"none\.op2: there is no such file"):
+        read_op2(tmp_path / "none.op2")
+    with pytest.raises(FlexibleError, match=r"it has no matrix 'kxx'; matrices: .*mgg"):
+        read_op2(file, stiffness="KXX")
+    with pytest.raises(FlexibleError, match="the stiffness has 30 rows and 30 columns, the grid points have 2 degrees"):
+        read_op2(file, dofs=[(1, 1), (1, 2)])
+    bare = Op2Writer()
+    bare.matrix("KGG", bar.stiffness.toarray())
+    with pytest.raises(FlexibleError, match=r"no grid points \(GEOM1, BGPDT, EQEXIN are missing\).*Data blocks: KGG"):
+        read_op2(bare.write(tmp_path / "bare.op2"))
+    held = Op2Writer()
+    held.grids(bar.ids, 1e3 * bar.positions)
+    held.matrix("KGG", bar.stiffness.toarray())
+    held.matrix("MGG", bar.mass.toarray())
+    report = check_model(read_op2(held.write(tmp_path / "mm.op2")))
+    assert any("meets stiffness" in remark for remark in report.remarks)
+
+
+ASSEMBLY = """\
+SEBULK       101  EXTOP4          MANUAL                     101
+$
+CORD2R*               10               0 0.000000000E+00 0.000000000E+00
+*        0.000000000E+00 0.100000000E+01 0.000000000E+00 0.000000000E+00
+*        0.000000000E+00 0.100000000E+01 0.000000000E+00
+$
+SECONCT      101       0              NO
+               1       1       5       5
+         2995001 2995001 2995002 2995002
+$
+GRID*                  1               0 0.000000000E+00 0.000000000E+00
+*        0.000000000E+00               0               0               0
+GRID*                  5               0 0.000000000E+00 0.000000000E+00
+*        0.400000000E+00              10               0               0
+$
+SPOINT   2995001 2995002
+"""
+
+
+def superelement(folder, bar):
+    """OP4 and assembly of the bar reduced to its ends and two modes, point 5 in a turned coordinate system."""
+    k, m = bar.stiffness.toarray(), bar.mass.toarray()
+    outer = np.flatnonzero(np.isin(bar.dofs[:, 0], (0, 4)))
+    inner = np.setdiff1d(np.arange(len(k)), outer)
+    basis = np.zeros((len(k), 14))
+    basis[outer, np.arange(12)] = 1.0
+    basis[np.ix_(inner, np.arange(12))] = -np.linalg.solve(k[np.ix_(inner, inner)], k[np.ix_(inner, outer)])
+    _, vectors = scipy.linalg.eigh(k[np.ix_(inner, inner)], m[np.ix_(inner, inner)])
+    basis[np.ix_(inner, [12, 13])] = vectors[:, :2]
+    # axes of the system as columns: its z is the basic x, its x the basic y
+    axes = np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]])
+    turn = np.eye(14)
+    turn[6:9, 6:9] = turn[9:12, 9:12] = axes.T
+    reduced = [turn @ basis.T @ matrix @ basis @ turn.T for matrix in (k, m)]
+    op4.write(str(folder / "bar.op4"), dict(zip(("kxx", "mxx"), reduced)))
+    (folder / "bar.asm").write_text(ASSEMBLY)
+
+
+def test_a_superelement_with_its_assembly_file(tmp_path, bar):
+    superelement(tmp_path, bar)
+    found = read_op4(tmp_path / "bar.op4", assembly=tmp_path / "bar.asm")
+    report = check_model(found, 2)
+    assert report.good
+    np.testing.assert_allclose(report.properties.mass, bar.mass_properties().mass, rtol=1e-9)
+    np.testing.assert_allclose(report.properties.com, bar.mass_properties().com, atol=1e-9)
+    exact = check_model(bar, 2).frequencies[6:]
+    np.testing.assert_allclose(report.frequencies[6:], exact, rtol=5e-3)
+    assert np.all(report.frequencies[6:] >= exact * (1 - 1e-9))
+    body = reduce_model(found, [], modes=4, method="free")
+    np.testing.assert_allclose(body.frequencies[:2], exact, rtol=5e-3)
+
+
+def test_op4_files_that_lie_are_named(tmp_path, bar):
+    superelement(tmp_path, bar)
+    file = tmp_path / "bar.op4"
+    data, cut = file.read_bytes(), tmp_path / "cut.op4"
+    for share in np.linspace(0.01, 0.995, 20):
+        cut.write_bytes(data[: int(share * len(data))])
+        with pytest.raises(FlexibleError, match=r"cut\.op4: (byte \d+: .*cut off|it has no matrix|byte 0)"):
+            read_op4(cut, assembly=tmp_path / "bar.asm")
+    with pytest.raises(FlexibleError, match="give positions and dofs, or assembly"):
+        read_op4(file)
+    (tmp_path / "short.asm").write_text(ASSEMBLY.replace("SPOINT   2995001 2995002\n", "SPOINT   2995001\n"))
+    with pytest.raises(FlexibleError, match=r"14 rows and 14 columns, the grid points have|no assembly file"):
+        read_op4(file, assembly=tmp_path / "short.asm")
+    (tmp_path / "no.asm").write_text("nothing\n")
+    with pytest.raises(FlexibleError, match=r"no\.asm: it is no assembly file"):
+        read_op4(file, assembly=tmp_path / "no.asm")
+    op4.write(str(cut), {"kxx": np.eye(14), "mxx": np.eye(14)}, binary=False)
+    whole = cut.read_bytes()
+    for share in (0.3, 0.6, 0.9):
+        cut.write_bytes(whole[: int(share * len(whole))])
+        with pytest.raises(FlexibleError, match=r"cut\.op4: (it cannot be read as OP4|it has no matrix)"):
+            read_op4(cut, assembly=tmp_path / "bar.asm")
+
+
+@pytest.mark.skipif(FILES is None, reason="GEARMBS_NASTRAN_FILES names no folder with public files of Nastran")
+def test_public_files():
+    """A superelement of pyyeti's tests against Nastran's own weights; a beam of pyNastran's against its eigenvalues."""
+    folder = Path(FILES or "")
+    found = read_op4(folder / "inboard.op4", assembly=folder / "inboard.asm")
+    report = check_model(found)
+    np.testing.assert_allclose(report.properties.mass, 1.755052, rtol=1e-6)
+    assert report.rigid_energy.max() < 1e-10
+    masses = np.r_[0.5, np.ones(9), 0.5, 0.0] * 7.4851e-4 * np.pi
+    masses[10] += 2.59e-3
+    modes = read_op2_modes(folder / "beam_modes_m1.op2", masses)
+    np.testing.assert_allclose(modes.eigenvalues[:2, 1], [456.6603, 456.6603], rtol=1e-6)
+    np.testing.assert_allclose(modes.mass, 0.02610514, rtol=1e-5)
