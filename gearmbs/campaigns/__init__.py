@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from gearmbs.campaigns.chaos import PolynomialChaos, fit_chaos
     from gearmbs.campaigns.errors import CampaignError
     from gearmbs.campaigns.factors import Choice, Factor, Specimens, choose
-    from gearmbs.campaigns.plan import Plan, load_plan, make_plan
+    from gearmbs.campaigns.plan import Plan
+    from gearmbs.campaigns.planning import load_plan, make_plan
     from gearmbs.campaigns.response import ResponseSurface, condition_figure, condition_map, fit_surface
     from gearmbs.campaigns.runners.dask import dask_client
     from gearmbs.campaigns.sensitivity import SobolIndices, main_effects, morris_effects, sobol_indices
@@ -111,8 +112,8 @@ late(
         "choose": ".factors",
         "content_key": ".canonical",
         "dask_client": ".runners.dask",
-        "load_plan": ".plan",
-        "make_plan": ".plan",
+        "load_plan": ".planning",
+        "make_plan": ".planning",
         "make_subject": ".subjects",
         "subject_kinds": ".subjects",
     },

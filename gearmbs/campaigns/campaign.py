@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from gearmbs.campaigns.errors import CampaignError
 from gearmbs.campaigns.folder import Folder, extend_folder, make_folder
 from gearmbs.campaigns.plan import Plan
+from gearmbs.campaigns.settings import limit, whole
 from gearmbs.campaigns.status import CampaignStatus, read_status
 from gearmbs.campaigns.work import ALREADY, CLAIMED, DIED, STOPPED, UnitReport
 from gearmbs.progress import alone, bars, watched
@@ -104,13 +105,19 @@ class Campaign:
         from gearmbs.studies.parallel import available_cores
 
         runner: Any
+        if workers is not None:
+            workers = whole(workers, "workers", 0)
+        minutes = _of_minutes(minutes)
+        pending = self._pending()
         if client is not None:
+            if not hasattr(client, "nthreads"):
+                raise CampaignError(f"client = {client!r}; give a distributed.Client, see dask_client")
             runner = DaskRunner(client)
         elif workers == 0:
             runner = SerialRunner()
         else:
-            runner = ProcessRunner(min(workers or available_cores(), max(1, len(self._pending()))))
-        return self._drive(runner, self._pending(), progress, minutes)
+            runner = ProcessRunner(min(workers or available_cores(), max(1, len(pending))))
+        return self._drive(runner, pending, progress, minutes)
 
     def work(self, part: int, parts: int, *, minutes: float | None = None) -> CampaignStatus:
         """Work here on one part of the units: an element of a job array, without any coordination.
@@ -124,10 +131,10 @@ class Campaign:
         """
         from gearmbs.campaigns.runners import SerialRunner
 
-        if not 1 <= part <= parts:
+        if not 1 <= whole(part, "part", 0) <= whole(parts, "parts", 1):
             raise CampaignError(f"part {part} of {parts}: give a part from 1 to {parts}")
         mine = [unit for unit in self._pending() if unit % parts == part - 1]
-        return self._drive(SerialRunner(), mine, False, minutes)
+        return self._drive(SerialRunner(), mine, False, _of_minutes(minutes))
 
     def _pending(self) -> list[int]:
         done = set(self.folder.done())
@@ -235,6 +242,7 @@ class Campaign:
         return self.plan.subject.check(self.plan.data(row), f"case {index}")
 
     def _unit_of(self, index: int) -> int:
+        index = whole(index, "case", 0)
         for extent in self.folder.extents:
             if extent.first <= index < extent.last:
                 return extent.first_unit + (index - extent.first) // self.plan.unit
@@ -258,6 +266,16 @@ class Campaign:
         for unit in again:
             self.folder.ledger(unit).unlink(missing_ok=True)
         return len(again)
+
+
+def _of_minutes(minutes: float | None) -> float | None:
+    if minutes is None:
+        return None
+    if isinstance(minutes, str):
+        minutes = limit(minutes, "minutes", "55 min") / 60.0
+    if not minutes >= 0.0:
+        raise CampaignError(f"minutes = {minutes!r}; give the minutes after which no unit is started")
+    return minutes
 
 
 def _has_failures(folder: Folder, unit: int) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import pickle
 import subprocess
@@ -14,7 +15,11 @@ from typing import Any
 from gearmbs.campaigns.canonical import content_key
 from gearmbs.campaigns.folder import Folder
 from gearmbs.campaigns.limits import TimeLimitReached, limited
+from gearmbs.campaigns.signal_store import check_signals
 from gearmbs.campaigns.subjects.base import DIED, FAILED, MEMORY, TIME, Kept, Outcome
+
+DISK = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO}
+"""Errors of the disk and not of the case: they end the run, and the case is done again."""
 
 DEATHS = 2
 """A case whose own process has died so often is recorded as the cause."""
@@ -70,22 +75,25 @@ class CaseRunner:
         try:
             with limited(plan.time_limit, plan.memory_limit) as check:
                 record = self.subject.run(thing, check, plan.keep)
-                result.kept = self.subject.reduce(thing, record, plan.keep)
-            if "record" in plan.keep:
-                self._write("records", row, record)
-            result.outcome = Outcome()
+                kept = self.subject.reduce(thing, record, plan.keep)
+            check_signals(self.folder.specs, kept.signals)
         except TimeLimitReached as error:
             result.outcome = Outcome(TIME, str(error), "Raise time_limit, or narrow the ranges.")
         except MemoryError as error:
             result.outcome = Outcome(MEMORY, f"MemoryError: {error}"[:500], "Raise memory_limit, or narrow the ranges.")
-        except OSError:
-            # the disk, not the case
-            raise
+        except SystemExit as error:
+            result.outcome = Outcome(FAILED, f"SystemExit: {error}", "What is simulated must not end its process.")
         except Exception as error:
+            if isinstance(error, OSError) and error.errno in DISK:
+                raise
             result.outcome = self.subject.explain(error)
             partial = self.subject.partial(error)
             if partial is not None:
                 self._write("failed", row, partial)
+        else:
+            if "record" in plan.keep:
+                self._write("records", row, record)
+            result.outcome, result.kept = Outcome(), kept
 
     def _write(self, kind: str, row: dict[str, Any], record: Any) -> None:
         from gearmbs.studies.store import write_dataset

@@ -166,12 +166,24 @@ def export(
         str | None, typer.Option(help="Column, as specimen, whose values each are in one split only (parquet, hf).")
     ] = None,
     test: Annotated[float, typer.Option(help="Part of its values that is for the test.")] = 0.2,
+    held_out: Annotated[
+        list[str] | None,
+        typer.Option(help='Range of a column kept from training, as "severity=0.45:0.6"; repeat (parquet, hf).'),
+    ] = None,
 ) -> None:
     """Write the results for others."""
     with guarded():
         from gearmbs.campaigns import Campaign
 
-        for path in Campaign(folder).export(out, format, split_by=split_by, test=test):
+        ranges = {}
+        for item in held_out or ():
+            column, _, ends = item.rpartition("=")
+            try:
+                ranges[column] = tuple(float(end) for end in ends.split(":"))
+            except ValueError:
+                fail(f"--held-out is {item!r}; write it as severity=0.45:0.6")
+
+        for path in Campaign(folder).export(out, format, split_by=split_by, test=test, held_out=ranges):
             typer.echo(f"wrote {path}")
 
 

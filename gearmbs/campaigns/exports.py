@@ -26,6 +26,7 @@ def export(
     split: np.ndarray | None = None,
     split_by: str | None = None,
     test: float = 0.2,
+    held_out: Mapping[str, Sequence[float]] | None = None,
     add: Mapping[str, Any] | None = None,
 ) -> list[Path]:
     """Write a campaign for others; return the files.
@@ -42,6 +43,8 @@ def export(
         Instead the column, as "specimen", whose values each are in one split only: "train" or "test".
     test : float
         Part of its values that is for the test.
+    held_out : mapping of str to (low, high), optional
+        Ranges of columns, as ``{"severity": (0.45, 0.6)}``: training rows inside any of them are the split "withheld".
     add : mapping, optional
         Further columns for parquet, by row.
 
@@ -63,6 +66,8 @@ def export(
     if format in ("parquet", "hf"):
         if split_by is not None:
             split = _split_by(campaign, split_by, test)
+        if held_out:
+            split = _held_out(campaign, held_out, split)
         files = _parquet(campaign, target, split, add or {})
         return files if format == "parquet" else [*files, _readme(campaign, target, files)]
     raise CampaignError(f"format {format!r} is unknown; choose one of {', '.join(FORMATS)}")
@@ -101,6 +106,8 @@ def _parquet(campaign: Campaign, target: Path, split: np.ndarray | None, add: Ma
     done = (table["status"] == "done").to_numpy()
     names = np.full(len(table), "train") if split is None else np.asarray(split)
     rate = {spec.name: spec.rate for spec in campaign.folder.specs}
+    if not done.any():
+        raise CampaignError("export: none of the cases has results; see failed()")
     written = []
     kept = [c for c in table.columns if c not in ("unit", "slot", "status", "message", "advice")]
     for part_name in sorted(set(names[done])):
@@ -130,6 +137,21 @@ def _split_by(campaign: Campaign, column: str, test: float) -> np.ndarray:
         raise CampaignError(f"split by {column!r}: the table has no such column; it has {', '.join(table.columns)}")
     groups = np.unique(table[column].to_numpy(), return_inverse=True)[1]
     return split_by_group(groups, test=test, validation=0.0, seed=campaign.plan.seed)
+
+
+def _held_out(campaign: Campaign, ranges: Mapping[str, Sequence[float]], split: np.ndarray | None) -> np.ndarray:
+    """Return the split with training rows of some ranges withheld."""
+    from gearmbs.campaigns.datasets.splits import withhold
+
+    table = campaign.table
+    found = np.full(len(table), "train") if split is None else np.asarray(split)
+    for column, ends in ranges.items():
+        if column not in table.columns or table[column].dtype.kind not in "biuf":
+            raise CampaignError(f"held out: {column!r} is no column of numbers")
+        if len(ends) != 2 or not float(ends[0]) <= float(ends[1]):
+            raise CampaignError(f"held out: {column} = {ends!r}; give its lower and upper end")
+        found = withhold(found, table[column].to_numpy(), float(ends[0]), float(ends[1]))
+    return found
 
 
 def front_matter(files: Sequence[Path], rows: int) -> list[str]:

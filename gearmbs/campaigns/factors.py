@@ -14,6 +14,8 @@ from typing import Any, Literal
 import numpy as np
 
 from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.settings import fields_error
+from gearmbs.campaigns.settings import whole as whole_number
 from gearmbs.campaigns.subjects.base import Subject
 from gearmbs.units import to_si
 
@@ -56,8 +58,12 @@ class Factor:
     name: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", tuple(self.values))
+        if isinstance(self.values, str) or not isinstance(self.values, Sequence | np.ndarray):
+            raise CampaignError(f"factor {self.path!r}: values = {self.values!r}; give a list of them")
+        object.__setattr__(self, "values", tuple(plain(v) for v in self.values))
         object.__setattr__(self, "name", self.name or self.path)
+        if self.levels is not None:
+            object.__setattr__(self, "levels", whole_number(self.levels, f"factor {self.path!r}: levels", 1))
         if bool(self.values) == (self.low is not None or self.high is not None):
             raise CampaignError(f"factor {self.path!r}: give low and high, or values")
         if not self.values and (self.low is None or self.high is None):
@@ -85,11 +91,13 @@ class Factor:
         """
         unit = subject.unit_of(self.path)
         if self.values:
-            values = tuple(_number(v, unit, self.path) for v in self.values)
+            values = tuple(number_in_si(v, unit, self.path) for v in self.values)
             return Factor(self.path, values=values, whole=self.whole, name=self.name)
         low, high = (_real(v, unit, self.path) for v in (self.low, self.high))
         if not low < high:
             raise CampaignError(f"factor {self.path!r}: low = {low:g} is not below high = {high:g}")
+        if self.whole and not (low.is_integer() and high.is_integer()):
+            raise CampaignError(f"factor {self.path!r}: {low:g} to {high:g} is no range of whole numbers")
         if self.scale == "log" and low <= 0.0:
             raise CampaignError(f"factor {self.path!r}: low = {low:g} has no logarithm; give a positive one")
         return Factor(self.path, low, high, self.scale, whole=self.whole, levels=self.levels, name=self.name)
@@ -110,7 +118,7 @@ class Factor:
     def coordinate(self, value: Any, unit: str) -> float:
         """Return where a value lies in the range, between 0 and 1."""
         if self.values:
-            number = _number(value, unit, self.path)
+            number = number_in_si(value, unit, self.path)
             if number not in self.values:
                 raise CampaignError(f"{self.path}: {value!r} is none of {self.values}")
             return (self.values.index(number) + 0.5) / len(self.values)
@@ -182,7 +190,7 @@ class Choice:
                 for key, value in table.items():
                     if _is_range(value):
                         unit = subject.table_unit(self.path, table, key)
-                        table[key] = [_number(v, unit, f"{self.path}.{name}.{key}") for v in value]
+                        table[key] = [number_in_si(v, unit, f"{self.path}.{name}.{key}") for v in value]
             options[name] = list(table) if isinstance(table, tuple) else table
         return Choice(self.path, options, self.crossed, self.name)
 
@@ -270,14 +278,14 @@ class Specimens:
 
     def in_si(self, subject: Subject) -> Specimens:
         """Return the specimens with their ranges in SI."""
-        errors = {path: [_number(v, subject.unit_of(path), path) for v in r] for path, r in self.errors.items()}
+        errors = {path: [number_in_si(v, subject.unit_of(path), path) for v in r] for path, r in self.errors.items()}
         faults = []
         for table in self.faults:
             table = dict(table)
             for key, value in table.items():
                 if _is_range(value):
                     unit = subject.table_unit("fault.teeth", table, key)
-                    table[key] = [_number(v, unit, f"specimens.{key}") for v in value]
+                    table[key] = [number_in_si(v, unit, f"specimens.{key}") for v in value]
             faults.append(table)
         return Specimens(self.draws, errors, tuple(faults), self.seed, self.name)
 
@@ -330,7 +338,7 @@ def factor_from(table: Mapping[str, Any]) -> AnyFactor:
     try:
         return FACTORS[kind](**settings)
     except TypeError as error:
-        raise CampaignError(f"{kind} {settings.get('path', '')}: {error}") from error
+        raise CampaignError(f"{kind} {settings.get('path', '')}: {fields_error(FACTORS[kind], error)}") from error
 
 
 def choose(path: str, *, crossed: bool = False, **options: Any) -> Choice:
@@ -362,7 +370,7 @@ def _is_range(value: Any) -> bool:
     return isinstance(value, Sequence) and not isinstance(value, str) and len(value) == 2
 
 
-def _number(value: Any, unit: str, where: str) -> Any:
+def number_in_si(value: Any, unit: str, where: str) -> Any:
     """Return a value of a field in SI; texts of fields without a unit stay as they are."""
     if unit == "1" or isinstance(value, (bool, list, tuple, dict)):
         return list(value) if isinstance(value, tuple) else value
@@ -371,6 +379,9 @@ def _number(value: Any, unit: str, where: str) -> Any:
 
 def _real(value: Any, unit: str, where: str) -> float:
     try:
-        return to_si(value, "dimensionless" if unit == "1" else unit, where)
+        number = to_si(value, "dimensionless" if unit == "1" else unit, where)
     except (ValueError, TypeError) as error:
         raise CampaignError(str(error)) from None
+    if not math.isfinite(number):
+        raise CampaignError(f"{where}: {value!r} is not finite")
+    return number

@@ -13,7 +13,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import shutil
+import uuid
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +25,7 @@ import numpy as np
 
 from gearmbs.campaigns.errors import CampaignError
 from gearmbs.campaigns.plan import FORMAT, Plan
+from gearmbs.campaigns.settings import whole
 from gearmbs.campaigns.subjects.base import SignalSpec
 from gearmbs.view.files import whole_file, write_whole
 
@@ -63,8 +67,11 @@ class Folder:
             tree = json.loads((self.path / "plan.json").read_text(encoding="utf-8"))
         except OSError as error:
             raise CampaignError(f"{self.path}: no campaign here (plan.json: {error.strerror})") from None
-        if tree["format"] != FORMAT:
-            raise CampaignError(f"{self.path}: format {tree['format']} is unknown; this version reads {FORMAT}")
+        except ValueError as error:
+            raise CampaignError(f"{self.path}: plan.json is damaged ({error}); plan again in another folder") from None
+        if not isinstance(tree, dict) or tree.get("format") != FORMAT:
+            found = tree.get("format") if isinstance(tree, dict) else None
+            raise CampaignError(f"{self.path}: format {found} is unknown; this version reads {FORMAT}")
         self.tree = tree
         self.extents = [Extent(**e) for e in tree["extents"]]
         self.plan = Plan.from_dict(tree["plan"], self.extents[-1].points)
@@ -136,10 +143,47 @@ def make_folder(path: str | Path, plan: Plan) -> Folder:
     """
     path = Path(path)
     if (path / "plan.json").exists():
-        folder = Folder(path)
-        if folder.tree["plan"] != json.loads(json.dumps(plan.as_dict())):
-            raise CampaignError(f"{path}: holds another campaign; choose another folder, or extend that one")
-        return folder
+        return _taken_up(path, plan)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.exists() and (not path.is_dir() or any(path.iterdir())):
+            raise CampaignError(f"{path}: holds something else than a campaign; choose another folder")
+        # made aside and moved in one piece: whoever makes the same campaign at this moment finds it whole or not at all
+        aside = path.resolve().parent / f".{path.resolve().name}.{uuid.uuid4().hex[:8]}.partial"
+        try:
+            _fill(aside, plan)
+            aside.rename(path.resolve())
+        finally:
+            shutil.rmtree(aside, ignore_errors=True)
+    except OSError as error:
+        if (path / "plan.json").exists():
+            return _taken_up(path, plan)
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        raise CampaignError(f"{path}: cannot be made ({error.strerror or error}); choose another folder") from error
+    return Folder(path)
+
+
+def _taken_up(path: Path, plan: Plan) -> Folder:
+    """Return the campaign that is there, if it is the plan's."""
+    folder, wanted = Folder(path), json.loads(json.dumps(plan.as_dict()))
+    other = [name for name in wanted if folder.tree["plan"].get(name) != wanted[name]]
+    if other:
+        raise CampaignError(
+            f"{path}: holds another campaign, with other {' and '.join(other)}; choose another folder, or take up "
+            "that one without a plan"
+        )
+    drawn = folder.extents[-1].points
+    if plan.extends and plan.n > drawn:
+        raise CampaignError(
+            f"{path}: {drawn} points have been drawn, the plan has n = {plan.n}; take the campaign up without a plan "
+            f"and extend it to {plan.n}"
+        )
+    return folder
+
+
+def _fill(path: Path, plan: Plan) -> None:
+    """Write the files of a new campaign."""
     specs = plan.check()
     for name in ("units", "table", "cases"):
         (path / name).mkdir(parents=True, exist_ok=True)
@@ -155,7 +199,6 @@ def make_folder(path: str | Path, plan: Plan) -> Folder:
         "signals": [asdict(s) for s in specs],
     }
     write_whole(path / "plan.json", json.dumps(tree, indent=1))
-    return Folder(path)
 
 
 def extend_folder(folder: Folder, n: int) -> Folder:
@@ -167,6 +210,7 @@ def extend_folder(folder: Folder, n: int) -> Folder:
         If the design cannot go on, or n is not above what there is.
     """
     plan, last = folder.plan, folder.extents[-1]
+    n = whole(n, "extend: n", 1)
     if not plan.extends:
         raise CampaignError(f"extend: a {plan.design} design cannot go on where it stopped; a Sobol' sequence can")
     if n <= last.points:

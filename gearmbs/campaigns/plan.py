@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-import tomllib
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,17 +23,16 @@ from gearmbs.campaigns.factors import (
     plain,
     set_path,
 )
-from gearmbs.campaigns.subjects.base import SignalSpec, Subject, check_keep, make_subject
+from gearmbs.campaigns.subjects.base import SignalSpec, Subject, make_subject
 
 FORMAT = 1
-FAILURE_POLICIES = ("record", "tighter", "stop")
 ALL_CORNERS = 6
 """Up to so many coordinates every corner is checked; beyond, both ends of each and some corners."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a campaign is to do; make it with `make_plan`, which checks it.
+    """What a campaign is to do; make it with `gearmbs.campaigns.make_plan`, which checks it.
 
     Attributes
     ----------
@@ -54,7 +50,8 @@ class Plan:
     constraints : tuple of str
         Points that do not satisfy them all are left out.
     options : dict
-        Of the design: ``generators``, ``faced``, ``centre``, ``levels``, ``rows``.
+        Of the design: ``levels`` of a grid (where the factor does not say), a one-at-a-time or a Morris design,
+        ``generators``, ``faced``, ``centre``, ``rows``.
     unit : int
         Cases worked on and stored together.
     time_limit : float, optional
@@ -109,9 +106,9 @@ class Plan:
         if self.design == "morris":
             return designs.morris(n, d, self.seed, int(o.get("levels", 4)))
         if self.design == "grid":
-            return designs.grid(self._counts())
+            return designs.grid(self.counts())
         if self.design == "one at a time":
-            return designs.one_at_a_time(self._counts(), [self._base_coordinate(f) for f in self.factors])
+            return designs.one_at_a_time(self.counts(), [self._base_coordinate(f) for f in self.factors])
         if self.design == "factorial":
             return 0.5 + 0.5 * designs.factorial(d, o.get("generators", ()))
         if self.design == "plackett burman":
@@ -125,8 +122,15 @@ class Plan:
             return np.zeros((len(o["rows"]), 0))
         return designs.sequence(self.design, n, d, self.seed)
 
-    def _counts(self) -> list[int]:
-        return [count for f in self.factors for count in (f.count, *([1] * (f.width - 1)))]
+    def count(self, factor: AnyFactor) -> int:
+        """Return how many values of a factor a grid takes."""
+        if isinstance(factor, Factor) and not factor.values and factor.levels is None:
+            return int(self.options.get("levels", 2))
+        return factor.count
+
+    def counts(self) -> list[int]:
+        """Return how many values of each coordinate a grid takes: one of those beyond a factor's first."""
+        return [count for f in self.factors for count in (self.count(f), *([1] * (f.width - 1)))]
 
     def _base_coordinate(self, factor: AnyFactor) -> float:
         if not isinstance(factor, Factor):
@@ -142,9 +146,12 @@ class Plan:
         rows = np.repeat(np.arange(len(u)), count)
         found: Columns = {"point": rows + first_point}
         if self.design == "list":
+            here = self.options["rows"][first_point : first_point + len(u)]
             for name in dict.fromkeys(key for row in self.options["rows"] for key in row):
-                values = [row.get(name) for row in self.options["rows"][first_point : first_point + len(u)]]
-                found[name] = np.array(values)
+                values = [row.get(name) for row in here]
+                # NaN stands for a number that a row leaves at the base's
+                numbers = all(v is None or isinstance(v, float) for v in values)
+                found[name] = np.array(values, dtype=float) if numbers else _column(values)
             return found
         variant = np.tile(np.arange(count), len(u))
         at = 0
@@ -170,7 +177,9 @@ class Plan:
         data = self.subject.base()
         if self.design == "list":
             for name in dict.fromkeys(key for r in self.options["rows"] for key in r):
-                set_path(data, name, plain(row[name]))
+                value = plain(row[name])
+                if value is not None and value == value:
+                    set_path(data, name, value)
             return data
         # the errors of a specimen come on top of what else is chosen
         for factor in sorted(self.factors, key=lambda f: isinstance(f, Specimens)):
@@ -229,6 +238,9 @@ class Plan:
                 shown = ", ".join(f"{n} = {_short(v)}" for n, v in row.items() if n != "point")
                 wrong.append(f"{shown}: {error}")
         if wrong and self.options.get("corners") != "ignore":
+            reasons = {text.rpartition(": corner ")[2].partition(": ")[2] for text in wrong}
+            if len(wrong) == len(corners["point"]) and len(reasons) == 1 and reasons != {""}:
+                raise CampaignError(f"plan: no case is possible: {reasons.pop()}")
             more = f"\n(and {len(wrong) - 3} more corners)" if len(wrong) > 3 else ""
             raise CampaignError(
                 f"plan: {len(wrong)} of {len(corners['point'])} corners are impossible; narrow the ranges or add a "
@@ -269,116 +281,13 @@ class Plan:
         )
 
 
-def make_plan(
-    base: Any = None,
-    factors: Iterable[AnyFactor] = (),
-    design: str = "sobol",
-    n: int = 0,
-    *,
-    keep: Sequence[str] | None = None,
-    **settings: Any,
-) -> Plan:
-    """Return a checked plan.
-
-    Parameters
-    ----------
-    base : Case or Subject, optional
-        What is simulated, with everything that no factor changes; default the case of the preset.
-    factors : iterable of Factor, Choice, Specimens
-    design : str
-        ``sobol``, ``halton``, ``random`` (these go on where they stopped), ``latin hypercube``, ``grid``, ``list``,
-        ``one at a time``, ``factorial``, ``plackett burman``, ``central composite``, ``box behnken``, ``saltelli``,
-        ``morris``.
-    n : int
-        Points of a sequence or a hypercube, base points of a Saltelli design, trajectories of a Morris design.
-    keep : sequence of str, optional
-        Default: the first of what the subject keeps.
-    **settings
-        Further attributes of `Plan`.
-
-    Raises
-    ------
-    CampaignError
-        For whatever is wrong with it. Corners are checked when a campaign is made.
-
-    Examples
-    --------
-    >>> plan = make_plan(factors=[Factor("operation.torque", "50 N m", "200 N m")], n=8)
-    >>> plan.columns(plan.points())["operation.torque"].size
-    8
-    """
-    from gearmbs.campaigns.subjects.pair import PairSubject
-
-    subject = base if isinstance(base, Subject) else PairSubject(base)
-    own = tuple(factor.in_si(subject) for factor in factors)
-    if design not in designs.DESIGNS:
-        raise CampaignError(f"design {design!r} is unknown; choose one of {', '.join(designs.DESIGNS)}")
-    counted = (*designs.SEQUENCES, *designs.ANALYSES, "latin hypercube")
-    if design in counted and n < 1:
-        raise CampaignError(f"n = {n!r}: give the number of points of the {design} design")
-    keep = tuple(keep if keep is not None else subject.keeps[:1])
-    check_keep(subject, keep)
-    for name in ("constraints", "reuse"):
-        if name in settings:
-            settings[name] = tuple(str(item) for item in settings[name])
-    plan = Plan(subject, own, design, int(n), keep=keep, **settings)
-    _consistent(plan)
-    return plan
-
-
-def _consistent(plan: Plan) -> None:
-    """Refuse settings that contradict each other."""
-    names = [name for f in plan.factors for name in f.columns(np.full((1, f.width), 0.5), *_variant(f))]
-    doubled = {name for name in names if names.count(name) > 1}
-    if doubled:
-        raise CampaignError(
-            f"factors: {', '.join(sorted(doubled))} stand for several columns; give them names of their own"
-        )
-    if plan.design == "list":
-        if not plan.options.get("rows"):
-            raise CampaignError("design list: give options={'rows': [{path: value, ...}, ...]}")
-        for path in dict.fromkeys(key for row in plan.options["rows"] for key in row):
-            plan.subject.unit_of(path)
-    elif not plan.factors:
-        raise CampaignError("factors: give at least one")
-    if plan.constraints and plan.design in designs.ANALYSES:
-        raise CampaignError(
-            f"constraints: points left out would break the {plan.design} design; narrow the ranges instead"
-        )
-    if plan.unit < 1:
-        raise CampaignError(f"unit = {plan.unit!r}; give the number of cases stored together, 1 or more")
-    if plan.on_failure not in FAILURE_POLICIES:
-        raise CampaignError(f"on_failure = {plan.on_failure!r}; choose one of {', '.join(FAILURE_POLICIES)}")
-
-
-def _variant(factor: AnyFactor) -> tuple:
-    return (np.zeros(1, dtype=int),) if isinstance(factor, Choice) and factor.crossed else ()
-
-
-def load_plan(path: str | Path) -> Plan:
-    """Read a plan in TOML: ``[subject]`` or ``[base]``, ``[[factor]]`` and the attributes of `Plan`.
-
-    Raises
-    ------
-    CampaignError
-        If it cannot be read or is wrong.
-    """
-    path = Path(path)
-    try:
-        tree = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise CampaignError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise CampaignError(f"{path}: not a valid TOML file ({error})") from error
-    subject = tree.pop("subject", {})
-    kind = subject.pop("kind", "pair")
-    if "base" in tree:
-        subject["case"] = tree.pop("base")
-    factors = [factor_from(table) for table in tree.pop("factor", [])]
-    try:
-        return make_plan(make_subject(kind, subject), factors, **tree)
-    except TypeError as error:
-        raise CampaignError(f"{path}: {error}") from error
+def _column(values: list[Any]) -> np.ndarray:
+    """Return values of any kind as a column; those that are sequences stay in one place each."""
+    if not any(isinstance(v, (list, tuple, dict)) or v is None for v in values):
+        return np.array(values)
+    column = np.empty(len(values), dtype=object)
+    column[:] = values
+    return column
 
 
 def _short(value: Any) -> str:

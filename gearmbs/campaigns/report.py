@@ -115,6 +115,8 @@ def _decides(campaign: Campaign, result: str) -> str:
         heading = "<h3>Sobol' indices from a polynomial chaos</h3>"
         return _at_hand(campaign, result) + heading + _table(found.table()) + note + _surface(campaign, result)
     if isinstance(found, SobolIndices):
+        if campaign.plan.design == "grid":
+            return "<h3>Parts of the grid's variance</h3>" + _table(found.table()[["first", "total"]])
         note = f"<p><small>{found.base_points} base points, {found.left_out} left out for want of results; "
         note += f"control variates explain {found.explained:.1%} of the variance of points left out.</small></p>"
         return "<h3>Sobol' indices</h3>" + _table(found.table()) + note

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.results import factor_names
 from gearmbs.campaigns.sensitivity import coordinates, results_in_order
+from gearmbs.campaigns.settings import whole
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -96,6 +98,8 @@ def fit_surface(
     CampaignError
         If the points do not determine the coefficients.
     """
+    if degree not in (1, 2):
+        raise CampaignError(f"response surface: degree = {degree!r}; give 1 or 2, or fit_chaos for more")
     y = np.asarray(values, dtype=float)
     good = np.isfinite(y)
     x, y = design_matrix(2.0 * u[good] - 1.0, degree), y[good]
@@ -167,6 +171,11 @@ def condition_map(
     columns = {str(name): table[name].to_numpy() for name in table.columns}
     columns |= {str(name).replace(".", "_").replace(" ", "_"): table[name].to_numpy() for name in table.columns}
     held = satisfied(condition, columns)
+    bins = whole(bins, "bins", 1)
+    for name in (across, along):
+        if name not in table.columns or table[name].dtype.kind not in "biuf":
+            known = ", ".join(str(n) for n in factor_names(campaign.folder) if table[n].dtype.kind in "biuf")
+            raise CampaignError(f"map: {name!r} is no column of numbers; factors that are one: {known}")
     x, y = (table[name].to_numpy(dtype=float) for name in (across, along))
     edges_x, edges_y = (np.quantile(v, np.linspace(0.0, 1.0, bins + 1)) for v in (x, y))
     i = np.clip(np.searchsorted(edges_y, y, side="right") - 1, 0, bins - 1)

@@ -8,6 +8,7 @@ import numpy as np
 
 from gearmbs.campaigns.errors import CampaignError
 from gearmbs.campaigns.folder import Folder
+from gearmbs.campaigns.status import REMEDY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,7 +24,7 @@ def read_table(folder: Folder) -> pd.DataFrame:
     Raises
     ------
     CampaignError
-        If nothing is finished.
+        If nothing is finished, or what is stored is damaged.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -31,7 +32,12 @@ def read_table(folder: Folder) -> pd.DataFrame:
     done = folder.done()
     if not done:
         raise CampaignError(f"{folder.path}: no unit is finished yet; run the campaign")
-    tables = [pq.ParquetFile(folder.table(unit)).read() for unit in done]
+    tables = []
+    for unit in done:
+        try:
+            tables.append(pq.ParquetFile(folder.table(unit)).read())
+        except (OSError, pa.ArrowInvalid) as error:
+            raise CampaignError(f"{folder.table(unit)}: missing or damaged ({error}); {REMEDY}") from None
     table = pa.concat_tables(tables, promote_options="permissive").to_pandas()
     return table.sort_values("index", ignore_index=True)
 
@@ -71,7 +77,10 @@ def open_dataset(folder: Folder) -> xr.Dataset:
     )
     if not folder.specs:
         return data
-    stored = xr.open_zarr(folder.signals, consolidated=False, chunks=None)
+    try:
+        stored = xr.open_zarr(folder.signals, consolidated=False, chunks=None)
+    except OSError as error:
+        raise CampaignError(f"{folder.signals}: missing or damaged ({error}); {REMEDY}") from None
     stored = stored.isel(slot=table["slot"].to_numpy()).rename(slot="case")
     for spec in folder.specs:
         signal = stored[spec.name]

@@ -241,7 +241,7 @@ def one_factor_studies(campaign: Campaign, result: str) -> pd.DataFrame:
     y, columns = results_in_order(campaign, result), plan.columns(points)
     rows, first = [], 1
     for factor in plan.factors:
-        stop = first + factor.count
+        stop = first + plan.count(factor)
         values, found = columns[factor.name][first:stop], y[first:stop]
         slope = np.full(found.size, np.nan)
         if values.dtype.kind in "fiu" and found.size > 1:
@@ -252,6 +252,40 @@ def one_factor_studies(campaign: Campaign, result: str) -> pd.DataFrame:
         first = stop + factor.width - 1
     table = pd.DataFrame(rows, columns=["factor", "value", "result", "change", "sensitivity"])
     return table.set_index(["factor", "value"])
+
+
+def grid_indices(values: np.ndarray, counts: Sequence[int], names: list[str]) -> SobolIndices:
+    """Return first and total Sobol' indices of results on a full grid, each value of a factor as likely as the others.
+
+    These are the parts of the grid's own variance (analysis of variance of a complete layout), free of any sampling
+    error: the mean over all factors but one varies by its first index, the mean over that one leaves what is not in its
+    total.
+
+    Parameters
+    ----------
+    values : ndarray, shape (product of counts,)
+        The last factor running fastest, as `gearmbs.campaigns.designs.grid` does.
+    counts : sequence of int
+        Values of each factor.
+
+    Raises
+    ------
+    CampaignError
+        If a result is missing, or all are equal.
+    """
+    y = np.asarray(values, dtype=float).reshape(tuple(counts))
+    missing = int((~np.isfinite(y)).sum())
+    if missing:
+        raise CampaignError(f"grid: {missing} of {y.size} cases have no result; the parts of a grid need them all")
+    variance = float(y.var())
+    if variance == 0.0:
+        raise CampaignError("grid: the result is the same everywhere; it depends on none of the factors")
+    d = len(names)
+    others = [tuple(a for a in range(d) if a != k) for k in range(d)]
+    first = np.array([y.mean(axis=axes).var() for axes in others]) / variance
+    total = np.array([y.var(axis=k).mean() for k in range(d)]) / variance
+    zero = np.zeros(d)
+    return SobolIndices(names, first, total, zero, zero, y.size, 0, float(y.mean()), variance)
 
 
 def coordinates(campaign: Campaign) -> tuple[list[str], np.ndarray]:
@@ -270,7 +304,9 @@ def results_in_order(campaign: Campaign, result: str) -> np.ndarray:
         from gearmbs.campaigns.results import result_names
 
         known = ", ".join(result_names(campaign.folder, table)[:12])
-        raise CampaignError(f"result {result!r} is unknown; known are {known} ...")
+        raise CampaignError(f"result {result!r} is unknown; known are {known or 'none, since no case has results'}")
+    if table[result].dtype.kind not in "biuf":
+        raise CampaignError(f"result {result!r} is a column of texts, not of numbers")
     values = np.full(campaign.folder.case_count, np.nan)
     values[table["index"].to_numpy()] = table[result].to_numpy(dtype=float)
     return values
@@ -303,8 +339,9 @@ def _levels(plan: Plan) -> list[int]:
 def sensitivity(campaign: Campaign, result: str) -> Any:
     """Return what decides a result, by the campaign's design.
 
-    `SobolIndices` of a Saltelli design, a table of effects of a Morris or factorial one, and a `PolynomialChaos`, whose
-    coefficients are Sobol' indices, of points that fill the space; `one_factor_studies` of a one-at-a-time design.
+    `SobolIndices` of a Saltelli design or a full grid, a table of effects of a Morris or factorial one, and a
+    `PolynomialChaos`, whose coefficients are Sobol' indices, of points that fill the space; `one_factor_studies` of a
+    one-at-a-time design.
 
     Raises
     ------
@@ -324,6 +361,10 @@ def sensitivity(campaign: Campaign, result: str) -> Any:
         return morris_effects(values, points, names)
     if plan.design in ("factorial", "plackett burman"):
         return main_effects(2.0 * points - 1.0, values, names, interactions=plan.design == "factorial")
+    if plan.design == "grid" and not plan.constraints:
+        # crossed choices, which take no coordinate, were refused above
+        varied = [k for k, count in enumerate(plan.counts()) if count > 1]
+        return grid_indices(values, [plan.counts()[k] for k in varied], [names[k] for k in varied])
     if plan.design == "one at a time":
         return one_factor_studies(campaign, result)
     if plan.design in (*SEQUENCES, "latin hypercube"):

@@ -8,7 +8,7 @@ empty.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +46,26 @@ def grow_store(path: Path, specs: Sequence[SignalSpec], slots: int) -> None:
         array.resize((slots, *array.shape[1:]))
 
 
+def check_signals(specs: Sequence[SignalSpec], signals: Mapping[str, np.ndarray]) -> None:
+    """Refuse the signals of a case that have no room in the arrays.
+
+    Raises
+    ------
+    CampaignError
+    """
+    for spec in specs:
+        if spec.name not in signals:
+            continue
+        shape = signals[spec.name].shape
+        if len(shape) != 2 or shape[0] != len(spec.channels):
+            raise CampaignError(f"signal {spec.name!r}: shape {shape}, planned for {len(spec.channels)} channels")
+        if shape[1] > spec.samples:
+            raise CampaignError(
+                f"signal {spec.name!r}: {shape[1]} samples, planned for {spec.samples} from the corners; make a plan "
+                "whose longest record is at a corner"
+            )
+
+
 def write_signals(
     path: Path, specs: Sequence[SignalSpec], unit: int, number: int, signals: Sequence[dict[str, np.ndarray]]
 ) -> dict[str, str]:
@@ -54,12 +74,7 @@ def write_signals(
     Parameters
     ----------
     signals : sequence of dict
-        Of each case its signals, shape (channels, samples); nothing for a case that failed.
-
-    Raises
-    ------
-    CampaignError
-        If a signal is longer than planned.
+        Of each case its signals, shape (channels, samples); nothing for a case that failed. See `check_signals`.
     """
     import zarr
 
@@ -71,12 +86,6 @@ def write_signals(
             if spec.name not in case:
                 continue
             values = case[spec.name]
-            if values.shape[1] > spec.samples:
-                raise CampaignError(
-                    f"signal {spec.name!r}: {values.shape[1]} samples, planned for {spec.samples} from the "
-                    f"corners; make a "
-                    "plan whose longest record is at a corner"
-                )
             block[k, :, : values.shape[1]] = values
         assert group is not None
         array: Any = group[spec.name]

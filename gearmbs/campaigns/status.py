@@ -11,8 +11,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from gearmbs.campaigns.errors import CampaignError
 from gearmbs.campaigns.folder import Folder
 from gearmbs.campaigns.ledger import owner
+
+REMEDY = "gearmbs campaign check --sweep takes out what is damaged, and run does it again"
 
 RECENT = 20
 """Units by whose pace the remaining time is judged."""
@@ -87,11 +90,19 @@ def _counts(path: str, written: int) -> tuple[int, int, int, float, float, float
 
 
 def read_ledger(path: Path) -> dict[str, Any] | None:
-    """Return a ledger, or None if it is not there."""
+    """Return a ledger, or None if it is not there.
+
+    Raises
+    ------
+    CampaignError
+        If it is damaged.
+    """
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError:
         return None
+    except ValueError:
+        raise CampaignError(f"{path}: this ledger is damaged; {REMEDY}") from None
 
 
 def read_status(folder: Folder) -> CampaignStatus:
@@ -144,7 +155,13 @@ def check_folder(folder: Folder, *, sweep: bool = False) -> list[str]:
 
     found = []
     for unit in folder.done():
-        entry = read_ledger(folder.ledger(unit)) or {"digests": {}}
+        try:
+            entry = read_ledger(folder.ledger(unit)) or {"digests": {}}
+        except CampaignError:
+            found.append(f"unit {unit}: the ledger is damaged")
+            if sweep:
+                folder.ledger(unit).unlink(missing_ok=True)
+            continue
         wrong = []
         for name, digest in entry["digests"].items():
             try:
@@ -161,6 +178,10 @@ def check_folder(folder: Folder, *, sweep: bool = False) -> list[str]:
             found.append(f"unit {unit}: {', '.join(wrong)} not as the ledger says")
             if sweep:
                 folder.ledger(unit).unlink(missing_ok=True)
+    if sweep and folder.specs and not folder.signals.exists():
+        from gearmbs.campaigns.signal_store import make_store
+
+        make_store(folder.signals, folder.specs, folder.plan.unit, folder.unit_count)
     litter = [p for p in folder.path.rglob(".*") if p.is_file()]
     litter += [p for p in folder.path.rglob("*.partial*") if p.is_file()]
     litter += [p for p in (folder.path / "units").glob("*.claim") if owner(p) is None]
@@ -168,6 +189,7 @@ def check_folder(folder: Folder, *, sweep: bool = False) -> list[str]:
         # what is younger may belong to somebody at work
         if time.time() - path.stat().st_mtime > 60.0 or path.suffix == ".claim":
             found.append(f"litter: {path.relative_to(folder.path)}")
-            if sweep and path.suffix != ".claim":
+            # the claims of what is not done count its attempts
+            if sweep and (path.suffix != ".claim" or path.with_suffix(".json").exists()):
                 path.unlink(missing_ok=True)
     return found

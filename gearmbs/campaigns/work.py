@@ -142,8 +142,11 @@ def _store(folder: Folder, unit: int, rows: list[dict[str, Any]], results: list[
     for name in ("status", "message", "advice"):
         columns[name] = [getattr(r.outcome, name) for r in results]
     table = {name: pa.array(values) for name, values in columns.items()}
+    taken = set(table)
     for name in dict.fromkeys(key for r in results for key in r.kept.numbers):
-        table[name] = pa.array([r.kept.numbers.get(name) for r in results], type=pa.float64())
+        # a result must not take the place of a factor or of the status
+        column = f"result.{name}" if name in taken else name
+        table[column] = pa.array([r.kept.numbers.get(name) for r in results], type=pa.float64())
     with whole_file(folder.table(unit)) as part:
         pq.write_table(pa.table(table), part, compression="zstd")
         digests["table"] = hashlib.sha256(part.read_bytes()).hexdigest()

@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-8
 """Of the integrator, so that differences over a step of 1e-2 are right to a few percent."""
 
+WAYS = ("band", "orders")
+"""How levels are taken."""
+
 Gains = Literal["none", "one", "channel", "case", "line"]
 
 
@@ -43,8 +46,8 @@ class CaseProblem:
     ----------
     measured : DataFrame
         Columns ``case``, ``channel``, ``harmonic``, ``value`` and ``sigma`` (relative); see `harmonic_table`.
-    cases : mapping of str to Case
-        By the names in the column ``case``.
+    cases : Case or mapping of str to Case
+        By the names in the column ``case``; one case stands for everything measured.
     free : sequence of Free or str
         Paths of fields with their starts and bounds in any unit; of a plain path the start is the first case's value.
         A path belongs to all cases, or to one whose name stands before it: "high:operation.torque".
@@ -67,7 +70,7 @@ class CaseProblem:
     def __init__(
         self,
         measured: pd.DataFrame,
-        cases: Mapping[str, Case],
+        cases: Mapping[str, Case] | Case,
         free: Sequence[Free | str],
         *,
         gains: Gains = "none",
@@ -75,10 +78,25 @@ class CaseProblem:
         way: str = "band",
         workers: int = 1,
     ) -> None:
+        from gearmbs.studies import Case as CaseClass
+        from gearmbs.studies.limits import HARMONICS
+
         self.table = check_table(measured)
+        if isinstance(cases, CaseClass):
+            cases = dict.fromkeys(self.table["case"], cases)
+        if not isinstance(cases, Mapping) or not cases:
+            raise IdentifyError("cases: give a Case, or cases by the names in the column case")
+        if way not in WAYS:
+            raise IdentifyError(f"way is {way!r}; choose one of {', '.join(WAYS)}")
         self.cases = {name: case.changed(solver={"tolerance": TOLERANCE}) for name, case in cases.items()}
         self.way, self.workers = way, workers
-        self.free = [_in_si(item, self.cases) for item in free]
+        self.free = [_in_si(item, self.cases) for item in ((free,) if isinstance(free, str | Free) else free)]
+        paths = [path for item in self.free for path in (item.name, *item.also)]
+        doubled = sorted({path for path in paths if paths.count(path) > 1})
+        if doubled or not paths:
+            raise IdentifyError(f"free: {', '.join(doubled)} more than once" if paths else "free: give a parameter")
+        if (most := int(self.table["harmonic"].max())) > HARMONICS:
+            raise IdentifyError(f"measured: harmonic {most}; cases give the first {HARMONICS}, leave the others out")
         unknown = set(self.table["case"]) - set(self.cases)
         if unknown:
             raise IdentifyError(f"measured: no case is given for {', '.join(sorted(unknown))}")
@@ -156,7 +174,8 @@ class CaseProblem:
         """Return the logarithms of the predicted values, gains left out, for several parameter vectors; NaN where it
         fails."""
         names = list(dict.fromkeys(self.table["case"]))
-        keys = [(name, self._own(name, p)) for p in points for name in names]
+        lost = np.full(len(self.table), np.nan)
+        keys = [(name, self._own(name, p)) for p in points if np.isfinite(p).all() for name in names]
         new = [key for key in dict.fromkeys(keys) if key not in self._known]
         if self.workers > 1 and len(new) > 1:
             with ThreadPoolExecutor(self.workers) as pool:
@@ -165,6 +184,9 @@ class CaseProblem:
             self._known.update((key, self._simulate(key)) for key in new)
         found = []
         for p in points:
+            if not np.isfinite(p).all():
+                found.append(lost)
+                continue
             own = {name: self._known[name, self._own(name, p)] for name in names}
             rows = zip(self.table["case"], self.components, self.table["harmonic"])
             levels = [own[str(n)].get((c, int(h)), np.nan) for n, c, h in rows]
@@ -283,10 +305,7 @@ def identify(
     >>> found = identify(table, case, ["contact.depth", "friction.static"], gains="one")  # doctest: +SKIP
     >>> print(found.report())  # doctest: +SKIP
     """
-    from gearmbs.studies import Case as CaseClass
-
-    given = {name: cases for name in dict.fromkeys(measured["case"])} if isinstance(cases, CaseClass) else cases
-    problem = CaseProblem(measured, given, free, **settings)
+    problem = CaseProblem(measured, cases, free, **settings)
     if check:
         remarks = problem.identifiability(noise=tell is not None).remarks()
         if remarks and tell is None:
@@ -340,23 +359,39 @@ def _groups(table: pd.DataFrame, gains: str) -> np.ndarray | None:
 
 def _in_si(item: Free | str, cases: Mapping[str, Case]) -> Free:
     """Return a parameter with its start and bounds in SI; a path starts at its case's value."""
+    path = item if isinstance(item, str) else item.name
+    value, unit = _field(path, cases)
+    if isinstance(item, str):
+        return Free(path, value, log=value > 0.0)
+    for other in item.also:
+        _field(other, cases)
+
+    def number(given: Any) -> Any:
+        try:
+            return None if given is None else to_si(given, unit, path)
+        except (ValueError, TypeError) as error:
+            raise IdentifyError(str(error)) from None
+
+    found = replace(item, start=number(item.start), low=number(item.low), high=number(item.high))
+    # refused here rather than after the simulations that come first
+    Scale((found,)).bounds()
+    return found
+
+
+def _field(path: str, cases: Mapping[str, Case]) -> tuple[float, str]:
+    """Return the value and the SI unit of a number of a case, whose name may stand before the path."""
     from gearmbs.studies.case import units_of_fields
 
-    path = item if isinstance(item, str) else item.name
     owner, _, place = path.rpartition(":")
     if owner and owner not in cases:
         raise IdentifyError(f"{path}: there is no case {owner!r}; the cases are {', '.join(cases)}")
     section, _, field = place.partition(".")
     holder = getattr(cases[owner] if owner else next(iter(cases.values())), section, None)
-    if holder is None or field not in type(holder).model_fields:
+    if holder is None or field not in getattr(type(holder), "model_fields", {}):
         raise IdentifyError(f"{path}: a case has no such field; write section.field, for instance contact.depth")
     unit = units_of_fields(holder).get(field, "1")
     unit = "dimensionless" if unit == "1" else unit
-    value = to_si(getattr(holder, field), unit, path)
-    if isinstance(item, str):
-        return Free(path, value, log=value > 0.0)
-
-    def number(given: Any) -> Any:
-        return None if given is None else to_si(given, unit, path)
-
-    return replace(item, start=number(item.start), low=number(item.low), high=number(item.high))
+    try:
+        return to_si(getattr(holder, field), unit, path), unit
+    except (ValueError, TypeError):
+        raise IdentifyError(f"{path} is {getattr(holder, field)!r}, which is no number that could be fitted") from None

@@ -23,6 +23,7 @@ Model = Callable[[np.ndarray], np.ndarray]
 Progress = Callable[[float, str], None]
 USUAL_STEPS = 10
 """Steps that a search usually takes, each with a Jacobian by central differences."""
+LOSSES = ("linear", "soft_l1", "huber", "cauchy")
 POLISH = 50
 """Gauss-Newton steps at most after the search."""
 
@@ -34,6 +35,7 @@ def fit(
     free: Sequence[Free],
     *,
     sigma: ArrayLike | None = None,
+    absolute_sigma: bool = True,
     many: Callable[[Sequence[np.ndarray]], list[np.ndarray]] | None = None,
     step: float = SMOOTH_STEP,
     starts: int = 1,
@@ -54,6 +56,9 @@ def fit(
     free : sequence of Free
     sigma : float or array_like, optional
         Standard deviation of the measured values. Without it all weigh the same and the noise is estimated.
+    absolute_sigma : bool
+        Whether ``sigma`` is the noise itself, or known up to a common factor only, which is then estimated from the
+        residuals: for a model that does not describe everything measured.
     many : callable, optional
         Predictions for several parameter vectors at once; default one after the other.
     step : float
@@ -91,7 +96,11 @@ def fit(
     >>> found.values.round(6).tolist()
     [2.0, -0.5]
     """
-    problem = _Problem(model, measured, free, sigma, many, step, lost)
+    if loss not in LOSSES:
+        raise IdentifyError(f"fit: loss is {loss!r}; choose one of {', '.join(LOSSES)}")
+    if not (isinstance(starts, int) and starts >= 1):
+        raise IdentifyError(f"fit: starts = {starts!r}; give a whole number, 1 or more")
+    problem = _Problem(model, measured, free, sigma, many, step, lost, absolute_sigma)
     if progress is not None:
         problem.tell = told_of_runs(progress, starts * USUAL_STEPS * (2 * len(free) + 1))
     low, high = problem.scale.bounds()
@@ -120,15 +129,19 @@ def told_of_runs(progress: Progress, usual: int) -> Callable[[int], None]:
 class _Problem:
     """Weighted residuals of a model over z."""
 
-    def __init__(self, model, measured, free, sigma, many, step, lost) -> None:
+    def __init__(self, model, measured, free, sigma, many, step, lost, absolute_sigma) -> None:
         self.scale = Scale(tuple(free))
         self.measured = np.asarray(measured, dtype=float)
         size, count = self.measured.size, len(self.scale.free)
+        if not np.isfinite(self.measured).all():
+            raise IdentifyError("fit: every measured value must be finite")
+        if count == 0:
+            raise IdentifyError("fit: free is empty; give a parameter")
         if size - lost < count:
             raise IdentifyError(
                 f"fit: {size - lost} independent values for {count} parameters; measure more or free fewer"
             )
-        self.known = sigma is not None
+        self.known = sigma is not None and absolute_sigma
         self.sigma = np.broadcast_to(np.asarray(1.0 if sigma is None else sigma, dtype=float), (size,))
         if not (self.sigma > 0.0).all():
             raise IdentifyError("fit: every sigma must be positive")
@@ -144,6 +157,9 @@ class _Problem:
         with np.errstate(all="ignore"):
             found = self._many([self.scale.p(np.asarray(z)) for z in points])
         self.tell(self.total)
+        for f in found:
+            if np.shape(f) != self.measured.shape:
+                raise IdentifyError(f"fit: the model returned shape {np.shape(f)} for {self.measured.shape} values")
         return [(np.asarray(f, dtype=float) - self.measured) / self.sigma for f in found]
 
     def residual(self, z: np.ndarray) -> np.ndarray:

@@ -59,7 +59,11 @@ def harmonic_table(
     from gearmbs.signals import gmf_rms
 
     rows = []
+    if not isinstance(signals, Mapping):
+        raise IdentifyError("signals: give recordings by the name of the case that models them, {name: signal}")
     for case, signal in signals.items():
+        if "channel" not in getattr(signal, "dims", ()) or "time" not in signal.dims:
+            raise IdentifyError(f"signals: {case} is no signal with time and channels; read it by gearmbs.read_signal")
         names = [str(c) for c in signal.channel.values]
         size = signal.sizes["time"] // sections
         levels = []
@@ -88,12 +92,25 @@ def check_table(table: pd.DataFrame) -> pd.DataFrame:
     IdentifyError
         For missing columns and values that have no logarithm.
     """
+    import pandas as pd
+
+    if not isinstance(table, pd.DataFrame):
+        raise IdentifyError(f"measured is a {type(table).__name__}; give a DataFrame with {', '.join(COLUMNS)}")
     missing = [c for c in COLUMNS[:4] if c not in table.columns]
     if missing:
         raise IdentifyError(f"measured: columns {', '.join(missing)} are missing; give {', '.join(COLUMNS)}")
+    if table.empty:
+        raise IdentifyError("measured: the table has no rows")
     table = table.copy()
     if "sigma" not in table.columns:
         table["sigma"] = 0.02
+    for name in ("harmonic", "value", "sigma"):
+        try:
+            table[name] = pd.to_numeric(table[name])
+        except (ValueError, TypeError) as error:
+            raise IdentifyError(f"measured: column {name}: {error}") from None
+    if not ((table["harmonic"] >= 1) & (table["harmonic"] % 1 == 0)).all():
+        raise IdentifyError("measured: harmonic must be a whole number, 1 or more, in every row")
     if not ((table["value"] > 0.0) & (table["sigma"] > 0.0)).all():
         raise IdentifyError("measured: value and sigma must be positive in every row")
     return table.reset_index(drop=True)

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from gearmbs.identify.parameters import Scale
 
 LEVEL = 0.95
+DOUBTFUL = 0.01
+"""Probability of residuals as large as these below which the noise given cannot be all."""
+
 CORRELATED = 0.95
 """Correlation from which two parameters are said to be told apart badly."""
 
@@ -105,6 +108,8 @@ class Fit:
         """
         from scipy.stats import norm, t
 
+        if not 0.0 < level < 1.0:
+            raise IdentifyError(f"level = {level!r}; give the probability of the interval, as 0.95")
         k = self._place(name)
         q = norm.ppf(0.5 + 0.5 * level) if self.known_noise else t.ppf(0.5 + 0.5 * level, max(1, self.freedom))
         ends = np.tile(self.z, (2, 1))
@@ -201,6 +206,8 @@ class Fit:
 
     def report(self) -> str:
         """Return values, errors and correlations as Markdown."""
+        from scipy.stats import chi2
+
         lines = ["| parameter | value | standard error | 95 % interval |", "|---|---|---|---|"]
         for name, row in self.table().iterrows():
             lines.append(
@@ -210,6 +217,12 @@ class Fit:
         lines += ["", f"{self.residuals.size} values, {self.freedom} degrees of freedom, {self.runs} evaluations."]
         if self.known_noise:
             lines.append(f"Chi-square over degrees of freedom: {self.chi_square:.3g}.")
+            if self.freedom > 0 and chi2.sf(self.cost, self.freedom) < DOUBTFUL:
+                lines.append(
+                    "The residuals are larger than the noise that was given explains: the model does not describe all "
+                    f"that was measured, and the errors above are too small, by a factor of {self.chi_square**0.5:.2g} "
+                    "if what is missing acts like noise (absolute_sigma=False takes it so)."
+                )
         else:
             lines.append(f"Standard deviation of the residuals: {np.sqrt(max(self.chi_square, 0.0)):.3g}.")
         close = [

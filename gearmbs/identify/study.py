@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,10 +52,7 @@ def load_problem(path: str | Path) -> tuple[CaseProblem, dict[str, Any]]:
     measured = dict(tree.get("measured", {}))
     way = str(measured.get("way", "band"))
     table = _table(tree["recording"], measured, path.parent, tuple(tree.get("channels", {})))
-    try:
-        free = [Free(item.pop("path"), **item) for item in tree["free"]]
-    except (KeyError, TypeError) as error:
-        raise IdentifyError(f"{path}: [[free]]: {error}; give path, start, low, high, log, also") from None
+    free = [_free(item, path) for item in tree["free"]]
     problem = CaseProblem(
         table,
         _cases(tree.get("case", {}), tree["recording"]),
@@ -67,11 +65,31 @@ def load_problem(path: str | Path) -> tuple[CaseProblem, dict[str, Any]]:
     return problem, {"starts": int(tree.get("starts", 1)), "experiments": tree.get("experiment")}
 
 
+def _free(item: dict[str, Any], path: Path) -> Free | str:
+    """Return a parameter of the file; a path alone starts at its case's value."""
+    known = [f.name for f in fields(Free)][1:]
+    for key in item:
+        if key not in ("path", *known):
+            raise IdentifyError(f"{path}: [[free]]: unknown key {key!r}; give path, {', '.join(known)}")
+    settings = dict(item)
+    if "path" not in settings:
+        raise IdentifyError(f"{path}: [[free]]: path is missing; write for instance contact.depth")
+    name = settings.pop("path")
+    if not settings:
+        return name
+    if "start" not in settings:
+        raise IdentifyError(f"{path}: [[free]]: {name}: start is missing")
+    return Free(name, **settings)
+
+
 def _cases(given: dict[str, Any], recordings: dict[str, str]) -> dict[str, Case]:
     """Return the case of each recording: what all have in common, changed by its own."""
     from gearmbs.studies import make_case
 
     common = given.get("all", {})
+    for name in given:
+        if name != "all" and name not in recordings:
+            raise IdentifyError(f"[case.{name}]: no recording has this name; write all, {', '.join(recordings)}")
     cases = {}
     for name in recordings:
         data = {section: dict(values) if isinstance(values, dict) else values for section, values in common.items()}
@@ -105,7 +123,13 @@ def _table(
             if "harmonic" in head:
                 parts.append(pd.read_csv(place).assign(case=name))
                 continue
-        signal = read_any(place, **measured)
+        try:
+            signal = read_any(place, **measured)
+        except TypeError as error:
+            word = str(error).rpartition("argument ")[2]
+            raise IdentifyError(
+                f"[measured]: unknown key {word}; see gearmbs.read_signal for those there are"
+            ) from None
         if "speed" not in signal.attrs:
             signal.attrs["speed"] = estimate_speed(signal).speed
         parts.append(harmonic_table({name: signal}, channels=channels or None, **levels))

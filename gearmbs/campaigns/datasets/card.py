@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import gearmbs
+from gearmbs.campaigns.errors import CampaignError
 from gearmbs.campaigns.exports import front_matter
 
 TYPES = {
@@ -96,9 +97,11 @@ def write_card(
     return write_whole(folder / "README.md", "\n".join(lines))
 
 
-def write_croissant(folder: Path, title: str, files: Sequence[Path], url: str | None = None) -> Path:
-    """Write croissant.json: files with their digests, and the columns as fields of a record set; where it is published,
-    if it is."""
+def write_croissant(
+    folder: Path, title: str, files: Sequence[Path], url: str | None = None, published: str | None = None
+) -> Path:
+    """Write croissant.json: files with their digests, and the columns as fields of a record set; where and when (year,
+    month and day, as 2026-01-31) it is published, if it is."""
     from gearmbs.view.files import write_whole
 
     fields = []
@@ -122,7 +125,6 @@ def write_croissant(folder: Path, title: str, files: Sequence[Path], url: str | 
         "conformsTo": "http://mlcommons.org/croissant/1.0",
         "license": "https://creativecommons.org/publicdomain/zero/1.0/",
         "version": gearmbs.__version__,
-        "datePublished": date.today().isoformat(),
         "citeAs": "simulated by gearmbs",
         "distribution": [
             *(
@@ -146,6 +148,11 @@ def write_croissant(folder: Path, title: str, files: Sequence[Path], url: str | 
         ],
         "recordSet": [{"@type": "cr:RecordSet", "@id": "records", "name": "records", "field": fields}],
     }
+    if published is not None:
+        try:
+            tree["datePublished"] = date.fromisoformat(published).isoformat()
+        except ValueError:
+            raise CampaignError(f"published = {published!r}; write year-month-day, as 2026-01-31") from None
     if url is not None:
         tree["url"] = url
     return write_whole(folder / "croissant.json", json.dumps(tree, indent=1))

@@ -19,6 +19,8 @@ def dataset(
     seed: Annotated[int, typer.Option(help="Of design, specimens and sensors.")] = 0,
     workers: Annotated[int | None, typer.Option(help="Processes; default: the cores.")] = None,
     dask: Annotated[str | None, typer.Option(help='Address of a Dask scheduler, or "local".')] = None,
+    url: Annotated[str | None, typer.Option(help="Where it will be published, for the metadata.")] = None,
+    published: Annotated[str | None, typer.Option(help="When, as 2026-01-31, for the metadata.")] = None,
 ) -> None:
     """Make a labelled data set of gear faults: simulate, put sensors on, split by specimen, write card and metadata."""
     with guarded():
@@ -35,7 +37,8 @@ def dataset(
         else:
             status = campaign.run(workers, progress=True)
         typer.echo(str(status))
-        for path in write_data_set(campaign, out, layers=SensorLayers(sensors=sensors, seed=seed), seed=seed):
+        layers = SensorLayers(sensors=sensors, seed=seed)
+        for path in write_data_set(campaign, out, layers=layers, seed=seed, url=url, published=published):
             typer.echo(f"wrote {path}")
 
 

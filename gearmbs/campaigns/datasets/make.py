@@ -14,7 +14,8 @@ from gearmbs.campaigns.datasets.layers import SensorLayers
 from gearmbs.campaigns.datasets.splits import shared_groups, split_by_group, withhold
 from gearmbs.campaigns.errors import CampaignError
 from gearmbs.campaigns.factors import AnyFactor, Choice, Factor, Specimens
-from gearmbs.campaigns.plan import Plan, make_plan
+from gearmbs.campaigns.plan import Plan
+from gearmbs.campaigns.planning import make_plan
 
 STATES: dict[str, Any] = {
     "healthy": [],
@@ -110,6 +111,7 @@ def write_data_set(
     withheld: tuple[float, float] = (0.45, 0.6),
     seed: int = 0,
     url: str | None = None,
+    published: str | None = None,
 ) -> list[Path]:
     """Write a campaign as a data set: parquet by split, README.md, croissant.json, plan.json.
 
@@ -123,8 +125,9 @@ def write_data_set(
         Parts of the specimens.
     withheld : tuple of float
         Range of severities that training specimens keep for the split "withheld".
-    url : str, optional
-        Where it will be published, for the metadata.
+    url, published : str, optional
+        Where and when it will be published, for the metadata; the same campaign gives the same files whenever they are
+        written.
 
     Raises
     ------
@@ -159,7 +162,7 @@ def write_data_set(
         "specimens in two splits": max(shared_groups(split, groups).values()),
         "processor time of the simulations, core hours": f"{campaign.status().processor_seconds / 3600:.3g}",
     }
-    paths = [write_card(out, title, files, facts, layers.as_dict()), write_croissant(out, title, files, url)]
+    paths = [write_card(out, title, files, facts, layers.as_dict()), write_croissant(out, title, files, url, published)]
     shutil.copy(campaign.path / "plan.json", out / "plan.json")
     return [*files, *paths, out / "plan.json"]
 

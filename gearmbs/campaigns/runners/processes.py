@@ -5,9 +5,11 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
+from types import ModuleType
 from typing import Any
 
 from gearmbs.campaigns.work import DIED, UnitReport, work_unit
@@ -65,7 +67,7 @@ class ProcessRunner:
             self._end(at_work)
 
     def _start(self, path: str) -> Connection:
-        with _inherited_settings():
+        with _inherited_settings(), _without_main():
             ours, theirs = self._context.Pipe()
             process = self._context.Process(target=_serve, args=(path, theirs), daemon=True)
             process.start()
@@ -110,6 +112,17 @@ def _serve(path: str, connection: Connection) -> None:
             connection.send(answer)
         except ConnectionError:
             return
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Keep a new process from running the user's script again: it needs modules only, which it imports by name."""
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 @contextmanager

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import copy
+from collections.abc import Callable, Mapping, Sequence
+from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
 
 from gearmbs.campaigns.errors import CampaignError
 from gearmbs.campaigns.subjects.base import Kept, SignalSpec, Subject, imported, kept_by_functions
-from gearmbs.units import to_si
+from gearmbs.units import DIMENSIONS, to_si
 
 
 class FunctionSubject(Subject):
@@ -17,12 +19,14 @@ class FunctionSubject(Subject):
 
     Parameters
     ----------
-    function : str
-        ``"module:name"``, so that every worker finds it.
+    function : str or callable
+        ``"module:name"``, or a function at the top of a module: every worker imports it by that name. It returns a
+        dictionary of numbers and arrays, a Dataset, or one number, which is kept under the function's name.
     parameters : dict
-        Its arguments with their defaults: numbers, texts with units where ``units`` says so, other texts.
+        Its arguments with their defaults: numbers, texts, truth values, None, and lists, arrays and tables of these.
+        Texts with units where ``units`` says so. Factors reach into tables by dots: ``"spring.stiffness"``.
     units : dict, optional
-        SI units or dimensions of those parameters that are quantities, as ``{"stiffness": "N/m"}``.
+        SI units or dimensions of those parameters that are quantities, as ``{"spring.stiffness": "N/m"}``.
     version : str
         Part of the identity of every case; to be changed whenever the function returns something else.
     signals : dict, optional
@@ -35,20 +39,46 @@ class FunctionSubject(Subject):
 
     def __init__(
         self,
-        function: str,
+        function: str | Callable[..., Any],
         parameters: dict[str, Any] | None = None,
         *,
         units: dict[str, str] | None = None,
         version: str = "1",
         signals: dict[str, Sequence[float]] | None = None,
     ) -> None:
-        self.function, self.version = function, str(version)
+        self.function, self.version = _name_of(function), str(version)
         self.units = dict(units or {})
         self.signal_sizes = {name: (int(size[0]), float(size[1])) for name, size in (signals or {}).items()}
-        self.parameters = {name: self._value(name, value) for name, value in (parameters or {}).items()}
+        self.parameters = {str(name): _tree(name, value) for name, value in (parameters or {}).items()}
+        for path, unit in self.units.items():
+            self._found(path)
+            _check_unit(path, unit)
+        self.parameters = self._in_si(self.parameters)
 
-    def _value(self, name: str, value: Any) -> Any:
-        return to_si(value, self.units[name], name) if name in self.units else value
+    def _in_si(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Return parameters with their quantities in SI."""
+        found = copy.deepcopy(data)
+        for path, unit in self.units.items():
+            *tables, name = path.split(".")
+            place = found
+            for table in tables:
+                place = place[table]
+            try:
+                place[name] = float(to_si(place[name], unit, path))
+            except (ValueError, TypeError) as error:
+                raise CampaignError(str(error)) from None
+        return found
+
+    def _found(self, path: str) -> Any:
+        """Return the parameter at a path."""
+        place: Any = self.parameters
+        for part in path.split("."):
+            if not isinstance(place, dict) or part not in place:
+                raise CampaignError(
+                    f"{path}: {self.function} has no such parameter; known are {', '.join(self.parameters)}"
+                )
+            place = place[part]
+        return place
 
     def settings(self) -> dict[str, Any]:
         """Return the function's name, its parameters and their units."""
@@ -68,20 +98,17 @@ class FunctionSubject(Subject):
 
     def base(self) -> dict[str, Any]:
         """Return the parameters."""
-        return dict(self.parameters)
+        return copy.deepcopy(self.parameters)
 
     def unit_of(self, path: str) -> str:
         """Return the SI unit of a parameter."""
-        if path not in self.parameters:
-            raise CampaignError(
-                f"{path}: {self.function} has no such parameter; known are {', '.join(self.parameters)}"
-            )
+        self._found(path)
         return self.units.get(path, "1")
 
     def check(self, data: dict[str, Any], name: str) -> dict[str, Any]:
         """Return the parameters in SI."""
         imported(self.function, "function")
-        return {key: self._value(key, value) for key, value in data.items()}
+        return self._in_si(data)
 
     def canonical(self, thing: dict[str, Any]) -> Any:
         """Return the function's name and version and the parameters."""
@@ -93,6 +120,13 @@ class FunctionSubject(Subject):
 
     def reduce(self, thing: dict[str, Any], record: Any, keep: Sequence[str]) -> Kept:
         """Return the scalars of the record, and those of its arrays that are kept as signals."""
+        if isinstance(record, Real) or (isinstance(record, np.ndarray) and record.ndim == 0):
+            record = {self.function.partition(":")[2]: record}
+        if not (isinstance(record, Mapping) or hasattr(record, "data_vars")):
+            raise CampaignError(
+                f"{self.function} returned {record!r:.60}; return a dictionary of numbers and arrays, a Dataset or one "
+                "number"
+            )
         kept = Kept(numbers=kept_by_functions(keep, record))
         items = {**record.attrs, **record.data_vars} if hasattr(record, "data_vars") else dict(record)
         if "numbers" in keep:
@@ -104,6 +138,8 @@ class FunctionSubject(Subject):
         for item in keep:
             if item.startswith("signal:"):
                 name = item.removeprefix("signal:")
+                if name not in items:
+                    raise CampaignError(f"{self.function} returned no {name!r}, which is to be kept as a signal")
                 kept.signals[name] = np.atleast_2d(np.asarray(items[name], dtype=float))
         return kept
 
@@ -120,3 +156,51 @@ class FunctionSubject(Subject):
                 samples, rate = self.signal_sizes[name]
                 specs.append(SignalSpec(name, (name,), samples, rate, "1"))
         return specs
+
+
+def _name_of(function: str | Callable[..., Any]) -> str:
+    """Return the name under which workers import a function."""
+    if isinstance(function, str):
+        name = function
+    else:
+        name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', function)}"
+    module, _, attribute = name.partition(":")
+    if module == "__main__":
+        raise CampaignError(
+            f"function {attribute!r} stands in the script that runs, where workers cannot import it; put it into a "
+            "module beside the script, and import it from there"
+        )
+    if not attribute.isidentifier():
+        raise CampaignError(f"function {name!r}: give module:name of a function at the top of a module")
+    return name
+
+
+def _check_unit(path: str, unit: str) -> None:
+    target = DIMENSIONS.get(unit, unit)
+    try:
+        to_si("1" if target in ("1", "dimensionless") else f"1 {target}", target, path)
+    except Exception as error:
+        # of the library of units, which has its own
+        raise CampaignError(f"units: {path}: {unit!r} is no unit ({error})") from None
+
+
+def _tree(name: str, value: Any) -> Any:
+    """Return a parameter as a tree of numbers, texts, lists and tables, as it is stored.
+
+    Raises
+    ------
+    CampaignError
+        For anything else.
+    """
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _tree(f"{name}.{key}", item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_tree(name, item) for item in value]
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    raise CampaignError(
+        f"parameter {name!r} is a {type(value).__name__}, which cannot be stored with the plan; give numbers, texts, "
+        "lists or tables, and let the function make the object of them"
+    )

@@ -1,0 +1,283 @@
+"""What is given wrongly is refused before anything runs, in one line with the remedy; what is meant is taken."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearmbs.campaigns import Campaign, CampaignError, Factor, FunctionSubject, choose, condition_map, make_plan
+from gearmbs.campaigns.folder import make_folder
+from gearmbs.studies import Case
+from tests.campaigns.models import PLACES, ishigami
+from tests.campaigns.support import function, ranges, small
+
+TORQUE = Factor("operation.torque", 50.0, 60.0)
+BAD_PLANS = [
+    ({"n": 2.5}, "n = 2.5; give a whole number"),
+    ({"n": "8"}, "n = '8'; give a whole number"),
+    ({"seed": None}, "seed = None; give a whole number"),
+    ({"seed": -1}, "seed = -1; give a whole number, 0 or more"),
+    ({"unit": 2.5}, "unit = 2.5; give a whole number"),
+    ({"uint": 4}, "unknown setting 'uint'; did you mean unit"),
+    ({"time_limit": "60 N"}, "time_limit = '60 N'; give a positive number or text such as '60 s'"),
+    ({"time_limit": -5}, "time_limit = -5; give a positive"),
+    ({"memory_limit": "2 apples"}, "memory_limit = '2 apples'"),
+    ({"factors": ["operation.torque"]}, "factors: 'operation.torque' is none; give Factor"),
+    ({"factors": [TORQUE, Factor("operation.torque", 1.0, 2.0, name="other")]}, "is set by several of them"),
+    ({"base": {"operation": {}}}, "give a Case or a Subject"),
+    ({"design": "factorial", "options": {"generator": ["B=A"]}}, "did you mean generators"),
+    ({"design": "list", "options": {"rows": "none"}}, "give options={'rows'"),
+]
+
+
+@pytest.mark.parametrize(("settings", "words"), BAD_PLANS, ids=[" ".join(s) for s, _ in BAD_PLANS])
+def test_bad_plans(settings, words):
+    given = {"base": Case(), "factors": [TORQUE], "n": 4, **settings}
+    with pytest.raises(CampaignError) as error:
+        make_plan(**given)
+    assert words in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"high": float("inf")}, "is not finite"),
+        ({"values": "100 N m", "low": None, "high": None}, "give a list"),
+        ({"levels": 0}, "levels = 0; give a whole number, 1 or more"),
+        ({"levels": 2.5}, "levels = 2.5; give a whole number"),
+        ({"low": 2.5, "high": 7.0, "whole": True}, "2.5 to 7 is no range of whole numbers"),
+    ],
+)
+def test_bad_factors(settings, words):
+    with pytest.raises(CampaignError) as error:
+        make_plan(Case(), [Factor(**{"path": "operation.torque", "low": 1.0, "high": 2.0, **settings})], n=4)
+    assert words in str(error.value)
+
+
+def test_what_is_meant_is_taken():
+    plan = make_plan(Case(), TORQUE, n=4.0, keep="harmonics", time_limit="2 min", memory_limit="2 GB", reuse="a")
+    assert plan.n == 4
+    assert plan.keep == ("harmonics",)
+    assert plan.time_limit == 120.0
+    assert plan.memory_limit == 2e9
+    # workers need not run in the folder of this process
+    assert plan.reuse == (str(Path("a").absolute()),)
+    grid = make_plan(Case(), [TORQUE, Factor("operation.speed", 90.0, 110.0, levels=2)], "grid", options={"levels": 5})
+    assert len(grid.points()) == 10
+
+
+def test_rows_of_a_list_leave_out_what_stays():
+    rows = [{"operation.torque": "100 N m"}, {"operation.torque": 120, "operation.speed": "900 rpm"}]
+    plan = make_plan(Case(), design="list", options={"rows": rows})
+    columns = plan.columns(plan.points())
+    made = [plan.data({k: v[i] for k, v in columns.items()})["operation"] for i in range(2)]
+    assert [m["torque"] for m in made] == [100.0, 120.0]
+    assert made[0]["speed"] == Case().operation.speed
+    assert made[1]["speed"] == pytest.approx(900 * np.pi / 30)
+
+
+def test_wrong_everywhere_is_said_once():
+    plan = make_plan(FunctionSubject("nowhere:f", {"x": 1.0}), [Factor("x", 0.0, 1.0)], n=2)
+    with pytest.raises(CampaignError, match=r"^plan: no case is possible: function 'nowhere:f': cannot be imported"):
+        plan.check()
+
+
+def nested(x: float, law: dict, table: list) -> float:
+    """Return one number of parameters that are none."""
+    return x * law["stiffness"] + sum(table)
+
+
+def test_functions_of_more_than_numbers(tmp_path):
+    parameters = {"x": 1.0, "law": {"stiffness": "2 N/mm", "kind": "soft"}, "table": np.arange(3)}
+    subject = FunctionSubject(nested, parameters, units={"law.stiffness": "N/m"})
+    campaign = Campaign(tmp_path / "c", make_plan(subject, [Factor("law.stiffness", "1 N/mm", "3 N/mm")], n=4))
+    campaign.run(workers=0)
+    np.testing.assert_allclose(campaign.table.nested, campaign.table["law.stiffness"] + 3.0)
+    with pytest.raises(CampaignError, match="is a Case, which cannot be stored"):
+        FunctionSubject(nested, {"x": Case()})
+    with pytest.raises(CampaignError, match="of a function at the top of a module"):
+        FunctionSubject(lambda x: x, {"x": 1.0})
+    with pytest.raises(CampaignError, match="stands in the script that runs"):
+        FunctionSubject("__main__:f", {"x": 1.0})
+    with pytest.raises(CampaignError, match="'zork' is no unit"):
+        FunctionSubject(nested, {"x": 1.0}, units={"x": "zork"})
+    with pytest.raises(CampaignError, match="has no such parameter"):
+        subject.unit_of("law.damping")
+    assert FunctionSubject(ishigami, PLACES).function == "tests.campaigns.models:ishigami"
+
+
+def unruly(x: float) -> dict:
+    """Go wrong in a way of its own for each x, or return names that are taken."""
+    if x == 1:
+        raise FileNotFoundError(2, "No such file", "table.csv")
+    if x == 2:
+        sys.exit(3)
+    if x == 3:
+        return {"wave": np.zeros(9)}
+    if x == 4:
+        return None
+    return {"x": 5.0, "status": 7.0, "wave": np.ones(4)}
+
+
+def test_cases_that_go_wrong_in_odd_ways(tmp_path):
+    """None of them ends the run, none takes the place of a column."""
+    subject = FunctionSubject(unruly, {"x": 0}, signals={"wave": (4, 1.0)})
+    rows = [{"x": k} for k in range(6)]
+    plan = make_plan(subject, design="list", options={"rows": rows}, keep=["numbers", "signal:wave"], unit=3)
+    campaign = Campaign(tmp_path / "c", plan)
+    campaign.run(workers=1)
+    failed = campaign.failed().set_index("x")
+    assert sorted(failed.index) == [1, 2, 3, 4]
+    assert "table.csv" in failed.message[1]
+    assert failed.message[2] == "SystemExit: 3"
+    assert "9 samples, planned for 4" in failed.message[3]
+    assert "returned None; return a dictionary" in failed.message[4]
+    done = campaign.table[campaign.table.status == "done"]
+    assert list(done.x) == [0, 5]
+    assert list(done["result.x"]) == [5.0, 5.0]
+    assert list(done["result.status"]) == [7.0, 7.0]
+
+
+def test_a_script_without_a_guard_runs(tmp_path):
+    """New processes import modules; they do not run the script again."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from tests.campaigns.support import small\nprint('begun')\n"
+        f"print(small({str(tmp_path / 'c')!r}, n=16).run(workers=2))\n"
+    )
+    found = subprocess.run(
+        [sys.executable, script], capture_output=True, text=True, timeout=120, check=False,
+        env={"PYTHONPATH": ":".join(p or "." for p in sys.path)},
+    )  # fmt: skip
+    assert found.stdout.count("begun") == 1
+    assert "16 of 16 cases done" in found.stdout
+
+
+def _make(path: str) -> None:
+    make_folder(path, make_plan(function(), ranges(), n=64, unit=2, keep=["numbers", "signal:wave"]))
+
+
+def test_made_by_several_at_once(tmp_path):
+    """Whoever comes second takes up what is there; nobody clears what another one has begun."""
+    context = multiprocessing.get_context("fork")
+    makers = [context.Process(target=_make, args=(str(tmp_path / "c"),)) for _ in range(4)]
+    for maker in makers:
+        maker.start()
+    for maker in makers:
+        maker.join(60)
+    assert [maker.exitcode for maker in makers] == [0, 0, 0, 0]
+    assert [p.name for p in tmp_path.iterdir()] == ["c"]
+    assert Campaign(tmp_path / "c").folder.case_count == 64
+
+
+def test_places_that_will_not_do(tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(CampaignError, match="holds something else than a campaign"):
+        small(tmp_path)
+    with pytest.raises(CampaignError, match="holds something else than a campaign"):
+        small(tmp_path / "notes.txt")
+    with pytest.raises(CampaignError, match="cannot be made"):
+        small(tmp_path / "notes.txt" / "c")
+    assert [p.name for p in tmp_path.iterdir()] == ["notes.txt"]
+
+
+def test_an_edited_plan_is_told(tmp_path):
+    small(tmp_path / "c", n=8)
+    with pytest.raises(CampaignError, match="with other seed and unit; choose another folder"):
+        small(tmp_path / "c", n=8, seed=4, unit=4)
+    with pytest.raises(CampaignError, match="8 points have been drawn, the plan has n = 16"):
+        small(tmp_path / "c", n=16)
+    # a script whose campaign was extended since is run again
+    Campaign(tmp_path / "c").extend(12)
+    assert small(tmp_path / "c", n=8).folder.case_count == 12
+
+
+def test_damaged_files_are_named(tmp_path):
+    campaign = small(tmp_path / "c", n=16)
+    campaign.run(workers=0)
+    whole = campaign.table
+    ledger = campaign.folder.ledger(1)
+    ledger.write_text(ledger.read_text()[:50])
+    with pytest.raises(CampaignError, match="this ledger is damaged; gearmbs campaign check --sweep"):
+        campaign.status()
+    assert campaign.check(sweep=True) == ["unit 1: the ledger is damaged"]
+    campaign.run(workers=0)
+    campaign.folder.table(0).unlink()
+    with pytest.raises(CampaignError, match="missing or damaged"):
+        _ = campaign.table
+    for path in sorted(campaign.folder.signals.rglob("*"), reverse=True):
+        path.rmdir() if path.is_dir() else path.unlink()
+    campaign.folder.signals.rmdir()
+    with pytest.raises(CampaignError, match="missing or damaged"):
+        campaign.check(sweep=True), campaign.run(workers=0), campaign.folder.table(0).unlink(), campaign.open()
+    campaign.check(sweep=True)
+    campaign.run(workers=0)
+    assert campaign.table.equals(whole)
+    plan = campaign.path / "plan.json"
+    plan.write_text(plan.read_text()[:40])
+    with pytest.raises(CampaignError, match=r"plan.json is damaged"):
+        Campaign(campaign.path)
+    plan.write_text(json.dumps({}))
+    with pytest.raises(CampaignError, match="format None is unknown"):
+        Campaign(campaign.path)
+
+
+def test_questions_put_wrongly(tmp_path):
+    campaign = small(tmp_path / "c", n=16)
+    campaign.run(workers=0)
+    asked = [
+        (lambda: campaign.response_surface("y", 7), "degree = 7; give 1 or 2"),
+        (lambda: campaign.sensitivity("message"), "is a column of texts"),
+        (lambda: condition_map(campaign, "y > 1", "nope", "x1"), "'nope' is no column of numbers"),
+        (lambda: condition_map(campaign, "y > 1", "x1", "x2", 0), "bins = 0"),
+        (lambda: campaign.run("2"), "workers = '2'; give a whole number"),
+        (lambda: campaign.run(client=3), "give a distributed.Client"),
+        (lambda: campaign.run(0, minutes=-1), "minutes = -1"),
+        (lambda: campaign.extend(9.5), "extend: n = 9.5; give a whole number"),
+        (lambda: campaign.case("a"), "case = 'a'; give a whole number"),
+        (lambda: campaign.export(tmp_path / "o", "hf", held_out={"nope": (0, 1)}), "'nope' is no column of numbers"),
+        (lambda: campaign.export(tmp_path / "o", "hf", held_out={"x1": (2, 1)}), "give its lower and upper end"),
+    ]
+    for ask, words in asked:
+        with pytest.raises(CampaignError) as error:
+            ask()
+        assert words in str(error.value)
+
+
+def test_a_grid_tells_what_decides(tmp_path):
+    """Parts of variance by hand: y = a + b + c on levels, and an interaction in the total indices."""
+    kinds = choose("x3", low=0.0, high=2.0)
+    factors = [Factor("x1", 0.0, 1.0, levels=3), Factor("x2", 0.0, 1.0, levels=4), kinds]
+    campaign = Campaign(tmp_path / "c", make_plan(function(), factors, "grid"))
+    campaign.run(workers=0)
+    found = campaign.sensitivity("y")
+    y = campaign.table.y.to_numpy().reshape(3, 4, 2)
+    means = [y.mean(axis=(1, 2)), y.mean(axis=(0, 2)), y.mean(axis=(0, 1))]
+    np.testing.assert_allclose(found.first, [m.var() / y.var() for m in means])
+    # x2 takes part in no interaction
+    assert found.total[1] == pytest.approx(found.first[1], rel=1e-12)
+    assert found.total[0] - found.first[0] == pytest.approx(found.total[2] - found.first[2], rel=1e-9)
+    assert found.first.sum() + found.total[0] - found.first[0] == pytest.approx(1.0, rel=1e-12)
+    assert "Parts of the grid's variance" in campaign.report(tmp_path / "r.html").read_text()
+
+
+def test_ranges_held_out(tmp_path):
+    campaign = small(tmp_path / "c", n=40)
+    campaign.run(workers=0)
+    campaign.export(tmp_path / "o", "hf", split_by="point", held_out={"x1": (0.0, 1.0)})
+    import pyarrow.parquet as pq
+
+    def inside(split):
+        x = pq.read_table(next((tmp_path / "o" / "data").glob(f"{split}-*"))).to_pandas().x1
+        return ((x >= 0.0) & (x <= 1.0)).mean()
+
+    assert inside("withheld") == 1.0
+    assert inside("train") == 0.0
+    assert 0.0 < inside("test") < 1.0
+    assert "split: withheld" in (tmp_path / "o" / "README.md").read_text()
