@@ -89,17 +89,23 @@ def update_bodies(y, at, code, body, modal, kin, partial, scratch, derivatives):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
+def update_marker(m, marker_body, marker, kin, frame):
+    """Fill one row of the marker table: arm and axes in global components."""
+    row = kin[marker_body[m]]
+    for c in range(3):
+        a = KIN_A + 3 * c
+        frame[m, T.MK_ARM + c] = dot3(row, a, marker[m], 0)
+        for axis in range(3):
+            frame[m, T.MK_AXES + 3 * axis + c] = (
+                row[a] * marker[m, 3 + axis] + row[a + 1] * marker[m, 6 + axis] + row[a + 2] * marker[m, 9 + axis]
+            )
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_markers(marker_body, marker, kin, frame):
-    """Fill the marker table: arms and axes in global components."""
+    """Fill the marker table."""
     for m in range(marker_body.size):
-        row = kin[marker_body[m]]
-        for c in range(3):
-            a = KIN_A + 3 * c
-            frame[m, T.MK_ARM + c] = dot3(row, a, marker[m], 0)
-            for axis in range(3):
-                frame[m, T.MK_AXES + 3 * axis + c] = (
-                    row[a] * marker[m, 3 + axis] + row[a + 1] * marker[m, 6 + axis] + row[a + 2] * marker[m, 9 + axis]
-                )
+        update_marker(m, marker_body, marker, kin, frame)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

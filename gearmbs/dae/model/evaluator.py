@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
-from numba import float64, int64, types
+from numba import float64, int64
 from scipy.sparse import csc_array
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.lanes import LANES
 from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
 from gearmbs.dae.equations import accelerations as index1
 from gearmbs.dae.equations import layout as T
@@ -20,21 +20,17 @@ from gearmbs.dae.equations.output_records import joint_loads, loads_of_rows, pos
 from gearmbs.dae.equations.projection import are_satisfied, displace, largest_violation, violations
 from gearmbs.dae.equations.reactions import renew_reactions
 from gearmbs.dae.equations.residual import update
-from gearmbs.dae.equations.rotation import POSE_COLUMNS
 from gearmbs.dae.equations.update import update_tables
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.linalg.counted_entries import FEWEST_ENTRIES, LEAVING_PLANS
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan, SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, LUFactors, factor, new_factors, solve, solve_pair
+from gearmbs.dae.model import side_by_side
+from gearmbs.dae.model.records import FARTHEST, RECORDS_TYPE, Records, allow_rounding, new_records
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
-_CUBE = float64[:, :, ::1]
 _IVEC = int64[::1]
-
-
-FARTHEST = 1e-3
-"""A constraint farther off than this belongs to an angle whose full turns were not counted; it is left alone."""
 
 
 GENERIC_TURNS = (0.1, 0.02, 0.3, 0.0)
@@ -48,99 +44,8 @@ SAME_POSITION = 0.05
 SINGULAR = 1e-8
 """Relative singular value of the index-1 matrix below which a direction counts as undetermined."""
 
-ROUNDED = 1e-13
-"""Change of an entry of the equilibrated matrix that is rounding, of all the products that it is made of.
-
-Of wheels that spin about fixed axes the mass matrix and the constraints' gradients stay what they are in global
-components, and so do the factors."""
-
 REACTION_PASSES = 30
 """Most corrections of loads that depend on reactions, such as joint friction, to the multipliers of one output."""
-
-
-class Records(NamedTuple):
-    """What is evaluated, one row per output time.
-
-    Attributes
-    ----------
-    pose : ndarray, shape (m, 18 bodies)
-        R, A (row-major), v, omega of each moving body.
-    solution : ndarray, shape (m, 6 bodies + rows)
-        Accelerations a, alpha of each body, then the multipliers.
-    loads : ndarray, shape (m, elements, 6 + diagnostics)
-        F, N and what each element tells beside them.
-    phi : ndarray, shape (m, 3 rows)
-        Phi, its rate and its partial time derivative, row by row.
-    force, moment : ndarray, shape (m, rows, 3)
-        Reaction on I's body at marker I.
-    strayed : ndarray, shape (m,)
-        Largest |Phi| of the integrator's solution, before it is projected onto the constraints.
-    """
-
-    pose: np.ndarray
-    solution: np.ndarray
-    loads: np.ndarray
-    phi: np.ndarray
-    force: np.ndarray
-    moment: np.ndarray
-    strayed: np.ndarray
-
-    @property
-    def by_body(self) -> np.ndarray:
-        """`pose` as (m, bodies, 18)."""
-        bodies = self.bodies
-        return self.pose[:, : POSE_COLUMNS * bodies].reshape(len(self.pose), bodies, POSE_COLUMNS)
-
-    @property
-    def bodies(self) -> int:
-        """Number of moving bodies."""
-        coordinates = self.solution.shape[1] - self.force.shape[1]
-        # 18 places a body and two a mode in one, 6 and one in the other
-        return (self.pose.shape[1] - 2 * coordinates) // 6
-
-    @property
-    def modal(self) -> np.ndarray:
-        """q_f, v_f and their accelerations, shape (3, m, modal coordinates)."""
-        first, bodies = POSE_COLUMNS * self.bodies, self.bodies
-        half = (self.pose.shape[1] - first) // 2
-        accelerations = self.solution[:, 6 * bodies : 6 * bodies + half]
-        return np.stack([self.pose[:, first : first + half], self.pose[:, first + half :], accelerations])
-
-    @property
-    def accelerations(self) -> np.ndarray:
-        """a and alpha, shape (m, bodies, 6)."""
-        m, bodies = len(self.pose), self.bodies
-        return self.solution[:, : 6 * bodies].reshape(m, bodies, 6)
-
-    @property
-    def multipliers(self) -> np.ndarray:
-        """Lambda, shape (m, rows)."""
-        return self.solution[:, self.solution.shape[1] - self.force.shape[1] :]
-
-    @property
-    def by_row(self) -> np.ndarray:
-        """`phi` as (m, rows, 3)."""
-        return self.phi.reshape(len(self.phi), self.phi.shape[1] // 3, 3)
-
-    def first(self, m: int) -> Records:
-        """Return views of the first m rows."""
-        return Records(*(part[:m] for part in self))
-
-
-RECORDS_TYPE = types.NamedTuple((_MAT, _MAT, _CUBE, _MAT, _CUBE, _CUBE, _VEC), Records)
-
-
-def new_records(m: int, bodies: int, rows: int, elements: int, diagnostics: int, modes: int = 0) -> Records:
-    """Return empty records for m output times; ``diagnostics`` is the most that an element has."""
-    return Records(
-        np.zeros((m, POSE_COLUMNS * bodies + 2 * modes)),
-        np.zeros((m, 6 * bodies + modes + rows)),
-        np.zeros((m, max(elements, 1), index1.FORCE_RECORD + diagnostics)),
-        np.zeros((m, 3 * rows)),
-        np.zeros((m, rows, 3)),
-        np.zeros((m, rows, 3)),
-        np.zeros(m),
-    )
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -187,15 +92,6 @@ def project(t, at, phi, plan, factors, pair, idata, tab):
     displace(at, pair[0], pair[1], idata, tab)
     update_tables(t, at, tab, True)
     return strayed
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def allow_rounding(plan, allowed):
-    """Write by how much each entry of the matrix may change and still count as unchanged."""
-    for p in range(plan.a_src.size):
-        allowed[plan.a_src[p]] = ROUNDED / plan.a_scale[p]
-    for p in range(plan.left_src.size):
-        allowed[plan.left_src[p]] = plan.left_limit[p]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -373,6 +269,8 @@ class Evaluator:
         self.vals = np.zeros(self.pattern[1].size)
         self.plan: LUPlan | None = None
         self.factors: LUFactors | None = None
+        self.has_lanes = side_by_side.is_possible(idata)
+        self.side: side_by_side.SideBySide | None = None
         self.growth = GROWTH_LIMIT
         self.counted = np.zeros(self.vals.size, dtype=bool)
         self.plans = 0
@@ -384,7 +282,7 @@ class Evaluator:
         """
         y = np.ascontiguousarray(y)
         bounds = [row for row, _ in epochs] + [t.size]
-        slots, rdata, work, vals = self.pattern[2], self.rdata, self.work, self.vals
+        rdata, work = self.rdata, self.work
         for (first, table), last in zip(epochs, bounds[1:]):
             table = np.ascontiguousarray(table)
             attempt = 0
@@ -397,11 +295,24 @@ class Evaluator:
                         continue
                     if attempt > 1 or not self._choose_sparsely(*place, table):
                         self._choose_pivots(*place, table, GENERIC_TURNS[max(attempt, 1) - 1])
-                done = evaluate_rows(
-                    first, last, t, y, slots, table, rdata, work, vals, self.plan, self.factors, records, self.growth
-                )
+                done = self._evaluate(first, last, t, y, table, records)
                 attempt = attempt + 1 if done == first else 1 if done < last else 0
                 first = done
+
+    def _evaluate(
+        self, first: int, last: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records: Records
+    ) -> int:
+        """Evaluate rows side by side, where the model allows it, and the rest one after the other."""
+        slots, rdata, work = self.pattern[2], self.rdata, self.work
+        if self.side is not None:
+            together = first + LANES * ((last - first) // LANES)
+            done = self.side.evaluate(first, together, t, y, slots, table, rdata, work, records, self.growth)
+            if done < together or done == last:
+                return done
+            first = done
+        return evaluate_rows(
+            first, last, t, y, slots, table, rdata, work, self.vals, self.plan, self.factors, records, self.growth
+        )
 
     def _choose_sparsely(self, t: np.ndarray, y: np.ndarray, table: np.ndarray) -> bool:
         """Choose pivots at one row, if there entries can be left out that have been negligible so far."""
@@ -427,6 +338,7 @@ class Evaluator:
                 "that differ by too many orders of magnitude"
             ) from error
         self.factors = new_factors(self.plan)
+        self.side = side_by_side.SideBySide(table, self.plan, self.vals.size) if self.has_lanes else None
         # an ill-scaled mechanism may grow with the best of pivots
         self.growth = max(GROWTH_LIMIT, 100.0 * factor(self.plan, self.factors, self.vals))
 

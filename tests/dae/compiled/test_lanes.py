@@ -1,0 +1,41 @@
+"""Eight numbers at a time: the arithmetic of numpy's on rows of eight."""
+
+import numpy as np
+import pytest
+
+from gearmbs._jit import njit
+from gearmbs.dae.compiled.lanes import LANES, all_lanes, lanes_at, larger, magnitude, put_lanes
+
+
+@njit(error_model="numpy")
+def combine(a, out):
+    x, y, z = lanes_at(a, 0), lanes_at(a, 1), lanes_at(a, 2)
+    put_lanes(out, 0, x + y * z - x / y)
+    put_lanes(out, 1, 2.0 * x - z * 0.5 + (1.0 - y) + 3.0 / x)
+    put_lanes(out, 2, larger(-x, magnitude(y)))
+    put_lanes(out, 3, all_lanes(a[0, 1]))
+    total = all_lanes(0.0)
+    for k in range(3):
+        total += lanes_at(a, k)
+    put_lanes(out, 4, total)
+
+
+def test_arithmetic_is_that_of_each_number():
+    a = np.random.default_rng(1).uniform(-2.0, 2.0, (3, LANES))
+    out = np.zeros((5, LANES))
+    combine(a, out)
+    x, y, z = a
+    np.testing.assert_array_equal(out[0], x + y * z - x / y)
+    np.testing.assert_allclose(out[1], 2.0 * x - z * 0.5 + (1.0 - y) + 3.0 / x, rtol=1e-15)
+    np.testing.assert_array_equal(out[2], np.maximum(-x, np.abs(y)))
+    assert (out[3] == a[0, 1]).all()
+    np.testing.assert_array_equal(out[4], (x + y) + z)
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_the_larger_of_a_number_and_nan_is_nan(place):
+    a = np.ones((3, LANES))
+    a[place, 3] = np.nan
+    out = np.zeros((5, LANES))
+    combine(a, out)
+    assert np.isnan(out[2]).tolist() == [lane == 3 for lane in range(LANES)]
