@@ -24,10 +24,13 @@ if TYPE_CHECKING:
     from gearmbs.flexible.rotor import Campbell, Rotor, Support, UnbalanceResponse, WhirlModes
     from gearmbs.flexible.shaft import Disc, Shaft, ShaftSection
     from gearmbs.flexible.solid import block_mesh, nodes_where, ring_mesh, solid_model
+    from gearmbs.flexible.stress import StressModes
+    from gearmbs.flexible.surface import BodySurface
 
 __all__ = [
     "BeamChain",
     "BeamSection",
+    "BodySurface",
     "Campbell",
     "Disc",
     "ElasticMaterial",
@@ -44,6 +47,7 @@ __all__ = [
     "Seat",
     "Shaft",
     "ShaftSection",
+    "StressModes",
     "Support",
     "UnbalanceResponse",
     "WhirlModes",
@@ -78,6 +82,7 @@ late(
     {
         "BeamChain": ".large_beam",
         "BeamSection": ".beam",
+        "BodySurface": ".surface",
         "Campbell": ".rotor",
         "Disc": ".shaft",
         "ElasticMaterial": ".material",
@@ -94,6 +99,7 @@ late(
         "Seat": ".modal_model",
         "Shaft": ".shaft",
         "ShaftSection": ".shaft",
+        "StressModes": ".stress",
         "Support": ".rotor",
         "UnbalanceResponse": ".rotor",
         "WhirlModes": ".rotor",

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 
 from gearmbs.flexible.beam import Slices
 from gearmbs.flexible.errors import FlexibleError
+from gearmbs.flexible.stress import StressRecovery
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +53,10 @@ class FiniteElementModel:
         What the mass matrix was made from, of beams.
     faces : ndarray of int, shape (f, 3 or 4), optional
         Rows of the corners of surface facets, for views.
+    outline : ndarray, shape (k, 2), optional
+        Of a body of revolution about z: rows of z and radius, m, for views.
+    recovery : StressRecovery, optional
+        How stresses follow from displacements of the nodes.
 
     Raises
     ------
@@ -68,6 +73,8 @@ class FiniteElementModel:
     seats: dict[str, int] = field(default_factory=dict)
     slices: Slices | None = None
     faces: np.ndarray | None = None
+    outline: np.ndarray | None = None
+    recovery: StressRecovery | None = None
 
     def __post_init__(self) -> None:
         d = len(self.dofs)

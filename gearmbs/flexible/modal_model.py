@@ -12,6 +12,8 @@ import numpy.typing as npt
 from gearmbs.flexible.damping import Damping, damping_ratios
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import MassProperties
+from gearmbs.flexible.stress import StressModes, StressRecovery
+from gearmbs.flexible.surface import BodySurface, faceted_surface, hull_surface, revolved_surface
 from gearmbs.mechanism import Mechanism, ModalBody, Mode, ShapeIntegrals
 
 REACH = 1e-4
@@ -70,6 +72,10 @@ class ModalModel:
         Whether the nodes are those of a beam along z, between which shapes are interpolated.
     masses, inertias : ndarray, shapes (N,), (N, 3, 3), optional
         Lumped at the nodes, kg and kg m^2.
+    outline : ndarray, shape (k, 2), optional
+        Of a body of revolution about z: rows of z and radius, m.
+    recovery : StressRecovery, optional
+        How stresses follow from the shapes; see `stress_modes`.
     stiffened : bool
         Whether the integrals have the stiffening by a spin across the long axis.
     """
@@ -87,6 +93,8 @@ class ModalModel:
     line: bool = False
     masses: np.ndarray | None = None
     inertias: np.ndarray | None = None
+    outline: np.ndarray | None = None
+    recovery: StressRecovery | None = None
     stiffened: bool = False
 
     @property
@@ -161,15 +169,26 @@ class ModalModel:
         return solved.T
 
     def _on_line(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the motion of the section of a beam at a point that turns with it."""
+        """Return the motion of a point that turns with its section of a beam."""
+        moved, turned = self.section_motion(point[2])
+        return moved + np.cross(turned, np.array([point[0], point[1], 0.0])), turned
+
+    def section_motion(self, at: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return displacement of the middle, and rotation, of the section of a beam at z, by each mode, each (n, 3).
+
+        Raises
+        ------
+        FlexibleError
+            Off the shaft.
+        """
         z = self.positions[:, 2]
-        if not z[0] - REACH * self.size <= point[2] <= z[-1] + REACH * self.size:
+        if not z[0] - REACH * self.size <= at <= z[-1] + REACH * self.size:
             raise FlexibleError(
-                f"{self.name}: z = {point[2]:.6g} m is off the shaft, which reaches from {z[0]:.6g} to {z[-1]:.6g} m"
+                f"{self.name}: z = {at:.6g} m is off the shaft, which reaches from {z[0]:.6g} to {z[-1]:.6g} m"
             )
-        k = int(np.clip(np.searchsorted(z, point[2]) - 1, 0, z.size - 2))
+        k = int(np.clip(np.searchsorted(z, at) - 1, 0, z.size - 2))
         length = z[k + 1] - z[k]
-        x = np.clip((point[2] - z[k]) / length, 0.0, 1.0)
+        x = np.clip((at - z[k]) / length, 0.0, 1.0)
         a, b = self.moved[:, k], self.moved[:, k + 1]
         assert self.turned is not None
         ta, tb = self.turned[:, k], self.turned[:, k + 1]
@@ -182,8 +201,7 @@ class ModalModel:
             moved[:, plane] = sum(w * e for w, e in zip(h, ends))
             # slopes with shear differ from rotations: keep the nodes' rotations, the field's change between
             turned[:, axis] = sign / length * sum(w * e for w, e in zip(g, ends))
-        offset = np.array([point[0], point[1], 0.0])
-        return moved + np.cross(turned, offset), turned
+        return moved, turned
 
     def selected(self, chosen: npt.ArrayLike) -> ModalModel:
         """Return the body with some of its modes, counted from 0."""
@@ -265,6 +283,7 @@ class ModalModel:
         body = mechanism.modal_body(
             label, p.mass, p.inertia, modes, self.shapes, integrals=self.integrals.coupled(coupling), com=p.com, **where
         )
+        body.surface = self.surface
         values, axes = np.linalg.eigh(p.inertia)
         if values[0] < SLENDER * values[1] and not (self.stiffened and coupling == "full"):
             body.long_axis = axes[:, 0].copy()
@@ -274,6 +293,31 @@ class ModalModel:
     def displaced(self, coordinates: np.ndarray, factor: float = 1.0) -> np.ndarray:
         """Return the nodes moved by modal coordinates of shape (n,), ``factor`` times as far, shape (N, 3), m."""
         return self.positions + factor * np.einsum("n,npi->pi", np.asarray(coordinates, dtype=float), self.moved)
+
+    def surface(self) -> BodySurface | None:
+        """Return what is drawn of the body: its outline, its facets, or the hull of its nodes; None if that is flat."""
+        if self.outline is not None:
+            return revolved_surface(self.outline, self.positions[:, 2], self.section_motion)
+        if self.faces is not None:
+            return faceted_surface(self.positions, self.faces, self.moved)
+        return hull_surface(self.positions, self.moved)
+
+    def stress_modes(self) -> StressModes:
+        """Return the stresses by one unit of each mode, where the finite elements are known.
+
+        They are of shafts by sections and of meshes assembled here; with a file's own stresses see `StressModes`.
+
+        Raises
+        ------
+        FlexibleError
+            If nothing tells how stresses follow from the shapes.
+        """
+        if self.recovery is None:
+            raise FlexibleError(
+                f"{self.name}: its stresses are not known, since its elements are not; take the stresses of the modes "
+                "from the finite-element program and make StressModes(positions, values) of them"
+            )
+        return self.recovery(self.moved, self.turned)
 
     def strain_energies(self, coordinates: np.ndarray) -> np.ndarray:
         """Return the strain energy in each mode, J, for coordinates of shape (..., n)."""

@@ -212,6 +212,8 @@ def as_modal_model(
         line=model.slices is not None,
         masses=masses,
         inertias=inertias,
+        outline=model.outline,
+        recovery=model.recovery,
     )
 
 

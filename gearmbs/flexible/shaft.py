@@ -23,6 +23,8 @@ from gearmbs.flexible.beam import (
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import FiniteElementModel
 from gearmbs.flexible.material import STEEL, ElasticMaterial
+from gearmbs.flexible.stress_recovery import ShaftStresses
+from gearmbs.flexible.surface import outline_of
 from gearmbs.mechanism.quantities import quantity
 from gearmbs.units import Quantity
 
@@ -120,6 +122,16 @@ class Disc(Written):
         round_part = self.outer**2 + self.inner**2
         return m, m * round_part / 8, m * (3 * round_part + 4 * self.width**2) / 48
 
+    def plain_size(self, material: ElasticMaterial) -> tuple[float, float]:
+        """Return radius and width, m; of the plain disc with its moments if it was given by them."""
+        if self.outer is not None and self.width is not None:
+            return self.outer / 2, self.width
+        mass, polar, diametral = self.properties(material)
+        if not mass > 0.0:
+            return 0.0, 0.0
+        square = 2.0 * polar / mass
+        return float(np.sqrt(square)), float(np.sqrt(max(12.0 * diametral / mass - 3.0 * square, 0.0)))
+
 
 @dataclass(frozen=True)
 class Shaft(Written):
@@ -195,15 +207,32 @@ class Shaft(Written):
 
     def element_section(self, a: float, b: float) -> BeamSection:
         """Return the section of the element between two stations; a cone has the one at its middle."""
-        start, mid = 0.0, 0.5 * (a + b)
-        for s in self.sections:
-            if mid < start + s.length or s is self.sections[-1]:
-                x = (mid - start) / s.length
-                outer = s.outer + x * (s.outer_end - s.outer)
-                inner = s.inner + x * (s.inner_end - s.inner)
-                return BeamSection.ring(s.material or self.material, outer, inner, self.shear)
-            start += s.length
-        raise AssertionError
+        section, start = self._section_around(0.5 * (a + b))
+        outer, inner = _diameters(section, 0.5 * (a + b) - start)
+        return BeamSection.ring(section.material or self.material, outer, inner, self.shear)
+
+    def outline(self) -> np.ndarray:
+        """Return the outline with the discs, rows of z and radius, m; steps have two rows at one place."""
+        ends = np.concatenate([[0.0], np.cumsum([s.length for s in self.sections])])
+        pieces = [(a, b, s.outer / 2, s.outer_end / 2) for (a, b), s in zip(pairwise(ends), self.sections)]
+        for disc in self.discs:
+            radius, width = disc.plain_size(self.material)
+            if radius > 0.0 and width > 0.0:
+                pieces.append((disc.at - width / 2, disc.at + width / 2, radius, radius))
+        return outline_of(pieces)
+
+    def _stresses(self, stations: np.ndarray) -> ShaftStresses:
+        sizes = []
+        for a, b in pairwise(stations):
+            section, start = self._section_around(0.5 * (a + b))
+            sizes.append((_diameters(section, a - start), _diameters(section, b - start)))
+        return ShaftStresses(stations, [self.element_section(a, b) for a, b in pairwise(stations)], sizes)
+
+    def _section_around(self, z: float) -> tuple[ShaftSection, float]:
+        """Return the section that a place is in, and where it begins, m."""
+        starts = np.concatenate([[0.0], np.cumsum([s.length for s in self.sections])])
+        k = int(np.clip(np.searchsorted(starts, z, side="right") - 1, 0, len(self.sections) - 1))
+        return self.sections[k], float(starts[k])
 
     def model(self) -> FiniteElementModel:
         """Return the finite-element model: consistent Timoshenko elements with axial motion and torsion."""
@@ -230,8 +259,9 @@ class Shaft(Written):
         dofs = np.column_stack([np.repeat(np.arange(z.size), DOFS), np.tile(np.arange(DOFS), z.size)])
         seats = {key: int(np.argmin(np.abs(z - at))) for key, at in self.seats.items()}
         return FiniteElementModel(
-            np.arange(1, z.size + 1), positions, dofs, stiffness, slices.mass_matrix(), self.name, seats, slices
-        )
+            np.arange(1, z.size + 1), positions, dofs, stiffness, slices.mass_matrix(), self.name, seats, slices,
+            outline=self.outline(), recovery=self._stresses(z),
+        )  # fmt: skip
 
     def spin_stiffness(self, about: str | Quantity) -> np.ndarray:
         """Return the geometric stiffness by a spin of 1 rad/s across the shaft, about an axis through a place of it.
@@ -287,6 +317,14 @@ class Shaft(Written):
             max_frequency=max_frequency,
             spin_stiffness=None if spin is None else self.spin_stiffness(spin),
         )
+
+
+def _diameters(section: ShaftSection, way: float) -> tuple[float, float]:
+    """Return outer and inner diameter of a section so far from its beginning, m."""
+    x = way / section.length
+    return section.outer + x * (section.outer_end - section.outer), section.inner + x * (
+        section.inner_end - section.inner
+    )
 
 
 def _slices(rows: list[tuple[Any, ...]], size: int) -> Slices:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import FiniteElementModel
 from gearmbs.flexible.material import STEEL, ElasticMaterial
 from gearmbs.flexible.matrices import from_matrices
+from gearmbs.flexible.stress_recovery import SolidStresses
 from gearmbs.mechanism.quantities import quantities, quantity
 from gearmbs.units import Quantity
 
@@ -74,13 +76,15 @@ def solid_model(
     def inertia(u, v, _):
         return material.density * dot(u, v)
 
-    basis = fem.Basis(mesh, fem.ElementVector(kinds[type(mesh).__name__][int(quadratic)]()), intorder=5)
+    element = kinds[type(mesh).__name__][int(quadratic)]()
+    basis = fem.Basis(mesh, fem.ElementVector(element), intorder=5)
     k, m = stiffness.assemble(basis), inertia.assemble(basis)
     # degrees of freedom come in threes, one for each direction at one place
     places = basis.doflocs[:, ::3].T
     dofs = np.column_stack([np.repeat(np.arange(1, len(places) + 1), 3), np.tile([1, 2, 3], len(places))])
     facets = mesh.facets[:, mesh.boundary_facets()].T
-    return from_matrices(k, m, places, dofs=dofs, name=name, faces=facets)
+    found = from_matrices(k, m, places, dofs=dofs, name=name, faces=facets)
+    return replace(found, recovery=SolidStresses(basis, element, material))
 
 
 def block_mesh(size: npt.ArrayLike, divisions: tuple[int, int, int] = (4, 4, 4)) -> skfem.MeshHex:

@@ -71,6 +71,17 @@ class Measures:
         """Return the velocity of a marker's, or of a body's frame's, origin, global components, shape (m, 3), m/s."""
         return self._motion(marker)[:, KIN_V : KIN_V + 3]
 
+    def deflection(self, at: Marker | str) -> tuple[np.ndarray, np.ndarray]:
+        """Return how far a marker of a modal body is displaced (m) and turned (rad) in the body's axes, each (m, 3)."""
+        marker = self._find(at) if isinstance(at, str) else at
+        body = getattr(marker, "body", None)
+        if not isinstance(body, ModalBody):
+            raise ModelError(f"{marker!r} is not a marker of a modal body; rigid bodies do not deflect")
+        found = self.solution.evaluated
+        q = found.modal(found.model.names.bodies.index(body.name) + 1)[0]
+        moved, turned = body.shape_at(marker)
+        return q @ moved, q @ turned
+
     def _axes(self, marker: Marker) -> np.ndarray:
         return self._motion(marker)[:, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
 

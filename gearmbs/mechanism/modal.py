@@ -257,6 +257,9 @@ class ModalBody(Body):
         Direction in the body's axes of a slender body.
     spin_limit : float
         Angular speed across it, rad/s, from which :func:`simulate` warns that geometric stiffening is missing.
+    surface : callable, optional
+        Returns what is drawn of the body, with ``vertices``, ``triangles`` and ``moved`` as of
+        :class:`gearmbs.flexible.BodySurface`, or None.
     """
 
     modal: ModalInertia = None  # type: ignore[assignment]
@@ -266,6 +269,7 @@ class ModalBody(Body):
     rate: np.ndarray = field(default_factory=lambda: np.zeros(0))
     long_axis: np.ndarray | None = None
     spin_limit: float = float("inf")
+    surface: Callable[[], Any] | None = None
 
     def shape_at(self, marker: Marker) -> tuple[np.ndarray, np.ndarray]:
         """Return displacements, less the mean, and rotations at a marker by one unit of each mode, each (n, 3).

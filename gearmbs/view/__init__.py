@@ -44,11 +44,12 @@ if TYPE_CHECKING:
     from gearmbs.view.planetary import planetary_plot, planetary_scene
     from gearmbs.view.reports import analysis_figures, comparison_figures, report_plot
     from gearmbs.view.revolution import average_plot
-    from gearmbs.view.scene import Part, Scene
+    from gearmbs.view.scene import Deflection, Part, Scene
     from gearmbs.view.scenes import gear_scene, mechanism_scene, solution_scene
     from gearmbs.view.signals import order_plot, spectrum_plot, time_plot
     from gearmbs.view.solid import gear_solid, pair_solids
     from gearmbs.view.solution_figures import solution_plot
+    from gearmbs.view.stress_figure import stress_plot
     from gearmbs.view.topology import mechanism_plot
     from gearmbs.view.transverse import mesh_view
     from gearmbs.view.wheel import wheel_plot
@@ -58,6 +59,7 @@ __all__ = [
     "BodyAnimation",
     "ContactPoints",
     "ContactProbe",
+    "Deflection",
     "Mesh",
     "MeshAnimation",
     "Page",
@@ -104,6 +106,7 @@ __all__ = [
     "spectrum_plot",
     "static_motion",
     "stiffness_plot",
+    "stress_plot",
     "time_plot",
     "transmission_error_plot",
     "waterfall_plot",
@@ -121,8 +124,10 @@ late(
         "deformation_animation": ".flexible_bodies",
         "mode_animation": ".flexible_bodies",
         "modal_energy_plot": ".flexible_bodies",
+        "stress_plot": ".stress_figure",
         "whirl_plot": ".flexible_bodies",
         "BodyAnimation": ".flexible_bodies",
+        "Deflection": ".scene",
         "COLOURS": ".figure_style",
         "ContactPoints": ".contacts",
         "ContactProbe": ".contacts",

@@ -62,7 +62,7 @@ def plotly_figure(scene: SceneData, frames: int = 24) -> Any:
 def _moving(go: Any, scene: SceneData, instant: int) -> list:
     traces = []
     for part in scene.parts:
-        mesh = part.mesh.placed(part.origins[instant], part.axes[instant])
+        mesh = part.placed(instant)
         x, y, z = mesh.vertices.T
         i, j, k = mesh.triangles.T
         shape = {"x": x, "y": y, "z": z, "i": i, "j": j, "k": k, "flatshading": True, "lighting": LIGHT}

@@ -18,7 +18,7 @@ from gearmbs.view.film import ENDINGS, write_film
 from gearmbs.view.page import Page
 from gearmbs.view.plotly_scene import plotly_figure
 from gearmbs.view.render import Camera, render
-from gearmbs.view.scene_data import AZIMUTH, ELEVATION, Part, SceneData
+from gearmbs.view.scene_data import AZIMUTH, ELEVATION, Deflection, Part, SceneData
 from gearmbs.view.shading import corner_normals
 from gearmbs.view.viewer import scene_page
 
@@ -78,7 +78,7 @@ class Scene(SceneData):
             height = BORDER + min(max(width * camera.aspect(points), 0.3 * width), 1.2 * width)
         columns, rows = round(width * dpi), round((height - BORDER) * dpi)
         camera.frame(points, columns, rows)
-        solids = [p.mesh.placed(p.origins[instant], p.axes[instant]) for p in self.parts]
+        solids = [part.placed(instant) for part in self.parts]
         image = render(
             [m.corners for m in solids],
             [corner_normals(m) for m in solids],
@@ -163,4 +163,4 @@ class Scene(SceneData):
             ax.annotate("", ends[1, :2], ends[0, :2], arrowprops=style, zorder=5)
 
 
-__all__ = ["Part", "Scene"]
+__all__ = ["Deflection", "Part", "Scene"]

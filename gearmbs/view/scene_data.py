@@ -13,8 +13,38 @@ UP = (0.0, 1.0, 0.0)
 
 
 @dataclass(frozen=True)
+class Deflection:
+    """How a solid bends: the sum of shapes times coordinates.
+
+    Attributes
+    ----------
+    shapes : ndarray, shape (n, vertices, 3)
+        In the part's own frame, m.
+    coordinates : ndarray, shape (instants, n)
+    """
+
+    shapes: np.ndarray
+    coordinates: np.ndarray
+
+    def at(self, instant: int) -> np.ndarray:
+        """Return the displacements of the vertices at an instant, shape (vertices, 3), m."""
+        return np.tensordot(self.coordinates[instant], self.shapes, axes=1)
+
+    def reduced(self, accuracy: float = 1e-3) -> Deflection:
+        """Return nearly the same by fewer shapes, as far off as a share of the largest displacement at most."""
+        sizes = np.maximum(np.linalg.norm(self.shapes, axis=2).max(axis=1), 1e-300)
+        left, values, right = np.linalg.svd(self.coordinates * sizes, full_matrices=False)
+        if not values.size or values[0] == 0.0:
+            return Deflection(self.shapes[:0], self.coordinates[:, :0])
+        # what is left out is no larger than the sum of its singular values
+        kept = int(np.sum(np.cumsum(values[::-1])[::-1] > accuracy * np.abs(self.coordinates * sizes).max()))
+        shapes = np.tensordot(right[:kept] / sizes, self.shapes, axes=1)
+        return Deflection(shapes, left[:, :kept] * values[:kept])
+
+
+@dataclass(frozen=True)
 class Part:
-    """A rigid solid and where it is.
+    """A solid and where it is.
 
     Attributes
     ----------
@@ -25,6 +55,8 @@ class Part:
         As matplotlib understands it.
     origins, axes : ndarray, shape (n, 3) and (n, 3, 3)
         Frame at each instant, global, m.
+    deflection : Deflection, optional
+        Of a solid that bends.
     """
 
     name: str
@@ -32,6 +64,14 @@ class Part:
     colour: str
     origins: np.ndarray
     axes: np.ndarray
+    deflection: Deflection | None = None
+
+    def placed(self, instant: int) -> Mesh:
+        """Return the mesh where it is at an instant, global, m."""
+        mesh = self.mesh
+        if self.deflection is not None:
+            mesh = Mesh(mesh.vertices + self.deflection.at(instant), mesh.triangles)
+        return mesh.placed(self.origins[instant], self.axes[instant])
 
 
 @dataclass
@@ -68,13 +108,21 @@ class SceneData:
         for part in self.parts:
             if len(part.origins) != self.value.size or len(part.axes) != self.value.size:
                 raise ValueError(f"part {part.name!r} has {len(part.origins)} poses for {self.value.size} instants")
+            bend = part.deflection
+            if bend is not None and (
+                len(bend.coordinates) != self.value.size or bend.shapes.shape[1] != len(part.mesh.vertices)
+            ):
+                raise ValueError(
+                    f"part {part.name!r} has deflections of {bend.shapes.shape[1]} vertices at {len(bend.coordinates)} "
+                    f"instants; it has {len(part.mesh.vertices)} vertices and {self.value.size} instants"
+                )
 
     def __len__(self) -> int:
         return self.value.size
 
     def corners(self, instant: int = 0) -> np.ndarray:
         """Return all vertices at an instant, global, shape (n, 3), m."""
-        return np.concatenate([p.mesh.placed(p.origins[instant], p.axes[instant]).vertices for p in self.parts])
+        return np.concatenate([part.placed(instant).vertices for part in self.parts])
 
     @property
     def size(self) -> float:

@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.gears import GearPair
+from gearmbs.mechanism.modal import ModalBody
 from gearmbs.progress import waiting
+from gearmbs.view.bending import Bending, bodies_bent
+from gearmbs.view.body_mesh import body_mesh
 from gearmbs.view.contacts import ContactProbe
 from gearmbs.view.figure_style import BLUE, COLOURS, GREY, ORANGE
-from gearmbs.view.mesh import Mesh, ball, box, cylinder, joined, rod
+from gearmbs.view.mesh import Mesh, ball, cylinder
 from gearmbs.view.motion import PairMotion, chosen_times, marker_motion, mechanism_of, static_motion
 from gearmbs.view.scene import Part, Scene
 from gearmbs.view.scene_data import UP
@@ -21,7 +24,6 @@ from gearmbs.view.solid import pair_solids
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism import Mechanism
-    from gearmbs.mechanism.parts import Body
 
 TOLERANCE = 8e-6
 """Chords of the drawn profile, m; finer than a pixel."""
@@ -29,8 +31,6 @@ TOLERANCE = 8e-6
 SHAFT = "#A9B0BA"
 GEARS = (BLUE, ORANGE)
 OTHERS = tuple(c for c in COLOURS if c not in GEARS)
-SAME = 1e-6
-THIN = 0.12
 ROD = 0.012
 """Radius of rods between markers, as a part of the mechanism's size."""
 
@@ -129,12 +129,14 @@ def mechanism_scene(
     *,
     shapes: Mapping[str, Mesh] | None = None,
     joints: bool = True,
+    factor: float | None = None,
     title: str | None = None,
 ) -> Scene:
     """Return a mechanism at its initial position.
 
     Wheels of a gear contact are drawn from their geometry. Any other body is the cylinder or box that has its mass
-    moments, and rods lead to its markers; a body without mass is its markers and the rods between them.
+    moments, and rods lead to its markers; a body without mass is its markers and the rods between them. Bodies that
+    deform are drawn with their surface, bent as they are at the start.
 
     Parameters
     ----------
@@ -143,13 +145,20 @@ def mechanism_scene(
         Meshes in the bodies' frames instead.
     joints : bool
         Mark joints with small balls.
+    factor : float, optional
+        Bodies are drawn bent that many times as far as they are; default such that it can be seen.
     title : str, optional
     """
-    names = list(mechanism.bodies)
-    poses = {n: (mechanism.bodies[n].position[None], mechanism.bodies[n].orientation[None]) for n in names}
+    poses, bent = {}, {}
+    for name, body in mechanism.bodies.items():
+        turned = body.orientation
+        poses[name] = ((body.centre_of_mass()[0] - turned @ body.com)[None], turned[None])
+        if isinstance(body, ModalBody):
+            bent[name] = body.start[None]
     balls = _joint_parts(mechanism, None, np.zeros(1, dtype=int)) if joints else []
-    parts = [*_body_parts(mechanism, poses, shapes or {}), *balls]
-    scene = Scene(parts, title or mechanism.name, up=_up(mechanism))
+    bending = bodies_bent(mechanism, bent, factor)
+    parts = [*_body_parts(mechanism, poses, shapes or {}, bending), *balls]
+    scene = Scene(parts, title or mechanism.name + bending.remark, up=_up(mechanism))
     scene.lines = _lines(mechanism, scene.size)
     return scene
 
@@ -164,6 +173,7 @@ def solution_scene(
     shapes: Mapping[str, Mesh] | None = None,
     joints: bool = False,
     forces: bool = True,
+    factor: float | None = None,
     title: str | None = None,
 ) -> Scene:
     """Return a simulated mechanism in motion; see `mechanism_scene` for how its bodies are drawn.
@@ -179,65 +189,30 @@ def solution_scene(
         See `mechanism_scene`.
     forces : bool
         Draw the forces between the teeth of gear contacts.
+    factor : float, optional
+        Bodies that deform are drawn bent that many times as far as they are; default such that it can be seen. The
+        title says how many times.
     title : str, optional
     """
     mechanism = mechanism_of(solution)
     chosen = chosen_times(solution.t, start, stop, frames)
-    poses = {}
+    poses, bent = {}, {}
     for name, body in mechanism.bodies.items():
         turned = solution.orientation(name)[chosen]
         poses[name] = (solution.com_position(name)[chosen] - turned @ body.com, turned)
+        if isinstance(body, ModalBody):
+            bent[name] = solution.modal_coordinates(name)[chosen]
+    bending = bodies_bent(mechanism, bent, factor)
     balls = _joint_parts(mechanism, solution, chosen) if joints else []
-    parts = [*_body_parts(mechanism, poses, shapes or {}), *balls]
+    parts = [*_body_parts(mechanism, poses, shapes or {}, bending), *balls]
     arrows = _contact_forces(solution, chosen) if forces else []
-    scene = Scene(parts, title or mechanism.name, "time", "s", solution.t[chosen], arrows, [], _up(mechanism))
+    heading = title or mechanism.name + bending.remark
+    scene = Scene(parts, heading, "time", "s", solution.t[chosen], arrows, [], _up(mechanism))
     scene.lines = _lines(mechanism, scene.size)
     return scene
 
 
-def body_mesh(body: Body, reach: float = 0.0) -> Mesh | None:
-    """Return the cylinder (or ball, or box) that has a body's mass and moments, in the body's frame.
-
-    A body with two equal principal moments becomes a cylinder along the third, any other a box; None without mass or
-    moments. Rods of a part ``reach`` of the size of the mechanism lead to its markers.
-    """
-    pieces: list[Mesh] = []
-    moments, axes = np.linalg.eigh(body.inertia)
-    if body.mass > 0.0 and moments[-1] > 0.0:
-        pieces.append(_equivalent(body.mass, moments, axes).placed(body.com, np.eye(3)))
-    hub = body.com if body.mass > 0.0 or not body.markers else body.markers[0].position
-    if reach > 0.0:
-        for marker in body.markers:
-            if np.linalg.norm(marker.position - hub) > 4.0 * reach:
-                pieces.append(rod(hub, marker.position, reach))
-        if not pieces:
-            pieces.append(ball(2.0 * reach).placed(hub, np.eye(3)))
-    return joined(pieces) if pieces else None
-
-
-def _equivalent(mass: float, moments: np.ndarray, axes: np.ndarray) -> Mesh:
-    for k in range(3):
-        one, two = moments[(k + 1) % 3], moments[(k + 2) % 3]
-        if abs(one - two) > SAME * moments[-1]:
-            continue
-        # a solid cylinder: I_z = m r^2 / 2, I_x = m (3 r^2 + l^2) / 12
-        square = 2.0 * moments[k] / mass
-        length = 12.0 * 0.5 * (one + two) / mass - 3.0 * square
-        if length <= 0.0:
-            continue
-        length = math.sqrt(length)
-        radius = max(math.sqrt(square), 0.5 * THIN * THIN * length)
-        frame = np.column_stack([axes[:, (k + 1) % 3], axes[:, (k + 2) % 3], axes[:, k]])
-        frame[:, 0] *= np.linalg.det(frame)
-        return cylinder(radius, length, 72).placed(np.zeros(3), frame)
-    total = moments.sum()
-    edges = np.sqrt(np.maximum(6.0 * (total - 2.0 * moments) / mass, 0.0))
-    edges = np.maximum(edges, THIN * THIN * edges.max())
-    frame = axes * np.array([1.0, 1.0, np.linalg.det(axes)])
-    return box(*edges).placed(np.zeros(3), frame)
-
-
-def _body_parts(mechanism: Mechanism, poses: dict, shapes: Mapping[str, Mesh]) -> list[Part]:
+def _body_parts(mechanism: Mechanism, poses: dict, shapes: Mapping[str, Mesh], bending: Bending) -> list[Part]:
     unknown = [name for name in shapes if name not in poses]
     if unknown:
         raise ValueError(f"shapes: no body {unknown[0]!r}; the bodies are {', '.join(poses)}")
@@ -251,11 +226,12 @@ def _body_parts(mechanism: Mechanism, poses: dict, shapes: Mapping[str, Mesh]) -
             parts.append(Part(name, mesh.placed(marker.position, marker.orientation), colour, origins, axes))
             continue
         body = mechanism.bodies[name]
-        own = shapes.get(name) or body_mesh(body, 0.0 if wheels else reach)
+        mesh, deflection = bending.parts.get(name, (None, None)) if name not in shapes else (None, None)
+        own = shapes.get(name) or mesh or body_mesh(body, 0.0 if wheels else reach)
         if own is not None:
             colour = SHAFT if wheels else OTHERS[other % len(OTHERS)]
             other += 1
-            parts.append(Part(name, own, colour, origins, axes))
+            parts.append(Part(name, own, colour, origins, axes, deflection))
     return parts
 
 

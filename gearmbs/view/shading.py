@@ -26,6 +26,11 @@ def corner_normals(mesh: Mesh) -> np.ndarray:
 
 def feature_edges(mesh: Mesh) -> np.ndarray:
     """Return the end points of the sharp edges, shape (n, 2, 3), m."""
+    return mesh.vertices[feature_ends(mesh)]
+
+
+def feature_ends(mesh: Mesh) -> np.ndarray:
+    """Return the vertex numbers of the sharp edges, shape (n, 2)."""
     t = mesh.triangles.astype(np.int64)
     ends = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
     owner = np.tile(np.arange(len(t)), 3)
@@ -35,7 +40,7 @@ def feature_edges(mesh: Mesh) -> np.ndarray:
     first = np.flatnonzero(same)
     normals = mesh.normals
     sharp = np.einsum("ij,ij->i", normals[owner[first]], normals[owner[first + 1]]) < CREASE
-    return mesh.vertices[ends[first[sharp]]]
+    return ends[first[sharp]]
 
 
 @njit(cache=True)

@@ -8,7 +8,7 @@ from matplotlib.colors import to_rgb
 from gearmbs.view.figure_style import unit_text
 from gearmbs.view.page import Page, packed, rounded
 from gearmbs.view.scene_data import AZIMUTH, ELEVATION, Part, SceneData
-from gearmbs.view.shading import corner_normals, feature_edges
+from gearmbs.view.shading import corner_normals, feature_ends
 
 ARROW = 0.22
 """Length of the largest force, as a part of the scene's size."""
@@ -70,12 +70,24 @@ def _part(part: Part) -> dict:
     padded = np.zeros((len(rows), 4), dtype=np.int8)
     padded[:, :3] = rows[:, 1:]
     poses = np.concatenate([part.axes.reshape(-1, 9), part.origins], axis=1)
+    ends = feature_ends(part.mesh)
+    bending = {}
+    if part.deflection is not None and len(part.deflection.shapes):
+        bend = part.deflection.reduced()
+        where = np.empty(len(part.mesh.vertices), dtype=np.int64)
+        where[rows[:, 0]] = np.arange(len(rows))
+        bending = {
+            "shapes": packed(bend.shapes[:, rows[:, 0]]),
+            "coordinates": packed(bend.coordinates),
+            "ends": packed(where[ends], "<u4"),
+        }
     return {
         "name": part.name,
         "colour": [round(c, 4) for c in to_rgb(part.colour)],
         "points": packed(part.mesh.vertices[rows[:, 0]]),
         "normals": packed(padded, "i1"),
         "index": packed(index.reshape(-1), "<u4"),
-        "edges": packed(feature_edges(part.mesh)),
+        "edges": packed(part.mesh.vertices[ends]),
         "poses": packed(poses),
+        **bending,
     }

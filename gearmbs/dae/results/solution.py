@@ -376,6 +376,14 @@ class Solution(Shown):
         """Return the velocity of a marker's origin, shape (m, 3), m/s, global; arguments as of `marker_position`."""
         return self._measures().velocity(marker)
 
+    def deflection(self, marker) -> tuple[np.ndarray, np.ndarray]:
+        """Return displacement (m) and rotation (rad) by deformation at a marker of a modal body, each (m, 3).
+
+        In the body's axes, against the undeformed body about the same centre of mass; by marker or name. Markers may
+        have been added after the run, so that any node can be asked for: ``body.marker(model.place(17))``.
+        """
+        return self._measures().deflection(marker)
+
     def state(self, state) -> np.ndarray:
         """Return a user-defined state of the mechanism, shape (m,); by state or name."""
         return self._measures().state(state)

@@ -7,7 +7,35 @@
     name: p.name, colour: p.colour, visible: true,
     points: decode(p.points, Float32Array), normals: decode(p.normals, Int8Array),
     index: decode(p.index, Uint32Array), edges: decode(p.edges, Float32Array), poses: decode(p.poses, Float32Array),
+    bend: p.shapes && {
+      shapes: decode(p.shapes, Float32Array), coordinates: decode(p.coordinates, Float32Array),
+      ends: decode(p.ends, Uint32Array), start: decode(p.points, Float32Array), frame: -1,
+    },
   }));
+  // Points, normals and edges of a part that bends, at an instant; whether they are others than before.
+  function deflect(p, frame) {
+    const b = p.bend;
+    if (!b || b.frame === frame) return false;
+    b.frame = frame;
+    const size = b.start.length, count = b.shapes.length / size;
+    p.points.set(b.start);
+    for (let k = 0; k < count; k++) {
+      const q = b.coordinates[frame * count + k];
+      for (let i = 0; i < size; i++) p.points[i] += q * b.shapes[k * size + i];
+    }
+    const sum = new Float32Array(size), at = p.points, n = p.normals;
+    for (let t = 0; t < p.index.length; t += 3) {
+      const [i, j, k] = [3 * p.index[t], 3 * p.index[t + 1], 3 * p.index[t + 2]];
+      const u = [0, 1, 2].map((r) => at[j + r] - at[i + r]), v = [0, 1, 2].map((r) => at[k + r] - at[i + r]), w = cross(u, v);
+      for (const m of [i, j, k]) for (let r = 0; r < 3; r++) sum[m + r] += w[r];
+    }
+    for (let m = 0; m < size / 3; m++) {
+      const length = Math.hypot(sum[3 * m], sum[3 * m + 1], sum[3 * m + 2]);
+      if (length > 0) for (let r = 0; r < 3; r++) n[4 * m + r] = Math.round(127 * sum[3 * m + r] / length);
+    }
+    b.ends.forEach((end, k) => { for (let r = 0; r < 3; r++) p.edges[3 * k + r] = at[3 * end + r]; });
+    return true;
+  }
   const up = data.up;
   let azimuth = data.azimuth * Math.PI / 180, elevation = data.elevation * Math.PI / 180;
   let zoom = 1, panX = 0, panY = 0, current = 0;
@@ -136,6 +164,10 @@
     gl.enableVertexAttribArray(point);
     gl.enable(gl.DEPTH_TEST);
     gl.enable(gl.CULL_FACE);
+    function refill(buf, values) {
+      gl.bindBuffer(gl.ARRAY_BUFFER, buf);
+      gl.bufferData(gl.ARRAY_BUFFER, values, gl.DYNAMIC_DRAW);
+    }
     function strokes(buf, count, colour, lift) {
       gl.bindBuffer(gl.ARRAY_BUFFER, buf);
       gl.vertexAttribPointer(point, 3, gl.FLOAT, false, 0, 0);
@@ -153,6 +185,11 @@
       const view = viewing();
       for (const p of parts) {
         if (!p.visible) continue;
+        if (deflect(p, frame)) {
+          refill(p.gl.points, p.points);
+          refill(p.gl.normals, p.normals);
+          refill(p.gl.edges, p.edges);
+        }
         const pose = p.poses.subarray(12 * frame, 12 * frame + 12);
         gl.uniformMatrix4fv(at.place, false, matrix(view, pose));
         gl.uniformMatrix3fv(at.turn, false, turning(view, pose));
@@ -196,6 +233,7 @@
       pen.fillRect(0, 0, w, h);
       for (const p of parts) {
         if (!p.visible) continue;
+        deflect(p, frame);
         const m = matrix(view, p.poses.subarray(12 * frame, 12 * frame + 12)), n = p.points.length / 3;
         const seen = new Float32Array(3 * n);
         for (let k = 0; k < n; k++)
