@@ -27,7 +27,6 @@ INSTEAD: dict[str, str] = {
     "NFORCE": "BEAM or FIELD between neighbouring PARTs",
     "NODE": "it belongs to a FLEX_BODY",
     "NORMAL_MODE_ANALYSIS": "LINEAR/EIGENSOL in the script",
-    "POINT_MASS": "a PART with small moments of inertia",
     "PSTATE": "none needed: LINEAR chooses the coordinates",
     "SECTION": "the areas and moments of BEAM",
     "SURFACE": "a mesh in an EXTERNAL solid of GRAPHICS",
@@ -53,7 +52,6 @@ INSTEAD_OF_ARGUMENTS: dict[tuple[str, str], str] = {
     ("SPLINE", "FILE"): "X and Y in the deck",
     ("MATRIX", "FILE"): "VALUES in the deck",
     ("JOINT", "FRICTION"): "a FRICTION statement",
-    ("PART", "PLANAR"): "JOINT/PLANAR to the ground",
 }
 """What to do instead of arguments that are refused."""
 

@@ -17,7 +17,7 @@ from gearmbs.dae.equations.unknowns import I3, Counts, offsets
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.model.builder import TableBuilder
 from gearmbs.dae.model.configuration import Configuration
-from gearmbs.dae.model.model import Names
+from gearmbs.dae.model.model import STATE_IMPLICIT, Names
 from gearmbs.dae.model.system import System
 from gearmbs.mechanism import elements as el
 from gearmbs.mechanism import joints as jt
@@ -365,6 +365,8 @@ def starting_angles(
 
 
 def _state_kind(state: State) -> int:
+    if state.implicit:
+        return STATE_IMPLICIT
     return T.STATE_ALGEBRAIC if state.algebraic else T.STATE_DIFFERENTIAL
 
 

@@ -170,10 +170,12 @@ class Load:
 class State:
     """A state: z' = expression from ``start``, or z = expression when it is algebraic.
 
-    That of a force element has no expression: its kernel knows it.
+    That of a force element has no expression: its kernel knows it. An ``implicit`` algebraic one stands in its own
+    expression; its error is controlled.
     """
 
     name: str
     expression: str = ""
     start: float = 0.0
     algebraic: bool = False
+    implicit: bool = False

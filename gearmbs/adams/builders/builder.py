@@ -18,6 +18,8 @@ from gearmbs.adams.builders.control import state_system
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.builders.data_calls import translated
 from gearmbs.adams.builders.frames import inertia_about_cm, marker_orientation, part_orientation
+from gearmbs.adams.builders.held_bodies import add_point_mass, hold
+from gearmbs.adams.builders.implicit import diff_name, implicit_states
 from gearmbs.adams.builders.model import KINDS, AdamsModel, BodyState
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
 from gearmbs.adams.parse import statements as st
@@ -98,7 +100,7 @@ class Builder:
         self._taken: set[str] = {"ground"}
 
     def add_bodies(self, add_flex_body: Maker, add_flexible_marker: Maker) -> bool:
-        """Add gravity, parts, flexible bodies and markers; return whether elements may follow.
+        """Add gravity, parts, point masses, flexible bodies and markers; return whether elements may follow.
 
         Parameters
         ----------
@@ -111,6 +113,8 @@ class Builder:
             self.mechanism.gravity = scale * np.array([gravity.igrav, gravity.jgrav, gravity.kgrav])
         for part in self.deck.of(st.Part).values():
             self.attempt(part, self.add_part)
+        for point in self.deck.of(st.PointMass).values():
+            self.attempt(point, partial(add_point_mass, self))
         for flexible in self.deck.of(st.FlexBody).values():
             self.attempt(flexible, partial(add_flex_body, self))
         for marker in self.deck.of(st.Marker).values():
@@ -133,7 +137,7 @@ class Builder:
         """Return a marker of a statement that is on no part or flexible body, and so is left out; None without one."""
         markers = self.deck.of(st.Marker)
         refs = [getattr(statement, name, None) for name in MARKER_FIELDS]
-        owned = {ref for ref, marker in markers.items() if (marker.part, marker.flex_body) != (None, None)}
+        owned = {ref for ref, marker in markers.items() if marker.owner() != ("PART", None)}
         return next((ref for ref in refs if ref in markers and ref not in owned), None)
 
     def attempt(self, statement: st.Statement, add: Callable[[Any], None]) -> None:
@@ -273,6 +277,8 @@ class Builder:
             angular_velocity=start.angular_velocity,
         )
         self.model.sources[body.name] = part
+        if part.planar:
+            hold(self.mechanism, body, "planar")
 
     def direction(
         self, ref: int | None, part: st.Part | st.FlexBody, axes: np.ndarray, cm: st.Marker | None
@@ -281,14 +287,17 @@ class Builder:
         marker = self.deck.of(st.Marker)[ref] if ref is not None else cm
         if marker is None:
             return np.eye(3)
-        owner = self.deck.of(st.Part)[marker.part or 0]
-        own = np.eye(3) if owner.ground else (axes if owner is part else part_orientation(owner))
+        keyword, number = marker.owner()
+        owner: Any = self.deck.of(st.STATEMENTS[keyword])[number or 0]
+        ground = isinstance(owner, st.Part) and owner.ground
+        own = np.eye(3) if ground else (axes if owner is part else part_orientation(owner))
         return own @ marker_orientation(marker)
 
     def add_marker(self, statement: st.Marker) -> None:
-        if statement.part is None:
+        keyword, number = statement.owner()
+        owner = self.model.names.get((keyword.lower(), number or 0))
+        if owner is None:
             return
-        owner = self.model.names["part", statement.part]
         body = self.mechanism.ground if owner == "ground" else self.mechanism.bodies.get(owner)
         if body is None:
             # its part could not be built, which is reported
@@ -329,11 +338,11 @@ class Builder:
             if curve.sampled or curve.matrix in self.deck.of(st.Matrix):
                 self.attempt(curve, self.add_curve)
         for diff in self.active(st.Diff):
+            text = self.text(diff.function)
             if diff.implicit:
-                self.unsupported(diff, "IMPLICIT")
+                m.states.update(implicit_states(diff, text, self.units.time))
                 continue
-            text = f"({self.text(diff.function)})/{self.units.time!r}"
-            m.states[diff.id] = State(f"DIFF_{diff.id}", text, diff.ic[0])
+            m.states[diff.id] = State(diff_name(diff), f"({text})/{self.units.time!r}", diff.ic[0])
         for system in (*self.active(st.Lse), *self.active(st.Tfsiso), *self.active(st.Gse)):
             self.attempt(system, self.add_state_system)
         for sensor in self.active(st.Sensor):
@@ -349,9 +358,9 @@ class Builder:
 
     def add_state_system(self, statement: st.Lse | st.Tfsiso | st.Gse) -> None:
         """Add the states of an LSE, TFSISO or GSE."""
-        if isinstance(statement, st.Gse) and statement.implicit:
-            self.unsupported(statement, "IMPLICIT")
-            return
-        system = state_system(self.deck, statement)
+        system, states = state_system(self.deck, statement), self.mechanism.states
         for name, rate, start in zip(system.names, system.rates(), system.start):
-            self.mechanism.states[name] = State(name, f"({self.text(rate)})/{self.units.time!r}", float(start))
+            if rate is not None:
+                states[name] = State(name, f"({self.text(rate)})/{self.units.time!r}", float(start))
+        for state in system.algebraic:
+            states[state.name] = replaced(state, expression=self.text(state.expression))

@@ -107,15 +107,30 @@ def add_coupler(b: Builder, s: st.Coupler) -> None:
         return
     scales = s.scales if len(s.scales) == len(joints) else (1.0, *s.scales)
     types = s.type or tuple("TRANSLATIONAL" if j.kind == "translational" else "ROTATIONAL" for j in joints)
-    terms = []
-    for joint, scale, kind in zip(joints, scales, types):
-        if (kind == "TRANSLATIONAL") != (joint.kind == "translational"):
-            if joint.kind == "cylindrical":
-                b.unsupported(s, f"the translation of the cylindrical joint {joint.name}")
-                return
+    for joint, kind in zip(joints, types):
+        if joint.kind != "cylindrical" and (kind == "TRANSLATIONAL") != (joint.kind == "translational"):
             raise ValueError(f"TYPE is {kind}, but {joint.name} is {joint.kind}")
-        terms.append((joint, scale / b.units.length if kind == "TRANSLATIONAL" else scale))
-    b.mechanism.coupler(b.model.names["coupler", s.id], terms)
+    name = b.model.names["coupler", s.id]
+    if any(joint.kind == "cylindrical" and kind == "TRANSLATIONAL" for joint, kind in zip(joints, types)):
+        moved = [_since_start(b, name, joint, kind) for joint, kind in zip(joints, types)]
+        text = " + ".join(f"({scale!r})*({travel})" for scale, travel in zip(scales, moved))
+        b.mechanism.general_constraint(name, text)
+        return
+    units = [b.units.length if kind == "TRANSLATIONAL" else 1.0 for kind in types]
+    b.mechanism.coupler(name, [(joint, scale / unit) for joint, scale, unit in zip(joints, scales, units)])
+
+
+def _since_start(b: Builder, name: str, joint: Joint, kind: str) -> str:
+    """Return how far a joint has moved since the analysis began, as an expression of the deck."""
+    i, j = joint.i, joint.j
+    axes = j.global_orientation()
+    if kind == "TRANSLATIONAL":
+        start = float(axes[:, 2] @ (i.global_position() - j.global_position())) / b.units.length
+        return f"DZ({i.number},{j.number},{j.number}) - ({start!r})"
+    # markers of its own count from zero
+    turned = i.body.marker_at(i.global_position(), axes, name=f"{name} {joint.name} I")
+    fixed = j.body.marker_at(j.global_position(), axes, name=f"{name} {joint.name} J")
+    return f'AZ("{turned.name}","{fixed.name}")'
 
 
 def coupled_text(joint: Joint) -> str:

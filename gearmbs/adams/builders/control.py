@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gearmbs.adams.builders.curve_data import matrix_values
+from gearmbs.adams.builders.implicit import diff_name, rate_name
 from gearmbs.adams.builders.state_equations import StateEquations, of_array, state_equations
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
+from gearmbs.mechanism.elements import State
 
 if TYPE_CHECKING:
     from gearmbs.adams.builders.model import AdamsModel
@@ -30,6 +32,8 @@ class LinearSystem(NamedTuple):
         States at the start.
     x, y : int or None
         ARRAYs of the states and outputs.
+    algebraic : tuple of State
+        None here.
     """
 
     names: tuple[str, ...]
@@ -41,6 +45,7 @@ class LinearSystem(NamedTuple):
     start: np.ndarray
     x: int | None
     y: int | None
+    algebraic: tuple[State, ...] = ()
 
     def rates(self) -> list[str]:
         """Return the states' rates as expressions."""
@@ -161,8 +166,13 @@ def _canonical(s: st.Tfsiso, inputs: tuple[int, ...]) -> tuple[np.ndarray, np.nd
 def hold_states(model: AdamsModel) -> None:
     """Make the states of statements with STATIC_HOLD keep their values, as in static analyses."""
     deck, states = model.deck, model.mechanism.states
-    held: list[int | str] = [d.id for d in deck.of(st.Diff).values() if d.static_hold]
-    held += [name for s, system in state_systems(deck) if getattr(s, "static_hold", False) for name in system.names]
+    held: list[int | str] = []
+    for diff in deck.of(st.Diff).values():
+        if diff.static_hold:
+            held += [diff.id, diff_name(diff), rate_name(diff_name(diff))]
+    for s, system in state_systems(deck):
+        if getattr(s, "static_hold", False):
+            held += [*system.names, *(state.name for state in system.algebraic)]
     for name in held:
         if name in states:
-            states[name].expression = "0"
+            states[name].expression = repr(states[name].start) if states[name].algebraic else "0"

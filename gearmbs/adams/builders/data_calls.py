@@ -7,20 +7,21 @@ from collections.abc import Callable, Mapping
 
 from gearmbs.adams.builders.control import state_systems
 from gearmbs.adams.builders.curve_data import curve_points
+from gearmbs.adams.builders.implicit import diff_name, has_rate, rate_name
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.mechanism.expression_syntax import Call, Chain, Name, Node, Number, Power, unparse
 from gearmbs.mechanism.expression_syntax import parse as parsed
 
-CONCERNED = re.compile(r"\b(SENVAL|CURVE|ARYVAL)\s*\(", re.IGNORECASE)
+CONCERNED = re.compile(r"\b(SENVAL|CURVE|ARYVAL|DIF|DIF1)\s*\(", re.IGNORECASE)
 
 
 def data_call(deck: Deck, sensed: Mapping[int, float], call: Call) -> Node:
     """Return what a call stands for; others as they are.
 
     SENVAL(s) is the number that sensor s evaluated last, 0 before; ARYVAL(a, k) of an array of variables is VARVAL of
-    the k-th, of one of states or outputs what the linear system makes it; CURVE(u, order, component, c), with u from -1
-    to 1, a spline of the curve's parameter.
+    the k-th, of one of states or outputs what its system makes it; DIF and DIF1 of an implicit DIFF are algebraic
+    states; CURVE(u, order, component, c), with u from -1 to 1, a spline of the curve's parameter.
     """
     numbers = [a.integer if isinstance(a, Number) else None for a in call.args]
     if call.name == "SENVAL" and len(numbers) == 1 and numbers[0] in deck.of(st.Sensor):
@@ -31,6 +32,8 @@ def data_call(deck: Deck, sensed: Mapping[int, float], call: Call) -> Node:
             ref = array.variables[numbers[1] - 1]
             return Call("VARVAL", (Number(float(ref), call.at, ref),), call.at)
         return _of_system(deck, call, numbers[0], numbers[1])
+    if call.name in ("DIF", "DIF1") and numbers[:1] and numbers[0] in deck.of(st.Diff):
+        return _of_diff(deck.of(st.Diff)[numbers[0] or 0], call)
     if call.name == "CURVE" and len(numbers) == 4 and numbers[3] in deck.of(st.CurveStatement):
         return _curve(deck, call, numbers)
     return call
@@ -42,10 +45,19 @@ def _of_system(deck: Deck, call: Call, array: int, place: int) -> Node:
         if isinstance(statement, st.Gse) and array == statement.xd and 1 <= place <= statement.nd:
             return Number(statement.held[place - 1], call.at)
         if array == system.x and 1 <= place <= len(system.names):
-            return Call("DIF", (Name(system.names[place - 1], call.at),), call.at)
+            name = "DIF" if system.rates()[place - 1] is not None else "VARVAL"
+            return Call(name, (Name(system.names[place - 1], call.at),), call.at)
         if array == system.y and 1 <= place <= len(system.outputs()):
             return parsed(system.outputs()[place - 1])
     return call
+
+
+def _of_diff(diff: st.Diff, call: Call) -> Node:
+    """Return the value or the rate of an implicit DIFF; of others the call as it is."""
+    if not diff.implicit or (call.name == "DIF") == has_rate(diff):
+        return call
+    name = diff_name(diff) if call.name == "DIF" else rate_name(diff_name(diff))
+    return Call("VARVAL", (Name(name, call.at),), call.at)
 
 
 def _curve(deck: Deck, call: Call, numbers: list[int | None]) -> Node:

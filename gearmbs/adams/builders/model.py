@@ -98,6 +98,7 @@ class AdamsModel:
             | {name: text for _, system in state_systems(deck) for name, text in zip(system.names, system.rates())},
             splines={s.id: spline_data(s) for s in deck.of(st.Spline).values() if s.data_file is None}
             | _curves(self.mechanism),
+            states=frozenset(str(k).upper() for k, state in self.mechanism.states.items() if state.algebraic),
             arrays=self.mechanism.arrays,
             functions=self.mechanism.functions,
             plants=self.mechanism.plants,

@@ -4,7 +4,8 @@ A routine is called with a `RoutineCall`, which holds what ADAMS hands to its su
 quantities of its element, and the utility calls by name. It is called some times beforehand, with numbers of no
 meaning, to learn which quantities it asks for, as ADAMS does with IFLAG; what it asks for becomes the arguments of a
 function in the deck's expressions, so that a force by a routine has its derivatives, and stands in statics, modes and
-results as any other. A function that numba has compiled is called with (time, x, xd, u, parameters) instead.
+results as any other. A function that numba has compiled is called with (time, x, xd, u, parameters) instead,
+of an implicit GSE with xdot behind them.
 """
 
 from __future__ import annotations
@@ -64,6 +65,8 @@ class RoutineCall:
         Whether this call only finds out what the routine asks for; numbers then have no meaning.
     x, xd, u : ndarray
         Continuous states, discrete states and inputs of a GSE.
+    xdot : ndarray
+        Rates of the continuous states of an implicit GSE.
     q : ndarray
         Displacements of the joints of a COUPLER; rotations in rad.
     displacement, velocity : ndarray, shape (6,)
@@ -80,6 +83,7 @@ class RoutineCall:
     x: np.ndarray = field(default_factory=_empty)
     xd: np.ndarray = field(default_factory=_empty)
     u: np.ndarray = field(default_factory=_empty)
+    xdot: np.ndarray = field(default_factory=_empty)
     q: np.ndarray = field(default_factory=_empty)
     displacement: np.ndarray = field(default_factory=_empty)
     velocity: np.ndarray = field(default_factory=_empty)
@@ -239,7 +243,8 @@ def _compiled(routine: Any) -> Routine:
     """Return a routine that calls a function compiled by numba with numbers and arrays."""
 
     def called(call: RoutineCall) -> Any:
-        return routine(call.time, call.x, call.xd, call.u, np.array(call.parameters))
+        more = (call.xdot,) if call.xdot.size else ()
+        return routine(call.time, call.x, call.xd, call.u, np.array(call.parameters), *more)
 
     return called
 

@@ -6,8 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gearmbs.adams.builders.implicit import condition, rate_name
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
+from gearmbs.mechanism.elements import State
 
 
 class StateEquations(NamedTuple):
@@ -17,21 +19,26 @@ class StateEquations(NamedTuple):
     ----------
     names : tuple of str
         Of the states in the mechanism.
-    derivatives, results : list of str
+    derivatives : list of str or None
+        None of an algebraic state.
+    results : list of str
     start : ndarray
         States at the start.
     x, y : int or None
         ARRAYs of the states and outputs.
+    algebraic : tuple of State
+        Of implicit equations: the rates, and states without one.
     """
 
     names: tuple[str, ...]
-    derivatives: list[str]
+    derivatives: list[str | None]
     results: list[str]
     start: np.ndarray
     x: int | None
     y: int | None
+    algebraic: tuple[State, ...] = ()
 
-    def rates(self) -> list[str]:
+    def rates(self) -> list[str | None]:
         """Return the states' rates as expressions."""
         return self.derivatives
 
@@ -66,17 +73,33 @@ def state_equations(deck: Deck, s: st.Gse) -> StateEquations:
         if part not in s.callers:
             return []
         caller = s.callers[part]
-        arguments = ", ".join(caller.arguments(given_texts))
+        more = rate_texts(s) if part == "deriv" else []
+        arguments = ", ".join(caller.arguments([*given_texts, *more]))
         return [f"USER_GSE_{s.id}_{part.upper()}_{k + 1}({arguments})" for k in range(caller.count)]
 
     start = np.array(deck.of(st.Array)[s.ic].numbers) if s.ic is not None else np.zeros(s.ns)
-    return StateEquations(names, texts("deriv"), texts("output"), start, s.x, s.y)
+    found = texts("deriv")
+    if not s.implicit:
+        return StateEquations(names, list(found), texts("output"), start, s.x, s.y)
+    rates = [f"VARVAL({rate_name(name)})" if rated else None for name, rated in zip(names, s.rated)]
+    unknowns = [rate_name(name) if rated else name for name, rated in zip(names, s.rated)]
+    starts = [0.0 if rated else float(x) for x, rated in zip(start, s.rated)]
+    algebraic = tuple(condition(*given) for given in zip(unknowns, found, starts))
+    return StateEquations(names, rates, texts("output"), start, s.x, s.y, algebraic)
 
 
 def quantities(s: st.Gse, inputs: tuple[int, ...]) -> list[str]:
     """Return what a GSE's routines are given, as expressions: states, discrete states, inputs."""
-    states = [f"DIF(GSE_{s.id}.X{k + 1})" for k in range(s.ns)]
+    names = [f"GSE_{s.id}.X{k + 1}" for k in range(s.ns)]
+    rated = s.rated or (True,) * s.ns
+    states = [f"DIF({name})" if has_rate else f"VARVAL({name})" for name, has_rate in zip(names, rated)]
     return [*states, *(repr(float(v)) for v in s.held), *(f"VARVAL({v})" for v in inputs)]
+
+
+def rate_texts(s: st.Gse) -> list[str]:
+    """Return the rates that the routine of an implicit GSE is given, too; of an algebraic state it is zero."""
+    names = [rate_name(f"GSE_{s.id}.X{k + 1}") for k in range(s.ns)] if s.implicit else []
+    return [f"VARVAL({name})" if rated else "0" for name, rated in zip(names, s.rated)]
 
 
 def of_array(deck: Deck, s: st.Statement, name: str, ref: int | None) -> int:

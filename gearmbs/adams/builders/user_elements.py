@@ -24,6 +24,8 @@ SHARE = 1e-3
 """Their distance for a translation, of the largest coordinate in the deck."""
 LINEAR = 1e-12
 """Spread of slopes, of the largest, below which a term is linear."""
+DRAWS = 4
+"""Places at which implicit equations are asked on which rates they depend."""
 PARTS = ("deriv", "output", "update")
 """Parts of a GSE's routines, in the order of INTERFACE."""
 
@@ -71,13 +73,34 @@ def bind_gse(deck: Deck, s: st.Gse, parameters: tuple[float, ...], found: Mappin
     inputs = deck.of(st.Array)[s.u].variables if s.u in deck.of(st.Array) else ()
     sizes = {"x": s.ns, "xd": s.nd, "u": len(inputs)}
     counts = dict(zip(PARTS, (s.ns, s.no, s.nd)))
-    callers = {part: Caller(deck, s, parameters, routine, counts[part], sizes) for part, routine in found.items()}
+    callers = {}
+    for part, routine in found.items():
+        more = {"xdot": s.ns} if s.implicit and part == "deriv" else {}
+        callers[part] = Caller(deck, s, parameters, routine, counts[part], sizes | more)
     for part in ("deriv", "output"):
         if part in callers:
             # the expressions are put together where the discrete states are known
-            callers[part].texts(deck.functions, f"USER_GSE_{s.id}_{part.upper()}", [""] * sum(sizes.values()))
+            given = sum(callers[part].quantities.values())
+            callers[part].texts(deck.functions, f"USER_GSE_{s.id}_{part.upper()}", [""] * given)
     held = deck.of(st.Array)[s.icd].numbers if s.icd in deck.of(st.Array) else (0.0,) * s.nd
-    return replace(s, function=None, callers=callers, held=tuple(held))
+    rated = _rated(callers["deriv"], s.ns) if s.implicit and s.ns else ()
+    return replace(s, function=None, callers=callers, held=tuple(held), rated=rated)
+
+
+def _rated(caller: Caller, n: int) -> tuple[bool, ...]:
+    """Return of each state whether implicit equations depend on its rate, by draws."""
+    draw = np.random.default_rng(2)
+    sizes = list(caller.quantities.values())
+    first = 1 + sum(sizes[:-1])
+    found = np.zeros(n, dtype=bool)
+    for _ in range(DRAWS):
+        arguments = draw.uniform(0.1, 1.0, 1 + sum(sizes) + len(caller.asked))
+        before = caller.results(arguments.tolist())
+        for k in range(n):
+            moved = arguments.copy()
+            moved[first + k] += draw.uniform(0.1, 1.0)
+            found[k] |= caller.results(moved.tolist()) != before
+    return tuple(found.tolist())
 
 
 def bind_coupler(deck: Deck, s: st.Coupler, parameters: tuple[float, ...], found: Mapping[str, Routine]) -> st.Coupler:

@@ -47,14 +47,13 @@ MEASURES = frozenset(
 MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv", "corner", "icm", "irm", "jrm", "iicm", "jicm")
 TWO_PARTS = (st.Joint, st.Jprim)
 UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
-    st.Marker: ("point_mass", "fe_part", "node_label", "curve"),
+    st.Marker: ("fe_part", "node_label", "curve"),
     st.FlexBody: ("db_file", "bdf_file", "index_in_database", "dmode", "vmode"),
     st.Joint: ("friction",),
     st.Coupler: ("function",),
     st.Field: ("function",),
     st.Spline: ("data_file",),
     st.Request: ("function",),
-    st.Part: ("planar",),
     st.Matrix: ("data_file",),
     st.CurveStatement: ("function",),
     st.Contact: ("normal_function", "friction_function", "iflex", "jflex"),
@@ -68,6 +67,7 @@ WITHOUT_EFFECT: dict[type, tuple[str, ...]] = {
     st.Output: ("dscale", "vscale", "ascale", "fscale", "dzero", "vzero", "azero", "fzero", "chart"),
     st.Results: tuple(n for n in specs_of(st.Results) if n.startswith("no")),
     st.Part: ("exact",),
+    st.PointMass: ("exact",),
     st.FlexBody: ("exact", "char_len"),
     st.Friction: ("formulation",),
     st.Variable: ("ic",),
@@ -88,6 +88,7 @@ WHY = {
     st.Output: "values are written as they are",
     st.Results: "everything is written",
     st.FlexBody: "bodies are moved as little as the joints allow, and deform linearly",
+    st.PointMass: "the parts are moved as little as the joints allow",
     st.Part: "the parts are moved as little as the joints allow",
     st.Friction: "friction follows one law, see the documentation",
     st.Variable: "variables need no starting value",
@@ -141,11 +142,15 @@ def check(deck: Deck) -> list[Diagnostic]:
     _remark_idle(deck)
     for part in deck.of(st.Part).values():
         _check_part(deck, part, fail)
+    for point in deck.of(st.PointMass).values():
+        _check_point_mass(deck, point, fail)
     for marker in deck.of(st.Marker).values():
         if marker.part is not None and marker.part not in deck.of(st.Part):
             fail(marker, f"there is no PART/{marker.part}", "part")
         if marker.flex_body is not None and marker.flex_body not in deck.of(st.FlexBody):
             fail(marker, f"there is no FLEX_BODY/{marker.flex_body}", "flex_body")
+        if marker.point_mass is not None and marker.point_mass not in deck.of(st.PointMass):
+            fail(marker, f"there is no POINT_MASS/{marker.point_mass}", "point_mass")
         if marker.flex_body is None and marker.node_id is not None:
             fail(marker, "NODE_ID is for markers of a FLEX_BODY", "node_id")
     _check_constraints(deck, fail)
@@ -230,9 +235,8 @@ def _check_markers(deck: Deck, statement: st.Statement, fail: Fail) -> None:
             fail(statement, f"there is no MARKER/{ref} for {name.upper()}", name)
     if isinstance(statement, TWO_PARTS) and statement.i in markers and statement.j in markers:
         i, j = markers[statement.i], markers[statement.j]
-        if (i.part, i.flex_body) == (j.part, j.flex_body):
-            owner = f"PART/{i.part}" if i.flex_body is None else f"FLEX_BODY/{i.flex_body}"
-            fail(statement, f"I and J are both on {owner}; it must join two parts")
+        if i.owner() == j.owner():
+            fail(statement, f"I and J are both on {'/'.join(map(str, i.owner()))}; it must join two parts")
 
 
 def _check_part(deck: Deck, part: st.Part, fail: Fail) -> None:
@@ -248,6 +252,14 @@ def _check_part(deck: Deck, part: st.Part, fail: Fail) -> None:
             fail(part, f"{name.upper()} = {marker.id}, but MARKER/{marker.id} is on PART/{marker.part}", name)
     if part.reuler is not None and (part.zg or part.xg):
         fail(part, "give either REULER or ZG and XG, not both", "reuler")
+
+
+def _check_point_mass(deck: Deck, point: st.PointMass, fail: Fail) -> None:
+    if not point.mass > 0.0:
+        fail(point, f"MASS = {point.mass}; it must be positive", "mass")
+    marker = deck.of(st.Marker).get(point.cm or -1)
+    if marker is not None and marker.point_mass != point.id:
+        fail(point, f"CM = {marker.id}, but MARKER/{marker.id} is on {'/'.join(map(str, marker.owner()))}", "cm")
 
 
 def _check_constraints(deck: Deck, fail: Fail) -> None:

@@ -49,6 +49,7 @@ from gearmbs.adams.parse.statements_model import (
     Marker,
     Motion,
     Part,
+    PointMass,
     Units,
 )
 
@@ -83,6 +84,7 @@ STATEMENTS: dict[str, type[Statement]] = {
     "OUTPUT": Output,
     "PART": Part,
     "PINPUT": PlantInput,
+    "POINT_MASS": PointMass,
     "POUTPUT": PlantOutput,
     "PTCV": Ptcv,
     "REQUEST": Request,
@@ -111,7 +113,7 @@ IGNORED = frozenset("MATERIAL PREFERENCES DEBUG FEMDATA LSOLVER".split())
 
 UNSUPPORTED = frozenset(
     """CLEARANCE EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART MFORCE MREQUEST
-    NFORCE NODE NORMAL_MODE_ANALYSIS POINT_MASS PSTATE SECTION SURFACE TIRE UCON""".split()
+    NFORCE NODE NORMAL_MODE_ANALYSIS PSTATE SECTION SURFACE TIRE UCON""".split()
 )
 """Statements of ADAMS that change the motion and are not modelled here."""
 
@@ -154,6 +156,7 @@ __all__ = [
     "Plant",
     "PlantInput",
     "PlantOutput",
+    "PointMass",
     "Ptcv",
     "Request",
     "Results",

@@ -45,12 +45,16 @@ class Tfsiso(_System):
 class Gse(_System):
     """GSE: x' = f(t, x, xd, u), y = g(t, x, xd, u) and at samples xd_next = h(t, x, xd, u), by routines of the user.
 
+    With IMPLICIT the first is 0 = f(t, x, xd, u, x').
+
     Attributes
     ----------
     callers : mapping
         Of the parts "deriv", "output" and "update", once they are bound.
     held : tuple of float
         Discrete states as they are.
+    rated : tuple of bool
+        Of each continuous state of implicit equations, whether they depend on its rate.
     """
 
     ns: int = arg("NS", INT, 0)
@@ -71,3 +75,4 @@ class Gse(_System):
     yuflag: str | None = arg("YUFLAG", WORD)
     callers: Any = field(default=None, kw_only=True, compare=False)
     held: Vector = field(default=(), kw_only=True)
+    rated: tuple[bool, ...] = field(default=(), kw_only=True)

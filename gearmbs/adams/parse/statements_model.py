@@ -50,6 +50,22 @@ class Part(Statement):
 
 
 @dataclass(frozen=True)
+class PointMass(Statement, keyword="POINT_MASS"):
+    """POINT_MASS: a body that does not turn."""
+
+    mass: float = arg("MASS", REAL, 0.0, dimension="mass")
+    cm: int | None = arg("CM", ID)
+    qg: Vector = arg("QG", REALS, (0.0, 0.0, 0.0), count=3, dimension="length")
+    reuler: Vector | None = arg("REULER", REALS, count=3, dimension="angle")
+    zg: Vector | None = arg("ZG", REALS, count=3, dimension="length")
+    xg: Vector | None = arg("XG", REALS, count=3, dimension="length")
+    vx: float = arg("VX", REAL, 0.0, dimension="velocity")
+    vy: float = arg("VY", REAL, 0.0, dimension="velocity")
+    vz: float = arg("VZ", REAL, 0.0, dimension="velocity")
+    exact: tuple[str, ...] = arg("EXACT", WORDS, (), choices="X Y Z")
+
+
+@dataclass(frozen=True)
 class Marker(Statement):
     """MARKER: a frame on a part."""
 
@@ -66,6 +82,12 @@ class Marker(Statement):
     fe_part: int | None = arg("FE_PART", ID)
     node_label: int | None = arg("NODE_LABEL", ID)
     curve: int | None = arg("CURVE", ID)
+
+    def owner(self) -> tuple[str, int | None]:
+        """Return statement and id of the body it is on."""
+        if self.flex_body is not None:
+            return "FLEX_BODY", self.flex_body
+        return ("POINT_MASS", self.point_mass) if self.point_mass is not None else ("PART", self.part)
 
 
 JOINT_TYPES = "CONVEL CYLINDRICAL FIXED HOOKE PLANAR RACKPIN REVOLUTE SCREW SPHERICAL TRANSLATIONAL UNIVERSAL"

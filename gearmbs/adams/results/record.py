@@ -169,6 +169,12 @@ class RunRecord:
         """
         return np.concatenate([part_motion(s, number) for s in self.segments] or [np.zeros((0, 18))])
 
+    def point_mass(self, number: int) -> np.ndarray:
+        """Return position, velocity and acceleration of the frame of POINT_MASS/number, shape (m, 9), deck units."""
+        columns = [PART_COLUMNS.index(name) for name in POINT_COLUMNS]
+        rows = [part_motion(s, number, "point_mass")[:, columns] for s in self.segments]
+        return np.concatenate(rows or [np.zeros((0, len(columns)))])
+
     def flexible(self, number: int) -> np.ndarray:
         """Return the motion of the frame of FLEX_BODY/number, shape (m, 18), as of `part`."""
         rows = [part_motion(s, number, "flex_body") for s in self.segments]
@@ -280,6 +286,10 @@ class RunRecord:
             if not part.ground:
                 along = columns("part", PART_COLUMNS, tuple(self.unit(d) for d in PART_DIMENSIONS))
                 data[f"part_{number}"] = (along, self.part(number), {"long_name": part.name or part.label()})
+        for number, point in self.deck.of(st.PointMass).items() if self.segments else ():
+            units = tuple(self.unit(PART_DIMENSIONS[PART_COLUMNS.index(name)]) for name in POINT_COLUMNS)
+            along = columns("point_mass", POINT_COLUMNS, units)
+            data[f"point_mass_{number}"] = (along, self.point_mass(number), {"long_name": point.name or point.label()})
         for number, body in self.deck.of(st.FlexBody).items() if self.segments else ():
             along = columns("part", PART_COLUMNS, tuple(self.unit(d) for d in PART_DIMENSIONS))
             data[f"flex_body_{number}"] = (along, self.flexible(number), {"long_name": body.name or body.label()})
@@ -305,6 +315,7 @@ class RunRecord:
 
 
 PART_COLUMNS = tuple("X Y Z PSI THETA PHI VX VY VZ WX WY WZ ACCX ACCY ACCZ WDX WDY WDZ".split())
+POINT_COLUMNS = tuple("X Y Z VX VY VZ ACCX ACCY ACCZ".split())
 PART_DIMENSIONS = (
     ("length",) * 3
     + ("angle",) * 3

@@ -172,7 +172,7 @@ class RequestEvaluator:
         return self._names.get(index, "")
 
     def _unknown(self, key: tuple) -> np.ndarray:
-        if key[0] == "diff":
+        if key[0] in ("diff", "variable"):
             return self.state(key[1])
         kind, ref, component = key
         return self.wrench(kind, ref)[:, component]

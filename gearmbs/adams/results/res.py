@@ -11,7 +11,7 @@ import numpy as np
 
 from gearmbs.adams.builders.model import KINDS
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.results.record import FORCE_COLUMNS, PART_COLUMNS, PART_DIMENSIONS, RunRecord
+from gearmbs.adams.results.record import FORCE_COLUMNS, PART_COLUMNS, PART_DIMENSIONS, POINT_COLUMNS, RunRecord
 from gearmbs.adams.results.tracks import TRACK_COLUMNS
 
 NAMESPACE = "http://www.mscsoftware.com/:xrf10"
@@ -44,6 +44,12 @@ def _entities(result: RunRecord) -> Iterator[_Entity]:
         attributes = f'name={quoteattr(name + "_XFORM")} entity={quoteattr(name)} entType="Part" objectId="{number}"'
         units = tuple(result.unit(d) for d in PART_DIMENSIONS)
         yield _Entity(attributes, PART_COLUMNS, units, result.part(number))
+    for number, point in deck.of(st.PointMass).items():
+        name = point.name or f"POINT_MASS_{number}"
+        kind = f'entity={quoteattr(name)} entType="Point_Mass" objectId="{number}"'
+        columns = [k for k, column in enumerate(PART_COLUMNS) if column in POINT_COLUMNS]
+        units = tuple(result.unit(PART_DIMENSIONS[k]) for k in columns)
+        yield _Entity(f"name={quoteattr(name + '_XFORM')} {kind}", POINT_COLUMNS, units, result.point_mass(number))
     yield from _flexible_entities(result)
     wrench_units = (result.unit("force"),) * 3 + (result.unit("torque"),) * 3
     kinds = {kind: cls for cls, kind in KINDS.items()}

@@ -16,6 +16,7 @@ from gearmbs.adams.parse.deck import Deck
 
 AT_START: dict[type, frozenset[str]] = {
     st.Part: frozenset("qg reuler zg xg vx vy vz wx wy wz vm wm exact".split()),
+    st.PointMass: frozenset("qg reuler zg xg vx vy vz exact".split()),
     st.FlexBody: frozenset("qg reuler zg xg vx vy vz wx wy wz vm wm exact".split()),
     st.Joint: frozenset(["ic", "ictran", "icrot"]),
     st.Motion: frozenset(["icdisp", "icvel"]),

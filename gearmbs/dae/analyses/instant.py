@@ -59,10 +59,13 @@ class Instant:
         return csc_array((vals, self.problem.indices, self.problem.indptr), shape=(y.size, y.size))
 
     def settle(self, y: np.ndarray) -> np.ndarray:
-        """Put applied loads and algebraic states at the values their definitions give; return y."""
+        """Put applied loads and algebraic states at the values their definitions give; return y.
+
+        Implicit states, which stand in their own definitions, keep the values that Newton's method gave them.
+        """
         places = self.block("F", "mu")
         explicit = np.ones(places.size, dtype=bool)
-        explicit[places.size - self.differential.size :] = ~self.differential
+        explicit[places.size - self.differential.size :] = ~self.system.model.controlled_states
         places = places[explicit]
         for _ in range(SETTLE_PASSES if places.size else 0):
             correction = self.residual(y)[places]

@@ -19,6 +19,9 @@ from gearmbs.dae.equations.modal_inertia import ModalInertia, present_size
 from gearmbs.dae.equations.rotation import KIN_COLUMNS
 from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, Counts, Unknown, named, offsets, places
 
+STATE_IMPLICIT = 2
+"""Kind of a state z = f(..., z): to the equations algebraic, to integrators an unknown whose error counts."""
+
 
 def frozen(array: npt.ArrayLike) -> np.ndarray:
     """Return a copy of an array that cannot be written to."""
@@ -145,6 +148,11 @@ class Model:
     def differential_states(self) -> np.ndarray:
         """Which user-defined states are given by their rates, shape (states,)."""
         return self.states[:, T.STATE_KIND] == T.STATE_DIFFERENTIAL
+
+    @property
+    def controlled_states(self) -> np.ndarray:
+        """Which user-defined states have their error controlled: those by their rates, and by equations they enter."""
+        return self.states[:, T.STATE_KIND] != T.STATE_ALGEBRAIC
 
     def modal_sizes(self) -> np.ndarray:
         """Return for each modal coordinate a typical value and the modal mass, shape (modal coordinates, 2).

@@ -185,7 +185,7 @@ def make_problem(system: PosedModel, formulation: str, rate_scale: float) -> DAE
         work_size=size,
         y0=y,
         yp0=yp,
-        error_mask=unknowns.error_mask(at, form, differential),
+        error_mask=unknowns.error_mask(at, form, model.controlled_states),
         atol_scale=allowed,
         scale=scale,
         differential=unknowns.differential_mask(at, form, differential),
