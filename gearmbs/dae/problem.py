@@ -65,7 +65,7 @@ class DAEProblem:
     restart_rates : callable, optional
         ``restart_rates(t, y, yp, idata, rdata)`` returns y' consistent with y after ``hook`` has rewritten y.
     jacobian_residuals : int
-        Calls of ``residual`` that one of ``jacobian`` takes, if that takes differences.
+        Calls of ``residual`` whose time one of ``jacobian`` takes, if they are many: differences, modal bodies.
     small_entries : bool
         Whether many entries of the Jacobian are small beside others, as second derivatives by modal coordinates beside
         the stiffness of the modes, so that a corrector converges without them.

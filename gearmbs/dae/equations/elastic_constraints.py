@@ -17,21 +17,21 @@ from gearmbs.dae.equations.elastic_coordinates import (
     is_idle,
     place,
 )
-from gearmbs.dae.equations.elastic_frames import BIAS, DP, DX, is_elastic, partials, tail_of
+from gearmbs.dae.equations.elastic_frames import BIAS, DP, DV, DX, is_elastic, partials, tail_of
 from gearmbs.dae.equations.entries import put, put_pair
 from gearmbs.dae.equations.rotation import KIN_R
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def seconds_with(i, same, linear, side, count):
-    """Return first and last, plus one, of the coordinates by which, and by coordinate i, a row has second derivatives.
+def has_second(i, j, same, linear, side):
+    """Return whether a row has a second derivative by coordinates i and j of its sides.
 
     Of a side that is linear in the displacement only angles, with angles or modes, have some. A row whose sides are all
-    linear is their sum; see `put_row`. ``count`` is the number of coordinates of the other side.
+    linear is their sum; see `put_row`. ``same`` says whether both coordinates are of the frame on ``side``.
     """
     if same and (linear >> side) & 1:
-        return 3, 3 if i < 3 else count if i < 6 else 6
-    return 0, count if same or linear != 3 else 0
+        return min(i, j) >= 3 and min(i, j) < 6
+    return same or linear != 3
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -82,46 +82,135 @@ def put_row(
     y, at, partial : ndarray
         Unknowns, their places, the frames' partial derivatives.
     """
-    t, s = np.empty(12), np.empty(3)
-    left = np.empty(6 * n_frames)
+    total = 0
+    for a in range(n_frames):
+        total += coordinates(frames[a], at)
+    side, own = np.empty(total, dtype=np.int64), np.empty(total, dtype=np.int64)
+    along, left, rates = np.empty((total, 6)), np.empty((total, 6 * n_frames)), np.empty(total)
+    count = 0
     for a in range(n_frames):
         b = frames[a]
-        blind = (linear >> a) & 1 == 1
+        if linear == 3 and is_elastic(b, at):
+            k = put_linear_side(
+                mode, slot, vals, k, b, g, g_t, 6 * a, coef, row, lam, mu, factor, rate_rows, at, partial
+            )  # fmt: skip
+            continue
         for i in range(coordinates(b, at)):
             # the gradient of a sum of linear sides is a unit vector for good
-            if is_idle(b, i, blind, at, partial) or (linear == 3 and i < 3 and g[6 * a + i] == 0.0):
+            if is_idle(b, i, (linear >> a) & 1 == 1, at, partial) or (linear == 3 and i < 3 and g[6 * a + i] == 0.0):
                 continue
-            direction(b, i, at, partial, t, 0)
-            slope, rate = coef * dot6(g, 6 * a, t, 0), coef * dot6(g_t, 6 * a, t, 0)
-            # a side that is linear has no Hessian by the coordinates of its frame, a sum of such sides none at all
-            curved = linear != 3 or not is_elastic(b, at)
-            if curved:
-                times_hessian(t, hess, width, 6 * a, left)
-            force, position = place(b, i, FORCE, at), place(b, i, POSITION, at)
-            k = put(mode, slot, vals, k, row[0], position, slope)
-            k = put(mode, slot, vals, k, force, row[0], factor * slope)
-            for a2 in range(n_frames):
-                b2 = frames[a2]
-                begin, end = seconds_with(i, a == a2, linear, a, coordinates(b2, at))
-                for j in range(begin, end):
-                    if is_idle(b2, j, (linear >> a2) & 1 == 1, at, partial):
-                        continue
-                    value = 0.0
-                    if curved:
-                        direction(b2, j, at, partial, t, 6)
-                        value += dot6(left, 6 * a2, t, 6)
-                    if a == a2 and is_elastic(b, at):
-                        value += curvature(b, i, j, g, 6 * a, at, partial, s)
-                    value *= coef
-                    rate += value * y[place(b2, j, VELOCITY, at)]
-                    other = place(b2, j, POSITION, at)
-                    k = put(mode, slot, vals, k, force, other, lam * value)
-                    if rate_rows:
-                        k = put(mode, slot, vals, k, position, other, -mu * value)
+            side[count], own[count] = a, i
+            direction(b, i, at, partial, along[count], 0)
+            times_hessian(along[count], hess, width, 6 * a, left[count])
+            rates[count] = coef * dot6(g_t, 6 * a, along[count], 0)
+            count += 1
+    k = put_seconds(
+        mode, slot, vals, k, frames, linear, g, coef, lam, mu, rate_rows, y, at, partial, side[:count], own, along,
+        left, rates,
+    )  # fmt: skip
+    for p in range(count):
+        b, i = frames[side[p]], own[p]
+        slope = coef * dot6(g, 6 * side[p], along[p], 0)
+        position = place(b, i, POSITION, at)
+        k = put(mode, slot, vals, k, row[0], position, slope)
+        k = put(mode, slot, vals, k, place(b, i, FORCE, at), row[0], factor * slope)
+        if rate_rows:
+            k = put(mode, slot, vals, k, position, row[1], -factor * slope)
+            k = put(mode, slot, vals, k, row[1], place(b, i, VELOCITY, at), slope)
+            k = put(mode, slot, vals, k, row[1], position, rates[p])
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def put_seconds(
+    mode, slot, vals, k, frames, linear, g, coef, lam, mu, rate_rows, y, at, partial, side, own, along, left, rates,
+):  # fmt: skip
+    """Hand over the second derivatives of a row, once for both orders, and add them to its rate's derivatives.
+
+    Parameters
+    ----------
+    mode, slot, vals, k, frames, linear, g, coef, lam, mu, rate_rows, y, at, partial
+        As of `put_row`.
+    side, own : ndarray of int, shape (m,)
+        Which frame, and which coordinate of it, each of the row's coordinates is.
+    along, left : ndarray, shape (m, 6), (m, 6 frames)
+        Directions T, and T times the Hessian.
+    rates : ndarray, shape (m,)
+        Derivatives of the row's rate by the coordinates; changed.
+    """
+    s = np.empty(3)
+    for p in range(side.size):
+        b, i = frames[side[p]], own[p]
+        force, position, speed = place(b, i, FORCE, at), place(b, i, POSITION, at), y[place(b, i, VELOCITY, at)]
+        elastic = is_elastic(b, at)
+        for q in range(p, side.size):
+            same = side[q] == side[p]
+            b2, j = frames[side[q]], own[q]
+            if not has_second(i, j, same, linear, side[p]):
+                continue
+            value = dot6(left[p], 6 * side[q], along[q], 0)
+            if same and elastic:
+                value += curvature(b, i, j, g, 6 * side[p], at, partial, s)
+            value *= coef
+            other_force, other = place(b2, j, FORCE, at), place(b2, j, POSITION, at)
+            rates[p] += value * y[place(b2, j, VELOCITY, at)]
+            k = put(mode, slot, vals, k, force, other, lam * value)
             if rate_rows:
-                k = put(mode, slot, vals, k, position, row[1], -factor * slope)
-                k = put(mode, slot, vals, k, row[1], place(b, i, VELOCITY, at), slope)
-                k = put(mode, slot, vals, k, row[1], position, rate)
+                k = put(mode, slot, vals, k, position, other, -mu * value)
+            if q == p:
+                continue
+            rates[q] += value * speed
+            k = put(mode, slot, vals, k, other_force, position, lam * value)
+            if rate_rows:
+                k = put(mode, slot, vals, k, other, position, -mu * value)
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def put_linear_side(mode, slot, vals, k, b, g, g_t, first, coef, row, lam, mu, factor, rate_rows, at, partial):
+    """Hand over what elastic frame b gives to a row that is a sum of sides linear in displacements; see `put_row`.
+
+    With g the constant gradient, the second derivatives are g . (X_lo x P_hi) = (g x X_lo) . P_hi, of angles with
+    angles or modes, and the derivatives of the rate are g . dV.
+
+    Parameters
+    ----------
+    b : int
+        The frame.
+    first : int
+        Where its part of the gradients ``g`` and ``g_t`` begins.
+    """
+    turned = np.empty(9)
+    d = partials(b, at, partial)
+    for c in range(3):
+        cross3(g, first, d[c], DX, turned, 3 * c)
+    for i in range(coordinates(b, at)):
+        # the gradient is a unit vector for good
+        if is_idle(b, i, True, at, partial) or (i < 3 and g[first + i] == 0.0):
+            continue
+        force, position = place(b, i, FORCE, at), place(b, i, POSITION, at)
+        slope, rate = g[first + i] if i < 3 else dot3(g, first, d[i - 3], DP), 0.0
+        if i < 3:
+            rate = g_t[first + i]
+        else:
+            rate = dot3(g, first, d[i - 3], DV) + dot6(g_t, first, d[i - 3], DP)
+        slope, rate = coef * slope, coef * rate
+        k = put(mode, slot, vals, k, row[0], position, slope)
+        k = put(mode, slot, vals, k, force, row[0], factor * slope)
+        if rate_rows:
+            k = put(mode, slot, vals, k, position, row[1], -factor * slope)
+            k = put(mode, slot, vals, k, row[1], place(b, i, VELOCITY, at), slope)
+            k = put(mode, slot, vals, k, row[1], position, rate)
+        for j in range(3, min(i + 1, 6)):
+            value = coef * dot3(turned, 3 * (j - 3), d[i - 3], DP)
+            other_force, other = place(b, j, FORCE, at), place(b, j, POSITION, at)
+            k = put(mode, slot, vals, k, other_force, position, lam * value)
+            if rate_rows:
+                k = put(mode, slot, vals, k, other, position, -mu * value)
+            if j != i:
+                k = put(mode, slot, vals, k, force, other, lam * value)
+                if rate_rows:
+                    k = put(mode, slot, vals, k, position, other, -mu * value)
     return k
 
 

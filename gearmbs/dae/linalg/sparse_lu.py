@@ -114,10 +114,22 @@ def factor(plan, factors, vals):
         Largest multiplier in L. Above `GROWTH_LIMIT`, infinite or NaN the pivots no longer fit, or an entry that was
         left out counts: analyse again.
     """
+    return refactor(plan, factors, vals) if fits(plan, vals) else np.inf
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def fits(plan, vals):
+    """Return whether the entries left out of a plan are negligible in the matrix with values ``vals``."""
     left_src, left_limit = plan.left_src, plan.left_limit
+    found = True
     for p in range(left_src.shape[0]):
-        if not abs(vals[left_src[p]]) <= left_limit[p]:
-            return np.inf
+        found &= abs(vals[left_src[p]]) <= left_limit[p]
+    return found
+
+
+@njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
+def refactor(plan, factors, vals):
+    """Factor as `factor` does, without a look at the entries that the plan leaves out."""
     x, l_vals, pivot_inv = factors.x, factors.l_vals, factors.pivot_inv
     a_pos, a_src, a_scale, l_pos = plan.a_pos, plan.a_src, plan.a_scale, plan.l_pos
     by_nodes = has_nodes(plan.node_end)
@@ -178,11 +190,22 @@ def _forward_by_nodes(plan, factors):
         k = end
 
 
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _backward_by_columns(plan, factors):
+    """Take from ``factors.x`` what the unknowns above the diagonal of U give, column by column."""
+    x, u_vals, pivot_inv, u_pos, u_ptr = factors.x, factors.u_vals, factors.pivot_inv, plan.u_pos, plan.u_ptr
+    for m in range(x.shape[0]):
+        k = np.uint64(x.shape[0] - 1 - m)
+        v = x[k] * pivot_inv[k]
+        for p in range(np.uint64(u_ptr[k]), np.uint64(u_ptr[k + np.uint64(1)])):
+            x[u_pos[p]] -= u_vals[p] * v
+
+
 @njit(types.void(PLAN_TYPE, FACTORS_TYPE, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def solve(plan, factors, b, out):
     """Write the solution of A out = b; ``out`` may be ``b`` itself.
 
-    One loop over all entries does without those over columns, most of which have one or two.
+    One loop over all entries does without those over columns, if most of these have one or two.
 
     Parameters
     ----------
@@ -199,14 +222,15 @@ def solve(plan, factors, b, out):
         x[k] = b[row_from[k]] * row_scale[k]
     if has_nodes(plan.node_end):
         _forward_by_nodes(plan, factors)
+        _backward_by_columns(plan, factors)
     else:
         for q in range(l_pos.shape[0]):
             x[l_pos[q]] -= l_vals[q] * x[l_col[q]]
-    last = u_pos.shape[0] - 1
-    for m in range(u_pos.shape[0]):
-        p = last - m
-        k = u_col[p]
-        x[u_pos[p]] -= u_vals[p] * (x[k] * pivot_inv[k])
+        last = u_pos.shape[0] - 1
+        for m in range(u_pos.shape[0]):
+            p = last - m
+            k = u_col[p]
+            x[u_pos[p]] -= u_vals[p] * (x[k] * pivot_inv[k])
     for k in range(n):
         out[col_to[k]] = x[k] * pivot_inv[k] * col_scale[k]
         x[k] = 0.0
