@@ -12,8 +12,8 @@ from typing import Any
 
 
 @contextlib.contextmanager
-def _uncollected() -> Iterator[None]:
-    """Pause the garbage collector: an import makes many objects that stay, which it would go through in vain."""
+def uncollected() -> Iterator[None]:
+    """Pause the garbage collector, for what makes many objects that stay: it would go through them in vain."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -37,7 +37,7 @@ class _LatePackage(ModuleType):
         if home is None:
             raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
         module, colon, other = home.partition(":")
-        with _uncollected():
+        with uncollected():
             value = importlib.import_module(module, self.__name__)
         if other or not colon:
             value = getattr(value, other or name)

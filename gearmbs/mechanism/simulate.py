@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearmbs._lazy import uncollected
 from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.integrators.ida import solve_ida
@@ -135,7 +136,7 @@ def simulate(
     t_eval = _output_times(t_start, quantity(t_end, "time", "t_end"), rate, t_eval, every_step)
     name = _checked(integrator, tol, options)
     asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
-    with raised_errors(mechanism.functions.values()):
+    with uncollected(), raised_errors(mechanism.functions.values()):
         system, problem, members = _prepared(mechanism, t_start, lump, formulation, rate_scale)
     if stops:
         if name == "IDA" or lump:

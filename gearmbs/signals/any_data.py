@@ -5,13 +5,14 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar, cast
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from gearmbs.units import to_si
 
 from .errors import SignalError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 GIVEN = ("rate", "units", "channels", "gaps")
 """Keywords of `to_signal` that such functions have in addition to their own."""
@@ -61,6 +62,8 @@ def takes_data(**dimensions: str) -> Callable[[F], F]:
 
 def as_given(data: Any, given: dict[str, Any]) -> xr.DataArray:
     """Return data as a signal; a signal is left as it is."""
+    import xarray as xr
+
     known = {name: value for name, value in given.items() if value is not None}
     if not known and isinstance(data, xr.DataArray) and "sampling_rate" in data.attrs:
         return data

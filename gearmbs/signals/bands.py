@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from .errors import SignalError
 from .filters import bandpass_taps, filtered_mean_square
 from .orders import MIN_PERIODS, harmonic_amplitudes
 from .signal import check_teeth, common_unit, mesh_frequency, rate_of, units_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 HALF_WIDTH = 0.25
 TRANSITION = 0.25
@@ -75,6 +78,8 @@ def order_rms(signal: xr.DataArray, fundamental: float, orders: Sequence[float])
     --------
     gearmbs.signals.orders.harmonic_amplitudes
     """
+    import xarray as xr
+
     orders = [float(k) for k in orders]
     amplitudes = np.abs(harmonic_amplitudes(signal.values, rate_of(signal), fundamental, np.asarray(orders)))
     return xr.DataArray(
@@ -136,6 +141,8 @@ def gmf_rms(
     >>> gmf_rms(signal, 480.0)["orders"].values.round(4).ravel().tolist()
     [0.7071, 0.3536, 0.0]
     """
+    import xarray as xr
+
     gmf = mesh_frequency(signal, speed, teeth) if gmf is None else float(gmf)
     if not (math.isfinite(gmf) and gmf > 0.0):
         raise SignalError(f"gmf: must be a positive frequency in Hz, got {gmf!r}")
@@ -193,6 +200,8 @@ def _channel_coords(signal: xr.DataArray) -> dict:
 
 
 def _per_channel(signal: xr.DataArray, values: np.ndarray) -> xr.DataArray:
+    import xarray as xr
+
     return xr.DataArray(
         values,
         dims=("channel",),

@@ -10,15 +10,17 @@ from __future__ import annotations
 import functools
 import math
 from fractions import Fraction
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import xarray as xr
 
 from .any_data import takes_data
 from .errors import SignalError
 from .fir import convolve_valid, kaiser_order, windowed_sinc
 from .signal import check_rate, like, rate_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Edges = Literal["trim", "extend"]
 ATTENUATION_DB = 100.0

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from .errors import SignalError
 from .signal import common_unit, like, make_signal, rate_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 COMPONENTS = ("line_of_centres", "tangential", "line_of_action", "resultant")
 """Components of a force between gear and shaft; see `force_components`."""

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from .errors import MissingMetadataError, SignalError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 UNKNOWN_UNITS = "unknown"
 MIXED_UNITS = "mixed"
@@ -81,6 +83,8 @@ def make_signal(
     >>> signal.dims, signal.attrs["units"], round(mesh_frequency(signal), 1)
     (('time', 'channel'), 'm/s', 483.3)
     """
+    import xarray as xr
+
     values, channels = _columns(data, channels)
     names = [f"ch{i + 1}" for i in range(values.shape[1])] if channels is None else [str(c) for c in channels]
     if len(names) != values.shape[1] or len(set(names)) != len(names):
@@ -148,6 +152,8 @@ def as_signal(signal: xr.DataArray | xr.Dataset, rate: float | None = None) -> x
     SignalError
         If there is no time dimension or the time coordinate is not uniform.
     """
+    import xarray as xr
+
     if isinstance(signal, xr.Dataset):
         variables = {str(k): v for k, v in signal.data_vars.items() if v.dims == ("time",)}
         if not variables:
@@ -310,6 +316,8 @@ def like(
     t0, rate : float, optional
         Start in s and rate in Hz where they differ from those of `signal`.
     """
+    import xarray as xr
+
     rate = rate_of(signal) if rate is None else check_rate(rate)
     t0 = float(signal["time"].values[0]) if t0 is None else t0
     result = xr.DataArray(

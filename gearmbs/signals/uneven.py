@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from .errors import SignalError
 from .filters import decimation_taps
 from .monotone_cubic import monotone_cubic
 from .signal import check_rate, make_signal
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FINE_RATE = 400e3
 """Rate, Hz, that the values are interpolated to at least before the anti-alias filter."""

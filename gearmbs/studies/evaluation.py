@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from gearmbs.signals import (
     decimate,
@@ -22,6 +21,9 @@ from gearmbs.studies.case import Case, CaseError
 from gearmbs.studies.drive import drive_angle
 from gearmbs.studies.limits import HARMONICS, edge
 from gearmbs.studies.measured import COUNTS, SMOOTH, Measured
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FORCES = ("force_1", "force_2")
 LEVELS = ("gmf_rms", "order_rms")
@@ -56,6 +58,8 @@ def evaluate(case: Case, known: Measured, *, even: bool, variables: Collection[s
     variables : collection of str, optional
         Of `VARIABLES`; default all.
     """
+    import xarray as xr
+
     level = LEVELS[0 if case.operation.speed_curve is None else 1]
     wanted = set(VARIABLES if variables is None else variables) - (set(LEVELS) - {level})
     start = case.operation.run_up + case.operation.settling
@@ -136,6 +140,8 @@ def _even_times(case: Case, known: Measured, start: float, stop: float, *, even:
 
 def time_series(t: np.ndarray, values: dict[str, np.ndarray]) -> xr.Dataset:
     """Return the dataset of variables over time, whichever of `SERIES` there are."""
+    import xarray as xr
+
     units = {**SMOOTH, **COUNTS, "transmission_error": "m"}
     long_names = {"transmission_error": "lag of the driven wheel at its base circle"}
     data: dict[str, Any] = {}
@@ -168,6 +174,8 @@ def _acceleration(case: Case, forces: xr.DataArray, start: float, stop: float) -
 
 def _mesh_levels(acceleration: xr.DataArray) -> xr.DataArray:
     """Return the RMS of the mesh harmonics by both ways."""
+    import xarray as xr
+
     levels = gmf_rms(acceleration)
     ways = xr.concat([levels["band"], levels["orders"]], dim="way").assign_coords(way=["band", "orders"])
     found = ways.drop_vars(["channel_units", "units"], errors="ignore").rename(channel="component")

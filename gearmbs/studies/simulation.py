@@ -10,9 +10,9 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 import gearmbs
+from gearmbs._lazy import uncollected
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.simulate import simulate
@@ -24,6 +24,8 @@ from gearmbs.studies.limits import check_record, edge, remarks, slip
 from gearmbs.studies.measured import Measured, Recorder, measure, rows_of_record
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from gearmbs.bearings import Bearing
     from gearmbs.mechanism import Mechanism
 
@@ -300,7 +302,9 @@ def _evaluated(
     slipped = slip(case, known.t, known.error)
     if slipped is not None:
         raise SimulationFailed(f"case '{case.name}': {slipped}", solution, case)
-    dataset = evaluate(case, known, even=even, variables=variables)
+    # the first one loads xarray and what xarray loads
+    with uncollected():
+        dataset = evaluate(case, known, even=even, variables=variables)
     dataset.attrs = attributes_of(case, solution)
     return dataset
 

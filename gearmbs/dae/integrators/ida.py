@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse import csc_array
+import scipy
 
 from gearmbs.dae.integrators.messages import advice, unknown_name
 from gearmbs.dae.integrators.options import Options
@@ -146,7 +146,7 @@ def _solver(problem: DAEProblem, calls: _Callbacks, atol: np.ndarray, rtol: floa
 
     # the binding insists on 32-bit indices
     places = problem.indices.astype(np.int32), problem.indptr.astype(np.int32)
-    pattern = csc_array((np.ones(problem.indices.size), *places), shape=(problem.n,) * 2)
+    pattern = scipy.sparse.csc_array((np.ones(problem.indices.size), *places), shape=(problem.n,) * 2)
     linear = {"linsolver": "dense"} if calls.dense else {"linsolver": "sparse", "sparsity": pattern}
     with warnings.catch_warnings():
         # it says that our Jacobian is used instead of differences on the pattern, which is what we want

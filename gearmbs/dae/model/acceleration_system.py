@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csc_array
+import scipy
 
 from gearmbs._jit import njit
 from gearmbs.dae.equations import layout as T
@@ -38,7 +38,7 @@ POSE_PLACES = 6
 class Assembled(NamedTuple):
     """The acceleration system of a model at a configuration, with the unknowns and tables it was made from."""
 
-    matrix: csc_array
+    matrix: scipy.sparse.csc_array
     rhs: np.ndarray
     phi: np.ndarray
     loads: np.ndarray
@@ -113,13 +113,13 @@ class AccelerationSystem:
         n = indptr.size - 1
         vals = np.zeros(indices.size)
         records = evaluator.assemble(np.array([t]), y[None, :], slots, idata, rdata, size, vals)
-        matrix = csc_array((vals, indices, indptr), shape=(n, n))
+        matrix = scipy.sparse.csc_array((vals, indices, indptr), shape=(n, n))
         return Assembled(matrix, records.solution[0], records.phi[0], records.loads[0], y, idata, rdata, work)
 
     def constraints(
         self, place: Configuration, t: float, states: np.ndarray
-    ) -> tuple[csc_array, np.ndarray, np.ndarray]:
+    ) -> tuple[scipy.sparse.csc_array, np.ndarray, np.ndarray]:
         """Return Phi_q in spatial displacements and modal coordinates, Phi, and Phi_q v + Phi_t."""
         found = self.at(place, t, None, states)
         base = place.coordinates
-        return csc_array(found.matrix[base:, :base]), found.phi[0::3].copy(), found.phi[1::3].copy()
+        return scipy.sparse.csc_array(found.matrix[base:, :base]), found.phi[0::3].copy(), found.phi[1::3].copy()

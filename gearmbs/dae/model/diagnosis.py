@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import splu
+import scipy
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.errors import ModelError
@@ -93,7 +92,7 @@ def body_of(model: Model, coordinate: int) -> str:
     return model.names.bodies[owners[coordinate - 6 * bodies]]
 
 
-def is_massless(model: Model, matrix: csc_array) -> bool:
+def is_massless(model: Model, matrix: scipy.sparse.csc_array) -> bool:
     """Return whether some motion allowed by the constraints has no inertia."""
     inertia = model.bodies[1:, T.BODY_INERTIA :].reshape(-1, 3, 3)
     if np.all(model.bodies[1:, T.BODY_MASS] > 0.0) and np.all(np.linalg.eigvalsh(inertia)[:, 0] > 0.0):
@@ -101,7 +100,7 @@ def is_massless(model: Model, matrix: csc_array) -> bool:
     return free_massless_body(model, matrix) is not None
 
 
-def free_massless_body(model: Model, matrix: csc_array) -> str | None:
+def free_massless_body(model: Model, matrix: scipy.sparse.csc_array) -> str | None:
     """Return a body that the constraints let move without any inertia, None when there is none."""
     from scipy.linalg import null_space
 
@@ -118,14 +117,14 @@ def free_massless_body(model: Model, matrix: csc_array) -> str | None:
     return None
 
 
-def _free_massless_body_of_many(model: Model, matrix: csc_array) -> str | None:
+def _free_massless_body_of_many(model: Model, matrix: scipy.sparse.csc_array) -> str | None:
     """Look for a motion without inertia by inverse iteration, on masses raised by a trace that keeps it regular."""
     base = model.counts.coordinates
     heaviest = abs(matrix[:base, :base]).max()
     raised = np.zeros(matrix.shape[0])
     raised[:base] = 1e-15 * heaviest
     try:
-        factors = splu(csc_array(matrix + diags_array(raised)))
+        factors = scipy.sparse.linalg.splu(scipy.sparse.csc_array(matrix + scipy.sparse.diags_array(raised)))
     except RuntimeError:
         return None
     motion = np.zeros(matrix.shape[0])
@@ -141,7 +140,7 @@ def _free_massless_body_of_many(model: Model, matrix: csc_array) -> str | None:
     return body_of(model, int(np.argmax(np.abs(motion[:base]))))
 
 
-def singular_message(model: Model, matrix: csc_array) -> str:
+def singular_message(model: Model, matrix: scipy.sparse.csc_array) -> str:
     """Say why the accelerations are not determined."""
     name = free_massless_body(model, matrix)
     if name is not None:

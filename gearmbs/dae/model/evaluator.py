@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import scipy
 from numba import float64, int64
-from scipy.sparse import csc_array
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.lanes import LANES
@@ -348,7 +348,7 @@ def _least_squares_row(k: int, t, y, matrix_pattern, idata, rdata, work_size, re
     indptr, indices, slots = matrix_pattern
     vals, n = np.zeros(indices.size), indptr.size - 1
     one = assemble(t, y, slots, idata, rdata, work_size, vals)
-    matrix = csc_array((vals, indices, indptr), shape=(n, n)).toarray()
+    matrix = scipy.sparse.csc_array((vals, indices, indptr), shape=(n, n)).toarray()
     # rows and columns to one size first, or masses and constraints would be told apart by their units
     scale = 1.0 / np.sqrt(np.maximum(np.abs(matrix).max(axis=1), 1e-300))
     scaled = scale[:, None] * matrix * scale

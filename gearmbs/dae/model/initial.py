@@ -10,9 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import qr
-from scipy.sparse import block_array, csc_array, csr_array, diags_array
-from scipy.sparse.linalg import splu
+import scipy
 
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.errors import AssemblyError, SingularModelError
@@ -105,7 +103,7 @@ class InitialReport:
 
 
 def independent_rows(
-    jacobian: csc_array, weights: np.ndarray, least: float = LEAST, order: np.ndarray | None = None
+    jacobian: scipy.sparse.csc_array, weights: np.ndarray, least: float = LEAST, order: np.ndarray | None = None
 ) -> np.ndarray:
     """Return the indices of a largest set of independent rows of the constraint Jacobian, in order.
 
@@ -114,58 +112,62 @@ def independent_rows(
     preference.
     """
     if order is not None:
-        preferred = csc_array(csr_array(jacobian)[order])
+        preferred = scipy.sparse.csc_array(scipy.sparse.csr_array(jacobian)[order])
         return np.sort(order[independent_rows(preferred, weights, least)])
     m = jacobian.shape[0]
     if m == 0:
         return np.zeros(0, dtype=np.int64)
-    scaled = csc_array(jacobian @ diags_array(1.0 / np.sqrt(weights)))
+    scaled = scipy.sparse.csc_array(jacobian @ scipy.sparse.diags_array(1.0 / np.sqrt(weights)))
     norms = np.sqrt(np.asarray((scaled.multiply(scaled)).sum(axis=1)).ravel())
     norms[norms == 0.0] = 1.0
-    scaled = csc_array(diags_array(1.0 / norms) @ scaled)
+    scaled = scipy.sparse.csc_array(scipy.sparse.diags_array(1.0 / norms) @ scaled)
     if m > DENSE_ROWS:
         return _sparse_rows(scaled, least)
     dense = scaled.toarray()
-    r_diagonal = np.abs(np.diag(qr(dense.T, mode="r", pivoting=True)[0]))
+    r_diagonal = np.abs(np.diag(scipy.linalg.qr(dense.T, mode="r", pivoting=True)[0]))
     rank = int(np.sum(r_diagonal > RANK_TOLERANCE * max(1.0, r_diagonal[0])))
     if rank == m and least <= LEAST:
         return np.arange(m)
     return _greedy_rows(dense, rank, least)
 
 
-def _pivots(gram: csc_array, order: str) -> np.ndarray | None:
+def _pivots(gram: scipy.sparse.csc_array, order: str) -> np.ndarray | None:
     """Return the pivots of a symmetric factorisation: in the order NATURAL, squared distances to the rows before."""
     try:
-        factors = splu(gram, permc_spec=order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        factors = scipy.sparse.linalg.splu(
+            gram, permc_spec=order, diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
     except RuntimeError:
         return None
     return np.abs(factors.U.diagonal())
 
 
-def _sparse_rows(scaled: csc_array, least: float = LEAST) -> np.ndarray:
+def _sparse_rows(scaled: scipy.sparse.csc_array, least: float = LEAST) -> np.ndarray:
     """Independent rows of a large sparse matrix whose rows have length 1, earlier ones preferred."""
     m = scaled.shape[0]
-    gram = csc_array(scaled @ scaled.T)
+    gram = scipy.sparse.csc_array(scaled @ scaled.T)
     pivots = _pivots(gram, "MMD_AT_PLUS_A")
     if pivots is not None and least <= LEAST and pivots.min() > SURE:
         return np.arange(m)
     # a little on the diagonal keeps the elimination going past dependent rows
-    pivots = _pivots(csc_array(gram + diags_array(np.full(m, SURE))), "NATURAL")
+    pivots = _pivots(scipy.sparse.csc_array(gram + scipy.sparse.diags_array(np.full(m, SURE))), "NATURAL")
     if pivots is None:
         return _greedy_rows(scaled.toarray(), min(scaled.shape), least)
     kept = _looked_at_again(scaled, np.flatnonzero(pivots < DOUBTFUL[0]), least)
-    among = _pivots(csc_array(gram[kept][:, kept]), "MMD_AT_PLUS_A")
+    among = _pivots(scipy.sparse.csc_array(gram[kept][:, kept]), "MMD_AT_PLUS_A")
     doubtful = np.flatnonzero(pivots < DOUBTFUL[1])
     if (among is None or among.min() <= BLURRED) and doubtful.size <= MOST_DOUBTFUL:
         kept = _looked_at_again(scaled, doubtful, least)
     return kept
 
 
-def _looked_at_again(scaled: csc_array, doubtful: np.ndarray, least: float) -> np.ndarray:
+def _looked_at_again(scaled: scipy.sparse.csc_array, doubtful: np.ndarray, least: float) -> np.ndarray:
     """Return all rows but the doubtful ones, and of these those that are farther than ``least`` from the rest."""
     sure = np.setdiff1d(np.arange(scaled.shape[0]), doubtful)
-    rows = csc_array(scaled[sure])
-    factors = splu(csc_array(rows @ rows.T), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    rows = scipy.sparse.csc_array(scaled[sure])
+    factors = scipy.sparse.linalg.splu(
+        scipy.sparse.csc_array(rows @ rows.T), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+    )
     added: list[int] = []
     directions = np.zeros((0, scaled.shape[1]))
     for first in range(0, doubtful.size, CHUNK):
@@ -197,13 +199,15 @@ def _greedy_rows(dense: np.ndarray, rank: int, least: float = LEAST) -> np.ndarr
     return np.array(kept, dtype=np.int64)
 
 
-def least_correction(jacobian: csc_array, weights: np.ndarray, violation: np.ndarray) -> np.ndarray:
+def least_correction(jacobian: scipy.sparse.csc_array, weights: np.ndarray, violation: np.ndarray) -> np.ndarray:
     """Solve min |x|_W subject to jacobian x = -violation."""
     n = jacobian.shape[1]
-    kkt = csc_array(block_array([[diags_array(weights), jacobian.T], [jacobian, None]]))
+    kkt = scipy.sparse.csc_array(
+        scipy.sparse.block_array([[scipy.sparse.diags_array(weights), jacobian.T], [jacobian, None]])
+    )
     rhs = np.concatenate([np.zeros(n), -violation])
     try:
-        return splu(kkt).solve(rhs)[:n]
+        return scipy.sparse.linalg.splu(kkt).solve(rhs)[:n]
     except RuntimeError as error:
         raise AssemblyError(
             "the constraints became dependent while the mechanism was being assembled: "
@@ -268,7 +272,7 @@ def _note_correction(system: PosedModel, report: InitialReport, before: np.ndarr
 
 def _closed(
     system: PosedModel, place: Configuration, t: float, kept: np.ndarray, length: float
-) -> tuple[Configuration, csc_array, np.ndarray, int]:
+) -> tuple[Configuration, scipy.sparse.csc_array, np.ndarray, int]:
     """Solve the kept rows for the nearest position; return it with the Jacobian, Phi and the iterations taken."""
     weights = system.coordinate_weights()
     jacobian, phi, _ = system.constraint_jacobian(place, t)
@@ -279,7 +283,7 @@ def _closed(
             raise _not_finite(system, phi, t)
         if size <= POSITION_TOLERANCE * max(1.0, length):
             return place, jacobian, phi, iteration
-        step = least_correction(csc_array(jacobian[kept]), weights, phi[kept])
+        step = least_correction(scipy.sparse.csc_array(jacobian[kept]), weights, phi[kept])
         turn = np.abs(place.parts(step)[0][:, 3:]).max(initial=0.0)
         place = place.displaced(step * min(1.0, 0.5 / max(turn, 1e-300)))
         jacobian, phi, _ = system.constraint_jacobian(place, t)

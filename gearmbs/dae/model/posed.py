@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_array
+import scipy
 
 from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R
 from gearmbs.dae.model.acceleration_system import AccelerationSystem
@@ -140,7 +140,11 @@ class PosedModel:
         """Whether constraint rows were dropped as redundant."""
         return self._dropped.size > 0
 
-    def dropped_rates(self, place: Configuration, t: float) -> tuple[csc_array, np.ndarray, list[str]]:
+    def dropped_rates(self, place: Configuration, t: float) -> tuple[scipy.sparse.csc_array, np.ndarray, list[str]]:
         """Return Phi_q, Phi_q v + Phi_t and the names of the rows dropped as redundant, at a configuration."""
         phi_q, _, rate = self._of_whole.constraints(place, t, self.state_start)
-        return csc_array(phi_q[self._dropped]), rate[self._dropped], [self.whole.names.rows[i] for i in self._dropped]
+        return (
+            scipy.sparse.csc_array(phi_q[self._dropped]),
+            rate[self._dropped],
+            [self.whole.names.rows[i] for i in self._dropped],
+        )

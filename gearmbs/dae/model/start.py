@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
+import scipy
 
 from gearmbs.dae.equations import jacobian, residual, unknowns
 from gearmbs.dae.equations import layout as T
@@ -53,7 +52,7 @@ def accelerations(system: PosedModel, place: Configuration, t: float) -> tuple[n
         found = system.assembler.at(place, t, inner, system.state_start)
         diagnosis.check_finite(system, found.rhs, found.loads, t)
         try:
-            solution = splu(found.matrix).solve(found.rhs)
+            solution = scipy.sparse.linalg.splu(found.matrix).solve(found.rhs)
         except RuntimeError:
             solution = np.full(found.rhs.size, np.nan)
         if not np.all(np.isfinite(solution)) or (attempt == 0 and diagnosis.is_massless(system.model, found.matrix)):
@@ -106,9 +105,9 @@ def _algebraic_start(system: PosedModel, place: Configuration, t: float) -> np.n
         residual.residual(t, y, rest, out, idata, rdata, work)
         diagnosis.check_states(system, out[z:], t)
         jacobian.jacobian(t, y, rest, 0.0, vals, idata, rdata, work)
-        matrix = csc_array((vals, indices, indptr), shape=(y.size, y.size))
+        matrix = scipy.sparse.csc_array((vals, indices, indptr), shape=(y.size, y.size))
         try:
-            step = splu(csc_array(matrix[places][:, places])).solve(out[places])
+            step = scipy.sparse.linalg.splu(scipy.sparse.csc_array(matrix[places][:, places])).solve(out[places])
         except RuntimeError:
             break
         if not np.all(np.isfinite(step)):
