@@ -26,8 +26,10 @@ from gearmbs.adams.run.script_check import check_script
 from . import (
     test_accelerations,
     test_contacts,
+    test_couplers,
     test_curves,
     test_flexible,
+    test_held_bodies,
     test_linear_systems,
     test_passages,
     test_plant,
@@ -42,6 +44,7 @@ from .mutations import mutated
 SECONDS = 60
 """In which a deck must be done."""
 CHECKED = "m\no\nSIMULATE/DYNAMICS, END=0.002, STEPS=2\n"
+IMPLICIT = "DIFF/1, IMPLICIT, IC=0.5, FUNCTION=DIF1(1)+DIF1(1)**3-COS(TIME)+DIF(1)\nREQUEST/1, F2=DIF1(1)\n"
 RUNS = [
     CHECKED, "m\no\nSIMULATE/KINEMATICS, END=0.002, STEPS=2\n", "m\no\nSIMULATE/STATICS\n", "m\no\nLINEAR/EIGENSOL\n",
     "m\no\nLINEAR/STATEMAT, PINPUT=1, POUTPUT=1\n",
@@ -93,6 +96,10 @@ def corpus() -> list[str]:
         test_accelerations.DECK.format(extra=test_accelerations.ASKED),
         test_passages.DECK.format(x=0.8, y=0.6, end=1.6, rod=1.0, start=1.6, stroke=1.0),
         test_user_elements.HEAD + test_user_elements.CART + test_user_elements.LOOP + test_user_elements.GSE + "END\n",
+        test_couplers.DECK.format(coupler="JOINTS=1,2,3, TYPE=T:R:T, SCALES=1,-250,2"),
+        test_held_bodies.HEAD + test_held_bodies.POINT + "END\n",
+        test_held_bodies.HEAD + test_held_bodies.PLATE.format(extra=", PLANAR, WZ=0.2") + "END\n",
+        test_user_elements.HEAD + test_user_elements.CART + IMPLICIT + "END\n",
         test_plant.SPRING,
         test_flexible.DECK.format(pivot="0,90D,0"),
         test_redundancy.DOOR, test_redundancy.PARALLEL,
