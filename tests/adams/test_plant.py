@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearmbs.adams import DeckError, linear_plant, parse_deck, parse_script, run_deck
+from gearmbs.adams import DeckError, linear_plant, parse_deck, parse_script, read_results, run_deck
 
 MASS, STIFFNESS, DAMPING = 2.0, 50.0, 3.0
 SPRING = f"""mass, spring and damper
@@ -161,3 +161,21 @@ def test_the_command_writes_the_plant(tmp_path):
     done = runner.invoke(app, ["plant", str(tmp_path / "mass.adm"), "-o", str(tmp_path / "m.txt")])
     assert done.exit_code == 1
     assert "a plant is written as .mat or .npz" in done.output
+
+
+def test_variables_and_lists_of_a_control_program_are_in_the_results(tmp_path):
+    """As ADAMS has them: VARIABLEs with the component Q, PINPUT with IN1 and so on, POUTPUT with OUT1."""
+    script = parse_script("m\no\nSIM/DYN, END=0.1, STEPS=5\nVARIABLE/1, FUNCTION=8*TIME\nSIM/DYN, END=0.2, STEPS=5\n")
+    result = run_deck(parse_deck(SPRING), script, tmp_path / "spring", tol=1e-8)
+    assert result.variables == [1, 2, 3, 4]
+    np.testing.assert_array_equal(result.variable(1), np.r_[np.zeros(6), 8 * result.t[6:]])
+    np.testing.assert_allclose(result.variable(2), result.part(2)[:, 0], atol=1e-15)
+    np.testing.assert_allclose(result.variable(4), result.part(2)[:, 12], atol=1e-12)
+    np.testing.assert_array_equal(result.to_dataset().variable_2, result.variable(2))
+    found = read_results(tmp_path / "spring.res")
+    assert found["VARIABLE_2"].kind == "ADAMS_Variable"
+    np.testing.assert_allclose(found["VARIABLE_2"]["Q"], result.variable(2), rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(found["PINPUT_1"]["IN1"], result.variable(1), rtol=1e-9)
+    assert found["POUTPUT_1"].components == ("OUT1", "OUT2", "OUT3")
+    with pytest.raises(KeyError, match="no values of VARIABLE/9; there are those of 1, 2, 3, 4"):
+        result.variable(9)

@@ -338,11 +338,7 @@ class Builder:
             if curve.sampled or curve.matrix in self.deck.of(st.Matrix):
                 self.attempt(curve, self.add_curve)
         for diff in self.active(st.Diff):
-            text = self.text(diff.function)
-            if diff.implicit:
-                m.states.update(implicit_states(diff, text, self.units.time))
-                continue
-            m.states[diff.id] = State(diff_name(diff), f"({text})/{self.units.time!r}", diff.ic[0])
+            self.attempt(diff, self.add_diff)
         for system in (*self.active(st.Lse), *self.active(st.Tfsiso), *self.active(st.Gse)):
             self.attempt(system, self.add_state_system)
         for sensor in self.active(st.Sensor):
@@ -355,6 +351,14 @@ class Builder:
             alpha, *rows = np.array(curve.sampled).T
             for axis, values in zip("XYZ", rows):
                 self.mechanism.splines[f"CURVE_{curve.id}.BY.{axis}"] = SplineData(tuple(alpha), (tuple(values),))
+
+    def add_diff(self, diff: st.Diff) -> None:
+        """Add the state of a DIFF, with IMPLICIT the one of its rate, too."""
+        states, text = self.mechanism.states, self.text(diff.function or "0")
+        if diff.implicit:
+            states.update(implicit_states(diff, text, self.units.time))
+        else:
+            states[diff.id] = State(diff_name(diff), f"({text})/{self.units.time!r}", diff.ic[0])
 
     def add_state_system(self, statement: st.Lse | st.Tfsiso | st.Gse) -> None:
         """Add the states of an LSE, TFSISO or GSE."""

@@ -27,11 +27,8 @@ def condition(unknown: str, residual: str, start: float) -> State:
 
 def has_rate(diff: st.Diff) -> bool:
     """Whether an implicit DIFF asks for its own rate."""
-    return any(
-        isinstance(node, Call) and node.name == "DIF1" and isinstance(node.args[0], Number)
-        and node.args[0].integer == diff.id
-        for node in walk(parse(diff.function or "0"))
-    )  # fmt: skip
+    asked = [n.args[:1] for n in walk(parse(diff.function or "0")) if isinstance(n, Call) and n.name == "DIF1"]
+    return any(isinstance(first, Number) and first.integer == diff.id for args in asked for first in args)
 
 
 def diff_name(diff: st.Diff) -> str:

@@ -57,6 +57,8 @@ class Segment:
         (kind, id) -> force and torque on the I side, global components, SI, shape (m, 6).
     tracks : dict of int to ContactTracks
         What happened where the solids of a CONTACT touched, by id, SI.
+    variables : dict of int to ndarray
+        Values of the VARIABLEs, by id, in the deck's units, shape (m,).
     """
 
     command: Simulate
@@ -68,6 +70,7 @@ class Segment:
     requests: dict[int, RequestSeries] = field(default_factory=dict)
     wrenches: dict[tuple[str, int], np.ndarray] = field(default_factory=dict)
     tracks: dict[int, ContactTracks] = field(default_factory=dict)
+    variables: dict[int, np.ndarray] = field(default_factory=dict)
     equilibrium: StaticResult | None = None
     assembly: Assembly | None = None
     passage: tuple[float, str] | None = None
@@ -209,6 +212,25 @@ class RunRecord:
         rows = [s.wrenches.get((kind, number), np.zeros((s.solution.t.size, 6))) for s in self.segments]
         return np.concatenate(rows or [np.zeros((0, 6))]) / scale
 
+    @property
+    def variables(self) -> list[int]:
+        """Ids of the VARIABLEs whose values are known: all but those left out."""
+        known = [set(s.variables) for s in self.segments]
+        return [number for number in self.deck.of(st.Variable) if known and all(number in k for k in known)]
+
+    def variable(self, number: int) -> np.ndarray:
+        """Return the values of VARIABLE/number, deck units, shape (m,).
+
+        Raises
+        ------
+        KeyError
+            If there is no such variable, or it has been left out.
+        """
+        if number not in self.variables:
+            known = ", ".join(str(k) for k in self.variables)
+            raise KeyError(f"there are no values of VARIABLE/{number}; there are those of {known or 'none'}")
+        return np.concatenate([s.variables[number] for s in self.segments])
+
     def tracks(self, number: int) -> np.ndarray:
         """Return where and how the solids of CONTACT/number touched, shape (m, tracks, 28), deck units.
 
@@ -304,6 +326,10 @@ class RunRecord:
             if tracks.size:
                 time, component = columns("track", TRACK_COLUMNS, self.track_units)
                 data[f"contact_{number}_tracks"] = ((time, f"contact_{number}_track", component), tracks)
+        for number in self.variables:
+            variable = self.deck.of(st.Variable)[number]
+            long_name = {"long_name": variable.name or variable.label()}
+            data[f"variable_{number}"] = ("time", self.variable(number), long_name)
         out = xr.Dataset(data, coords=coords)
         out.attrs["title"] = self.deck.title
         out.attrs["units"] = ", ".join(f"{d}: {self.unit(d)}" for d in ("length", "mass", "time", "force", "angle"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -152,6 +153,14 @@ class RequestEvaluator:
             angles, np.zeros(max(1, tape.gradient_size)), np.zeros(tape.work_size), out,
         )  # fmt: skip
         return out
+
+    def variables(self) -> dict[int, np.ndarray]:
+        """Return the values of the deck's VARIABLEs over time, but for those that ask for what is not there."""
+        found = {}
+        for number in self.model.deck.of(st.Variable):
+            with contextlib.suppress(ExpressionError):
+                found[number] = self.expression(f"VARVAL({number})")
+        return found
 
     def turns(self) -> dict[tuple[str, str, str], float]:
         """Return where the angles counted so far between markers of the deck end, rad."""

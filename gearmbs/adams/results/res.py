@@ -61,6 +61,7 @@ def _entities(result: RunRecord) -> Iterator[_Entity]:
         yield _Entity(attributes, FORCE_COLUMNS, wrench_units, result.force(kind, number))
         if kind == "contact":
             yield from _tracks(result, number, name)
+    yield from _variable_entities(result)
     for number, request in deck.of(st.Request).items():
         name = request.results_name or request.name or f"REQUEST_{number}"
         names = result.segments[0].requests[number].names if result.segments else ()
@@ -93,6 +94,24 @@ def _flexible_entities(result: RunRecord) -> Iterator[_Entity]:
         rates = (f"1/{result.unit('time')}",) * q_f.shape[1]
         modal = ("no_units",) * q_f.shape[1] + rates
         yield _Entity(f"name={quoteattr(name + '_Q')} {kind}", names, modal, np.hstack([q_f, v_f]))
+
+
+def _variable_entities(result: RunRecord) -> Iterator[_Entity]:
+    """VARIABLEs, then the lists of a control program that have all of their members."""
+    deck, known = result.deck, result.variables
+    for number in known:
+        name = quoteattr(deck.of(st.Variable)[number].name or f"VARIABLE_{number}")
+        attributes = f'name={name} entity={name} entType="ADAMS_Variable" objectId="{number}"'
+        yield _Entity(attributes, ("Q",), ("no_units",), result.variable(number)[:, None])
+    for kind, kind_name, letters in ((st.PlantInput, "Plant_Input", "IN"), (st.PlantOutput, "Plant_Output", "OUT")):
+        for number, plant in deck.of(kind).items():
+            if not plant.variables or not set(plant.variables) <= set(known):
+                continue
+            name = quoteattr(plant.name or f"{kind.keyword}_{number}")
+            attributes = f'name={name} entity={name} entType="{kind_name}" objectId="{number}"'
+            columns = tuple(f"{letters}{k + 1}" for k in range(len(plant.variables)))
+            values = np.stack([result.variable(v) for v in plant.variables], axis=1)
+            yield _Entity(attributes, columns, ("no_units",) * len(columns), values)
 
 
 def _package_version() -> str:

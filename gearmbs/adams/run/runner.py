@@ -327,6 +327,7 @@ def _part(
     for kind_id in model.pairs:
         segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
     segment.tracks = tracks_of(model, solution)
+    segment.variables = evaluator.variables()
     if kind not in ("STATICS", "INITIAL_CONDITIONS"):
         segment.passage = singular_passage(solution)
     _remember(session, model, segment, evaluator)
