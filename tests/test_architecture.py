@@ -87,10 +87,10 @@ CIRCLES = {
         "methods of Mechanism, and the functions that carry them out",
     ("adams.builders.accelerations", "adams.builders.builder", "adams.builders.constraints", "adams.builders.contacts",
      "adams.builders.control", "adams.builders.curve_data", "adams.builders.curves", "adams.builders.data_calls",
-     "adams.builders.flexible", "adams.builders.forces", "adams.builders.held_bodies",
-     "adams.builders.initial", "adams.builders.mechanism",
-     "adams.builders.model", "adams.builders.routine_calls", "adams.builders.routines",
-     "adams.builders.state_equations", "adams.builders.user_elements", "adams.parse.check",
+     "adams.builders.flexible", "adams.builders.flexible_data", "adams.builders.forces", "adams.builders.initial",
+     "adams.builders.mechanism", "adams.builders.modal_forces", "adams.builders.modal_loads", "adams.builders.model",
+     "adams.builders.held_bodies", "adams.builders.routine_calls",
+     "adams.builders.routines", "adams.builders.state_equations", "adams.builders.user_elements", "adams.parse.check",
      "adams.parse.deck", "adams.parse.readers"):
         "a deck builds its mechanism; types only, and one method",
     ("campaigns.campaign", "campaigns.exports", "campaigns.report", "campaigns.response", "campaigns.sensitivity"):

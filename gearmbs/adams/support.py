@@ -22,7 +22,6 @@ INSTEAD: dict[str, str] = {
     "FE_LOAD": "an SFORCE or GFORCE at markers of a chain of PARTs and BEAMs",
     "FE_NODE": "a PART of a chain of PARTs and BEAMs",
     "FE_PART": "a chain of PARTs joined by BEAMs, or a body with modes in Python (`gearmbs.flexible`)",
-    "MFORCE": "it acts on a FLEX_BODY; in Python a force element on a body with modes",
     "MREQUEST": "a REQUEST for each marker",
     "NFORCE": "BEAM or FIELD between neighbouring PARTs",
     "NODE": "it belongs to a FLEX_BODY",
@@ -46,11 +45,8 @@ INSTEAD_OF_ARGUMENTS: dict[tuple[str, str], str] = {
     ("FLEX_BODY", "DB_FILE"): "MNF_FILE, a modal neutral file",
     ("FLEX_BODY", "BDF_FILE"): "MNF_FILE; beams of large motion in Python (`gearmbs.flexible.add_beam`)",
     ("FLEX_BODY", "INDEX_IN_DATABASE"): "MNF_FILE, a modal neutral file",
-    ("FLEX_BODY", "DMODE"): "SIMULATE/STATICS first: it deforms the body under its loads",
-    ("FLEX_BODY", "VMODE"): "an SFORCE that acts for a moment",
     ("REQUEST", "FUNCTION"): "USER with a routine, or F1 to F8",
     ("SPLINE", "FILE"): "X and Y in the deck",
-    ("MATRIX", "FILE"): "VALUES in the deck",
     ("JOINT", "FRICTION"): "a FRICTION statement",
 }
 """What to do instead of arguments that are refused."""

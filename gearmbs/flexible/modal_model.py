@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -289,6 +289,28 @@ class ModalModel:
             body.long_axis = axes[:, 0].copy()
             body.spin_limit = SPIN_SHARE * 2 * np.pi * float(self.frequencies.min())
         return body
+
+    def modal_load(self, forces: Mapping[str | int, tuple[npt.ArrayLike, npt.ArrayLike]]) -> np.ndarray:
+        """Return the load that forces and torques at seats and nodes are to the undeformed body.
+
+        Parameters
+        ----------
+        forces : mapping of str or int to a pair of array_like of 3 floats
+            Force (N) and torque (N m) at a seat by its name, or a node by its number, in the body's axes.
+
+        Returns
+        -------
+        ndarray, shape (6 + n,)
+            Force and torque about the origin of the nodes' frame, then the force on each mode: for
+            :func:`gearmbs.mechanism.add_modal_force`.
+        """
+        out = np.zeros(6 + self.modes)
+        for where, (force, torque) in forces.items():
+            place = self.place(where)
+            moved, turned = self.shapes(place)
+            f, t = np.asarray(force, dtype=float), np.asarray(torque, dtype=float)
+            out += np.concatenate([f, t + np.cross(place, f), moved @ f + turned @ t])
+        return out
 
     def displaced(self, coordinates: np.ndarray, factor: float = 1.0) -> np.ndarray:
         """Return the nodes moved by modal coordinates of shape (n,), ``factor`` times as far, shape (N, 3), m."""

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from gearmbs.dae.errors import AssemblyError, ModelError, SingularModelError
     from gearmbs.mechanism.analyses import kinematic, linear_modes, quasi_static, static_equilibrium
     from gearmbs.mechanism.elements import Compiled, ForceElement, Load, State, Torque
+    from gearmbs.mechanism.forces.modal_force import add_modal_force
     from gearmbs.mechanism.friction_parameters import JointFriction
     from gearmbs.mechanism.functions import (
         TimeFunction,
@@ -46,6 +47,7 @@ __all__ = [
     "State",
     "TimeFunction",
     "Torque",
+    "add_modal_force",
     "constant",
     "curve",
     "curve_integral",
@@ -82,6 +84,7 @@ late(
         "State": ".elements",
         "TimeFunction": ".functions",
         "Torque": ".elements",
+        "add_modal_force": ".forces.modal_force",
         "constant": ".functions",
         "curve": ".functions",
         "curve_integral": ".functions",

@@ -240,6 +240,20 @@ def _ordered_products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 @dataclass(eq=False)
+class ShapedMarker(Marker):
+    """A marker of a modal body whose shapes are given with it, instead of being those of its place.
+
+    Attributes
+    ----------
+    moved, turned : ndarray, shape (n, 3)
+        Displacement and rotation by one unit of each mode, in the body's frame.
+    """
+
+    moved: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    turned: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+
+
+@dataclass(eq=False)
 class ModalBody(Body):
     """A body with modal coordinates. Made by :meth:`gearmbs.mechanism.Mechanism.modal_body`.
 
@@ -280,7 +294,9 @@ class ModalBody(Body):
             If the shapes given have other sizes.
         """
         n = self.modal.modes
-        moved, turned = (np.asarray(part, dtype=float) for part in self.shapes(marker.position.copy()))
+        own = isinstance(marker, ShapedMarker)
+        given = (marker.moved, marker.turned) if own else self.shapes(marker.position.copy())  # type: ignore[attr-defined]
+        moved, turned = (np.asarray(part, dtype=float) for part in given)
         for part, what in ((moved, "displacements"), (turned, "rotations")):
             if part.shape != (n, 3) or not np.all(np.isfinite(part)):
                 raise ModelError(

@@ -113,7 +113,7 @@ def test_results_file_and_data_set_have_the_modal_coordinates(folder, tmp_path):
     [
         ("bar.mnf", "none.mnf", "MNF_FILE = none.mnf: No such file"),
         ("bar.mnf", "mdids://x/bar.mnf", "give the path of the file"),
-        ("MNF_FILE=bar.mnf,", "", "MATRIX/2: DATA_FILE is not supported"),
+        ("MNF_FILE=bar.mnf,", "", "FLEX_BODY/1: MNF_FILE is missing"),
         ("NODE=3", "NODE=77", "there is no node 77"),
         ("NODE=3", "NODE=3,QP=0,0,150", "QP is 50 from node 3"),
         ("NODE=3", "QP=0,0,170", "QP is 30 from node 3"),

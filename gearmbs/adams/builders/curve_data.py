@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.matrix_files import read_matrices
 from gearmbs.mechanism.curves import Curve
 
 
@@ -51,8 +54,10 @@ def matrix_values(matrix: st.Matrix) -> np.ndarray:
     Raises
     ------
     ValueError
-        If the numbers do not fill it.
+        If the numbers do not fill it, or it is not in its file.
     """
+    if matrix.data_file:
+        return _from_file(matrix)
     rows, columns = matrix.rows or 0, matrix.columns or 0
     if matrix.sparse:
         entries = np.array(matrix.values)
@@ -70,3 +75,13 @@ def matrix_values(matrix: st.Matrix) -> np.ndarray:
     if matrix.full == "CORDER":
         return np.reshape(matrix.values, (columns, rows)).T
     return np.reshape(matrix.values, (rows, columns))
+
+
+def _from_file(matrix: st.Matrix) -> np.ndarray:
+    """Return a MATRIX of a file beside the deck: by its name there, or the only one."""
+    path = Path((matrix.data_file or "").replace("\\", "/"))
+    found = read_matrices(path if path.is_absolute() else Path(matrix.file).parent / path)
+    wanted = (matrix.matrix_name or "").upper()
+    if wanted in found or (not wanted and len(found) == 1):
+        return found[wanted] if wanted else next(iter(found.values()))
+    raise ValueError(f"{matrix.label()}: FILE = {path.name} has no matrix {wanted!r}; it has {', '.join(found)}")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gearmbs.adams.builders.builder import Builder
+from gearmbs.adams.builders.flexible_data import flexible_body
 from gearmbs.adams.builders.frames import marker_orientation, part_orientation
 from gearmbs.adams.builders.model import BodyState
 from gearmbs.adams.errors import WARNING
@@ -17,7 +17,7 @@ from gearmbs.mechanism.expression_compiler import compile_expression
 from gearmbs.mechanism.expression_syntax import Scope
 
 if TYPE_CHECKING:
-    from gearmbs.flexible import ModalModel, ModalNeutralFile
+    from gearmbs.flexible import ModalModel
     from gearmbs.flexible.damping import Damping
 
 COUPLINGS = {"T" * 9: "full", "TTTTFTTTF": "partial"}
@@ -30,13 +30,13 @@ ON_NODE = 1e-6
 
 def add_flex_body(b: Builder, s: st.FlexBody) -> None:
     """FLEX_BODY: a modal body from its MNF, with the damping and the coupling of the statement."""
-    mnf, model = _model(b, s)
+    flexible = flexible_body(b.deck, s)
+    model = flexible.model
     name = b.claim(s, "flex_body")
     level = _coupling(s)
-    numbers = mnf.mode_ids[mnf.elastic]
     ratios: Damping = "adams"
     if s.cratio is not None:
-        ratios = modal_ratios(s.cratio, model.frequencies, numbers).tolist()
+        ratios = modal_ratios(s.cratio, model.frequencies, flexible.numbers).tolist()
     start = b.state.get(("FLEX_BODY", s.id))
     if start is None:
         start = _start(b, s, model)
@@ -49,12 +49,8 @@ def add_flex_body(b: Builder, s: st.FlexBody) -> None:
         body.rate[:] = start.v_f
     b.model.sources[body.name] = s
     b.flexible[s.id] = model
-    if s.matrices:
-        b.remark(
-            WARNING,
-            s,
-            f"all {model.modes} elastic modes of the MNF are taken; which of them MATRICES select is not read",
-        )
+    if flexible.remark:
+        b.remark(WARNING, s, flexible.remark)
 
 
 def add_flexible_marker(b: Builder, statement: st.Marker) -> None:
@@ -102,29 +98,6 @@ def modal_ratios(text: str, frequencies: np.ndarray, numbers: np.ndarray) -> np.
     return np.array(out)
 
 
-def _model(b: Builder, s: st.FlexBody) -> tuple[ModalNeutralFile, ModalModel]:
-    """Read the body's MNF, once a deck."""
-    from gearmbs.flexible import FlexibleError, read_mnf
-
-    if s.mnf_file is None:
-        raise ValueError("MNF_FILE is missing; bodies from MATRICES alone, MD DB and BDF files are not read")
-    path = Path(s.mnf_file.replace("\\", "/"))
-    if "://" in s.mnf_file:
-        raise ValueError(f"MNF_FILE = {s.mnf_file}: no database of ADAMS/Car is looked up; give the path of the file")
-    if not path.is_absolute():
-        path = Path(b.deck.file).parent / path
-    key = str(path)
-    if key not in b.deck.modal_files:
-        try:
-            b.deck.modal_files[key] = read_mnf(path)
-        except FlexibleError as error:
-            raise ValueError(str(error)) from error
-        except OSError as error:
-            raise ValueError(f"MNF_FILE = {s.mnf_file}: {error.strerror}; looked for {path}") from error
-    mnf = b.deck.modal_files[key]
-    return mnf, mnf.modal_model(s.name or s.label())
-
-
 def _coupling(s: st.FlexBody) -> str:
     """Return the level of coupling that a pattern of invariants asks for."""
     if not s.invariants:
@@ -137,7 +110,7 @@ def _coupling(s: st.FlexBody) -> str:
 
 
 def _start(b: Builder, s: st.FlexBody, model: ModalModel) -> BodyState:
-    """Return where the deck puts the body: QG and its angles, velocities of its centre of mass."""
+    """Return where the deck puts the body: QG and its angles, velocities of its centre of mass, modal coordinates."""
     units = b.units
     axes = part_orientation(s)
     com = model.properties.com
@@ -145,4 +118,8 @@ def _start(b: Builder, s: st.FlexBody, model: ModalModel) -> BodyState:
     spin = units.factor("angular_velocity") * (b.direction(s.wm, s, axes, None) @ np.array([s.wx, s.wy, s.wz]))
     push = b.direction(s.vm, s, axes, None) if s.vm is not None else own
     velocity = units.factor("velocity") * (push @ np.array([s.vx, s.vy, s.vz]))
-    return BodyState(units.length * np.array(s.qg), axes, velocity - np.cross(spin, axes @ com), spin)
+    for given, what in ((s.dmode, "DMODE"), (s.vmode, "VMODE")):
+        if given and len(given) != model.modes:
+            raise ValueError(f"{what} has {len(given)} values for {model.modes} modes")
+    q_f, v_f = np.array(s.dmode), np.array(s.vmode) / units.time
+    return BodyState(units.length * np.array(s.qg), axes, velocity - np.cross(spin, axes @ com), spin, q_f, v_f)

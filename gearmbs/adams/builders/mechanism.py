@@ -12,8 +12,10 @@ from gearmbs.adams.builders.curves import CURVES
 from gearmbs.adams.builders.flexible import add_flex_body, add_flexible_marker
 from gearmbs.adams.builders.forces import FORCES
 from gearmbs.adams.builders.initial import with_initial_motions
+from gearmbs.adams.builders.modal_forces import add_mforce
 from gearmbs.adams.builders.model import AdamsModel, BodyState
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
+from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism
@@ -75,7 +77,7 @@ def build_model(
     if builder.add_bodies(add_flex_body, add_flexible_marker):
         builder.name_elements()
         builder.add_data()
-        for kind, make in (CONSTRAINTS | CURVES | FORCES | CONTACTS).items():
+        for kind, make in (CONSTRAINTS | CURVES | FORCES | {st.Mforce: add_mforce} | CONTACTS).items():
             for statement in builder.active(kind):
                 builder.attempt(statement, partial(make, builder))
     model = builder.model

@@ -73,6 +73,8 @@ class RoutineCall:
         Of I of a FIELD, as seen from J: DX, DY, DZ, AX, AY, AZ and VX, VY, VZ, WX, WY, WZ.
     alpha : float
         Parameter of a CURVE.
+    loads : ndarray, shape (6 + n, cases)
+        Load cases of the FLEX_BODY of an MFORCE.
     """
 
     id: int
@@ -88,6 +90,7 @@ class RoutineCall:
     displacement: np.ndarray = field(default_factory=_empty)
     velocity: np.ndarray = field(default_factory=_empty)
     alpha: float = 0.0
+    loads: np.ndarray = field(default_factory=_empty)
     _values: dict[str, float] = field(default_factory=dict)
     _draw: np.random.Generator = field(default_factory=np.random.default_rng)
     _deck: Deck = field(default_factory=Deck)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from gearmbs.adams.builders.modal_loads import bind_mforce
 from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall
 from gearmbs.adams.builders.user_elements import bind_coupler, bind_curve, bind_field, bind_gse, gse_parts
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
@@ -35,6 +36,7 @@ BINDERS: dict[type, tuple[str, Callable]] = {
     st.Field: ("FIESUB", bind_field),
     st.CurveStatement: ("CURSUB", bind_curve),
     st.Gse: ("GSE_DERIV", bind_gse),
+    st.Mforce: ("MFOSUB", bind_mforce),
 }
 """Likewise, with what makes of a routine what the statement needs."""
 
@@ -144,7 +146,7 @@ def _uses(s: st.Statement) -> Iterator[_Use]:
     """Yield what a statement calls of the user."""
     if type(s) in ROUTINES or type(s) in BINDERS:
         name, fields = ROUTINES.get(type(s)) or (BINDERS[type(s)][0], ())
-        call = _user_call(getattr(s, "function", None))
+        call = _user_call(getattr(s, "function", None)) or _user_call(getattr(s, "force", None))
         if call is not None:
             yield _Use(s, call, name, fields, getattr(s, "routine", None))
     if isinstance(s, st.Sensor):

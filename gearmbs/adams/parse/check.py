@@ -38,6 +38,7 @@ REQUIRED: dict[type, tuple[str, ...]] = {
     st.Cvcv: ("icurve", "jcurve", "irm", "jrm"),
     st.Sensor: ("function",),
     st.Gse: ("function",),
+    st.Mforce: ("flex_body",),
 }
 MEASURES = frozenset(
     """DX DY DZ DM AX AY AZ INCANG PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
@@ -48,13 +49,12 @@ MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv", "corner
 TWO_PARTS = (st.Joint, st.Jprim)
 UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
     st.Marker: ("fe_part", "node_label", "curve"),
-    st.FlexBody: ("db_file", "bdf_file", "index_in_database", "dmode", "vmode"),
+    st.FlexBody: ("db_file", "bdf_file", "index_in_database"),
     st.Joint: ("friction",),
     st.Coupler: ("function",),
     st.Field: ("function",),
     st.Spline: ("data_file",),
     st.Request: ("function",),
-    st.Matrix: ("data_file",),
     st.CurveStatement: ("function",),
     st.Contact: ("normal_function", "friction_function", "iflex", "jflex"),
 }
@@ -127,14 +127,12 @@ def check(deck: Deck) -> list[Diagnostic]:
         if cls is st.Marker and (statement.flex_body or statement.point_mass or statement.fe_part):  # type: ignore[attr-defined]
             required = ()
         if getattr(statement, "data_file", None) or (cls is st.CurveStatement and "function" in statement.given):
-            # not supported, which is said below
+            # the file has them, or it is not supported, which is said below
             required = ()
         for name in required:
             if getattr(statement, name) in (None, ()):
                 keyword = _choices(cls, name) if specs_of(cls)[name].kind == CHOICE else name.upper()
                 fail(statement, f"{keyword} is missing")
-        if cls is st.Matrix and statement.id in _matrices_beside_files(deck):
-            continue
         for name in refused_arguments(statement):
             message = f"{statement.label()}: {name.upper()} is not supported"
             deck.diagnostics.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.given[name]))
@@ -153,6 +151,9 @@ def check(deck: Deck) -> list[Diagnostic]:
             fail(marker, f"there is no POINT_MASS/{marker.point_mass}", "point_mass")
         if marker.flex_body is None and marker.node_id is not None:
             fail(marker, "NODE_ID is for markers of a FLEX_BODY", "node_id")
+    for force in deck.of(st.Mforce).values():
+        if force.flex_body is not None and force.flex_body not in deck.of(st.FlexBody):
+            fail(force, f"there is no FLEX_BODY/{force.flex_body}", "flex_body")
     _check_constraints(deck, fail)
     _check_forces(deck, fail)
     _check_contacts(deck, fail)
@@ -166,11 +167,6 @@ def refused_arguments(statement: st.Statement) -> list[str]:
     """Return the arguments of a statement that are not supported, but for those that switch something off."""
     names = UNSUPPORTED_ARGUMENTS.get(type(statement), ())
     return [name for name in names if name in statement.given and getattr(statement, name) != "OFF"]
-
-
-def _matrices_beside_files(deck: Deck) -> set[int]:
-    """Return the matrices of flexible bodies that come from a file: what they hold is in the file, too."""
-    return {ref for body in deck.of(st.FlexBody).values() if body.mnf_file for ref in body.matrices}
 
 
 Fail = Callable[..., None]

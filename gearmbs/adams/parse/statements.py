@@ -27,7 +27,7 @@ from gearmbs.adams.parse.statements_data import (
     Variable,
 )
 from gearmbs.adams.parse.statements_events import Sensor, String
-from gearmbs.adams.parse.statements_flexible import FlexBody
+from gearmbs.adams.parse.statements_flexible import FlexBody, Mforce
 from gearmbs.adams.parse.statements_forces import (
     Accgrav,
     Beam,
@@ -80,6 +80,7 @@ STATEMENTS: dict[str, type[Statement]] = {
     "LSE": Lse,
     "MARKER": Marker,
     "MATRIX": Matrix,
+    "MFORCE": Mforce,
     "MOTION": Motion,
     "OUTPUT": Output,
     "PART": Part,
@@ -112,7 +113,7 @@ IGNORED = frozenset("MATERIAL PREFERENCES DEBUG FEMDATA LSOLVER".split())
 """Statements without effect on the numbers computed here."""
 
 UNSUPPORTED = frozenset(
-    """CLEARANCE EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART MFORCE MREQUEST
+    """CLEARANCE EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART MREQUEST
     NFORCE NODE NORMAL_MODE_ANALYSIS PSTATE SECTION SURFACE TIRE UCON""".split()
 )
 """Statements of ADAMS that change the motion and are not modelled here."""
@@ -150,6 +151,7 @@ __all__ = [
     "Lse",
     "Marker",
     "Matrix",
+    "Mforce",
     "Motion",
     "Output",
     "Part",

@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from gearmbs.adams.parse.grammar import EXPRESSION, ID, IDS, INT, PATH, REAL, REALS, WORDS, arg
+from gearmbs.adams.parse.grammar import EXPRESSION, ID, IDS, INT, PATH, REAL, REALS, TEXT, WORDS, arg
 from gearmbs.adams.parse.statement import Statement, Vector
 
 
@@ -38,3 +38,17 @@ class FlexBody(Statement, keyword="FLEX_BODY"):
     vmode: Vector = arg("VMODE", REALS, (), count=(1, 10000))
     char_len: float | None = arg("CHAR_LEN", REAL, dimension="length")
     cratio: str | None = arg("CRATIO", EXPRESSION)
+
+
+@dataclass(frozen=True)
+class Mforce(Statement):
+    """MFORCE: a distribution of forces on a FLEX_BODY."""
+
+    flex_body: int | None = arg("FLEX_BODY", ID)
+    jfloat: int | None = arg("JFLOAT", ID)
+    case_index: int | None = arg("CASE_INDEX", INT)
+    scale: str | None = arg("SCALE", EXPRESSION)
+    force: str | None = arg("FORCE", EXPRESSION)
+    function: str | None = arg("FUNCTION", EXPRESSION)
+    routine: str | None = arg("ROUTINE", TEXT)
+    shares: tuple[str, ...] = field(default=(), kw_only=True)
