@@ -20,7 +20,7 @@ from gearmbs.mechanism.modal import ModalBody
 from gearmbs.mechanism.parts import Body, Marker
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.members import Members
+    from gearmbs.dae.model.member_tables import Members
     from gearmbs.dae.model.system import System
     from gearmbs.mechanism.mechanism import Mechanism
 
@@ -245,7 +245,7 @@ class _Lumping:
     # --- the way back --------------------------------------------------------------------------------
 
     def _members(self, system: System, edges: list[tuple[int, int, Joint]]) -> Members:
-        from gearmbs.dae.model import members as mb
+        from gearmbs.dae.model import member_tables as mb
 
         n = len(self.bodies)
         names = {name: k + 1 for k, name in enumerate(system.body_names)}

@@ -27,7 +27,7 @@ from gearmbs.mechanism.user_functions import raised_errors
 from gearmbs.progress import time_bar
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.members import Members
+    from gearmbs.dae.model.member_tables import Members
     from gearmbs.dae.model.system import System
 
 INTEGRATORS = ("WSTIFF", "GSTIFF", "IDA")

@@ -41,11 +41,11 @@ class Measured(NamedTuple):
 
 
 class _Columns(NamedTuple):
-    """The quantities of `Measured` for some output times, the wheels' angles, rad, in place of the error."""
+    """The quantities of `Measured` for some output times, the wheels' x axes, (m, 2, 3), in place of the error."""
 
     t: np.ndarray
     forces: np.ndarray
-    angles: np.ndarray
+    x_axes: np.ndarray
     contact: np.ndarray
 
 
@@ -130,17 +130,20 @@ class Recorder:
     def columns(self, part: Solution) -> _Columns:
         """Return what is recorded of one part of a solution."""
         forces = np.concatenate([part.reaction_force(seat) for seat in rig.SEATS], axis=1)
-        angles = np.empty((part.t.size, 2))
-        for wheel, (gear, axes) in enumerate(zip(rig.GEARS, self._axes, strict=True)):
-            x_axis = part.orientation(gear)[:, :, 0] @ axes[:, :2]
-            angles[:, wheel] = np.arctan2(x_axis[:, 1], x_axis[:, 0])
+        x_axes = np.stack([part.orientation(gear)[:, :, 0] for gear in rig.GEARS], axis=1)
         diagnostics = part.contact(rig.MESH)
-        return _Columns(part.t.copy(), forces, angles, np.stack([diagnostics[n] for n in (*SMOOTH, *COUNTS)], axis=1))
+        return _Columns(part.t.copy(), forces, x_axes, np.stack([diagnostics[n] for n in (*SMOOTH, *COUNTS)], axis=1))
 
     def joined(self, columns: list[_Columns]) -> Measured:
         """Return the parts as one, with the transmission error from the wheels' angles."""
         whole = _Columns(*(np.concatenate(c) for c in zip(*columns, strict=True)))
-        turned = np.unwrap(whole.angles, axis=0)
-        error = self._lag * (turned[:, 0] * self._ratio + turned[:, 1])
+        turned = [self._turned(whole.x_axes[:, wheel], axes) for wheel, axes in enumerate(self._axes)]
+        error = self._lag * (turned[0] * self._ratio + turned[1])
         contact = {name: whole.contact[:, k] for k, name in enumerate((*SMOOTH, *COUNTS))}
         return Measured(whole.t, whole.forces, error, contact)
+
+    @staticmethod
+    def _turned(x_axis: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        """Return the angle by which a wheel has turned, rad, from its x axis in the frame of its shaft."""
+        along, across = (x_axis @ axes[:, k] for k in range(2))
+        return np.unwrap(np.arctan2(across, along))

@@ -26,6 +26,7 @@ from gearmbs.dae.linalg.counted_entries import FEWEST_ENTRIES, LEAVING_PLANS
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan, SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, LUFactors, factor, new_factors, solve, solve_pair
 from gearmbs.dae.model import side_by_side
+from gearmbs.dae.model.member_tables import Members
 from gearmbs.dae.model.records import FARTHEST, RECORDS_TYPE, Records, allow_rounding, new_records
 
 _VEC = float64[::1]
@@ -262,7 +263,8 @@ class Evaluator:
     Pieces are to be handed over in the order of time.
     """
 
-    def __init__(self, idata: np.ndarray, rdata: np.ndarray, work_size: int) -> None:
+    def __init__(self, idata: np.ndarray, rdata: np.ndarray, work_size: int, members: Members | None = None) -> None:
+        self.members = members
         self.pattern = pattern(idata, rdata, work_size)
         self.rdata = rdata.copy()
         self.work = np.zeros(work_size)
@@ -282,7 +284,6 @@ class Evaluator:
         """
         y = np.ascontiguousarray(y)
         bounds = [row for row, _ in epochs] + [t.size]
-        rdata, work = self.rdata, self.work
         for (first, table), last in zip(epochs, bounds[1:]):
             table = np.ascontiguousarray(table)
             attempt = 0
@@ -290,7 +291,7 @@ class Evaluator:
                 if self.plan is None or attempt > 0:
                     place = t[first : first + 1], y[first : first + 1]
                     if attempt > len(GENERIC_TURNS):
-                        _least_squares_row(first, *place, self.pattern, table, rdata, work.size, records)
+                        self._evaluate_singular(first, *place, table, records)
                         first, attempt, self.plan = first + 1, 0, None
                         continue
                     if attempt > 1 or not self._choose_sparsely(*place, table):
@@ -310,9 +311,18 @@ class Evaluator:
             if done < together or done == last:
                 return done
             first = done
+        return self._evaluate_singly(first, last, t, y, table, records)
+
+    def _evaluate_singly(self, first: int, last: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records) -> int:
+        """Evaluate rows one after the other."""
         return evaluate_rows(
-            first, last, t, y, slots, table, rdata, work, self.vals, self.plan, self.factors, records, self.growth
-        )
+            first, last, t, y, self.pattern[2], table, self.rdata, self.work, self.vals, self.plan, self.factors,
+            records, self.growth,
+        )  # fmt: skip
+
+    def _evaluate_singular(self, row: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records: Records) -> None:
+        """Evaluate a row at a singular position; ``t`` and ``y`` hold it alone."""
+        _least_squares_row(row, t, y, self.pattern, table, self.rdata, self.work.size, records)
 
     def _choose_sparsely(self, t: np.ndarray, y: np.ndarray, table: np.ndarray) -> bool:
         """Choose pivots at one row, if there entries can be left out that have been negligible so far."""
@@ -338,7 +348,7 @@ class Evaluator:
                 "that differ by too many orders of magnitude"
             ) from error
         self.factors = new_factors(self.plan)
-        self.side = side_by_side.SideBySide(table, self.plan, self.vals.size) if self.has_lanes else None
+        self.side = side_by_side.SideBySide(table, self.plan, self.vals.size, self.members) if self.has_lanes else None
         # an ill-scaled mechanism may grow with the best of pivots
         self.growth = max(GROWTH_LIMIT, 100.0 * factor(self.plan, self.factors, self.vals))
 

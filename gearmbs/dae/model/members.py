@@ -7,10 +7,8 @@ and other loads are known: per joint no equation is left to be solved.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numba import float64, int64, types, void
+from numba import float64, int64, void
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
@@ -20,55 +18,29 @@ from gearmbs.dae.equations.accelerations import ROW_RECORD
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM
 from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W, POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.equations.update import update_functions, update_markers
-from gearmbs.dae.model.evaluator import RECORDS_TYPE, Evaluator, Records, new_records
+from gearmbs.dae.model.evaluator import Evaluator
+from gearmbs.dae.model.member_tables import (
+    EDGE_AXES,
+    EDGE_CHILD,
+    EDGE_CHILD_HAS_I,
+    EDGE_I,
+    EDGE_J,
+    EDGE_PARENT,
+    EDGE_ROWS,
+    MEMBERS_TYPE,
+    PLACE_A,
+    PLACE_INERTIA,
+    PLACE_MASS,
+    PLACE_R,
+    Members,
+)
+from gearmbs.dae.model.records import RECORDS_TYPE, Records, new_records
 
 PART = 512
 """Output times evaluated at a time, whose records fit the processor's cache."""
 
-EDGE_CHILD, EDGE_PARENT, EDGE_I, EDGE_J, EDGE_CHILD_HAS_I = range(5)
-EDGE_AXES = 5
-"""Of the three rows that keep the orientation: 3 * axis of I + axis of J."""
-EDGE_ROWS = 8
-"""Six rows in the order of the joint: coincident x, y, z, then the orientation."""
-EDGE_COLUMNS = 14
-"""Of a fixed joint inside a group; members count from 0, -1 is the ground."""
-
-PLACE_R, PLACE_A = 0, 3
-PLACE_MASS, PLACE_INERTIA = 12, 13
-PLACE_COLUMNS = 22
-"""Of a member: its centre of mass and axes in the frame of its group, mass, inertia in its own axes."""
-
 _IVEC = int64[::1]
-_IMAT = int64[:, ::1]
 _VEC = float64[::1]
-_MAT = float64[:, ::1]
-
-
-class Members(NamedTuple):
-    """What bodies integrated as one are made of.
-
-    Attributes
-    ----------
-    group : ndarray of int, shape (members,)
-        Body of the integrated model that each body of the whole one belongs to; 0 is the ground.
-    place : ndarray, shape (members, PLACE_COLUMNS)
-        Where it is in it, and its inertia.
-    of_marker : ndarray of int, shape (markers,)
-        Member on which each marker of the integrated model lies, -1 for the ground itself.
-    row : ndarray of int, shape (rows,)
-        Number among all rows of each row of the integrated model.
-    edge : ndarray of int, shape (joints, EDGE_COLUMNS)
-        Fixed joints inside groups, outermost first.
-    """
-
-    group: np.ndarray
-    place: np.ndarray
-    of_marker: np.ndarray
-    row: np.ndarray
-    edge: np.ndarray
-
-
-MEMBERS_TYPE = types.NamedTuple((_IVEC, _MAT, _IVEC, _IVEC, _IMAT), Members)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -377,27 +349,26 @@ def expand(first, count, t, idata, rdata, work, members, narrow, wide):
 class MemberEvaluator(Evaluator):
     """Evaluator of the whole mechanism's records on the unknowns of one in which bodies are integrated as one."""
 
-    def __init__(self, idata: np.ndarray, rdata: np.ndarray, work_size: int, members: Members) -> None:
-        super().__init__(idata, rdata, work_size)
-        self.members = members
-        self.sizes = (
-            int(idata[T.H_BODIES]) - 1,
-            int(idata[T.H_ROWS]),
-            int(idata[T.H_FORCES]),
-            int(idata[T.H_DIAGNOSTICS]),
-        )
-        self.narrow = new_records(0, *self.sizes)
+    members: Members
 
-    def fill(self, t: np.ndarray, y: np.ndarray, epochs, records: Records) -> None:
-        """Fill ``records`` of all bodies and joints; see `Evaluator.fill`."""
-        if len(self.narrow.pose) < min(PART, t.size):
-            self.narrow = new_records(min(PART, t.size), *self.sizes)
-        starts = [row for row, _ in epochs]
-        for first in range(0, t.size, PART):
-            last = min(first + PART, t.size)
-            here = int(np.searchsorted(starts, first, side="right")) - 1
-            now = [(max(row - first, 0), table) for row, table in epochs[here:] if row < last]
-            times = np.ascontiguousarray(t[first:last])
-            super().fill(times, y[first:last], now, self.narrow)
-            table = np.ascontiguousarray(now[0][1])
-            expand(first, last - first, times, table, self.rdata, self.work, self.members, self.narrow, records)
+    def __init__(self, idata: np.ndarray, rdata: np.ndarray, work_size: int, members: Members) -> None:
+        super().__init__(idata, rdata, work_size, members)
+        sizes = (int(idata[k]) for k in (T.H_BODIES, T.H_ROWS, T.H_FORCES, T.H_DIAGNOSTICS))
+        bodies, rows, elements, diagnostics = sizes
+        self.narrow = new_records(PART, bodies - 1, rows, elements, diagnostics)
+
+    def _evaluate_singly(self, first: int, last: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records) -> int:
+        """Evaluate rows one after the other, and expand them."""
+        while first < last:
+            stop = min(first + PART, last)
+            done = super()._evaluate_singly(0, stop - first, t[first:stop], y[first:stop], table, self.narrow)
+            times = t[first : first + done]
+            expand(first, done, times, table, self.rdata, self.work, self.members, self.narrow, records)
+            first += done
+            if first < stop:
+                break
+        return first
+
+    def _evaluate_singular(self, row: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records: Records) -> None:
+        super()._evaluate_singular(0, t, y, table, self.narrow)
+        expand(row, 1, t, table, self.rdata, self.work, self.members, self.narrow, records)

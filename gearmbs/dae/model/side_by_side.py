@@ -27,9 +27,12 @@ from gearmbs.dae.equations.lane_system import (
 )
 from gearmbs.dae.equations.output_records import poses
 from gearmbs.dae.equations.projection import EPS, ROUNDED_POSITION, ROUNDED_RATE, displace
+from gearmbs.dae.equations.rotation import POSE_COLUMNS
 from gearmbs.dae.equations.update import update_bodies, update_functions, update_marker
 from gearmbs.dae.linalg.lanes_lu import LaneFactors, factor_lanes, new_lane_factors, solve_lanes
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
+from gearmbs.dae.model.lane_members import MemberLanes, expand_lanes, new_member_lanes
+from gearmbs.dae.model.member_tables import MEMBERS_TYPE, Members, no_members
 from gearmbs.dae.model.records import FARTHEST, RECORDS_TYPE, allow_rounding
 
 LOOKED_AT = 32
@@ -57,6 +60,8 @@ class Bench(Struct):
         Counted angles before the outputs, then at each.
     markers : ndarray of int
         Markers that loads and terms of rare kinds look at.
+    pose : ndarray
+        Room for the poses of bodies that are made of others, which nobody asks for.
     """
 
     factored: Vector
@@ -70,6 +75,7 @@ class Bench(Struct):
     one_turn: Vector
     winding: Matrix
     markers: IntVector
+    pose: Vector
 
 
 def is_possible(idata: np.ndarray) -> bool:
@@ -108,11 +114,13 @@ def _watched_markers(idata: np.ndarray, lanes: LaneTables) -> np.ndarray:
 class SideBySide:
     """Tables, factors and scratch to evaluate outputs of one model side by side with one plan."""
 
-    def __init__(self, idata: np.ndarray, plan: LUPlan, nnz: int) -> None:
+    def __init__(self, idata: np.ndarray, plan: LUPlan, nnz: int, members: Members | None = None) -> None:
         terms = int(idata[T.H_TERMS])
         self.plan = plan
         self.lanes = new_lane_tables(idata, nnz)
         self.factors = new_lane_factors(plan)
+        self.members = no_members() if members is None else members
+        self.wide = new_member_lanes(self.members, int(idata[T.H_FORCES]))
         n = self.lanes.rhs.size
         self.bench = Bench(
             factored=np.full(LANES * nnz, np.inf),
@@ -126,13 +134,14 @@ class SideBySide:
             one_turn=np.zeros(n // LANES),
             winding=np.zeros((1 + LANES, 1 + 2 * terms)),
             markers=_watched_markers(idata, self.lanes),
+            pose=np.zeros(POSE_COLUMNS * (int(idata[T.H_BODIES]) - 1)),
         )
 
     def evaluate(self, first, last, t, y, slots, idata, rdata, work, records, growth) -> int:
         """Evaluate output rows from ``first``; see `evaluate_side_by_side`."""
         return evaluate_side_by_side(
-            first, last, t, y, slots, idata, rdata, work, self.plan, self.factors, self.lanes, self.bench, records,
-            growth,
+            first, last, t, y, slots, idata, rdata, work, self.plan, self.factors, self.lanes, self.bench, self.members,
+            self.wide, records, growth,
         )  # fmt: skip
 
 
@@ -214,7 +223,7 @@ def move_onto_constraints(idata, rdata, work, lanes, bench):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def take_output(lane, t, again, counts_turns, loads, pose, idata, tab, lanes, bench):
+def take_output(lane, t, again, counts_turns, loads, pose, idata, tab, lanes, bench, wide):
     """Bring the tables up to date with one output, and take from them what the lanes need.
 
     Parameters
@@ -227,7 +236,7 @@ def take_output(lane, t, again, counts_turns, loads, pose, idata, tab, lanes, be
     loads, pose : ndarray
         Rows of the records, written; without room in them while the unknowns are not final.
     idata, tab : ndarray of int, Tables
-    lanes, bench : LaneTables, Bench
+    lanes, bench, wide : LaneTables, Bench, MemberLanes
     """
     at = vector_at(lanes.y, lanes.y.shape[1] * lane, lanes.y.shape[1])
     update_bodies(at, tab.at, tab.code, tab.body, tab.modal, tab.kin, tab.partial, tab.scratch, False)
@@ -252,6 +261,9 @@ def take_output(lane, t, again, counts_turns, loads, pose, idata, tab, lanes, be
         apply_loads(t, at, own, loads, idata, tab)
         for c in range(own.size):
             applied[LANES * c + lane] = own[c]
+        told = wide.loads
+        for q in range(told.size // LANES):
+            told[LANES * q + lane] = loads[q // 6, q % 6]
         poses(at, tab.at, tab.code, tab.kin, pose)
 
 
@@ -276,24 +288,41 @@ def write_outputs(first, count, lanes, bench, records):
         records.strayed[first + lane] = bench.strayed[lane]
 
 
+@njit(cache=True, error_model="numpy")
+def write_members(first, count, wide, bench, records):
+    """As `write_outputs`, of all bodies and joints."""
+    rows = records.force.shape[1]
+    _deal(wide.pose, uncounted(records.pose), count, records.pose.shape[1], first)
+    _deal(wide.solution, uncounted(records.solution), count, records.solution.shape[1], first)
+    _deal(wide.phi, uncounted(records.phi), count, records.phi.shape[1], first)
+    _deal(wide.force, uncounted(records.force), count, 3 * rows, first)
+    _deal(wide.moment, uncounted(records.moment), count, 3 * rows, first)
+    for lane in range(count):
+        records.strayed[first + lane] = bench.strayed[lane]
+
+
 @njit(
     int64(
         int64, int64, _VEC, _MAT, _IVEC, _IVEC, _VEC, _VEC, PLAN_TYPE, LaneFactors.numba_type, LaneTables.numba_type,
-        Bench.numba_type, RECORDS_TYPE, float64,
+        Bench.numba_type, MEMBERS_TYPE, MemberLanes.numba_type, RECORDS_TYPE, float64,
     ),
     cache=True,
     error_model="numpy",
     nogil=True,
 )  # fmt: skip
-def evaluate_side_by_side(first, last, t, y, slots, idata, rdata, work, plan, factors, lanes, bench, records, growth):
+def evaluate_side_by_side(
+    first, last, t, y, slots, idata, rdata, work, plan, factors, lanes, bench, members, wide, records, growth
+):  # fmt: skip
     """Evaluate output rows from ``first``; return the row where new pivots are needed, or ``last``.
 
     Parameters
     ----------
     first, last, t, y, slots, idata, rdata, work, plan, records, growth
         As of `gearmbs.dae.model.evaluator.evaluate_rows`.
-    factors, lanes, bench : LaneFactors, LaneTables, Bench
+    factors, lanes, bench, wide : LaneFactors, LaneTables, Bench, MemberLanes
         Overwritten.
+    members : Members
+        What the bodies are made of; the records are about all of these then.
     """
     idata, slots, t, rdata, work = uncounted(idata), uncounted(slots), uncounted(t), uncounted(rdata), uncounted(work)
     tab = T.unpack(idata, rdata, work)
@@ -325,9 +354,12 @@ def evaluate_side_by_side(first, last, t, y, slots, idata, rdata, work, plan, fa
                 move_onto_constraints(idata, rdata, work, lanes, bench)
             for lane in range(LANES):
                 row = k + min(lane, count - 1)
-                pose = vector_at(all_poses, width * row, width if stage == 1 or trusted else 0)
+                final = stage == 1 or trusted
+                pose = vector_at(bench.pose, 0, bench.pose.size if final else 0)
+                if members.group.size == 0:
+                    pose = vector_at(all_poses, width * row, width if final else 0)
                 loads = matrix_at(all_loads, elements * columns * row, elements, columns)
-                take_output(lane, t[row], stage == 1, counts_turns, loads, pose, idata, tab, lanes, bench)
+                take_output(lane, t[row], stage == 1, counts_turns, loads, pose, idata, tab, lanes, bench, wide)
             lane_saddle(slots, idata, rdata, work, lanes)
             if stage == 0:
                 satisfied = find_violations(idata, rdata, work, lanes, bench)
@@ -345,6 +377,10 @@ def evaluate_side_by_side(first, last, t, y, slots, idata, rdata, work, plan, fa
             put_lanes(lanes.rhs, c, lanes_at(lanes.rhs, c) + lanes_at(lanes.applied, c))
         solve_lanes(plan, factors, lanes.rhs, lanes.solution)
         lane_reactions(idata, rdata, work, lanes)
-        write_outputs(k, count, lanes, bench, records)
+        if members.group.size > 0:
+            expand_lanes(idata, rdata, work, members, lanes, wide)
+            write_members(k, count, wide, bench, records)
+        else:
+            write_outputs(k, count, lanes, bench, records)
         k += count
     return last

@@ -26,22 +26,24 @@ from gearmbs.progress import waiting
 if TYPE_CHECKING:
     import xarray as xr
 
-    from gearmbs.dae.model.members import Members
+    from gearmbs.dae.model.member_tables import Members
     from gearmbs.dae.model.system import System
     from gearmbs.dae.problem import DAEProblem
 
-PART_SIZE = 512
-"""Output times whose records fit the processor's cache."""
+PART_SIZE = 2048
+"""Output times whose records stay in the processor's cache, and outweigh what Python does for each part."""
 
 CONFLICT_SAMPLES = 50
 """Outputs at which constraints removed as redundant are looked at."""
 
 
 def _sum_of_rows(records: np.ndarray, rows: list[int]) -> np.ndarray:
-    """Return the sum over some constraint rows, (m, rows, 3) to (m, 3): far faster one by one than by an axis."""
-    total = records[:, rows[0]].copy()
-    for row in rows[1:]:
-        total += records[:, row]
+    """Return the sum over some constraint rows, (m, rows, 3) to (m, 3): fastest by single columns."""
+    total = np.empty((len(records), 3))
+    for c in range(3):
+        total[:, c] = records[:, rows[0], c]
+        for row in rows[1:]:
+            total[:, c] += records[:, row, c]
     return total
 
 

@@ -13,7 +13,7 @@ from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, PART_SIZE, Solution
 
 if TYPE_CHECKING:
-    from gearmbs.dae.model.members import Members
+    from gearmbs.dae.model.member_tables import Members
 
 
 class Stream:

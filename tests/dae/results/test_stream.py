@@ -23,12 +23,12 @@ def test_parts_are_the_whole(integrator):
     def take(part):
         found.append((part.t.copy(), part.reaction("pin")[0].copy(), part.orientation("rotor").copy()))
 
-    options = {"every_step": True, "integrator": integrator, "tol": 1e-7}
+    options = {"every_step": True, "integrator": integrator, "tol": 1e-7 if integrator == "WSTIFF" else 1e-9}
     whole = tumbling().simulate(1.5, **options)
     last = tumbling().simulate(1.5, consumer=take, **options)
     t, force, turned = (np.concatenate(part) for part in zip(*found, strict=True))
     assert integrator == "IDA" or len(whole.result.epochs) > 1
-    assert len(found) > 1 or t.size < 600
+    assert len(found) > 1 or t.size < 2000
     np.testing.assert_array_equal(t, whole.t)
     np.testing.assert_allclose(force, whole.reaction("pin")[0], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(turned, whole.orientation("rotor"), atol=1e-12)

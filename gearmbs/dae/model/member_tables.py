@@ -1,0 +1,56 @@
+"""What bodies integrated as one are made of, as tables; see `gearmbs.dae.model.members`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import float64, int64, types
+
+_IVEC = int64[::1]
+
+EDGE_CHILD, EDGE_PARENT, EDGE_I, EDGE_J, EDGE_CHILD_HAS_I = range(5)
+EDGE_AXES = 5
+"""Of the three rows that keep the orientation: 3 * axis of I + axis of J."""
+EDGE_ROWS = 8
+"""Six rows in the order of the joint: coincident x, y, z, then the orientation."""
+EDGE_COLUMNS = 14
+"""Of a fixed joint inside a group; members count from 0, -1 is the ground."""
+
+PLACE_R, PLACE_A = 0, 3
+PLACE_MASS, PLACE_INERTIA = 12, 13
+PLACE_COLUMNS = 22
+"""Of a member: its centre of mass and axes in the frame of its group, mass, inertia in its own axes."""
+
+
+class Members(NamedTuple):
+    """What bodies integrated as one are made of.
+
+    Attributes
+    ----------
+    group : ndarray of int, shape (members,)
+        Body of the integrated model that each body of the whole one belongs to; 0 is the ground.
+    place : ndarray, shape (members, PLACE_COLUMNS)
+        Where it is in it, and its inertia.
+    of_marker : ndarray of int, shape (markers,)
+        Member on which each marker of the integrated model lies, -1 for the ground itself.
+    row : ndarray of int, shape (rows,)
+        Number among all rows of each row of the integrated model.
+    edge : ndarray of int, shape (joints, EDGE_COLUMNS)
+        Fixed joints inside groups, outermost first.
+    """
+
+    group: np.ndarray
+    place: np.ndarray
+    of_marker: np.ndarray
+    row: np.ndarray
+    edge: np.ndarray
+
+
+MEMBERS_TYPE = types.NamedTuple((_IVEC, float64[:, ::1], _IVEC, _IVEC, int64[:, ::1]), Members)
+
+
+def no_members() -> Members:
+    """Return the tables of a model whose bodies are all integrated by themselves."""
+    nobody, numbers = np.zeros(0, dtype=np.int64), np.zeros((0, PLACE_COLUMNS))
+    return Members(nobody, numbers, nobody, nobody, np.zeros((0, EDGE_COLUMNS), dtype=np.int64))
