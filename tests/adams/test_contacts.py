@@ -7,6 +7,7 @@ import pytest
 
 from gearmbs.adams import DeckError, parse_deck, read_deck, run_deck
 from gearmbs.mechanism.contacts import Box
+from tests.solids.transmit_files import block, drilled, transmit
 
 DECK = """contact
 UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=MILLIMETER, TIME=SECOND
@@ -80,6 +81,8 @@ def test_poisson():
         ("GRAPHICS/2, ELLIPSOID, CM=20, XS=40, YS=40, ZS=20", 10.0),
         ("GRAPHICS/2, TORUS, CM=20, MAJOR=20, MINOR=5", 5.0),
         ("GRAPHICS/2, EXTERNAL, RM=20, FILE=box.obj", 15.0),
+        ("GRAPHICS/2, EXTERNAL, RM=20, FILE=solids.xmt_txt, ELEMENT=BLOCK", 15.0),
+        ("GRAPHICS/2, EXTERNAL, RM=20, FILE=solids.xmt_txt, ELEMENT=TUBE", 15.0),
         ("GRAPHICS/2, POINT, RM=22", 15.0),
     ],
 )
@@ -90,6 +93,15 @@ def test_solids_rest_where_their_surface_is(tmp_path, solid, rests, ground):
     vertices, triangles = Box((20, 20, 30)).facets()
     text = "".join(f"v {x} {y} {z}\n" for x, y, z in vertices)
     (tmp_path / "box.obj").write_text(text + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in triangles))
+    if "TUBE" in solid:
+        pytest.importorskip("pythoncdt")
+    (tmp_path / "solids.xmt_txt").write_text(
+        transmit(
+            block(0.02, 0.02, 0.03, (-0.01, -0.01, -0.015), name="BLOCK"),
+            block(0.01, 0.01, 0.01, name="TUBE", part=7),
+            drilled(block(0.02, 0.02, 0.03, (-0.01, -0.01, -0.015), name="TUBE", part=2), (0, 0), 0.004),
+        )
+    )
     path = tmp_path / "rest.adm"
     path.write_text(deck(rests, solids=f"{ground}\n{solid}"))
     result = run_deck(read_deck(path), end=0.3, steps=30)
@@ -134,7 +146,8 @@ def test_only_what_touches_is_read():
         (("DMAX=0.1", "DMAX=0.1, COULOMB_FRICTION=ON"), "STICTION_TRANSITION_VELOCITY is missing"),
         (("XS=40", "XS=-40"), "must be positive"),
         (("CM=20, XS", "XS"), "CM, RM or CORNER is missing"),
-        (("ELLIPSOID, CM=20, XS=40, YS=40, ZS=40", "EXTERNAL, RM=20, FILE=a.xmt_txt"), "save the solid as .stl"),
+        (("ELLIPSOID, CM=20, XS=40, YS=40, ZS=40", "EXTERNAL, RM=20, FILE=a.xmt_txt"), "put the file beside"),
+        (("ELLIPSOID, CM=20, XS=40, YS=40, ZS=40", "EXTERNAL, RM=20, FILE=a.xmt_bin"), "save the solid as .x_t"),
         (("ELLIPSOID, CM=20, XS=40, YS=40, ZS=40", "EXTERNAL, RM=20, FILE=a.stl"), "cannot be read"),
         (("ELLIPSOID, CM=20", "ELLIPSOID, CM=10"), "both sides are on body"),
         (("PLANE", "CYLINDER, RANGLE=90D"), "only whole solids"),

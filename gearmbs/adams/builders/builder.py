@@ -38,7 +38,11 @@ from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Body, Marker
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from gearmbs.flexible import ModalModel
+    from gearmbs.mechanism.contacts.shapes import Shape
+    from gearmbs.solids.bodies import Body as SolidBody
 
 
 Maker = Callable[["Builder", Any], None]
@@ -95,6 +99,8 @@ class Builder:
         self.markers = Markers()
         self.joints: dict[int, Joint] = {}
         self.flexible: dict[int, ModalModel] = {}
+        self.solid_files: dict[Path, list[SolidBody]] = {}
+        self.solids: dict[tuple[Path, int], Shape] = {}
         self.problems: list[Diagnostic] = []
         self.left_out: set[tuple[str, int]] = set()
         self._taken: set[str] = {"ground"}

@@ -13,6 +13,7 @@ from gearmbs.adams.builders.builder import Builder
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.errors import WARNING
 from gearmbs.adams.parse import statements as st
+from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.contacts.element import Coulomb, Impact, Poisson
 from gearmbs.mechanism.contacts.mesh_files import READERS, read_mesh
 from gearmbs.mechanism.contacts.shapes import (
@@ -28,6 +29,7 @@ from gearmbs.mechanism.contacts.shapes import (
     extruded,
     revolved,
 )
+from gearmbs.mechanism.contacts.solid_files import SUFFIXES, bodies, body_of, shape_of
 from gearmbs.mechanism.parts import Marker
 
 ROUND = 1e-9
@@ -45,9 +47,9 @@ def add_contact(b: Builder, s: st.Contact) -> None:
         first = b.markers[graphics[0].marker or 0]
         solids = []
         for g in graphics:
-            if g.type == "EXTERNAL" and Path(g.data_file or "").suffix.lower() not in READERS:
-                what = f"{g.label()} in {g.data_file}: save the solid as {', '.join(READERS)}; other files"
-                b.unsupported(s, what)
+            why = _unread(b, g) if g.type == "EXTERNAL" else ""
+            if why:
+                b.unsupported(s, f"{g.label()} in {g.data_file}: {why}")
                 return
             marker = b.markers[g.marker or 0]
             if marker.body is not first.body:
@@ -161,9 +163,35 @@ def _point(b: Builder, g: st.Graphics) -> Shape:
     return Sphere(0.0)
 
 
+def _file(b: Builder, g: st.Graphics) -> Path:
+    name = Path((g.data_file or "").replace("\\", "/"))
+    return name if name.is_absolute() else Path(b.deck.file).parent / name
+
+
+def _unread(b: Builder, g: st.Graphics) -> str:
+    """Return why the solid of a file cannot be read at all; empty if it can."""
+    path = _file(b, g)
+    if path.suffix.lower() not in (*READERS, *SUFFIXES):
+        return f"save the solid as {', '.join((*SUFFIXES, *READERS))}; other files"
+    if path.suffix.lower() in SUFFIXES and not path.is_file():
+        return "put the file beside the deck; a CONTACT without it"
+    return ""
+
+
 def _external(b: Builder, g: st.Graphics) -> Shape:
-    name = Path(g.data_file or "")
-    return read_mesh(name if name.is_absolute() else Path(b.deck.file).parent / name, b.units.length)
+    """A mesh in the deck's units, or a body of a Parasolid file, which is in metres."""
+    path = _file(b, g)
+    if path.suffix.lower() in READERS:
+        return read_mesh(path, b.units.length)
+    if path not in b.solid_files:
+        b.solid_files[path] = bodies(path)
+    body = body_of(path, b.solid_files[path], g.element, b.deck.of(st.Marker)[g.marker or 0].part)
+    if (path, body.node.index) not in b.solids:
+        try:
+            b.solids[path, body.node.index] = shape_of(body)
+        except ModelError as error:
+            raise ModelError(f"{path}: {error}") from None
+    return b.solids[path, body.node.index]
 
 
 def _extrusion(b: Builder, g: st.Graphics) -> Shape:

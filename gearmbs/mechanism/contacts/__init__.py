@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         extruded,
         revolved,
     )
+    from gearmbs.mechanism.contacts.solid_files import read_solid
     from gearmbs.mechanism.contacts.tracks import ContactTracks, contact_tracks
 
 __all__ = [
@@ -40,6 +41,7 @@ __all__ = [
     "contact_tracks",
     "extruded",
     "read_mesh",
+    "read_solid",
     "revolved",
 ]
 
@@ -48,6 +50,7 @@ late(
     {
         **dict.fromkeys(("Coulomb", "Impact", "Poisson", "SolidContact"), ".element"),
         "read_mesh": ".mesh_files",
+        "read_solid": ".solid_files",
         **dict.fromkeys(
             ("Box", "Cylinder", "Ellipsoid", "Frustum", "HalfSpace", "Mesh", "Shape", "Sphere", "Torus"), ".shapes"
         ),

@@ -13,6 +13,7 @@ from gearmbs.dae.equations.force_elements import Diagnostic
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.contacts import fields, kernel
 from gearmbs.mechanism.contacts.boxes import MOST
+from gearmbs.mechanism.contacts.facets import BLOCK
 from gearmbs.mechanism.contacts.loads import IMPACT, LAW_REALS, POISSON
 from gearmbs.mechanism.contacts.points import COLUMNS
 from gearmbs.mechanism.contacts.shapes import (
@@ -244,6 +245,28 @@ def vertex_weights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return weights
 
 
+def in_blocks(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return triangles so that neighbours in the table are neighbours in space, and the boxes of each block of them.
+
+    Each half of the triangles is halved again across its longest side, down to the size of a block.
+    """
+    middles = vertices[triangles].mean(axis=1)
+    groups, order = [np.arange(len(triangles))], []
+    while groups:
+        group = groups.pop()
+        if len(group) <= BLOCK:
+            order.append(group)
+            continue
+        axis = int(np.argmax(np.ptp(middles[group], axis=0)))
+        group = group[np.argsort(middles[group, axis], kind="stable")]
+        half = BLOCK * max(1, round(len(group) / 2 / BLOCK))
+        groups += [group[half:], group[:half]]
+    triangles = triangles[np.concatenate(order)] if order else triangles
+    parts = (vertices[triangles[k : k + BLOCK]].reshape(-1, 3) for k in range(0, len(triangles), BLOCK))
+    boxes = [np.concatenate([p.min(axis=0), p.max(axis=0)]) for p in parts]
+    return triangles, np.concatenate([np.zeros(0), *boxes])
+
+
 class _Tables:
     """The tables of a contact as they grow."""
 
@@ -279,8 +302,9 @@ class _Tables:
             middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
             offset, vertices = offset + shape.axes @ middle, vertices - middle
         weights = vertex_weights(vertices, triangles)
+        triangles, boxes = in_blocks(vertices, triangles)
         at, points, faces = self.n_reals, self.n_reals + kernel.SOLID_REALS, self.n_triangles
-        self._append(np.concatenate([shape.axes.ravel(), offset, sizes, vertices.ravel(), weights]))
+        self._append(np.concatenate([shape.axes.ravel(), offset, sizes, vertices.ravel(), weights, boxes]))
         self.triangles.append(triangles.ravel())
         self.n_triangles += triangles.size
         return [kind, at, len(vertices), points, len(triangles), faces]

@@ -2,7 +2,8 @@
 
 Integers: the number of pairs, then `PAIR` for each: family, whether the first solid is J's, and both solids. A solid is
 its kind, its place in the reals (axes, origin, sizes; of a faceted one the last size is the radius of a ball about it),
-number of vertices, their place (coordinates, then weights), number of triangles, their place in the integers. Reals
+number of vertices, their place (coordinates, then weights, then boxes of triangles), number of triangles, their place
+in the integers. Reals
 begin with the law.
 """
 
@@ -13,7 +14,7 @@ from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P
 from gearmbs.mechanism.contacts import points as pt
 from gearmbs.mechanism.contacts.boxes import SCRATCH, two_boxes
-from gearmbs.mechanism.contacts.facets import join_patches, vertices_below
+from gearmbs.mechanism.contacts.facets import BLOCK, join_patches, vertices_below
 from gearmbs.mechanism.contacts.fields import BOX, MESH, distance
 from gearmbs.mechanism.contacts.loads import LAW_REALS, press, share_out
 from gearmbs.mechanism.contacts.points import local_point
@@ -91,10 +92,12 @@ def points_of(ints, reals, at, frames, rows, derivatives, work):
         of_a = (
             ints[a], sizes_a, pose_a, vector_at(reals, ints[a + 3], 3 * na),
             vector_at(reals, ints[a + 3] + 3 * na, na), vector_at(ints, ints[a + 5], 3 * ints[a + 4]),
+            vector_at(reals, ints[a + 3] + 4 * na, 6 * ((ints[a + 4] + BLOCK - 1) // BLOCK)),
         )  # fmt: skip
         of_b = (
             ints[b], sizes_b, pose_b, vector_at(reals, ints[b + 3], 3 * nb),
             vector_at(reals, ints[b + 3] + 3 * nb, nb), vector_at(ints, ints[b + 5], 3 * ints[b + 4]),
+            vector_at(reals, ints[b + 3] + 4 * nb, 6 * ((ints[b + 4] + BLOCK - 1) // BLOCK)),
         )  # fmt: skip
         vertices_below(rows, 0, 0, of_a, of_b, origins[0], origins[1], derivatives, scratch)
         vertices_below(rows, na, 1, of_b, of_a, origins[1], origins[0], derivatives, scratch)

@@ -1,0 +1,228 @@
+"""Bodies of a Parasolid file: their names, faces, loops and edges.
+
+Source: Siemens, Parasolid XT Format Reference, chapters 4 and 5.3. Everything is in metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearmbs.dae.errors import ModelError
+from gearmbs.solids.curves import Chain, Curve, chain, curve_of
+from gearmbs.solids.surfaces import Surface, Turned, surface_of
+from gearmbs.solids.transmit import Node, Nodes, read_transmit
+
+SOLID = 1
+NAMES = ("AdamsObjectName", "SDL/TYSA_NAME", "SDL/TYSA_UNAME")
+"""Attributes that name a body, the first one as a deck does."""
+PART_NUMBER = "UG2/ADAMS_ID"
+"""Attribute with the number of the body's PART."""
+
+
+@dataclass
+class Face:
+    """A face: its surface, whether its normal is that of the surface, and its loops.
+
+    Attributes
+    ----------
+    number : int
+    surface : Surface
+    outward : float
+        1 if the normal of the surface points out of the body, else -1.
+    loops : list of list of (int, bool)
+        Edges of each loop, and whether it runs along them.
+    """
+
+    number: int
+    surface: Surface
+    outward: float
+    loops: list[list[tuple[int, bool]]]
+
+
+@dataclass
+class Body:
+    """A solid body of a file."""
+
+    nodes: Nodes
+    node: Node
+
+    @cached_property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of the body by the names of their definitions: the first value of the first field that has one."""
+        out: dict[str, Any] = {}
+        for number in _along(self.nodes, self.node.attributes, "next"):
+            a = self.nodes[number]
+            if a.kind != "ATTRIBUTE" or a.definition not in self.nodes:
+                continue
+            definition = self.nodes[self.nodes[a.definition].identifier].string
+            values = (vars(self.nodes[f]).get("values") for f in a.fields if f in self.nodes)
+            first = next((v for v in values if v), None)
+            if first is not None:
+                out.setdefault(definition, first if isinstance(first, str) else first[0])
+        return out
+
+    @property
+    def name(self) -> str:
+        """The name by which a deck calls the body, else that of the program that made it; empty if it has none."""
+        return next((str(self.attributes[n]) for n in NAMES if n in self.attributes), "")
+
+    def surface(self, number: int) -> Surface:
+        """Return the surface of a node."""
+        known = self._surfaces.get(number)
+        if known is None:
+            known = self._surfaces[number] = surface_of(self.nodes, number)
+        return known
+
+    @cached_property
+    def _surfaces(self) -> dict[int, Surface]:
+        return {}
+
+    @cached_property
+    def faces(self) -> list[Face]:
+        """Faces of the body.
+
+        Raises
+        ------
+        ModelError
+            If it is no solid, or has a surface that is not read.
+        """
+        if self.node.body_type != SOLID:
+            raise ModelError(f"its body '{self.name}' is no solid but wires or sheets; save a solid")
+        found: dict[int, Face] = {}
+        for region in _along(self.nodes, self.node.region, "next"):
+            if self.nodes[region].type != "S":
+                continue
+            for shell in _along(self.nodes, self.nodes[region].shell, "next"):
+                for number in _along(self.nodes, self.nodes[shell].face, "next"):
+                    found[number] = self._face(number)
+        if not found:
+            raise ModelError(f"its body '{self.name}' has no faces")
+        return list(found.values())
+
+    def _face(self, number: int) -> Face:
+        node = self.nodes[number]
+        if node.surface not in self.nodes:
+            raise ModelError(f"its face {number} has no surface")
+        loops = []
+        for number_of_loop in _along(self.nodes, node.loop, "next"):
+            first = self.nodes[number_of_loop].halfedge
+            edges = []
+            for fin in _along(self.nodes, first, "forward"):
+                edge = self.nodes[fin].edge
+                if edge:
+                    edges.append((edge, self.nodes[fin].sense == "+"))
+            if edges:
+                loops.append(edges)
+        return Face(number, self.surface(node.surface), -1.0 if node.sense == "-" else 1.0, loops)
+
+    def edge_points(self, number: int, tolerance: float) -> np.ndarray:
+        """Return an edge as points from its start to its end, shape (n, 3), m; of a ring the first is the last."""
+        edge = self.nodes[number]
+        forward = self.nodes[edge.halfedge]
+        other = self.nodes[forward.other]
+        if forward.sense == "-":
+            forward, other = other, forward
+        ends = [self._place(f.vertex) for f in (other, forward)]
+        fin = None if edge.curve else next((f for f in (forward, other) if f.curve), None)
+        if not edge.curve and fin is None:
+            raise ModelError(f"its edge {number} has no curve")
+        at = edge.curve or fin.curve  # type: ignore[union-attr]
+        curve = curve_of(self.nodes, at, self.surface)
+        along = self.nodes[at].sense != "-" if fin is None else fin.sense == "+"
+        points = self._between(curve, at, ends, along, tolerance)
+        for k, end in ((0, ends[0]), (-1, ends[1])):
+            if end is not None:
+                points[k] = end
+        if ends[0] is None:
+            points[-1] = points[0]
+        return points
+
+    def _between(
+        self, curve: Curve, at: int, ends: list[np.ndarray | None], along: bool, tolerance: float
+    ) -> np.ndarray:
+        """Return the piece of a curve between the ends of an edge, in the edge's direction."""
+        node = self.nodes[at]
+        if node.kind == "TRIMMED_CURVE":
+            t0, t1 = node.parm_1, node.parm_2
+            if isinstance(curve, Chain):
+                # its parameter is the number of a point, not that of the file
+                forward = t1 > t0
+                t0, t1 = (curve.parameter(np.array(p)) for p in (node.point_1, node.point_2))
+                if curve.period is not None and (t1 <= t0 if forward else t1 >= t0):
+                    t1 += curve.period if forward else -curve.period
+            points = chain(curve, t0, t1, tolerance)
+            if ends[0] is not None and ends[1] is not None:
+                same = np.linalg.norm(points[0] - ends[0]) + np.linalg.norm(points[-1] - ends[1])
+                crossed = np.linalg.norm(points[0] - ends[1]) + np.linalg.norm(points[-1] - ends[0])
+                along = same <= crossed if abs(same - crossed) > 1e-9 else along
+            return points if along else points[::-1].copy()
+        if ends[0] is None or ends[1] is None:
+            low = curve.low if np.isfinite(curve.low) else 0.0
+            if curve.period is None:
+                raise ModelError(f"its edge on curve {at} has no ends, but the curve is not closed")
+            points = chain(curve, low, low + curve.period, tolerance)
+            return points if along else points[::-1].copy()
+        t0, t1 = curve.parameter(ends[0]), curve.parameter(ends[1])
+        if curve.period is not None:
+            ring = np.linalg.norm(ends[0] - ends[1]) < 1e-9
+            if along and (t1 <= t0 or ring):
+                t1 = t0 + curve.period if ring else t1 + curve.period
+            elif not along and (t1 >= t0 or ring):
+                t1 = t0 - curve.period if ring else t1 - curve.period
+        return chain(curve, t0, t1, tolerance)
+
+    def _place(self, vertex: int) -> np.ndarray | None:
+        if not vertex:
+            return None
+        return np.array(self.nodes[self.nodes[vertex].point].pvec, dtype=float)
+
+    @cached_property
+    def corners(self) -> np.ndarray:
+        """Vertices and points of edges of the body, taken roughly, for its size, shape (n, 3), m."""
+        edges = {edge for face in self.faces for loop in face.loops for edge, _ in loop}
+        found = [self.edge_points(edge, 1.0) for edge in edges]
+        for face in self.faces:
+            s = face.surface
+            if isinstance(s, Turned) and s.kind in ("SPHERE", "TORUS") and not face.loops:
+                reach = s.radius + s.tube
+                found.append(s.origin + reach * np.vstack([np.eye(3), -np.eye(3)]))
+        if not found:
+            raise ModelError(f"its body '{self.name}' has no edges")
+        return np.vstack(found)
+
+
+def _along(nodes: Nodes, first: int, step: str) -> Iterator[int]:
+    """Yield the numbers of a chain, or of a ring once around."""
+    seen: set[int] = set()
+    number = first
+    while number and number in nodes and number not in seen:
+        seen.add(number)
+        yield number
+        number = getattr(nodes[number], step)
+
+
+def bodies(path: str | Path) -> list[Body]:
+    """Return the bodies of a Parasolid text transmit file.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be read, is damaged, or is an assembly.
+    """
+    path = Path(path)
+    nodes = read_transmit(path)
+    root = nodes[1]
+    if root.kind == "BODY":
+        return [Body(nodes, root)]
+    if root.kind in ("PART_XMT_BLOCK", "POINTER_LIS_BLOCK"):
+        found = [nodes[number] for number in root.entries if number in nodes]
+        return [Body(nodes, node) for node in found if node.kind == "BODY"]
+    if root.kind == "ASSEMBLY":
+        raise ModelError(f"{path}: it is an assembly; save its parts as bodies")
+    raise ModelError(f"{path}: its root is a {root.kind}, not a body")
