@@ -55,6 +55,13 @@ def band_rms(
     -------
     xarray.DataArray of dimension (channel,)
     """
+    return _per_channel(signal, _band_levels(signal, frequency, half_width, transition, period))
+
+
+def _band_levels(
+    signal: xr.DataArray, frequency: float, half_width: float, transition: float, period: float | None
+) -> np.ndarray:
+    """RMS of each channel in a band; see `band_rms`."""
     rate, n = rate_of(signal), signal.sizes["time"]
     taps = bandpass_taps(rate, frequency - half_width, frequency + half_width, transition, ATTENUATION_DB)
     if n < taps.size:
@@ -63,8 +70,7 @@ def band_rms(
             "give a longer record or a wider transition band"
         )
     count = whole_period_count(n - taps.size + 1, rate, 1.0 / period if period else frequency)
-    levels = [math.sqrt(filtered_mean_square(column, taps, count)) for column in signal.values.T]
-    return _per_channel(signal, np.asarray(levels))
+    return np.array([math.sqrt(filtered_mean_square(column, taps, count)) for column in signal.values.T])
 
 
 def order_rms(signal: xr.DataArray, fundamental: float, orders: Sequence[float]) -> xr.DataArray:
@@ -152,14 +158,8 @@ def gmf_rms(
         raise SignalError(f"half_width: must lie between 0 and {1.0 - TRANSITION:g} of the GMF, got {half_width!r}")
     multiples = np.arange(1, harmonics + 1)
     per_turn = _whole_turns(signal, gmf, teeth)
-    by_band = np.stack(
-        [
-            band_rms(
-                signal, k * gmf, half_width=half_width * gmf, transition=TRANSITION * gmf, period=per_turn / gmf
-            ).values
-            for k in multiples
-        ]
-    )
+    widths = half_width * gmf, TRANSITION * gmf
+    by_band = np.stack([_band_levels(signal, k * gmf, *widths, per_turn / gmf) for k in multiples])
     by_orders = order_rms(signal, gmf / per_turn, list(multiples * per_turn)).values
     units = common_unit(signal)
     dims = ("harmonic", "channel")

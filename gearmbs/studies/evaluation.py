@@ -119,7 +119,8 @@ def _series(
     values: dict[str, np.ndarray] = {}
     for name in FORCES:
         if name in wanted and forces is not None:
-            values[name] = forces.sel(channel=[f"{name[-1]}{axis}" for axis in "xyz"]).values[inside]
+            first = list(forces["channel"].values).index(f"{name[-1]}x")
+            values[name] = forces.values[inside, first : first + 3]
     if "transmission_error" in wanted:
         values["transmission_error"] = monotone_cubic(known.t, known.error, t)
     values |= {name: np.interp(t, known.t, known.contact[name]) for name in SMOOTH if name in wanted}
@@ -164,8 +165,9 @@ def time_series(t: np.ndarray, values: dict[str, np.ndarray]) -> xr.Dataset:
 def _acceleration(case: Case, forces: xr.DataArray, start: float, stop: float) -> xr.DataArray:
     """Return the components of the force on the driven gear over its mass, at the signal rate."""
     pair = case.pair()
-    signal = forces.isel(channel=slice(-3, None)).assign_coords(channel=["x", "y", "z"])
-    components = force_components(signal, pressure_angle=pair.working_pressure_angle, sense=pair.rotation)
+    components = force_components(
+        forces, pressure_angle=pair.working_pressure_angle, sense=pair.rotation, channels=("2x", "2y", "2z")
+    )
     acceleration = force_to_acceleration(components, pair.wheels[1].mass)
     if case.signal_rate < case.output_rate:
         acceleration = decimate(acceleration, case.signal_rate)
@@ -177,8 +179,17 @@ def _mesh_levels(acceleration: xr.DataArray) -> xr.DataArray:
     import xarray as xr
 
     levels = gmf_rms(acceleration)
-    ways = xr.concat([levels["band"], levels["orders"]], dim="way").assign_coords(way=["band", "orders"])
-    found = ways.drop_vars(["channel_units", "units"], errors="ignore").rename(channel="component")
+    ways = ("band", "orders")
+    found = xr.DataArray(
+        np.stack([levels[way].values for way in ways]),
+        dims=("way", "harmonic", "component"),
+        coords={
+            "harmonic": levels["harmonic"].variable,
+            "frequency": levels["frequency"].variable,
+            "component": levels["channel"].values,
+            "way": list(ways),
+        },
+    )
     found.attrs = {"units": "m/s^2", "long_name": "RMS of the gear mesh frequency harmonics"}
     return found
 

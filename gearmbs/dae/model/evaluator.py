@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
@@ -25,9 +26,11 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.dae.linalg.counted_entries import FEWEST_ENTRIES, LEAVING_PLANS
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan, SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, LUFactors, factor, new_factors, solve, solve_pair
-from gearmbs.dae.model import side_by_side
 from gearmbs.dae.model.member_tables import Members
 from gearmbs.dae.model.records import FARTHEST, RECORDS_TYPE, Records, allow_rounding, new_records
+
+if TYPE_CHECKING:
+    from gearmbs.dae.model.side_by_side import SideBySide
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
@@ -44,6 +47,11 @@ SAME_POSITION = 0.05
 
 SINGULAR = 1e-8
 """Relative singular value of the index-1 matrix below which a direction counts as undetermined."""
+
+FEWEST_TOGETHER = 1000
+"""Outputs, of those handed over at a time, from which on they are evaluated side by side."""
+
+NEVER = 1 << 62
 
 REACTION_PASSES = 30
 """Most corrections of loads that depend on reactions, such as joint friction, to the multipliers of one output."""
@@ -271,8 +279,8 @@ class Evaluator:
         self.vals = np.zeros(self.pattern[1].size)
         self.plan: LUPlan | None = None
         self.factors: LUFactors | None = None
-        self.has_lanes = side_by_side.is_possible(idata)
-        self.side: side_by_side.SideBySide | None = None
+        self.side: SideBySide | None = None
+        self.fewest_together = FEWEST_TOGETHER
         self.growth = GROWTH_LIMIT
         self.counted = np.zeros(self.vals.size, dtype=bool)
         self.plans = 0
@@ -304,14 +312,28 @@ class Evaluator:
         self, first: int, last: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records: Records
     ) -> int:
         """Evaluate rows side by side, where the model allows it, and the rest one after the other."""
-        slots, rdata, work = self.pattern[2], self.rdata, self.work
-        if self.side is not None:
+        side = self._side_by_side(table) if t.size >= self.fewest_together else None
+        if side is not None:
             together = first + LANES * ((last - first) // LANES)
-            done = self.side.evaluate(first, together, t, y, slots, table, rdata, work, records, self.growth)
+            done = side.evaluate(
+                first, together, t, y, self.pattern[2], table, self.rdata, self.work, records, self.growth
+            )
             if done < together or done == last:
                 return done
             first = done
         return self._evaluate_singly(first, last, t, y, table, records)
+
+    def _side_by_side(self, table: np.ndarray) -> SideBySide | None:
+        """Return what evaluates rows side by side with the present pivots; None if the model does not allow it."""
+        if self.side is None:
+            # a pendulum's few outputs are there before its kernels are compiled
+            from gearmbs.dae.model.side_by_side import SideBySide, is_possible
+
+            if not is_possible(table):
+                self.fewest_together = NEVER
+            elif self.plan is not None:
+                self.side = SideBySide(table, self.plan, self.vals.size, self.members)
+        return self.side
 
     def _evaluate_singly(self, first: int, last: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records) -> int:
         """Evaluate rows one after the other."""
@@ -348,7 +370,7 @@ class Evaluator:
                 "that differ by too many orders of magnitude"
             ) from error
         self.factors = new_factors(self.plan)
-        self.side = side_by_side.SideBySide(table, self.plan, self.vals.size, self.members) if self.has_lanes else None
+        self.side = None
         # an ill-scaled mechanism may grow with the best of pivots
         self.growth = max(GROWTH_LIMIT, 100.0 * factor(self.plan, self.factors, self.vals))
 

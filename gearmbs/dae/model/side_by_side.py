@@ -11,7 +11,7 @@ import numpy as np
 from numba import float64, int64
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.lanes import LANES, all_lanes, lanes_at, larger, magnitude, put_lanes
+from gearmbs.dae.compiled.lanes import LANES, all_lanes, deal_eight, lanes_at, larger, magnitude, put_lanes
 from gearmbs.dae.compiled.structs import IntVector, Matrix, Struct, Vector
 from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
 from gearmbs.dae.equations import layout as T
@@ -270,9 +270,12 @@ def take_output(lane, t, again, counts_turns, loads, pose, idata, tab, lanes, be
 @njit(cache=True, error_model="numpy")
 def _deal(lanes, out, count, columns, first):
     """Write the first ``count`` lanes of a table to rows of a record with so many columns, from row ``first`` on."""
+    together = columns - columns % LANES if count == LANES else 0
+    for c in range(0, together, LANES):
+        deal_eight(lanes, c, out, columns * first + c, columns)
     for lane in range(count):
         row = vector_at(out, columns * (first + lane), columns)
-        for c in range(columns):
+        for c in range(together, columns):
             row[c] = lanes[LANES * c + lane]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.lanes import LANES, all_lanes, lanes_at, larger, magnitude, put_lanes
+from gearmbs.dae.compiled.lanes import LANES, all_lanes, deal_eight, lanes_at, larger, magnitude, put_lanes
 
 
 @njit(error_model="numpy")
@@ -39,3 +39,16 @@ def test_the_larger_of_a_number_and_nan_is_nan(place):
     out = np.zeros((5, LANES))
     combine(a, out)
     assert np.isnan(out[2]).tolist() == [lane == 3 for lane in range(LANES)]
+
+
+@njit(error_model="numpy")
+def deal(lanes, out):
+    deal_eight(lanes, 1, out, 2, out.shape[1])
+
+
+def test_lanes_are_dealt_to_rows():
+    lanes = np.arange(10.0 * LANES).reshape(10, LANES)
+    out = np.full((LANES, 12), -1.0)
+    deal(lanes, out)
+    np.testing.assert_array_equal(out[:, 2:10], lanes[1:9].T)
+    assert (out[:, [0, 1, 10, 11]] == -1.0).all()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gearmbs.dae.compiled.lanes import LANES
+from gearmbs.dae.model.evaluator import NEVER
 from gearmbs.dae.model.side_by_side import is_possible
 from gearmbs.mechanism import Mechanism, Mode
 from tests.mechanism.test_lumping import tree
@@ -43,10 +44,10 @@ def coupled() -> Mechanism:
 def records(solution, has_lanes: bool, first: int = 0):
     """Return what is evaluated at the outputs of a solution, in lanes or not, and the evaluator."""
     evaluator = solution._evaluator()
-    assert evaluator.has_lanes
-    evaluator.has_lanes = has_lanes
+    evaluator.fewest_together = LANES if has_lanes else NEVER
     out = solution._new_records(solution.t.size - first)
     evaluator.fill(solution.t[first:], solution.result.y[first:], solution.result.epochs[:1], out)
+    assert (evaluator.side is not None) == has_lanes
     return out, evaluator
 
 
@@ -91,16 +92,16 @@ def test_steps_on_the_constraints_are_left_where_they_are():
 
 
 def test_outputs_whose_pivots_do_not_fit_get_new_ones():
-    """With a bound on the growth that the first plan passes barely, plans change within blocks of eight."""
+    """With a bound on the growth that many rows exceed, plans change within blocks of eight."""
     solution = slider_crank().simulate(2.0, rate=60.0)
     alone, _ = records(solution, False)
     evaluator = solution._evaluator()
+    evaluator.fewest_together = LANES
     choose = evaluator._choose_pivots
 
     def strictly(*args):
         choose(*args)
-        # no growth at all is allowed beyond that at the row the pivots were chosen for
-        evaluator.growth = 1.02 * evaluator.growth / 100.0 if evaluator.growth > 1e5 else 4.0
+        evaluator.growth = 4.0
 
     evaluator._choose_pivots = strictly
     out = solution._new_records(solution.t.size)
