@@ -3,6 +3,11 @@
 A table is the mesh harmonics of a pair of known penetration, stiffness and friction at two loads, two components of the
 force and three harmonics, each with 2 % of noise of its own. The fit knows nothing of the truth but begins there, which
 saves simulations: where the search ends does not depend on it.
+
+Two hundred shares scatter by 1.5 %, whoever estimates. So that chance is told from fault, the same noise goes through
+the exact theory, too: with the derivatives at the truth the estimate's error is (J'J)^-1 J' times the noise, normal
+with exactly the covariance that the intervals are made of, and held by 95 % of them. The share of the fits less that of
+the theory on the same tables, plus 95 %, is the coverage with most of the chance taken out.
 """
 
 from __future__ import annotations
@@ -49,21 +54,27 @@ def recovered(seed: int) -> dict[str, float]:
     problem.table = known.table.assign(value=np.exp(exact + NOISE * noise))
     problem._known = dict(known._known)
     fit = problem.fit()
+    matrix = known.derivatives()
+    covariance = np.linalg.inv(matrix.T @ matrix)
+    ideal = covariance @ matrix.T @ noise / np.sqrt(np.diag(covariance))
     found: dict[str, float] = {"simulations": float(problem.simulations - known.simulations)}
-    for name, value in TRUTH.items():
+    for k, (name, value) in enumerate(TRUTH.items()):
         low, high = fit.interval(name)
+        found[f"ideal.{name}"] = float(ideal[k])
         found[f"held.{name}"] = float(low <= value <= high)
         found[f"off.{name}"] = float(np.log(fit[name] / value) / (fit.errors[fit.names.index(name)] / fit[name]))
     return found
 
 
-def main(folder: str, tables: int = 200, workers: int = 2) -> None:
+def main(folder: str, tables: int = 200, workers: int = 2, first: int = 0) -> None:
     """Run the fits as a campaign and print the shares."""
+    from scipy.stats import norm
+
     from gearmbs.campaigns import Campaign, FunctionSubject, make_plan
     from gearmbs.campaigns.given_data import probability
 
     subject = FunctionSubject("benchmarks.coverage:recovered", {"seed": 0})
-    rows = [{"seed": k} for k in range(tables)]
+    rows = [{"seed": k} for k in range(first, first + tables)]
     campaign = Campaign(folder, make_plan(subject, (), "list", options={"rows": rows}, unit=10))
     print(campaign.run(workers))
     table = campaign.table
@@ -71,6 +82,13 @@ def main(folder: str, tables: int = 200, workers: int = 2) -> None:
         share, low, high = probability(table[f"held.{name}"].to_numpy())
         spread = table[f"off.{name}"].std()
         print(f"{name}: {share:.1%} of the intervals hold the truth ({low:.1%} to {high:.1%}), deviation {spread:.3f}")
+        ideal = table[f"ideal.{name}"]
+        theory = (ideal.abs() < norm.ppf(0.975)).mean()
+        apart = (table[f"off.{name}"] - ideal).std()
+        print(
+            f"    exact theory on the same noise {theory:.1%}, deviation {ideal.std():.3f}; the fits differ from it "
+            f"by {apart:.3f} standard errors; coverage without that chance {share - theory + 0.95:.1%}"
+        )
     held = table[[f"held.{name}" for name in TRUTH]].to_numpy()
     print(f"all: {held.mean():.1%}; {table.simulations.mean():.0f} new simulations a table")
     print(f"{campaign.status().processor_seconds:.0f} s of processor time")

@@ -16,7 +16,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from gearmbs.campaigns import Campaign, PolynomialChaos, fit_chaos, load_plan
+from gearmbs.campaigns import Campaign, PolynomialChaos, fit_chaos, load_plan, total_bounds
 from gearmbs.campaigns.given_data import first_indices, probability
 from gearmbs.campaigns.status import read_ledger
 from gearmbs.signals import COMPONENTS
@@ -75,7 +75,17 @@ def store(campaign: Campaign) -> None:
         "processor": ledger.get("processor", "unknown"),
         "versions": {name: ledger[name] for name in ("gearmbs", "numpy", "scipy", "numba") if name in ledger},
     }
+    facts["bounds"] = {ratio: bounds(data, ratio) for ratio in LEAST if ratio != "load_each"}
     write_whole(DATA / "claims.json", json.dumps(facts, indent=1) + "\n")
+
+
+def bounds(data: pd.DataFrame, ratio: str, component: str = "line_of_action") -> dict:
+    """Return between which values the total indices of the logarithm of a ratio lie."""
+    levels = [2 if name == "plane" else 0 for name in SETTINGS]
+    values = np.log(data[f"{ratio}.{component}"].to_numpy(dtype=float))
+    found = total_bounds(points(data), values, list(SETTINGS), levels=levels)
+    columns = {c: np.round(getattr(found, c), 4).tolist() for c in ("low", "high", "sure_low", "sure_high")}
+    return {"explained": round(found.q_squared, 4), **columns}
 
 
 def shortened(values: np.ndarray) -> np.ndarray:
@@ -148,10 +158,10 @@ def deciding(data: pd.DataFrame, component: str = "line_of_action") -> pd.DataFr
 
 
 def totals(data: pd.DataFrame, component: str = "line_of_action") -> pd.DataFrame:
-    """Return first and total indices of the ratios' logarithms, in percent, and what the surrogate explains.
+    """Return first and total indices of the ratios' logarithms, in percent, and what the surrogates explain.
 
     ``within`` is where the total index of the ratio itself must lie, whatever the part is like that the surrogate does
-    not explain: the parts of the variance add up.
+    not explain; see `gearmbs.campaigns.bounds`.
     """
     found = {}
     for ratio in ("misaligned", "distance", "load"):
@@ -160,9 +170,10 @@ def totals(data: pd.DataFrame, component: str = "line_of_action") -> pd.DataFram
         for kind in ("first", "total"):
             text = [f"{100 * v:.0f} ± {100 * c:.0f}" for v, c in zip(table[kind], table[f"{kind}_confidence"])]
             found[NAMES[ratio], kind] = [*text, f"{100 * fitted.q_squared:.0f}"]
-        low = 100 * fitted.q_squared * table["total"]
-        rest = 100 * (1.0 - fitted.q_squared)
-        found[NAMES[ratio], "within"] = [*(f"{v:.0f} to {v + rest:.0f}" for v in low), ""]
+        known = facts()["bounds"][ratio]
+        ends = zip(known["sure_low"], known["sure_high"])
+        explained = f"{100 * known['explained']:.0f}"
+        found[NAMES[ratio], "within"] = [*(f"{100 * a:.0f} to {100 * b:.0f}" for a, b in ends), explained]
     return pd.DataFrame(found, index=[*SETTINGS, "explained of points left out"])
 
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from gearmbs._lazy import late
 
 if TYPE_CHECKING:
+    from gearmbs.campaigns.bounds import TotalBounds, total_bounds
     from gearmbs.campaigns.campaign import Campaign
     from gearmbs.campaigns.canonical import canonical, content_key
     from gearmbs.campaigns.chaos import PolynomialChaos, fit_chaos
@@ -62,6 +63,7 @@ __all__ = [
     "SobolIndices",
     "Specimens",
     "Subject",
+    "TotalBounds",
     "canonical",
     "choose",
     "condition_figure",
@@ -77,12 +79,15 @@ __all__ = [
     "morris_effects",
     "sobol_indices",
     "subject_kinds",
+    "total_bounds",
 ]
 
 late(
     __name__,
     {
         "sobol_indices": ".sensitivity",
+        "TotalBounds": ".bounds",
+        "total_bounds": ".bounds",
         "morris_effects": ".sensitivity",
         "main_effects": ".sensitivity",
         "SobolIndices": ".sensitivity",

@@ -72,6 +72,10 @@ class CampaignStatus:
             parts.append(f"about {_duration(self.eta)} left")
         return ", ".join(parts)
 
+    def _repr_html_(self) -> str:
+        """Return the bar and the words, for notebooks."""
+        return f"<progress value='{self.fraction:.4f}' max='1'></progress> {self}"
+
 
 def _duration(seconds: float) -> str:
     if seconds < 90:

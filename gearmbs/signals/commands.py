@@ -257,6 +257,8 @@ def compare(
         from gearmbs.signals.simulated import parse_models, parse_states, read_any
         from gearmbs.signals.speed_file import parse_speed
 
+        for item in (*experiment, *(model or ())):
+            check_kind(Path(item.partition("=")[2] or item), "record")
         known = {
             "teeth": None if teeth is None else tooth_counts(teeth),
             "speed": parse_speed(speed),

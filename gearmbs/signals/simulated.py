@@ -181,7 +181,7 @@ def read_any(path: str | Path, component: str | None = None, **settings: Any) ->
     **settings
         For `gearmbs.signals.read_signal`.
     """
-    if Path(path).suffix == ".nc":
+    if _may_be_netcdf(Path(path)):
         # of a damaged file read_signal says what is wrong with it
         with contextlib.suppress(OSError, ValueError), xr.open_dataset(path, engine="h5netcdf") as data:
             if "acceleration" in data and "case_json" in data.attrs and "load" not in data.dims:
@@ -191,6 +191,17 @@ def read_any(path: str | Path, component: str | None = None, **settings: Any) ->
             if "measured" in data and "train_json" in data.attrs:
                 return sensor_signals(data, component, **settings)
     return read_signal(path, **settings)
+
+
+def _may_be_netcdf(path: Path) -> bool:
+    """Whether a file is NetCDF by its ending or, without one, by its first bytes."""
+    if path.suffix:
+        return path.suffix == ".nc"
+    try:
+        with path.open("rb") as file:
+            return file.read(8) == b"\x89HDF\r\n\x1a\n"
+    except OSError:
+        return False
 
 
 def model_signals(path: str | Path, component: str) -> dict[str, dict[str, xr.DataArray]]:

@@ -281,10 +281,17 @@ def _partial_dataset(case: Case, solution: Solution, known: Measured) -> xr.Data
     return dataset
 
 
-def record(case: Case, solution: Solution) -> xr.Dataset:
+def record(case: Case, solution: Solution, mechanism: Mechanism | None = None) -> xr.Dataset:
     """Return the record of a simulated case; see :func:`run_case`.
 
     Forces at uneven times are brought to the output rate through an anti-alias filter, the other series interpolated.
+
+    Parameters
+    ----------
+    case : Case
+    solution : Solution
+    mechanism : Mechanism, optional
+        The one that was simulated, if it was not the case's own: the record then says on which rolling bearings it ran.
 
     Raises
     ------
@@ -292,7 +299,9 @@ def record(case: Case, solution: Solution) -> xr.Dataset:
         If teeth slipped past each other.
     """
     known = measure(case, solution, rows_of_record(case, solution.t))
-    return _evaluated(case, solution, known, even=_is_even(solution.t, case.output_rate))
+    dataset = _evaluated(case, solution, known, even=_is_even(solution.t, case.output_rate))
+    dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
+    return dataset
 
 
 def _evaluated(

@@ -103,7 +103,7 @@ def test_functions_of_more_than_numbers(tmp_path):
         FunctionSubject(nested, {"x": Case()})
     with pytest.raises(CampaignError, match="of a function at the top of a module"):
         FunctionSubject(lambda x: x, {"x": 1.0})
-    with pytest.raises(CampaignError, match="stands in the script that runs"):
+    with pytest.raises(CampaignError, match="stands in the script or notebook that runs"):
         FunctionSubject("__main__:f", {"x": 1.0})
     with pytest.raises(CampaignError, match="'zork' is no unit"):
         FunctionSubject(nested, {"x": 1.0}, units={"x": "zork"})

@@ -21,8 +21,9 @@ from gearmbs.campaigns import (
     make_plan,
     morris_effects,
     sobol_indices,
+    total_bounds,
 )
-from gearmbs.campaigns.designs import factorial, morris, saltelli
+from gearmbs.campaigns.designs import factorial, morris, saltelli, sequence
 from gearmbs.cli import app
 from tests.campaigns.models import PI
 from tests.campaigns.support import function, ranges, small
@@ -233,3 +234,36 @@ def test_one_factor_studies(tmp_path):
     np.testing.assert_allclose(table.sensitivity["x1"].iloc[2], np.sin(0.5) / 0.5)
     np.testing.assert_allclose(table.change["x2"], 7 * np.sin(at) ** 2, atol=1e-12)
     assert "One factor after the other" in campaign.report(tmp_path / "r.html", ["y"]).read_text()
+
+
+def test_bounds_hold_the_truth_however_bad_the_surrogate():
+    """Ishigami's total indices, from points as they are, and with noise that no surrogate explains."""
+    pytest.importorskip("sklearn")
+    u = sequence("sobol", 256, 3, 5)
+    y, truth = _values(u), np.array(TOTAL)
+    found = total_bounds(u, y, NAMES)
+    assert found.q_squared > 0.8
+    assert (found.low <= truth).all()
+    assert (truth <= found.high).all()
+    assert (found.sure_low <= found.low).all()
+    assert (found.sure_high >= found.high).all()
+    # noise as of a further factor of half the variance: all indices are half, and 0.5 more may be anyone's
+    noisy = total_bounds(u, y + y.std() * np.random.default_rng(1).standard_normal(256), NAMES)
+    assert noisy.q_squared < 0.6
+    assert (noisy.sure_low <= 0.5 * truth).all()
+    assert (0.5 * truth <= noisy.sure_high).all()
+    assert list(found.table().index) == NAMES
+    with pytest.raises(CampaignError, match="draw more points"):
+        total_bounds(u, np.ones(256), NAMES)
+
+
+def test_bounds_of_a_few_levels():
+    """Two values of a factor: y = x1 + 3 x2, whose parts are 1/12 and 9/4 of 28/12 ... in closed form."""
+    pytest.importorskip("sklearn")
+    u = sequence("sobol", 128, 2, 3)
+    y = u[:, 0] + 3.0 * (u[:, 1] >= 0.5)
+    truth = np.array([1.0 / 12.0, 9.0 / 4.0]) / (1.0 / 12.0 + 9.0 / 4.0)
+    found = total_bounds(u, y, ["a", "b"], levels=[0, 2])
+    assert (found.sure_low <= truth).all()
+    assert (truth <= found.sure_high).all()
+    assert found.low[1] > 0.9

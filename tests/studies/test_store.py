@@ -13,7 +13,16 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from gearmbs import _kept, cli
-from gearmbs.studies import Case, CaseError, SimulationFailed, case_mechanism, run_case, run_cases, simulation
+from gearmbs.studies import (
+    Case,
+    CaseError,
+    SimulationFailed,
+    case_mechanism,
+    run_case,
+    run_cases,
+    simulate_case,
+    simulation,
+)
 from gearmbs.studies.parallel import StorageWarning
 from gearmbs.studies.store import KeptElsewhere, check_place, keep_dataset, record_size, stored_record, write_dataset
 
@@ -208,5 +217,26 @@ def test_a_record_on_bearings_is_told_from_one_on_joints(tmp_path):
     assert told["bearing 2 b"]["defects"][0]["width"] == pytest.approx(1e-3)
     write_dataset(tmp_path / "one.nc", run_case(case, False))
     assert stored_record(tmp_path, case) is not None
+    # a solution does not know its mechanism; whoever evaluates it says so
+    solution = simulate_case(case, False, mechanism=m)
+    assert simulation.record(case, solution, m).attrs["bearings_json"] == record.attrs["bearings_json"]
+    assert "bearings_json" not in simulation.record(case, solution).attrs
     with pytest.raises(ValueError, match="there is no 'bearing 3'; choose among bearing 1 a"):
         case_mechanism(case, "6206", each={"bearing 3": {}})
+
+
+def test_a_record_without_an_ending_is_recognised(tmp_path):
+    """By its first bytes; and what is no record is refused by its name."""
+    from gearmbs.signals.simulated import read_any
+
+    record = run_case(Case(name="one", operation=SHORT), False)
+    write_dataset(tmp_path / "one.nc", record)
+    (tmp_path / "one.nc").rename(tmp_path / "one")
+    found = read_any(tmp_path / "one")
+    np.testing.assert_array_equal(
+        found.sel(channel="line_of_action"), record.acceleration.sel(component="line_of_action")
+    )
+    (tmp_path / "case.toml").write_text("[operation]\ntorque = '90 N m'\n")
+    refused = CliRunner().invoke(cli.app, ["compare", "--experiment", f"low:healthy={tmp_path / 'case.toml'}"])
+    assert refused.exit_code == 1
+    assert "describes a case, not a record" in refused.output

@@ -167,8 +167,8 @@ def _name_of(function: str | Callable[..., Any]) -> str:
     module, _, attribute = name.partition(":")
     if module == "__main__":
         raise CampaignError(
-            f"function {attribute!r} stands in the script that runs, where workers cannot import it; put it into a "
-            "module beside the script, and import it from there"
+            f"function {attribute!r} stands in the script or notebook that runs, where workers cannot import it; put "
+            "it into a module beside it, and import it from there"
         )
     if not attribute.isidentifier():
         raise CampaignError(f"function {name!r}: give module:name of a function at the top of a module")

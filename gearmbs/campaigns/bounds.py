@@ -1,0 +1,183 @@
+"""Between which values total Sobol' indices must lie, from points at hand and any surrogate, however bad it is.
+
+With V the variance of y, the total index of factor i is T_i = E[Var(y | all but i)] / V. Two inequalities hold for
+every function of the factors, so that a surrogate fitted to other points gives bounds and not estimates:
+
+* no function m of all factors but i explains more than 1 - T_i, so T_i <= 1 - corr(y, m)^2;
+* of a function h whose mean over factor i is zero wherever the others are, y has a part of at most T_i in its direction
+  (Cauchy and Schwarz), so T_i >= corr(y, h)^2.
+
+Taken are m_i, the surrogate's mean over factor i, and h_i = g - m_i, of a Gaussian process g of Matern's kernel [1]_.
+What the surrogate does not explain widens the gap between both and makes neither of them wrong.
+
+References
+----------
+.. [1] C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press, 2006.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearmbs.campaigns.errors import CampaignError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FOLDS = 10
+NODES = 10
+"""Of the Gauss-Legendre quadrature over a factor."""
+
+MOST_FOR_LENGTHS = 1200
+"""Points that the lengths of the kernel are found from; the cost grows by their third power."""
+
+FEWEST = 40
+RESAMPLES = 400
+
+
+@dataclass(frozen=True)
+class TotalBounds:
+    """Bounds of total indices.
+
+    Attributes
+    ----------
+    names : list of str
+    low, high : ndarray, shape (d,)
+        From the correlations found.
+    sure_low, sure_high : ndarray, shape (d,)
+        With the sampling error of the correlations, by resampling: each holds with a probability of 97.5 %.
+    q_squared : float
+        Part of the variance that the surrogate explains of points it was not fitted to.
+    """
+
+    names: list[str]
+    low: np.ndarray
+    high: np.ndarray
+    sure_low: np.ndarray
+    sure_high: np.ndarray
+    q_squared: float
+
+    def table(self) -> pd.DataFrame:
+        """Return the bounds by factor, the highest lower one first."""
+        import pandas as pd
+
+        data = {"low": self.low, "high": self.high, "sure_low": self.sure_low, "sure_high": self.sure_high}
+        table = pd.DataFrame(data, index=pd.Index(self.names, name="factor"))
+        return table.sort_values("low", ascending=False)
+
+
+def total_bounds(
+    u: np.ndarray,
+    values: Sequence[float] | np.ndarray,
+    names: list[str],
+    *,
+    levels: Sequence[int] | None = None,
+    seed: int = 0,
+) -> TotalBounds:
+    """Return bounds of the total Sobol' indices; needs scikit-learn, of the extra ``datasets``.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n, d)
+        Points in the unit cube, evenly spread.
+    values : array_like, shape (n,)
+        NaN are left out.
+    names : list of str
+        The d factors' coordinates.
+    levels : sequence of int, optional
+        Number of values of each coordinate that has but a few, 0 for a range.
+    seed : int
+        Of the folds and of the resampling.
+
+    Raises
+    ------
+    CampaignError
+        For too few points, a result that is the same everywhere, or without scikit-learn.
+    """
+    y = np.asarray(values, dtype=float)
+    good = np.isfinite(y)
+    x, y = _places(np.asarray(u, dtype=float)[good], levels or [0] * len(names)), y[good]
+    if y.size < FEWEST or np.ptp(y) == 0.0:
+        raise CampaignError(f"bounds: {y.size} points, or a result that is the same everywhere; draw more points")
+    y = (y - y.mean()) / y.std()
+    order = np.random.default_rng(seed).permutation(y.size)
+    kernel = _lengths(x[order[:MOST_FOR_LENGTHS]], y[order[:MOST_FOR_LENGTHS]])
+    whole, means = np.empty(y.size), np.zeros((len(names), y.size))
+    for k in range(FOLDS):
+        mine = order[k::FOLDS]
+        others = np.setdiff1d(order, mine)
+        process = _process(kernel, fixed=True).fit(x[others], y[others])
+        whole[mine] = process.predict(x[mine])
+        for i, count in enumerate(levels or [0] * len(names)):
+            nodes, weights = _quadrature(count)
+            for node, weight in zip(nodes, weights):
+                moved = x[mine].copy()
+                moved[:, i] = node
+                means[i, mine] += weight * process.predict(moved)
+    away, sure_away = _squares(y, whole - means, seed)
+    without, sure_without = _squares(y, means, seed)
+    return TotalBounds(
+        list(names),
+        away,
+        1.0 - without,
+        sure_away,
+        1.0 - sure_without,
+        1.0 - float(np.mean((y - whole) ** 2)),
+    )
+
+
+def _places(u: np.ndarray, levels: Sequence[int]) -> np.ndarray:
+    """Return points with those of a few values at the values' places."""
+    x = u.copy()
+    for k, count in enumerate(levels):
+        if count:
+            x[:, k] = (np.minimum(np.floor(u[:, k] * count), count - 1) + 0.5) / count
+    return x
+
+
+def _quadrature(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return nodes and weights of the mean over a coordinate."""
+    if count:
+        return (np.arange(count) + 0.5) / count, np.full(count, 1.0 / count)
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    return 0.5 * (nodes + 1.0), 0.5 * weights
+
+
+def _process(kernel: Any, fixed: bool) -> Any:
+    try:
+        from sklearn.gaussian_process import GaussianProcessRegressor
+    except ImportError:
+        raise CampaignError("bounds need scikit-learn; install the extra: pip install 'gearmbs[datasets]'") from None
+    return GaussianProcessRegressor(kernel, optimizer=None) if fixed else GaussianProcessRegressor(kernel)
+
+
+def _lengths(x: np.ndarray, y: np.ndarray) -> Any:
+    """Return the kernel of greatest likelihood: a length for each coordinate, and what is taken for noise."""
+    process = _process(None, fixed=False)
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+
+    process.kernel = ConstantKernel(1.0) * Matern(np.ones(x.shape[1]), (0.05, 50.0), nu=1.5) + WhiteKernel(0.1)
+    with warnings.catch_warnings():
+        # a length at its bound is that of a coordinate without influence
+        warnings.simplefilter("ignore")
+        return process.fit(x, y).kernel_
+
+
+def _squares(y: np.ndarray, functions: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the squares of the correlations with several functions, shape (d, n), and the lower ends of these."""
+    generator = np.random.default_rng(seed)
+    rows = [np.arange(y.size), *(generator.integers(y.size, size=y.size) for _ in range(RESAMPLES))]
+    # a function that goes the other way explains nothing of points it was not fitted to
+    found = np.array([np.maximum(_correlations(y[r], functions[:, r]), 0.0) ** 2 for r in rows])
+    return found[0], np.minimum(found[0], np.quantile(found[1:], 0.025, axis=0))
+
+
+def _correlations(y: np.ndarray, functions: np.ndarray) -> np.ndarray:
+    a, b = y - y.mean(), functions - functions.mean(axis=1, keepdims=True)
+    size = np.sqrt((a**2).sum() * (b**2).sum(axis=1))
+    return np.divide(b @ a, size, out=np.zeros(len(b)), where=size > 0.0)
