@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import dis
 import gc
-import importlib
+import importlib.util
 import pkgutil
 import re
 import sys
@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from types import CodeType, ModuleType
+from typing import Any
 
 from gearmbs._jit import Kernel
 
@@ -86,6 +87,11 @@ def below(kernel: Kernel) -> set[Kernel]:
     return found
 
 
+def size(kernel: Kernel) -> int:
+    """Return the length of a kernel's byte code, to compare the time it takes to compile."""
+    return len(kernel.py_func.__code__.co_code)
+
+
 def entries(found: list[Kernel], modules: Iterable[str] | None = None) -> list[Kernel]:
     """Return those of some kernels with a declared signature that Python calls, or that nothing else calls.
 
@@ -124,12 +130,21 @@ def _names(code: CodeType, own: Iterable = (), imported: set | None = None) -> I
         elif step.opname == "IMPORT_NAME":
             source = step.argval
         elif step.opname == "IMPORT_FROM" and imported is not None and code.co_name != "<module>":
-            value = getattr(sys.modules.get(source), step.argval, None)
+            value = _if_loaded(source, step.argval)
             if isinstance(value, Kernel):
                 imported.add(value)
     for inner in code.co_consts:
         if isinstance(inner, CodeType) and (inner.co_filename, inner.co_firstlineno) not in own:
             yield from _names(inner, own, imported)
+
+
+def _if_loaded(module: str, name: str) -> Any:
+    """Return what a module calls by a name, None if it is still to be imported; see `gearmbs._lazy.late`."""
+    space = vars(sys.modules.get(module, object))
+    home, _, other = space.get("_homes", {}).get(name, "").partition(":")
+    if home and name not in space:
+        space = vars(sys.modules.get(importlib.util.resolve_name(home, module), object))
+    return space.get(other or name)
 
 
 def _kernels_of(names: set[str], space: dict) -> Iterator[Kernel]:

@@ -204,7 +204,7 @@ class _Tasks:
 
     def __init__(self, wanted: list[Kernel], report: Report | None) -> None:
         from gearmbs import _kernel_cache as cache
-        from gearmbs._kernel_calls import address, below
+        from gearmbs._kernel_calls import address, below, size
 
         self.report = report or (lambda line: None)
         self.errors: list[str] = []
@@ -222,12 +222,14 @@ class _Tasks:
         for kind, kernels in (("part", parts), ("entry", wanted)):
             for kernel in kernels:
                 task = f"{kind} {address(kernel)}"
-                self.waiting[task] = {f"part {address(k)}" for k in below(kernel) & parts}
-        # what much else waits for goes first, then what is large
-        for task, before in self.waiting.items():
-            self.order[task] = self.order.get(task, 0) + len(before)
-            for other in before:
-                self.order[other] = self.order.get(other, 0) + 1000
+                found = below(kernel)
+                self.waiting[task] = {f"part {address(k)}" for k in found & parts}
+                # an entry is optimised with all below it, a part compiled with the helpers that have no signature
+                self.order[task] = size(kernel) + sum(size(k) for k in found if kind == "entry" or k.declared is None)
+        # the longest chain of tasks first: a part is as urgent as the largest of those that wait for it
+        for task in sorted(self.waiting, key=lambda t: len(self.waiting[t]), reverse=True):
+            for before in self.waiting[task]:
+                self.order[before] = max(self.order[before], self.order[task] + 1)
         self.total = len(self.waiting)
 
     def work(self) -> None:

@@ -107,6 +107,52 @@ def test_a_program_says_that_it_compiles(tmp_path):
     assert second.stdout == "True\n"
 
 
+LOADED_LATER = """
+import sys
+from gearmbs._jit import Kernel
+from gearmbs._kernel_calls import kernel_modules
+
+compiling, first = Kernel.compile, set()
+
+def noted(kernel, signature):
+    first.update(() if first else sys.modules)
+    return compiling(kernel, signature)
+
+Kernel.compile = noted
+{program}
+assert first
+print(*sorted((set(sys.modules) - first) & set(kernel_modules())))
+"""
+PENDULUM = """
+from gearmbs.mechanism import Mechanism
+m = Mechanism()
+rod = m.body("rod", 1.0, (0.1, 0.1, 0.01), position=(0.5, 0, 0))
+m.revolute("pin", rod, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+m.simulate(0.1)
+"""
+PAIR = """
+from gearmbs.studies import make_case, run_case
+run_case(make_case({"operation": {"duration": "0.3 s", "settling": "0 s"}}))
+"""
+
+
+@pytest.mark.parametrize("program", [PENDULUM, PAIR])
+def test_what_a_run_needs_is_known_at_once(program):
+    """Kernels that were loaded after the first one was called would be compiled in a second round."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    code = LOADED_LATER.format(program=program)
+    assert not subprocess.check_output([sys.executable, "-c", code], env=environment, text=True, cwd="/").strip()
+
+
+def test_looking_for_calls_imports_nothing():
+    """Packages whose names are imported late stay as they are: their kernels would be compiled, too."""
+    code = "import sys; from gearmbs._kernel_calls import entries, kernels; import gearmbs.mechanism.simulate; "
+    code += "loaded = [n for n in sys.modules if n.startswith('gearmbs.')]; entries(kernels(loaded), loaded); "
+    code += "print(*({n for n in sys.modules if n.startswith('gearmbs.')} - {*loaded}))"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    assert not subprocess.check_output([sys.executable, "-c", code], env=environment, text=True, cwd="/").strip()
+
+
 def test_failing_helpers(monkeypatch):
     """What a helper cannot compile is told with its traceback."""
     kernel = _kernel_calls.find("gearmbs.dae.equations.rotation", "rotation_matrix")

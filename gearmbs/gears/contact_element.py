@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,14 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.tables import pack
 from gearmbs.mechanism.elements import Compiled, ForceElement
+
+
+def contact_kernels() -> tuple[Any, tuple[Any, Any]]:
+    """Return the kernel of the force, and that of the contact below it with its signature; they are imported now."""
+    from gearmbs.contact import GEAR_CONTACT_SIG, gear_contact
+    from gearmbs.contact.force_kernel import contact_force
+
+    return contact_force, (gear_contact, GEAR_CONTACT_SIG)
 
 
 @dataclass(eq=False, repr=False)
@@ -33,11 +42,9 @@ class GearContact(ForceElement):
     )
 
     def compiled(self) -> Compiled:
-        from gearmbs.contact import GEAR_CONTACT_SIG, gear_contact
-        from gearmbs.contact.force_kernel import contact_force
-
+        force, contact = contact_kernels()
         integers, reals, scratch = pack(self.pair)
-        return Compiled(contact_force, integers, reals, ((gear_contact, GEAR_CONTACT_SIG),), scratch=scratch)
+        return Compiled(force, integers, reals, (contact,), scratch=scratch)
 
     def check(self) -> None:
         """Check the initial distance of the two wheels.

@@ -13,6 +13,7 @@ from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.integrators.ida import solve_ida
 from gearmbs.dae.integrators.options import Options
+from gearmbs.dae.integrators.wstiff import solve_wstiff
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
@@ -213,8 +214,6 @@ def _integrated(
     times, last = None if every_step else t_eval, float(t_eval[-1])
     if name == "IDA":
         return solve_ida(problem, times, t_end=last, **options)
-    from gearmbs.dae.integrators.wstiff import solve_wstiff
-
     # errors are controlled on positions and velocities, and so is the corrector
     options.setdefault("corrector", "modified")
     options.setdefault("slopes", times is not None)

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import functools
-import json
-import platform
+import importlib
 from collections.abc import Callable, Collection, Mapping
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import gearmbs
 from gearmbs._lazy import uncollected
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
+from gearmbs.gears.contact_element import contact_kernels
 from gearmbs.mechanism.simulate import simulate
 from gearmbs.studies import rig
-from gearmbs.studies.case import Case, CaseError, units_of_fields
-from gearmbs.studies.drive import drive_angle
+from gearmbs.studies.attributes import attributes_of, bearing_attributes
+from gearmbs.studies.case import Case, CaseError
 from gearmbs.studies.evaluation import check_variables, evaluate, time_series
-from gearmbs.studies.limits import check_record, edge, remarks, slip
+from gearmbs.studies.limits import check_record, edge, slip
 from gearmbs.studies.measured import Measured, Recorder, measure, rows_of_record
 
 if TYPE_CHECKING:
@@ -37,6 +34,15 @@ ADVICE = {
     Status.SOLVER_FAILURE: "Loosen solver.tolerance, make operation.run_up longer, or take the WSTIFF integrator.",
 }
 """What the settings of a case offer against a failing integration."""
+
+
+KERNELS = (
+    "gearmbs.dae.model.side_by_side",
+    "gearmbs.mechanism.forces.torque_kernel",
+    "gearmbs.signals.decimation",
+    "gearmbs.signals.piecewise_cubic",
+)
+"""Modules of kernels that are called late in a run, besides those of the contact."""
 
 
 class SimulationFailed(RuntimeError):
@@ -103,6 +109,7 @@ def simulate_case(
         Sampled at the case's output rate, or at the integrator's own steps, from which :func:`record` makes signals
         without aliases; see its ``status``.
     """
+    _load_kernels()
     mechanism = case_mechanism(case) if mechanism is None else mechanism
     operation, solver = case.operation, case.solver
     t_end = operation.run_up + operation.settling + operation.duration + edge(case)
@@ -214,6 +221,7 @@ def run_case(
         raise CaseError(f"case: is a {type(case).__name__}; make a case of tables by make_case, of a file by load_case")
     check_record(case)
     check_variables(variables)
+    _load_kernels()
     recorder = Recorder(case)
     solution = simulate_case(case, progress, mechanism=mechanism, every_step=True, consumer=recorder.take)
     if not solution.success:
@@ -229,37 +237,20 @@ def run_case(
     return dataset
 
 
+def _load_kernels() -> None:
+    """Import the kernels of a run before the first is called, so that all that are missing are compiled at once."""
+    with uncollected():
+        contact_kernels()
+        for name in KERNELS:
+            importlib.import_module(name)
+
+
 def _partial(case: Case, solution: Solution, recorder: Recorder, mechanism: Mechanism | None) -> xr.Dataset | None:
     if recorder.is_empty:
         return None
     dataset = _partial_dataset(case, solution, recorder.everything())
     dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
     return dataset
-
-
-def bearing_attributes(mechanism: Mechanism | None, title: str = "") -> dict[str, Any]:
-    """Return what a record says of the rolling bearings of its mechanism, which its case does not know.
-
-    Returns
-    -------
-    dict
-        ``title``; ``bearings`` and ``bearing_defects`` in words; ``bearings_json``: of each by name its bearing, the
-        settings other than the defaults and its defects with labels, in SI. Empty without rolling bearings.
-    """
-    if mechanism is None or not any(e.kind == "rolling bearing" for e in mechanism.elements.values()):
-        return {}
-    from gearmbs.bearings.record import described
-
-    told = described(mechanism)
-    words = {name: [d["label"] for d in one["defects"]] for name, one in told.items()}
-    kinds = {one["bearing"]["designation"] or one["bearing"]["kind"] for one in told.values()}
-    return {
-        "title": f"{title} on rolling bearings",
-        "bearings": f"{len(told)} rolling bearings {', '.join(sorted(kinds))}",
-        "bearing_defects": "; ".join(f"{name}: {', '.join(labels)}" for name, labels in words.items() if labels)
-        or "none",
-        "bearings_json": json.dumps(told),
-    }
 
 
 def partial_record(case: Case, solution: Solution) -> xr.Dataset:
@@ -320,68 +311,3 @@ def _evaluated(
 
 def _is_even(t: np.ndarray, rate: float) -> bool:
     return bool(np.allclose(np.diff(t) * rate, 1.0, atol=1e-6))
-
-
-_version = functools.cache(version)
-
-
-def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any]:
-    """Return every parameter of a case, the versions and the solver's statistics as flat attributes.
-
-    The unit of a quantity is beside it: ``operation_speed`` has ``operation_speed_units``. What is unusual about the
-    case is said in ``remarks``.
-    """
-    out: dict[str, Any] = {"title": f"gear pair: {case.name}", "case": case.name}
-    for section in ("gears", "shafts", "operation", "fault", "contact", "friction", "solver"):
-        settings = getattr(case, section)
-        units = units_of_fields(settings)
-        for key, value in settings.model_dump().items():
-            name = f"{section}_{key}"
-            if name in ("operation_speed", "operation_torque") and isinstance(value, tuple):
-                out[f"{name}_curve"] = json.dumps(value)
-                value = max(number for _, number in value)
-            if value is None:
-                out[name] = "default"
-            elif name == "fault_teeth":
-                out[name] = json.dumps(value)
-            elif isinstance(value, bool):
-                out[name] = int(value)
-            else:
-                out[name] = list(value) if isinstance(value, tuple) else value
-                if key in units and not isinstance(value, str):
-                    out[f"{name}_units"] = units[key]
-    out["solver_tolerance"] = case.solver.used_tolerance
-    for name, rate in (("signal_rate", case.signal_rate), ("output_rate", case.output_rate)):
-        out[f"solver_{name}"], out[f"solver_{name}_units"] = rate, "Hz"
-    pair = case.pair()
-    out["contact_ratio"] = pair.contact_ratio
-    out["face_slices"] = pair.face_slices
-    out["remarks"] = "; ".join(remarks(case)) or "none"
-    out["mesh_frequency"] = case.mesh_frequency
-    out["mesh_frequency_units"] = "Hz"
-    out["case_json"] = case.model_dump_json()
-    out["gearmbs_version"] = gearmbs.__version__
-    for package in ("numpy", "scipy", "numba", "scikit-sundae", "xarray"):
-        out[f"{package.replace('-', '_')}_version"] = _version(package)
-    out["python_version"] = platform.python_version()
-    if solution is not None:
-        out.update({f"solver_{key}": value for key, value in solution.stats.as_dict().items()})
-        out.update(cost(case, solution))
-    return out
-
-
-def cost(case: Case, solution: Solution) -> dict[str, Any]:
-    """Return what a run cost: seconds simulated in a second of the solver, and its time for each cycle of the mesh.
-
-    The first falls with the speed of the wheels, the second hardly does.
-    """
-    operation = case.operation
-    end, spent = float(solution.t[-1]), solution.stats.wall_time
-    angle = drive_angle(operation.speed, operation.run_up, operation.run_up + operation.settling)
-    cycles = case.gears.teeth[0] * (angle(end) - angle(0.0)) / (2.0 * np.pi)
-    return {
-        "solver_mesh_cycles": cycles,
-        "solver_real_time_factor": end / spent if spent > 0.0 else 0.0,
-        "solver_time_per_mesh_cycle": spent / cycles if cycles > 0.0 else 0.0,
-        "solver_time_per_mesh_cycle_units": "s",
-    }
