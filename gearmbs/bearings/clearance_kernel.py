@@ -15,6 +15,7 @@ import numpy as np
 
 from gearmbs._jit import njit
 from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P, FRAME_V, FRAME_W
+from gearmbs.dae.equations.time_functions import smooth_step
 
 CLEARANCE, STIFFNESS, EXPONENT, DAMPING, DEPTH = range(5)
 """Reals: c (m, half the diametral clearance), K (N/m^m), m, C (N s/m), depth of the damping (m)."""
@@ -98,8 +99,8 @@ def clearance_bearing(ints, reals, t, frames, states, inputs, want, work, wrench
         speed += n[q] * u[q]
     share, rise = 1.0, 0.0
     if depth < reals[DEPTH]:
-        x = depth / reals[DEPTH]
-        share, rise = x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / reals[DEPTH]
+        _, share, slope, _ = smooth_step(depth / reals[DEPTH], 0)
+        rise = slope / reals[DEPTH]
     elastic = reals[STIFFNESS] * depth ** reals[EXPONENT]
     force = elastic + reals[DAMPING] * share * speed
     diagnostics[0] = elastic * depth / (reals[EXPONENT] + 1.0)

@@ -12,6 +12,7 @@ spring; with one a side that has let go never pulls.
 from __future__ import annotations
 
 from gearmbs._jit import njit
+from gearmbs.dae.equations.time_functions import smooth_step
 from gearmbs.drivetrain.torque_kernel import BY_ANGLE, BY_SPEED, LAW_SIG, LOST, STORED, TOLD, TORQUE
 
 FREE, LINEAR, CUBIC, DAMPING, BAND, DEPTH, MORE, SECOND, WIDTH = range(9)
@@ -49,8 +50,8 @@ def clutch(p, t, angle, speed, times, states, out):
         return
     share, rise = 1.0, 0.0
     if d < p[DEPTH]:
-        x = d / p[DEPTH]
-        share, rise = x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / p[DEPTH]
+        _, share, slope, _ = smooth_step(d / p[DEPTH], 0)
+        rise = slope / p[DEPTH]
     closing = side * speed
     force = elastic + p[DAMPING] * share * closing
     if force <= 0.0:
