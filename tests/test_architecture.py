@@ -90,6 +90,7 @@ CIRCLES = {
         "methods of Mechanism, and the functions that carry them out",
     ("adams.builders.accelerations", "adams.builders.builder", "adams.builders.constraints", "adams.builders.contacts",
      "adams.builders.control", "adams.builders.curve_data", "adams.builders.curves", "adams.builders.data_calls",
+     "adams.builders.fe_parts",
      "adams.builders.flexible", "adams.builders.flexible_data", "adams.builders.forces", "adams.builders.initial",
      "adams.builders.mechanism", "adams.builders.modal_forces", "adams.builders.modal_loads", "adams.builders.model",
      "adams.builders.held_bodies", "adams.builders.routine_calls",

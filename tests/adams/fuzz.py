@@ -70,7 +70,19 @@ def corpus() -> list[str]:
     curves = test_curves
     cam = "CURVE/1, CLOSED, CURVE_POINTS, MATRIX=1\nPTCV/1, I=30, CURVE=1, RM=20, JFLOAT=32"
     turned = {"height": 50.0, "mass": curves.MASS, "speed": curves.SPEED, "g": curves.G}
-    unbuilt = "TFSISO/1", "JOINT/6", "JOINT/10", "JPRIM/4", "GEAR/1", "TIRE/1", "GSE/1", "FLEX_BODY/1", "MFORCE/1"
+    unbuilt = (
+        "TFSISO/1",
+        "JOINT/6",
+        "JOINT/10",
+        "JPRIM/4",
+        "GEAR/1",
+        "TIRE/1",
+        "GSE/1",
+        "FLEX_BODY/1",
+        "MFORCE/1",
+        "FE_PART/1",
+        "FE_LOAD/1",
+    )
     built = without(EVERYTHING, *unbuilt)
     locked = *(f"JOINT/{k}" for k in range(2, 12)), "JPRIM/1", "JPRIM/2", "JPRIM/3", "COUPLER/1", "GCON/1", "MOTION/1"
     runs = without(built, *locked, "PTCV/1", "CVCV/1")

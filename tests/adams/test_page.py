@@ -37,7 +37,7 @@ def test_page_lists_what_the_program_knows(heading, known):
 
 def test_page_lists_what_a_script_switches():
     after = PAGE[PAGE.index("**these elements**:") :].split("\n* ")[0]
-    assert set(re.findall(r"\b[A-Z]{2,}\b", after)) == set(commands.ELEMENTS.split())
+    assert set(re.findall(r"\b[A-Z_]{2,}\b", after)) == set(commands.ELEMENTS.split())
 
 
 def test_expression_page_lists_all_functions():

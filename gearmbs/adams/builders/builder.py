@@ -40,6 +40,7 @@ from gearmbs.mechanism.parts import Body, Marker
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from gearmbs.adams.builders.fe_parts import Beam
     from gearmbs.flexible import ModalModel
     from gearmbs.mechanism.contacts.shapes import Shape
     from gearmbs.solids.bodies import Body as SolidBody
@@ -101,17 +102,20 @@ class Builder:
         self.flexible: dict[int, ModalModel] = {}
         self.solid_files: dict[Path, list[SolidBody]] = {}
         self.solids: dict[tuple[Path, int], Shape] = {}
+        self.beams: dict[int, Beam] = {}
         self.problems: list[Diagnostic] = []
         self.left_out: set[tuple[str, int]] = set()
         self._taken: set[str] = {"ground"}
 
-    def add_bodies(self, add_flex_body: Maker, add_flexible_marker: Maker) -> bool:
+    def add_bodies(self, bodies: Mapping[type, Maker], markers: Mapping[str, Maker]) -> bool:
         """Add gravity, parts, point masses, flexible bodies and markers; return whether elements may follow.
 
         Parameters
         ----------
-        add_flex_body, add_flexible_marker : callable
-            What adds a FLEX_BODY, and a marker on one.
+        bodies : mapping of type to callable
+            What adds bodies that deform, by their statement.
+        markers : mapping of str to callable
+            What adds markers on them, by the name of the statement.
         """
         gravity = self.deck.only(st.Accgrav)
         if gravity is not None and ("ACCGRAV", 0) not in self.inactive:
@@ -121,11 +125,13 @@ class Builder:
             self.attempt(part, self.add_part)
         for point in self.deck.of(st.PointMass).values():
             self.attempt(point, partial(add_point_mass, self))
-        for flexible in self.deck.of(st.FlexBody).values():
-            self.attempt(flexible, partial(add_flex_body, self))
+        for kind, make in bodies.items():
+            deforming: Mapping[int, st.Statement] = self.deck.of(kind)
+            for statement in deforming.values():
+                self.attempt(statement, partial(make, self))
         for marker in self.deck.of(st.Marker).values():
-            on_node = marker.flex_body is not None
-            self.attempt(marker, partial(add_flexible_marker, self) if on_node else self.add_marker)
+            on_node = markers.get(marker.owner()[0])
+            self.attempt(marker, partial(on_node, self) if on_node is not None else self.add_marker)
         return not any(d.severity == ERROR for d in self.problems)
 
     # --- helpers ------------------------------------------------------------------------------------

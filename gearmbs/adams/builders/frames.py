@@ -41,7 +41,7 @@ def axes_from_points(
     return np.column_stack([x, np.cross(z, x), z])
 
 
-def part_orientation(part: st.Part | st.FlexBody | st.PointMass) -> np.ndarray:
+def part_orientation(part: st.Part | st.FlexBody | st.FePart | st.PointMass) -> np.ndarray:
     """Return the axes of a part's frame at the start, global components."""
     if part.zg is not None or part.xg is not None:
         return axes_from_points(part.qg, part.zg, part.xg, False)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 
-from gearmbs.adams.builders.builder import Builder
+from gearmbs.adams.builders.builder import Builder, Maker
 from gearmbs.adams.builders.constraints import CONSTRAINTS
 from gearmbs.adams.builders.contacts import CONTACTS
 from gearmbs.adams.builders.curves import CURVES
+from gearmbs.adams.builders.fe_parts import add_fe_load, add_fe_part, add_node_marker
 from gearmbs.adams.builders.flexible import add_flex_body, add_flexible_marker
 from gearmbs.adams.builders.forces import FORCES
 from gearmbs.adams.builders.initial import with_initial_motions
@@ -19,6 +20,11 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism
+
+DEFORMING: dict[type, Maker] = {st.FlexBody: add_flex_body, st.FePart: add_fe_part}
+"""What adds bodies that deform."""
+ON_NODES: dict[str, Maker] = {"FLEX_BODY": add_flexible_marker, "FE_PART": add_node_marker}
+"""What adds their markers."""
 
 
 def build_mechanism(
@@ -74,10 +80,12 @@ def build_model(
     if deck.unsupported and not allow_unsupported:
         raise DeckError(deck.unsupported)
     builder = Builder(deck, inactive, state or {}, span, sensed or {})
-    if builder.add_bodies(add_flex_body, add_flexible_marker):
+    if builder.add_bodies(DEFORMING, ON_NODES):
         builder.name_elements()
         builder.add_data()
-        for kind, make in (CONSTRAINTS | CURVES | FORCES | {st.Mforce: add_mforce} | CONTACTS).items():
+        for kind, make in (
+            CONSTRAINTS | CURVES | FORCES | {st.Mforce: add_mforce, st.FeLoad: add_fe_load} | CONTACTS
+        ).items():
             for statement in builder.active(kind):
                 builder.attempt(statement, partial(make, builder))
     model = builder.model

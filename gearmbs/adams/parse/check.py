@@ -39,6 +39,8 @@ REQUIRED: dict[type, tuple[str, ...]] = {
     st.Sensor: ("function",),
     st.Gse: ("function",),
     st.Mforce: ("flex_body",),
+    st.FePart: ("type", "node_labels", "coordinates", "section", "material"),
+    st.FeLoad: ("fe_part",),
 }
 MEASURES = frozenset(
     """DX DY DZ DM AX AY AZ INCANG PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
@@ -48,7 +50,9 @@ MEASURES = frozenset(
 MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv", "corner", "icm", "irm", "jrm", "iicm", "jicm")
 TWO_PARTS = (st.Joint, st.Jprim)
 UNSUPPORTED_ARGUMENTS: dict[type, tuple[str, ...]] = {
-    st.Marker: ("fe_part", "node_label", "curve"),
+    st.Marker: ("curve",),
+    st.FePart: ("cratiom", "preload"),
+    st.FeLoad: ("function",),
     st.FlexBody: ("db_file", "bdf_file", "index_in_database"),
     st.Joint: ("friction",),
     st.Coupler: ("function",),
@@ -151,6 +155,11 @@ def check(deck: Deck) -> list[Diagnostic]:
             fail(marker, f"there is no POINT_MASS/{marker.point_mass}", "point_mass")
         if marker.flex_body is None and marker.node_id is not None:
             fail(marker, "NODE_ID is for markers of a FLEX_BODY", "node_id")
+        if marker.fe_part is not None and marker.fe_part not in deck.of(st.FePart):
+            fail(marker, f"there is no FE_PART/{marker.fe_part}", "fe_part")
+    for load in deck.of(st.FeLoad).values():
+        if load.fe_part is not None and load.fe_part not in deck.of(st.FePart):
+            fail(load, f"there is no FE_PART/{load.fe_part}", "fe_part")
     for force in deck.of(st.Mforce).values():
         if force.flex_body is not None and force.flex_body not in deck.of(st.FlexBody):
             fail(force, f"there is no FLEX_BODY/{force.flex_body}", "flex_body")

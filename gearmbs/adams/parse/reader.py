@@ -136,10 +136,14 @@ def _take(deck: Deck, raw: RawStatement, errors: list[Diagnostic]) -> bool:
 
 
 def _read_named(deck: Deck, errors: list[Diagnostic]) -> None:
-    """Read the GRAPHICS that contacts name; the others are for show."""
-    named = {ref for contact in deck.of(st.Contact).values() for ref in (*contact.igeom, *contact.jgeom)}
+    """Read the GRAPHICS that contacts name, the others are for show, and the MATERIAL of beams."""
+    named: dict[str, set[int | None]] = {
+        "GRAPHICS": {ref for contact in deck.of(st.Contact).values() for ref in (*contact.igeom, *contact.jgeom)},
+        "MATERIAL": {part.material for part in deck.of(st.FePart).values()},
+    }
+    users = {"GRAPHICS": "CONTACT", "MATERIAL": "FE_PART"}
     for (name, number), raw in deck.unread.items():
-        if number not in named:
+        if number not in named[name]:
             deck.diagnostics.append(Diagnostic(IGNORED, name, deck.file, raw.line))
             continue
         match = _HEAD.match(raw.text)
@@ -147,7 +151,7 @@ def _read_named(deck: Deck, errors: list[Diagnostic]) -> None:
             statement = read_statement(name, number, raw, match.end() if match else 0, deck.file)
         except StatementError as error:
             line = raw.line_at(error.offset)
-            errors.append(Diagnostic(ERROR, f"{name}/{number}, which a CONTACT names: {error}", deck.file, line))
+            errors.append(Diagnostic(ERROR, f"{name}/{number}, which {users[name]} names: {error}", deck.file, line))
             continue
         deck.items.setdefault(type(statement), {})[number] = statement
 

@@ -27,7 +27,7 @@ from gearmbs.adams.parse.statements_data import (
     Variable,
 )
 from gearmbs.adams.parse.statements_events import Sensor, String
-from gearmbs.adams.parse.statements_flexible import FlexBody, Mforce
+from gearmbs.adams.parse.statements_flexible import FeLoad, FeNode, FePart, FlexBody, Material, Mforce
 from gearmbs.adams.parse.statements_forces import (
     Accgrav,
     Beam,
@@ -64,6 +64,8 @@ STATEMENTS: dict[str, type[Statement]] = {
     "CVCV": Cvcv,
     "DIFF": Diff,
     "EQUILIBRIUM": Equilibrium,
+    "FE_LOAD": FeLoad,
+    "FE_PART": FePart,
     "FIELD": Field,
     "FLEX_BODY": FlexBody,
     "FRICTION": Friction,
@@ -79,6 +81,7 @@ STATEMENTS: dict[str, type[Statement]] = {
     "KINEMATICS": Kinematics,
     "LSE": Lse,
     "MARKER": Marker,
+    "MATERIAL": Material,
     "MATRIX": Matrix,
     "MFORCE": Mforce,
     "MOTION": Motion,
@@ -106,15 +109,15 @@ KEYWORD_OF = {cls: keyword for keyword, cls in STATEMENTS.items()}
 WITHOUT_ID = frozenset("ACCGRAV EQUILIBRIUM IC INTEGRATOR KINEMATICS OUTPUT RESULTS UNITS".split())
 """Statements that stand once and have no id."""
 
-ON_DEMAND = frozenset(["GRAPHICS"])
+ON_DEMAND = frozenset(["GRAPHICS", "MATERIAL"])
 """Statements that are read only as far as others name them."""
 
-IGNORED = frozenset("MATERIAL PREFERENCES DEBUG FEMDATA LSOLVER".split())
+IGNORED = frozenset("PREFERENCES DEBUG FEMDATA FE_NODE LSOLVER SECTION".split())
 """Statements without effect on the numbers computed here."""
 
 UNSUPPORTED = frozenset(
-    """CLEARANCE EXTERNAL_SYSTEM FE_LOAD FE_NODE FE_PART MREQUEST
-    NFORCE NODE NORMAL_MODE_ANALYSIS PSTATE SECTION SURFACE TIRE UCON""".split()
+    """CLEARANCE EXTERNAL_SYSTEM MREQUEST
+    NFORCE NODE NORMAL_MODE_ANALYSIS PSTATE SURFACE TIRE UCON""".split()
 )
 """Statements of ADAMS that change the motion and are not modelled here."""
 
@@ -135,6 +138,9 @@ __all__ = [
     "Cvcv",
     "Diff",
     "Equilibrium",
+    "FeLoad",
+    "FeNode",
+    "FePart",
     "Field",
     "FlexBody",
     "Friction",
@@ -150,6 +156,7 @@ __all__ = [
     "Kinematics",
     "Lse",
     "Marker",
+    "Material",
     "Matrix",
     "Mforce",
     "Motion",

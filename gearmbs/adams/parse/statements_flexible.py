@@ -6,9 +6,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from gearmbs.adams.parse.grammar import EXPRESSION, ID, IDS, INT, PATH, REAL, REALS, TEXT, WORDS, arg
 from gearmbs.adams.parse.statement import Statement, Vector
+
+NODES = 100_000
+"""More than an FE_PART has nodes: the number of a node is that of its part times this, and its own."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,62 @@ class FlexBody(Statement, keyword="FLEX_BODY"):
     vmode: Vector = arg("VMODE", REALS, (), count=(1, 10000))
     char_len: float | None = arg("CHAR_LEN", REAL, dimension="length")
     cratio: str | None = arg("CRATIO", EXPRESSION)
+
+
+@dataclass(frozen=True)
+class Material(Statement):
+    """MATERIAL of an FE_PART."""
+
+    label_name: str | None = arg("NAME", TEXT)
+    density: float | None = arg("DENSITY", REAL)
+    youngs_modulus: float | None = arg("YOUNGS_MODULUS", REAL)
+    poissons_ratio: float | None = arg("POISSONS_RATIO", REAL)
+
+
+@dataclass(frozen=True)
+class FePart(Statement, keyword="FE_PART"):
+    """FE_PART: a beam of large motion through nodes."""
+
+    type: str | None = arg("TYPE", TEXT)
+    qg: Vector = arg("QG", REALS, (0.0, 0.0, 0.0), count=3, dimension="length")
+    reuler: Vector | None = arg("REULER", REALS, count=3, dimension="angle")
+    node_labels: tuple[int, ...] = arg("NODE_LABELS", IDS, (), count=(1, 1000))
+    coordinates: Vector = arg("COORDINATES", REALS, (), count=(1, 7000), dimension="angle")
+    section: Vector = arg("SECTION", REALS, (), count=(1, 6000))
+    material: int | None = arg("MATERIAL", ID)
+    cratiok: float = arg("CRATIOK", REAL, 0.0, dimension="time")
+    cratiom: float = arg("CRATIOM", REAL, 0.0)
+    preload: str | None = arg("PRELOAD", TEXT)
+
+    zg: ClassVar[None] = None
+    xg: ClassVar[None] = None
+
+
+@dataclass(frozen=True)
+class FeNode(Statement, keyword="FE_NODE"):
+    """A node of an FE_PART that has been built; the FE_NODE statements of a deck repeat what its FE_PART says."""
+
+    part: str = ""
+
+    def label(self) -> str:
+        """Return the part and the number of the node."""
+        return f"{self.part}, node {self.id % NODES}"
+
+
+@dataclass(frozen=True)
+class FeLoad(Statement, keyword="FE_LOAD"):
+    """FE_LOAD: force and torque a length on an FE_PART."""
+
+    fe_part: int | None = arg("FE_PART", ID)
+    rm: int | None = arg("RM", ID)
+    function: str | None = arg("FUNCTION", EXPRESSION)
+    routine: str | None = arg("ROUTINE", TEXT)
+    fx: str | None = arg("FX", EXPRESSION)
+    fy: str | None = arg("FY", EXPRESSION)
+    fz: str | None = arg("FZ", EXPRESSION)
+    tx: str | None = arg("TX", EXPRESSION)
+    ty: str | None = arg("TY", EXPRESSION)
+    tz: str | None = arg("TZ", EXPRESSION)
 
 
 @dataclass(frozen=True)

@@ -87,6 +87,8 @@ class Marker(Statement):
         """Return statement and id of the body it is on."""
         if self.flex_body is not None:
             return "FLEX_BODY", self.flex_body
+        if self.fe_part is not None:
+            return "FE_PART", self.fe_part
         return ("POINT_MASS", self.point_mass) if self.point_mass is not None else ("PART", self.part)
 
 

@@ -116,8 +116,8 @@ def expression_errors(model: AdamsModel, session: Session) -> list[Diagnostic]:
     read = read_variables(deck)
     for statement in deck:
         key = (st.KEYWORD_OF[type(statement)], statement.id)
-        if key in session.inactive or isinstance(statement, st.FlexBody):
-            # CRATIO is evaluated for each mode of the body
+        if key in session.inactive or isinstance(statement, (st.FlexBody, st.FeLoad)):
+            # CRATIO is evaluated for each mode of the body, S at each node of a beam
             continue
         for name, spec in specs_of(type(statement)).items():
             text = getattr(statement, name)
