@@ -167,5 +167,5 @@ def test_other_beams_are_refused():
         parse_deck(text.replace("3DBEAM", "2DBEAMXY")).to_mechanism()
     with pytest.raises(DeckError, match="there is no MATERIAL/9"):
         parse_deck(text.replace("MATERIAL=7", "MATERIAL=9")).to_mechanism()
-    with pytest.raises(DeckError, match="MATERIAL/8, which FE_PART names: unknown argument YOUNGS_MODULUS_X"):
+    with pytest.raises(DeckError, match="MATERIAL/8, which an FE_PART names: unknown argument YOUNGS_MODULUS_X"):
         parse_deck(text.replace("MATERIAL=7", "MATERIAL=8")).to_mechanism()

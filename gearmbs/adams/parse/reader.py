@@ -141,7 +141,7 @@ def _read_named(deck: Deck, errors: list[Diagnostic]) -> None:
         "GRAPHICS": {ref for contact in deck.of(st.Contact).values() for ref in (*contact.igeom, *contact.jgeom)},
         "MATERIAL": {part.material for part in deck.of(st.FePart).values()},
     }
-    users = {"GRAPHICS": "CONTACT", "MATERIAL": "FE_PART"}
+    users = {"GRAPHICS": "a CONTACT", "MATERIAL": "an FE_PART"}
     for (name, number), raw in deck.unread.items():
         if number not in named[name]:
             deck.diagnostics.append(Diagnostic(IGNORED, name, deck.file, raw.line))
