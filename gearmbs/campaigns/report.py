@@ -12,6 +12,7 @@ import numpy as np
 
 from gearmbs.campaigns.chaos import PolynomialChaos
 from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.factors import Factor
 from gearmbs.campaigns.given_data import first_indices, probability
 from gearmbs.campaigns.results import factor_names, result_names
 from gearmbs.campaigns.sensitivity import SobolIndices, sensitivity
@@ -57,13 +58,22 @@ def write_report(campaign: Campaign, path: str | Path, results: list[str] | None
 
 def _plan(campaign: Campaign) -> str:
     plan, status = campaign.plan, campaign.status()
-    rows = "".join(f"<tr><td>{html.escape(f.name)}</td><td>{html.escape(_span(f))}</td></tr>" for f in plan.factors)
+    units = _units(campaign)
+    spans = ((f.name, f"{_span(f)} {units.get(f.name, '')}".strip()) for f in plan.factors)
+    rows = "".join(f"<tr><td>{html.escape(name)}</td><td>{html.escape(span)}</td></tr>" for name, span in spans)
     about = (
         f"<p>{html.escape(plan.subject.kind)}, {html.escape(plan.design)} design, seed {plan.seed}. "
         f"{html.escape(str(status))}. "
         f"{status.processor_seconds:.4g} s of processor time.</p>"
     )
-    return f"{about}<table><tr><th>factor</th><th>range (SI)</th></tr>{rows}</table>"
+    return f"{about}<table><tr><th>factor</th><th>range</th></tr>{rows}</table>"
+
+
+def _units(campaign: Campaign) -> dict[str, str]:
+    """Return the SI units of the columns of those factors that have one."""
+    plan = campaign.plan
+    units = {f.name: plan.subject.unit_of(f.path) for f in plan.factors if isinstance(f, Factor)}
+    return {name: unit for name, unit in units.items() if unit not in ("1", "dimensionless")}
 
 
 def _span(factor: Any) -> str:
@@ -87,7 +97,7 @@ def _scatter(campaign: Campaign, table: pd.DataFrame, result: str) -> str:
 
     names = [n for n in factor_names(campaign.folder) if not n.endswith("severity")][:8]
     rows = -(-len(names) // 4)
-    figure = new_figure(10.0, 2.6 * rows)
+    figure, units = new_figure(10.0, 2.6 * rows), _units(campaign)
     for k, name in enumerate(names):
         ax = figure.add_subplot(rows, min(4, len(names)), k + 1)
         x = table[name]
@@ -96,7 +106,7 @@ def _scatter(campaign: Campaign, table: pd.DataFrame, result: str) -> str:
         else:
             levels = sorted(x.astype(str).unique())
             ax.boxplot([table[result][x.astype(str) == level].dropna() for level in levels], tick_labels=levels)
-        ax.set_xlabel(name, fontsize=8)
+        ax.set_xlabel(f"{name}, {units[name]}" if name in units else name, fontsize=8)
         ax.tick_params(labelsize=7)
     return _picture(figure, f"{result} over the factors")
 
