@@ -1,5 +1,7 @@
 """Commands for what changes with the speed: analyse of a run-up, waterfall, sweep and Campbell diagram."""
 
+import re
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -93,6 +95,26 @@ def test_waterfall_of_records_of_constant_speed(tmp_path):
     assert result.exit_code == 1
     assert "--speed is given 1 times for 2 files; give one for each" in result.output
     assert "--orders is '1,x'; give numbers" in invoked("waterfall", files[0], "--orders", "1,x").output
+    assert "--steps divides the speed of one run-up" in invoked("waterfall", *files, *speeds, "--steps", "5").output
+
+
+@pytest.mark.parametrize("told", [("--speed-channel", "n"), ("--tacho", "pulse", "--pulses", "2")])
+def test_waterfall_of_records_that_hold_their_speed(tmp_path, told):
+    files = []
+    for k, turns in enumerate((10.0, 20.0)):
+        columns = {
+            "x": np.cos(2 * np.pi * 23 * turns * TIME),
+            "n": np.full(TIME.size, 60.0 * turns),
+            "pulse": (np.cos(2 * np.pi * 2.0 * turns * TIME) > 0.0).astype(float),
+        }
+        units = {"x": "m/s^2", "n": "rpm", "pulse": "V"}
+        files.append(tmp_path / f"{k}.csv")
+        write_signal(gm.make_signal(columns, RATE, units=units), files[-1])
+    result = invoked("waterfall", *files, *told, "--channel", "x", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    found = re.search(r"2 spectra from ([\d.]+) to ([\d.]+) rpm", result.output)
+    assert found is not None, result.output
+    assert [float(text) for text in found.groups()] == pytest.approx([600.0, 1200.0], rel=1e-3)
 
 
 def test_sweep_writes_records_table_and_figure_and_is_taken_up(tmp_path):
