@@ -54,6 +54,7 @@ def make_plan(
 
     Examples
     --------
+    >>> from gearmbs.campaigns import Factor
     >>> plan = make_plan(factors=[Factor("operation.torque", "50 N m", "200 N m")], n=8)
     >>> plan.columns(plan.points())["operation.torque"].size
     8
