@@ -1,7 +1,7 @@
 """The acceleration system of `gearmbs.dae.equations.accelerations` at eight outputs side by side, of rigid bodies.
 
 Inertia, POINT and DOT1 terms, which most rows are made of, are computed in lanes; terms of other kinds, the bodies'
-motion and the applied loads are taken from the tables of one output after the other (`take_bodies`, `take_term`).
+motion and the applied loads are taken from the tables of one output after the other (`take_bodies`, `take_terms`).
 """
 
 from __future__ import annotations
@@ -182,7 +182,7 @@ def add_pair(slot, vals, k, value):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def update_lane_markers(marker_body, marker, lanes):
-    """Fill the markers of moving bodies: arms and axes in global components."""
+    """Fill the marker table in lanes: arms and axes in global components."""
     body, frame = lanes.body, lanes.frame
     for m in range(marker_body.size):
         first, to = marker_body[m] * BODY_COLUMNS + KIN_A, T.MK_COLUMNS * m
