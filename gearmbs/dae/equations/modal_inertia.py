@@ -94,7 +94,7 @@ class ModalInertia:
         rows = np.hstack([second, coupling])
         lists = [_listed(rows, 0), _listed(turned, 9 * n)]
         if sum(len(part) for part in lists) > LISTED * (rows.size + turned.size):
-            lists = [np.empty((0, 3))] * 2
+            lists = [np.empty((0, 2))] * 2
         head = [float(apart), *(float(len(part)) for part in lists)]
         pairs = STIFF * (self.stiffness.astype(bool) | self.j2.any(axis=(2, 3)))
         pairs += TURNED * (self.damping.astype(bool) | self.c1.any(axis=2)) + SPUN * self.c1.any(axis=2).T
@@ -104,13 +104,17 @@ class ModalInertia:
 
 
 def _listed(rows: np.ndarray, first: int) -> np.ndarray:
-    """Return place, row and value of each entry that is not zero; the places begin with ``first``."""
+    """Return place and row, packed, and value of each entry that is not zero; the places begin with ``first``."""
     l, k = np.nonzero(rows)
-    return np.column_stack([first + k, l, rows[l, k]])
+    return np.column_stack([first + k + ROW_OF_ENTRY * l, rows[l, k]])
 
 
 LISTED = 0.25
 """Share of integrals that do not vanish up to which they are taken one by one."""
+
+ROW_OF_ENTRY = 1 << 24
+"""Factor of the row in the number that says where an entry belongs: more than all places."""
+WHOLE_ROW, LAST_PLACE = np.uint64(ROW_OF_ENTRY), np.uint64(ROW_OF_ENTRY - 1)
 
 STIFF, TURNED, SPUN, HEAVY = 1, 2, 4, 8
 """What two modes have in common: entries of p_f by q_f, p_f by v_f, v_f by q_f, and v_f by v_f."""
@@ -210,14 +214,17 @@ def add_listed(y, q, v, listed, turns, entries, state):
         Places of the modal coordinates and velocities.
     listed, turns : int
         Numbers of entries to be multiplied by the coordinates, then by the velocities.
-    entries : ndarray, shape (listed + turns, 3)
+    entries : ndarray, shape (listed + turns, 2)
         See `ModalInertia.table`.
     state : ndarray
         Of `present`, as one vector.
     """
-    for e in range(listed + turns):
-        first = q if e < listed else v
-        state[np.uint64(int(entries[e, 0]))] += y[np.uint64(first + int(entries[e, 1]))] * entries[e, 2]
+    for e in range(listed):
+        where = np.uint64(int(entries[e, 0]))
+        state[where & LAST_PLACE] += y[np.uint64(q) + where // WHOLE_ROW] * entries[e, 1]
+    for e in range(listed, listed + turns):
+        where = np.uint64(int(entries[e, 0]))
+        state[where & LAST_PLACE] += y[np.uint64(v) + where // WHOLE_ROW] * entries[e, 1]
 
 
 @njit(cache=True, error_model="numpy")
@@ -232,7 +239,7 @@ def update_inertia(y, at, modal, partial, body_row):
         gyro[k] = 0.0
     listed, turns = int(j0[10]), int(j0[11])
     if listed + turns > 0:
-        entries = matrix_at(modal, at[T.AT_MODAL] + HEAD + 9 * n + 16 * n * n, listed + turns, 3)
+        entries = matrix_at(modal, at[T.AT_MODAL] + HEAD + 9 * n + 16 * n * n, listed + turns, 2)
         add_listed(y, q, v, listed, turns, entries, vector_at(partial, place, 12 * n))
     else:
         for l in range(n):

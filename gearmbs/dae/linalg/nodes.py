@@ -9,6 +9,8 @@ from gearmbs._jit import njit
 
 SMALLEST_NODE = 12
 """Columns that are worth to be taken together; fewer are faster one operation after the other."""
+SMALLEST_BESIDE = 6
+"""The same where there are larger nodes, so that columns are gone through one by one anyway."""
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -20,15 +22,16 @@ def nodes(l_ptr, l_pos):
     """Return the end of each column's node, see `LUPlan`."""
     n = l_ptr.shape[0] - 1
     ends = np.arange(1, n + 1)
-    first = 0
+    largest, first = 0, 0
     while first < n:
         end = first + 1
         while end < n and _follows(l_ptr, l_pos, end):
             end += 1
-        if end - first >= SMALLEST_NODE:
+        if end - first >= SMALLEST_BESIDE:
             ends[first:end] = end
+        largest = max(largest, end - first)
         first = end
-    return ends
+    return ends if largest >= SMALLEST_NODE else np.arange(1, n + 1)
 
 
 @njit(types.boolean(_IVEC), cache=True, nogil=True, error_model="numpy")
