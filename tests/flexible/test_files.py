@@ -154,6 +154,21 @@ def test_public_files_against_the_text_dump_of_adams(tmp_path, name):
         numbers = [float(x) for x in re.findall(r"-?\d\.\d+e[+-]\d+", part)]
         np.testing.assert_allclose(np.array(numbers).reshape(own[key].shape), own[key], atol=1e-10)
 
+    start = text.index("Block   7:")
+    rows = re.findall(r"^ *\d+((?: +[-\d.]+e[+-]\d+){5})$", text[start : text.index("Block   8:")], re.MULTILINE)
+    printed = np.array([[float(x) for x in row.split()] for row in rows])
+    assert len(printed) == len(found.mode_ids)
+    elastic = printed[:, 1] > 1e-2
+    np.testing.assert_allclose(found.eigenvalues[elastic], printed[elastic], rtol=1e-9)
+    # what rounding leaves of the six rigid modes
+    np.testing.assert_allclose(found.eigenvalues[~elastic], printed[~elastic], rtol=1e-7, atol=1e-9)
+    model = found.modal_model()
+    assert np.count_nonzero(elastic) == model.modes == len(printed) - 6
+    np.testing.assert_allclose(np.sort(model.frequencies), np.sort(printed[elastic, 1]), rtol=1e-8)
+    mass, *centre = re.search(r"Mass: +(\S+)\s+Center of Mass: +(\S+) +(\S+) +(\S+)", text).groups()
+    np.testing.assert_allclose(model.properties.mass, float(mass), rtol=1e-8)
+    np.testing.assert_allclose(model.properties.com, [float(x) for x in centre], atol=1e-9)
+
 
 # --- matrices ---------------------------------------------------------------------------------------------
 
