@@ -54,8 +54,9 @@ class GearboxStudy:
         """Return the Campbell diagram: modes under load, mesh harmonics, and where they meet."""
         from gearmbs.signals import campbell
 
-        speeds = np.linspace(0.0, 1.2 * self.train.drives[0].speed, 13)
-        return campbell(self.modes, speeds, mesh_orders(self.train), maximum=HIGHEST)
+        operating = float(self.train.drives[0].speed)
+        found = campbell(self.modes, np.linspace(0.0, 1.2 * operating, 13), mesh_orders(self.train), maximum=HIGHEST)
+        return found.assign_attrs(operating_speed=operating)
 
     def report(self) -> str:
         """Return the report in Markdown: modes, critical speeds, the steady state, the run-up, choices."""

@@ -98,9 +98,11 @@ def train_campbell(
     Returns
     -------
     Dataset
-        See `gearmbs.signals.campbell`; draw it by `gearmbs.view.campbell_plot`.
+        See `gearmbs.signals.campbell`; its attribute ``operating_speed`` is that of the first drive, rad/s. Draw it by
+        `gearmbs.view.campbell_plot`.
     """
     from gearmbs.signals import campbell
 
     turned = np.linspace(0.0, 1.2 * abs(train.drives[0].speed), 13) if speeds is None else speeds
-    return campbell(train_modes(train), turned, mesh_orders(train, harmonics), maximum=maximum)
+    found = campbell(train_modes(train), turned, mesh_orders(train, harmonics), maximum=maximum)
+    return found.assign_attrs(operating_speed=abs(train.drives[0].speed))

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from gearmbs.signals import campbell
 from gearmbs.signals.any_data import in_si
 from gearmbs.view.figure_style import COLOURS, GREY, VERMILLION, drawn_on, legend_below, look
-from gearmbs.view.speed_maps import RANGE_DB, RPM, by_speed, draw_map, one_channel, tag, upto
+from gearmbs.view.speed_maps import RANGE_DB, RPM, by_speed, draw_map, mark_operating, one_channel, tag, upto
 
 
 def campbell_plot(
@@ -24,6 +24,7 @@ def campbell_plot(
     measured: xr.DataArray | None = None,
     channel: str | None = None,
     maximum: float | str | None = None,
+    operating: Any = None,
     title: str | None = None,
     ax: Axes | None = None,
 ) -> Figure:
@@ -39,6 +40,9 @@ def campbell_plot(
         Its channel; default the first.
     maximum : float or str, optional
         Highest frequency shown, Hz or text; default a tenth above the highest mode.
+    operating : float, str or sequence, optional
+        Operating speeds to mark, rad/s or text; default the diagram's attribute ``operating_speed``, rad/s, if it has
+        one.
     title : str, optional
     ax : matplotlib axes, optional
 
@@ -52,6 +56,7 @@ def campbell_plot(
             raise ValueError("speeds: give the speeds of the diagram, or what campbell(modes, speeds, orders) returns")
         diagram = campbell(diagram, speeds, orders)
     rpm = diagram["speed"].values * RPM
+    operating = diagram.attrs.get("operating_speed") if operating is None else operating
     highest = in_si(maximum, "frequency", "maximum")
     top = 1.1 * float(np.nanmax(diagram["frequency"].values)) if highest is None else float(highest)
     with look():
@@ -80,6 +85,7 @@ def campbell_plot(
             zorder=5,
             label="critical speeds",
         )
+        mark_operating(panel, operating)
         panel.set_xlim(float(rpm[0]), float(rpm[-1]))
         panel.set_ylim(0.0, top)
         panel.set_xlabel("speed, rpm")

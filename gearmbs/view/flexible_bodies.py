@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.flexible import Campbell, ModalModel
 from gearmbs.view.figure_style import COLOURS, drawn_on, label, legend_below, look, new_figure, png_bytes
 from gearmbs.view.film import RATE, write_film
+from gearmbs.view.speed_maps import mark_operating
 
 SHOWN = 0.1
 """Share of a body's size that the largest deflection of a picture has where no factor is given."""
@@ -173,7 +175,9 @@ def modal_energy_plot(
     return figure
 
 
-def whirl_plot(diagram: Campbell, *, orders: Sequence[float] = (1.0,), ax: Axes | None = None) -> Figure:
+def whirl_plot(
+    diagram: Campbell, *, orders: Sequence[float] = (1.0,), operating: Any = None, ax: Axes | None = None
+) -> Figure:
     """Draw the natural frequencies of a rotor over its speed, and lines of orders.
 
     Parameters
@@ -182,6 +186,8 @@ def whirl_plot(diagram: Campbell, *, orders: Sequence[float] = (1.0,), ax: Axes 
         Of `Rotor.campbell`.
     orders : sequence of float
         Times the speed.
+    operating : float, str or sequence, optional
+        Operating speeds to mark, rad/s or text.
     ax : matplotlib axes, optional
     """
     speed, frequency = diagram.speeds * 30 / np.pi, diagram.frequencies / (2 * np.pi)
@@ -199,6 +205,7 @@ def whirl_plot(diagram: Campbell, *, orders: Sequence[float] = (1.0,), ax: Axes 
         top = 1.05 * float(np.nanmax(frequency))
         for order in orders:
             panel.plot(speed, order * speed / 60, color="0.6", linewidth=0.8)
+        mark_operating(panel, operating)
         panel.set_ylim(0.0, top)
         panel.set_xlabel(label("speed", "rpm"))
         panel.set_ylabel(label("natural frequency", "Hz"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,7 +13,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from gearmbs.signals.any_data import in_si
-from gearmbs.view.figure_style import COLOURS, VERMILLION, label
+from gearmbs.view.figure_style import BLACK, COLOURS, VERMILLION, label
 
 RPM = 30.0 / math.pi
 RANGE_DB = 60.0
@@ -154,6 +155,16 @@ def mark_top(panel: Axes, x: float, text: str) -> None:
     panel.plot(
         [x, x], [1.0, 0.985], transform=panel.get_xaxis_transform(), color=VERMILLION, linewidth=1.2, clip_on=False
     )
+
+
+def mark_operating(panel: Axes, speeds: Any) -> None:
+    """Mark operating speeds, rad/s or texts, by upright lines over a panel whose speeds are in rpm."""
+    given = [] if speeds is None else [speeds] if isinstance(speeds, str) or np.ndim(speeds) == 0 else list(speeds)
+    for k, speed in enumerate(given):
+        panel.axvline(
+            abs(in_si(speed, "angular speed", "operating")) * RPM, color=BLACK, linewidth=1.1,
+            linestyle=(0, (1, 1.5)), label=None if k else "operating speed",
+        )  # fmt: skip
 
 
 def tag(panel: Axes, x: float, y: float, text: str, colour: str, inside: bool = False) -> None:

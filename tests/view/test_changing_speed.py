@@ -51,6 +51,14 @@ def test_campbell_diagram_over_a_measurement(signal):
     points = next(line for line in panel.lines if line.get_label() == "critical speeds")
     np.testing.assert_allclose(points.get_xdata(), [1200.0, 2400.0])
     assert campbell_plot([200.0], speeds=[0.0, 300.0], orders=[10]).axes
+    assert "operating speed" not in figure.axes[0].get_legend_handles_labels()[1]
+    for drawn in (
+        campbell_plot(diagram, operating="1500 rpm"), campbell_plot(diagram.assign_attrs(operating_speed=50 * np.pi))
+    ):  # fmt: skip
+        lines = dict(zip(*drawn.axes[0].get_legend_handles_labels()[::-1]))
+        np.testing.assert_allclose(lines["operating speed"].get_xdata(), 1500.0)
+    with pytest.raises(ValueError, match="operating"):
+        campbell_plot(diagram, operating="1500 kg")
     with pytest.raises(ValueError, match="speeds: give"):
         campbell_plot([200.0])
 

@@ -68,3 +68,6 @@ def test_whirl_splits_with_the_speed():
     for frequency in diagram.frequencies.ravel() / (2 * np.pi):
         assert np.nanmin(np.abs(shown - frequency)) < 1e-9
     assert panel.get_xlabel().startswith("speed")
+    marked = whirl_plot(diagram, operating=["4000 rpm", 500.0]).axes[0]
+    upright = [line.get_xdata()[0] for line in marked.lines if len(set(line.get_xdata())) == 1]
+    np.testing.assert_allclose(upright, [4000.0, 500.0 * 30 / np.pi])
