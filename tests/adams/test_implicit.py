@@ -8,6 +8,8 @@ from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from gearmbs.adams import parse_deck, run_deck
+from tests.adams.decks import PENDULUM
 from tests.adams.test_user_elements import CART, GSE, LOOP, LSE, deriv, output, run
 
 IMPLICIT = GSE.replace("NS=2", "IMPLICIT, NS=2")
@@ -31,6 +33,16 @@ def test_a_rate_that_no_function_gives():
     np.testing.assert_allclose(found[:, 1], x.y[0], atol=1e-8)
     np.testing.assert_allclose(found[:, 2], [rate(t, v) for t, v in zip(times, x.y[0])], atol=1e-7)
     np.testing.assert_allclose(found[:, 3], x.y[1], atol=1e-8)
+
+
+def test_a_rate_that_follows_a_reaction():
+    """2 r = F of the pin of a pendulum, which the acceleration decides: the start finds both."""
+    text = PENDULUM.replace("END\n", "DIFF/1, IMPLICIT, FUNCTION=2*DIF1(1)-JOINT(1,0,4,0)\n")
+    result = run_deck(parse_deck(text + "REQUEST/9, F2=DIF1(1)\\F3=JOINT(1,0,4,0)\nEND\n"), end=0.2, steps=4, tol=1e-8)
+    assert result.success
+    rate, force = result.request(9)[:, 1:3].T
+    assert abs(force[0]) > 0.1
+    np.testing.assert_allclose(2.0 * rate, force, rtol=1e-6)
 
 
 def test_an_equation_without_a_rate_determines_its_state():

@@ -170,7 +170,7 @@ def make_problem(system: PosedModel, formulation: str, rate_scale: float) -> DAE
     y[at["F"] : at["mu"]] = found.y[first:]
     (yp if form == SI1 else y)[at["lambda"] : at["lambda"] + len(lam)] = lam
     differential = model.differential_states
-    _state_rates(system, y, yp, slice(at["z"], at["mu"]), idata, rdata, work)
+    _state_rates(system, y, yp, slice(at["z"], at["mu"]), idata, rdata, work, (indptr, indices))
     _rates(y, yp, acc, system.t0, idata, rdata, work)
     largest = float(np.abs(found.loads[:, :3]).max(initial=0.0))
     scale = unknowns.scales(model.counts, form, model.bodies[1:], model.modal_sizes(), min(system.length, 1.0), largest)
@@ -218,18 +218,33 @@ def _hook_interval(model: Model, at: dict[str, int]):
     return interval
 
 
-def _state_rates(system: PosedModel, y, yp, z: slice, idata, rdata, work) -> None:
-    """Settle algebraic states to their definitions, which reactions may enter; set the rates of the others."""
+def _state_rates(
+    system: PosedModel, y, yp, z: slice, idata, rdata, work, pattern: tuple[np.ndarray, np.ndarray]
+) -> None:
+    """Settle algebraic states to their definitions, which reactions may enter; set the rates of the others.
+
+    Implicit ones, which stand in their own definitions, are found by Newton's method. ``pattern`` is indptr and indices
+    of the Jacobian.
+    """
     out = np.zeros(y.size)
-    algebraic = ~system.model.differential_states
-    for _ in range(MAX_STATE_ITERATIONS if algebraic.any() else 1):
+    differential, controlled = system.model.differential_states, system.model.controlled_states
+    implicit = z.start + np.flatnonzero(controlled & ~differential)
+    for _ in range(MAX_STATE_ITERATIONS if not differential.all() else 1):
         residual.residual(system.t0, y, yp, out, idata, rdata, work)
         diagnosis.check_states(system, out[z], system.t0)
-        correction = out[z] * algebraic
+        correction = out[z] * ~differential
         if np.abs(correction).max(initial=0.0) <= 1e-12 * (1.0 + np.abs(y[z]).max(initial=0.0)):
             break
+        if implicit.size:
+            indptr, indices = pattern
+            vals = np.zeros(indices.size)
+            jacobian.jacobian(system.t0, y, yp, 0.0, vals, idata, rdata, work)
+            matrix = scipy.sparse.csc_array((vals, indices, indptr), shape=(y.size, y.size))
+            block = matrix[implicit][:, implicit].toarray()
+            # a singular one leaves them to the check of the start
+            correction[implicit - z.start] = np.linalg.lstsq(block, out[implicit], rcond=None)[0]
         y[z] -= correction
-    yp[z] -= out[z] * ~algebraic
+    yp[z] -= out[z] * differential
 
 
 def _rates(y, yp, acc: np.ndarray, t: float, idata, rdata, work) -> None:
