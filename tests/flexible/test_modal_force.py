@@ -24,7 +24,7 @@ def test_a_constant_force_on_the_modes_of_a_free_body(bar):
     w = 2 * np.pi * bar.frequencies
     expected = load[6:] / (np.diag(bar.integrals.mass) * w**2) * (1 - np.cos(np.outer(t, w)))
     found = solution.modal_coordinates("bar")
-    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+    np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max())
 
 
 def swung(bar, force, at_node):
