@@ -5,7 +5,7 @@ from __future__ import annotations
 from gearmbs._jit import njit
 from gearmbs.dae.integrators.controller import meets_kinks
 from gearmbs.dae.integrators.run_state import REPIVOT, RUNNING
-from gearmbs.dae.linalg.sparse_lu import factor, refactor
+from gearmbs.dae.linalg.sparse_lu import factor
 
 GAMMA_DRIFT = 0.2
 GAMMA_DRIFT_AT_KINKS = 0.3
@@ -37,11 +37,8 @@ def evaluate_matrix(functions, st):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def factor_matrix(st, plan, factors, fresh):
-    """Factor the matrix carried over to the step's leading coefficient; return whether its plan still fits.
-
-    What the plan leaves out is looked at when the matrix is ``fresh``: its limits leave room for another coefficient.
-    """
+def factor_matrix(st, plan, factors):
+    """Factor the matrix carried over to the step's leading coefficient; return whether its plan still fits."""
     if plan.left_src.shape[0] > 0:
         # what is negligible at one step size need not be at another
         ratio = st.gamma / st.gamma_planned
@@ -51,7 +48,7 @@ def factor_matrix(st, plan, factors, fresh):
     jac, slope, matrix = st.jac, st.jac_slope, st.matrix
     for p in range(jac.shape[0]):
         matrix[p] = jac[p] + change * slope[p]
-    growth = factor(plan, factors, matrix) if fresh else refactor(plan, factors, matrix)
+    growth = factor(plan, factors, matrix)
     st.factorizations += 1
     return growth <= st.growth_limit
 
@@ -79,7 +76,7 @@ def form_matrix(functions, st, plan, factors):
     if wanted:
         st.matrix_wanted = True
         evaluate_matrix(functions, st)
-    fits = factor_matrix(st, plan, factors, wanted)
+    fits = factor_matrix(st, plan, factors)
     if whole_again:
         st.drop_level = 0
         st.drop_age = 0
@@ -99,7 +96,7 @@ def form_matrix(functions, st, plan, factors):
 def renew_matrix(functions, st, plan, factors):
     """Evaluate and factor the matrix at the iterate in ``st.y``; return whether its pivots fit."""
     evaluate_matrix(functions, st)
-    if not factor_matrix(st, plan, factors, True):
+    if not factor_matrix(st, plan, factors):
         return False
     st.gamma_factored = st.gamma
     st.rate = RATE_OF_FRESH

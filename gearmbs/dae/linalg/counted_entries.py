@@ -15,12 +15,12 @@ from gearmbs.dae.linalg.pivoting import equilibrate
 
 NEGLIGIBLE = 1e-13
 """Size up to which an entry of the equilibrated matrix may stay left out of a plan: it is rounding."""
-NEGLIGIBLE_IN_NEWTON = 1e-2
+NEGLIGIBLE_IN_NEWTON = 1e-4
 """The same of a Newton matrix with many small entries, if the corrector converges without them, see `RATE_ALLOWED`."""
 WHEN_PLANNED = 0.01
 """Share of that size from which on an entry counts when a plan is made."""
 RATE_ALLOWED = 0.02
-"""Largest part of an error that corrections may leave for lack of these entries: the corrector expects no less."""
+"""Largest part of an error that a correction may leave for lack of these entries: the corrector expects no less."""
 WORTH_LEAVING = 0.8
 """Largest share of entries that count with which the others are left out: fewer would not pay for looking at them."""
 FEWEST_ENTRIES = 200

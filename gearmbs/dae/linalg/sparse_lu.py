@@ -114,22 +114,12 @@ def factor(plan, factors, vals):
         Largest multiplier in L. Above `GROWTH_LIMIT`, infinite or NaN the pivots no longer fit, or an entry that was
         left out counts: analyse again.
     """
-    return refactor(plan, factors, vals) if fits(plan, vals) else np.inf
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def fits(plan, vals):
-    """Return whether the entries left out of a plan are negligible in the matrix with values ``vals``."""
     left_src, left_limit = plan.left_src, plan.left_limit
-    found = True
+    fits = True
     for p in range(left_src.shape[0]):
-        found &= abs(vals[left_src[p]]) <= left_limit[p]
-    return found
-
-
-@njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
-def refactor(plan, factors, vals):
-    """Factor as `factor` does, without a look at the entries that the plan leaves out."""
+        fits &= abs(vals[left_src[p]]) <= left_limit[p]
+    if not fits:
+        return np.inf
     x, l_vals, pivot_inv = factors.x, factors.l_vals, factors.pivot_inv
     a_pos, a_src, a_scale, l_pos = plan.a_pos, plan.a_src, plan.a_scale, plan.l_pos
     by_nodes = has_nodes(plan.node_end)
