@@ -123,6 +123,8 @@ class Factor:
                 raise CampaignError(f"{self.path}: {value!r} is none of {self.values}")
             return (self.values.index(number) + 0.5) / len(self.values)
         number = _real(value, unit, self.path)
+        if self.scale == "log" and number <= 0.0:
+            raise CampaignError(f"{self.path}: the base has {number:g}, which has no place on a logarithmic range")
         if self.scale == "log":
             return math.log(number / self.low) / math.log(self.high / self.low)
         return (number - self.low) / (self.high - self.low)
@@ -190,7 +192,7 @@ class Choice:
                 for key, value in table.items():
                     if _is_range(value):
                         unit = subject.table_unit(self.path, table, key)
-                        table[key] = [number_in_si(v, unit, f"{self.path}.{name}.{key}") for v in value]
+                        table[key] = _range_in_si(value, unit, f"{self.path}.{name}.{key}")
             options[name] = list(table) if isinstance(table, tuple) else table
         return Choice(self.path, options, self.crossed, self.name)
 
@@ -263,8 +265,11 @@ class Specimens:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "faults", tuple(self.faults))
-        if self.draws < 1:
-            raise CampaignError(f"specimens: draws = {self.draws!r}; give 1 or more")
+        object.__setattr__(self, "draws", whole_number(self.draws, "specimens: draws", 1))
+        object.__setattr__(self, "seed", whole_number(self.seed, "specimens: seed", 0))
+        for path, given in self.errors.items():
+            if not _is_range(given):
+                raise CampaignError(f"specimens: {path} = {given!r}; give its two ends")
 
     @property
     def width(self) -> int:
@@ -278,14 +283,14 @@ class Specimens:
 
     def in_si(self, subject: Subject) -> Specimens:
         """Return the specimens with their ranges in SI."""
-        errors = {path: [number_in_si(v, subject.unit_of(path), path) for v in r] for path, r in self.errors.items()}
+        errors = {path: _range_in_si(r, subject.unit_of(path), path) for path, r in self.errors.items()}
         faults = []
         for table in self.faults:
             table = dict(table)
             for key, value in table.items():
                 if _is_range(value):
                     unit = subject.table_unit("fault.teeth", table, key)
-                    table[key] = [number_in_si(v, unit, f"specimens.{key}") for v in value]
+                    table[key] = _range_in_si(value, unit, f"specimens.{key}")
             faults.append(table)
         return Specimens(self.draws, errors, tuple(faults), self.seed, self.name)
 
@@ -368,6 +373,14 @@ def plain(value: Any) -> Any:
 
 def _is_range(value: Any) -> bool:
     return isinstance(value, Sequence) and not isinstance(value, str) and len(value) == 2
+
+
+def _range_in_si(ends: Sequence[Any], unit: str, where: str) -> list[Any]:
+    """Return both ends of a range in SI; two texts without a unit are none, and stay as they are."""
+    low, high = (number_in_si(v, unit, where) for v in ends)
+    if isinstance(low, int | float) and isinstance(high, int | float) and low > high:
+        raise CampaignError(f"{where}: {ends[0]} is above {ends[1]}; give the lower end first")
+    return [low, high]
 
 
 def number_in_si(value: Any, unit: str, where: str) -> Any:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 from gearmbs.campaigns.errors import CampaignError
+from gearmbs.campaigns.settings import whole
 
 HEADS = {
     "slurm": """#!/bin/bash
@@ -50,13 +52,20 @@ def job_script(folder: str | Path, elements: int, minutes: int, system: str = "s
     Raises
     ------
     CampaignError
-        For another system.
+        For another system, and for numbers below one.
     """
     if system not in HEADS:
         raise CampaignError(f"--system is {system!r}; choose {' or '.join(HEADS)}")
+    elements, minutes = whole(elements, "--elements", 1), whole(minutes, "--minutes", 1)
     folder = Path(folder).resolve()
     stop = max(1, minutes - max(2, minutes // 10))
     disk, element = VARIABLES[system]
-    given = {"name": folder.stem, "elements": elements, "folder": folder, "disk": disk, "element": element}
+    given = {
+        "name": folder.stem.replace(" ", "_"),
+        "elements": elements,
+        "folder": shlex.quote(str(folder)),
+        "disk": disk,
+        "element": element,
+    }
     hours, rest = divmod(minutes, 60)
     return (HEADS[system] + BODY).format(**given, minutes=minutes, hours=hours, rest=rest, stop=stop)

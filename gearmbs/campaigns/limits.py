@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+
+_ALONE = threading.Lock()
+"""Held while a bound of memory is in force, which is the whole process's."""
 
 
 class TimeLimitReached(RuntimeError):
@@ -21,10 +25,12 @@ def limited(seconds: float | None, memory: float | None) -> Iterator[Callable[[f
     Parameters
     ----------
     seconds : float, optional
-        Of this thread's processor time. In a main thread a timer interrupts code that reports no progress, too.
+        Of this thread's processor time. Python code that reports no progress is interrupted, too: by a timer in a main
+        thread, in others, as those of Dask's workers, by a thread that looks at the clock.
     memory : float, optional
         Bytes that may be allocated beyond what the process has: more raises MemoryError. Without effect where the
-        system cannot tell how much that is.
+        system cannot tell how much that is. Threads of one process wait for each other, since the bound of one would
+        be that of its neighbours.
 
     Raises
     ------
@@ -42,16 +48,29 @@ def limited(seconds: float | None, memory: float | None) -> Iterator[Callable[[f
 
 @contextlib.contextmanager
 def _timer(seconds: float | None) -> Iterator[None]:
-    if seconds is None or threading.current_thread() is not threading.main_thread() or not hasattr(signal, "SIGPROF"):
+    if seconds is None:
         yield
         return
+    message = f"more than {seconds:g} s of processor time"
+    # a little later than the check between steps, which can say how far the run has come
+    allowed = 1.1 * seconds + 0.1
+    if threading.current_thread() is threading.main_thread() and hasattr(signal, "SIGPROF"):
+        with _alarm(allowed, message):
+            yield
+    elif hasattr(time, "pthread_getcpuclockid"):
+        with _watched(allowed, message):
+            yield
+    else:
+        yield
 
+
+@contextlib.contextmanager
+def _alarm(allowed: float, message: str) -> Iterator[None]:
     def late(*_args) -> None:
-        raise TimeLimitReached(f"more than {seconds:g} s of processor time")
+        raise TimeLimitReached(message)
 
     before = signal.signal(signal.SIGPROF, late)
-    # a little later than the check between steps, which can say how far the run has come
-    signal.setitimer(signal.ITIMER_PROF, 1.1 * seconds + 0.1)
+    signal.setitimer(signal.ITIMER_PROF, allowed)
     try:
         yield
     finally:
@@ -60,22 +79,55 @@ def _timer(seconds: float | None) -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def _watched(allowed: float, message: str) -> Iterator[None]:
+    """Interrupt this thread from another one, which looks at its processor time."""
+
+    class Late(TimeLimitReached):
+        def __init__(self) -> None:
+            # the interpreter makes it of the class alone
+            super().__init__(message)
+
+    interrupt = ctypes.pythonapi.PyThreadState_SetAsyncExc
+    me = ctypes.c_ulong(threading.get_ident())
+    clock = time.pthread_getcpuclockid(threading.get_ident())
+    end = time.clock_gettime(clock) + allowed
+    over, deciding = threading.Event(), threading.Lock()
+
+    def watch() -> None:
+        # processor time never runs faster than the clock on the wall
+        while not over.wait(max(0.01, end - time.clock_gettime(clock))):
+            with deciding:
+                if not over.is_set() and time.clock_gettime(clock) >= end:
+                    interrupt(me, ctypes.py_object(Late))
+                    return
+
+    threading.Thread(target=watch, daemon=True).start()
+    try:
+        yield
+    finally:
+        with deciding:
+            over.set()
+            # what was sent and has not arrived must not hit the next case
+            interrupt(me, None)
+
+
+@contextlib.contextmanager
 def _memory(limit: float | None) -> Iterator[None]:
-    used = _address_space()
-    if limit is None or used is None:
+    if limit is None or _address_space() is None:
         yield
         return
     import resource
 
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    bound = int(used + limit)
-    if hard != resource.RLIM_INFINITY:
-        bound = min(bound, hard)
-    resource.setrlimit(resource.RLIMIT_AS, (bound, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+    with _ALONE:
+        soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+        bound = int((_address_space() or 0) + limit)
+        if hard != resource.RLIM_INFINITY:
+            bound = min(bound, hard)
+        resource.setrlimit(resource.RLIMIT_AS, (bound, hard))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
 def _address_space() -> int | None:

@@ -56,7 +56,10 @@ def check_settings(given: Mapping[str, Any], cls: type, design: str) -> dict[str
     if not isinstance(options, Mapping):
         raise CampaignError(f"options = {options!r}; give a dictionary of the design's options")
     if "levels" in options:
-        found["options"] = {**options, "levels": whole(options["levels"], "options: levels", 1)}
+        levels = whole(options["levels"], "options: levels", 1)
+        if design == "morris" and levels % 2:
+            raise CampaignError(f"options: levels = {levels}; a morris design needs an even number of them")
+        found["options"] = {**options, "levels": levels}
     for name in options:
         allowed = (*OPTIONS.get(design, ()), "corners")
         if name not in allowed:

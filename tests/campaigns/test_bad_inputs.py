@@ -11,7 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearmbs.campaigns import Campaign, CampaignError, Factor, FunctionSubject, choose, condition_map, make_plan
+from gearmbs.campaigns import (
+    Campaign,
+    CampaignError,
+    Factor,
+    FunctionSubject,
+    Specimens,
+    choose,
+    condition_map,
+    make_plan,
+)
 from gearmbs.campaigns.folder import make_folder
 from gearmbs.studies import Case
 from tests.campaigns.models import PLACES, ishigami
@@ -33,6 +42,9 @@ BAD_PLANS = [
     ({"base": {"operation": {}}}, "give a Case or a Subject"),
     ({"design": "factorial", "options": {"generator": ["B=A"]}}, "did you mean generators"),
     ({"design": "list", "options": {"rows": "none"}}, "give options={'rows'"),
+    ({"design": "morris", "options": {"levels": 3}}, "levels = 3; a morris design needs an even number"),
+    ({"factors": [choose("fault.teeth", a={"kind": "broken tooth", "lost": (0.9, 0.1)})]}, "give the lower end first"),
+    ({"factors": [Specimens(5, {"fault.backlash": ("160 um", "60 um")})]}, "160 um is above 60 um"),
 ]
 
 
@@ -281,3 +293,16 @@ def test_ranges_held_out(tmp_path):
     assert inside("train") == 0.0
     assert 0.0 < inside("test") < 1.0
     assert "split: withheld" in (tmp_path / "o" / "README.md").read_text()
+
+
+@pytest.mark.parametrize("settings", [{"draws": 2.5}, {"draws": "5"}, {"draws": 5, "errors": {"fault.backlash": 1e-4}}])
+def test_bad_specimens(settings):
+    with pytest.raises(CampaignError, match=r"draws = |give its two ends"):
+        Specimens(**settings)
+
+
+def test_a_base_without_a_place_on_a_logarithmic_range():
+    plan = make_plan(function(), [Factor("x1", 1.0, 2.0, scale="log")], "one at a time")
+    plan.subject.parameters["x1"] = 0.0
+    with pytest.raises(CampaignError, match="no place on a logarithmic range"):
+        plan.points()

@@ -8,12 +8,14 @@ import random
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 
 from gearmbs.campaigns import Campaign, CampaignError
 from gearmbs.campaigns.job_script import job_script
+from gearmbs.campaigns.limits import TimeLimitReached, limited
 from gearmbs.campaigns.runners.dask import batch_cluster
 from tests.campaigns.support import digest, small
 
@@ -54,6 +56,46 @@ def test_kills_of_driver_and_workers(tmp_path, undisturbed):
     assert digest(campaign) == undisturbed
 
 
+def test_time_is_limited_in_threads_that_have_no_timer():
+    found: list[str] = []
+
+    def work() -> None:
+        try:
+            with limited(0.05, None):
+                while True:
+                    pass
+        except TimeLimitReached as error:
+            found.append(str(error))
+        with limited(60.0, None):
+            found.append("undisturbed")
+
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    thread.join(30.0)
+    assert found == ["more than 0.05 s of processor time", "undisturbed"]
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the size of a process is read from /proc")
+def test_limits_of_memory_side_by_side_leave_the_process_as_it_was():
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    gate = threading.Barrier(2)
+
+    def work(seconds: float) -> None:
+        gate.wait(30.0)
+        with limited(None, 4e9):
+            end = time.monotonic() + seconds
+            while time.monotonic() < end:
+                pass
+
+    threads = [threading.Thread(target=work, args=(s,)) for s in (0.05, 0.1)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(30.0)
+    assert resource.getrlimit(resource.RLIMIT_AS) == before
+
+
 @pytest.mark.slow
 def test_two_drivers_at_once(tmp_path, undisturbed):
     campaign = small(tmp_path / "c", "burning", n=64)
@@ -89,6 +131,9 @@ def test_job_scripts_of_both_systems():
     assert "#PBS -l walltime=02:30:00" in pbs
     assert "--part $PBS_ARRAY_INDEX/40 --minutes 135" in pbs
     assert "${TMPDIR:-/tmp}/gearmbs-kernels" in pbs
+    assert "work '/my data/a b.campaign' --part" in job_script("/my data/a b.campaign", 1, 60)
+    with pytest.raises(CampaignError, match="--elements = 0; give a whole number"):
+        job_script("x", 0, 60)
     with pytest.raises(CampaignError, match="choose slurm or pbs"):
         job_script("x", 1, 60, "lsf")
 

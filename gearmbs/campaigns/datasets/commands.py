@@ -63,7 +63,10 @@ def baseline(
             one_state_a_group,
         )
 
-        x, labels, specimens, _ = feature_table(Campaign(folder), SensorLayers(sensors=sensors), window=window)
+        campaign = Campaign(folder)
+        # the sensors that the data set was made with
+        layers = SensorLayers(sensors=sensors, seed=campaign.plan.seed)
+        x, labels, specimens, _ = feature_table(campaign, layers, window=window)
         single = one_state_a_group(labels, specimens)
         for what, rows in (("all states of each specimen", slice(None)), ("one state of each specimen", single)):
             for name, found in leak_and_no_leak(x[rows], labels[rows], specimens[rows]).items():
