@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from gearmbs.flexible.large_beam import BeamChain, LargeBeam, add_beam
     from gearmbs.flexible.material import ElasticMaterial
     from gearmbs.flexible.matrices import from_matrices, read_abaqus, read_calculix, read_nodes
-    from gearmbs.flexible.mnf import ModalNeutralFile, mnf_of, read_mnf, write_mnf
+    from gearmbs.flexible.mnf import mnf_of, read_mnf, write_mnf
+    from gearmbs.flexible.mnf_content import ModalNeutralFile
     from gearmbs.flexible.modal_model import ModalModel, Seat
     from gearmbs.flexible.nastran import read_op2, read_op4
     from gearmbs.flexible.nastran_modes import read_op2_modes
@@ -92,7 +93,7 @@ late(
         "LargeBeam": ".large_beam",
         "MassProperties": ".fe_model",
         "ModalModel": ".modal_model",
-        "ModalNeutralFile": ".mnf",
+        "ModalNeutralFile": ".mnf_content",
         "ModelReport": ".check",
         "ReductionReport": ".check",
         "Rotor": ".rotor",

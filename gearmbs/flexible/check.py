@@ -74,12 +74,15 @@ class ReductionReport:
         Modal assurance criterion of each reduced mode with the best of the exact ones, 0 to 1.
     flexibility : dict of str to float
         Of each seat, the share of the flexibility of the free body there, under forces, that the reduction has lost.
+    turning : dict of str to float
+        The same under torques, of seats that turn: what a joint needs that holds the seat's direction.
     """
 
     frequencies: np.ndarray
     exact: np.ndarray
     similarity: np.ndarray
     flexibility: dict[str, float]
+    turning: dict[str, float]
 
     @property
     def errors(self) -> np.ndarray:
@@ -97,10 +100,10 @@ class ReductionReport:
             f"{k + 1:4d} {a:14.4f} {b:14.4f} {100 * (a / b - 1):11.4f} {s:5.3f}"
             for k, (a, b, s) in enumerate(zip(self.frequencies, self.exact, self.similarity))
         ]
-        lost = [
-            f"seat {key}: {100 * share:.3g} % of its static flexibility is lost"
-            for key, share in self.flexibility.items()
-        ]
+        lost = []
+        for key, share in self.flexibility.items():
+            torques = f", {100 * self.turning[key]:.3g} % under torques" if key in self.turning else ""
+            lost.append(f"seat {key}: {100 * share:.3g} % of its static flexibility is lost under forces{torques}")
         return "\n".join([head, *rows, *lost, f"errors below 1 % up to {self.converged_up_to():.6g} Hz"])
 
 
@@ -144,16 +147,14 @@ def check_model(model: FiniteElementModel, count: int = 6) -> ModelReport:
     if values[0] < 0.0 or values[2] > (1 + 1e-6) * (values[0] + values[1]):
         remarks.append(f"principal moments of inertia {values} kg m^2 are those of no body: nodes and mass do not fit")
     size = float(np.linalg.norm(np.ptp(model.positions, axis=0)))
-    if size > 100.0:
-        remarks.append(f"the body is {size:.4g} m large; if the file is in millimetres, give its unit of length")
-    density = properties.mass / max(size, 1e-300) ** 3
-    if density > 1e5:
-        remarks.append(f"{properties.mass:.4g} kg in {size:.4g} m: the units of mass and length do not fit")
+    remarks += properties.doubts(size)
     return ModelReport(model.name, properties, masses, energy, frequencies, massless, remarks)
 
 
 def check_reduction(model: FiniteElementModel, reduced: ModalModel, interfaces=None) -> ReductionReport:
     """Compare a reduction with its finite elements: free frequencies, shapes, static flexibility of the seats.
+
+    Slow modes have little of the flexibility under torques; a body clamped at a seat is too stiff by what is lost.
 
     Parameters
     ----------
@@ -179,22 +180,26 @@ def check_reduction(model: FiniteElementModel, reduced: ModalModel, interfaces=N
         reduced.frequencies,
         frequencies,
         np.minimum(grouped.max(axis=1), 1.0),
-        _lost(sp.csc_array(k), sp.csc_array(m), parts, rigid, reduced),
+        *_lost(sp.csc_array(k), sp.csc_array(m), parts, rigid, reduced),
     )
 
 
-def _lost(k, m, parts, rigid: np.ndarray, reduced: ModalModel) -> dict[str, float]:
-    """Return how much of the flexibility of the free body at each seat, under forces in x, y and z, is lacking."""
+def _lost(k, m, parts, rigid: np.ndarray, reduced: ModalModel) -> tuple[dict[str, float], dict[str, float]]:
+    """Return how much of the flexibility of the free body at each seat is lacking, under forces and under torques."""
+    forces: dict[str, float] = {}
+    torques: dict[str, float] = {}
     if not parts.places:
-        return {}
+        return forces, torques
     shapes = attachment_modes(k, m, rigid, parts.constraints)
     inertial = m @ rigid
     shapes = shapes - rigid @ np.linalg.solve(rigid.T @ inertial, inertial.T @ shapes)
     exact = np.diag(parts.constraints @ shapes)
     stiff = (2 * np.pi * reduced.frequencies) ** 2
-    out = {}
     for key, (_, rows) in parts.places.items():
-        own = rows[:3][rows[:3] >= 0]
-        has = (reduced.seats[key].moved[:, rows[:3] >= 0] ** 2 / stiff[:, None]).sum()
-        out[key] = float(1.0 - has / exact[own].sum())
-    return out
+        seat = reduced.seats[key]
+        for out, three, motion in ((forces, rows[:3], seat.moved), (torques, rows[3:], seat.turned)):
+            there = three >= 0
+            whole = exact[three[there]].sum()
+            if whole > 0.0:
+                out[key] = float(1.0 - (motion[:, there] ** 2 / stiff[:, None]).sum() / whole)
+    return forces, torques

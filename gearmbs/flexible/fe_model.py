@@ -11,6 +11,11 @@ from gearmbs.flexible.beam import Slices
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.stress import StressRecovery
 
+LARGE = 100.0
+"""Diagonal of a body, m, above which its unit of length is doubted."""
+DENSE = 1e5
+"""Mass over the cube of the diagonal, kg/m^3, above which units are doubted: no solid has a quarter of it."""
+
 
 @dataclass(frozen=True, eq=False)
 class MassProperties:
@@ -29,6 +34,15 @@ class MassProperties:
     mass: float
     com: np.ndarray
     inertia: np.ndarray
+
+    def doubts(self, size: float) -> list[str]:
+        """Return what speaks against the units of a body whose diagonal is ``size``, m; empty if nothing does."""
+        out = []
+        if size > LARGE:
+            out.append(f"the body is {size:.4g} m large; if the file is in millimetres, give its unit of length")
+        if self.mass / max(size, 1e-300) ** 3 > DENSE:
+            out.append(f"{self.mass:.4g} kg in {size:.4g} m: the units of mass and length do not fit")
+        return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -217,22 +217,28 @@ class ModalModel:
             self, frequencies=self.frequencies[k], integrals=integrals, moved=self.moved[k], turned=turned, seats=seats
         )
 
-    def participation(self) -> np.ndarray:
+    def participation(self, *, torques: bool = False) -> np.ndarray:
         """Return the share of each mode in the static compliance of the seats, shape (n,).
 
         The largest share that the mode has of the displacement of any seat under a force there, in its own direction.
+
+        Parameters
+        ----------
+        torques : bool
+            Whether rotations under torques count, too: for joints that hold the direction of a seat.
         """
         stiffness = (2 * np.pi * self.frequencies) ** 2
         shares = [np.zeros(self.modes)]
         for seat in self.seats.values():
-            flexibility = seat.moved**2 / stiffness[:, None]
+            motion = np.hstack([seat.moved, seat.turned]) if torques else seat.moved
+            flexibility = motion**2 / stiffness[:, None]
             total = flexibility.sum(axis=0)
             shares.append((flexibility[:, total > 0] / total[total > 0]).max(axis=1, initial=0.0))
         return np.max(shares, axis=0)
 
-    def by_participation(self, least: float = 1e-4) -> ModalModel:
+    def by_participation(self, least: float = 1e-4, *, torques: bool = False) -> ModalModel:
         """Return the body without the modes whose `participation` is below ``least``."""
-        return self.selected(np.flatnonzero(self.participation() >= least))
+        return self.selected(np.flatnonzero(self.participation(torques=torques) >= least))
 
     def add_to(
         self,

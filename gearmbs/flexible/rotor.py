@@ -27,6 +27,10 @@ DIRECTIONS = {"lateral": (0, 1, 3, 4), "torsional": (5,), "axial": (2,), "all": 
 """Degrees of freedom of each kind of vibration; those of round shafts do not know each other."""
 
 
+SAME = 1e-7
+"""Relative distance below which eigenvalues are equal."""
+
+
 @dataclass(frozen=True)
 class Support(Written):
     """A linear bearing at a seat of a shaft.
@@ -84,7 +88,7 @@ class WhirlModes:
         Damped natural frequencies, rad/s.
     damping_ratios : ndarray, shape (n,)
     directions : list of str
-        "forward", "backward" or "planar" whirl of the station that moves most.
+        "forward", "backward" or "planar" whirl of the station that moves most; planar, too, where two modes are equal.
     shapes : ndarray, shape (n, stations, 6)
         Complex displacements and rotations of the stations.
     """
@@ -121,6 +125,13 @@ class Campbell:
     frequencies: np.ndarray
     damping_ratios: np.ndarray
     directions: np.ndarray
+
+    def __repr__(self) -> str:
+        rows = [
+            f"{w * 30 / np.pi:10.6g}  " + " ".join(f"{f / (2 * np.pi):12.4f} {d[0]}" for f, d in zip(row, ways))
+            for w, row, ways in zip(self.speeds, self.frequencies, self.directions)
+        ]
+        return "\n".join(["speed, rpm; frequencies, Hz; f forward, b backward, p planar", *rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +229,11 @@ class Rotor:
         chosen = chosen[np.argsort(values[chosen].imag)][:count]
         values = values[chosen]
         shapes = self._at_stations(vectors[:n, chosen].T)
-        return WhirlModes(speed, values.imag.copy(), -values.real / np.abs(values), [_whirl(s) for s in shapes], shapes)
+        ways = [_whirl(s) for s in shapes]
+        for k in np.flatnonzero(np.abs(np.diff(values)) < SAME * np.abs(values[1:])):
+            # of equal modes any combination is one: straight lines as well as circles in either sense
+            ways[k] = ways[k + 1] = "planar"
+        return WhirlModes(speed, values.imag.copy(), -values.real / np.abs(values), ways, shapes)
 
     @waiting("modes at each speed")
     def campbell(self, speeds: Sequence[Quantity], count: int = 8) -> Campbell:

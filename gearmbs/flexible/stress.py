@@ -74,6 +74,9 @@ class StressModes:
         if not np.all(np.isfinite(self.values)):
             raise FlexibleError("StressModes: values have entries that are not finite")
 
+    def __repr__(self) -> str:
+        return f"StressModes({len(self.values)} modes, {len(self.positions)} places)"
+
     def at(self, coordinates: npt.ArrayLike) -> np.ndarray:
         """Return the stresses for modal coordinates of shape (..., n), shape (..., P, 6), Pa.
 

@@ -191,10 +191,13 @@ def whirl_plot(
     ax : matplotlib axes, optional
     """
     speed, frequency = diagram.speeds * 30 / np.pi, diagram.frequencies / (2 * np.pi)
+    # a pair that is equal at rest begins the curves into which it splits
+    ways = np.where(diagram.directions == "planar", np.roll(diagram.directions, -1, axis=0), diagram.directions)
+    ways[-1] = diagram.directions[-1]
     with look():
         figure, panel = drawn_on(ax)
         for kind, dash in DASHES.items():
-            kept = np.where(diagram.directions == kind, frequency, np.nan)
+            kept = np.where(ways == kind, frequency, np.nan)
             if np.all(np.isnan(kept)):
                 continue
             for k in range(frequency.shape[1]):

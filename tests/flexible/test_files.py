@@ -120,6 +120,24 @@ def test_files_that_lie_are_named(tmp_path, at, new, message):
         read_mnf(changed(rotating_bar_file(tmp_path), at, new))
 
 
+def test_numbers_that_do_not_fit_each_other_are_named(tmp_path):
+    """Whole files: shapes in millimetres, a wrong eigenvalue, and units that are not those of the numbers."""
+    path = rotating_bar_file(tmp_path)
+    found = read_mnf(path)
+    shapes = found.shapes * [1e3, 1e3, 1e3, 1, 1, 1]
+    write_mnf(path, replace(found, shapes=shapes))
+    with pytest.raises(FlexibleError, match=r"bar.mnf: mode 1: its shape has the mass 1.*e\+06 .* other units"):
+        read_mnf(path)
+    eigenvalues = found.eigenvalues.copy()
+    eigenvalues[9, 0] *= 1.01
+    write_mnf(path, replace(found, eigenvalues=eigenvalues))
+    with pytest.raises(FlexibleError, match=r"mode 10: eigenvalue .* do not fit each other"):
+        read_mnf(path)
+    write_mnf(path, replace(found, units=("KILOGRAM", "MILLIMETER", "SECOND", "NEWTON"), unit_bytes=b""))
+    with pytest.warns(UserWarning, match="units of mass and length do not fit; the file names KILOGRAM, MILLIMETER"):
+        read_mnf(path)
+
+
 def test_other_nodes_units_and_no_nodal_inertias(tmp_path):
     found = read_mnf(rotating_bar_file(tmp_path))
     path = tmp_path / "other.mnf"

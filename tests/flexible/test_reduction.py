@@ -3,9 +3,18 @@
 import numpy as np
 import pytest
 
-from gearmbs.flexible import FlexibleError, Interface, Shaft, ShaftSection, check_reduction, from_matrices, reduce_model
+from gearmbs.flexible import (
+    ElasticMaterial,
+    FlexibleError,
+    Interface,
+    Shaft,
+    ShaftSection,
+    check_reduction,
+    from_matrices,
+    reduce_model,
+)
 from gearmbs.flexible.integrals import of_lumps, of_mass_matrix
-from gearmbs.mechanism import ShapeIntegrals
+from gearmbs.mechanism import Mechanism, ShapeIntegrals, static_equilibrium
 from tests.flexible.test_files import cube
 
 
@@ -38,11 +47,40 @@ def test_reductions_converge_from_above_and_keep_static_flexibility(kind, method
         report = check_reduction(model, reduce_model(model, ends(kind), internal=internal, method=method), ends(kind))
         assert np.all(report.errors[:4] > -1e-8)
         assert all(-1e-9 < share < (1e-9 if method == "free" else 0.7) for share in report.flexibility.values())
+        assert all(-1e-9 < share < (1e-9 if method == "free" else 0.7) for share in report.turning.values())
         errors.append(np.abs(report.errors[:3]).max())
     assert errors[2] < 5e-3
     assert errors[2] <= errors[1] + 1e-9 <= errors[0] + 2e-9
     assert "errors below 1 %" in repr(report)
     assert report.converged_up_to(0.5) > 0.0
+
+
+def test_slow_modes_lack_flexibility_under_torques():
+    """A bar clamped at one end and pinned at the other: its mean deflection by weight is w L^4 / (320 EI)."""
+    steel = ElasticMaterial(youngs_modulus=2.1e11, shear_modulus=8e10, density=7850.0)
+    shaft = Shaft([ShaftSection(1.0, 0.02)], seats={"pinned": 0.0, "clamped": 1.0}, material=steel)
+    area, bending = np.pi * 0.02**2 / 4, 2.1e11 * np.pi * 0.02**4 / 64
+    exact = 7850.0 * area * 9.81 / (320 * bending)
+    sag = {}
+    for modes in (8, None):
+        model = shaft.modal_model(modes)
+        m = Mechanism("bar", gravity=(0, -9.81, 0))
+        body = model.add_to(m)
+        m.spherical("pin", body.marker(model.place("pinned")), m.ground.marker())
+        m.fixed("clamp", body.marker(model.place("clamped")), m.ground.marker((0, 0, 1)))
+        # the centre of mass moves by the mean
+        sag[modes] = -static_equilibrium(m).com_position(body.name)[1]
+        report = check_reduction(shaft.model(), model)
+        if modes:
+            assert max(report.flexibility.values()) < 0.02
+            assert min(report.turning.values()) > 0.2
+            assert "% under torques" in repr(report)
+        else:
+            assert max(report.turning.values()) < 0.01
+    np.testing.assert_allclose(sag[None], exact, rtol=0.01)
+    assert sag[8] < 0.7 * exact
+    whole = shaft.modal_model()
+    assert whole.by_participation(1e-2).modes < whole.by_participation(1e-2, torques=True).modes
 
 
 def test_rigid_faces_stiffen_and_averages_do_not():

@@ -110,6 +110,9 @@ def test_campbell_table():
     assert table.frequencies.shape == (3, 4)
     np.testing.assert_allclose(table.frequencies[2], [85.389, 87.796, 251.781, 294.706], rtol=1e-5)
     assert list(table.directions[2]) == ["backward", "forward"] * 2
+    # at rest any orbit of a pair is a mode
+    assert list(table.directions[0]) == ["planar"] * 4
+    assert repr(table).splitlines()[3].split()[:3] == ["4000", "13.5901", "b"]
 
 
 def test_masses_of_sections_cones_and_discs():
