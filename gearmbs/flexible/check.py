@@ -137,7 +137,11 @@ def check_model(model: FiniteElementModel, count: int = 6) -> ModelReport:
         if slow != 6:
             remarks.append(f"{slow} modes are rigid motions instead of 6: the body is held, or is in several parts")
     else:
-        remarks.append(f"{massless} degrees of freedom have no mass: lumped matrices leave rotations without")
+        still = int(np.sum(model.mass.diagonal()[model.dofs[:, 1] < 3] <= 0.0))
+        if massless > still:
+            remarks.append(f"{massless - still} rotations have no mass: lumped matrices leave them without")
+        if still:
+            remarks.append(f"{still} displacements have no mass: the mass matrix is not whole, or nodes carry nothing")
     worst = int(np.argmax(energy))
     if energy[worst] > GROUNDED:
         remarks.append(

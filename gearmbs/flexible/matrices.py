@@ -154,6 +154,7 @@ def read_abaqus(
         dofs: Any = 6 if size == 6 * len(ids) else 3
     else:
         dofs, k, m = _common(k_dofs, k, m_dofs, m)
+    _check_mass(Path(mass), m, dofs)
     k, m = scaled(k, m, dofs, length, force, mass_unit)
     return from_matrices(k, m, positions * length, ids=ids, dofs=dofs, name=label)
 
@@ -190,6 +191,7 @@ def read_calculix(path: Path_, nodes: Path_, *, name: str | None = None) -> Fini
         rows.append((int(node), int(direction)))
     ids, positions = read_nodes(nodes)
     stiffness, mass = (_read_triplets(file, len(rows))[1] for file in files[:2])
+    _check_mass(files[1], mass, np.array(rows))
     return from_matrices(stiffness, mass, positions, ids=ids, dofs=np.array(rows), name=name or base.name)
 
 
@@ -261,6 +263,20 @@ def _read_triplets(path: Path_, size: int | None = None) -> tuple[np.ndarray | N
     if not (np.any(i < j) and np.any(i > j)):
         matrix = sp.csc_array(matrix + matrix.T - sp.diags_array(matrix.diagonal()))
     return dofs, matrix
+
+
+def _check_mass(file: Path, mass: sp.csc_array, dofs: Any) -> None:
+    """Refuse a mass matrix that lacks the last displacement: a file cut off at the end of a line looks whole."""
+    rows = np.arange(mass.shape[0])
+    table = np.asarray(dofs) if np.ndim(dofs) else np.column_stack([rows // int(dofs) + 1, rows % int(dofs) + 1])
+    moving = np.flatnonzero(table[:, 1] <= 3)
+    massless = moving[mass.diagonal()[moving] == 0.0]
+    if massless.size and massless[-1] == moving[-1]:
+        what = f"node {table[massless[0], 0]}" if np.ndim(dofs) else f"row {massless[0] + 1}"
+        raise FlexibleError(
+            f"{file.name}: {massless.size} displacements, from {what} on, have stiffness and no mass: the file is cut "
+            "off; write it anew, and nodes that carry nothing before the others"
+        )
 
 
 def _common(k_dofs, k, m_dofs, m):

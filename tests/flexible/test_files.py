@@ -242,6 +242,22 @@ def test_abaqus_and_calculix_matrices(tmp_path, both, pairs):
         np.testing.assert_allclose(found.frequencies, expected, rtol=1e-12)
 
 
+def test_a_mass_file_of_abaqus_that_ends_early(tmp_path):
+    """It ends with a whole line and a whole node, so that only the nodes of the stiffness tell."""
+    corners, k, m = cube()
+    for name, matrix in (("k.mtx", k), ("m.mtx", m)):
+        write_triplets(tmp_path / name, matrix, both=False, pairs=True)
+    write_nodes(tmp_path / "n.inp", corners)
+    files = [tmp_path / name for name in ("k.mtx", "m.mtx", "n.inp")]
+    assert check_model(read_abaqus(*files)).good
+    files[1].write_text("".join(files[1].read_text().splitlines(True)[:15]))
+    with pytest.raises(FlexibleError, match=r"m\.mtx: 9 displacements, from node 6 on, have stiffness and no mass"):
+        read_abaqus(*files)
+    half = np.diag([0.5] * 21 + [0.0] * 3)
+    report = check_model(from_matrices(k, half, corners))
+    assert any("3 displacements have no mass" in remark for remark in report.remarks)
+
+
 def test_op4_files_through_pyyeti(tmp_path):
     with np.printoptions():
         op4 = pytest.importorskip("pyyeti.nastran.op4")
@@ -280,6 +296,10 @@ def test_op4_files_through_pyyeti(tmp_path):
         (lambda f: f["inp"].write_text("*NODE\n1, 0, 0\n"), r"a.inp: line 2: .* is no node"),
         (lambda f: f["inp"].write_text("*ELEMENT\n1, 0, 0\n"), r"it has no nodes"),
         (lambda f: f["mas"].unlink(), r"a.mas: there is no such file"),
+        (
+            lambda f: f["mas"].write_text("".join(f["mas"].read_text().splitlines(True)[:21])),
+            r"a.mas: 3 displacements, from node 8 on, have stiffness and no mass: the file is cut off",
+        ),
     ],
 )
 def test_wrong_matrix_files_are_named(tmp_path, change, message):
