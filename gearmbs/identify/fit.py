@@ -147,7 +147,7 @@ class _Problem:
             raise IdentifyError("fit: every sigma must be positive")
         self._many = many or (lambda points: [np.asarray(model(p), dtype=float) for p in points])
         self.step, self.lost = step, lost
-        self.runs = self.total = 0
+        self.runs = self.total = self.without = 0
         self.tell: Callable[[int], None] = lambda done: None
 
     def residuals(self, points: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -157,6 +157,7 @@ class _Problem:
         with np.errstate(all="ignore"):
             found = self._many([self.scale.p(np.asarray(z)) for z in points])
         self.tell(self.total)
+        self.without += sum(not np.isfinite(f).all() for f in found)
         for f in found:
             if np.shape(f) != self.measured.shape:
                 raise IdentifyError(f"fit: the model returned shape {np.shape(f)} for {self.measured.shape} values")

@@ -215,6 +215,7 @@ class Fit:
                 f"to {row.high:.5g} |"
             )
         lines += ["", f"{self.residuals.size} values, {self.freedom} degrees of freedom, {self.runs} evaluations."]
+        lines += self._reservations()
         if self.known_noise:
             lines.append(f"Chi-square over degrees of freedom: {self.chi_square:.3g}.")
             if self.freedom > 0 and chi2.sf(self.cost, self.freedom) < DOUBTFUL:
@@ -236,6 +237,25 @@ class Fit:
             again = sum(cost <= best * 1.01 + 1e-12 for cost in self.waterfall)
             lines.append(f"{again} of {len(self.waterfall)} searches ended at the best cost.")
         return "\n".join(lines) + "\n"
+
+    def _reservations(self) -> list[str]:
+        """Return what the standard errors do not know: bounds within reach, and simulations that failed."""
+        lines = []
+        low, high = self.scale.bounds()
+        for k, name in enumerate(self.names):
+            ends = self.interval(name)
+            a, b = (float(self.scale.p(side)[k]) for side in (low, high))
+            if ends[0] < a or ends[1] > b:
+                lines.append(
+                    f"The interval of {name} reaches beyond its bounds, {a:.5g} to {b:.5g}: its error and those of "
+                    "others that depend on it do not hold there. Widen the bounds, or see the profile."
+                )
+        if self.problem is not None and self.problem.without:
+            lines.append(
+                f"{self.problem.without} of {self.runs} evaluations gave no values, and count as far away and without "
+                "slope; beside the estimate that spoils its errors."
+            )
+        return lines
 
 
 def covariance_of(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

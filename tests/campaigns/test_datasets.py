@@ -11,6 +11,7 @@ import pytest
 from gearmbs.campaigns import Campaign, CampaignError
 from gearmbs.campaigns.datasets import (
     SensorLayers,
+    classifier,
     data_set_plan,
     feature_table,
     features,
@@ -20,6 +21,7 @@ from gearmbs.campaigns.datasets import (
     one_state_a_group,
     random_split,
     recording_features,
+    score,
     shared_groups,
     split_by_group,
     withhold,
@@ -117,6 +119,18 @@ def test_a_leak_looks_like_skill():
     assert found["random windows"].auroc > 0.95
     assert found["by specimen"].low < 0.5 < found["by specimen"].high
     assert "chance" in str(found["by specimen"])
+
+
+def test_one_specimen_gives_no_interval():
+    x, labels = np.arange(40.0)[:, None], np.repeat(["a", "b"], 20)
+    found = score(classifier().fit(x, labels), x, labels, np.zeros(40, dtype=int))
+    assert found.auroc == 1.0
+    assert np.isnan([found.low, found.high]).all()
+
+
+def test_too_few_signals_are_refused_before_anything_runs():
+    with pytest.raises(CampaignError, match=r"24 signals are 2 points .* ask for 72 signals"):
+        data_set_plan(24, specimens=6, sensors=2)
 
 
 def test_features_do_not_know_the_gain():

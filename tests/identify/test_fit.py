@@ -116,3 +116,20 @@ def test_a_fit_tells_how_far_it_is():
     # one at a time, and four for each Jacobian
     assert counts[0] == 1
     assert set(np.diff(counts)) <= {1, 4}
+
+
+def test_the_report_tells_bounds_and_failures():
+    x = np.linspace(0.0, 1.0, 20)
+    y = 2.0 * np.exp(-0.5 * x)
+
+    def model(p):
+        return np.full(20, np.nan) if p[0] > 2.0 else p[0] * np.exp(p[1] * x)
+
+    slope = Free("b", -1.0, log=False)
+    free = fit(lambda p: p[0] * np.exp(p[1] * x), y, [Free("a", 1.0), slope], sigma=0.02)
+    assert "bounds" not in free.report()
+    assert "no values" not in free.report()
+    held = fit(lambda p: p[0] * np.exp(p[1] * x), y, [Free("a", 1.0, 0.5, 1.5), slope], sigma=0.02)
+    assert "The interval of a reaches beyond its bounds, 0.5 to 1.5" in held.report()
+    blind = fit(model, y, [Free("a", 1.0), slope], sigma=0.02)
+    assert "evaluations gave no values" in blind.report()

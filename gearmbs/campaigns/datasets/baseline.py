@@ -23,7 +23,7 @@ class Score:
     Attributes
     ----------
     auroc, low, high : float
-        Value and 95 % interval, from resampling groups of the test rows.
+        Value and 95 % interval, from resampling groups of the test rows; no interval, NaN, from a single group.
     accuracy : float
     chance : float
         Accuracy of always naming the commonest class.
@@ -71,7 +71,8 @@ def score(model: Any, x: np.ndarray, labels: np.ndarray, groups: np.ndarray, see
     for _ in range(RESAMPLES):
         rows = np.concatenate([np.flatnonzero(groups == g) for g in generator.choice(names, names.size)])
         drawn.append(macro_auroc(labels[rows], p[rows], model.classes_))
-    low, high = np.nanquantile(drawn, [0.025, 0.975])
+    drawn = [value for value in drawn if np.isfinite(value)]
+    low, high = np.quantile(drawn, [0.025, 0.975]) if names.size > 1 and drawn else (np.nan, np.nan)
     counts = np.unique(labels, return_counts=True)[1]
     return Score(
         macro_auroc(labels, p, model.classes_),

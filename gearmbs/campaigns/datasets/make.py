@@ -68,9 +68,20 @@ def data_set_plan(
         Of a record, s.
     sensors : int
         Signals that `SensorLayers` will make of each record.
+
+    Raises
+    ------
+    CampaignError
+        If there are fewer points, each of which is simulated in all states, than specimens.
     """
     from gearmbs.studies import Case
 
+    points = -(-signals // (len(STATES) * sensors))
+    if points < specimens:
+        raise CampaignError(
+            f"data set: {signals} signals are {points} points of {len(STATES)} states and {sensors} sensors, too few "
+            f"for {specimens} specimens; ask for {len(STATES) * sensors * specimens} signals or fewer specimens"
+        )
     base = Case(
         operation={"duration": duration, "run_up": 0.05, "settling": 0.05},
         solver={"signal_rate": 12800, "output_rate": 51200, "tolerance": TOLERANCE, "lump": True},
@@ -92,7 +103,7 @@ def data_set_plan(
         base,
         factors,
         "sobol",
-        n=-(-signals // (len(STATES) * sensors)),
+        n=points,
         seed=seed,
         keep=["contact", "signal:line_of_action"],
         unit=unit,
