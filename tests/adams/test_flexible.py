@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_script, read_deck, read_results, run_deck
-from gearmbs.adams.builders.flexible import modal_ratios
+from gearmbs.adams.builders.flexible import has_momentum, modal_ratios
 from gearmbs.flexible import Shaft, ShaftSection, mnf_of, read_mnf, reduce_model, write_mnf
 from gearmbs.mechanism import Mechanism
 
@@ -65,6 +65,25 @@ def test_a_bar_from_a_file_swings_as_the_same_bar_in_python(folder):
     assert v_f.shape == q_f.shape == (21, 8)
 
 
+@pytest.mark.parametrize(
+    ("invariants", "coupling"),
+    [("T:T:T:T:T:T:T:T:T", "full"), ("T:T:T:T:F:T:T:T:F", "partial"), ("T:T:T:T:F:T:T:F:F", "constant")],
+)
+def test_invariants_choose_the_coupling(folder, invariants, coupling):
+    text = DECK.format(pivot="0,90D,0").replace(",CRATIO", f",INVARIANTS={invariants},CRATIO", 1)
+    built = parse_deck(text, str(folder / "other.adm")).to_mechanism()
+    expected = by_hand(folder, coupling)[0].bodies["bar"].modal
+    found = next(body.modal for body in built.bodies.values() if hasattr(body, "modal"))
+    for name in ("c0", "c1", "j1", "j2"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-12)
+
+
+def test_modes_of_a_free_body_have_no_momentum_but_with_lumped_masses(folder):
+    bar = Shaft([ShaftSection(0.4, 0.004)], seats={"A": 0.0, "B": 0.4}, elements=4, name="bar").model()
+    assert not has_momentum(reduce_model(bar, modes=8))
+    assert has_momentum(read_mnf(folder / "bar.mnf").modal_model())
+
+
 def test_velocity_and_acceleration_of_the_frame_are_those_of_its_place(folder):
     result = run_deck(read_deck(folder / "bar.adm"), end=0.01, steps=500)
     frame = result.flexible(1)
@@ -119,7 +138,8 @@ def test_results_file_and_data_set_have_the_modal_coordinates(folder, tmp_path):
         ("NODE=3", "QP=0,0,170", "QP is 30 from node 3"),
         ("STEP(FXFREQ,1000,0.02,20000,0.5)", "0.1*TIME", "changes with time"),
         ("STEP(FXFREQ,1000,0.02,20000,0.5)", "0.1*FREQ", "FREQ"),
-        (",CRATIO", ",INVARIANTS=T:T:F:F:F:T:T:F:F,CRATIO", "is not supported; choose one of"),
+        (",CRATIO", ",INVARIANTS=T:T:F:F:F:T:T:F:F,CRATIO", "the modes have momentum"),
+        (",CRATIO", ",INVARIANTS=T:T:F:F:F:F:T:F:F,CRATIO", "is not supported; choose one of"),
         ("102,FLEX_BODY=1", "102,FLEX_BODY=7", "there is no FLEX_BODY/7"),
         ("I=100,J=11", "I=100,J=102", "both on FLEX_BODY/1"),
     ],

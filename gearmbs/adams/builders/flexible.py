@@ -20,8 +20,11 @@ if TYPE_CHECKING:
     from gearmbs.flexible import ModalModel
     from gearmbs.flexible.damping import Damping
 
-COUPLINGS = {"T" * 9: "full", "TTTTFTTTF": "partial"}
-"""Levels of coupling by the inertia invariants that are kept; without a choice it is the second."""
+COUPLINGS = {"T" * 9: "full", "TTTTFTTTF": "partial", "TTTTFTTFF": "constant", "TTFFFTTFF": "constant"}
+"""Levels of coupling by the inertia invariants that are kept; without a choice it is the second. The last one also
+leaves out the third and the fourth, which vanish where the modes have neither momentum nor angular momentum."""
+MOMENTUM = 1e-6
+"""Share of its bound by Schwarz up to which the momentum of a mode vanishes."""
 FREQUENCY, NUMBER = (re.compile(rf"\b{name}\b(\s*\(\s*\w*\s*\))?", re.IGNORECASE) for name in ("FXFREQ", "FXMODE"))
 """What CRATIO may ask for: the frequency of a mode in Hz, and its number."""
 ON_NODE = 1e-6
@@ -33,7 +36,7 @@ def add_flex_body(b: Builder, s: st.FlexBody) -> None:
     flexible = flexible_body(b.deck, s)
     model = flexible.model
     name = b.claim(s, "flex_body")
-    level = _coupling(s)
+    level = _coupling(s, model)
     ratios: Damping = "adams"
     if s.cratio is not None:
         ratios = modal_ratios(s.cratio, model.frequencies, flexible.numbers).tolist()
@@ -98,7 +101,7 @@ def modal_ratios(text: str, frequencies: np.ndarray, numbers: np.ndarray) -> np.
     return np.array(out)
 
 
-def _coupling(s: st.FlexBody) -> str:
+def _coupling(s: st.FlexBody, model: ModalModel) -> str:
     """Return the level of coupling that a pattern of invariants asks for."""
     if not s.invariants:
         return "partial"
@@ -106,7 +109,23 @@ def _coupling(s: st.FlexBody) -> str:
     if pattern not in COUPLINGS:
         known = ", ".join(f"{':'.join(p)} ({level})" for p, level in COUPLINGS.items())
         raise ValueError(f"INVARIANTS = {':'.join(pattern)} is not supported; choose one of {known}")
+    if pattern[2:4] == "FF" and has_momentum(model):
+        raise ValueError(
+            f"INVARIANTS = {':'.join(pattern)}: the modes have momentum, which cannot be left out; choose "
+            "T:T:T:T:F:T:T:F:F (constant)"
+        )
     return COUPLINGS[pattern]
+
+
+def has_momentum(model: ModalModel) -> bool:
+    """Return whether the third and fourth invariants of a body's modes do not vanish."""
+    i, p = model.integrals, model.properties
+    size = np.sqrt(np.diag(i.mass))[:, None]
+    turning = np.sqrt(np.trace(p.inertia))
+    return bool(
+        np.any(np.abs(i.momentum) > MOMENTUM * size * np.sqrt(p.mass))
+        or np.any(np.abs(i.angular_momentum) > MOMENTUM * size * turning)
+    )
 
 
 def _start(b: Builder, s: st.FlexBody, model: ModalModel) -> BodyState:
