@@ -124,14 +124,31 @@ class CaseProblem:
         """Simulations so far."""
         return len(self._known)
 
-    def with_case(self, name: str, case: Case, like: str) -> CaseProblem:
-        """Return the problem with one more case, measured as another one was; its values stand for none yet."""
+    def with_case(self, name: str, case: Case, like: str, known: Sequence[str] = ()) -> CaseProblem:
+        """Return the problem with one more case, measured as another one was; its values stand for none yet.
+
+        What is unknown of the other case alone is as unknown of this one, in the ratio of their values, unless its path
+        is ``known``.
+        """
         import pandas as pd
 
         more = self.table[self.table["case"] == like].assign(case=name, value=1.0)
         table = pd.concat([self.table, more], ignore_index=True)
         settings: dict[str, Any] = {"gains": self.gains, "channels": self.channels, "way": self.way}
-        found = CaseProblem(table, {**self.cases, name: case}, self.free, workers=self.workers, **settings)
+        cases = {**self.cases, name: case}
+        free = []
+        for item in self.free:
+            owned = {
+                path: factor for path, factor in {item.name: 1.0, **item.also}.items() if path.startswith(f"{like}:")
+            }
+            tied = {}
+            for path, factor in owned.items():
+                place = path.removeprefix(f"{like}:")
+                if place not in known:
+                    ratio = _field(f"{name}:{place}", cases)[0] / _field(path, cases)[0]
+                    tied[f"{name}:{place}"] = factor * ratio
+            free.append(replace(item, also={**item.also, **tied}))
+        found = CaseProblem(table, cases, free, workers=self.workers, **settings)
         found._known = dict(self._known)
         return found
 

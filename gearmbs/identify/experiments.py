@@ -37,7 +37,8 @@ def rank_experiments(
     """Rank further measurements by how much better the worst known combination would be known.
 
     Each candidate is simulated about the starts and added to what was measured, with the same channels, harmonics,
-    standard deviations and gains.
+    standard deviations and gains. What is unknown of the case that is changed is so of the candidate, too: twice an
+    unknown torque is unknown. What a candidate gives as a value with its unit is known.
 
     Parameters
     ----------
@@ -80,7 +81,8 @@ def _worth(problem: CaseProblem, name: str, changes: Mapping[str, Any], of: str,
     """Return what an experiment is worth."""
     from gearmbs.identify.result import covariance_of
 
-    joint = problem.with_case(name, _changed(problem, changes, of), like=of)
+    given = [path for path, value in changes.items() if path not in FACTORS or isinstance(value, str)]
+    joint = problem.with_case(name, _changed(problem, changes, of), like=of, known=given)
     try:
         matrix = joint.derivatives()
     except IdentifyError:

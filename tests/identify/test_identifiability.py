@@ -135,3 +135,18 @@ def test_the_experiment_that_would_tell():
     assert ranked.worst.iloc[0] < 0.3 < ranked.worst.iloc[1]
     with pytest.raises(IdentifyError, match=r"no field 'operation\.heat'"):
         rank_experiments(problem, {"x": {"operation.heat": 2.0}})
+
+
+def test_what_is_unknown_of_a_case_is_unknown_of_experiments_with_it():
+    cases = {name: Case(operation={**SHORT, "torque": torque}) for name, torque in (("low", 50.0), ("high", 100.0))}
+    rows = [(case, c, k, 1.0, 0.02) for case in cases for c in COMPONENTS for k in (1, 2, 3)]
+    table = pd.DataFrame(rows, columns=["case", "channel", "harmonic", "value", "sigma"])
+    free = [Free(f"{name}:operation.torque", torque) for name, torque in (("low", 50.0), ("high", 100.0))]
+    problem = CaseProblem(table, cases, free, gains="line", way="orders")
+    candidates = {"again": {}, "torque x 2": {"operation.torque": 2.0}, "weighed": {"operation.torque": "50 N m"}}
+    ranked = rank_experiments(problem, candidates)
+    # the same once more is worth at most as much as every value measured twice
+    assert 1.0 - 1e-9 <= ranked.gain["again"] <= 2.0**0.5 + 1e-9
+    assert ranked.index[0] == "weighed"
+    joint = problem.with_case("more", problem.cases["low"].changed(operation={"torque": 100.0}), like="low")
+    assert joint.case("more", [60.0, 100.0]).operation.torque == 120.0
