@@ -45,6 +45,11 @@ class ModelReport:
     remarks: list[str]
 
     @property
+    def slow(self) -> int:
+        """How many of the frequencies are those of rigid motions."""
+        return int(np.sum(self.frequencies < 1e-2 * self.frequencies.max(initial=0.0)))
+
+    @property
     def good(self) -> bool:
         """Whether there is nothing to remark."""
         return not self.remarks
@@ -56,7 +61,8 @@ class ModelReport:
             f"{self.name}: mass {p.mass:.6g} kg, centre {np.array2string(p.com, precision=6)} m",
             f"inertia about the centre, kg m^2: {np.array2string(np.diag(p.inertia), precision=6)}",
             f"rigid-body energy: {energy}",
-            f"first frequencies, Hz: {np.array2string(self.frequencies, precision=4)}",
+            f"first frequencies, Hz: {self.slow} rigid motions, "
+            f"{', '.join(f'{f:.6g}' for f in self.frequencies[self.slow :]) or 'none'}",
             *(f"! {remark}" for remark in self.remarks),
         ]
         return "\n".join(lines)
