@@ -33,6 +33,8 @@ from gearmbs.mechanism.quantities import quantity
 
 REVERSAL = 1e-3
 """Speed, m/s, about which the penalty goes over from compression to restitution."""
+FLAT = 1e-6
+"""Angle, rad, below which two triangles lie in one plane."""
 CONVEX = (Ellipsoid, Box, Cylinder, Frustum, Torus)
 ANALYTIC = (Sphere, Ellipsoid, Box, Cylinder, Frustum, Torus, HalfSpace)
 
@@ -161,10 +163,18 @@ class SolidContact(ForceElement):
     def compiled(self) -> Compiled:
         friction = [0.0, 0.0, 1.0, 2.0] if self.friction is None else self.friction.reals()
         table = _Tables([*self.law.reals(), *friction])
-        for a, b in product(self.solids_i, self.solids_j):
+        for _, a, b in self.pairs():
             table.add_pair(self.name, a, b)
         integers, reals, most = table.finished()
         return Compiled(kernel.contact_of_solids, integers, reals, scratch=kernel.ROWS + most * COLUMNS)
+
+    def pairs(self) -> list[tuple[tuple[int, int], Shape, Shape]]:
+        """Return the numbers of the solids of each pair, and the two; separate solids of one mesh are apart."""
+        found: list[tuple[tuple[int, int], Shape, Shape]] = []
+        for (k, a), (m, b) in product(enumerate(self.solids_i), enumerate(self.solids_j)):
+            sides = [shape.shells() if isinstance(shape, Mesh) else (shape,) for shape in (a, b)]
+            found += [((k, m), *pair) for pair in product(*sides)]
+        return found
 
     def exact(self) -> bool:
         """Whether the geometry of all pairs is exact; else one is faceted."""
@@ -231,17 +241,45 @@ def reach_of(kind: int, sizes: np.ndarray) -> float:
     }.get(kind, float(np.linalg.norm(sizes[:3])))
 
 
-def vertex_weights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return the weight of each vertex: of the triangles around it, the area times the angle there.
+def plane_faces(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the number of the plane face to which each triangle belongs."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
 
-    The corners of a rectangle so have the same weight whichever way its diagonal runs.
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    order = np.lexsort(edges.T)
+    one, other = order[:-1], order[1:]
+    shared = np.all(edges[one] == edges[other], axis=1)
+    one, other = one[shared] % len(triangles), other[shared] % len(triangles)
+    bent = np.linalg.norm(np.cross(normals[one], normals[other]), axis=1)
+    flat = (bent < FLAT) & (np.sum(normals[one] * normals[other], axis=1) > 0.0)
+    joined = coo_array((np.ones(flat.sum()), (one[flat], other[flat])), shape=(len(triangles),) * 2)
+    return connected_components(joined, directed=False)[1]
+
+
+def vertex_weights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the weight of each vertex: its part of a plane face, the largest of those of its faces.
+
+    Parts are as, of the triangles around a vertex, the area times the angle there: the corners of a rectangle so have the
+    same whichever way its diagonal runs. Those of a face sum to 1.
     """
     weights = np.zeros(len(vertices))
+    if not len(triangles):
+        return weights
+    parts = np.zeros(triangles.shape)
     for k in range(3):
         here, ahead, behind = (vertices[triangles[:, (k + q) % 3]] for q in range(3))
         one, other = ahead - here, behind - here
         area = np.linalg.norm(np.cross(one, other), axis=1)
-        np.add.at(weights, triangles[:, k], area * np.arctan2(area, np.sum(one * other, axis=1)))
+        parts[:, k] = area * np.arctan2(area, np.sum(one * other, axis=1))
+    faces = plane_faces(vertices, triangles)
+    whole = np.bincount(faces, parts.sum(axis=1))
+    keys, back = np.unique(faces[:, None] * len(vertices) + triangles, return_inverse=True)
+    own = np.bincount(back.reshape(-1), parts.ravel()) / whole[keys // len(vertices)]
+    np.maximum.at(weights, keys % len(vertices), own)
     return weights
 
 

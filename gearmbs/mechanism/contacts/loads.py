@@ -26,6 +26,8 @@ LAW, STIFFNESS, EXPONENT, DAMPING, FULL_DEPTH, PENALTY, RESTITUTION, REVERSAL = 
 MU_STATIC, MU_DYNAMIC, STICTION, FRICTION = 8, 9, 10, 11
 """Coefficients, and the speeds at which they are reached, m/s."""
 LAW_REALS = 12
+NORM = 20
+"""q of the level of faceted solids."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -74,33 +76,90 @@ def friction_factor(law, speed):
 
 
 @njit(cache=True, error_model="numpy")
-def share_out(rows, count):
-    """Write the share of each point in the load of its patch; return how many patches there are."""
+def share_out(rows, count, derivatives):
+    """Write the share of each point in the load of its patch, and its depth as level; return the number of patches.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (points, COLUMNS)
+    count : int
+    derivatives : bool
+    """
     patches = 0
     for k in range(count):
-        rows[k, pt.SHARE] = 0.0
-        if rows[k, pt.POOL] < 0.0:
+        row = rows[k]
+        row[pt.SHARE], row[pt.LEVEL] = 0.0, row[pt.DEPTH]
+        if row[pt.POOL] < 0.0:
             continue
         total, first = 0.0, True
         for m in range(count):
-            if rows[m, pt.POOL] == rows[k, pt.POOL]:
+            if rows[m, pt.POOL] == row[pt.POOL]:
                 total += rows[m, pt.WEIGHT] * rows[m, pt.DEPTH]
                 first = first and m >= k
         patches += first
-        rows[k, pt.SHARE] = rows[k, pt.WEIGHT] * rows[k, pt.DEPTH] / total
+        row[pt.SHARE] = row[pt.WEIGHT] * row[pt.DEPTH] / total
+        if not derivatives:
+            continue
+        for c in range(12):
+            row[pt.D_LEVEL + c] = _d_depth(row, c)
+            row[pt.D_SHARE + c] = _share_slope(rows, count, k, c) if row[pt.SHARE] < 1.0 else 0.0
     return patches
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _d_depth(row, c):
+    """Return the derivative of a point's depth by one of the twelve variations of bodies I and J."""
+    return row[pt.D_DEPTH + (c + 6 * int(row[pt.SWAPPED])) % 12]
+
+
 @njit(cache=True, error_model="numpy")
-def share_slope(rows, count, k, column):
+def _share_slope(rows, count, k, c):
     """Return the derivative of a point's share by one of the twelve variations of bodies I and J."""
     total = slopes = 0.0
     for m in range(count):
         if rows[m, pt.POOL] == rows[k, pt.POOL]:
             total += rows[m, pt.WEIGHT] * rows[m, pt.DEPTH]
-            slopes += rows[m, pt.WEIGHT] * rows[m, pt.D_DEPTH + (column + 6 * int(rows[m, pt.SWAPPED])) % 12]
-    own = rows[k, pt.D_DEPTH + (column + 6 * int(rows[k, pt.SWAPPED])) % 12]
-    return (rows[k, pt.WEIGHT] * own - rows[k, pt.SHARE] * slopes) / total
+            slopes += rows[m, pt.WEIGHT] * _d_depth(rows[m], c)
+    return (rows[k, pt.WEIGHT] * _d_depth(rows[k], c) - rows[k, pt.SHARE] * slopes) / total
+
+
+@njit(cache=True, error_model="numpy")
+def share_by_norm(rows, count, derivatives):
+    """Write shares g = dD/dd of the points of two faceted solids in one load at the level D; return their patches.
+
+    D^q = sum(w d^q), so that the loads g f(D) are the gradient of one potential, however patches join or part.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (points, COLUMNS)
+        All in contact.
+    count : int
+    derivatives : bool
+    """
+    most, total, patches = 0.0, 0.0, 0
+    for k in range(count):
+        most = max(most, rows[k, pt.DEPTH])
+    for k in range(count):
+        total += rows[k, pt.WEIGHT] * (rows[k, pt.DEPTH] / most) ** NORM
+    level = most * total ** (1.0 / NORM)
+    for k in range(count):
+        first = True
+        for m in range(k):
+            first = first and rows[m, pt.POOL] != rows[k, pt.POOL]
+        patches += first
+        rows[k, pt.LEVEL] = level
+        rows[k, pt.SHARE] = rows[k, pt.WEIGHT] * (rows[k, pt.DEPTH] / level) ** (NORM - 1)
+    if not derivatives:
+        return patches
+    for c in range(12):
+        slope = 0.0
+        for k in range(count):
+            slope += rows[k, pt.SHARE] * _d_depth(rows[k], c)
+        for k in range(count):
+            row = rows[k]
+            row[pt.D_LEVEL + c] = slope
+            row[pt.D_SHARE + c] = (NORM - 1) * row[pt.SHARE] * (_d_depth(row, c) / row[pt.DEPTH] - slope / level)
+    return patches
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -125,14 +184,13 @@ def slip(frames, place, out, work):
 
 
 @njit(cache=True, error_model="numpy")
-def press(rows, count, k, law, frames, wrench, diagnostics, jac, derivatives, work):
+def press(row, law, frames, wrench, diagnostics, jac, derivatives, work):
     """Add the load of one point of contact to the wrench on I's body about marker I.
 
     Parameters
     ----------
-    rows : ndarray, shape (points, COLUMNS)
-    count, k : int
-        How many there are, and which one.
+    row : ndarray, shape (COLUMNS,)
+        The point.
     law : ndarray, shape (LAW_REALS,)
     frames : ndarray, shape (2, 18)
         Of markers I and J.
@@ -144,8 +202,7 @@ def press(rows, count, k, law, frames, wrench, diagnostics, jac, derivatives, wo
     work : ndarray, shape (36,)
         Scratch.
     """
-    row = rows[k]
-    share, depth = row[pt.SHARE], row[pt.DEPTH]
+    share, depth, level = row[pt.SHARE], row[pt.DEPTH], row[pt.LEVEL]
     place, n, u, arm, force = row[0:3], work[6:9], work[9:12], work[12:15], work[15:18]
     sign = -1.0 if row[pt.SWAPPED] != 0.0 else 1.0
     for q in range(3):
@@ -156,13 +213,14 @@ def press(rows, count, k, law, frames, wrench, diagnostics, jac, derivatives, wo
     for q in range(3):
         u[q] += rate * n[q]
     speed = np.sqrt(dot(u, u))
-    f, f_depth, f_rate, stored, lost = normal_force(law, depth, rate)
+    f, f_depth, f_rate, stored, lost = normal_force(law, level, rate)
     m, m_square = friction_factor(law, speed)
     for q in range(3):
         force[q] = share * f * (n[q] - m * u[q])
         wrench[0, q] += force[q]
     add_cross(arm, force, wrench[0, 3:6])
-    diagnostics[0] += share * stored
+    # shares of a norm weighed with depths sum to the level
+    diagnostics[0] += share * (depth / level) * stored
     diagnostics[1] += share * lost
     diagnostics[2] += share * f * m * speed**2
     diagnostics[4] = max(diagnostics[4], depth)
@@ -172,12 +230,11 @@ def press(rows, count, k, law, frames, wrench, diagnostics, jac, derivatives, wo
     dp, dn, du, df, moment = work[18:21], work[21:24], work[24:27], work[27:30], work[30:33]
     for c in range(24):
         body, part = c // 12, c % 12
-        d_depth = d_share = 0.0
+        d_level = d_share = 0.0
         dp[0] = dp[1] = dp[2] = dn[0] = dn[1] = dn[2] = du[0] = du[1] = du[2] = 0.0
         if part < 6:
             column = (part + 6 * body + (6 if sign < 0.0 else 0)) % 12
-            d_depth = row[pt.D_DEPTH + column]
-            d_share = share_slope(rows, count, k, part + 6 * body) if share < 1.0 else 0.0
+            d_level, d_share = row[pt.D_LEVEL + part + 6 * body], row[pt.D_SHARE + part + 6 * body]
             for q in range(3):
                 dp[q] = row[pt.D_PLACE + 12 * q + column]
                 dn[q] = sign * row[pt.D_NORMAL + 12 * q + column]
@@ -195,7 +252,7 @@ def press(rows, count, k, law, frames, wrench, diagnostics, jac, derivatives, wo
         d_rate = -dot(n, du) - dot(u, dn) + rate * dot(n, dn)
         for q in range(3):
             du[q] += d_rate * n[q] + rate * dn[q]
-        d_force = d_share * f + share * (f_depth * d_depth + f_rate * d_rate)
+        d_force = d_share * f + share * (f_depth * d_level + f_rate * d_rate)
         d_m = m_square * dot(u, du)
         for q in range(3):
             df[q] = d_force * (n[q] - m * u[q]) + share * f * (dn[q] - d_m * u[q] - m * du[q])

@@ -23,7 +23,12 @@ D_PLACE = 10
 D_NORMAL = D_PLACE + 36
 D_DEPTH = D_NORMAL + 36
 SHARE = D_DEPTH + 12
-COLUMNS = SHARE + 1
+LEVEL = SHARE + 1
+"""Depth at which the law of the load is taken, m."""
+D_SHARE = LEVEL + 1
+"""Derivatives of the share, then of the level, by the variations of bodies I and J, whichever is a."""
+D_LEVEL = D_SHARE + 12
+COLUMNS = D_LEVEL + 12
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

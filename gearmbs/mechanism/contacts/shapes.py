@@ -196,6 +196,23 @@ class Mesh(Shape):
     def facets(self) -> tuple[np.ndarray, np.ndarray]:
         return self.vertices, self.triangles
 
+    def shells(self) -> tuple[Mesh, ...]:
+        """Return its separate solids; itself if it is one, or has cavities."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        a, b, c = self.triangles.T
+        joined = coo_array((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, c])), shape=(len(self.vertices),) * 2)
+        shell = connected_components(joined, directed=False)[1][a]
+        parts = [self.triangles[shell == k] for k in np.unique(shell)]
+        if len(parts) == 1 or any(len(part) < 4 or volume(self.vertices, part) <= 0.0 for part in parts):
+            return (self,)
+        found = []
+        for part in parts:
+            kept, back = np.unique(part, return_inverse=True)
+            found.append(Mesh(self.vertices[kept], back.reshape(-1, 3), offset=self.offset, axes=self.axes))
+        return tuple(found)
+
 
 def positive_lengths(label: str, values: Any) -> np.ndarray:
     """Return three lengths, m, given as numbers or texts with units.

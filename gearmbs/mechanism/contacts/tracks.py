@@ -7,7 +7,6 @@ output time to the next is a track; of several that end or begin, those nearest 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.results.frames import frame_motion
 from gearmbs.mechanism.contacts import kernel
 from gearmbs.mechanism.contacts import points as pt
-from gearmbs.mechanism.contacts.loads import LAW_REALS, friction_factor, normal_force, share_out, slip
+from gearmbs.mechanism.contacts.loads import LAW_REALS, friction_factor, normal_force, slip
 from gearmbs.mechanism.contacts.points import dot
 
 if TYPE_CHECKING:
@@ -55,7 +54,7 @@ def incidents(ints, reals, frames, out, work):
     found = 0
     for pair in range(ints[0]):
         count = kernel.points_of(ints, reals, 1 + kernel.PAIR * pair, frames, rows, False, work)
-        share_out(rows, count)
+        kernel.shared(ints[1 + kernel.PAIR * pair], rows, count, False)
         for first in range(count):
             pool = rows[first, pt.POOL]
             seen = pool < 0.0
@@ -66,7 +65,7 @@ def incidents(ints, reals, frames, out, work):
             row = out[found]
             row[:] = 0.0
             row[PAIR] = pair
-            total = 0.0
+            total = size = 0.0
             for k in range(first, count):
                 if rows[k, pt.POOL] != pool:
                     continue
@@ -77,7 +76,7 @@ def incidents(ints, reals, frames, out, work):
                 rate = -dot(n, u)
                 for q in range(3):
                     u[q] += rate * n[q]
-                f = rows[k, pt.SHARE] * normal_force(law, rows[k, pt.DEPTH], rate)[0]
+                f = rows[k, pt.SHARE] * normal_force(law, rows[k, pt.LEVEL], rate)[0]
                 m = friction_factor(law, np.sqrt(dot(u, u)))[0]
                 for q in range(3):
                     row[PLACE + q] += rows[k, pt.SHARE] * rows[k, pt.PLACE + q]
@@ -86,10 +85,13 @@ def incidents(ints, reals, frames, out, work):
                     row[PRESSED + q] += f * n[q]
                     row[RUBBED + q] -= f * m * u[q]
                 row[DEPTH] = max(row[DEPTH], rows[k, pt.DEPTH])
+                total += rows[k, pt.SHARE]
             for q in range(3):
-                total += row[NORMAL + q] ** 2
+                size += row[NORMAL + q] ** 2
             for q in range(3):
-                row[NORMAL + q] /= max(np.sqrt(total), 1e-300)
+                row[NORMAL + q] /= max(np.sqrt(size), 1e-300)
+                row[PLACE + q] /= max(total, 1e-300)
+                row[SLIP + q] /= max(total, 1e-300)
             found += 1
     return found
 
@@ -156,7 +158,7 @@ def contact_tracks(solution: Solution, contact: SolidContact) -> ContactTracks:
     for k in range(solution.t.size):
         tracker.take(k, out[: at(ints, reals, frames[k], out, work)])
     table, touching = tracker.table(solution.t.size)
-    pairs = list(product(range(len(contact.solids_i)), range(len(contact.solids_j))))
+    pairs = [numbers for numbers, _, _ in contact.pairs()]
     half = 0.5 * table[:, :, DEPTH, None] * table[:, :, NORMAL : NORMAL + 3]
     place = table[:, :, PLACE : PLACE + 3]
     return ContactTracks(
