@@ -31,7 +31,9 @@ def two_bumps(n=20, m=10):
 def on_plane(shape, law):
     """Return the load and the diagnostics as functions of the height and the tilt of a solid on a plane."""
     m = Mechanism("pair")
-    element = SolidContact("c", m.body("body", 1.0, (1, 1, 1)).marker(), m.ground.marker(), (shape,), (HalfSpace(),), law)
+    element = SolidContact(
+        "c", m.body("body", 1.0, (1, 1, 1)).marker(), m.ground.marker(), (shape,), (HalfSpace(),), law
+    )
     made = element.compiled()
     tables = np.array(made.integers, dtype=np.int64), np.array(made.reals, dtype=float)
     work, none = np.zeros(made.scratch), np.zeros(0)
@@ -82,8 +84,8 @@ LYING = Rotation.from_rotvec([np.pi / 2, 0.0, 0.0]).as_matrix()
 SINGLE = {
     "box on its face": (Box((0.2, 0.3, 0.4)), 0.2, STANDING, 1.0, 1.0),
     "cylinder standing": (Cylinder(0.1, 0.4), 0.2, STANDING, 1.0, 1.0),
-    "cylinder lying": (Cylinder(0.1, 0.4), 0.1, LYING, 0.9, 1.0),
-    "ball": (Sphere(0.1), 0.1, STANDING, 0.65, 1.15),
+    "cylinder lying": (Cylinder(0.1, 0.4), 0.1, LYING, 0.97, 1.0),
+    "ball": (Sphere(0.1), 0.1, STANDING, 0.95, 1.0),
 }
 
 

@@ -173,7 +173,7 @@ class SolidContact(ForceElement):
         found: list[tuple[tuple[int, int], Shape, Shape]] = []
         for (k, a), (m, b) in product(enumerate(self.solids_i), enumerate(self.solids_j)):
             sides = [shape.shells() if isinstance(shape, Mesh) else (shape,) for shape in (a, b)]
-            found += [((k, m), *pair) for pair in product(*sides)]
+            found += [((k, m), one, other) for one, other in product(*sides)]
         return found
 
     def exact(self) -> bool:
@@ -261,26 +261,21 @@ def plane_faces(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def vertex_weights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return the weight of each vertex: its part of a plane face, the largest of those of its faces.
+    """Return the weight of each vertex: of the triangles around it, the area times the angle there.
 
-    Parts are as, of the triangles around a vertex, the area times the angle there: the corners of a rectangle so have the
-    same whichever way its diagonal runs. Those of a face sum to 1.
+    The corners of a rectangle so have the same weight whichever way its diagonal runs. Those of the plane face in which
+    they are largest sum to 1.
     """
     weights = np.zeros(len(vertices))
     if not len(triangles):
         return weights
-    parts = np.zeros(triangles.shape)
     for k in range(3):
         here, ahead, behind = (vertices[triangles[:, (k + q) % 3]] for q in range(3))
         one, other = ahead - here, behind - here
         area = np.linalg.norm(np.cross(one, other), axis=1)
-        parts[:, k] = area * np.arctan2(area, np.sum(one * other, axis=1))
-    faces = plane_faces(vertices, triangles)
-    whole = np.bincount(faces, parts.sum(axis=1))
-    keys, back = np.unique(faces[:, None] * len(vertices) + triangles, return_inverse=True)
-    own = np.bincount(back.reshape(-1), parts.ravel()) / whole[keys // len(vertices)]
-    np.maximum.at(weights, keys % len(vertices), own)
-    return weights
+        np.add.at(weights, triangles[:, k], area * np.arctan2(area, np.sum(one * other, axis=1)))
+    corners = np.unique(plane_faces(vertices, triangles)[:, None] * len(vertices) + triangles)
+    return weights / np.bincount(corners // len(vertices), weights[corners % len(vertices)]).max()
 
 
 def in_blocks(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
