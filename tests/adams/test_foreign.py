@@ -43,7 +43,7 @@ def test_friction_may_say_inactive_during_statics():
     assert friction.inactive == "STATIC"
 
 
-@pytest.mark.parametrize("name", ["SECTION", "FE_NODE", "CLEARANCE"])
+@pytest.mark.parametrize("name", ["SURFACE", "NODE", "CLEARANCE"])
 def test_statements_of_adams_are_not_taken_for_misspelt_others(name):
     deck = parse_deck(with_lines(f"{name}/1, I=0201\n"))
     assert [d.message for d in deck.unsupported] == [f"{name}/1 is not supported; it changes the motion"]
@@ -157,7 +157,8 @@ def test_the_old_friction_of_joints_is_refused(value):
 
 def test_what_stands_on_parts_that_are_left_out_is_left_out():
     text = with_lines(
-        "FE_PART/9, TYPE=3DBEAM\nMARKER/901, FE_PART=9, NODE_LABEL=1\nJOINT/9, FIXED, I=901, J=0101\n"
+        "FE_PART/9, TYPE=2DXYBEAM, NODE_LABELS=1,2, COORDINATES=0,1, SECTION=1,1, MATERIAL=1\n"
+        "MARKER/901, FE_PART=9, NODE_LABEL=1\nJOINT/9, FIXED, I=901, J=0101\n"
         "SFORCE/9, TRANSLATIONAL, I=901, J=0101, FUNCTION=1\nMOTION/9, JOINT=9, FUNCTION=0\n"
     )
     result = run_deck(parse_deck(text), end=0.01, steps=1, allow_unsupported=True)
@@ -203,17 +204,17 @@ def test_what_is_not_modelled_can_be_switched_and_requests_stay():
 
 
 def test_one_remark_for_many_of_a_kind():
-    """Thirty variables that nothing reads, with a function that is not there; thirty markers on deformable bodies."""
+    """Thirty variables that nothing reads, with a function that is not there; thirty markers on curves."""
     lines = "".join(f"VARIABLE/{n}, FUNCTION=RANDOM(1,2,3)\n" for n in range(1, 31))
     found = [m for m in run_deck(parse_deck(with_lines(lines)), end=0.01, steps=1).messages if "RANDOM" in m]
     assert len(found) == 1
     assert "VARIABLE/1, VARIABLE/2, VARIABLE/3, VARIABLE/4 and 26 more: FUNCTION" in found[0]
-    lines = "".join(f"MARKER/{n}, FE_PART=1, NODE_LABEL={n}\n" for n in range(5001, 5031))
+    lines = "".join(f"MARKER/{n}, PART=01, CURVE=1\n" for n in range(5001, 5031))
     with pytest.raises(DeckError) as refused:
         run_deck(parse_deck(with_lines(lines)), end=0.01, steps=1)
-    assert len(refused.value.diagnostics) == 60
-    assert len(str(refused.value).splitlines()) == 2
-    assert "MARKER/5004 and 26 more: FE_PART is not supported" in str(refused.value)
+    assert len(refused.value.diagnostics) == 30
+    assert len(str(refused.value).splitlines()) == 1
+    assert "MARKER/5004 and 26 more: CURVE is not supported" in str(refused.value)
 
 
 def test_friction_takes_any_word_for_when_it_rests():

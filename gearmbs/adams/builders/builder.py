@@ -130,7 +130,11 @@ class Builder:
             for statement in deforming.values():
                 self.attempt(statement, partial(make, self))
         for marker in self.deck.of(st.Marker).values():
-            on_node = markers.get(marker.owner()[0])
+            owner = marker.owner()
+            if owner in self.left_out:
+                self.left_out.add(("MARKER", marker.id))
+                continue
+            on_node = markers.get(owner[0])
             self.attempt(marker, partial(on_node, self) if on_node is not None else self.add_marker)
         return not any(d.severity == ERROR for d in self.problems)
 
@@ -146,11 +150,9 @@ class Builder:
         return next((ref for ref in joints_of(s) if ("JOINT", ref) in self.inactive), None)
 
     def absent_marker(self, statement: st.Statement) -> int | None:
-        """Return a marker of a statement that is on no part or flexible body, and so is left out; None without one."""
-        markers = self.deck.of(st.Marker)
+        """Return a marker of a statement that is left out with what it is on; None without one."""
         refs = [getattr(statement, name, None) for name in MARKER_FIELDS]
-        owned = {ref for ref, marker in markers.items() if marker.owner() != ("PART", None)}
-        return next((ref for ref in refs if ref in markers and ref not in owned), None)
+        return next((ref for ref in refs if ("MARKER", ref) in self.left_out), None)
 
     def attempt(self, statement: st.Statement, add: Callable[[Any], None]) -> None:
         """Add one statement; what is wrong with it gets its line, and so does what it warns of."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.adams.builders.builder import Builder
+from gearmbs.adams.builders.builder import Builder, LeftOutError
 from gearmbs.adams.builders.frames import marker_orientation, part_orientation
 from gearmbs.adams.builders.model import BodyState
 from gearmbs.adams.errors import WARNING
@@ -67,7 +67,7 @@ def add_fe_part(b: Builder, s: st.FePart) -> None:
     from gearmbs.flexible.large_beam import LargeBeam
 
     if (s.type or "").upper() != "3DBEAM":
-        raise ValueError(f"TYPE = {s.type} is not read; 3DBEAM is")
+        raise LeftOutError(f"TYPE = {s.type}")
     places, turns = _line(b, s)
     sections = _sections(b, s)
     name = b.claim(s, "fe_part")
