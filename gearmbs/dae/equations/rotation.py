@@ -71,12 +71,12 @@ def cross_into(ax, ay, az, bx, by, bz, out, k):
     out[k + 2] = ax * by - ay * bx
 
 
-@njit("void(float64, float64, float64, int64, float64[::1], int64)", cache=True, error_model="numpy")
-def rotation_matrix(psi, theta, phi, code, out, k):
-    """Write A (row-major) of the 3-1-3 angles and the reference code to ``out[k:k+9]``."""
-    c1, s1 = np.cos(psi), np.sin(psi)
-    c2, s2 = np.cos(theta), np.sin(theta)
-    c3, s3 = np.cos(phi), np.sin(phi)
+@njit(cache=True, error_model="numpy", forceinline=True)
+def matrix_of(turn_1, turn_2, turn_3, code, out, k):
+    """Write A (row-major) to ``out[k:k+9]`` from cosine and sine of each of the three angles."""
+    c1, s1 = turn_1
+    c2, s2 = turn_2
+    c3, s3 = turn_3
     xx, xy, xz = c1 * c3 - s1 * c2 * s3, -c1 * s3 - s1 * c2 * c3, s1 * s2
     yx, yy, yz = s1 * c3 + c1 * c2 * s3, -s1 * s3 + c1 * c2 * c3, -c1 * s2
     zx, zy, zz = s2 * s3, s2 * c3, c2
@@ -88,6 +88,12 @@ def rotation_matrix(psi, theta, phi, code, out, k):
         out[k], out[k + 1], out[k + 2] = xx, -xz, xy
         out[k + 3], out[k + 4], out[k + 5] = yx, -yz, yy
         out[k + 6], out[k + 7], out[k + 8] = zx, -zz, zy
+
+
+@njit("void(float64, float64, float64, int64, float64[::1], int64)", cache=True, error_model="numpy")
+def rotation_matrix(psi, theta, phi, code, out, k):
+    """Write A (row-major) of the 3-1-3 angles and the reference code to ``out[k:k+9]``."""
+    matrix_of((np.cos(psi), np.sin(psi)), (np.cos(theta), np.sin(theta)), (np.cos(phi), np.sin(phi)), code, out, k)
 
 
 @njit("void(float64[::1], int64, int64, float64[::1], int64)", cache=True, error_model="numpy")
@@ -117,12 +123,11 @@ def best_reference(a, k):
     return REFERENCE_QUARTER_TURN
 
 
-@njit("void(float64, float64, float64, float64, float64, float64[:, ::1], int64)", cache=True, error_model="numpy")
-def axes_and_velocity(psi, theta, e1, e2, e3, kin, b):
-    """Fill axes, omega, d(omega)/d(theta) and axis rates of body b in the kinematics table."""
-    c1, s1 = np.cos(psi), np.sin(psi)
-    c2, s2 = np.cos(theta), np.sin(theta)
-    row = kin[b]
+@njit(cache=True, error_model="numpy", forceinline=True)
+def axes_of(turn_1, turn_2, e1, e2, e3, row):
+    """Fill what `axes_and_velocity` does in a row of the kinematics table, from cosine and sine of psi and theta."""
+    c1, s1 = turn_1
+    c2, s2 = turn_2
     g = KIN_AXES
     row[g], row[g + 1], row[g + 2] = 0.0, 0.0, 1.0
     row[g + 3], row[g + 4], row[g + 5] = c1, s1, 0.0
@@ -138,6 +143,12 @@ def axes_and_velocity(psi, theta, e1, e2, e3, kin, b):
     row[r] = row[r + 1] = row[r + 2] = 0.0
     row[r + 3], row[r + 4], row[r + 5] = -e1 * s1, e1 * c1, 0.0
     cross_into(e2 * c1, e2 * s1, e1, row[g + 6], row[g + 7], row[g + 8], row, r + 6)
+
+
+@njit("void(float64, float64, float64, float64, float64, float64[:, ::1], int64)", cache=True, error_model="numpy")
+def axes_and_velocity(psi, theta, e1, e2, e3, kin, b):
+    """Fill axes, omega, d(omega)/d(theta) and axis rates of body b in the kinematics table."""
+    axes_of((np.cos(psi), np.sin(psi)), (np.cos(theta), np.sin(theta)), e1, e2, e3, kin[b])
 
 
 @njit("void(float64[:, ::1], int64, float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
@@ -208,12 +219,14 @@ __all__ = [
     "REFERENCE_QUARTER_TURN",
     "SWITCH_SINE",
     "axes_and_velocity",
+    "axes_of",
     "best_reference",
     "cross_into",
     "euler_angles",
     "euler_from_matrix",
     "euler_rates",
     "matrix_from_euler",
+    "matrix_of",
     "momentum_from_conjugate",
     "rotation_matrix",
 ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import layout as T
@@ -18,8 +20,8 @@ from gearmbs.dae.equations.rotation import (
     KIN_R,
     KIN_V,
     KIN_W,
-    axes_and_velocity,
-    rotation_matrix,
+    axes_of,
+    matrix_of,
 )
 
 
@@ -79,8 +81,9 @@ def update_bodies(y, at, code, body, modal, kin, partial, scratch, derivatives):
             row[KIN_R + c] = y[r + c]
             row[KIN_V + c] = y[u + c]
         psi, theta, phi = y[th], y[th + 1], y[th + 2]
-        rotation_matrix(psi, theta, phi, code[b], row, KIN_A)
-        axes_and_velocity(psi, theta, y[e], y[e + 1], y[e + 2], kin, b)
+        turn_1, turn_2 = (np.cos(psi), np.sin(psi)), (np.cos(theta), np.sin(theta))
+        matrix_of(turn_1, turn_2, (np.cos(phi), np.sin(phi)), code[b], row, KIN_A)
+        axes_of(turn_1, turn_2, y[e], y[e + 1], y[e + 2], row)
         inertia_times(row, body[b], row, KIN_W, row, KIN_H, scratch)
         if at[b, T.AT_MODES] > 0:
             add_momentum(y, at[b], partial, row)
@@ -91,14 +94,19 @@ def update_bodies(y, at, code, body, modal, kin, partial, scratch, derivatives):
 @njit(cache=True, error_model="numpy", forceinline=True)
 def update_marker(m, marker_body, marker, kin, frame):
     """Fill one row of the marker table: arm and axes in global components."""
-    row = kin[marker_body[m]]
-    for c in range(3):
-        a = KIN_A + 3 * c
-        frame[m, T.MK_ARM + c] = dot3(row, a, marker[m], 0)
-        for axis in range(3):
-            frame[m, T.MK_AXES + 3 * axis + c] = (
-                row[a] * marker[m, 3 + axis] + row[a + 1] * marker[m, 6 + axis] + row[a + 2] * marker[m, 9 + axis]
-            )
+    row, own, out = kin[marker_body[m]], marker[m], frame[m]
+    # copied out, or the compiler reads them anew after each number that is written
+    xx, xy, xz = row[KIN_A], row[KIN_A + 1], row[KIN_A + 2]
+    yx, yy, yz = row[KIN_A + 3], row[KIN_A + 4], row[KIN_A + 5]
+    zx, zy, zz = row[KIN_A + 6], row[KIN_A + 7], row[KIN_A + 8]
+    for v in range(4):
+        # the arm, then the columns of a row-major matrix
+        at, step = (0, 1) if v == 0 else (2 + v, 3)
+        a, b, c = own[at], own[at + step], own[at + 2 * step]
+        k = T.MK_ARM + 3 * v
+        out[k] = xx * a + xy * b + xz * c
+        out[k + 1] = yx * a + yy * b + yz * c
+        out[k + 2] = zx * a + zy * b + zz * c
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
