@@ -155,7 +155,9 @@ def _faces(rows, pose_a, half_a, pose_b, half_b, k, swapped, origins, derivative
         limit = dot(side, pose_b[9:12]) + half_b[(k + 1 + s // 2) % 3]
         count = _clip(count, polygon, other, s, side, limit)
         polygon, other = other, polygon
-    level = dot(n, pose_b[9:12]) + half_b[k]
+    level, around = dot(n, pose_b[9:12]) + half_b[k], 0.0
+    for c in range(count):
+        around += _length(polygon[c], polygon[(c + 1) % count]) + LEAST
     found = 0
     for c in range(count):
         corner = polygon[c]
@@ -166,7 +168,8 @@ def _faces(rows, pose_a, half_a, pose_b, half_b, k, swapped, origins, derivative
         found += 1
         row[pt.DEPTH], row[pt.POOL], row[pt.SWAPPED] = depth, 0.0, swapped
         before = polygon[c - 1 if c > 0 else count - 1]
-        row[pt.WEIGHT] = _length(corner, polygon[(c + 1) % count]) + _length(corner, before) + LEAST
+        beside = _length(corner, polygon[(c + 1) % count]) + _length(corner, before)
+        row[pt.WEIGHT] = (0.5 * beside + LEAST) / around
         for q in range(3):
             row[pt.NORMAL + q] = n[q]
             row[pt.PLACE + q] = corner[q] + 0.5 * depth * n[q]

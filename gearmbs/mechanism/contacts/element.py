@@ -13,7 +13,7 @@ from gearmbs.dae.equations.force_elements import Diagnostic
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.contacts import fields, kernel
 from gearmbs.mechanism.contacts.boxes import MOST
-from gearmbs.mechanism.contacts.facets import BLOCK
+from gearmbs.mechanism.contacts.facets import BLOCK, TINY
 from gearmbs.mechanism.contacts.loads import IMPACT, LAW_REALS, POISSON
 from gearmbs.mechanism.contacts.points import COLUMNS
 from gearmbs.mechanism.contacts.shapes import (
@@ -35,6 +35,8 @@ REVERSAL = 1e-3
 """Speed, m/s, about which the penalty goes over from compression to restitution."""
 FLAT = 1e-6
 """Angle, rad, below which two triangles lie in one plane."""
+LEAST = 1e-12
+"""Least weight of a vertex over the largest: one at the end of slivers alone would divide nothing by nothing."""
 CONVEX = (Ellipsoid, Box, Cylinder, Frustum, Torus)
 ANALYTIC = (Sphere, Ellipsoid, Box, Cylinder, Frustum, Torus, HalfSpace)
 
@@ -248,7 +250,7 @@ def plane_faces(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), TINY)[:, None]
     edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     order = np.lexsort(edges.T)
     one, other = order[:-1], order[1:]
@@ -264,16 +266,17 @@ def vertex_weights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Return the weight of each vertex: of the triangles around it, the area times the angle there.
 
     The corners of a rectangle so have the same weight whichever way its diagonal runs. Those of the plane face in which
-    they are largest sum to 1.
+    they are largest sum to 1. A point without triangles has the weight 1.
     """
-    weights = np.zeros(len(vertices))
     if not len(triangles):
-        return weights
+        return np.ones(len(vertices))
+    weights = np.zeros(len(vertices))
     for k in range(3):
         here, ahead, behind = (vertices[triangles[:, (k + q) % 3]] for q in range(3))
         one, other = ahead - here, behind - here
         area = np.linalg.norm(np.cross(one, other), axis=1)
         np.add.at(weights, triangles[:, k], area * np.arctan2(area, np.sum(one * other, axis=1)))
+    weights = np.maximum(weights, LEAST * weights.max())
     corners = np.unique(plane_faces(vertices, triangles)[:, None] * len(vertices) + triangles)
     return weights / np.bincount(corners // len(vertices), weights[corners % len(vertices)]).max()
 

@@ -16,7 +16,7 @@ from gearmbs.mechanism.contacts import points as pt
 from gearmbs.mechanism.contacts.boxes import SCRATCH, two_boxes
 from gearmbs.mechanism.contacts.facets import BLOCK, join_patches, vertices_below
 from gearmbs.mechanism.contacts.fields import BOX, MESH, distance
-from gearmbs.mechanism.contacts.loads import LAW_REALS, press, share_by_norm, share_out
+from gearmbs.mechanism.contacts.loads import LAW_REALS, press, share_out
 from gearmbs.mechanism.contacts.points import local_point
 from gearmbs.mechanism.contacts.smooth_pairs import ball_and_solid, convex_and_plane
 
@@ -126,14 +126,6 @@ def _compacted(rows, count):
     return kept
 
 
-@njit(cache=True, error_model="numpy")
-def shared(family, rows, count, derivatives):
-    """Write the shares of a pair's points in its load; return how many patches they are."""
-    if family == FACETS:
-        return share_by_norm(rows, count, derivatives)
-    return share_out(rows, count, derivatives)
-
-
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
 def contact_of_solids(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
     """Write the wrench of all pairs on I's body; see `gearmbs.dae.equations.force_elements`.
@@ -145,6 +137,6 @@ def contact_of_solids(ints, reals, t, frames, states, inputs, want, work, wrench
     rows = matrix_at(work, ROWS, (work.size - ROWS) // pt.COLUMNS, pt.COLUMNS)
     for pair in range(ints[0]):
         count = points_of(ints, reals, 1 + PAIR * pair, frames, rows, derivatives, work)
-        diagnostics[3] += shared(ints[1 + PAIR * pair], rows, count, derivatives)
+        diagnostics[3] += share_out(rows, count, derivatives)
         for k in range(count):
             press(rows[k], law, frames, wrench, diagnostics, jac, derivatives, vector_at(work, GEOMETRY, 36))

@@ -6,10 +6,9 @@ With n from J to I, depth d, u the velocity of I's against J's material point, d
     POISSON    f = p d s(d'),  s = STEP(d', -v_0, r^2, v_0, 1)
     friction   F = f n - f m(v) u_t,  m(v) = mu(v) / v
 
-mu(v) rises by STEP from -mu_s at -v_s to mu_s at v_s, and goes over to mu_d at v_d. Of several points of two boxes each
-has the share w d / sum(w d) of its load; faceted solids have one load, of the law at the level D, which their points
-share by dD/dd. A spring that presses with p and expands with r^2 p gives back r^2 of its
-energy and r of the impulse: r is the coefficient of restitution.
+mu(v) rises by STEP from -mu_s at -v_s to mu_s at v_s, and goes over to mu_d at v_d. Two solids have one load, of the
+law at the level D, which their points share by dD/dd. A spring that presses with p and expands with r^2 p gives back
+r^2 of its energy and r of the impulse: r is the coefficient of restitution.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ MU_STATIC, MU_DYNAMIC, STICTION, FRICTION = 8, 9, 10, 11
 """Coefficients, and the speeds at which they are reached, m/s."""
 LAW_REALS = 12
 NORM = 300
-"""q of the level of faceted solids: D lies near the largest depth; twice as many vertices add 2^(1/q) - 1, 0.23 %."""
+"""q of the level of two solids: D lies near the largest depth; twice as many vertices add 2^(1/q) - 1, 0.23 %."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -76,37 +75,6 @@ def friction_factor(law, speed):
     return mu / speed, (slope - mu / speed) / speed**2
 
 
-@njit(cache=True, error_model="numpy")
-def share_out(rows, count, derivatives):
-    """Write the share of each point in the load of its patch, and its depth as level; return the number of patches.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (points, COLUMNS)
-    count : int
-    derivatives : bool
-    """
-    patches = 0
-    for k in range(count):
-        row = rows[k]
-        row[pt.SHARE], row[pt.LEVEL] = 0.0, row[pt.DEPTH]
-        if row[pt.POOL] < 0.0:
-            continue
-        total, first = 0.0, True
-        for m in range(count):
-            if rows[m, pt.POOL] == row[pt.POOL]:
-                total += rows[m, pt.WEIGHT] * rows[m, pt.DEPTH]
-                first = first and m >= k
-        patches += first
-        row[pt.SHARE] = row[pt.WEIGHT] * row[pt.DEPTH] / total
-        if not derivatives:
-            continue
-        for c in range(12):
-            row[pt.D_LEVEL + c] = _d_depth(row, c)
-            row[pt.D_SHARE + c] = _share_slope(rows, count, k, c) if row[pt.SHARE] < 1.0 else 0.0
-    return patches
-
-
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _d_depth(row, c):
     """Return the derivative of a point's depth by one of the twelve variations of bodies I and J."""
@@ -114,21 +82,11 @@ def _d_depth(row, c):
 
 
 @njit(cache=True, error_model="numpy")
-def _share_slope(rows, count, k, c):
-    """Return the derivative of a point's share by one of the twelve variations of bodies I and J."""
-    total = slopes = 0.0
-    for m in range(count):
-        if rows[m, pt.POOL] == rows[k, pt.POOL]:
-            total += rows[m, pt.WEIGHT] * rows[m, pt.DEPTH]
-            slopes += rows[m, pt.WEIGHT] * _d_depth(rows[m], c)
-    return (rows[k, pt.WEIGHT] * _d_depth(rows[k], c) - rows[k, pt.SHARE] * slopes) / total
+def share_out(rows, count, derivatives):
+    """Write shares g = dD/dd of the points of a pair in one load at the level D; return how many patches they are.
 
-
-@njit(cache=True, error_model="numpy")
-def share_by_norm(rows, count, derivatives):
-    """Write shares g = dD/dd of the points of two faceted solids in one load at the level D; return their patches.
-
-    D^q = sum(w d^q), so that the loads g f(D) are the gradient of one potential, however patches join or part.
+    D^q = sum(w d^q), so that the loads g f(D) are the gradient of one potential, however patches join or part. A single
+    point of weight 1 bears all of it at its own depth.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ PLACE = 0
 NORMAL = 3
 DEPTH = 6
 WEIGHT = 7
-"""Share of a pool's load, before it is weighed with the depth."""
+"""In the level of the pair: those of a plane face, or around the overlap of two boxes, sum to 1."""
 POOL = 8
 """Number of the patch to which the point belongs; negative: not in contact."""
 SWAPPED = 9

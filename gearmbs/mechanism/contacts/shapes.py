@@ -14,6 +14,9 @@ from gearmbs.mechanism.quantities import quantity
 SEGMENTS = 48
 """Around a solid of revolution that is cut into triangles."""
 LEVELS = 24
+NOTHING = 1e-12
+"""Part of the cube of its length that a solid's volume exceeds: that of a sheet is rounding."""
+TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -62,6 +65,8 @@ class Sphere(Shape):
     radius: Any
 
     def facets(self) -> tuple[np.ndarray, np.ndarray]:
+        if self.radius == 0.0:
+            return np.zeros((1, 3)), np.zeros((0, 3), dtype=np.int64)
         angles = np.linspace(-np.pi / 2, np.pi / 2, LEVELS + 1)
         return revolved(self.radius * np.cos(angles), self.radius * np.sin(angles))
 
@@ -164,6 +169,9 @@ class HalfSpace(Shape):
 class Mesh(Shape):
     """A closed surface of triangles, whose vertices are seen anticlockwise from outside.
 
+    Triangles that are seen the other way than most of those they hang together with are turned round, and vertices of
+    no triangle left out.
+
     Attributes
     ----------
     vertices : array_like, shape (n, 3)
@@ -177,18 +185,26 @@ class Mesh(Shape):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        vertices = np.asarray(self.vertices, dtype=float).reshape(-1, 3)
-        triangles = np.asarray(self.triangles, dtype=np.int64).reshape(-1, 3)
+        vertices, triangles = (
+            threes("mesh: vertices", self.vertices, float),
+            threes("mesh: triangles", self.triangles, int),
+        )
         if len(triangles) < 4:
             raise ModelError(f"mesh: {len(triangles)} triangles; a solid has at least four")
-        if triangles.min() < 0 or triangles.max() >= len(vertices) or not np.isfinite(vertices).all():
+        if not np.isfinite(vertices).all() or not ((triangles >= 0) & (triangles < len(vertices))).all():
             raise ModelError("mesh: triangles must name vertices by their number, from 0 on, and vertices be finite")
         vertices, triangles = merged(vertices, triangles)
+        if len(triangles) < 4:
+            raise ModelError(f"mesh: {len(triangles)} triangles whose corners are apart; a solid has at least four")
         edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
         _, uses = np.unique(edges, axis=0, return_counts=True)
         if np.any(uses % 2):
             raise ModelError(f"mesh: {np.sum(uses % 2)} edges belong to one triangle only; a solid's surface is closed")
-        if volume(vertices, triangles) < 0.0:
+        triangles = turned_alike(triangles)
+        inside = volume(vertices, triangles)
+        if abs(inside) <= NOTHING * float(np.ptp(vertices, axis=0).max()) ** 3:
+            raise ModelError(f"mesh: its surface encloses {abs(inside)} m^3; a solid has a volume")
+        if inside < 0.0:
             triangles = triangles[:, ::-1].copy()
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "triangles", triangles)
@@ -229,6 +245,63 @@ def positive_lengths(label: str, values: Any) -> np.ndarray:
     return found
 
 
+def threes(label: str, values: Any, kind: type) -> np.ndarray:
+    """Return rows of three numbers.
+
+    Raises
+    ------
+    ModelError
+    """
+    try:
+        given = np.asarray(values)
+        found = given.astype(kind, copy=False)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ModelError(f"{label} must be rows of three numbers: {error}") from None
+    if kind is int and np.any(found != given):
+        raise ModelError(f"{label} must name vertices by whole numbers, not {given.dtype}")
+    if found.ndim != 2 or found.shape[1] != 3:
+        raise ModelError(f"{label} have the shape {found.shape}; give rows of three numbers, shape (n, 3)")
+    return found
+
+
+def turned_alike(triangles: np.ndarray) -> np.ndarray:
+    """Return the triangles of a closed surface so that neighbours run along their common edge in opposite directions.
+
+    Of those that hang together by edges of two triangles, the fewer are turned round.
+
+    Raises
+    ------
+    ModelError
+        If there is no such way, as for a surface with one side.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    n = len(triangles)
+    ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    order = np.lexsort(np.sort(ends, axis=1).T)
+    along = np.sort(ends, axis=1)[order]
+    first = np.flatnonzero(np.r_[True, np.any(np.diff(along, axis=0) != 0, axis=1)])
+    first = first[np.diff(np.r_[first, 3 * n]) == 2]
+    one, other = order[first], order[first + 1]
+    alike = ends[one, 0] != ends[other, 0]
+    if alike.all():
+        return triangles
+    # each triangle stands twice, as it is and turned round; those that go together are joined
+    a, b = one % n, other % n
+    b, c = np.where(alike, b, b + n), np.where(alike, b + n, b)
+    joined = coo_array((np.ones(2 * len(a)), (np.r_[a, a + n], np.r_[b, c])), shape=(2 * n, 2 * n))
+    count, parts = connected_components(joined, directed=False)
+    here, there = parts[:n], parts[n:]
+    if np.any(here == there):
+        raise ModelError(
+            "mesh: its surface has one side only, as a Moebius strip has; a solid's has an inner and an outer one"
+        )
+    held = np.bincount(here, minlength=count)
+    fewer = (held[here] < held[there]) | ((held[here] == held[there]) & (here > there))
+    return np.where(fewer[:, None], triangles[:, ::-1], triangles)
+
+
 def volume(vertices: np.ndarray, triangles: np.ndarray) -> float:
     """Return the volume a surface encloses, negative if its triangles are seen clockwise."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
@@ -236,12 +309,13 @@ def volume(vertices: np.ndarray, triangles: np.ndarray) -> float:
 
 
 def merged(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a mesh whose coincident vertices are one and whose triangles have an area."""
-    size = float(np.ptp(vertices, axis=0).max())
+    """Return a mesh whose coincident vertices are one and all used, and whose triangles have three corners."""
+    size = max(float(np.ptp(vertices, axis=0).max()), TINY)
     _, first, back = np.unique(np.round(vertices / (1e-9 * size)), axis=0, return_index=True, return_inverse=True)
     triangles = back.reshape(-1)[triangles]
     a, b, c = triangles.T
-    return vertices[first], triangles[(a != b) & (b != c) & (c != a)]
+    used, back = np.unique(triangles[(a != b) & (b != c) & (c != a)], return_inverse=True)
+    return vertices[first[used]], back.reshape(-1, 3)
 
 
 def revolved(radii: np.ndarray, z: np.ndarray, closed: bool = False) -> tuple[np.ndarray, np.ndarray]:

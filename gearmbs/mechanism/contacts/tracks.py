@@ -20,7 +20,7 @@ from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.results.frames import frame_motion
 from gearmbs.mechanism.contacts import kernel
 from gearmbs.mechanism.contacts import points as pt
-from gearmbs.mechanism.contacts.loads import LAW_REALS, friction_factor, normal_force, slip
+from gearmbs.mechanism.contacts.loads import LAW_REALS, friction_factor, normal_force, share_out, slip
 from gearmbs.mechanism.contacts.points import dot
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def incidents(ints, reals, frames, out, work):
     found = 0
     for pair in range(ints[0]):
         count = kernel.points_of(ints, reals, 1 + kernel.PAIR * pair, frames, rows, False, work)
-        kernel.shared(ints[1 + kernel.PAIR * pair], rows, count, False)
+        share_out(rows, count, False)
         for first in range(count):
             pool = rows[first, pt.POOL]
             seen = pool < 0.0

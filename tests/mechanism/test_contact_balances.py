@@ -1,0 +1,170 @@
+"""Contact between solids: no energy out of nothing, the same load from either side, meshes that are not quite whole."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gearmbs.dae.errors import ModelError
+from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.contacts import (
+    Box,
+    Coulomb,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Impact,
+    Mesh,
+    SolidContact,
+    Sphere,
+    Torus,
+    extruded,
+)
+from gearmbs.mechanism.contacts.shapes import volume
+
+ELASTIC = Impact(1e7, 1.5, 0.0, 1e-4)
+CUBE = Box((0.1, 0.1, 0.1)).facets()
+ANGLE = Mesh(*extruded(0.01 * np.array([[0, 0], [10, 0], [10, 4], [4, 4], [4, 10], [0, 10]]) - 0.04, 0.06))
+
+
+def loads(first, second, law, friction=None):
+    """Return the load on the first of two solids and the diagnostics as functions of the frames of both."""
+    m = Mechanism("pair")
+    i, j = (m.body(name, 1.0, (1, 1, 1)).marker() for name in "ij")
+    made = SolidContact("c", i, j, (first,), (second,), law, friction).compiled()
+    tables = np.array(made.integers, dtype=np.int64), np.array(made.reals, dtype=float)
+    work, none = np.zeros(made.scratch), np.zeros(0)
+
+    def load(frames):
+        wrench, told = np.zeros((1, 6)), np.zeros(6)
+        made.kernel(*tables, 0.0, frames, none, none, 2, work, wrench, none, np.zeros((6, 24)), told)
+        return wrench[0], told
+
+    return load
+
+
+def frame(place, turn, velocity=(0, 0, 0), spin=(0, 0, 0)):
+    return np.r_[place, turn.as_matrix().ravel(), velocity, spin]
+
+
+def work_around(load, corners, steps=400):
+    """Return the work of the load on a body on its way around corners of heights and tilts, and the most of one leg."""
+    part, weight = np.polynomial.legendre.leggauss(steps)
+    legs = []
+    for (z0, a0), (z1, a1) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        leg = 0.0
+        for u, w in zip(0.5 * (part + 1.0), 0.5 * weight, strict=True):
+            turn = Rotation.from_rotvec([0.0, a0 + (a1 - a0) * u, 0.0])
+            frames = np.array([frame((0, 0, z0 + (z1 - z0) * u), turn), frame((0, 0, 0), Rotation.identity())])
+            wrench, _ = load(frames)
+            leg += w * (wrench[2] * (z1 - z0) + wrench[4] * (a1 - a0))
+        legs.append(leg)
+    return sum(legs), max(np.abs(legs))
+
+
+@pytest.mark.parametrize("tilt", [1e-2, 1e-1])
+@pytest.mark.parametrize("floor", [Box((0.3, 0.3, 0.1), offset=(0, 0, -0.05)), HalfSpace()])
+def test_a_box_gains_no_energy_around_a_loop(floor, tilt):
+    load = loads(Box((0.1, 0.1, 0.1)), floor, ELASTIC)
+    total, leg = work_around(load, [(0.0501, 0.0), (0.049, 0.0), (0.049, tilt), (0.0501, tilt)])
+    assert abs(total) < 1e-6 * leg
+
+
+@pytest.mark.parametrize(
+    ("solid", "floor"),
+    [
+        (Box((0.1, 0.1, 0.1)), Box((1, 1, 0.2), offset=(0, 0, -0.1))),
+        (Mesh(*CUBE), Box((1, 1, 0.2), offset=(0, 0, -0.1))),
+        (ANGLE, Mesh(*Box((1, 1, 0.2)).facets(), offset=(0, 0, -0.1))),
+        (Cylinder(0.05, 0.1), HalfSpace()),
+        (Torus(0.04, 0.02), HalfSpace()),
+    ],
+    ids=lambda solid: solid.kind,
+)
+@pytest.mark.parametrize("tilt", [(0.002, 0.001, 0.0), (0.3, 0.2, 0.1)])
+def test_an_elastic_body_that_rocks_keeps_its_energy(solid, floor, tilt):
+    m = Mechanism("rocking", gravity=(0, 0, -9.81))
+    turn = Rotation.from_rotvec(tilt)
+    low = (turn.apply(solid.facets()[0]))[:, 2].min()
+    body = m.body("body", 1.0, (2e-3, 2.5e-3, 3e-3), position=(0, 0, 2e-3 - low), orientation=turn.as_matrix())
+    m.contact("floor", body.marker(), solid, m.ground.marker(), floor, ELASTIC)
+    energy = m.simulate(0.3, rate=1000, tol=1e-8).energy_balance()
+    total = (energy.kinetic + energy.gravity + energy.elastic).values
+    assert energy.elastic.values.max() > 1e-3
+    # the whole fall is 2 mm: 0.02 J
+    assert np.ptp(total) < 2e-4
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (Box((0.1, 0.06, 0.08)), Box((0.08, 0.1, 0.06))),
+        (Ellipsoid((0.05, 0.03, 0.04)), Sphere(0.04)),
+        (ANGLE, Torus(0.05, 0.015)),
+        (ANGLE, Sphere(0.0)),
+    ],
+    ids=lambda solid: solid.kind,
+)
+def test_the_load_is_the_same_from_either_side_and_in_a_turned_world(first, second):
+    law, friction = Impact(1e6, 1.5, 300.0, 1e-3), Coulomb(0.4, 0.3, 0.01, 0.05)
+    load, other = loads(first, second, law, friction), loads(second, first, law, friction)
+    rng = np.random.default_rng(5)
+    found = 0
+    while found < 12:
+        turns = Rotation.random(2, random_state=rng)
+        frames = np.array(
+            [frame(0.05 * rng.normal(size=3), turns[k], *0.1 * rng.normal(size=(2, 3))) for k in range(2)]
+        )
+        wrench, told = load(frames)
+        if told[3] == 0 or told[4] > 0.01:
+            continue
+        found += 1
+        size = np.linalg.norm(wrench[:3])
+        assert size <= told[5] * np.hypot(1.0, 0.4) * (1.0 + 1e-9)
+        back, _ = other(frames[::-1].copy())
+        arm = frames[0, :3] - frames[1, :3]
+        np.testing.assert_allclose(back[:3], -wrench[:3], atol=1e-9 * size)
+        np.testing.assert_allclose(back[3:], -wrench[3:] - np.cross(arm, wrench[:3]), atol=1e-9 * size)
+        world, shift = Rotation.random(random_state=rng), rng.normal(size=3)
+        moved = np.array(
+            [frame(world.apply(f[:3]) + shift, world * turn, world.apply(f[12:15]), world.apply(f[15:]))
+             for f, turn in zip(frames, turns, strict=True)]
+        )  # fmt: skip
+        there, _ = load(moved)
+        np.testing.assert_allclose(there, world.apply(wrench.reshape(2, 3)).ravel(), atol=1e-7 * size)
+
+
+def test_vertices_of_no_triangle_touch_nothing():
+    vertices, triangles = CUBE
+    whole = Mesh(np.r_[vertices, [[0.0, 0.0, -0.2]]], triangles)
+    load = loads(whole, HalfSpace(), ELASTIC)
+    at = np.array([frame((0, 0, 0.0499), Rotation.identity()), frame((0, 0, 0), Rotation.identity())])
+    wrench, told = load(at)
+    assert wrench[2] == pytest.approx(1e7 * 1e-4**1.5, rel=1e-9)
+    assert told[4] == pytest.approx(1e-4)
+
+
+@pytest.mark.parametrize("solid", [Torus(0.05, 0.01), Box((1, 2, 3))], ids=lambda solid: solid.kind)
+def test_triangles_seen_from_inside_are_turned_round(solid):
+    vertices, triangles = solid.facets()
+    some = np.random.default_rng(3).random(len(triangles)) < 0.3
+    mixed = np.where(some[:, None], triangles[:, ::-1], triangles)
+    whole, mended = Mesh(vertices, triangles), Mesh(vertices, mixed)
+    assert volume(mended.vertices, mended.triangles) == pytest.approx(volume(whole.vertices, whole.triangles))
+
+
+@pytest.mark.parametrize(
+    ("vertices", "triangles", "says"),
+    [
+        (CUBE[0] * (1, 1, 0), CUBE[1], "its surface encloses"),
+        (np.zeros((8, 3)), CUBE[1], "0 triangles whose corners are apart"),
+        (CUBE[0][:, :2], CUBE[1], r"vertices have the shape \(8, 2\); give rows of three numbers"),
+        (CUBE[0], CUBE[1] + 0.5, "whole numbers"),
+        ("points", CUBE[1], "rows of three numbers"),
+        (CUBE[0], CUBE[1][1:], "belong to one triangle only"),
+    ],
+)
+def test_what_is_no_solid_is_refused(vertices, triangles, says):
+    with pytest.raises(ModelError, match=says):
+        Mesh(vertices, triangles)
