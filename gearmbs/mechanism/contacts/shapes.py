@@ -254,7 +254,7 @@ def threes(label: str, values: Any, kind: type) -> np.ndarray:
     """
     try:
         given = np.asarray(values)
-        found = given.astype(kind, copy=False)
+        found: np.ndarray = given.astype(kind, copy=False)
     except (TypeError, ValueError, OverflowError) as error:
         raise ModelError(f"{label} must be rows of three numbers: {error}") from None
     if kind is int and np.any(found != given):
