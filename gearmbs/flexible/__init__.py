@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from gearmbs.flexible.modal_model import ModalModel, Seat
     from gearmbs.flexible.nastran import read_op2, read_op4
     from gearmbs.flexible.nastran_modes import read_op2_modes
+    from gearmbs.flexible.nastran_stress import read_op2_stresses
     from gearmbs.flexible.reduction import reduce_model
     from gearmbs.flexible.rotor import Campbell, Rotor, Support, UnbalanceResponse, WhirlModes
     from gearmbs.flexible.shaft import Disc, Shaft, ShaftSection
@@ -69,6 +70,7 @@ __all__ = [
     "read_nodes",
     "read_op2",
     "read_op2_modes",
+    "read_op2_stresses",
     "read_op4",
     "reduce_model",
     "ring_mesh",
@@ -121,6 +123,7 @@ late(
         "read_nodes": ".matrices",
         "read_op2": ".nastran",
         "read_op2_modes": ".nastran_modes",
+        "read_op2_stresses": ".nastran_stress",
         "read_op4": ".nastran",
         "reduce_model": ".reduction",
         "ring_mesh": ".solid",

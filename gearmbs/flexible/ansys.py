@@ -33,7 +33,8 @@ def read_ansys(
     Parameters
     ----------
     full : str or Path
-        ``file.full`` of a modal analysis without supports, with stiffness and mass (``WRFULL,1`` is enough).
+        ``file.full`` of a modal analysis without supports, with stiffness and mass (``WRFULL,1`` is enough). The mass
+        is taken as it is: consistent, or lumped after ``LUMPM,ON``. Coarse meshes differ by several percent in it.
     nodes : str or Path, or (ids, positions)
         Result file (``.rst``) or archive (``.cdb``) of the same mesh, a table of number, x, y, z, or both arrays.
     name : str, optional

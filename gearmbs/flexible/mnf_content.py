@@ -9,6 +9,8 @@ import numpy as np
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import MassProperties
 from gearmbs.flexible.modal_model import ModalModel, Seat
+from gearmbs.flexible.stress import StressModes
+from gearmbs.flexible.stress_recovery import KnownStresses
 from gearmbs.mechanism import ShapeIntegrals
 from gearmbs.units import to_si
 
@@ -54,6 +56,8 @@ class ModalNeutralFile:
         Numbers of the interface nodes.
     header, unit_bytes, tail : bytes
         What is not looked at, and the units as they are filled up: kept for writing.
+    stresses : StressModes, optional
+        By one unit of each shape, SI; of an op2 file. They are not written.
     """
 
     ids: np.ndarray
@@ -73,6 +77,7 @@ class ModalNeutralFile:
     header: bytes = b""
     unit_bytes: bytes = b""
     tail: bytes = b""
+    stresses: StressModes | None = None
 
     def inertias(self) -> np.ndarray:
         """Return the inertia of each node, shape (N, 3, 3); zero where the file has none."""
@@ -143,6 +148,7 @@ class ModalNeutralFile:
         about += inertias.sum(axis=0)
         # a unit of a mode moves the nodes by the numbers of the file, in its length; rotations are numbers
         moved, turned = self.shapes[:, :, :3] * length, self.shapes[:, :, 3:]
+        recovery = None if self.stresses is None else KnownStresses(moved, self.stresses)
         kept = self.elastic
         if modes is not None:
             kept = kept[np.argsort(self.eigenvalues[kept, 1], kind="stable")][:modes]
@@ -172,6 +178,7 @@ class ModalNeutralFile:
             faces=np.array([_corners(f) for f in corners]) if corners else None,
             masses=masses,
             inertias=inertias,
+            recovery=recovery,
         )
 
     def in_si(self) -> dict[str, float]:

@@ -13,6 +13,7 @@ from gearmbs.flexible.damping import Damping, damping_ratios
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import MassProperties
 from gearmbs.flexible.stress import StressModes, StressRecovery
+from gearmbs.flexible.stress_recovery import KnownStresses
 from gearmbs.flexible.surface import BodySurface, faceted_surface, hull_surface, revolved_surface
 from gearmbs.mechanism import Mechanism, ModalBody, Mode, ShapeIntegrals
 
@@ -333,7 +334,7 @@ class ModalModel:
     def stress_modes(self) -> StressModes:
         """Return the stresses by one unit of each mode, where the finite elements are known.
 
-        They are of shafts by sections and of meshes assembled here; with a file's own stresses see `StressModes`.
+        They are of shafts by sections, of meshes assembled here, of files that have them, or given (`with_stresses`).
 
         Raises
         ------
@@ -343,9 +344,21 @@ class ModalModel:
         if self.recovery is None:
             raise FlexibleError(
                 f"{self.name}: its stresses are not known, since its elements are not; take the stresses of the modes "
-                "from the finite-element program and make StressModes(positions, values) of them"
+                "from the finite-element program and give them: with_stresses(StressModes(positions, values))"
             )
         return self.recovery(self.moved, self.turned)
+
+    def with_stresses(self, stresses: StressModes) -> ModalModel:
+        """Return the body with the stresses that a finite-element program gives for each of its modes.
+
+        They stay with it when modes are selected.
+
+        Raises
+        ------
+        FlexibleError
+            For another number of modes.
+        """
+        return replace(self, recovery=KnownStresses(self.moved, stresses))
 
     def strain_energies(self, coordinates: np.ndarray) -> np.ndarray:
         """Return the strain energy in each mode, J, for coordinates of shape (..., n)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from gearmbs.flexible.integrals import nodal_lumps
 from gearmbs.flexible.matrices import Path_
 from gearmbs.flexible.mnf_content import SI, ModalNeutralFile
 from gearmbs.flexible.nastran_files import GridTable, op2_tables, pyyeti_module
+from gearmbs.flexible.nastran_stress import grid_stresses
 
 MODES = ("OUGV1", "OUGV1PAT", "OUG1")
 """Data blocks of mode shapes, in displacement coordinate systems."""
@@ -34,6 +36,7 @@ def read_op2_modes(
     inertias: npt.ArrayLike | None = None,
     length: float = 1.0,
     mass_unit: float = 1.0,
+    stresses: bool = False,
 ) -> ModalNeutralFile:
     """Return the modes of a Nastran op2 file as the content of a modal neutral file, in SI.
 
@@ -52,6 +55,9 @@ def read_op2_modes(
         Of the grid points.
     length, mass_unit : float
         SI values of the file's units. Time is in seconds.
+    stresses : bool
+        Whether the stresses of the modes are read, too, as :func:`read_op2_stresses` does: the body then has
+        :meth:`~gearmbs.flexible.ModalModel.stress_modes`.
 
     Returns
     -------
@@ -64,21 +70,21 @@ def read_op2_modes(
         If pyyeti is not installed, the file is cut off or lacks a block, or masses and modes do not fit.
     """
     file = Path(path)
-    found = op2_tables(file, ["MGG"] if masses is None else [])
-    table = GridTable.of(found["uset"])
-    lama = found.get("lama")
+    blocks = op2_tables(file, ["MGG"] if masses is None else [])
+    table = GridTable.of(blocks["uset"])
+    lama = blocks.get("lama")
     if lama is None or not len(lama):
         raise FlexibleError(f"{file.name}: it has no table of eigenvalues (LAMA); run SOL 103 with PARAM,POST,-1")
     shapes = _shapes(file, table, len(lama))
     if masses is None:
-        if "mgg" not in found:
+        if "mgg" not in blocks:
             raise FlexibleError(
                 f"{file.name}: modes without masses of the grid points make no body; export MGG (OUTPUT2), "
                 "or give masses"
             )
-        masses = table.in_basic(found["mgg"])
+        masses = table.in_basic(blocks["mgg"])
     lumped, turning = _nodal_masses(masses, inertias, table, file)
-    weight = found.get("ogpwg")
+    weight = blocks.get("ogpwg")
     printed = None if not weight else float(weight["m66"][0, 0])
     if printed is not None and abs(lumped.sum() - printed) > SAME_MASS * printed:
         raise FlexibleError(
@@ -86,7 +92,13 @@ def read_op2_modes(
             "they belong to other nodes or units"
         )
     _check_orthogonal(file, lama[:, 5], _gram(shapes, masses, lumped, turning, table))
-    return _as_mnf(table, lama, shapes, lumped, turning, (length, mass_unit))
+    found = _as_mnf(table, lama, shapes, lumped, turning, (length, mass_unit))
+    if not stresses:
+        return found
+    own = grid_stresses(file, table, length, mass_unit * length)
+    if len(own.values) != len(lama):
+        raise FlexibleError(f"{file.name}: stresses of {len(own.values)} modes, LAMA has {len(lama)}; ask for all")
+    return replace(found, stresses=own)
 
 
 def _gram(shapes: np.ndarray, masses: Any, lumped: np.ndarray, turning: np.ndarray, table: GridTable) -> np.ndarray:

@@ -9,11 +9,14 @@ from itertools import pairwise
 import numpy as np
 
 from gearmbs.flexible.beam import DOFS, BeamSection, element_stiffness
+from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.material import ElasticMaterial
 from gearmbs.flexible.stress import COMPONENTS, StressModes
 
 AROUND = 16
 """Places round about a shaft where its stress is known."""
+SAME = 1e-6
+"""How far a shape may be from a combination of others, as a share of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,3 +104,37 @@ class SolidStresses:
                     np.add.at(right, row, (stress * test).sum(axis=1))
                 values[k, :, c] = solve(right)
         return StressModes(scalar.doflocs.T, values)
+
+
+@dataclass(frozen=True, eq=False)
+class KnownStresses:
+    """Stresses of combinations of shapes whose own stresses are known, as a finite-element program gives them.
+
+    Attributes
+    ----------
+    shapes : ndarray, shape (n, N, 3)
+        Displacements.
+    stresses : StressModes
+        Of the n shapes.
+    """
+
+    shapes: np.ndarray
+    stresses: StressModes
+
+    def __post_init__(self) -> None:
+        if len(self.stresses.values) != len(self.shapes):
+            raise FlexibleError(
+                f"there are stresses of {len(self.stresses.values)} modes for {len(self.shapes)} modes; give those of "
+                "each, in the same order"
+            )
+
+    def __call__(self, moved: np.ndarray, turned: np.ndarray | None = None) -> StressModes:
+        """Return the stresses of n shapes."""
+        known, wanted = (shapes.reshape(len(shapes), -1) for shapes in (self.shapes, moved))
+        shares = np.linalg.lstsq(known.T, wanted.T, rcond=None)[0].T
+        away = np.linalg.norm(wanted - shares @ known, axis=1) > SAME * np.linalg.norm(wanted, axis=1)
+        if away.any():
+            raise FlexibleError(
+                f"mode {1 + int(np.argmax(away))} is no combination of the {len(known)} shapes whose stresses are known"
+            )
+        return StressModes(self.stresses.positions, np.tensordot(shares, self.stresses.values, axes=1))

@@ -88,6 +88,25 @@ class Op2Writer:
             records.append(b"".join(self.ints(10 * i + 1, 1) + self.floats(x) for i, x in zip(ids, shape)))
         self.table("OUGV1", records)
 
+    def stresses(self, elements, values, kind=67, name="OES1X1", system=0, **head):
+        """OES1X1 of solids: rows of number and corners, stresses (n, elements, corners, 6) xx yy zz xy yz zx."""
+        corners = len(elements[0]) - 1
+        records = []
+        for k, mode in enumerate(values):
+            first = np.zeros(146, self.order + "i4")
+            words = {0: 23, 1: 5, 2: kind, 3: 1, 4: k + 1, 8: 1, 9: 4 + 21 * (corners + 1), 10: 1}
+            for place, value in (words | {int(key[1:]): value for key, value in head.items()}).items():
+                first[place] = value
+            rows = []
+            for (number, *grids), stress in zip(elements, mode):
+                rows.append(self.ints(10 * number + 3, system) + b"GRID" + self.ints(corners))
+                for grid, s in zip((0, *grids), np.vstack([np.mean(stress, axis=0), stress])):
+                    place = np.zeros(20)
+                    place[[0, 8, 14, 1, 9, 15]] = s
+                    rows.append(self.ints(grid) + self.floats(place))
+            records += [first.tobytes(), b"".join(rows)]
+        self.table(name, records)
+
     def weight(self, mass):
         """OGPWG with a mass."""
         data = np.zeros(78, self.order + "f4")

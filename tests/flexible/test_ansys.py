@@ -3,11 +3,13 @@
 import os
 import sys
 import types
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from scipy.io import mmread
 
 from gearmbs.flexible import FlexibleError, check_model, read_ansys
 from tests.flexible.test_files import cube
@@ -134,6 +136,15 @@ def test_public_rotor_of_ansys(tmp_path):
     report = check_model(found)
     np.testing.assert_allclose(report.properties.mass, 77.96604704575773, rtol=1e-12)
     assert report.rigid_energy.max() < 1e-9
+    # the file has consistent masses (LUMPM off); lumped, they make the frequency that is published for this rotor
+    np.testing.assert_allclose(report.frequencies[6:8], 116.733109, rtol=1e-7)
+    along = found.dofs[:, 1][:, None] == np.arange(3)
+    lumped = ((found.mass @ along) * along).sum(axis=1)
+    own = replace(found, mass=sp.diags_array(lumped).tocsc())
+    np.testing.assert_allclose(check_model(own).frequencies[6:8], 104.63701055, rtol=1e-9)
+    for matrix, ending in ((sp.diags_array(lumped), "Mass"), (found.stiffness, "Stiffness")):
+        published = mmread(folder / f"rotorAnsys{ending}MatrixSparse.txt").diagonal()
+        np.testing.assert_allclose(np.sort(matrix.diagonal()), np.sort(published), rtol=1e-14)
     cut, data = tmp_path / "cut.full", (folder / "sparse.full").read_bytes()
     for size in (100, 3000, 60000, 150000):
         cut.write_bytes(data[:size])

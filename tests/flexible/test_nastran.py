@@ -15,6 +15,7 @@ from gearmbs.flexible import (
     mnf_of,
     read_op2,
     read_op2_modes,
+    read_op2_stresses,
     read_op4,
     reduce_model,
 )
@@ -157,6 +158,68 @@ def test_op2_files_that_lie_are_named(tmp_path, bar):
     assert any("meets stiffness" in remark for remark in report.remarks)
 
 
+STRESS_OF_5 = [8.1035608e-7, -9.5543319e-7, 1.1088062e-7, -1.2773979e-7, 7.1479803e-7, -6.5983872e-7]
+"""Of a mode at grid point 5 of a public file."""
+BARS = [(7, 1, 2, 3, 4), (8, 2, 3, 4, 5)]
+"""Two tetrahedra on the nodes of the bar, as if it had some."""
+
+
+def with_stresses(path, bar, model, values, order="<", **head):
+    """An op2 file with modes, masses and stresses of two elements."""
+    mnf = mnf_of(model)
+    writer = Op2Writer(order)
+    writer.grids(bar.ids, bar.positions)
+    writer.modes(bar.ids, mnf.shapes[mnf.elastic], (2 * np.pi * model.frequencies) ** 2, np.ones(model.modes))
+    writer.matrix("MGG", bar.mass.toarray())
+    writer.stresses(BARS, values, kind=39, **head)
+    return writer.write(path)
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_stresses_of_op2_are_means_of_elements_and_follow_the_modes(tmp_path, bar, order):
+    model = reduce_model(bar, modes=6)
+    values = np.random.default_rng(7).normal(size=(model.modes, 2, 4, 6))
+    found = read_op2_stresses(with_stresses(tmp_path / "a.op2", bar, model, values, order), length=1e-3, force=2.0)
+    np.testing.assert_allclose(found.positions, 1e-3 * bar.positions, rtol=1e-6)
+    np.testing.assert_allclose(found.values[:, 0], 2e6 * values[:, 0, 0], rtol=1e-6)
+    np.testing.assert_allclose(found.values[:, 2], 1e6 * (values[:, 0, 2] + values[:, 1, 1]), rtol=1e-5, atol=1.0)
+    np.testing.assert_allclose(found.values[:, 4], 2e6 * values[:, 1, 3], rtol=1e-6)
+    if order == ">":
+        return
+    body = read_op2_modes(tmp_path / "a.op2", stresses=True).modal_model("bar")
+    np.testing.assert_allclose(body.stress_modes().values, found.values / 2e6, rtol=1e-6, atol=1e-6)
+    few = body.selected([4, 1])
+    np.testing.assert_allclose(few.stress_modes().values, body.stress_modes().values[[4, 1]], rtol=1e-9, atol=1e-9)
+    with pytest.raises(FlexibleError, match="its stresses are not known"):
+        read_op2_modes(tmp_path / "a.op2").modal_model("bar").stress_modes()
+
+
+def test_stresses_of_op2_that_cannot_be_taken_are_named(tmp_path, bar):
+    model = reduce_model(bar, modes=2)
+    values = np.ones((model.modes, 2, 4, 6))
+    cases = [
+        ({"system": 3}, "stresses of CTETRA 7 are in coordinate system 3; leave CORDM of its PSOLID blank"),
+        ({"w1": 2005}, "a table of code 2005, format 1, where 5 and 1 are stresses of real modes"),
+        ({"w8": 3}, "a table of code 5, format 3"),
+        ({"w9": 50}, "872 bytes are no elements of 50 words"),
+        ({"w9": 218}, "CTETRA has 218 words, 109 hold the stresses"),
+        ({"w4": 1}, "mode 1 has its stresses twice; write one subcase"),
+    ]
+    for head, message in cases:
+        with pytest.raises(FlexibleError, match=message):
+            read_op2_stresses(with_stresses(tmp_path / "a.op2", bar, model, values, **head))
+    with pytest.raises(FlexibleError, match=f"stresses of 1 modes, LAMA has {model.modes}; ask for all"):
+        read_op2_modes(with_stresses(tmp_path / "a.op2", bar, model, values[:1]), stresses=True)
+    with pytest.raises(FlexibleError, match=r"no stresses of solid elements \(OES1X1, OES1X, OES1\)"):
+        read_op2_stresses(modes_file(tmp_path / "b.op2", bar, model))
+    writer = Op2Writer()
+    writer.grids(bar.ids, bar.positions)
+    writer.stresses(BARS, values, kind=39)
+    writer.stresses([(9, 1, 2, 3, 4)], values[:, :1], kind=1, name="OES1")
+    with pytest.warns(UserWarning, match=r"elements that are no solids \(types 1 of Nastran\) are left out"):
+        assert len(read_op2_stresses(writer.write(tmp_path / "c.op2")).values) == model.modes
+
+
 ASSEMBLY = """\
 SEBULK       101  EXTOP4          MANUAL                     101
 $
@@ -247,3 +310,8 @@ def test_public_files():
     modes = read_op2_modes(folder / "beam_modes_m1.op2", masses)
     np.testing.assert_allclose(modes.eigenvalues[:2, 1], [456.6603, 456.6603], rtol=1e-6)
     np.testing.assert_allclose(modes.mass, 0.02610514, rtol=1e-5)
+    with pytest.warns(UserWarning, match="are left out"):
+        stresses = read_op2_stresses(folder / "modes_elements.op2")
+    # of grid point 5 in mode 2, by pyNastran 1.4.1, the mean of two elements
+    row = int(np.flatnonzero((stresses.positions == [1.0, 1.0, 1.0]).all(axis=1))[0])
+    np.testing.assert_allclose(stresses.values[1, row], STRESS_OF_5, rtol=1e-6)

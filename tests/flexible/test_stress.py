@@ -120,3 +120,15 @@ def test_von_mises_and_what_is_refused():
     chain = np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
     bare = from_matrices(np.kron(chain, np.eye(3)), np.eye(9), [[0, 0, 0], [1, 0, 0], [1, 1, 0]])
     assert bare.recovery is None
+
+
+def test_given_stresses_follow_the_modes():
+    model = BAR.modal_model(6)
+    values = np.random.default_rng(3).normal(size=(6, 2, 6))
+    own = model.with_stresses(StressModes([[0, 0, 0.1], [0, 0, 0.2]], values))
+    np.testing.assert_allclose(own.stress_modes().values, values, atol=1e-9)
+    np.testing.assert_allclose(own.selected([5, 0]).stress_modes().values, values[[5, 0]], atol=1e-9)
+    with pytest.raises(FlexibleError, match="stresses of 5 modes for 6 modes"):
+        model.with_stresses(StressModes([[0, 0, 0.1], [0, 0, 0.2]], values[:5]))
+    with pytest.raises(FlexibleError, match="mode 7 is no combination of the 6 shapes"):
+        own.recovery(BAR.modal_model(8).moved, None)
