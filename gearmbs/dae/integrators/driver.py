@@ -74,6 +74,8 @@ class Run:
         self.wall_time = 0.0
         self.repivots = 0
         self.first_pivots = 0
+        self.planned_step = 0.0
+        """First step that the present pivots were chosen for, zero for none."""
         self.counted = np.zeros(len(problem.indices), dtype=bool)
         self.started = False
         self.start_note = ""

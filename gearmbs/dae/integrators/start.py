@@ -12,7 +12,8 @@ import numpy as np
 
 from gearmbs.dae.integrators import messages
 from gearmbs.dae.integrators.history import newest_point
-from gearmbs.dae.linalg.sparse_lu import solve
+from gearmbs.dae.linalg.counted_entries import FEWEST_ENTRIES
+from gearmbs.dae.linalg.sparse_lu import factor, solve
 from gearmbs.dae.result import Status
 
 if TYPE_CHECKING:
@@ -84,10 +85,11 @@ def begin(run: Run) -> Failure | None:
     tried = [min(st.h, CHECK_STEP * span), st.h]
     if not run.steps_given[0]:
         tried.append(min(FIRST_TRIED * span, st.h_max))
+    _plan_first_step(run, max(tried))
     failure = None
     for h in tried:
         # an index-3 matrix is singular to working precision at a very short step: check over a longer one
-        failure = choose_first_pivots(run, h)
+        failure = None if _factors_with_plan(run, h) else choose_first_pivots(run, h)
         if failure is None:
             break
     if failure is not None:
@@ -99,12 +101,38 @@ def begin(run: Run) -> Failure | None:
 
 def choose_first_pivots(run: Run, h: float) -> Failure | None:
     """Factor the Newton matrix of a first step of size ``h``; return a failure or None."""
+    if run.planned_step == h and _factors_with_plan(run, h):
+        return None
+    _evaluate_matrix(run, h)
+    run.first_pivots += 1
+    run.planned_step = h
+    return run.repivot()
+
+
+def _evaluate_matrix(run: Run, h: float) -> None:
     st = run.state
     st.gamma = 1.0 / h
     run.problem.jacobian(st.t, st.y, st.yp, st.gamma, st.matrix, st.idata, st.rdata, st.work)
     st.jacobians += 1
-    run.first_pivots += 1
-    return run.repivot()
+
+
+def _plan_first_step(run: Run, h: float) -> None:
+    """Choose the pivots of the first step that will be tried, if the check before it may do with them.
+
+    A check asks for the size of a correction only. Of a matrix that leaves entries out each step size has its own.
+    """
+    if run.options.check_start and len(run.counted) < FEWEST_ENTRIES and choose_first_pivots(run, h) is not None:
+        run.planned_step = 0.0
+
+
+def _factors_with_plan(run: Run, h: float) -> bool:
+    """Factor the Newton matrix of a step ``h`` with the pivots of the first one; return whether they fit."""
+    st = run.state
+    if not run.planned_step > 0.0 or run.plan is None or run.factors is None:
+        return False
+    _evaluate_matrix(run, h)
+    st.factorizations += 1
+    return bool(factor(run.plan, run.factors, st.matrix) <= st.growth_limit)
 
 
 def _residual(run: Run) -> None:
