@@ -15,7 +15,7 @@ import numpy as np
 
 from gearmbs._jit import njit
 from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P, FRAME_V, FRAME_W
-from gearmbs.dae.equations.time_functions import smooth_step
+from gearmbs.dae.equations.impact import impact, stored_energy
 
 CLEARANCE, STIFFNESS, EXPONENT, DAMPING, DEPTH = range(5)
 """Reals: c (m, half the diametral clearance), K (N/m^m), m, C (N s/m), depth of the damping (m)."""
@@ -97,24 +97,18 @@ def clearance_bearing(ints, reals, t, frames, states, inputs, want, work, wrench
         n[q] /= e
         u[q] = frames[0, FRAME_V + q] - frames[1, FRAME_V + q] - u[q]
         speed += n[q] * u[q]
-    share, rise = 1.0, 0.0
-    if depth < reals[DEPTH]:
-        _, share, slope, _ = smooth_step(depth / reals[DEPTH], 0)
-        rise = slope / reals[DEPTH]
     elastic = reals[STIFFNESS] * depth ** reals[EXPONENT]
-    force = elastic + reals[DAMPING] * share * speed
-    diagnostics[0] = elastic * depth / (reals[EXPONENT] + 1.0)
+    stiffness = reals[EXPONENT] * elastic / depth
+    force, by_depth, by_speed = impact(elastic, stiffness, reals[DAMPING], reals[DEPTH], depth, speed)
+    diagnostics[0] = stored_energy(elastic, reals[EXPONENT], depth)
+    diagnostics[1] = (force - elastic) * speed
     diagnostics[2] = depth
-    if force <= 0.0:
-        diagnostics[1] = -elastic * speed
+    if force == 0.0:
         return
-    diagnostics[1] = reals[DAMPING] * share * speed * speed
     for q in range(3):
         wrench[0, q] = -force * n[q]
     if not want & DERIVATIVES:
         return
-    by_depth = reals[EXPONENT] * elastic / depth + reals[DAMPING] * rise * speed
-    by_speed = reals[DAMPING] * share
     unit, dr, dz, du = work[15:18], work[18:21], work[21:24], work[24:27]
     for column in range(24):
         kind, q = (column % 12) // 3, column % 3

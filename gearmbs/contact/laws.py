@@ -1,4 +1,7 @@
-"""Force laws of the contact: normal pressure by penetration and its rate, eq. (10) and (11); friction by speed."""
+"""Force laws of the contact: normal pressure by penetration and its rate; friction by speed.
+
+IMPACT, eq. (10) and (11), and its friction are `gearmbs.dae.equations.impact`.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import numpy as np
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.jit import inlined, kernel
+from gearmbs.dae.equations.impact import friction_over_speed, impact, stored_energy
 
 LAW_HUNT_CROSSLEY = L.LAW_HUNT_CROSSLEY
 FRICTION_ADAMS = L.FRICTION_ADAMS
@@ -48,30 +52,19 @@ def power(x, e):
 def pressure(law, elastic, e, c, d, delta, rate):
     """Pressure per unit face width and its derivatives at a positive penetration from its elastic part.
 
-    Parameters and results are those of `normal_law`; ``elastic`` is ``k delta^e``. STEP is that of
-    `gearmbs.dae.equations.time_functions.smooth_step`, written without its jumps.
+    Parameters and results are those of `normal_law`; ``elastic`` is ``k delta^e``.
     """
     slope = e * elastic / delta
-    energy = elastic * delta / (e + 1.0)
+    energy = stored_energy(elastic, e, delta)
     if law == LAW_HUNT_CROSSLEY:
         factor = 1.0 + c * rate
-        p = elastic * factor
-        p_delta = slope * factor
-        p_rate = elastic * c
+        pushes = elastic * factor > 0.0
+        p = elastic * factor if pushes else 0.0
+        p_delta = slope * factor if pushes else 0.0
+        p_rate = elastic * c if pushes else 0.0
     else:
-        ratio = min(delta / d, 1.0)
-        step = ratio * ratio * (3.0 - 2.0 * ratio)
-        p = elastic + c * step * rate
-        p_delta = slope + c * (6.0 * ratio * (1.0 - ratio) / d) * rate
-        p_rate = c * step
-    pushes = p > 0.0
-    return (
-        p if pushes else 0.0,
-        p_delta if pushes else 0.0,
-        p_rate if pushes else 0.0,
-        energy,
-        elastic,
-    )
+        p, p_delta, p_rate = impact(elastic, slope, c, d, delta, rate)
+    return p, p_delta, p_rate, energy, elastic
 
 
 @kernel
@@ -101,22 +94,6 @@ def normal_law(law, k, e, c, d, delta, rate):
     return pressure(law, elastic, e, c, d, delta, rate)
 
 
-@inlined
-def friction_ratio(mu_s, mu_d, v_s, v_d, speed):
-    """ADAMS's friction law; arguments and results are those of `friction_law`."""
-    r = speed / v_s
-    stick = 0.5 * mu_s * (3.0 - r * r) / v_s
-    stick_slope = -mu_s / (v_s * v_s * v_s)
-    moving = max(speed, v_s)
-    u = min((moving - v_s) / (v_d - v_s), 1.0)
-    mu = mu_s + (mu_d - mu_s) * u * u * (3.0 - 2.0 * u)
-    slope = (mu_d - mu_s) * 6.0 * u * (1.0 - u) / (v_d - v_s)
-    ratio = mu / moving
-    ratio_slope = (slope - ratio) / (moving * moving)
-    sticks = speed <= v_s
-    return stick if sticks else ratio, stick_slope if sticks else ratio_slope
-
-
 @kernel
 def friction_law(kind, mu_s, mu_d, v_s, v_d, speed):
     """Friction coefficient over sliding speed, and the derivative of that ratio over the speed.
@@ -132,7 +109,7 @@ def friction_law(kind, mu_s, mu_d, v_s, v_d, speed):
         ``(d ratio / d speed) / speed``, finite at rest.
     """
     if kind == FRICTION_ADAMS:
-        return friction_ratio(mu_s, mu_d, v_s, v_d, speed)
+        return friction_over_speed(mu_s, mu_d, v_s, v_d, speed)
     y = speed / v_s
     if y < 1e-2:
         y2 = y * y

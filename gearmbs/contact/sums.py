@@ -7,8 +7,9 @@ import numpy as np
 from gearmbs.contact import layout as L
 from gearmbs.contact.helical_friction import lay_directions, lay_slopes
 from gearmbs.contact.jit import inlined, kernel, summing
-from gearmbs.contact.laws import friction_law, friction_ratio
+from gearmbs.contact.laws import friction_law
 from gearmbs.contact.matrices import add_curvatures, add_outer, add_stack, add_two_outers
+from gearmbs.dae.equations.impact import friction_over_speed
 
 
 @kernel
@@ -82,7 +83,7 @@ def friction_ratios(wheels, kind, loads, n):
         return
     for j in range(n):
         vt, vz = loads.v_profile[j], loads.v_axial[j]
-        loads.ratio[j], loads.ratio_slope[j] = friction_ratio(mu_s, mu_d, v_s, v_d, np.sqrt(vt * vt + vz * vz))
+        loads.ratio[j], loads.ratio_slope[j] = friction_over_speed(mu_s, mu_d, v_s, v_d, np.sqrt(vt * vt + vz * vz))
 
 
 @summing

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.linalg
 
+from gearmbs.dae.equations.time_functions import smooth_step
 from gearmbs.drivetrain.drives import SpeedDrive
 from gearmbs.drivetrain.errors import require
 
@@ -272,5 +273,5 @@ def _mesh_damping(model: ContactModel, force: float) -> float:
     law = model.law
     if law.kind == "hunt-crossley":
         return law.damping * force
-    x = min(1.0, (model.penetration(force) if force > 0.0 else 0.5 * law.depth) / law.depth)
-    return law.damping * x * x * (3.0 - 2.0 * x)
+    depth = model.penetration(force) if force > 0.0 else 0.5 * law.depth
+    return law.damping * smooth_step(depth / law.depth, 0)[1]

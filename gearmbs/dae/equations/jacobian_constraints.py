@@ -9,14 +9,13 @@ from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.constraint_hessians import HESSIAN_BLOCKS, hessian
 from gearmbs.dae.equations.elastic_constraints import put_row
 from gearmbs.dae.equations.elastic_frames import is_elastic, touches_elastic
 from gearmbs.dae.equations.entries import put
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_HESSIAN, S_TERM, S_VECTOR
 from gearmbs.dae.equations.unknowns import has_rate_rows, multiplier_factor, multipliers_of_row
 from gearmbs.dae.equations.update import euler_component
-
-HESSIAN_BLOCKS = terms.HESSIAN_BLOCKS
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -192,7 +191,7 @@ def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
     for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
         coef = tab.coef[j]
         terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
-        terms.hessian(j, tab.term, tab.fval, tab.marker_body, tab.kin, tab.frame, hess, s)
+        hessian(j, tab.term, tab.fval, tab.marker_body, tab.kin, tab.frame, hess, s)
         if frames_are_elastic and touches_elastic(tab.term[j], tab.marker_body, tab.code.size):
             k = elastic_term_entries(
                 mode, j, coef, lam_value, mu_value, factor, rate_rows, lam, mu, y, g, gt, tab, slot, vals, k

@@ -15,6 +15,7 @@ from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.accelerations import ROW_PARTIAL, ROW_PHI, ROW_RATE, ROW_RECORD, packed
+from gearmbs.dae.equations.motions import point_motion, product_motion, scalar_product, vector_product
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_TERM
 from gearmbs.dae.equations.rotation import KIN_A, KIN_AXES, KIN_H, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.equations.simple_terms import OFFSET, QUADRATIC, RATE, RELATIVE
@@ -152,19 +153,23 @@ def three(a, i):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
+def add_three(out, place, factor, v):
+    """Add a multiple of a vector in lanes to the one that begins at a place."""
+    put_lanes(out, place, lanes_at(out, place) + factor * v[0])
+    put_lanes(out, place + 1, lanes_at(out, place + 1) + factor * v[1])
+    put_lanes(out, place + 2, lanes_at(out, place + 2) + factor * v[2])
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def dot(a, i, b, j):
     """Return a . b of vectors in lanes that begin at places i and j."""
-    a0, a1, a2 = three(a, i)
-    b0, b1, b2 = three(b, j)
-    return a0 * b0 + a1 * b1 + a2 * b2
+    return scalar_product(three(a, i), three(b, j))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def cross(a, i, b, j):
     """Return the components of a x b of vectors in lanes that begin at places i and j."""
-    a0, a1, a2 = three(a, i)
-    b0, b1, b2 = three(b, j)
-    return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
+    return vector_product(three(a, i), three(b, j))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -236,15 +241,11 @@ def lane_relative_motion(i, j, marker_body, lanes):
         marker = i if side == 0 else j
         sign = 1.0 - 2.0 * side
         first, arm = marker_body[marker] * BODY_COLUMNS, T.MK_COLUMNS * marker + T.MK_ARM
-        a0, a1, a2 = cross(body, first + KIN_W, frame, arm)
-        along, square = dot(body, first + KIN_W, frame, arm), dot(body, first + KIN_W, body, first + KIN_W)
-        for c in range(3):
-            w, x = lanes_at(body, first + KIN_W + c), lanes_at(frame, arm + c)
-            rate = a0 if c == 0 else a1 if c == 1 else a2
-            offset = lanes_at(body, first + KIN_R + c) + x
-            put_lanes(out, OFFSET + c, lanes_at(out, OFFSET + c) + sign * offset)
-            put_lanes(out, RATE + c, lanes_at(out, RATE + c) + sign * (lanes_at(body, first + KIN_V + c) + rate))
-            put_lanes(out, QUADRATIC + c, lanes_at(out, QUADRATIC + c) + sign * (w * along - square * x))
+        rate, bent = point_motion(three(body, first + KIN_V), three(body, first + KIN_W), three(frame, arm))
+        add_three(out, OFFSET, sign, three(body, first + KIN_R))
+        add_three(out, OFFSET, sign, three(frame, arm))
+        add_three(out, RATE, sign, rate)
+        add_three(out, QUADRATIC, sign, bent)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -275,7 +276,7 @@ def put_lane_dot(slot, k, coef, term, marker_body, lanes):
     a = T.MK_COLUMNS * i + T.MK_AXES + 3 * (term[T.TERM_AXES] // 3)
     b = T.MK_COLUMNS * j + T.MK_AXES + 3 * (term[T.TERM_AXES] % 3)
     wi, wj = marker_body[i] * BODY_COLUMNS + KIN_W, marker_body[j] * BODY_COLUMNS + KIN_W
-    x, y, z = cross(frame, a, frame, b)
+    phi, rate, bent, (x, y, z) = product_motion(three(frame, a), three(frame, b), three(body, wi), three(body, wj))
     for side in range(2):
         if marker_body[term[T.TERM_I + side]] == 0:
             continue
@@ -283,13 +284,7 @@ def put_lane_dot(slot, k, coef, term, marker_body, lanes):
         k = add_pair(slot, vals, k, sign * x)
         k = add_pair(slot, vals, k, sign * y)
         k = add_pair(slot, vals, k, sign * z)
-    phi = dot(frame, a, frame, b)
-    rate = x * (lanes_at(body, wi) - lanes_at(body, wj))
-    rate += y * (lanes_at(body, wi + 1) - lanes_at(body, wj + 1))
-    rate += z * (lanes_at(body, wi + 2) - lanes_at(body, wj + 2))
-    ia, ib, ja, jb = dot(body, wi, frame, a), dot(body, wi, frame, b), dot(body, wj, frame, a), dot(body, wj, frame, b)
-    ii, ij, jj = dot(body, wi, body, wi), dot(body, wi, body, wj), dot(body, wj, body, wj)
-    return k, phi, rate, ia * ib + ja * jb + 2.0 * (ij * phi - ib * ja) - (ii + jj) * phi
+    return k, phi, rate, bent
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -24,6 +24,12 @@ PIECEWISE = 8
 PIECE_SIZE = 6
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def cubic(x):
+    """Return STEP on the unit interval, eq. (11), and its slope, for x from 0 to 1."""
+    return x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x)
+
+
 @njit("UniTuple(float64, 4)(float64, int64)", cache=True, error_model="numpy")
 def smooth_step(x, quintic):
     """Return STEP (cubic) or STEP5 (quintic) on the unit interval: integral from 0, value, slope, curvature."""
@@ -32,7 +38,8 @@ def smooth_step(x, quintic):
     if x >= 1.0:
         return x - 0.5, 1.0, 0.0, 0.0
     if quintic == 0:
-        return x**3 * (1.0 - 0.5 * x), x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x), 6.0 - 12.0 * x
+        value, slope = cubic(x)
+        return x**3 * (1.0 - 0.5 * x), value, slope, 6.0 - 12.0 * x
     value = x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
     integral = x**4 * (2.5 - 3.0 * x + x * x)
     slope = 30.0 * x * x * (1.0 - x) ** 2

@@ -12,7 +12,7 @@ spring; with one a side that has let go never pulls.
 from __future__ import annotations
 
 from gearmbs._jit import njit
-from gearmbs.dae.equations.time_functions import smooth_step
+from gearmbs.dae.equations.impact import impact
 from gearmbs.drivetrain.torque_kernel import BY_ANGLE, BY_SPEED, LAW_SIG, LOST, STORED, TOLD, TORQUE
 
 FREE, LINEAR, CUBIC, DAMPING, BAND, DEPTH, MORE, SECOND, WIDTH = range(9)
@@ -48,16 +48,9 @@ def clutch(p, t, angle, speed, times, states, out):
         out[BY_SPEED] = -p[DAMPING]
         out[LOST] = p[DAMPING] * speed * speed
         return
-    share, rise = 1.0, 0.0
-    if d < p[DEPTH]:
-        _, share, slope, _ = smooth_step(d / p[DEPTH], 0)
-        rise = slope / p[DEPTH]
     closing = side * speed
-    force = elastic + p[DAMPING] * share * closing
-    if force <= 0.0:
-        out[LOST] = -elastic * closing
-        return
-    out[TORQUE] = -side * force
-    out[BY_ANGLE] = -(tangent + p[DAMPING] * rise * closing)
-    out[BY_SPEED] = -p[DAMPING] * share
-    out[LOST] = p[DAMPING] * share * closing * closing
+    torque, by_depth, by_rate = impact(elastic, tangent, p[DAMPING], p[DEPTH], d, closing)
+    out[TORQUE] = -side * torque
+    out[BY_ANGLE] = -by_depth
+    out[BY_SPEED] = -by_rate
+    out[LOST] = (torque - elastic) * closing

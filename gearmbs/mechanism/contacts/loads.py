@@ -17,6 +17,7 @@ import numpy as np
 
 from gearmbs._jit import njit
 from gearmbs.dae.equations.force_elements import FRAME_P, FRAME_V, FRAME_W
+from gearmbs.dae.equations.impact import friction_over_speed, impact, stored_energy
 from gearmbs.dae.equations.time_functions import smooth_step
 from gearmbs.mechanism.contacts import points as pt
 from gearmbs.mechanism.contacts.points import dot, turned
@@ -52,27 +53,16 @@ def normal_force(law, depth, rate):
             0.5 * p * back * depth**2,
             p * depth * (gain - back) * rate,
         )
-    spring = law[STIFFNESS] * depth ** law[EXPONENT]
-    stiff = law[STIFFNESS] * law[EXPONENT] * depth ** (law[EXPONENT] - 1.0)
-    full, slope = rise(depth, law[FULL_DEPTH])
-    stored = spring * depth / (law[EXPONENT] + 1.0)
-    force = spring + law[DAMPING] * full * rate
-    if force <= 0.0:
-        return 0.0, 0.0, 0.0, stored, -spring * rate
-    return force, stiff + law[DAMPING] * slope * rate, law[DAMPING] * full, stored, (force - spring) * rate
+    elastic = law[STIFFNESS] * depth ** law[EXPONENT]
+    stiffness = law[EXPONENT] * elastic / depth
+    force, by_depth, by_rate = impact(elastic, stiffness, law[DAMPING], law[FULL_DEPTH], depth, rate)
+    return force, by_depth, by_rate, stored_energy(elastic, law[EXPONENT], depth), (force - elastic) * rate
 
 
 @njit(cache=True, error_model="numpy")
 def friction_factor(law, speed):
     """Return m = mu(v)/v and (dm/dv)/v."""
-    static, dynamic, stick, slip = law[MU_STATIC], law[MU_DYNAMIC], law[STICTION], law[FRICTION]
-    if static == 0.0 and dynamic == 0.0:
-        return 0.0, 0.0
-    if speed < stick:
-        return static / stick * (1.5 - 0.5 * (speed / stick) ** 2), -static / stick**3
-    s, slope = rise(speed - stick, slip - stick)
-    mu, slope = static + (dynamic - static) * s, (dynamic - static) * slope
-    return mu / speed, (slope - mu / speed) / speed**2
+    return friction_over_speed(law[MU_STATIC], law[MU_DYNAMIC], law[STICTION], law[FRICTION], speed)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
