@@ -48,7 +48,7 @@ share: the problem, results, errors, and the function that solves a user's DAE."
 
 EXCEPTIONS = {
     ("contact", "dae.compiled"): "views of flat tables",
-    ("contact", "dae.equations"): "the signature that every force element's kernel has",
+    ("contact", "dae.equations"): "the signature that every force element's kernel has, and IMPACT",
     ("gears", "dae.equations"): "the same door: a pair hands its kernel to the mechanism",
     (
         "flexible",
