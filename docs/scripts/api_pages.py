@@ -117,7 +117,9 @@ MORE = {
             "best_reference",
             "momentum_from_conjugate",
         ],
-        "gearmbs.dae.equations.constraint_terms": ["gradient", "hessian", "quadratic_part"],
+        "gearmbs.dae.equations.constraint_terms": ["gradient", "quadratic_part"],
+        "gearmbs.dae.equations.constraint_hessians": ["hessian"],
+        "gearmbs.dae.equations.impact": ["impact", "friction_over_speed"],
     },
     "gearmbs.studies": {
         "gearmbs.studies.case": [
