@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import ctypes
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -35,7 +35,7 @@ IndexVector: TypeAlias = np.ndarray
 SCALARS = {"float": "f8", "int": "i8", "bool": "?"}
 ARRAYS = {"Vector": ("f8", 1), "Matrix": ("f8", 2), "IntVector": ("i8", 1), "IndexVector": ("u4", 1)}
 _WORD = 8
-_byte_of = ctypes.c_char.from_buffer
+_byte_of: Callable[[Any], ctypes.c_char] = ctypes.c_char.from_buffer
 
 
 class StructType(types.Type):
