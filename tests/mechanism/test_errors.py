@@ -254,6 +254,23 @@ def test_massless_free_body():
 
 
 @pytest.mark.parametrize("dense_up_to", [600, 6])
+def test_a_light_body_beside_a_heavy_one_is_not_massless(monkeypatch, dense_up_to):
+    monkeypatch.setattr("gearmbs.dae.model.diagnosis.DENSE_COORDINATES", dense_up_to)
+    for ghost in (False, True):
+        m = Mechanism("scales")
+        m.body("press", 2e4, (3e4,) * 3)
+        m.body("grain", 2e-7, (2e-14,) * 3)
+        held = m.body("massless", 0.0, (0, 0, 0))
+        m.fixed("weld", held, m.ground, at=(0, 0, 0))
+        if not ghost:
+            assert m.compile().problem().n > 0
+            continue
+        m.body("ghost", 0.0, (0, 0, 0))
+        with pytest.raises(SingularModelError, match="body 'ghost' can move without any inertia"):
+            m.compile().problem()
+
+
+@pytest.mark.parametrize("dense_up_to", [600, 6])
 def test_massless_free_body_at_the_end_of_a_chain(monkeypatch, dense_up_to):
     """The last of 20 slender rods hangs on a ball: nothing resists its turning about itself. A pin holds it."""
     monkeypatch.setattr("gearmbs.dae.model.diagnosis.DENSE_COORDINATES", dense_up_to)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gearmbs.dae.equations.force_elements import DERIVATIVES, DIAGNOSTICS
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.contacts import Box, Cylinder, HalfSpace, Impact, Mesh, Poisson, SolidContact, Sphere
-from gearmbs.mechanism.contacts.element import vertex_weights
+from gearmbs.mechanism.contacts.facet_tables import vertex_weights
 
 LAWS = {"impact": Impact(1e8, 1.5, 0.0, 1e-4), "poisson": Poisson(1e6, 1.0)}
 
@@ -44,7 +45,9 @@ def on_plane(shape, law):
         turn = Rotation.from_rotvec([0.0, tilt, 0.0]).as_matrix() if axes is None else axes
         frames[0, 2], frames[0, 3:12] = z, turn.ravel()
         wrench, told = np.zeros((1, 6)), np.zeros(6)
-        made.kernel(*tables, 0.0, frames, none, none, 1, work, wrench, none, np.zeros((6, 24)), told)
+        made.kernel(
+            *tables, 0.0, frames, none, none, DERIVATIVES | DIAGNOSTICS, work, wrench, none, np.zeros((6, 24)), told
+        )
         return wrench[0], told
 
     return load
@@ -113,3 +116,32 @@ def test_separate_solids_of_a_mesh_bear_loads_of_their_own_and_cavities_do_not()
     markers = m.body("body", 1.0, (1, 1, 1)).marker(), m.ground.marker()
     contact = SolidContact("c", *markers, (Sphere(0.1), feet), (HalfSpace(),), Impact(1e6))
     assert [numbers for numbers, _, _ in contact.pairs()] == [(0, 0), (1, 0), (1, 0)]
+
+
+def test_no_vertex_below_is_passed_over():
+    """A ball of 1154 facets' corners, anywhere about a block: depths by going through them all."""
+    rng = np.random.default_rng(5)
+    ball = Mesh(*Sphere(0.1).facets())
+    m = Mechanism("pair")
+    markers = m.body("body", 1.0, (1, 1, 1)).marker(), m.ground.marker()
+    for block in (Box((0.5, 0.4, 0.3)), Mesh(*Box((0.5, 0.4, 0.3)).facets())):
+        made = SolidContact("c", *markers, (ball,), (block,), Impact(1e6)).compiled()
+        tables = np.array(made.integers, dtype=np.int64), np.array(made.reals, dtype=float)
+        touching = 0
+        for _ in range(300):
+            frames, none = np.zeros((2, 18)), np.zeros(0)
+            axes = Rotation.random(2, random_state=rng).as_matrix()
+            frames[:, 3:12] = axes.reshape(2, 9)
+            side = int(rng.integers(3))
+            place = rng.uniform(-0.5, 0.5, 3) * (0.25, 0.15, 0.05)
+            place[side] = (0.25, 0.2, 0.15)[side] + rng.uniform(0.09, 0.11)
+            frames[0, :3] = axes[1] @ place
+            corners = ball.vertices @ axes[0].T @ axes[1] + place
+            depth = -np.max(np.abs(corners) - (0.25, 0.2, 0.15), axis=1).min()
+            told = np.zeros(6)
+            work, wrench, jac = np.zeros(made.scratch), np.zeros((1, 6)), np.zeros((6, 24))
+            made.kernel(*tables, 0.0, frames, none, none, DERIVATIVES, work, wrench, none, jac, told)
+            assert told[4] == pytest.approx(max(depth, 0.0), abs=1e-14)
+            assert (told[5] > 0.0) == (depth > 0.0)
+            touching += depth > 0.0
+        assert 50 < touching < 250

@@ -105,6 +105,7 @@ def free_massless_body(model: Model, matrix: scipy.sparse.csc_array) -> str | No
     from scipy.linalg import null_space
 
     base = model.counts.coordinates
+    matrix = _by_own_inertia(matrix, base)
     if base > DENSE_COORDINATES:
         return _free_massless_body_of_many(model, matrix)
     constraint = matrix[base:, :base].toarray()
@@ -115,6 +116,23 @@ def free_massless_body(model: Model, matrix: scipy.sparse.csc_array) -> str | No
         motion = np.abs(free @ vectors[:, 0])
         return body_of(model, int(np.argmax(motion)))
     return None
+
+
+def _by_own_inertia(matrix: scipy.sparse.csc_array, base: int) -> scipy.sparse.csc_array:
+    """Return masses and constraints in coordinates in which every inertia that a body has itself is 1.
+
+    So a light body beside a heavy one is not taken for one without mass. Rows of constraints have the largest entry 1.
+    """
+    own = matrix.diagonal()[:base]
+    has = own > 0.0
+    scale = np.ones(matrix.shape[0])
+    scale[:base] = np.where(has, own, np.median(own[has]) if has.any() else 1.0) ** -0.5
+    scaled = scipy.sparse.csr_array(scipy.sparse.diags_array(scale) @ matrix @ scipy.sparse.diags_array(scale))
+    largest = abs(scaled[base:, :base]).max(axis=1).toarray().ravel() if scaled.shape[0] > base else np.zeros(0)
+    rows = np.ones(matrix.shape[0])
+    rows[base:] = 1.0 / np.where(largest > 0.0, largest, 1.0)
+    rows = scipy.sparse.diags_array(rows)
+    return scipy.sparse.csc_array(rows @ scaled @ rows)
 
 
 def _free_massless_body_of_many(model: Model, matrix: scipy.sparse.csc_array) -> str | None:

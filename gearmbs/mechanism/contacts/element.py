@@ -13,7 +13,7 @@ from gearmbs.dae.equations.force_elements import Diagnostic
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.contacts import fields, kernel
 from gearmbs.mechanism.contacts.boxes import MOST
-from gearmbs.mechanism.contacts.facets import BLOCK, TINY
+from gearmbs.mechanism.contacts.facet_tables import Facets
 from gearmbs.mechanism.contacts.loads import IMPACT, LAW_REALS, POISSON
 from gearmbs.mechanism.contacts.points import COLUMNS
 from gearmbs.mechanism.contacts.shapes import (
@@ -33,10 +33,6 @@ from gearmbs.mechanism.quantities import quantity
 
 REVERSAL = 1e-3
 """Speed, m/s, about which the penalty goes over from compression to restitution."""
-FLAT = 1e-6
-"""Angle, rad, below which two triangles lie in one plane."""
-LEAST = 1e-12
-"""Least weight of a vertex over the largest: one at the end of slivers alone would divide nothing by nothing."""
 CONVEX = (Ellipsoid, Box, Cylinder, Frustum, Torus)
 ANALYTIC = (Sphere, Ellipsoid, Box, Cylinder, Frustum, Torus, HalfSpace)
 
@@ -243,66 +239,6 @@ def reach_of(kind: int, sizes: np.ndarray) -> float:
     }.get(kind, float(np.linalg.norm(sizes[:3])))
 
 
-def plane_faces(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return the number of the plane face to which each triangle belongs."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1), TINY)[:, None]
-    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
-    order = np.lexsort(edges.T)
-    one, other = order[:-1], order[1:]
-    shared = np.all(edges[one] == edges[other], axis=1)
-    one, other = one[shared] % len(triangles), other[shared] % len(triangles)
-    bent = np.linalg.norm(np.cross(normals[one], normals[other]), axis=1)
-    flat = (bent < FLAT) & (np.sum(normals[one] * normals[other], axis=1) > 0.0)
-    joined = coo_array((np.ones(flat.sum()), (one[flat], other[flat])), shape=(len(triangles),) * 2)
-    return connected_components(joined, directed=False)[1]
-
-
-def vertex_weights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return the weight of each vertex: of the triangles around it, the area times the angle there.
-
-    The corners of a rectangle so have the same weight whichever way its diagonal runs. Those of the plane face in which
-    they are largest sum to 1. A point without triangles has the weight 1.
-    """
-    if not len(triangles):
-        return np.ones(len(vertices))
-    weights = np.zeros(len(vertices))
-    for k in range(3):
-        here, ahead, behind = (vertices[triangles[:, (k + q) % 3]] for q in range(3))
-        one, other = ahead - here, behind - here
-        area = np.linalg.norm(np.cross(one, other), axis=1)
-        np.add.at(weights, triangles[:, k], area * np.arctan2(area, np.sum(one * other, axis=1)))
-    weights = np.maximum(weights, LEAST * weights.max())
-    corners = np.unique(plane_faces(vertices, triangles)[:, None] * len(vertices) + triangles)
-    return weights / np.bincount(corners // len(vertices), weights[corners % len(vertices)]).max()
-
-
-def in_blocks(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return triangles so that neighbours in the table are neighbours in space, and the boxes of each block of them.
-
-    Each half of the triangles is halved again across its longest side, down to the size of a block.
-    """
-    middles = vertices[triangles].mean(axis=1)
-    groups, order = [np.arange(len(triangles))], []
-    while groups:
-        group = groups.pop()
-        if len(group) <= BLOCK:
-            order.append(group)
-            continue
-        axis = int(np.argmax(np.ptp(middles[group], axis=0)))
-        group = group[np.argsort(middles[group, axis], kind="stable")]
-        half = BLOCK * max(1, round(len(group) / 2 / BLOCK))
-        groups += [group[half:], group[:half]]
-    triangles = triangles[np.concatenate(order)] if order else triangles
-    parts = (vertices[triangles[k : k + BLOCK]].reshape(-1, 3) for k in range(0, len(triangles), BLOCK))
-    boxes = [np.concatenate([p.min(axis=0), p.max(axis=0)]) for p in parts]
-    return triangles, np.concatenate([np.zeros(0), *boxes])
-
-
 class _Tables:
     """The tables of a contact as they grow."""
 
@@ -337,12 +273,11 @@ class _Tables:
             # the origin goes to the middle of the box that holds it
             middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
             offset, vertices = offset + shape.axes @ middle, vertices - middle
-        weights = vertex_weights(vertices, triangles)
-        triangles, boxes = in_blocks(vertices, triangles)
+        made = Facets.of(vertices, triangles)
         at, points, faces = self.n_reals, self.n_reals + kernel.SOLID_REALS, self.n_triangles
-        self._append(np.concatenate([shape.axes.ravel(), offset, sizes, vertices.ravel(), weights, boxes]))
-        self.triangles.append(triangles.ravel())
-        self.n_triangles += triangles.size
+        self._append(np.concatenate([shape.axes.ravel(), offset, sizes, made.reals()]))
+        self.triangles.append(made.triangles.ravel())
+        self.n_triangles += made.triangles.size
         return [kind, at, len(vertices), points, len(triangles), faces]
 
     def _append(self, values: np.ndarray) -> None:

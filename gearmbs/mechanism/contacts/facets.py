@@ -1,7 +1,8 @@
-"""Where faceted solids touch: vertices of one below the surface of the other, grouped into patches.
+"""Where faceted solids touch: vertices of one below the surface of the other.
 
-Vertices in contact that a triangle of their own mesh joins belong to one patch. Vertices of the other solid join the
-patch of the vertex next to them.
+Most vertices are known to be outside without their distance. They are passed over in blocks whose box is beside that of
+the other solid, and where a point nearby is farther from it than from them: a distance changes by no more than its
+point moves.
 """
 
 from __future__ import annotations
@@ -10,205 +11,217 @@ import numpy as np
 
 from gearmbs._jit import njit
 from gearmbs.mechanism.contacts import points as pt
-from gearmbs.mechanism.contacts.fields import MESH, distance
-from gearmbs.mechanism.contacts.points import dot, local_point, to_global
+from gearmbs.mechanism.contacts.fields import BALL, BOX, ELLIPSOID, FRUSTUM, MESH, TORUS, distance
+from gearmbs.mechanism.contacts.meshes import BLOCK, mesh_distance
+from gearmbs.mechanism.contacts.points import to_global
 from gearmbs.mechanism.contacts.smooth_pairs import by_distance
 
-FACE, EDGE, CORNER = 0, 1, 2
-TINY = 1e-300
-BLOCK = 16
-"""Triangles that share a box; those next to each other in the table are next to each other in space."""
-APART = -1.0
-"""Pool of a vertex that is not in contact."""
+BEARING = 0.8
+"""Part of the largest depth below which a vertex bears less than 1e-17 of the load, by the norm in `loads`, whatever
+the weights."""
+LESS = 1.0 - 1e-9
+"""Of a distance, what certainly is clear of a surface."""
 
 
 @njit(cache=True, error_model="numpy")
-def nearest_of_triangle(x, a, b, c, out):
-    """Write the nearest point of a triangle; return on which feature it lies."""
-    d1 = d2 = d3 = d4 = d5 = d6 = 0.0
+def half_lengths(kind, sizes, out):
+    """Write half the edges of the box about a solid, in its frame."""
     for q in range(3):
-        ab, ac = b[q] - a[q], c[q] - a[q]
-        d1 += ab * (x[q] - a[q])
-        d2 += ac * (x[q] - a[q])
-        d3 += ab * (x[q] - b[q])
-        d4 += ac * (x[q] - b[q])
-        d5 += ab * (x[q] - c[q])
-        d6 += ac * (x[q] - c[q])
-    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
-    feature = FACE
-    if d1 <= 0.0 and d2 <= 0.0:
-        v, w, feature = 0.0, 0.0, CORNER
-    elif d3 >= 0.0 and d4 <= d3:
-        v, w, feature = 1.0, 0.0, CORNER
-    elif d6 >= 0.0 and d5 <= d6:
-        v, w, feature = 0.0, 1.0, CORNER
-    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
-        v, w, feature = d1 / max(d1 - d3, TINY), 0.0, EDGE
-    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
-        v, w, feature = 0.0, d2 / max(d2 - d6, TINY), EDGE
-    elif va <= 0.0 and d4 >= d3 and d5 >= d6:
-        w = (d4 - d3) / max(d4 - d3 + d5 - d6, TINY)
-        v, feature = 1.0 - w, EDGE
-    else:
-        total = max(va + vb + vc, TINY)
-        v, w = vb / total, vc / total
-    for q in range(3):
-        out[q] = a[q] + v * (b[q] - a[q]) + w * (c[q] - a[q])
-    return feature
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def square_to_box(x, boxes, block):
-    """Return the square of the distance of a point from the box of a block; 0 within."""
-    total = 0.0
-    for q in range(3):
-        low, high = boxes[6 * block + q], boxes[6 * block + 3 + q]
-        off = max(low - x[q], x[q] - high, 0.0)
-        total += off * off
-    return total
+        if kind == MESH or kind == BOX or kind == ELLIPSOID:
+            out[q] = sizes[q]
+        elif kind == BALL:
+            out[q] = sizes[0]
+        elif kind == FRUSTUM:
+            out[q] = sizes[2] if q == 2 else max(sizes[0], sizes[1])
+        elif kind == TORUS:
+            out[q] = sizes[1] if q == 2 else sizes[0] + sizes[1]
+        else:
+            out[q] = 1e150
 
 
 @njit(cache=True, error_model="numpy")
-def mesh_distance(x, places, triangles, boxes, grad, hess, work):
-    """Return the signed distance from a closed mesh; write gradient and Hessian.
-
-    Of several triangles that are equally near, the one that x is most nearly in front of or behind tells the side.
+def seen_from(pose_a, pose_b, half, out):
+    """Write how a point of a's frame is turned and moved into b's, and in a's frame the box about b.
 
     Parameters
     ----------
-    x : ndarray, shape (3,)
-    places : ndarray, shape (3 vertices,)
-    triangles : ndarray of int, shape (3 triangles,)
-        Corners, anticlockwise seen from outside.
-    boxes : ndarray, shape (6 blocks,)
-        Lowest and highest coordinates of each `BLOCK` triangles.
-    grad, hess : ndarray, shape (3,), (9,)
-        Out.
-    work : ndarray, shape (9,)
+    pose_a, pose_b : ndarray, shape (12,)
+        Axes and origins.
+    half : ndarray, shape (3,)
+        Half the edges of the box of b in its own frame.
+    out : ndarray, shape (18,)
+        Turn (9), shift (3), lowest and highest coordinates (6).
     """
-    near, normal, best_point = work[0:3], work[3:6], work[6:9]
-    best, straight, feature, side = np.inf, -1.0, FACE, 1.0
-    for q in range(9):
-        hess[q] = 0.0
-    start, least = 0, np.inf
-    for block in range(boxes.size // 6):
-        square = square_to_box(x, boxes, block)
-        if square < least:
-            start, least = block, square
-    # the nearest box first, so that most others are too far
-    for turn in range(-1, boxes.size // 6):
-        block = start if turn < 0 else turn
-        if turn == start or square_to_box(x, boxes, block) > best * (1.0 + 1e-12):
-            continue
-        for k in range(3 * BLOCK * block, min(3 * BLOCK * (block + 1), triangles.size), 3):
-            a = places[3 * triangles[k] : 3 * triangles[k] + 3]
-            b = places[3 * triangles[k + 1] : 3 * triangles[k + 1] + 3]
-            c = places[3 * triangles[k + 2] : 3 * triangles[k + 2] + 3]
-            kind = nearest_of_triangle(x, a, b, c, near)
-            square = (x[0] - near[0]) ** 2 + (x[1] - near[1]) ** 2 + (x[2] - near[2]) ** 2
-            if square > best * (1.0 + 1e-12):
-                continue
-            for q in range(3):
-                q1, q2 = (q + 1) % 3, (q + 2) % 3
-                normal[q] = (b[q1] - a[q1]) * (c[q2] - a[q2]) - (b[q2] - a[q2]) * (c[q1] - a[q1])
-            size = max(np.sqrt(dot(normal, normal)), TINY)
-            height = 0.0
-            for q in range(3):
-                height += normal[q] / size * (x[q] - near[q])
-            if square < best * (1.0 - 1e-12) or abs(height) > straight:
-                best, straight, feature = min(square, best), abs(height), kind
-                for q in range(3):
-                    best_point[q] = near[q]
-                    grad[q] = normal[q] / size
-                side = 1.0 if height >= 0.0 else -1.0
-    phi = np.sqrt(best)
-    if feature == FACE or phi < 1e-12:
-        return side * phi
-    for q in range(3):
-        grad[q] = side * (x[q] - best_point[q]) / phi
-    if feature == CORNER:
+    for r in range(3):
+        out[9 + r] = 0.0
         for q in range(3):
-            for p in range(3):
-                hess[3 * q + p] = ((1.0 if q == p else 0.0) - grad[q] * grad[p]) * side / phi
-    return side * phi
+            out[9 + r] += pose_b[3 * q + r] * (pose_a[9 + q] - pose_b[9 + q])
+        for c in range(3):
+            out[3 * r + c] = 0.0
+            for q in range(3):
+                out[3 * r + c] += pose_b[3 * q + r] * pose_a[3 * q + c]
+    for c in range(3):
+        middle = reach = 0.0
+        for r in range(3):
+            middle -= out[3 * r + c] * out[9 + r]
+            reach += abs(out[3 * r + c]) * half[r]
+        reach *= 1.0 + 1e-9
+        out[12 + c], out[15 + c] = middle - reach, middle + reach
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def brought(move, x, out):
+    """Write a point of a's frame in b's."""
+    for r in range(3):
+        out[r] = move[3 * r] * x[0] + move[3 * r + 1] * x[1] + move[3 * r + 2] * x[2] + move[9 + r]
 
 
 @njit(cache=True, error_model="numpy")
-def label_patches(rows, first, count, triangles):
-    """Number the vertices in contact so that those joined by triangles have one number."""
-    changed = True
-    for _ in range(count):
-        if not changed:
-            return
-        changed = False
-        for k in range(0, triangles.size, 3):
-            least = np.inf
-            for q in range(3):
-                pool = rows[first + triangles[k + q], pt.POOL]
-                if pool >= 0.0:
-                    least = min(least, pool)
-            for q in range(3):
-                row = rows[first + triangles[k + q]]
-                if row[pt.POOL] > least:
-                    row[pt.POOL] = least
-                    changed = True
+def from_solid(solid, x, grad, hess, work):
+    """Return the signed distance of a point of a solid's frame from it; write gradient and Hessian."""
+    if solid[0] == MESH:
+        return mesh_distance(x, solid[3], solid[5], solid[7], solid[8], grad, hess, work)
+    return distance(solid[0], solid[1], x, grad, hess)
 
 
 @njit(cache=True, error_model="numpy")
-def vertices_below(rows, first, swapped, solid_a, solid_b, origin_a, origin_b, derivatives, work):
-    """Write the vertices of solid a that lie below the surface of solid b.
+def block_clear(solid, block, move, anchor, work):
+    """Return whether a block of vertices is outside the solid whose place in their frame ``move`` is.
+
+    Parameters
+    ----------
+    solid : tuple
+        The other solid, as in `vertices_below`.
+    block : ndarray, shape (6,)
+        Box of the vertices.
+    move : ndarray, shape (18,)
+    anchor : ndarray, shape (4,)
+        In and out: a point and how far it is outside.
+    work : ndarray, shape (35,)
+    """
+    for q in range(3):
+        if block[q] > move[15 + q] or block[3 + q] < move[12 + q]:
+            return True
+    middle, local = work[0:3], work[3:6]
+    square = 0.0
+    for q in range(3):
+        middle[q] = 0.5 * (block[q] + block[3 + q])
+        square += (block[3 + q] - middle[q]) ** 2
+    radius = np.sqrt(square)
+    brought(move, middle, local)
+    if within(local, anchor, radius):
+        return True
+    phi = from_solid(solid, local, work[6:9], work[9:18], work[18:32])
+    if phi > 0.0:
+        for q in range(3):
+            anchor[q] = local[q]
+        anchor[3] = phi
+    return phi * LESS > radius
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def within(x, anchor, radius):
+    """Return whether a ball about x is within the ball about the anchor that holds nothing of the solid."""
+    left = anchor[3] * LESS - radius
+    if left <= 0.0:
+        return False
+    return (x[0] - anchor[0]) ** 2 + (x[1] - anchor[1]) ** 2 + (x[2] - anchor[2]) ** 2 < left * left
+
+
+@njit(cache=True, error_model="numpy")
+def vertices_below(rows, count, first, swapped, solid_a, solid_b, work):
+    """Write the vertices of solid a that lie below the surface of solid b; return how many rows there are then.
 
     Parameters
     ----------
     rows : ndarray, shape (points, COLUMNS)
-        Out, from row ``first`` on: one for each vertex of a.
-    first, swapped : int
+        Out, from row ``count`` on, in the order of the vertices.
+    count, first, swapped : int
+        Rows that are there, what to add to numbers of vertices.
     solid_a, solid_b : tuple
-        Kind, sizes, pose, vertices, weights, triangles and their boxes of each.
-    origin_a, origin_b : ndarray
-        Origins of the markers.
-    derivatives : bool
-    work : ndarray, shape (48,)
+        Kind, sizes, pose, vertices, weights, triangles, boxes of vertices, of triangles, and of these of each.
+    work : ndarray, shape (75,)
     """
-    pose_a, places, weights, triangles = solid_a[2], solid_a[3], solid_a[4], solid_a[5]
-    kind, sizes, pose_b = solid_b[0], solid_b[1], solid_b[2]
-    x, local, grad, normal, hess = work[12:15], work[15:18], work[18:21], work[21:24], work[24:33]
-    touching = False
-    for v in range(weights.size):
-        row = rows[first + v]
-        row[pt.POOL] = APART
-        to_global(pose_a, places[3 * v : 3 * v + 3], x)
-        for q in range(3):
-            x[q] += pose_a[9 + q]
-        local_point(pose_b, x, local)
-        if kind == MESH:
-            if abs(local[0]) > sizes[0] or abs(local[1]) > sizes[1] or abs(local[2]) > sizes[2]:
-                continue
-            phi = mesh_distance(local, solid_b[3], solid_b[5], solid_b[6], grad, hess, work[33:42])
-        else:
-            phi = distance(kind, sizes, local, grad, hess)
-        if phi >= 0.0:
+    pose_a, places, weights, boxes = solid_a[2], solid_a[3], solid_a[4], solid_a[6]
+    pose_b = solid_b[2]
+    local, grad, hess, anchor = work[35:38], work[38:41], work[41:50], work[50:54]
+    half, move = work[54:57], work[57:75]
+    half_lengths(solid_b[0], solid_b[1], half)
+    seen_from(pose_a, pose_b, half, move)
+    anchor[3] = from_solid(solid_b, move[9:12], grad, hess, work[0:14])
+    if anchor[3] * LESS > solid_a[1][3]:
+        return count
+    for q in range(3):
+        anchor[q] = move[9 + q]
+    for block in range(boxes.size // 6):
+        if block_clear(solid_b, boxes[6 * block : 6 * block + 6], move, anchor, work[0:35]):
             continue
-        to_global(pose_b, grad, normal)
-        by_distance(row, x, 0.0, phi, hess, normal, pose_b, origin_a, origin_b, derivatives, work)
-        row[pt.POOL], row[pt.WEIGHT], row[pt.SWAPPED] = first + v, weights[v], swapped
-        touching = True
-    if touching:
-        label_patches(rows, first, weights.size, triangles)
+        for v in range(BLOCK * block, min(BLOCK * (block + 1), weights.size)):
+            brought(move, places[3 * v : 3 * v + 3], local)
+            if abs(local[0]) > half[0] or abs(local[1]) > half[1] or abs(local[2]) > half[2]:
+                continue
+            if within(local, anchor, 0.0):
+                continue
+            phi = from_solid(solid_b, local, grad, hess, work[0:14])
+            if phi >= 0.0:
+                for q in range(3):
+                    anchor[q] = local[q]
+                anchor[3] = phi
+                continue
+            row = rows[count]
+            count += 1
+            to_global(pose_a, places[3 * v : 3 * v + 3], row[pt.VERTEX_PLACE : pt.VERTEX_PLACE + 3])
+            for q in range(3):
+                row[pt.VERTEX_PLACE + q] += pose_a[9 + q]
+            to_global(pose_b, grad, row[pt.NORMAL : pt.NORMAL + 3])
+            for q in range(9):
+                row[pt.HESSIAN + q] = hess[q]
+            row[pt.DEPTH] = -phi
+            for q in range(3):
+                row[pt.PLACE + q] = row[pt.VERTEX_PLACE + q] - 0.5 * phi * row[pt.NORMAL + q]
+            row[pt.VERTEX] = row[pt.POOL] = first + v
+            row[pt.WEIGHT], row[pt.SWAPPED] = weights[v], swapped
+    return count
 
 
 @njit(cache=True, error_model="numpy")
-def join_patches(rows, count, total):
-    """Give the vertices of the second solid, rows from ``count`` on, the patch of the nearest of the first."""
-    for v in range(count, total):
-        if rows[v, pt.POOL] < 0.0:
+def without_idle(rows, count):
+    """Move the points that bear a load to the first rows; return how many there are."""
+    deepest, kept = 0.0, 0
+    for k in range(count):
+        deepest = max(deepest, rows[k, pt.DEPTH])
+    for k in range(count):
+        if rows[k, pt.DEPTH] < BEARING * deepest:
             continue
-        best = np.inf
-        for u in range(count):
-            if rows[u, pt.POOL] < 0.0:
-                continue
-            square = 0.0
-            for q in range(3):
-                square += (rows[u, pt.PLACE + q] - rows[v, pt.PLACE + q]) ** 2
-            if square < best:
-                best, rows[v, pt.POOL] = square, rows[u, pt.POOL]
+        if kept < k:
+            for q in range(pt.COLUMNS):
+                rows[kept, q] = rows[k, q]
+        kept += 1
+    return kept
+
+
+@njit(cache=True, error_model="numpy")
+def moved_with(rows, count, pose_a, pose_b, origins, work):
+    """Write how the points move with both bodies.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (points, COLUMNS)
+    count : int
+    pose_a, pose_b : ndarray, shape (12,)
+        Of the solids of the bodies of markers I and J, if a row is not swapped.
+    origins : ndarray, shape (2, 3)
+        Of the markers.
+    work : ndarray, shape (27,)
+    """
+    x, normal, hess = work[12:15], work[15:18], work[18:27]
+    for k in range(count):
+        row = rows[k]
+        for q in range(3):
+            x[q], normal[q] = row[pt.VERTEX_PLACE + q], row[pt.NORMAL + q]
+        for q in range(9):
+            hess[q] = row[pt.HESSIAN + q]
+        if row[pt.SWAPPED] == 0.0:
+            by_distance(row, x, 0.0, -row[pt.DEPTH], hess, normal, pose_b, origins[0], origins[1], True, work)
+        else:
+            by_distance(row, x, 0.0, -row[pt.DEPTH], hess, normal, pose_a, origins[1], origins[0], True, work)

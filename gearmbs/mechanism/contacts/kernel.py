@@ -2,21 +2,22 @@
 
 Integers: the number of pairs, then `PAIR` for each: family, whether the first solid is J's, and both solids. A solid is
 its kind, its place in the reals (axes, origin, sizes; of a faceted one the last size is the radius of a ball about it),
-number of vertices, their place (coordinates, then weights, then boxes of triangles), number of triangles, their place
-in the integers. Reals
-begin with the law.
+number of vertices, their place (coordinates, weights, boxes of blocks of vertices, of triangles, and of these boxes),
+number of triangles, their place in the integers. Reals begin with the law.
 """
 
 from __future__ import annotations
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import matrix_at, vector_at
-from gearmbs.dae.equations.force_elements import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_P
+from gearmbs.dae.equations.force_elements import DERIVATIVES, DIAGNOSTICS, FORCE_SIG, FRAME_A, FRAME_P
 from gearmbs.mechanism.contacts import points as pt
 from gearmbs.mechanism.contacts.boxes import SCRATCH, two_boxes
-from gearmbs.mechanism.contacts.facets import BLOCK, join_patches, vertices_below
+from gearmbs.mechanism.contacts.facets import moved_with, vertices_below, without_idle
 from gearmbs.mechanism.contacts.fields import BOX, MESH, distance
 from gearmbs.mechanism.contacts.loads import LAW_REALS, press, share_out
+from gearmbs.mechanism.contacts.meshes import BLOCK
+from gearmbs.mechanism.contacts.patches import join_patches, label_patches, patches_in
 from gearmbs.mechanism.contacts.points import local_point
 from gearmbs.mechanism.contacts.smooth_pairs import ball_and_solid, convex_and_plane
 
@@ -53,7 +54,7 @@ def far_from(kind, sizes, pose, centre, reach, work):
 
 
 @njit(cache=True, error_model="numpy")
-def points_of(ints, reals, at, frames, rows, derivatives, work):
+def points_of(ints, reals, at, frames, rows, derivatives, labelled, work):
     """Write the points at which one pair touches; return how many rows may hold one.
 
     Parameters
@@ -66,6 +67,8 @@ def points_of(ints, reals, at, frames, rows, derivatives, work):
     rows : ndarray, shape (points, COLUMNS)
         Out.
     derivatives : bool
+    labelled : bool
+        Whether to tell patches of faceted solids apart; else only points that bear a load are written.
     work : ndarray
     """
     family, first = ints[at], ints[at + 1]
@@ -88,21 +91,18 @@ def points_of(ints, reals, at, frames, rows, derivatives, work):
             return 0
         if far_from(ints[a], sizes_a, pose_a, pose_b[9:12], sizes_b[3], scratch):
             return 0
-        na, nb = ints[a + 2], ints[b + 2]
-        of_a = (
-            ints[a], sizes_a, pose_a, vector_at(reals, ints[a + 3], 3 * na),
-            vector_at(reals, ints[a + 3] + 3 * na, na), vector_at(ints, ints[a + 5], 3 * ints[a + 4]),
-            vector_at(reals, ints[a + 3] + 4 * na, 6 * ((ints[a + 4] + BLOCK - 1) // BLOCK)),
-        )  # fmt: skip
-        of_b = (
-            ints[b], sizes_b, pose_b, vector_at(reals, ints[b + 3], 3 * nb),
-            vector_at(reals, ints[b + 3] + 3 * nb, nb), vector_at(ints, ints[b + 5], 3 * ints[b + 4]),
-            vector_at(reals, ints[b + 3] + 4 * nb, 6 * ((ints[b + 4] + BLOCK - 1) // BLOCK)),
-        )  # fmt: skip
-        vertices_below(rows, 0, 0, of_a, of_b, origins[0], origins[1], derivatives, scratch)
-        vertices_below(rows, na, 1, of_b, of_a, origins[1], origins[0], derivatives, scratch)
-        join_patches(rows, na, na + nb)
-        return _compacted(rows, na + nb)
+        of_a, of_b = faceted(ints, reals, a, sizes_a, pose_a), faceted(ints, reals, b, sizes_b, pose_b)
+        middle = vertices_below(rows, 0, 0, 0, of_a, of_b, scratch)
+        count = vertices_below(rows, middle, ints[a + 2], 1, of_b, of_a, scratch)
+        if labelled:
+            label_patches(rows, 0, middle, 0, of_a[5])
+            label_patches(rows, middle, count, ints[a + 2], of_b[5])
+            join_patches(rows, middle, count)
+        else:
+            count = without_idle(rows, count)
+        if derivatives:
+            moved_with(rows, count, pose_a, pose_b, origins, scratch)
+        return count
     row = rows[0]
     row[pt.WEIGHT], row[pt.POOL], row[pt.SWAPPED] = 1.0, 0.0, first
     if family == BALL_SOLID:
@@ -114,16 +114,20 @@ def points_of(ints, reals, at, frames, rows, derivatives, work):
     return 1 if row[pt.DEPTH] > 0.0 else 0
 
 
-@njit(cache=True, error_model="numpy")
-def _compacted(rows, count):
-    """Move the vertices in contact to the first rows; return how many there are."""
-    kept = 0
-    for k in range(count):
-        if rows[k, pt.POOL] >= 0.0:
-            for q in range(pt.COLUMNS):
-                rows[kept, q] = rows[k, q]
-            kept += 1
-    return kept
+@njit(cache=True, error_model="numpy", forceinline=True)
+def faceted(ints, reals, at, sizes, pose):
+    """Return a solid's tables: kind, sizes, pose, vertices, weights, triangles, boxes of vertices, triangles, boxes."""
+    vertices, triangles = ints[at + 2], ints[at + 4]
+    blocks, boxes = (vertices + BLOCK - 1) // BLOCK, (triangles + BLOCK - 1) // BLOCK
+    weights = ints[at + 3] + 3 * vertices
+    of_vertices = weights + vertices
+    of_triangles = of_vertices + 6 * blocks
+    of_boxes = of_triangles + 6 * boxes
+    return (
+        ints[at], sizes, pose, vector_at(reals, ints[at + 3], 3 * vertices), vector_at(reals, weights, vertices),
+        vector_at(ints, ints[at + 5], 3 * triangles), vector_at(reals, of_vertices, 6 * blocks),
+        vector_at(reals, of_triangles, 6 * boxes), vector_at(reals, of_boxes, 6 * ((boxes + BLOCK - 1) // BLOCK)),
+    )  # fmt: skip
 
 
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
@@ -133,10 +137,12 @@ def contact_of_solids(ints, reals, t, frames, states, inputs, want, work, wrench
     Diagnostics: energy stored, powers lost by damping and friction, patches, largest depth, sum of normal forces.
     """
     law = vector_at(reals, 0, LAW_REALS)
-    derivatives = (want & DERIVATIVES) != 0
+    derivatives, told = (want & DERIVATIVES) != 0, (want & DIAGNOSTICS) != 0
     rows = matrix_at(work, ROWS, (work.size - ROWS) // pt.COLUMNS, pt.COLUMNS)
     for pair in range(ints[0]):
-        count = points_of(ints, reals, 1 + PAIR * pair, frames, rows, derivatives, work)
-        diagnostics[3] += share_out(rows, count, derivatives)
+        count = points_of(ints, reals, 1 + PAIR * pair, frames, rows, derivatives, told, work)
+        share_out(rows, count, derivatives)
+        if told:
+            diagnostics[3] += patches_in(rows, count)
         for k in range(count):
             press(rows[k], law, frames, wrench, diagnostics, jac, derivatives, vector_at(work, GEOMETRY, 36))

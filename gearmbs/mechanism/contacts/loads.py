@@ -73,7 +73,7 @@ def _d_depth(row, c):
 
 @njit(cache=True, error_model="numpy")
 def share_out(rows, count, derivatives):
-    """Write shares g = dD/dd of the points of a pair in one load at the level D; return how many patches they are.
+    """Write shares g = dD/dd of the points of a pair in one load at the level D.
 
     D^q = sum(w d^q), so that the loads g f(D) are the gradient of one potential, however patches join or part. A single
     point of weight 1 bears all of it at its own depth.
@@ -85,21 +85,17 @@ def share_out(rows, count, derivatives):
     count : int
     derivatives : bool
     """
-    most, total, patches = 0.0, 0.0, 0
+    most, total = 0.0, 0.0
     for k in range(count):
         most = max(most, rows[k, pt.DEPTH])
     for k in range(count):
         total += rows[k, pt.WEIGHT] * (rows[k, pt.DEPTH] / most) ** NORM
     level = most * total ** (1.0 / NORM)
     for k in range(count):
-        first = True
-        for m in range(k):
-            first = first and rows[m, pt.POOL] != rows[k, pt.POOL]
-        patches += first
         rows[k, pt.LEVEL] = level
         rows[k, pt.SHARE] = rows[k, pt.WEIGHT] * (rows[k, pt.DEPTH] / level) ** (NORM - 1)
     if not derivatives:
-        return patches
+        return
     for c in range(12):
         slope = 0.0
         for k in range(count):
@@ -108,7 +104,6 @@ def share_out(rows, count, derivatives):
             row = rows[k]
             row[pt.D_LEVEL + c] = slope
             row[pt.D_SHARE + c] = (NORM - 1) * row[pt.SHARE] * (_d_depth(row, c) / row[pt.DEPTH] - slope / level)
-    return patches
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -28,7 +28,11 @@ LEVEL = SHARE + 1
 D_SHARE = LEVEL + 1
 """Derivatives of the share, then of the level, by the variations of bodies I and J, whichever is a."""
 D_LEVEL = D_SHARE + 12
-COLUMNS = D_LEVEL + 12
+VERTEX = D_LEVEL + 12
+"""Of a vertex: its number, where it is, and the Hessian (9) of its distance in the frame of the other solid."""
+VERTEX_PLACE = VERTEX + 1
+HESSIAN = VERTEX_PLACE + 3
+COLUMNS = HESSIAN + 9
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

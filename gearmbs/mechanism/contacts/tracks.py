@@ -53,7 +53,7 @@ def incidents(ints, reals, frames, out, work):
     n, u = scratch[6:9], scratch[9:12]
     found = 0
     for pair in range(ints[0]):
-        count = kernel.points_of(ints, reals, 1 + kernel.PAIR * pair, frames, rows, False, work)
+        count = kernel.points_of(ints, reals, 1 + kernel.PAIR * pair, frames, rows, False, True, work)
         share_out(rows, count, False)
         for first in range(count):
             pool = rows[first, pt.POOL]

@@ -1,0 +1,156 @@
+"""Signed distance from a closed mesh, whose triangles stand in blocks with boxes about them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearmbs._jit import njit
+from gearmbs.mechanism.contacts.points import dot
+
+FACE, EDGE, CORNER = 0, 1, 2
+TINY = 1e-300
+BLOCK = 16
+"""Vertices or triangles that share a box, and such boxes that share another; neighbours in the tables are neighbours in
+space."""
+
+
+@njit(cache=True, error_model="numpy")
+def nearest_of_triangle(x, a, b, c, out):
+    """Write the nearest point of a triangle; return on which feature it lies."""
+    d1 = d2 = d3 = d4 = d5 = d6 = 0.0
+    for q in range(3):
+        ab, ac = b[q] - a[q], c[q] - a[q]
+        d1 += ab * (x[q] - a[q])
+        d2 += ac * (x[q] - a[q])
+        d3 += ab * (x[q] - b[q])
+        d4 += ac * (x[q] - b[q])
+        d5 += ab * (x[q] - c[q])
+        d6 += ac * (x[q] - c[q])
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    feature = FACE
+    if d1 <= 0.0 and d2 <= 0.0:
+        v, w, feature = 0.0, 0.0, CORNER
+    elif d3 >= 0.0 and d4 <= d3:
+        v, w, feature = 1.0, 0.0, CORNER
+    elif d6 >= 0.0 and d5 <= d6:
+        v, w, feature = 0.0, 1.0, CORNER
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v, w, feature = d1 / max(d1 - d3, TINY), 0.0, EDGE
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        v, w, feature = 0.0, d2 / max(d2 - d6, TINY), EDGE
+    elif va <= 0.0 and d4 >= d3 and d5 >= d6:
+        w = (d4 - d3) / max(d4 - d3 + d5 - d6, TINY)
+        v, feature = 1.0 - w, EDGE
+    else:
+        total = max(va + vb + vc, TINY)
+        v, w = vb / total, vc / total
+    for q in range(3):
+        out[q] = a[q] + v * (b[q] - a[q]) + w * (c[q] - a[q])
+    return feature
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def square_to_box(x, boxes, block):
+    """Return the square of the distance of a point from the box of a block; 0 within."""
+    total = 0.0
+    for q in range(3):
+        low, high = boxes[6 * block + q], boxes[6 * block + 3 + q]
+        off = max(low - x[q], x[q] - high, 0.0)
+        total += off * off
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def nearest_box(x, boxes, first, end):
+    """Return which of the boxes from ``first`` to ``end`` is nearest to a point."""
+    nearest, least = first, np.inf
+    for block in range(first, end):
+        square = square_to_box(x, boxes, block)
+        if square < least:
+            nearest, least = block, square
+    return nearest
+
+
+@njit(cache=True, error_model="numpy")
+def nearest_in_block(x, places, triangles, block, best, straight, found):
+    """Look for a nearer triangle in a block; return the square of the least distance and how straight x is before it.
+
+    Parameters
+    ----------
+    x : ndarray, shape (3,)
+    places, triangles : ndarray
+        As in `mesh_distance`.
+    block : int
+    best, straight : float
+        What was found in other blocks.
+    found : ndarray, shape (14,)
+        In and out: nearest point (3), normal of its triangle (3), feature, side; then scratch.
+    """
+    near, normal = found[8:11], found[11:14]
+    for k in range(3 * BLOCK * block, min(3 * BLOCK * (block + 1), triangles.size), 3):
+        a = places[3 * triangles[k] : 3 * triangles[k] + 3]
+        b = places[3 * triangles[k + 1] : 3 * triangles[k + 1] + 3]
+        c = places[3 * triangles[k + 2] : 3 * triangles[k + 2] + 3]
+        kind = nearest_of_triangle(x, a, b, c, near)
+        square = (x[0] - near[0]) ** 2 + (x[1] - near[1]) ** 2 + (x[2] - near[2]) ** 2
+        if square > best * (1.0 + 1e-12):
+            continue
+        for q in range(3):
+            q1, q2 = (q + 1) % 3, (q + 2) % 3
+            normal[q] = (b[q1] - a[q1]) * (c[q2] - a[q2]) - (b[q2] - a[q2]) * (c[q1] - a[q1])
+        size = max(np.sqrt(dot(normal, normal)), TINY)
+        height = 0.0
+        for q in range(3):
+            height += normal[q] / size * (x[q] - near[q])
+        if square < best * (1.0 - 1e-12) or abs(height) > straight:
+            best, straight = min(square, best), abs(height)
+            for q in range(3):
+                found[q] = near[q]
+                found[3 + q] = normal[q] / size
+            found[6], found[7] = kind, 1.0 if height >= 0.0 else -1.0
+    return best, straight
+
+
+@njit(cache=True, error_model="numpy")
+def mesh_distance(x, places, triangles, boxes, groups, grad, hess, work):
+    """Return the signed distance from a closed mesh; write gradient and Hessian.
+
+    Of several triangles that are equally near, the one that x is most nearly in front of or behind tells the side.
+
+    Parameters
+    ----------
+    x : ndarray, shape (3,)
+    places : ndarray, shape (3 vertices,)
+    triangles : ndarray of int, shape (3 triangles,)
+        Corners, anticlockwise seen from outside.
+    boxes, groups : ndarray, shape (6 blocks,), (6 groups,)
+        Lowest and highest coordinates of each `BLOCK` triangles, of each `BLOCK` boxes.
+    grad, hess : ndarray, shape (3,), (9,)
+        Out.
+    work : ndarray, shape (14,)
+    """
+    blocks, found = boxes.size // 6, work
+    # the nearest box first, so that most others are too far
+    group = nearest_box(x, groups, 0, groups.size // 6)
+    start = nearest_box(x, boxes, BLOCK * group, min(BLOCK * (group + 1), blocks))
+    best, straight = nearest_in_block(x, places, triangles, start, np.inf, -1.0, found)
+    for group in range(groups.size // 6):
+        if square_to_box(x, groups, group) > best * (1.0 + 1e-12):
+            continue
+        for block in range(BLOCK * group, min(BLOCK * (group + 1), blocks)):
+            if block != start and square_to_box(x, boxes, block) <= best * (1.0 + 1e-12):
+                best, straight = nearest_in_block(x, places, triangles, block, best, straight, found)
+    phi, feature, side = np.sqrt(best), int(found[6]), found[7]
+    for q in range(9):
+        hess[q] = 0.0
+    for q in range(3):
+        grad[q] = found[3 + q]
+    if feature == FACE or phi < 1e-12:
+        return side * phi
+    for q in range(3):
+        grad[q] = side * (x[q] - found[q]) / phi
+    if feature == CORNER:
+        for q in range(3):
+            for p in range(3):
+                hess[3 * q + p] = ((1.0 if q == p else 0.0) - grad[q] * grad[p]) * side / phi
+    return side * phi
