@@ -19,6 +19,13 @@ from gearmbs.dae.linalg.counted_entries import (
     scaled_entries,
     taken_pattern,
 )
+from gearmbs.dae.linalg.entry_lists import (
+    columns_of,
+    entries_in_order,
+    lower_by_columns,
+    places_of,
+    upper_by_columns,
+)
 from gearmbs.dae.linalg.nodes import has_nodes, nodes
 from gearmbs.dae.linalg.pivoting import (
     CANCELLED,
@@ -28,6 +35,7 @@ from gearmbs.dae.linalg.pivoting import (
     choose_pivots,
     new_lines,
 )
+from gearmbs.dae.linalg.schedule import column_by_column, schedule
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -51,9 +59,19 @@ class LUPlan(Struct):
         For each column the rows below the pivot.
     u_col, l_col : ndarray
         Column of each of these entries.
-    op_ptr, op_l : ndarray
-        For each column the entries of L by which the earlier pivots act on it, one after the other; empty if there are
-        nodes.
+    l_to, l_by, u_to, u_by : ndarray
+        Places that the entries of L and U change in a substitution, and by which, in the order in which the entries
+        stand among the numbers of the factors: L, then U, which is gone through from its end, then the pivots.
+    a_to : ndarray
+        Where the entries of the matrix stand among these numbers.
+    pivot_ptr, pivot_order : ndarray
+        Where the pivots of each level of columns begin and end, see `gearmbs.dae.linalg.schedule`, and which these are,
+        in the order in which they stand; those set aside are the last.
+    op_ptr, op_to, op_l, op_u : ndarray
+        For each level its operations: the number that is changed and the factors of the product that is taken off.
+    div_ptr, div_to, div_by : ndarray
+        For each level the numbers that become entries of L, and the pivots that they are divided by. All from ``a_to``
+        on are empty if there are nodes.
     node_end : ndarray
         For each column the end of its node: columns in a row whose rows below the node are the same.
     row_from, col_to : ndarray
@@ -76,8 +94,20 @@ class LUPlan(Struct):
     l_pos: IndexVector
     u_col: IndexVector
     l_col: IndexVector
+    l_to: IndexVector
+    l_by: IndexVector
+    u_to: IndexVector
+    u_by: IndexVector
+    a_to: IndexVector
+    pivot_ptr: IntVector
+    pivot_order: IndexVector
     op_ptr: IntVector
+    op_to: IndexVector
     op_l: IndexVector
+    op_u: IndexVector
+    div_ptr: IntVector
+    div_to: IndexVector
+    div_by: IndexVector
     node_end: IntVector
     row_from: IndexVector
     col_to: IndexVector
@@ -106,114 +136,16 @@ class SingularMatrixError(ValueError):
         self.cols = cols
 
 
-@njit(types.void(_UVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
-def _sort_lines(places, ptr):
-    """Sort each of the short lists ``places[ptr[k] : ptr[k + 1]]``."""
-    for k in range(ptr.shape[0] - 1):
-        for p in range(ptr[k] + 1, ptr[k + 1]):
-            value = places[p]
-            q = p - 1
-            while q >= ptr[k] and places[q] > value:
-                places[q + 1] = places[q]
-                q -= 1
-            places[q + 1] = value
-
-
 @njit(
-    types.Tuple((_IVEC, _UVEC, _UVEC, _VEC))(_IVEC, _IVEC, _VEC, _VEC, _IVEC, _IVEC),
+    types.Tuple((int64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _VEC, _VEC, _UVEC, _IVEC, _IVEC, _UVEC, _VEC))(
+        _IVEC, _IVEC, _VEC, _VEC, float64, _MASK, float64, LINES_TYPE, LINES_TYPE
+    ),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def _entries_in_order(indptr, indices, row_scale, col_scale, cols, row_place):
-    """Return the entries of the matrix column by column in pivot order, rows ascending: fields ``a_*`` of `LUPlan`."""
-    n = indptr.shape[0] - 1
-    nnz = indices.shape[0]
-    a_ptr = np.zeros(n + 1, dtype=np.int64)
-    a_pos = np.empty(nnz, dtype=np.uint32)
-    a_src = np.empty(nnz, dtype=np.uint32)
-    a_scale = np.empty(nnz)
-    at = np.empty(n, dtype=np.int64)
-    for k in range(n):
-        j = cols[k]
-        end = a_ptr[k]
-        for p in range(indptr[j], indptr[j + 1]):
-            a_pos[end] = row_place[indices[p]]
-            end += 1
-        a_ptr[k + 1] = end
-    _sort_lines(a_pos, a_ptr)
-    for k in range(n):
-        j = cols[k]
-        for p in range(indptr[j], indptr[j + 1]):
-            at[row_place[indices[p]]] = p
-        for e in range(a_ptr[k], a_ptr[k + 1]):
-            p = at[a_pos[e]]
-            a_src[e] = p
-            a_scale[e] = row_scale[indices[p]] * col_scale[j]
-    return a_ptr, a_pos, a_src, a_scale
-
-
-@njit(types.Tuple((_IVEC, _UVEC))(_IVEC, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
-def _upper_by_columns(u_ptr, u_cols, col_place):
-    """Return U's pattern by columns: it comes out pivot by pivot, so that each column's pivots ascend."""
-    n = u_ptr.shape[0] - 1
-    by_col = np.zeros(n + 1, dtype=np.int64)
-    for e in range(u_cols.shape[0]):
-        by_col[col_place[u_cols[e]] + 1] += 1
-    at = np.empty(n, dtype=np.int64)
-    for k in range(n):
-        by_col[k + 1] += by_col[k]
-        at[k] = by_col[k]
-    places = np.empty(u_cols.shape[0], dtype=np.uint32)
-    for k in range(n):
-        for e in range(u_ptr[k], u_ptr[k + 1]):
-            m = col_place[u_cols[e]]
-            places[at[m]] = k
-            at[m] += 1
-    return by_col, places
-
-
-@njit(_UVEC(_IVEC), cache=True, nogil=True, error_model="numpy")
-def _columns_of(ptr):
-    """Return the column of each entry of a pattern by columns."""
-    columns = np.empty(ptr[ptr.shape[0] - 1], dtype=np.uint32)
-    for k in range(ptr.shape[0] - 1):
-        for p in range(ptr[k], ptr[k + 1]):
-            columns[p] = k
-    return columns
-
-
-@njit(types.Tuple((_IVEC, _UVEC))(_IVEC, _UVEC, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
-def _operations(u_ptr, u_pos, l_ptr, node_end):
-    """Return the fields ``op_*`` of `LUPlan`."""
-    n = u_ptr.shape[0] - 1
-    op_ptr = np.zeros(n + 1, dtype=np.int64)
-    if has_nodes(node_end):
-        return op_ptr, np.empty(0, dtype=np.uint32)
-    for k in range(n):
-        op_ptr[k + 1] = op_ptr[k]
-        for p in range(u_ptr[k], u_ptr[k + 1]):
-            op_ptr[k + 1] += l_ptr[u_pos[p] + 1] - l_ptr[u_pos[p]]
-    op_l = np.empty(op_ptr[n], dtype=np.uint32)
-    e = 0
-    for p in range(u_pos.shape[0]):
-        for q in range(l_ptr[u_pos[p]], l_ptr[u_pos[p] + 1]):
-            op_l[e] = q
-            e += 1
-    return op_ptr, op_l
-
-
-@njit(
-    types.Tuple(
-        (int64, _IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC)
-        + (_VEC, _VEC, _VEC, _UVEC, _VEC)
-    )(_IVEC, _IVEC, _VEC, _VEC, float64, _MASK, float64, LINES_TYPE, LINES_TYPE),
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def _plan(all_ptr, all_indices, vals, scale, drop, counted, negligible, columns, rows_left):
-    """Return the rank and the fields of an `LUPlan`, in their order.
+def _choose(all_ptr, all_indices, vals, scale, drop, counted, negligible, columns, rows_left):
+    """Scale the matrix, leave out what is negligible and choose pivots.
 
     Parameters
     ----------
@@ -221,8 +153,18 @@ def _plan(all_ptr, all_indices, vals, scale, drop, counted, negligible, columns,
         As the pattern and the others of `analyse`.
     columns, rows_left
         As in `choose_pivots`.
+
+    Returns
+    -------
+    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols
+        See `choose_pivots`; no rank where a pool was too small.
+    row_scale, col_scale, taken
+        Scales; entries of the matrix that the plan is made for.
+    indptr, indices
+        Their pattern.
+    left, left_limit
+        See `LUPlan`.
     """
-    n = all_ptr.shape[0] - 1
     row_scale, col_scale, all_scaled = scaled_entries(all_ptr, all_indices, vals, scale)
     taken, left = part_entries(all_scaled, counted, WHEN_PLANNED * negligible)
     indptr, indices, scaled = taken_pattern(all_ptr, all_indices, all_scaled, taken)
@@ -232,58 +174,10 @@ def _plan(all_ptr, all_indices, vals, scale, drop, counted, negligible, columns,
             rank, growth, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(
                 indptr, indices, scaled, drop, threshold, columns, rows_left
             )
-    if rank < 0:
-        rows = np.arange(n)
-        cols = rows
-        l_ptr[:] = 0
-        u_ptr[:] = 0
-        l_rows = rows[:0]
-        u_cols = l_rows
-    row_place = np.empty(n, dtype=np.int64)
-    col_place = np.empty(n, dtype=np.int64)
-    row_from = np.empty(n, dtype=np.uint32)
-    col_to = np.empty(n, dtype=np.uint32)
-    kept = np.zeros(n)
-    for k in range(n):
-        row_place[rows[k]] = k
-        col_place[cols[k]] = k
-        row_from[k] = rows[k]
-        col_to[k] = cols[k]
-        if k < rank:
-            kept[k] = 1.0
-    a_ptr, a_pos, a_src, a_scale = _entries_in_order(indptr, indices, row_scale, col_scale, cols, row_place)
-    for e in range(a_src.shape[0]):
-        a_src[e] = taken[a_src[e]]
-    u_by_col, u_pos = _upper_by_columns(u_ptr, u_cols, col_place)
-    l_pos = np.empty(l_rows.shape[0], dtype=np.uint32)
-    for e in range(l_rows.shape[0]):
-        l_pos[e] = row_place[l_rows[e]]
-    _sort_lines(l_pos, l_ptr)
-    node_end = nodes(l_ptr, l_pos)
-    op_ptr, op_l = _operations(u_by_col, u_pos, l_ptr, node_end)
+    left_limit = limits(all_ptr, all_indices, left, row_scale, col_scale, negligible)
     return (
-        rank,
-        a_ptr,
-        a_pos,
-        a_src,
-        a_scale,
-        u_by_col,
-        u_pos,
-        l_ptr,
-        l_pos,
-        _columns_of(u_by_col),
-        _columns_of(l_ptr),
-        op_ptr,
-        op_l,
-        node_end,
-        row_from,
-        col_to,
-        row_scale[rows],
-        col_scale[cols],
-        kept,
-        left,
-        limits(all_ptr, all_indices, left, row_scale, col_scale, negligible),
-    )
+        rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left, left_limit
+    )  # fmt: skip
 
 
 def analyse(
@@ -329,17 +223,48 @@ def analyse(
         raise ValueError("the matrix has entries that are not finite")
     n = len(indptr) - 1
     size = 3 * len(indices) + 4 * n
-    rank = -1
     counted = np.ones(len(indices), dtype=bool) if counted is None else counted
-    while rank < 0:
+    while True:
         lines = new_lines(n, size, True), new_lines(n, size, False)
-        rank, *plan = _plan(
+        rank, *chosen = _choose(
             indptr, indices, vals, np.asarray(scale, dtype=float), max(drop, CANCELLED), counted, negligible, *lines
         )
+        if rank >= 0:
+            break
         size *= 2
     if rank < n and not counted.all():
         return analyse(indptr, indices, vals, scale, drop)
-    if rank < len(indptr) - 1 and drop == 0.0:
-        rows, cols = (np.asarray(plan[i], dtype=np.int64)[rank:] for i in (13, 14))
-        raise SingularMatrixError(rows, cols)
-    return LUPlan(**dict(zip(LUPlan.array_members, plan, strict=True)))
+    if rank < n and drop == 0.0:
+        rows, cols = chosen[:2]
+        raise SingularMatrixError(rows[rank:], cols[rank:])
+    return _plan(rank, *chosen)
+
+
+def _plan(
+    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left, left_limit
+) -> LUPlan:  # fmt: skip
+    """Return the plan that follows from what `_choose` returns.
+
+    Parameters
+    ----------
+    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left, left_limit
+        See there.
+    """
+    row_place, col_place = places_of(rows), places_of(cols)
+    a_ptr, a_pos, a_src, a_scale = entries_in_order(indptr, indices, row_scale, col_scale, cols, row_place)
+    u_by_col, u_pos = upper_by_columns(u_ptr, u_cols, col_place)
+    l_pos = lower_by_columns(l_ptr, l_rows, row_place)
+    u_col, l_col = columns_of(u_by_col), columns_of(l_ptr)
+    node_end = nodes(l_ptr, l_pos)
+    if has_nodes(node_end):
+        order = column_by_column(u_pos, u_col, l_pos, l_col)
+    else:
+        order = schedule(rank, a_ptr, a_pos, u_by_col, u_pos, u_col, l_ptr, l_pos, l_col)
+    kept = np.zeros(len(rows))
+    kept[:rank] = 1.0
+    return LUPlan(
+        a_ptr=a_ptr, a_pos=a_pos, a_src=taken[a_src], a_scale=a_scale, u_ptr=u_by_col, u_pos=u_pos, l_ptr=l_ptr,
+        l_pos=l_pos, u_col=u_col, l_col=l_col, node_end=node_end, row_from=rows.astype(np.uint32),
+        col_to=cols.astype(np.uint32), row_scale=row_scale[rows], col_scale=col_scale[cols], kept=kept, left_src=left,
+        left_limit=left_limit, **order,
+    )  # fmt: skip

@@ -1,16 +1,18 @@
 """Sparse LU for a fixed pattern: numeric factorisations replayed along a plan without search.
 
-`factor` replays the plan of `gearmbs.dae.linalg.lu_plan` column by column (left-looking), `solve` applies it. Pivots
-stay frozen until a multiplier grows beyond `GROWTH_LIMIT`, a pivot vanishes, or an entry that was left out of the plan
-counts; then the caller analyses again with the current values.
+`factor` replays the plan of `gearmbs.dae.linalg.lu_plan` level by level, see `gearmbs.dae.linalg.schedule`, or, where
+columns are taken together as nodes, column by column (left-looking); `solve` applies it. Pivots stay frozen until a
+multiplier grows beyond `GROWTH_LIMIT`, a pivot vanishes, or an entry that was left out of the plan counts; then the
+caller analyses again with the current values.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, types
+from numba import float64, int64, types
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 from gearmbs.dae.compiled.structs import Struct, Vector
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
 from gearmbs.dae.linalg.nodes import has_nodes, through_node
@@ -22,10 +24,20 @@ _MAT = float64[:, ::1]
 
 
 class LUFactors(Struct):
-    """Numbers of one factorisation: L below its unit diagonal, U above its diagonal, inverse pivots, scratch."""
+    """Numbers of one factorisation.
 
-    l_vals: Vector
-    u_vals: Vector
+    Attributes
+    ----------
+    lu : ndarray
+        L below its unit diagonal, U above its diagonal, inverse pivots, each in the plan's order, and one that nothing
+        uses.
+    pivot_inv : ndarray, shape (n,)
+        Inverse pivots by their places.
+    x, w : ndarray, shape (n,)
+        Scratch.
+    """
+
+    lu: Vector
     pivot_inv: Vector
     x: Vector
     w: Vector
@@ -38,32 +50,53 @@ def new_factors(plan: LUPlan) -> LUFactors:
     """Return empty factors for a plan."""
     n = len(plan.row_from)
     return LUFactors(
-        l_vals=np.zeros(len(plan.l_pos)),
-        u_vals=np.zeros(len(plan.u_pos)),
+        lu=np.zeros(len(plan.l_pos) + len(plan.u_pos) + n + 1),
         pivot_inv=np.zeros(n),
         x=np.zeros(n),
         w=np.zeros(n),
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _act(plan, factors, k):
-    """Eliminate from column k, spread out in ``factors.x``, what the earlier pivots act on it, and store U's part."""
-    x, l_vals, u_vals = factors.x, factors.l_vals, factors.u_vals
-    l_pos, l_col, u_pos, op_l = plan.l_pos, plan.l_col, plan.u_pos, plan.op_l
-    for e in range(np.uint64(plan.op_ptr[k]), np.uint64(plan.op_ptr[k + 1])):
-        q = op_l[e]
-        x[l_pos[q]] -= l_vals[q] * x[l_col[q]]
-    for p in range(np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])):
-        u_vals[p] = x[u_pos[p]]
-        x[u_pos[p]] = 0.0
+@njit(cache=True, nogil=True, error_model="numpy")
+def _factor_by_levels(plan, factors, vals):
+    """Factor the matrix with values ``vals`` level by level; return what `factor` does."""
+    lu, pivot_inv = factors.lu, factors.pivot_inv
+    a_to, a_src, a_scale, pivot_order = plan.a_to, plan.a_src, plan.a_scale, plan.pivot_order
+    op_to, op_l, op_u, div_to, div_by = plan.op_to, plan.op_l, plan.op_u, plan.div_to, plan.div_by
+    n = pivot_inv.shape[0]
+    pivots = np.uint64(plan.l_to.shape[0] + plan.u_to.shape[0])
+    for e in range(lu.shape[0]):
+        lu[e] = 0.0
+    for e in range(a_to.shape[0]):
+        lu[a_to[e]] = vals[a_src[e]] * a_scale[e]
+    regular, top = True, int64(0)
+    for m in range(plan.op_ptr.shape[0] - 1):
+        for e in range(np.uint64(plan.op_ptr[m]), np.uint64(plan.op_ptr[m + 1])):
+            lu[op_to[e]] -= lu[op_l[e]] * lu[op_u[e]]
+        for k in range(np.uint64(plan.pivot_ptr[m]), np.uint64(plan.pivot_ptr[m + 1])):
+            pivot = lu[pivots + k]
+            regular &= pivot != 0.0
+            lu[pivots + k] = 1.0 / pivot
+        for e in range(np.uint64(plan.div_ptr[m]), np.uint64(plan.div_ptr[m + 1])):
+            l = lu[div_to[e]] * lu[div_by[e]]
+            lu[div_to[e]] = l
+            top = max(top, bits_of(abs(l)))
+    if not regular:
+        return np.inf
+    for k in range(n):
+        pivot_inv[pivot_order[k]] = lu[pivots + np.uint64(k)] if plan.kept[k] != 0.0 else 0.0
+    return double_of(top)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _act_by_nodes(plan, factors, k):
-    """As `_act`, the columns of a node together."""
-    x, w, l_vals, u_vals = factors.x, factors.w, factors.l_vals, factors.u_vals
+    """Eliminate from column k, spread out in ``factors.x``, what the earlier pivots act on it, and store U's part.
+
+    The columns of a node act together.
+    """
+    x, w, lu = factors.x, factors.w, factors.lu
     l_ptr, l_pos, u_pos, node_end = plan.l_ptr, plan.l_pos, plan.u_pos, plan.node_end
+    upper = np.uint64(l_pos.shape[0])
     p, last = np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])
     while p < last:
         j = np.uint64(u_pos[p])
@@ -71,11 +104,11 @@ def _act_by_nodes(plan, factors, k):
         if end - np.int64(j) == 1:
             u = x[j]
             x[j] = 0.0
-            u_vals[p] = u
+            lu[upper + p] = u
             p += np.uint64(1)
             if u != 0.0:
                 for q in range(np.uint64(l_ptr[j]), np.uint64(l_ptr[j + np.uint64(1)])):
-                    x[l_pos[q]] -= l_vals[q] * u
+                    x[l_pos[q]] -= lu[q] * u
             continue
         # the column has all rows of the node from this one on
         stop, rows = np.uint64(min(end, k)), np.uint64(end) - j
@@ -86,14 +119,44 @@ def _act_by_nodes(plan, factors, k):
             x[j + i] = 0.0
         for i in range(rows, size):
             w[i] = 0.0
-        through_node(np.int64(j), np.int64(stop), np.int64(size), l_ptr, l_vals, w)
+        through_node(np.int64(j), np.int64(stop), np.int64(size), l_ptr, lu, w)
         for i in range(stop - j):
-            u_vals[p + i] = w[i]
+            lu[upper + p + i] = w[i]
         for i in range(stop - j, rows):
             x[j + i] = w[i]
         for i in range(size - rows):
             x[l_pos[below + i]] += w[rows + i]
         p += stop - j
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _factor_by_nodes(plan, factors, vals):
+    """Factor the matrix with values ``vals`` column by column; return what `factor` does."""
+    x, lu, pivot_inv = factors.x, factors.lu, factors.pivot_inv
+    a_pos, a_src, a_scale, l_pos = plan.a_pos, plan.a_src, plan.a_scale, plan.l_pos
+    growth = 0.0
+    for k in range(x.shape[0]):
+        for p in range(np.uint64(plan.a_ptr[k]), np.uint64(plan.a_ptr[k + 1])):
+            x[a_pos[p]] = vals[a_src[p]] * a_scale[p]
+        _act_by_nodes(plan, factors, k)
+        pivot = x[k]
+        x[k] = 0.0
+        if plan.kept[k] == 0.0:
+            pivot_inv[k] = 0.0
+            x[:] = 0.0
+            continue
+        if pivot == 0.0:
+            return np.inf
+        inv = 1.0 / pivot
+        pivot_inv[k] = inv
+        for q in range(np.uint64(plan.l_ptr[k]), np.uint64(plan.l_ptr[k + 1])):
+            i = l_pos[q]
+            l = x[i] * inv
+            x[i] = 0.0
+            lu[q] = l
+            if not abs(l) <= growth:
+                growth = abs(l)
+    return growth
 
 
 @njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
@@ -120,41 +183,15 @@ def factor(plan, factors, vals):
         fits &= abs(vals[left_src[p]]) <= left_limit[p]
     if not fits:
         return np.inf
-    x, l_vals, pivot_inv = factors.x, factors.l_vals, factors.pivot_inv
-    a_pos, a_src, a_scale, l_pos = plan.a_pos, plan.a_src, plan.a_scale, plan.l_pos
-    by_nodes = has_nodes(plan.node_end)
-    growth = 0.0
-    for k in range(x.shape[0]):
-        for p in range(np.uint64(plan.a_ptr[k]), np.uint64(plan.a_ptr[k + 1])):
-            x[a_pos[p]] = vals[a_src[p]] * a_scale[p]
-        if by_nodes:
-            _act_by_nodes(plan, factors, k)
-        else:
-            _act(plan, factors, k)
-        pivot = x[k]
-        x[k] = 0.0
-        if plan.kept[k] == 0.0:
-            pivot_inv[k] = 0.0
-            x[:] = 0.0
-            continue
-        if pivot == 0.0:
-            return np.inf
-        inv = 1.0 / pivot
-        pivot_inv[k] = inv
-        for q in range(np.uint64(plan.l_ptr[k]), np.uint64(plan.l_ptr[k + 1])):
-            i = l_pos[q]
-            l = x[i] * inv
-            x[i] = 0.0
-            l_vals[q] = l
-            if not abs(l) <= growth:
-                growth = abs(l)
-    return growth
+    if has_nodes(plan.node_end):
+        return _factor_by_nodes(plan, factors, vals)
+    return _factor_by_levels(plan, factors, vals)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _forward_by_nodes(plan, factors):
     """Solve L x = x in ``factors.x``, the columns of a node together."""
-    x, w, l_vals = factors.x, factors.w, factors.l_vals
+    x, w, lu = factors.x, factors.w, factors.lu
     l_pos, l_ptr, node_end = plan.l_pos, plan.l_ptr, plan.node_end
     n = x.shape[0]
     k = 0
@@ -164,7 +201,7 @@ def _forward_by_nodes(plan, factors):
             v = x[k]
             if v != 0.0:
                 for q in range(np.uint64(l_ptr[k]), np.uint64(l_ptr[k + 1])):
-                    x[l_pos[q]] -= l_vals[q] * v
+                    x[l_pos[q]] -= lu[q] * v
         else:
             first, rows, below = np.uint64(k), np.uint64(end - k), np.uint64(l_ptr[end - 1])
             size = rows + np.uint64(l_ptr[end]) - below
@@ -172,7 +209,7 @@ def _forward_by_nodes(plan, factors):
                 w[i] = x[first + i]
             for i in range(rows, size):
                 w[i] = 0.0
-            through_node(k, end, np.int64(size), l_ptr, l_vals, w)
+            through_node(k, end, np.int64(size), l_ptr, lu, w)
             for i in range(rows):
                 x[first + i] = w[i]
             for i in range(size - rows):
@@ -183,12 +220,13 @@ def _forward_by_nodes(plan, factors):
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _backward_by_columns(plan, factors):
     """Take from ``factors.x`` what the unknowns above the diagonal of U give, column by column."""
-    x, u_vals, pivot_inv, u_pos, u_ptr = factors.x, factors.u_vals, factors.pivot_inv, plan.u_pos, plan.u_ptr
+    x, lu, pivot_inv, u_pos, u_ptr = factors.x, factors.lu, factors.pivot_inv, plan.u_pos, plan.u_ptr
+    upper = np.uint64(plan.l_pos.shape[0])
     for m in range(x.shape[0]):
         k = np.uint64(x.shape[0] - 1 - m)
         v = x[k] * pivot_inv[k]
         for p in range(np.uint64(u_ptr[k]), np.uint64(u_ptr[k + np.uint64(1)])):
-            x[u_pos[p]] -= u_vals[p] * v
+            x[u_pos[p]] -= lu[upper + p] * v
 
 
 @njit(types.void(PLAN_TYPE, FACTORS_TYPE, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
@@ -204,8 +242,8 @@ def solve(plan, factors, b, out):
         From `factor`.
     b, out : ndarray, shape (n,)
     """
-    x, l_vals, u_vals, pivot_inv = factors.x, factors.l_vals, factors.u_vals, factors.pivot_inv
-    l_pos, l_col, u_pos, u_col = plan.l_pos, plan.l_col, plan.u_pos, plan.u_col
+    x, lu, pivot_inv = factors.x, factors.lu, factors.pivot_inv
+    l_to, l_by, u_to, u_by = plan.l_to, plan.l_by, plan.u_to, plan.u_by
     row_from, row_scale, col_to, col_scale = plan.row_from, plan.row_scale, plan.col_to, plan.col_scale
     n = x.shape[0]
     for k in range(n):
@@ -214,13 +252,13 @@ def solve(plan, factors, b, out):
         _forward_by_nodes(plan, factors)
         _backward_by_columns(plan, factors)
     else:
-        for q in range(l_pos.shape[0]):
-            x[l_pos[q]] -= l_vals[q] * x[l_col[q]]
-        last = u_pos.shape[0] - 1
-        for m in range(u_pos.shape[0]):
-            p = last - m
-            k = u_col[p]
-            x[u_pos[p]] -= u_vals[p] * (x[k] * pivot_inv[k])
+        for q in range(l_to.shape[0]):
+            x[l_to[q]] -= lu[q] * x[l_by[q]]
+        upper, last = np.uint64(l_to.shape[0]), u_to.shape[0] - 1
+        for m in range(u_to.shape[0]):
+            p = np.uint64(last - m)
+            k = u_by[p]
+            x[u_to[p]] -= lu[upper + p] * (x[k] * pivot_inv[k])
     for k in range(n):
         out[col_to[k]] = x[k] * pivot_inv[k] * col_scale[k]
         x[k] = 0.0
@@ -238,21 +276,21 @@ def solve_pair(plan, factors, pair):
     pair : ndarray, shape (4, n)
         Right-hand sides in the first two rows, overwritten by the solutions; the others are scratch.
     """
-    l_vals, u_vals, pivot_inv = factors.l_vals, factors.u_vals, factors.pivot_inv
-    l_pos, l_col, u_pos, u_col = plan.l_pos, plan.l_col, plan.u_pos, plan.u_col
+    lu, pivot_inv = factors.lu, factors.pivot_inv
+    l_to, l_by, u_to, u_by = plan.l_to, plan.l_by, plan.u_to, plan.u_by
     n = factors.x.shape[0]
     for k in range(n):
         row, size = plan.row_from[k], plan.row_scale[k]
         pair[2, k] = pair[0, row] * size
         pair[3, k] = pair[1, row] * size
-    for q in range(l_pos.shape[0]):
-        i, k, l = l_pos[q], l_col[q], l_vals[q]
+    for q in range(l_to.shape[0]):
+        i, k, l = l_to[q], l_by[q], lu[q]
         pair[2, i] -= l * pair[2, k]
         pair[3, i] -= l * pair[3, k]
-    last = u_pos.shape[0] - 1
-    for m in range(u_pos.shape[0]):
-        p = last - m
-        i, k, u = u_pos[p], u_col[p], u_vals[p]
+    upper, last = np.uint64(l_to.shape[0]), u_to.shape[0] - 1
+    for m in range(u_to.shape[0]):
+        p = np.uint64(last - m)
+        i, k, u = u_to[p], u_by[p], lu[upper + p]
         pair[2, i] -= u * (pair[2, k] * pivot_inv[k])
         pair[3, i] -= u * (pair[3, k] * pivot_inv[k])
     for k in range(n):
