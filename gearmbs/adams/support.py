@@ -10,6 +10,7 @@ from gearmbs.adams.parse import commands as acf
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import UNSUPPORTED_ARGUMENTS, WITHOUT_EFFECT
 from gearmbs.adams.parse.grammar import CHOICE, specs_of
+from gearmbs.adams.parse.remedies import INSTEAD_OF_ARGUMENTS
 from gearmbs.mechanism.expression_functions import BINARY, ELEMENT_FORCES, UNARY
 from gearmbs.mechanism.expression_functions import UNSUPPORTED as REFUSED_FUNCTIONS
 from gearmbs.mechanism.expression_library import FUNCTIONS
@@ -29,26 +30,6 @@ INSTEAD: dict[str, str] = {
     "UCON": "a GCON with an expression, or a COUPLER with a routine",
 }
 """What to do instead of statements that are refused."""
-
-INSTEAD_OF_ARGUMENTS: dict[tuple[str, str], str] = {
-    ("CONTACT", "NORMAL_FUNCTION"): "IMPACT or POISSON",
-    ("CONTACT", "FRICTION_FUNCTION"): "COULOMB_FRICTION",
-    ("CONTACT", "IFLEX"): "a solid on a rigid PART",
-    ("CONTACT", "JFLEX"): "a solid on a rigid PART",
-    ("CURVE", "FUNCTION"): "USER with a routine, or points in a MATRIX",
-    ("COUPLER", "FUNCTION"): "USER with a routine, or SCALES",
-    ("FE_LOAD", "FUNCTION"): "FX to TZ with expressions, which may contain S",
-    ("FE_PART", "CRATIOM"): "CRATIOK, or forces against the velocity at markers on nodes",
-    ("FE_PART", "PRELOAD"): "a GFORCE at its ends",
-    ("FIELD", "FUNCTION"): "USER with a routine, or KMATRIX and CMATRIX",
-    ("FLEX_BODY", "DB_FILE"): "MNF_FILE, a modal neutral file",
-    ("FLEX_BODY", "BDF_FILE"): "MNF_FILE; beams of large motion in Python (`gearmbs.flexible.add_beam`)",
-    ("FLEX_BODY", "INDEX_IN_DATABASE"): "MNF_FILE, a modal neutral file",
-    ("REQUEST", "FUNCTION"): "USER with a routine, or F1 to F8",
-    ("SPLINE", "FILE"): "X and Y in the deck",
-    ("JOINT", "FRICTION"): "a FRICTION statement",
-}
-"""What to do instead of arguments that are refused."""
 
 INSTEAD_OF_FUNCTIONS: dict[str, str] = {
     "ARYSUM": "the sum of ARYVALs",

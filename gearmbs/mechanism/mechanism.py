@@ -366,7 +366,7 @@ class Mechanism(JointMethods, LoadMethods, Shown):
         """Let expressions call a Python function of numbers by a name of its own, for instance ``SPRING(DX(a, b))``.
 
         The function is called at every evaluation, some microseconds a time, and should be smooth; its derivatives are
-        made by differences unless ``partials`` returns them.
+        made by differences unless ``partials`` returns them. In constraints it may have sixteen arguments.
 
         Parameters
         ----------

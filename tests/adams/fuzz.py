@@ -2,7 +2,7 @@
 
 Each deck is read, built and its expressions compiled, as before every run; one in a few is run, too. It must end in a
 result or in an error with a line, within its time. What does not is printed with its seed, from which
-``--only SEED`` makes it again.
+``--only SEED`` makes it again. ``--mild`` changes decks so that most of them can still be run.
 """
 
 from __future__ import annotations
@@ -39,9 +39,10 @@ from . import (
     test_user_elements,
 )
 from .decks import EVERYTHING, PENDULUM, SCRIPT
+from .mild_changes import mildly_changed
 from .mutations import mutated
 
-SECONDS = 60
+SECONDS = 20
 """In which a deck must be done."""
 CHECKED = "m\no\nSIMULATE/DYNAMICS, END=0.002, STEPS=2\n"
 IMPLICIT = "DIFF/1, IMPLICIT, IC=0.5, FUNCTION=DIF1(1)+DIF1(1)**3-COS(TIME)+DIF(1)\nREQUEST/1, F2=DIF1(1)\n"
@@ -51,6 +52,14 @@ RUNS = [
     "m\no\nSIMULATE/STATICS, END=0.002, STEPS=2\n", "m\no\nSIMULATE/INITIAL_CONDITIONS\n",
     "m\no\nSIM/DYN, END=0.001, STEPS=1\nDEACT/JOINT, RANGE=1,3\nSIM/DYN, END=0.002, STEPS=1\n",
 ]  # fmt: skip
+
+LONGER = "m\no\nSIMULATE/DYNAMICS, END=0.05, STEPS=5\n"
+MILD_RUNS = [*[CHECKED] * 3, LONGER, *RUNS[2:4], *RUNS[6:]]
+"""Those that most decks allow."""
+SMALL = 3000
+"""Characters of a deck that is built and run in some hundredths of a second."""
+RUNNING = 3
+"""Place in the corpus of the deck with most kinds of statements that can be run."""
 
 
 class Slow(Exception):
@@ -120,6 +129,13 @@ def corpus() -> list[str]:
     ]  # fmt: skip
 
 
+@cache
+def running() -> list[str]:
+    """Return the small decks of the corpus, each once."""
+    decks = list(dict.fromkeys(corpus()))
+    return [deck for deck in decks if len(deck) < SMALL] + [decks[RUNNING]]
+
+
 def carried_through(deck: str, script: str, rng: random.Random, run: bool) -> str:
     """Read, build and perhaps run; return what came of it.
 
@@ -134,25 +150,30 @@ def carried_through(deck: str, script: str, rng: random.Random, run: bool) -> st
         "GSE_DERIV": test_user_elements.deriv,
         "GSE_OUTPUT": test_user_elements.output,
     }
+    checked = False
     try:
         parsed = bound(parse_deck(deck, "fuzz"), routines, skip)
         commands = parse_script(script, "fuzz")
+        check_script(parsed, commands, skip)
+        checked = True
         if run:
             result = run_deck(parsed, commands, allow_unsupported=skip, routines=routines)
             assert result.success or result.messages
             return "ran" if result.success else "stopped"
-        check_script(parsed, commands, skip)
         return "built"
     except DeckError as error:
         placed = [d.message and d.line >= 0 for d in error.diagnostics]
         if not placed or not all(placed):
             raise AssertionError(f"an error without a place: {error.diagnostics}") from error
-        return "refused"
+        return "stopped" if checked else "refused"
 
 
-def case(seed: int, share: float) -> tuple[str, str, random.Random, bool]:
+def case(seed: int, share: float, mild: bool = False) -> tuple[str, str, random.Random, bool]:
     """Return deck, script, generator and whether it is run, of a seed."""
     rng = random.Random(seed)
+    if mild:
+        deck = mildly_changed(rng.choice(running()), rng)
+        return deck, rng.choice(MILD_RUNS), rng, rng.random() < share
     deck = mutated(rng.choice(corpus()), rng)
     run = rng.random() < share
     if rng.random() < 0.1:
@@ -175,13 +196,15 @@ def limited(seconds: float) -> Iterator[None]:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
-def outcome(seed: int, share: float, seconds: float = SECONDS) -> str:
+def outcome(seed: int, share: float, seconds: float = SECONDS, mild: bool = False) -> str:
     """Carry the deck of a seed through; return what came of it, a traceback if it failed."""
-    deck, script, rng, run = case(seed, share)
+    deck, script, rng, run = case(seed, share, mild)
     try:
         with limited(seconds), contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
             warnings.simplefilter("error")
             return carried_through(deck, script, rng, run)
+    except Slow as late:
+        return f"slow\n{late}"
     except Exception:
         return "failed\n" + traceback.format_exc()
 
@@ -192,11 +215,12 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--first", type=int, default=0, help="first seed")
     parser.add_argument("--share", type=float, default=0.1, help="share of the decks that are run")
+    parser.add_argument("--mild", action="store_true", help="change decks so that most can still be run")
     parser.add_argument("--only", type=int, help="carry one seed through, and print its deck")
     given = parser.parse_args()
     if given.only is not None:
-        deck, script, _, run = case(given.only, given.share)
-        print(deck, script, f"run: {run}", outcome(given.only, given.share), sep="\n")
+        deck, script, _, run = case(given.only, given.share, given.mild)
+        print(deck, script, f"run: {run}", outcome(given.only, given.share, mild=given.mild), sep="\n")
         return
     for deck in corpus() if given.share > 0.0 else ():
         for script in RUNS:
@@ -206,10 +230,10 @@ def main() -> None:
     began = time.process_time()
     for seed in range(given.first, given.first + given.count):
         print(seed, file=sys.stderr, end="\r", flush=True)
-        found = outcome(seed, given.share)
+        found = outcome(seed, given.share, mild=given.mild)
         word = found.split("\n", 1)[0]
         counts[word] = counts.get(word, 0) + 1
-        if word == "failed":
+        if word in ("failed", "slow"):
             print(f"seed {seed}: {found.strip()}\n", flush=True)
         if (seed + 1 - given.first) % 1000 == 0:
             print(seed + 1, counts, f"{time.process_time() - began:.0f} s", flush=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearmbs.adams import parse_deck, parse_script
+from gearmbs.adams import DeckError, parse_deck, parse_script
 from gearmbs.adams.run.runner import run_deck
 
 from .test_run import model, run
@@ -199,6 +199,22 @@ def test_bushing_and_field_are_the_same_when_diagonal():
     np.testing.assert_allclose(a.request(1), b.request(1), atol=1e-8)
     np.testing.assert_allclose(a.request(2), b.request(2), atol=1e-6)
     assert np.abs(a.request(2)[0, 1:4]).max() > 1.0
+
+
+@pytest.mark.parametrize("command", ["SIMULATE/STATICS", "LINEAR/EIGENSOL", "SIMULATE/DYNAMICS, END=1, STEPS=1"])
+def test_a_bushing_turned_by_a_right_angle_is_named(command):
+    bushing = "MARKER/11,PART=1,ZP=1,0,0\nBUSHING/1,I=20,J=11,K=1,1,1,KT=1,2,3\n"
+    deck = parse_deck(model(BLOCK + bushing))
+    script = parse_script(f"m\no\n{command}\n")
+    if "DYN" in command:
+        result = run_deck(deck, script)
+        told = "" if result.success else result.segments[-1].solution.result.message
+    else:
+        with pytest.raises(DeckError) as caught:
+            run_deck(deck, script)
+        told = str(caught.value)
+    assert "(BUSHING_1)" in told
+    assert "finite" in told
 
 
 def test_field_matrix_is_stored_by_columns():

@@ -152,7 +152,16 @@ def test_the_old_friction_of_joints_is_off_unless_it_is_switched_on(switch):
 @pytest.mark.parametrize("value", ["ON", "PRELOAD_ONLY"])
 def test_the_old_friction_of_joints_is_refused(value):
     deck = parse_deck(PENDULUM.replace("REVOLUTE", f"REVOLUTE, FRICTION={value}, MU_DYN_ROT=0.3", 1))
-    assert [d.message for d in deck.unsupported] == ["JOINT/1: FRICTION is not supported"]
+    (told,) = [d.message for d in deck.unsupported]
+    assert told.startswith(f"JOINT/1: FRICTION = {value} is not supported, as its law is not known; write FRICTION/1, ")
+    assert "JOINT = 1, MU_STATIC = ..., MU_DYNAMIC = 0.3, PIN_RADIUS = ..." in told
+    assert ("INPUTS = PRELOAD" in told) == (value == "PRELOAD_ONLY")
+
+
+def test_what_is_refused_has_what_to_write_instead():
+    deck = parse_deck(with_lines("SPLINE/9, FILE=a.dat"))
+    (told,) = [d.message for d in deck.unsupported]
+    assert told == "SPLINE/9: FILE is not supported; instead, use X and Y in the deck"
 
 
 def test_what_stands_on_parts_that_are_left_out_is_left_out():

@@ -69,6 +69,14 @@ def test_values_are_those_of_the_expression_to_the_last_digit():
     assert found.request(2)[0, 1] == expected.request(2)[0, 1]
 
 
+def test_values_are_those_of_the_expression_to_the_last_digit_at_all_times():
+    """On one motion the routine's force and the written one differ in no digit."""
+    text = EXPECTED + f"\nREQUEST/2, F2={WRITTEN}\nREQUEST/3, FUNCTION=USER(0.3, 0.01, 2)"
+    found = run(text, {"REQUEST/3": lambda call: (0, pull(call), 0, 0, 0, 0, 0, 0)})
+    assert np.ptp(found.request(2)[:, 1]) > 1.0
+    np.testing.assert_array_equal(found.request(3)[:, 1], found.request(2)[:, 1])
+
+
 def test_forces_of_several_components():
     def both(call):
         x, y, z = call.sysary("TDISP", 20, 1, 1)

@@ -109,6 +109,9 @@ def test_driven_mechanisms_are_watched_too():
         ("SENSOR/1, VALUE=1", "FUNCTION is missing"),
         ("SENSOR/1, GE, LE, VALUE=1, FUNCTION=TIME", "both GE and LE"),
         ("SENSOR/1, VALUE=1, FUNCTION=DZ(77)", "77"),
+        ("SENSOR/1, VALUE=1, FUNCTION=TIME, DT=0", r"SENSOR/1: DT = 0\.0; it must be positive"),
+        ("SENSOR/1, VALUE=1, FUNCTION=TIME, STEPSIZE=-1", r"STEPSIZE = -1\.0; it must be positive"),
+        ("SENSOR/1, VALUE=1, FUNCTION=TIME\nINTEGRATOR/GSTIFF, HMAX=0", r"HMAX = 0\.0; it must be positive"),
     ],
 )
 def test_mistakes_are_named(sensor, message):

@@ -177,11 +177,29 @@ def test_a_coupler_that_is_not_linear(mixed):
     assert rows[:, 1] == pytest.approx(exact.y[0], abs=2e-7)
 
 
-def test_a_coupler_of_three_mixed_displacements_is_refused():
-    text = SHAFTS.replace("{spin}", "").format(coupler="COUPLER/1, JOINTS=1,2,3, FUNCTION=USER(1)")
-    text += "PART/4, MASS=1, CM=40, IP=1,1,1\nMARKER/40, PART=4\nJOINT/3, REVOLUTE, I=40, J=1\n"
-    with pytest.raises(DeckError, match="COUPLER/1: its routine mixes three displacements"):
-        run(text, {"cousub": lambda call: call.q[0] * call.q[1] - call.q[2]})
+def test_a_coupler_of_three_mixed_displacements():
+    """A slide whose place is the product of two angles, one of which turns freely, one is driven by a torque."""
+    text = SHAFTS.replace("{spin}", ", WZ=0.5").format(coupler="COUPLER/1, JOINTS=1,2,3, FUNCTION=USER(0.4)")
+    text += (
+        "PART/4, MASS=1.5, CM=40, IP=1,1,1\nMARKER/40, PART=4\nJOINT/3, TRANSLATIONAL, I=40, J=1\n"
+        "REQUEST/2, F2=DZ(40,1)\\F3=VZ(40,1)\n"
+    )
+    found = run(text, {"cousub": lambda call: call.parameters[0] * call.q[0] * call.q[1] - call.q[2]})
+    assert found.success
+    from scipy.integrate import solve_ivp
+
+    def motion(t, y):
+        # z = k a b: M (a'', b'') + 2 m k^2 a' b' (a b) (1/a, 1/b) = (3 - a, 0)
+        a, b, da, db = y
+        by = 0.4 * np.array([b, a])
+        masses = np.diag([2.0, 3.0]) + 1.5 * np.outer(by, by)
+        return da, db, *np.linalg.solve(masses, np.array([3.0 - a, 0.0]) - 1.5 * 2.0 * 0.4 * da * db * by)
+
+    exact = solve_ivp(motion, (0.0, 1.0), (0.0, 0.0, 0.7, 0.5), t_eval=found.t, rtol=1e-11, atol=1e-12).y
+    rows, slide = found.request(1), found.request(2)
+    np.testing.assert_allclose(rows[:, 1:3].T, exact[:2], atol=1e-7)
+    np.testing.assert_allclose(slide[:, 1], 0.4 * exact[0] * exact[1], atol=1e-7)
+    np.testing.assert_allclose(slide[:, 2], 0.4 * (exact[2] * exact[1] + exact[0] * exact[3]), atol=1e-6)
 
 
 FREE = """PART/2, MASS=2, CM=20, IP=0.3,0.4,0.5, QG=0.1,0.02,-0.03, WX=0.2

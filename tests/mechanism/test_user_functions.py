@@ -75,6 +75,26 @@ def test_a_motion_is_a_function_of_time():
     np.testing.assert_allclose(solution.angular_velocity("arm")[:, 2], 0.6 * np.cos(2 * solution.t), atol=1e-6)
 
 
+@pytest.mark.parametrize("partials", [None, lambda x, y, t: (-1.0, math.cos(y) + 0.2 * t, 0.2 * y)])
+def test_a_constraint_is_that_of_the_expression(partials):
+    def coupled(constraint):
+        m = Mechanism("coupled", gravity=(0, -9.81, 0))
+        slider, arm = m.body("slider", 1.0, (1, 1, 1)), m.body("arm", 1.0, (1, 1, 2), position=(1, 0, 0))
+        m.translational("slide", slider, m.ground, at=(0, 0, 0), axis=(1, 0, 0))
+        m.revolute("pin", arm, m.ground, at=(1, 0, 0), axis=(0, 0, 1))
+        a, g = slider.marker(name="a"), m.ground.marker(name="g")
+        arm.marker((1, 0, 0), name="b"), m.ground.marker((1, 0, 0), name="h")
+        m.function("link", lambda x, y, t: math.sin(y) + 0.2 * y * t - x, partials)
+        m.general_constraint("linked", constraint)
+        m.load("pull", a, g, fx="3 - DX(a, g)")
+        return m.simulate(1.0, rate=20, tol=1e-9)
+
+    found = coupled("LINK(DX(a, g), AZ(b, h), TIME)")
+    expected = coupled("SIN(AZ(b, h)) + 0.2*AZ(b, h)*TIME - DX(a, g)")
+    assert found.success
+    np.testing.assert_allclose(found.com_position("slider"), expected.com_position("slider"), atol=2e-8)
+
+
 def test_what_fails_inside_is_raised_with_its_name():
     def breaks(x):
         if x < 0.05:

@@ -9,7 +9,6 @@ import numpy as np
 
 from gearmbs.adams.builders.builder import Builder
 from gearmbs.adams.parse import statements as st
-from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.mechanism.functions import expression
 from gearmbs.mechanism.joints import JOINTS, Joint, Prescribed
 from gearmbs.mechanism.parts import Marker
@@ -102,14 +101,12 @@ def add_coupler(b: Builder, s: st.Coupler) -> None:
     if s.function is not None:
         return
     joints = _coupled(b, s, s.joints)
-    if s.tables:
-        _add_user_coupler(b, s, joints)
+    if s.expression is not None:
+        moved = [_moved_text(joint, kind) for joint, kind in zip(joints, _coupled_types(s, joints))]
+        b.mechanism.general_constraint(b.model.names["coupler", s.id], s.expression.format(*moved))
         return
     scales = s.scales if len(s.scales) == len(joints) else (1.0, *s.scales)
-    types = s.type or tuple("TRANSLATIONAL" if j.kind == "translational" else "ROTATIONAL" for j in joints)
-    for joint, kind in zip(joints, types):
-        if joint.kind != "cylindrical" and (kind == "TRANSLATIONAL") != (joint.kind == "translational"):
-            raise ValueError(f"TYPE is {kind}, but {joint.name} is {joint.kind}")
+    types = _coupled_types(s, joints)
     name = b.model.names["coupler", s.id]
     if any(joint.kind == "cylindrical" and kind == "TRANSLATIONAL" for joint, kind in zip(joints, types)):
         moved = [_since_start(b, name, joint, kind) for joint, kind in zip(joints, types)]
@@ -118,6 +115,15 @@ def add_coupler(b: Builder, s: st.Coupler) -> None:
         return
     units = [b.units.length if kind == "TRANSLATIONAL" else 1.0 for kind in types]
     b.mechanism.coupler(name, [(joint, scale / unit) for joint, scale, unit in zip(joints, scales, units)])
+
+
+def _coupled_types(s: st.Coupler, joints: list[Joint]) -> tuple[str, ...]:
+    """Return which displacement of each joint is coupled."""
+    types = s.type or tuple("TRANSLATIONAL" if j.kind == "translational" else "ROTATIONAL" for j in joints)
+    for joint, kind in zip(joints, types):
+        if joint.kind != "cylindrical" and (kind == "TRANSLATIONAL") != (joint.kind == "translational"):
+            raise ValueError(f"TYPE is {kind}, but {joint.name} is {joint.kind}")
+    return types
 
 
 def _since_start(b: Builder, name: str, joint: Joint, kind: str) -> str:
@@ -133,26 +139,10 @@ def _since_start(b: Builder, name: str, joint: Joint, kind: str) -> str:
     return f'AZ("{turned.name}","{fixed.name}")'
 
 
-def coupled_text(joint: Joint) -> str:
+def _moved_text(joint: Joint, kind: str) -> str:
     """Return the displacement of a joint as an expression of the deck."""
     i, j = joint.i.number, joint.j.number
-    return f"DZ({i},{j},{j})" if joint.kind == "translational" else f"AZ({i},{j})"
-
-
-def _add_user_coupler(b: Builder, s: st.Coupler, joints: list[Joint]) -> None:
-    """COUPLER by a routine: the terms it was divided into add up to zero."""
-    terms = []
-    for k, (joint, table) in enumerate(zip(joints, s.tables), 1):
-        shown = coupled_text(joint)
-        if len(table) == 1:
-            terms.append(f"({table[0][0]!r})*{shown}")
-            continue
-        name = f"COUPLER_{s.id}.Q{k}"
-        b.mechanism.splines[name] = SplineData(table[0], (table[1],))
-        terms.append(f'CUBSPL({shown}, 0, "{name}")')
-        b.model.ranges.append((s, shown, table[0][0], table[0][-1]))
-    text = " + ".join(terms)
-    b.mechanism.general_constraint(b.model.names["coupler", s.id], f"{text} + ({s.constant!r})")
+    return f"DZ({i},{j},{j})" if kind == "TRANSLATIONAL" else f"AZ({i},{j})"
 
 
 def add_gear(b: Builder, s: st.Gear) -> None:

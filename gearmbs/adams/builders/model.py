@@ -65,8 +65,6 @@ class AdamsModel:
         What sensors have evaluated.
     initial_motions : list
         Joints with initial conditions: joint, "rotation" or "translation", displacement and velocity in deck units.
-    ranges : list
-        What routines were tabulated for: statement, expression, least and largest value.
     """
 
     mechanism: Mechanism
@@ -76,7 +74,6 @@ class AdamsModel:
     sources: dict[str, st.Statement] = field(default_factory=dict)
     sensed: Mapping[int, float] = field(default_factory=dict)
     initial_motions: list[tuple[Joint, str, tuple[float, ...]]] = field(default_factory=list)
-    ranges: list[tuple[st.Statement, str, float, float]] = field(default_factory=list)
 
     def scope(self, marker_index: dict[int, int], marker_body: list[int]) -> Scope:
         """Return what the deck's expressions may name, for requests."""

@@ -75,7 +75,7 @@ def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: 
     for use in users:
         statement, group = use.statement, made.items[type(use.statement)]
         refused = f"{statement.label()}: FUNCTION is not supported"
-        made.diagnostics = [d for d in made.diagnostics if d.message != refused]
+        made.diagnostics = [d for d in made.diagnostics if not d.message.startswith(refused)]
         found, missing = _found(use, known)
         if missing:
             word, are = ("routine", "is") if len(missing) == 1 else ("routines", "are")

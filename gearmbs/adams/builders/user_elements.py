@@ -10,20 +10,14 @@ import numpy as np
 from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
+from gearmbs.mechanism.user_functions import UserFunction
 
 SAMPLES = 201
 """Points at which a curve by a routine is taken; a cubic spline through them errs by some 1e-9 of a smooth curve."""
-SEPARATE = 1e-9
-"""Mixed difference, of the values, below which a coupler's displacements stand in separate terms."""
-NEWTON = 50
-TABLE = 16_000
-"""Points of a coupler's term on either side of zero."""
-ANGLE = 0.02
-"""Their distance for a rotation, rad: fifty turns to either side, and a spline that errs by 4e-10 of a sine."""
-SHARE = 1e-3
-"""Their distance for a translation, of the largest coordinate in the deck."""
 LINEAR = 1e-12
-"""Spread of slopes, of the largest, below which a term is linear."""
+"""Deviation from a linear function, of the largest term, below which a coupler is linear."""
+SHARE = 0.1
+"""Displacement over which a coupler by a routine may change much, of the largest coordinate in the deck."""
 DRAWS = 4
 """Places at which implicit equations are asked on which rates they depend."""
 PARTS = ("deriv", "output", "update")
@@ -104,11 +98,7 @@ def _rated(caller: Caller, n: int) -> tuple[bool, ...]:
 
 
 def bind_coupler(deck: Deck, s: st.Coupler, parameters: tuple[float, ...], found: Mapping[str, Routine]) -> st.Coupler:
-    """COUPLER by COUSUB: what it returns stays zero.
-
-    Displacements in separate terms, f1(q1) + f2(q2) + ... = 0, stay so; else the second one is solved for. A term that
-    is not linear becomes a cubic spline through TABLE points on either side.
-    """
+    """COUPLER by COUSUB: what it returns stays zero; a linear function becomes its slopes."""
     n = len(s.joints)
     caller = Caller(deck, s, parameters, found[""], 1, {"q": n})
     if caller.asked:
@@ -117,97 +107,38 @@ def bind_coupler(deck: Deck, s: st.Coupler, parameters: tuple[float, ...], found
     def residual(*q: float) -> float:
         return caller.results((0.0, *q))[0]
 
-    constant = 0.0
-    terms: list[Callable[[float], float]]
-    if _separate(residual, n):
-        constant = residual(*[0.0] * n)
-        terms = [_alone(residual, n, k, constant) for k in range(n)]
-    elif n == 2:
-        terms = [_solved(residual), lambda q: -q]
-    else:
-        raise ValueError("mixes three displacements; write it as a sum of functions of one displacement each")
-    tables = tuple(_table(term, _step(deck, ref)) for term, ref in zip(terms, s.joints))
-    return replace(s, function=None, tables=tables, constant=constant)
+    places = [f"{{{k}}}" for k in range(n)]
+    slopes = _slopes(residual, n)
+    if slopes is not None:
+        terms = [f"({slope!r})*({place})" for slope, place in zip(slopes, places)]
+        return replace(s, function=None, expression=" + ".join([*terms, f"({residual(*[0.0] * n)!r})"]))
+    key = f"COUSUB_COUPLER_{s.id}"
+    sizes = [_size(deck, ref) for ref in s.joints]
+    deck.functions[key] = UserFunction(f"{s.label()}: USER", residual, count=n, sizes=sizes)
+    return replace(s, function=None, expression=f"{key}({', '.join(places)})")
 
 
-def _step(deck: Deck, joint: int) -> float:
-    """Return the distance of a table's points: an angle, or a share of the model's extent."""
+def _size(deck: Deck, joint: int) -> float:
+    """Return over which displacement of a joint a coupler may change much: a radian, or a share of the model."""
     statement = deck.of(st.Joint).get(joint)
-    if statement is None or statement.type != "TRANSLATIONAL":
-        return ANGLE
+    if statement is None or statement.type not in ("TRANSLATIONAL", "CYLINDRICAL"):
+        return 1.0
     places = [abs(v) for part in deck.of(st.Part).values() for v in part.qg]
     places += [abs(v) for marker in deck.of(st.Marker).values() for v in marker.qp]
     return SHARE * (max(places, default=0.0) or 1.0)
 
 
-def _table(term: Callable[[float], float], step: float) -> tuple[tuple[float, ...], ...]:
-    """Return displacements and values of a term, or its slope alone if it is linear."""
-    probes = step * np.array([-TABLE, -0.37 * TABLE, -1.0, 1.0, 0.61 * TABLE, TABLE])
+def _slopes(residual: Callable[..., float], n: int) -> list[float] | None:
+    """Return the slopes of a linear function of several numbers, None of one that is not linear."""
+    draw = np.random.default_rng(1)
     try:
-        slopes = np.array([term(q) / q for q in probes])
-        if np.ptp(slopes) <= LINEAR * np.abs(slopes).max():
-            return ((float(slopes[-1]),),)
+        rest = residual(*[0.0] * n)
+        slopes = [residual(*[float(i == k) for i in range(n)]) - rest for k in range(n)]
+        for q in draw.uniform(-10.0, 10.0, (8, n)):
+            terms = [rest, *(slope * one for slope, one in zip(slopes, q))]
+            if not abs(residual(*q.tolist()) - sum(terms)) <= LINEAR * max(map(abs, terms)):
+                return None
     except (ArithmeticError, ValueError):
         # it has no value everywhere
-        pass
-    sides = []
-    for sign in (-1.0, 1.0):
-        side: list[tuple[float, float]] = []
-        for k in range(TABLE + 1):
-            try:
-                value = float(term(sign * k * step))
-            except (ArithmeticError, ValueError):
-                break
-            if not np.isfinite(value):
-                break
-            side.append((sign * k * step, value))
-        sides.append(side)
-    points = sides[0][:0:-1] + sides[1]
-    if len(points) < 4:
-        raise ValueError("has no value near the joints' zero displacement")
-    return tuple(q for q, _ in points), tuple(value for _, value in points)
-
-
-def _separate(residual: Callable[..., float], n: int) -> bool:
-    """Whether a function of several numbers is a sum of functions of one each, by mixed differences."""
-    draw = np.random.default_rng(1)
-    for _ in range(8):
-        a, b = draw.uniform(-1.0, 1.0, (2, n))
-        for i in range(n):
-            for j in range(i):
-                corners = [np.array(a) for _ in range(4)]
-                corners[1][i] = corners[3][i] = b[i]
-                corners[2][j] = corners[3][j] = b[j]
-                values = [residual(*corner) for corner in corners]
-                if abs(values[0] - values[1] - values[2] + values[3]) > SEPARATE * max(1e-30, *map(abs, values)):
-                    return False
-    return True
-
-
-def _alone(residual: Callable[..., float], n: int, k: int, rest: float) -> Callable[[float], float]:
-    def term(q: float) -> float:
-        return residual(*[q if i == k else 0.0 for i in range(n)]) - rest
-
-    return term
-
-
-def _solved(residual: Callable[..., float]) -> Callable[[float], float]:
-    """Return the second displacement as a function of the first, by Newton's method from the last one found."""
-    last = [0.0]
-
-    def second(first: float) -> float:
-        q = last[0]
-        for _ in range(NEWTON):
-            value = residual(first, q)
-            h = 1e-6 * max(1.0, abs(q))
-            slope = (residual(first, q + h) - residual(first, q - h)) / (2.0 * h)
-            if slope == 0.0:
-                break
-            change = value / slope
-            q -= change
-            if abs(change) <= 1e-14 * max(1.0, abs(q)):
-                last[0] = q
-                return q
-        raise ValueError(f"has no zero for the first displacement {first:g}")
-
-    return second
+        return None
+    return slopes

@@ -9,6 +9,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import CHOICE, EXPRESSION, specs_of
+from gearmbs.adams.parse.remedies import refused_message
 from gearmbs.mechanism.expression_syntax import Call, Number, parse, walk
 
 REQUIRED: dict[type, tuple[str, ...]] = {
@@ -42,6 +43,13 @@ REQUIRED: dict[type, tuple[str, ...]] = {
     st.FePart: ("type", "node_labels", "coordinates", "section", "material"),
     st.FeLoad: ("fe_part",),
 }
+POSITIVE: dict[type, tuple[str, ...]] = {
+    st.Beam: ("length", "area", "emodulus", "gmodulus"),
+    st.Integrator: ("error", "hinit", "hmax", "hmin"),
+    st.PointMass: ("mass",),
+    st.Sensor: ("dt", "stepsize"),
+}
+"""Arguments that must be positive where they are given."""
 MEASURES = frozenset(
     """DX DY DZ DM AX AY AZ INCANG PSI THETA PHI YAW PITCH ROLL ORIENT VX VY VZ VM VR WX WY WZ WM ACCX ACCY ACCZ ACCM
     WDTX WDTY WDTZ WDTM""".split()
@@ -138,8 +146,12 @@ def check(deck: Deck) -> list[Diagnostic]:
                 keyword = _choices(cls, name) if specs_of(cls)[name].kind == CHOICE else name.upper()
                 fail(statement, f"{keyword} is missing")
         for name in refused_arguments(statement):
-            message = f"{statement.label()}: {name.upper()} is not supported"
+            message = refused_message(statement, name)
             deck.diagnostics.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.given[name]))
+        for name in POSITIVE.get(cls, ()):
+            value = getattr(statement, name)
+            if value is not None and not value > 0.0:
+                fail(statement, f"{specs_of(cls)[name].keyword} = {value}; it must be positive", name)
         _check_markers(deck, statement, fail)
     _remark_idle(deck)
     for part in deck.of(st.Part).values():
@@ -260,8 +272,6 @@ def _check_part(deck: Deck, part: st.Part, fail: Fail) -> None:
 
 
 def _check_point_mass(deck: Deck, point: st.PointMass, fail: Fail) -> None:
-    if not point.mass > 0.0:
-        fail(point, f"MASS = {point.mass}; it must be positive", "mass")
     marker = deck.of(st.Marker).get(point.cm or -1)
     if marker is not None and marker.point_mass != point.id:
         fail(point, f"CM = {marker.id}, but MARKER/{marker.id} is on {'/'.join(map(str, marker.owner()))}", "cm")
@@ -300,10 +310,6 @@ def _check_forces(deck: Deck, fail: Fail) -> None:
         for force in deck.of(kind).values():
             if force.function is None and all(getattr(force, name) is None for name in names.split()):
                 fail(force, f"give at least one of {', '.join(names.upper().split())}")
-    for beam in deck.of(st.Beam).values():
-        for name in ("length", "area", "emodulus", "gmodulus"):
-            if not (getattr(beam, name) or 0.0) > 0.0:
-                fail(beam, f"{name.upper()} = {getattr(beam, name)}; it must be positive", name)
     for friction in deck.of(st.Friction).values():
         if friction.joint is not None and friction.joint not in deck.of(st.Joint):
             fail(friction, f"there is no JOINT/{friction.joint}", "joint")

@@ -146,8 +146,7 @@ class Coupler(Statement):
     scales: Vector = arg("SCALES", REALS, (), count=(1, 3))
     function: str | None = arg("FUNCTION", TEXT)
     routine: str | None = arg("ROUTINE", TEXT)
-    tables: tuple[tuple[Vector, ...], ...] = field(default=(), kw_only=True, compare=False)
-    constant: float = field(default=0.0, kw_only=True)
+    expression: str | None = field(default=None, kw_only=True)
 
 
 @dataclass(frozen=True)

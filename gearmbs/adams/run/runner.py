@@ -315,7 +315,6 @@ def _part(
         raise _failed(session, command, model, error) from error
 
     evaluator = RequestEvaluator(model, solution)
-    _check_ranges(session, model, evaluator)
     segment = Segment(command, kind, model, solution, options, note, equilibrium=equilibrium)
     if kind != "STATICS":
         segment.assembly = assembly_of(model, solution)
@@ -335,23 +334,6 @@ def _part(
     if kind not in ("STATICS", "INITIAL_CONDITIONS"):
         take_samples(session, evaluator, float(times[0]))
     return segment, fired
-
-
-def _check_ranges(session: Session, model: AdamsModel, evaluator: RequestEvaluator) -> None:
-    """Refuse a motion that leaves what routines were tabulated for.
-
-    Raises
-    ------
-    DeckError
-    """
-    for statement, text, low, high in model.ranges:
-        values = evaluator.expression(text)
-        if values.min() < low or values.max() > high:
-            message = (
-                f"{statement.label()}: {text} went from {values.min():.4g} to {values.max():.4g}; its routine is known "
-                f"from {low:.4g} to {high:.4g} only"
-            )
-            raise DeckError([Diagnostic(ERROR, message, session.deck.file, statement.line)])
 
 
 def _to_passage(

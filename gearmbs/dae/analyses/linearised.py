@@ -62,12 +62,18 @@ def reduce(instant: Instant) -> Reduced:
     Raises
     ------
     ModelError
-        If the applied loads depend on each other in a singular way.
+        If the applied loads depend on each other in a singular way, or have no derivatives here.
     """
     y = instant.y
     matrix = instant.matrix(y)
     mass = instant.mass_matrix(matrix).toarray()
     full = matrix.toarray()
+    if not np.all(np.isfinite(matrix.data)):
+        row = int(np.argmin(np.isfinite(full).all(axis=1)))
+        raise ModelError(
+            f"{instant.problem.names[row]}: its derivatives are not finite in this position; look for a division by "
+            "zero, coinciding markers, or angles about axes at right angles to each other"
+        )
     q, v = instant.block("R", "lambda"), np.concatenate([instant.block("u", "p"), instant.block("eps", "R")])
     force = instant.block("u", "eps")
     half = instant.at["p"] - instant.at["u"]

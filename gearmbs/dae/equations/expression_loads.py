@@ -78,7 +78,9 @@ def second(k, t, y, tab, grad, hess):
     """Return the value of tape k with gradient and Hessian over [R, theta] of its bodies and time."""
     ints, floats, ref = parts(k, tab)
     evaluate = second_at(tab.tape[k, SECOND])
-    return evaluate(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, grad, hess, tab.tape_work)
+    # functions of the user keep their derivatives at its end, where callers have gradient and Hessian
+    work = vector_at(tab.tape_work, 0, tab.tape_work.size - grad.size - hess.size)
+    return evaluate(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, grad, hess, work)
 
 
 @njit(cache=True, error_model="numpy")

@@ -104,9 +104,10 @@ def replaced_start(problem: DAEProblem, unknowns: np.ndarray) -> str:
 
 def not_finite(problem: DAEProblem, t: float, row: int, what: str = "equation") -> str:
     """Explain NaN or infinity out of a user's function."""
+    named = f" ({problem.names[row]})" if 0 <= row < len(problem.names) else ""
     return (
-        f"{Status.NOT_FINITE.sentence} Near t = {t:.9g} {what} {row} is NaN or infinite, and smaller steps did not "
-        f"help. {advice(problem, Status.NOT_FINITE)}"
+        f"{Status.NOT_FINITE.sentence} Near t = {t:.9g} {what} {row}{named} is NaN or infinite, and smaller steps did "
+        f"not help. {advice(problem, Status.NOT_FINITE)}"
     )
 
 

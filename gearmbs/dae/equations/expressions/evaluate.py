@@ -184,7 +184,7 @@ def forward(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, work, 
                     work[4 * n + k] = e[4]
                     work[5 * n + k] = e[5]
         elif code == op.EXTERNAL:
-            work[k] = external(ints, at, t, order, work)
+            work[k] = external(ints, at, t, order if order < 2 else op.ALL_SECOND, work)
         else:
             work[k] = work[selected(ints, at, work)]
         at += op.WIDTH

@@ -33,6 +33,15 @@ def _combine_rows(ints, at, k, n, work, rows):
         for q in range(columns):
             rows[k, q] = rows[s, q]
         return
+    if ints[at] == op.EXTERNAL:
+        partials = work.size - ints[op.HEAD_EXTERNAL] + ints[at + 3] + ints[at + 2] + 1
+        rows[k, :] = 0.0
+        for i in range(ints[at + 2]):
+            operand = ints[ints[at + 1] + i]
+            for q in range(columns):
+                if rows[operand, q] != 0.0:
+                    rows[k, q] += work[partials + i] * rows[operand, q]
+        return
     a = ints[at + 1]
     if ints[at] == op.INTEGRAL:
         for q in range(columns):
@@ -50,10 +59,32 @@ def _combine_rows(ints, at, k, n, work, rows):
                 rows[k, q] += pb * rows[b, q]
 
 
+@njit("void(int64[::1], int64, float64, float64[::1], float64[:, ::1], float64[:, ::1])", cache=True, nogil=True)
+def _external_curvature(ints, at, weight, work, rows, hess):
+    """Add the second partials of a function of the user, times its operands' gradients, to the Hessian."""
+    n = ints[at + 2]
+    second = work.size - ints[op.HEAD_EXTERNAL] + ints[at + 3] + 2 * n + 1
+    for i in range(n):
+        a = ints[ints[at + 1] + i]
+        for j in range(n):
+            b = ints[ints[at + 1] + j]
+            curvature = weight * work[second + n * i + j]
+            if curvature == 0.0:
+                continue
+            for p in range(rows.shape[1]):
+                if rows[a, p] == 0.0:
+                    continue
+                for q in range(rows.shape[1]):
+                    hess[p, q] += curvature * rows[a, p] * rows[b, q]
+
+
 @njit("void(int64[::1], int64, int64, float64, float64[::1], float64[:, ::1], float64[:, ::1])", cache=True, nogil=True)
 def _curvature(ints, at, k, weight, work, rows, hess):
     """Add the second partials of a scalar instruction, times its operands' gradients, to the Hessian."""
     count = ints[op.HEAD_COUNT]
+    if ints[at] == op.EXTERNAL:
+        _external_curvature(ints, at, weight, work, rows, hess)
+        return
     aa, ab, bb = work[3 * count + k], work[4 * count + k], work[5 * count + k]
     if ints[at] == op.INTEGRAL:
         last = rows.shape[1] - 1

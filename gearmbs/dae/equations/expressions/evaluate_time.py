@@ -54,7 +54,7 @@ def eval_time(ints, floats, t, out, work):
                 f2 += 2.0 * e[4] * a1 * b1
         elif code == op.EXTERNAL:
             # of time alone, its first argument
-            f = external(ints, at, t, 2, work)
+            f = external(ints, at, t, op.FIRST_SECOND, work)
             a = ints[ints[at + 1]]
             first = work.size - ints[op.HEAD_EXTERNAL] + ints[at + 3] + ints[at + 2] + 1
             f1 = work[first] * work[n + a]

@@ -92,6 +92,12 @@ LAST_BINARY = 73
 
 # a function of the user: where its arguments are listed, how many, its scratch, its address
 EXTERNAL = 80
+FIRST_SECOND = 2
+"""Order for which a function of the user gives both derivatives by its first argument."""
+ALL_SECOND = 3
+"""Order for which it gives all first partials and, behind them, the matrix of all second ones."""
+MOST_SECOND = 16
+"""Arguments up to which a function of the user gives these, and may stand in a constraint."""
 
 # condition and three branches
 SELECT = 90
@@ -108,3 +114,8 @@ LEVEL_POSITION = 2
 LEVEL_VELOCITY = 3
 LEVEL_ALGEBRAIC = 4
 LEVEL_ACCELERATION = 5
+
+
+def external_results(count: int) -> int:
+    """Return how many numbers a function of the user may write: its value and derivatives, two at least."""
+    return 1 + max(count + (count**2 if count <= MOST_SECOND else 0), 2)

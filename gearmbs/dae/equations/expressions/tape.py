@@ -255,7 +255,7 @@ class TapeBuilder:
         address : int
             Of a C function as of `gearmbs.dae.compiled.python_callback`, called as f(t, a, a, order, out) with the
             arguments in a; out receives the value, and for order 1 the partials behind it, for order 2 the first and
-            second derivative by the first argument.
+            second derivative by the first argument, for order 3 the partials and the matrix of second ones.
         arguments : sequence of int
             Registers.
         """
@@ -318,8 +318,7 @@ class TapeBuilder:
                 row[:5] = op.EXTERNAL, code_at + code.size + len(listed), count, scratch, c[1]
                 row[5:] = -1
                 listed += [renumber[a] for a in c[2:]]
-                # the arguments, and the value with as many derivatives, two at least
-                scratch += count + 1 + max(count, 2)
+                scratch += count + op.external_results(count)
                 continue
             row[: len(c)] = c
             row[6:] = -1
@@ -350,7 +349,8 @@ class TapeBuilder:
             algebraic=keys,
             n_angles=len(angle_slot),
             level=max(levels, default=op.LEVEL_CONSTANT),
-            second_order=all(c[0] in smooth for c in used if c[0] <= op.LAST_LEAF or c[0] == op.EXTERNAL),
+            second_order=all(c[0] in smooth for c in used if c[0] <= op.LAST_LEAF)
+            and all(len(c) - 2 <= op.MOST_SECOND for c in used if c[0] == op.EXTERNAL),
             text=text,
             integrates=any(c[0] == op.INTEGRAL for c in used),
             angles=tuple(self._angles[a] for a in angle_slot),
