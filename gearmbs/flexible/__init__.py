@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from gearmbs.flexible.interfaces import Interface
     from gearmbs.flexible.large_beam import BeamChain, LargeBeam, add_beam
     from gearmbs.flexible.material import ElasticMaterial
-    from gearmbs.flexible.matrices import from_matrices, read_abaqus, read_calculix, read_nodes
+    from gearmbs.flexible.matrices import from_matrices, read_abaqus, read_calculix
+    from gearmbs.flexible.matrix_text import read_nodes
     from gearmbs.flexible.mnf import mnf_of, read_mnf, write_mnf
     from gearmbs.flexible.mnf_content import ModalNeutralFile
     from gearmbs.flexible.modal_model import ModalModel, Seat
@@ -120,7 +121,7 @@ late(
         "read_ansys": ".ansys",
         "read_calculix": ".matrices",
         "read_mnf": ".mnf",
-        "read_nodes": ".matrices",
+        "read_nodes": ".matrix_text",
         "read_op2": ".nastran",
         "read_op2_modes": ".nastran_modes",
         "read_op2_stresses": ".nastran_stress",

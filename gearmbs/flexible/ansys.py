@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,8 @@ import scipy.sparse as sp
 
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import FiniteElementModel
-from gearmbs.flexible.matrices import Path_, from_matrices, read_nodes, scaled
+from gearmbs.flexible.matrices import FileUnits
+from gearmbs.flexible.matrix_text import Path_, read_nodes
 
 LEAST = 4 * 512
 """Bytes of the headers of a binary file."""
@@ -50,14 +53,12 @@ def read_ansys(
     file = Path(full)
     found = _opened(reader, file, ("load_km",), "file with matrices (.full)")
     _check_end(found, file)
-    try:
-        dofs, k, m = found.load_km(sort=True)
-    except Exception as error:
-        raise FlexibleError(f"{file.name}: its matrices cannot be read ({type(error).__name__}: {error})") from None
+    dofs, k, m = _guarded(file, "its matrices cannot be read", lambda: found.load_km(sort=True))
     if k is None or m is None:
         raise FlexibleError(
             f"{file.name}: it has no {'stiffness' if k is None else 'mass'}; write it in a modal analysis"
         )
+    _check_terms(found, file, k, m)
     if dofs[:, 1].max() > 5:
         raise FlexibleError(
             f"{file.name}: degree of freedom {dofs[:, 1].max()} of node {dofs[np.argmax(dofs[:, 1]), 0]} is neither "
@@ -76,8 +77,8 @@ def read_ansys(
     if len(ids) != len(positions):
         raise FlexibleError(f"{file.name}: {len(ids)} numbers of nodes for {len(positions)} positions")
     used = np.isin(ids, dofs[:, 0])
-    k, m = scaled(k, m, rows, length, force, mass_unit)
-    return from_matrices(k, m, positions[used] * length, ids=ids[used], dofs=rows, name=name or file.stem)
+    units = FileUnits(length, force, mass_unit)
+    return units.model(k, m, positions[used], rows, ids[used], name or file.stem)
 
 
 def _check_end(found: Any, file: Path) -> None:
@@ -86,6 +87,17 @@ def _check_end(found: Any, file: Path) -> None:
     size = file.stat().st_size
     if 4 * words > size:
         raise FlexibleError(f"{file.name}: byte {size}: it is cut off; its header says that it has {4 * words} bytes")
+
+
+def _check_terms(found: Any, file: Path, k: Any, m: Any) -> None:
+    """Refuse matrices with another number of terms than the header says; those of held rows are left out of them."""
+    header = getattr(found, "_header", {})
+    for matrix, name, what in ((k, "ntermKl", "stiffness"), (m, "ntermMl", "mass")):
+        told = int(header.get(name, matrix.nnz))
+        if matrix.nnz > told or (matrix.nnz < told and np.all(matrix.diagonal())):
+            raise FlexibleError(
+                f"{file.name}: its header says that the {what} has {told} terms, it has {matrix.nnz}; write it anew"
+            )
 
 
 def _mirrored(matrix: Any) -> sp.csc_array:
@@ -103,10 +115,7 @@ def _nodes(reader: Any, given: Any) -> tuple[np.ndarray, np.ndarray]:
         mesh = _opened(reader, path, ("mesh",), "result file (.rst)").mesh
         return np.asarray(mesh.nnum, dtype=int), np.asarray(mesh.nodes, dtype=float)[:, :3]
     if path.suffix.lower() in (".cdb", ".dat"):
-        try:
-            archive = reader.Archive(str(path), parse_vtk=False)
-        except Exception as error:
-            raise FlexibleError(f"{path.name}: it is no archive ({type(error).__name__}: {error})") from None
+        archive = _guarded(path, "it is no archive", lambda: reader.Archive(str(path), parse_vtk=False))
         return np.asarray(archive.nnum, dtype=int), np.asarray(archive.nodes, dtype=float)[:, :3]
     return read_nodes(path)
 
@@ -117,13 +126,28 @@ def _opened(reader: Any, path: Path, needed: tuple[str, ...], what: str) -> Any:
         raise FlexibleError(f"{path.name}: there is no such file")
     if path.stat().st_size < LEAST:
         raise FlexibleError(f"{path.name}: {path.stat().st_size} bytes are no {what} of Ansys")
-    try:
-        found = reader.read_binary(str(path))
-    except Exception as error:
-        raise FlexibleError(f"{path.name}: it is no {what} of Ansys ({type(error).__name__}: {error})") from None
+    found = _guarded(path, f"it is no {what} of Ansys", lambda: reader.read_binary(str(path)))
     if not all(hasattr(found, part) for part in needed):
         raise FlexibleError(f"{path.name}: it is a {type(found).__name__}, no {what}")
     return found
+
+
+def _guarded(path: Path, wrong: str, load: Callable[[], Any]) -> Any:
+    """Return what is read, first in a process of its own where there is one: the reader ends it on broken indices."""
+    if hasattr(os, "fork"):
+        child = os.fork()
+        if child == 0:
+            try:
+                load()
+            finally:
+                # what is wrong is told by the parent
+                os._exit(0)
+        if os.WIFSIGNALED(os.waitpid(child, 0)[1]):
+            raise FlexibleError(f"{path.name}: {wrong}: its indices lead out of it; write it anew")
+    try:
+        return load()
+    except Exception as error:
+        raise FlexibleError(f"{path.name}: {wrong} ({type(error).__name__}: {error})") from None
 
 
 def _reader() -> Any:

@@ -16,7 +16,8 @@ import scipy.sparse as sp
 
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import FiniteElementModel
-from gearmbs.flexible.matrices import Path_, from_matrices, scaled
+from gearmbs.flexible.matrices import FileUnits
+from gearmbs.flexible.matrix_text import Path_
 from gearmbs.flexible.nastran_files import GridTable, assembly_table, check_end, op2_tables, pyyeti_module
 
 
@@ -66,14 +67,13 @@ def read_op4(
     except Exception as error:
         raise FlexibleError(f"{file.name}: it cannot be read as OP4 ({type(error).__name__}: {error})") from None
     matrices = [_named(found, wanted, file) for wanted in (stiffness, mass)]
+    units = FileUnits(length, force, mass_unit)
     if assembly is not None:
         table = assembly_table(Path(assembly))
-        return _model_of(table, matrices, name or file.stem, file, length, force, mass_unit)
+        return _model_of(table, matrices, name or file.stem, file, units)
     if positions is None or dofs is None:
         raise FlexibleError(f"{file.name}: an OP4 file holds no grid points; give positions and dofs, or assembly")
-    place = np.asarray(positions, dtype=float) * length
-    k, m = scaled(matrices[0], matrices[1], dofs, length, force, mass_unit)
-    return from_matrices(k, m, place, ids=ids, dofs=dofs, name=name or file.stem)
+    return units.model(matrices[0], matrices[1], positions, dofs, ids, name or file.stem)
 
 
 def read_op2(
@@ -113,12 +113,10 @@ def read_op2(
     matrices = [_named(found, wanted, file) for wanted in (stiffness, mass)]
     if dofs is not None:
         table = GridTable(table.ids, table.positions, table.axes, np.asarray(dofs, dtype=int))
-    return _model_of(table, matrices, name or file.stem, file, length, force, mass_unit)
+    return _model_of(table, matrices, name or file.stem, file, FileUnits(length, force, mass_unit))
 
 
-def _model_of(
-    table: GridTable, matrices: list[Any], name: str, file: Path, length: float, force: float, mass_unit: float
-) -> FiniteElementModel:
+def _model_of(table: GridTable, matrices: list[Any], name: str, file: Path, units: FileUnits) -> FiniteElementModel:
     """Return the model of matrices of a table's degrees of freedom."""
     for matrix, what in zip(matrices, ("stiffness", "mass")):
         if matrix.shape != (len(table.dofs),) * 2:
@@ -127,8 +125,7 @@ def _model_of(
                 f"have {len(table.dofs)} degrees of freedom; name the matrices of all of them, or give dofs"
             )
     k, m = (table.in_basic(matrix) for matrix in matrices)
-    k, m = scaled(k, m, table.dofs, length, force, mass_unit)
-    return from_matrices(k, m, table.positions * length, ids=table.ids, dofs=table.dofs, name=name)
+    return units.model(k, m, table.positions, table.dofs, table.ids, name)
 
 
 def _named(found: dict[str, Any], wanted: str, file: Path) -> Any:

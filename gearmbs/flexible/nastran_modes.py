@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.integrals import nodal_lumps
-from gearmbs.flexible.matrices import Path_
+from gearmbs.flexible.matrix_text import Path_
 from gearmbs.flexible.mnf_content import SI, ModalNeutralFile
 from gearmbs.flexible.nastran_files import GridTable, op2_tables, pyyeti_module
 from gearmbs.flexible.nastran_stress import grid_stresses

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gearmbs.flexible.errors import FlexibleError
-from gearmbs.flexible.matrices import Path_
+from gearmbs.flexible.matrix_text import Path_
 from gearmbs.flexible.nastran_files import GridTable, op2_tables, pyyeti_module
 from gearmbs.flexible.stress import COMPONENTS, StressModes
 
@@ -59,16 +59,19 @@ def read_op2_stresses(path: Path_, *, length: float = 1.0, force: float = 1.0) -
 def grid_stresses(file: Path, table: GridTable, length: float, force: float) -> StressModes:
     """Return the stresses of a file whose grid points are known, SI."""
     modes: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
-    others: set[int] = set()
+    others: dict[int, int] = {}
     for kind, mode, words in _records(file):
         if kind in SOLIDS:
             modes.setdefault(mode, []).append(_places(file, kind, mode, words))
         else:
-            others.add(kind)
+            others[kind] = mode
     if not modes:
         raise FlexibleError(
             f"{file.name}: it has no stresses of solid elements ({', '.join(BLOCKS)}); ask for STRESS(PLOT)=ALL"
         )
+    for kind, mode in others.items():
+        if mode not in modes:
+            raise FlexibleError(f"{file.name}: mode {mode} has stresses of elements of type {kind} and none of solids")
     if others:
         kinds = ", ".join(str(kind) for kind in sorted(others))
         warnings.warn(

@@ -40,6 +40,8 @@ REACTION_KINDS = {
 }
 """Functions under which the reactions of joints, of the kind given, can be asked for; others are JOINT and JPRIM."""
 REACTION_KEYS = ("joint", "jprim", "motion", "coupler", "gear", "gcon")
+MODAL_BLOCKS = {"mode": "q_f", "mode1": "v_f"}
+"""Blocks of y that hold modal coordinates and their rates."""
 
 
 def compile_mechanism(mechanism: Mechanism, t0: float) -> System:
@@ -203,6 +205,7 @@ class _Compiler:
                     **{_upper(k): s.expression for k, s in m.states.items() if not s.algebraic},
                     **{_upper(s.name): None for s in m.every_state[len(m.states) :] if not s.algebraic},
                 },
+                modes={_upper(name): b.modal.modes for name, b in m.bodies.items() if isinstance(b, ModalBody)},
                 splines={_upper(k): v for k, v in m.splines.items()},
                 arrays={_upper(k): v for k, v in m.arrays.items()},
                 functions=m.functions,
@@ -230,6 +233,9 @@ class _Compiler:
         """Return the index in y of an unknown an expression asks for."""
         m = self.mechanism
         at = self.offsets()
+        if key[0] in MODAL_BLOCKS:
+            before = [_upper(name) for name in m.bodies].index(key[1])
+            return at[MODAL_BLOCKS[key[0]]] + sum(self.builder.modes[1 : 1 + before]) + key[2]
         if key[0] in ("diff", "variable"):
             names = [name.upper() for name in m.state_names]
             if str(key[1]).upper() in names:

@@ -276,6 +276,17 @@ def _diff_rate(low: Lowering, call: Call) -> int:
     return low.inline("diff", ref, text, call.at)
 
 
+def _modal(rate: bool, low: Lowering, call: Call) -> int:
+    """MODAL(body, k), MODAL1(body, k): the k-th modal coordinate of a body and its rate; no functions of ADAMS."""
+    ref = low.ref(call.args[0])
+    if ref not in low.scope.modes:
+        known = ", ".join(str(name) for name in low.scope.modes) or "none"
+        low.fail(f"there is no body {ref} with modes; those with modes: {known}", call.args[0].at)
+    key = ("mode1" if rate else "mode", ref, low.literal(call, 1, 1, low.scope.modes[ref]) - 1)
+    found = low.builder.algebraic(key)
+    return low.scaled(found, "rate") if rate else found
+
+
 def _array(low: Lowering, call: Call) -> int:
     ref = low.ref(call.args[0])
     if ref not in low.scope.arrays:
@@ -341,6 +352,8 @@ def _table() -> dict[str, Function]:
         "VARVAL": (_variable, 1, 1),
         "DIF": (_diff, 1, 1),
         "DIF1": (_diff_rate, 1, 1),
+        "MODAL": (partial(_modal, False), 2, 2),
+        "MODAL1": (partial(_modal, True), 2, 2),
         "ARYVAL": (_array, 2, 2),
         "PINVAL": (partial(_plant, "pinput"), 2, 2),
         "POUVAL": (partial(_plant, "poutput"), 2, 2),

@@ -132,6 +132,8 @@ class Scope:
         VARIABLEs that are unknowns of their own: VARVAL becomes ``("variable", ref)``.
     diffs : mapping
         Expression of every DIFF; None for an implicit one.  DIF becomes ``("diff", ref)``.
+    modes : mapping of str to int
+        Number of modes of each body that has some, by upper-case name.  MODAL becomes ``("mode", name, place)``.
     splines : mapping to SplineData
     arrays : mapping to sequences of float
     functions : mapping
@@ -152,6 +154,7 @@ class Scope:
     variables: Mapping[Ref, str] = field(default_factory=dict)
     states: frozenset[Ref] = frozenset()
     diffs: Mapping[Ref, str | None] = field(default_factory=dict)
+    modes: Mapping[Ref, int] = field(default_factory=dict)
     splines: Mapping[Ref, SplineData] = field(default_factory=dict)
     arrays: Mapping[Ref, Sequence[float]] = field(default_factory=dict)
     functions: Mapping[str, Any] = field(default_factory=dict)

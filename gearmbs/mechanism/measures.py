@@ -170,6 +170,9 @@ class Measures:
         if key[0] in ("diff", "variable"):
             return self.state(str(key[1]))
         kind, ref, component = key
+        if kind in ("mode", "mode1"):
+            body = next(name for name in self.mechanism.bodies if name.upper() == ref)
+            return self.solution.modal_motion(body)[int(kind == "mode1")][:, component]
         for name in self.solution.system.force_names:
             if name.upper() == str(ref).upper() and kind not in ("joint", "jprim", "motion", "coupler", "gear", "gcon"):
                 return np.hstack(self.solution.load(name))[:, component]

@@ -305,6 +305,29 @@ class ModalBody(Body):
                 )
         return _rounded(moved - self.mean), _rounded(turned)
 
+    def mode(self, k: int, *, rate: bool = False) -> str:
+        """Return what stands for a modal coordinate, or its rate, in expressions of loads, variables and measures.
+
+        Parameters
+        ----------
+        k : int
+            Which one, counted from 1.
+        rate : bool
+
+        Raises
+        ------
+        ModelError
+            If there is no such mode.
+
+        Examples
+        --------
+        >>> shaft.mode(2)  # doctest: +SKIP
+        'MODAL("shaft",2)'
+        """
+        if not 1 <= k <= self.modal.modes:
+            raise ModelError(f"body '{self.name}': mode {k}; modes go from 1 to {self.modal.modes}")
+        return f'MODAL{"1" if rate else ""}("{self.name}",{k})'
+
     def centre_of_mass(self) -> tuple[np.ndarray, np.ndarray]:
         """Return position and velocity of the centre of mass at the start, deformation included, global components."""
         arm = self.orientation @ (self.com + self.start @ self.mean)

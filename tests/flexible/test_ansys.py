@@ -1,6 +1,7 @@
 """Matrices of Ansys, through its reader and the files that come with it; without it through one in its place."""
 
 import os
+import signal
 import sys
 import types
 from dataclasses import replace
@@ -79,6 +80,7 @@ def test_files_of_ansys_that_lie_are_named(reader, tmp_path):
     held[:3] = False
     nodes = (ids, corners)
     loose = {"k": k * np.outer(held, held), "m": m * np.outer(held, held)}
+    twice = np.column_stack([np.repeat(np.r_[1:8, 3], 3), np.tile([0, 1, 2], 8)])
     heat = np.column_stack([np.repeat(ids, 3), np.tile([0, 1, 20], 8)])
     cases = [
         (
@@ -92,6 +94,7 @@ def test_files_of_ansys_that_lie_are_named(reader, tmp_path):
             nodes,
             "freedom 20 of node 1",
         ),
+        (body(ids, dofs=twice)[1], nodes, "direction 1 of node 3 is there twice"),
         (FullFile(None, k, m), nodes, "its matrices cannot be read .RuntimeError: short read"),
         (types.SimpleNamespace(mesh=1), nodes, "it is a SimpleNamespace, no file with matrices"),
         (full, (ids[:7], corners[:7]), "the matrices name node 8, which is not in the node table"),
@@ -112,6 +115,19 @@ def test_files_of_ansys_that_lie_are_named(reader, tmp_path):
         read_ansys(reader("b.full", full), nodes)
     with pytest.raises(FlexibleError, match=r"odd\.full: it is no file with matrices \(.full\) of Ansys"):
         read_ansys(tmp_path / "odd.full", nodes)
+
+
+def test_terms_are_counted_and_a_reader_that_breaks_down_is_survived(reader):
+    ids = np.arange(1, 9)
+    corners, full = body(ids)
+    full._header = {"ntermKl": full.parts[1].nnz, "ntermMl": full.parts[2].nnz}
+    assert check_model(read_ansys(reader("c.full", full), (ids, corners))).good
+    full._header = {"ntermKl": full.parts[1].nnz + 3, "ntermMl": full.parts[2].nnz}
+    with pytest.raises(FlexibleError, match=r"c\.full: its header says that the stiffness has \d+ terms, it has \d+"):
+        read_ansys(reader("c.full", full), (ids, corners))
+    full.load_km = lambda sort: os.kill(os.getpid(), signal.SIGKILL)
+    with pytest.raises(FlexibleError, match=r"c\.full: its matrices cannot be read: its indices lead out of it"):
+        read_ansys(reader("c.full", full), (ids, corners))
 
 
 def test_without_the_reader_its_extra_is_named(monkeypatch):

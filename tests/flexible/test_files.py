@@ -288,7 +288,19 @@ def test_op4_files_through_pyyeti(tmp_path):
         (lambda f: f["sti"].write_text("0 1 1.0\n"), r"count from 1"),
         (lambda f: f["sti"].write_text(""), r"no entries"),
         (lambda f: f["sti"].write_text("30 30 1.0\n"), r"row 30 of 24"),
-        (lambda f: f["dof"].write_text("1.1 x\n"), r"a.dof: line 2: 'x' is no node.direction"),
+        (lambda f: f["dof"].write_text("1.1 x\n"), r"a.dof: line 1: 'x' is no node.direction"),
+        (
+            lambda f: f["dof"].write_text("1.1\n1.\u00b2\n", "latin-1"),
+            r"a.dof: line 2: '1.\u00b2' is no node.direction",
+        ),
+        (lambda f: f["dof"].write_text("1.1\n1.2"), r"a.dof: line 2: the file ends within it, and may be cut off"),
+        (lambda f: f["sti"].write_bytes(f["sti"].read_bytes()[:-1]), r"a.sti: line \d+: the file ends within it"),
+        (lambda f: f["inp"].write_text("*NODE\n1, 0, 0, 0.2"), r"a.inp: line 2: the file ends within it"),
+        (lambda f: f["sti"].write_bytes(b"1 1 2.0\n1 \xe4 2.0\n"), r"a.sti: line 2: an entry is no number"),
+        (
+            lambda f: f["sti"].write_bytes(b"1 1 2.0\n24 23 2.0\n"),
+            r"23 displacements, from node 1 on, have mass and no",
+        ),
         (
             lambda f: f["dof"].write_text("".join(f"{i // 3 + 5}.{i % 3 + 1}\n" for i in range(24))),
             r"name node 9, which",

@@ -28,6 +28,40 @@ def test_a_constant_force_on_the_modes_of_a_free_body(bar):
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=tolerance)
 
 
+@pytest.mark.parametrize("formulation", ["I3", "SI2", "SI1"])
+def test_a_force_that_depends_on_a_modal_coordinate_is_a_spring_and_a_damper_of_the_mode(bar, formulation):
+    m = Mechanism("fed back")
+    body = bar.add_to(m, "bar", damping=0.0, start=[1e-3, 0, 0, 0])
+    w = float(2 * np.pi * bar.frequencies[0])
+    stiffer, damping = 0.5 * w**2, 0.02 * w
+    feedback = f"-{stiffer!r}*{body.mode(1)} - {damping!r}*{body.mode(1, rate=True)}"
+    add_modal_force(m, "f", body, np.eye(10)[6], feedback)
+    solution = m.simulate(0.01, t_eval=np.linspace(0, 0.01, 101), tol=1e-10, formulation=formulation)
+    t, z = solution.t, 0.5 * damping
+    ringing = np.sqrt(1.5 * w**2 - z**2)
+    expected = 1e-3 * np.exp(-z * t) * (np.cos(ringing * t) + z / ringing * np.sin(ringing * t))
+    np.testing.assert_allclose(solution.modal_coordinates("bar")[:, 0], expected, rtol=0.0, atol=1e-8)
+    np.testing.assert_array_equal(solution.evaluate(body.mode(1)), solution.modal_coordinates("bar")[:, 0])
+    np.testing.assert_array_equal(solution.evaluate("MODAL1(bar,3)"), solution.modal_velocities("bar")[:, 2])
+    # eigenvalues of the linearised equations have the feedback, too
+    if formulation == "SI2":
+        found = m.linear_modes().eigenvalues
+        assert np.abs(found - (-z + 1j * ringing)).min() < 1e-6 * w
+
+
+def test_modal_coordinates_that_do_not_exist_are_named(bar):
+    m = Mechanism("wrong")
+    body = bar.add_to(m, "bar")
+    m.body("rigid", 1.0, (1.0, 1.0, 1.0))
+    with pytest.raises(ModelError, match="body 'bar': mode 5; modes go from 1 to 4"):
+        body.mode(5)
+    for text, message in (("MODAL(bar,9)", "4"), ("MODAL(rigid,1)", "no body RIGID with modes; those with modes: BAR")):
+        m.elements.pop("f", None)
+        add_modal_force(m, "f", body, np.eye(10)[6], text)
+        with pytest.raises(ModelError, match=message):
+            m.simulate(0.01, rate=100)
+
+
 def swung(bar, force, at_node):
     m = Mechanism("clamped")
     body = bar.add_to(m, "bar", damping=0.05)

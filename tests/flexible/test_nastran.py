@@ -208,6 +208,12 @@ def test_stresses_of_op2_that_cannot_be_taken_are_named(tmp_path, bar):
     for head, message in cases:
         with pytest.raises(FlexibleError, match=message):
             read_op2_stresses(with_stresses(tmp_path / "a.op2", bar, model, values, **head))
+    whole = with_stresses(tmp_path / "a.op2", bar, model, values).read_bytes()
+    words = np.frombuffer(whole, "<i4").copy()
+    words[np.flatnonzero(words == 39)[1]] = 40
+    (tmp_path / "a.op2").write_bytes(words.tobytes())
+    with pytest.raises(FlexibleError, match="mode 2 has stresses of elements of type 40 and none of solids"):
+        read_op2_stresses(tmp_path / "a.op2")
     with pytest.raises(FlexibleError, match=f"stresses of 1 modes, LAMA has {model.modes}; ask for all"):
         read_op2_modes(with_stresses(tmp_path / "a.op2", bar, model, values[:1]), stresses=True)
     with pytest.raises(FlexibleError, match=r"no stresses of solid elements \(OES1X1, OES1X, OES1\)"):

@@ -198,6 +198,8 @@ class DeckWriter:
                     f"{shown(text)}: ADAMS has no function INTEGRAL; give a motion by its velocity to a joint, "
                     "or use a differential state"
                 )
+            if call.name in ("MODAL", "MODAL1"):
+                raise ModelError(f"{shown(text)}: ADAMS has no function {call.name}; use markers at nodes instead")
             call = replace(call, args=tuple(self._argument(call, k, a) for k, a in enumerate(call.args)))
             return self._element_call(call) if call.name in ELEMENT_FORCES else call
 
