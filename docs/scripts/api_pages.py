@@ -13,6 +13,7 @@ import gearmbs
 PACKAGES = {
     "gearmbs.mechanism": "Mechanism: bodies, markers, joints, motions, forces",
     "gearmbs.mechanism.contacts": "Contact of solids: shapes and laws",
+    "gearmbs.solids": "Solids: bodies of CAD files",
     "gearmbs.gears": "Gears: wheels, pairs, laws, static analyses",
     "gearmbs.drivetrain": "Drivetrains: gear trains by name, motors, clutches, pumps",
     "gearmbs.flexible": "Flexible bodies: shafts, finite elements, reduction",

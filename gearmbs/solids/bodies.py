@@ -207,7 +207,7 @@ def _along(nodes: Nodes, first: int, step: str) -> Iterator[int]:
         number = getattr(nodes[number], step)
 
 
-def bodies(path: str | Path) -> list[Body]:
+def read_bodies(path: str | Path) -> list[Body]:
     """Return the bodies of a Parasolid text transmit file.
 
     Raises

@@ -6,7 +6,7 @@ import pytest
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.contacts import Box, Cylinder, Frustum, Mesh, Sphere, Torus, read_solid
 from gearmbs.mechanism.contacts.shapes import volume
-from gearmbs.solids.bodies import bodies
+from gearmbs.solids import read_bodies
 from gearmbs.solids.facets import faceted
 from gearmbs.solids.primitives import primitive
 from tests.solids.transmit_files import Solid, block, circle, cylinder, drilled, line, plane, transmit, turned
@@ -22,7 +22,7 @@ def written(tmp_path, *solids, name="solid.x_t"):
 
 def facets_of(tmp_path, solid, tolerance=None):
     pytest.importorskip("pythoncdt")
-    (body,) = bodies(written(tmp_path, solid))
+    (body,) = read_bodies(written(tmp_path, solid))
     return faceted(body, tolerance)
 
 
@@ -155,7 +155,7 @@ def test_arcs_closer_than_the_tolerance_are_cut_finer(tmp_path):
 
 def test_bodies_are_found_by_name_and_part(tmp_path):
     path = written(tmp_path, block(name="A", part=3), turned(0.4, 0.4, 1.0, name="B", part=4), name="two.xmt_txt")
-    assert [b.name for b in bodies(path)] == ["A", "B"]
+    assert [b.name for b in read_bodies(path)] == ["A", "B"]
     assert isinstance(read_solid(path, "b"), Cylinder)
     with pytest.raises(ModelError, match="body named 'C', but 0 of 2: A, B"):
         read_solid(path, "C")
@@ -232,4 +232,4 @@ def test_a_mesh_of_a_drilled_block_touches_like_one(tmp_path):
     pytest.importorskip("pythoncdt")
     shape = read_solid(written(tmp_path, drilled(block())), tolerance="1 mm")
     assert isinstance(shape, Mesh)
-    assert primitive(bodies(written(tmp_path, drilled(block())))[0]) is None
+    assert primitive(read_bodies(written(tmp_path, drilled(block())))[0]) is None

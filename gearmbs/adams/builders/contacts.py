@@ -29,8 +29,9 @@ from gearmbs.mechanism.contacts.shapes import (
     extruded,
     revolved,
 )
-from gearmbs.mechanism.contacts.solid_files import SUFFIXES, bodies, body_of, shape_of
+from gearmbs.mechanism.contacts.solid_files import SUFFIXES, body_of, shape_of
 from gearmbs.mechanism.parts import Marker
+from gearmbs.solids import read_bodies
 
 ROUND = 1e-9
 """Relative difference of scales up to which an ellipsoid is a sphere."""
@@ -184,7 +185,7 @@ def _external(b: Builder, g: st.Graphics) -> Shape:
     if path.suffix.lower() in READERS:
         return read_mesh(path, b.units.length)
     if path not in b.solid_files:
-        b.solid_files[path] = bodies(path)
+        b.solid_files[path] = read_bodies(path)
     body = body_of(path, b.solid_files[path], g.element, b.deck.of(st.Marker)[g.marker or 0].part)
     if (path, body.node.index) not in b.solids:
         try:

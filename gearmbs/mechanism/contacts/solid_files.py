@@ -8,7 +8,7 @@ from typing import Any
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.contacts.shapes import Box, Cylinder, Frustum, Mesh, Shape, Sphere, Torus
 from gearmbs.mechanism.quantities import quantity
-from gearmbs.solids.bodies import PART_NUMBER, Body, bodies
+from gearmbs.solids.bodies import PART_NUMBER, Body, read_bodies
 from gearmbs.solids.facets import faceted
 from gearmbs.solids.primitives import primitive
 
@@ -42,7 +42,7 @@ def read_solid(path: str | Path, name: str | None = None, tolerance: Any = None)
         If the file cannot be read, the body is not in it, or has geometry that is not read.
     """
     path = Path(path)
-    found = body_of(path, bodies(path), name)
+    found = body_of(path, read_bodies(path), name)
     try:
         return shape_of(found, None if tolerance is None else quantity(tolerance, "length", "tolerance"))
     except ModelError as error:
