@@ -18,7 +18,7 @@ MARKER/1,PART=1
 MATERIAL/7,NAME=steel,DENSITY={density},YOUNGS_MODULUS=2.0E5,POISSONS_RATIO=0.3
 MATERIAL/8,YOUNGS_MODULUS_X=1
 SECTION/1,TYPE=Solid Rectangular,RECT_BASE=20,RECT_HEIGHT=10,AREA=200
-FE_PART/2,TYPE=3DBEAM,NODE_LABELS={labels},COORDINATES={nodes},SECTION={sections},MATERIAL=7{extra}
+FE_PART/2,TYPE={kind},NODE_LABELS={labels},COORDINATES={nodes},SECTION={sections},MATERIAL=7{extra}
 FE_NODE/1,FE_PART=2,LABEL=1,S=0
 MARKER/10,FE_PART=2,NODE_LABEL=1{turn}
 MARKER/11,FE_PART=2,NODE_LABEL={last},QP=1000,0,0
@@ -38,6 +38,7 @@ def deck(rest="", spans=5, density=DENSITY, extra="", **changed):
         "sections": ",".join(f"{k},{AREA},{IYY},{IZZ},0,{IXX}" for k in labels),
         "last": spans + 1,
         "turn": "",
+        "kind": "3DBEAM",
     }
     return parse_deck(DECK.format(rest=rest, density=density, extra=extra, **(fields | changed)), "beam.adm")
 
@@ -115,6 +116,32 @@ def test_it_swings_as_the_same_beam_in_python_and_goes_on():
     np.testing.assert_allclose(result.request(1)[:, 1:4], expected, atol=2e-3)
 
 
+@pytest.mark.parametrize(("kind", "along", "out"), [("XY", "FY", 3), ("ZX", "FZ", 2)])
+def test_a_plane_beam_bends_in_its_plane_alone(kind, along, out):
+    across = "FZ" if along == "FY" else "FY"
+    load = f"GFORCE/1,I=11,JFLOAT=1,RM=1,{along}=1"
+    plain, flat = (tip(f"{load},{across}=1", kind=name) for name in ("3DBEAM", f"2DBEAM{kind}"))
+    assert abs(plain[out]) > 0.1 and abs(flat[out]) < 1e-9
+    np.testing.assert_allclose(flat[1:4], tip(load)[1:4], atol=1e-6)
+
+
+def test_a_plane_beam_off_its_plane_is_refused():
+    with pytest.raises(DeckError, match="TYPE = 2DBEAMYZ: its nodes and their x axes must be parallel to that plane"):
+        deck(kind="2DBEAMYZ").to_mechanism()
+
+
+def test_results_hold_the_nodes(tmp_path):
+    result = run_deck(deck("GFORCE/1,I=11,JFLOAT=1,RM=1,FY=1", spans=2), parse_script("SIMULATE/STATICS\n"))
+    nodes = result.nodes(2)
+    assert list(nodes) == [1, 2, 3]
+    np.testing.assert_allclose(nodes[3][-1, :3], result.request(1)[-1, 1:4], atol=1e-9)
+    data = result.to_dataset()
+    assert data["fe_part_2"].shape == (result.t.size, 3, 18)
+    result.write(tmp_path / "beam")
+    text = (tmp_path / "beam.res").read_text()
+    assert 'name="FE_PART_2_3_XFORM" entity="FE_PART_2" entType="FE_Part" objectId="2"' in text
+
+
 def test_a_curved_beam_is_free_of_stress():
     """A quarter of a ring through three nodes stays as it is; its length is that of the arc."""
     angles = np.radians([0.0, 45.0, 90.0])
@@ -162,9 +189,10 @@ def test_other_beams_are_refused():
         sections="1,1,1,1,0,1",
         last=2,
         turn="",
+        kind="3DBEAM",
     )
-    with pytest.raises(DeckError, match="TYPE = 2DBEAMXY is not supported"):
-        parse_deck(text.replace("3DBEAM", "2DBEAMXY")).to_mechanism()
+    with pytest.raises(DeckError, match="TYPE = 4DBEAM is not supported"):
+        parse_deck(text.replace("3DBEAM", "4DBEAM")).to_mechanism()
     with pytest.raises(DeckError, match="there is no MATERIAL/9"):
         parse_deck(text.replace("MATERIAL=7", "MATERIAL=9")).to_mechanism()
     with pytest.raises(DeckError, match="MATERIAL/8, which an FE_PART names: unknown argument YOUNGS_MODULUS_X"):

@@ -15,6 +15,7 @@ import numpy as np
 
 from gearmbs.adams.builders.builder import Builder, LeftOutError
 from gearmbs.adams.builders.frames import marker_orientation, part_orientation
+from gearmbs.adams.builders.held_bodies import hold
 from gearmbs.adams.builders.model import BodyState
 from gearmbs.adams.errors import WARNING
 from gearmbs.adams.parse import statements as st
@@ -32,6 +33,10 @@ STUBBY = 0.01
 """Share of shear in the deflection of a cantilever from which its coefficient, which a deck does not give, matters."""
 SHARE = re.compile(r"(?<![A-Za-z0-9_])S(?![A-Za-z0-9_(])", re.IGNORECASE)
 """S in the functions of an FE_LOAD: the share of the length."""
+NORMALS = {"3DBEAM": None, "2DBEAMXY": 2, "2DBEAMYZ": 0, "2DBEAMZX": 1}
+"""Types, and the axis of the ground that plane ones stay normal to."""
+FLAT = 1e-6
+"""Share of the length by which nodes of a plane beam may be out of their plane, and sine of their x axes."""
 OF_POINTS = frozenset(["SD", "SV", "SA"])
 """Position, velocity and acceleration at S."""
 
@@ -66,12 +71,17 @@ def add_fe_part(b: Builder, s: st.FePart) -> None:
     """FE_PART: nodes, and elements between them."""
     from gearmbs.flexible.large_beam import LargeBeam
 
-    if (s.type or "").upper() != "3DBEAM":
+    kind = (s.type or "").upper()
+    if kind not in NORMALS:
         raise LeftOutError(f"TYPE = {s.type}")
     places, turns = _line(b, s)
     sections = _sections(b, s)
     name = b.claim(s, "fe_part")
     axes = part_orientation(s)
+    normal = NORMALS[kind]
+    if normal is not None:
+        arms = places - places[0]
+        _check_plane(kind, axes[normal] @ arms.T, np.abs(arms).max(), axes[normal] @ turns[:, :, 0].T)
     origin = b.units.length * np.array(s.qg)
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
@@ -87,6 +97,8 @@ def add_fe_part(b: Builder, s: st.FePart) -> None:
                 mass += half * part.mass
                 inertia += half * turn @ own @ np.diag(part.inertia) @ own.T @ turn.T
         bodies.append(_node(b, s, name, k, (mass, inertia), (origin + axes @ place, axes)))
+        if normal is not None:
+            hold(b.mechanism, bodies[-1], "planar", normal)
     for e, (part, own) in enumerate(of_element):
         frame = _element_axes(places[e + 1] - places[e], turns[e] @ own)
         i, j = (
@@ -97,10 +109,17 @@ def add_fe_part(b: Builder, s: st.FePart) -> None:
         b.mechanism.add(LargeBeam(f"{name}.beam{e + 1}", i, j, float(steps[e]), part, damping))
     reach = 0.5 * (np.concatenate([[0.0], steps]) + np.concatenate([steps, [0.0]]))
     labels = {label: ELEMENTS * k for k, label in enumerate(s.node_labels)}
+    b.model.beams[s.id] = {label: bodies[k].name for label, k in labels.items()}
     b.beams[s.id] = Beam(bodies, labels, along / along[-1], reach, axes, places)
     part = of_element[0][0]
     if 3.0 * max(part.bending) / (min(part.shear) * along[-1] ** 2) > STUBBY:
         b.remark(WARNING, s, "it is so stubby that shear matters; its coefficient is taken as 1")
+
+
+def _check_plane(kind: str, heights: np.ndarray, length: float, slopes: np.ndarray) -> None:
+    """Refuse a plane beam that is not parallel to its plane of the ground."""
+    if np.abs(heights).max() > FLAT * length or np.abs(slopes).max() > FLAT:
+        raise ValueError(f"TYPE = {kind}: its nodes and their x axes must be parallel to that plane of the ground")
 
 
 def _node(

@@ -20,11 +20,12 @@ if TYPE_CHECKING:
     from gearmbs.adams.builders.builder import Builder
 
 
-def hold(mechanism: Mechanism, body: Body, kind: str) -> None:
-    """Hold a body to the ground by a joint whose axes are those of the ground, where the body starts."""
+def hold(mechanism: Mechanism, body: Body, kind: str, normal: int = 2) -> None:
+    """Hold a body to the ground by a joint, where the body starts; its z is the given axis of the ground."""
     at = body.centre_of_mass()[0]
     name = f"{body.name}.{kind}"
-    i, j = (owner.marker_at(at, np.eye(3), name=f"{name} {owner.name}") for owner in (body, mechanism.ground))
+    axes = np.roll(np.eye(3), 2 - normal, axis=1)
+    i, j = (owner.marker_at(at, axes, name=f"{name} {owner.name}") for owner in (body, mechanism.ground))
     mechanism.joint(kind, name, i, j)
 
 

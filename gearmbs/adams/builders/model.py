@@ -65,6 +65,8 @@ class AdamsModel:
         What sensors have evaluated.
     initial_motions : list
         Joints with initial conditions: joint, "rotation" or "translation", displacement and velocity in deck units.
+    beams : dict of int to dict
+        Id of an FE_PART that was built -> label of a node -> name of its body.
     """
 
     mechanism: Mechanism
@@ -74,6 +76,7 @@ class AdamsModel:
     sources: dict[str, st.Statement] = field(default_factory=dict)
     sensed: Mapping[int, float] = field(default_factory=dict)
     initial_motions: list[tuple[Joint, str, tuple[float, ...]]] = field(default_factory=list)
+    beams: dict[int, dict[int, str]] = field(default_factory=dict)
 
     def scope(self, marker_index: dict[int, int], marker_body: list[int]) -> Scope:
         """Return what the deck's expressions may name, for requests."""

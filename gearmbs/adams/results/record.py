@@ -183,6 +183,22 @@ class RunRecord:
         rows = [part_motion(s, number, "flex_body") for s in self.segments]
         return np.concatenate(rows or [np.zeros((0, 18))])
 
+    def nodes(self, number: int) -> dict[int, np.ndarray]:
+        """Return the motion of the nodes of FE_PART/number by their labels, each of shape (m, 18), as of `part`.
+
+        A node has the axes of its part at the start.
+        """
+        labels = self.segments[0].model.beams[number]
+        return {
+            label: np.concatenate([_frame_motion(s, s.model.beams[number][label]) for s in self.segments])
+            for label in labels
+        }
+
+    @property
+    def beams(self) -> tuple[int, ...]:
+        """Ids of the FE_PARTs."""
+        return tuple(self.segments[0].model.beams) if self.segments else ()
+
     def modal(self, number: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the modal coordinates of FLEX_BODY/number and their rates (1/time), each of shape (m, modes).
 
@@ -319,6 +335,13 @@ class RunRecord:
             modes = ("time", f"flex_body_{number}_mode")
             data[f"flex_body_{number}_modal"] = (modes, q_f, {"long_name": "modal coordinates", "units": "1"})
             data[f"flex_body_{number}_modal_rate"] = (modes, v_f, {"units": f"1/{self.unit('time')}"})
+        for number in self.beams:
+            beam, found = self.deck.of(st.FePart)[number], self.nodes(number)
+            time, component = columns("part", PART_COLUMNS, tuple(self.unit(d) for d in PART_DIMENSIONS))
+            nodes = f"fe_part_{number}_node"
+            coords[nodes] = (nodes, np.array(list(found)))
+            motion = np.stack(list(found.values()), axis=1)
+            data[f"fe_part_{number}"] = ((time, nodes, component), motion, {"long_name": beam.name or beam.label()})
         for kind, number in self.elements:
             along = columns("force", FORCE_COLUMNS, (self.unit("force"),) * 3 + (self.unit("torque"),) * 3)
             data[f"{kind}_{number}"] = (along, self.force(kind, number), {"long_name": f"{kind.upper()}/{number}"})
@@ -367,10 +390,13 @@ def unique(names: tuple[str, ...]) -> tuple[str, ...]:
 
 def part_motion(segment: Segment, number: int, kind: str = "part") -> np.ndarray:
     """Return the 18 columns of the frame of a part, or of a ``"flex_body"``, over an analysis, in the deck's units."""
+    return _frame_motion(segment, segment.model.names[kind, number])
+
+
+def _frame_motion(segment: Segment, name: str) -> np.ndarray:
     from gearmbs.dae.equations.rotation import euler_from_matrix
 
     s = segment.solution
-    name = segment.model.names[kind, number]
     body = segment.model.mechanism.bodies[name]
     axes = s.orientation(name)
     arm, push, pushed = axes @ body.com, 0.0, 0.0

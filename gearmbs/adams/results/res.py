@@ -51,6 +51,7 @@ def _entities(result: RunRecord) -> Iterator[_Entity]:
         units = tuple(result.unit(PART_DIMENSIONS[k]) for k in columns)
         yield _Entity(f"name={quoteattr(name + '_XFORM')} {kind}", POINT_COLUMNS, units, result.point_mass(number))
     yield from _flexible_entities(result)
+    yield from _beam_entities(result)
     wrench_units = (result.unit("force"),) * 3 + (result.unit("torque"),) * 3
     kinds = {kind: cls for cls, kind in KINDS.items()}
     for kind, number in result.elements:
@@ -94,6 +95,16 @@ def _flexible_entities(result: RunRecord) -> Iterator[_Entity]:
         rates = (f"1/{result.unit('time')}",) * q_f.shape[1]
         modal = ("no_units",) * q_f.shape[1] + rates
         yield _Entity(f"name={quoteattr(name + '_Q')} {kind}", names, modal, np.hstack([q_f, v_f]))
+
+
+def _beam_entities(result: RunRecord) -> Iterator[_Entity]:
+    """Nodes of FE_PARTs with the columns of parts, one set a node."""
+    units = tuple(result.unit(d) for d in PART_DIMENSIONS)
+    for number in result.beams:
+        name = result.deck.of(st.FePart)[number].name or f"FE_PART_{number}"
+        kind = f'entity={quoteattr(name)} entType="FE_Part" objectId="{number}"'
+        for label, motion in result.nodes(number).items():
+            yield _Entity(f"name={quoteattr(f'{name}_{label}_XFORM')} {kind}", PART_COLUMNS, units, motion)
 
 
 def _variable_entities(result: RunRecord) -> Iterator[_Entity]:
