@@ -1,7 +1,8 @@
 """Bodies fixed to each other as one: a mechanism with fewer bodies, and the way back to all of them.
 
 The members of a group are moved by the same six coordinates. Their composite has their mass, their centre of mass and,
-by Steiner's theorem, their inertia about it; markers, joints and loads keep their place on it.
+by Steiner's theorem, their inertia about it; markers, joints and loads keep their place on it. Where all that is left
+turns about fixed axes, the angles alone are integrated; see `gearmbs.dae.equations.fixed_axes`.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ import numpy as np
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
+from gearmbs.dae.model.fixed_axes import fixed_axis_problem, starting_values
+from gearmbs.mechanism.fixed_axes import Hinge, axes_of, hinges, turn_table
 from gearmbs.mechanism.joints import Joint, Row
 from gearmbs.mechanism.modal import ModalBody
 from gearmbs.mechanism.parts import Body, Marker
@@ -22,6 +25,7 @@ from gearmbs.mechanism.parts import Body, Marker
 if TYPE_CHECKING:
     from gearmbs.dae.model.member_tables import Members
     from gearmbs.dae.model.system import System
+    from gearmbs.dae.problem import DAEProblem
     from gearmbs.mechanism.mechanism import Mechanism
 
 
@@ -42,10 +46,37 @@ class Lumped:
     whole: System
     system: System
     members: Members
+    hinges: dict[str, Hinge] | None = None
+    """Those of the integrated bodies, where each of them can only turn about a fixed axis."""
+
+    def problem(self, formulation: str, rate_scale: float) -> tuple[DAEProblem, Members]:
+        """Return what is integrated, and how the whole follows from it.
+
+        Bodies that turn about fixed axes are integrated by their angles alone in the formulation SI2.
+        """
+        if self.hinges is not None and formulation == "SI2":
+            problem = fixed_axis_problem(self.system, axes_of(self.system, self.hinges), rate_scale)
+            if problem is not None:
+                starts = starting_values(problem, len(self.hinges))
+                table = turn_table(self.whole, self.system, self.hinges, starts)
+                return problem, self.members._replace(turn=table)
+        return self.system.problem(formulation, rate_scale), self.members
+
+    def remark(self, formulation: str) -> str:
+        """Return a remark for the message of a run if another formulation would leave less to integrate."""
+        if self.hinges is None or formulation == "SI2":
+            return ""
+        return (
+            f"lump: with {formulation} bodies that turn about fixed axes keep six coordinates; formulation SI2 "
+            "integrates their angles alone."
+        )
 
 
 def lumped(mechanism: Mechanism, t0: float = 0.0) -> Lumped | None:
-    """Return a mechanism with the bodies that fixed joints connect as one, or None if there are none.
+    """Return a mechanism with the bodies that fixed joints connect as one, or None if that leaves no less to integrate.
+
+    What is left is less, too, where each body can only turn about a fixed axis: in one revolute joint on the ground,
+    driven by a rotation of it or not, see `gearmbs.dae.equations.fixed_axes`.
 
     All bodies are assembled first, so that errors, remarks and redundant rows are those of the whole mechanism. A fixed
     joint stays as it is
@@ -64,7 +95,7 @@ def lumped(mechanism: Mechanism, t0: float = 0.0) -> Lumped | None:
     whole = mechanism.compile(t0)
     whole.initialise()
     joints = [] if any(whole.model.modes) else _joints_inside(mechanism, whole)
-    if not joints:
+    if not joints and _hinges(mechanism, whole) is None:
         return None
     return _Lumping(mechanism, whole, joints).run(t0)
 
@@ -79,6 +110,10 @@ def why_not_lumped(mechanism: Mechanism) -> str:
     else:
         why = "the fixed joints share loads, enter expressions or constraints, or leave nothing that moves"
     return f"lump: no bodies are integrated as one, since {why}."
+
+
+def _hinges(mechanism: Mechanism, system: System) -> dict[str, Hinge] | None:
+    return hinges(mechanism.bodies, mechanism.joints.values(), set(system.row_names))
 
 
 def _joints_inside(mechanism: Mechanism, whole: System) -> list[Joint]:
@@ -124,7 +159,7 @@ class _Lumping:
         system = model.compile(t0)
         system.typical_length = self.whole.length
         system.initialise()
-        return Lumped(self.whole, system, self._members(system, edges))
+        return Lumped(self.whole, system, self._members(system, edges), _hinges(model, system))
 
     # --- groups -------------------------------------------------------------------------------------
 
@@ -282,5 +317,10 @@ class _Lumping:
             row[mb.EDGE_AXES : mb.EDGE_ROWS] = [r.terms[0].axes for r in joint.rows[3:]]
             row[mb.EDGE_ROWS :] = [at[f"{joint.name}: {r.label}"] for r in joint.rows]
         return mb.Members(
-            group, place, of_marker, np.array([at[name] for name in system.row_names], dtype=np.int64), edge
+            group,
+            place,
+            of_marker,
+            np.array([at[name] for name in system.row_names], dtype=np.int64),
+            edge,
+            mb.no_turns(),
         )

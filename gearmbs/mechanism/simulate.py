@@ -110,11 +110,11 @@ def simulate(
         and each valid during the call only, instead of keeping all steps in memory; see
         `gearmbs.dae.results.stream.Stream`. The solution returned then holds nothing but the last step.
     lump : bool, optional
-        Integrate bodies that fixed joints connect, or fix to the ground, as one; default the mechanism's ``lump``,
-        which only some presets set, and not with ``stops``. Results are about all bodies and joints as without it;
-        reactions inside are recovered exactly. Where that is not possible, as with any body that
-        deforms, all bodies are integrated, and the solution's ``message`` says why. See
-        `gearmbs.mechanism.lumping.lumped`.
+        Integrate bodies that fixed joints connect, or fix to the ground, as one, and if all that is left turns about
+        fixed axes, its angles alone; default the mechanism's ``lump``, which only some presets set, and not with
+        ``stops``. Results are about all bodies and joints as without it; reactions inside are recovered exactly. Where
+        that is not possible, as with any body that deforms, all bodies are integrated, and the solution's ``message``
+        says why. See `gearmbs.mechanism.lumping.lumped`.
     stops : sequence of StopAt
         The run ends where a state of the mechanism passes a value; times are in the result's ``t_events``, one array a
         stop. Not with IDA, and not with ``lump``.
@@ -138,15 +138,14 @@ def simulate(
     name = _checked(integrator, tol, options)
     asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
     with uncollected(), raised_errors(mechanism.functions.values()):
-        system, problem, members = _prepared(mechanism, t_start, lump, formulation, rate_scale)
+        system, problem, members, lumping = _prepared(mechanism, t_start, lump, formulation, rate_scale)
     if stops:
         if name == "IDA" or lump:
             raise ModelError("stops: they need the integrator WSTIFF or GSTIFF, and lump=False")
         problem = with_stops(problem, mechanism.state_names, int(problem.idata[tables.H_Z]), stops)
         options.update(stop_options(stops))
     problem.advice = {**ADVICE, **(advice or {})}
-    remarks = [locking_remark(mechanism, system), why_not_lumped(mechanism) if asked and members is None else ""]
-    remark = " ".join(text for text in remarks if text)
+    remark = " ".join(text for text in (locking_remark(mechanism, system), lumping if asked else "") if text)
     stream = None if consumer is None else Stream(system, problem, float(t_eval[-1]), consumer, members)
     bar = time_bar(progress, mechanism.name, float(t_eval[0]), float(t_eval[-1]))
     with bar as report, raised_errors(mechanism.functions.values()):
@@ -179,13 +178,17 @@ def _checked(integrator: str, tol: float, options: Mapping[str, Any]) -> str:
 
 def _prepared(
     mechanism: Mechanism, t_start: float, lump: bool, formulation: str, rate_scale: float
-) -> tuple[System, DAEProblem, Members | None]:
-    """Return the system of all bodies, what is integrated, and how the first follows from the second if it is less."""
+) -> tuple[System, DAEProblem, Members | None, str]:
+    """Return the system of all bodies, what is integrated, how the first follows from it if it is less, and a remark.
+
+    The remark tells why not less is integrated.
+    """
     one = lumped(mechanism, t_start) if lump else None
     if one is None:
         system = mechanism.compile(t_start)
-        return system, system.problem(formulation, rate_scale), None
-    return one.whole, one.system.problem(formulation, rate_scale), one.members
+        why = why_not_lumped(mechanism) if lump else ""
+        return system, system.problem(formulation, rate_scale), None, why
+    return one.whole, *one.problem(formulation, rate_scale), one.remark(formulation)
 
 
 def _output_times(

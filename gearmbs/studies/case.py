@@ -253,8 +253,8 @@ class Solver(Section):
     ``signal_rate`` is the sampling rate of the acceleration and its evaluation, ``output_rate`` that of forces and
     contact, a multiple of it. Where they are not given they follow the mesh frequency; see `Case.signal_rate`.
 
-    ``lump`` integrates each gear and its shaft, which are fixed to each other, as one body; the record is about all
-    bodies as without it.
+    ``lump`` integrates each gear and its shaft, which are fixed to each other, as one body, and of bodies that turn
+    about fixed axes the angles alone; the record is about all bodies as without it.
     """
 
     section: ClassVar[str] = "solver"

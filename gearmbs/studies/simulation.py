@@ -44,6 +44,9 @@ KERNELS = (
 )
 """Modules of kernels that are called late in a run, besides those of the contact."""
 
+LUMPED_KERNELS = ("gearmbs.dae.model.axis_outputs", "gearmbs.dae.model.fixed_axes")
+"""The same of a run in which gear and shaft turn as one."""
+
 
 class SimulationFailed(RuntimeError):
     """The integrator stopped early, or what it computed is no motion of meshing gears.
@@ -109,7 +112,7 @@ def simulate_case(
         Sampled at the case's output rate, or at the integrator's own steps, from which :func:`record` makes signals
         without aliases; see its ``status``.
     """
-    _load_kernels()
+    _load_kernels(case)
     mechanism = case_mechanism(case) if mechanism is None else mechanism
     operation, solver = case.operation, case.solver
     t_end = operation.run_up + operation.settling + operation.duration + edge(case)
@@ -221,7 +224,7 @@ def run_case(
         raise CaseError(f"case: is a {type(case).__name__}; make a case of tables by make_case, of a file by load_case")
     check_record(case)
     check_variables(variables)
-    _load_kernels()
+    _load_kernels(case)
     recorder = Recorder(case)
     solution = simulate_case(case, progress, mechanism=mechanism, every_step=True, consumer=recorder.take)
     if not solution.success:
@@ -237,11 +240,11 @@ def run_case(
     return dataset
 
 
-def _load_kernels() -> None:
+def _load_kernels(case: Case) -> None:
     """Import the kernels of a run before the first is called, so that all that are missing are compiled at once."""
     with uncollected():
         contact_kernels()
-        for name in KERNELS:
+        for name in (*KERNELS, *(LUMPED_KERNELS if case.solver.lump else ())):
             importlib.import_module(name)
 
 

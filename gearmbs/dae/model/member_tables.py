@@ -17,6 +17,14 @@ EDGE_ROWS = 8
 EDGE_COLUMNS = 14
 """Of a fixed joint inside a group; members count from 0, -1 is the ground."""
 
+TURN_I, TURN_J, TURN_SIDE, TURN_ROOT = range(4)
+"""Of an axis: markers I and J; 1 where I's body turns and -1 where J's does; 1, or -1 where I starts half a turn off
+what the motion says."""
+TURN_ROWS = 4
+"""Six rows: coincident x, y, z, the two that keep the axis, and that of the motion or -1."""
+TURN_COLUMNS = 10
+"""Of the revolute joint on the ground in which a group turns about a fixed axis, where that is all it can do."""
+
 PLACE_R, PLACE_A = 0, 3
 PLACE_MASS, PLACE_INERTIA = 12, 13
 PLACE_COLUMNS = 22
@@ -38,6 +46,9 @@ class Members(NamedTuple):
         Number among all rows of each row of the integrated model.
     edge : ndarray of int, shape (joints, EDGE_COLUMNS)
         Fixed joints inside groups, outermost first.
+    turn : ndarray of int, shape (groups, TURN_COLUMNS)
+        Joints of the groups where each is integrated by its angle alone, see `gearmbs.dae.equations.fixed_axes`; else
+        no rows.
     """
 
     group: np.ndarray
@@ -45,12 +56,18 @@ class Members(NamedTuple):
     of_marker: np.ndarray
     row: np.ndarray
     edge: np.ndarray
+    turn: np.ndarray
 
 
-MEMBERS_TYPE = types.NamedTuple((_IVEC, float64[:, ::1], _IVEC, _IVEC, int64[:, ::1]), Members)
+MEMBERS_TYPE = types.NamedTuple((_IVEC, float64[:, ::1], _IVEC, _IVEC, int64[:, ::1], int64[:, ::1]), Members)
+
+
+def no_turns() -> np.ndarray:
+    """Return the table of axes of groups that are integrated by all six coordinates."""
+    return np.zeros((0, TURN_COLUMNS), dtype=np.int64)
 
 
 def no_members() -> Members:
     """Return the tables of a model whose bodies are all integrated by themselves."""
     nobody, numbers = np.zeros(0, dtype=np.int64), np.zeros((0, PLACE_COLUMNS))
-    return Members(nobody, numbers, nobody, nobody, np.zeros((0, EDGE_COLUMNS), dtype=np.int64))
+    return Members(nobody, numbers, nobody, nobody, np.zeros((0, EDGE_COLUMNS), dtype=np.int64), no_turns())

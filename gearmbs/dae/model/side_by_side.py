@@ -268,7 +268,7 @@ def take_output(lane, t, again, counts_turns, loads, pose, idata, tab, lanes, be
 
 
 @njit(cache=True, error_model="numpy")
-def _deal(lanes, out, count, columns, first):
+def deal(lanes, out, count, columns, first):
     """Write the first ``count`` lanes of a table to rows of a record with so many columns, from row ``first`` on."""
     together = columns - columns % LANES if count == LANES else 0
     for c in range(0, together, LANES):
@@ -283,10 +283,10 @@ def _deal(lanes, out, count, columns, first):
 def write_outputs(first, count, lanes, bench, records):
     """Write what is in lanes to ``count`` rows of the records from ``first`` on."""
     rows = records.force.shape[1]
-    _deal(lanes.solution, uncounted(records.solution), count, records.solution.shape[1], first)
-    _deal(lanes.phi, uncounted(records.phi), count, records.phi.shape[1], first)
-    _deal(lanes.force, uncounted(records.force), count, 3 * rows, first)
-    _deal(lanes.moment, uncounted(records.moment), count, 3 * rows, first)
+    deal(lanes.solution, uncounted(records.solution), count, records.solution.shape[1], first)
+    deal(lanes.phi, uncounted(records.phi), count, records.phi.shape[1], first)
+    deal(lanes.force, uncounted(records.force), count, 3 * rows, first)
+    deal(lanes.moment, uncounted(records.moment), count, 3 * rows, first)
     for lane in range(count):
         records.strayed[first + lane] = bench.strayed[lane]
 
@@ -295,11 +295,11 @@ def write_outputs(first, count, lanes, bench, records):
 def write_members(first, count, wide, bench, records):
     """As `write_outputs`, of all bodies and joints."""
     rows = records.force.shape[1]
-    _deal(wide.pose, uncounted(records.pose), count, records.pose.shape[1], first)
-    _deal(wide.solution, uncounted(records.solution), count, records.solution.shape[1], first)
-    _deal(wide.phi, uncounted(records.phi), count, records.phi.shape[1], first)
-    _deal(wide.force, uncounted(records.force), count, 3 * rows, first)
-    _deal(wide.moment, uncounted(records.moment), count, 3 * rows, first)
+    deal(wide.pose, uncounted(records.pose), count, records.pose.shape[1], first)
+    deal(wide.solution, uncounted(records.solution), count, records.solution.shape[1], first)
+    deal(wide.phi, uncounted(records.phi), count, records.phi.shape[1], first)
+    deal(wide.force, uncounted(records.force), count, 3 * rows, first)
+    deal(wide.moment, uncounted(records.moment), count, 3 * rows, first)
     for lane in range(count):
         records.strayed[first + lane] = bench.strayed[lane]
 

@@ -10,7 +10,7 @@ import copy
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -35,6 +35,14 @@ PART_SIZE = 2048
 
 CONFLICT_SAMPLES = 50
 """Outputs at which constraints removed as redundant are looked at."""
+
+
+class Fills(Protocol):
+    """What evaluates outputs: fills records piece by piece, in the order of time."""
+
+    def fill(self, t: np.ndarray, y: np.ndarray, epochs: Any, records: outputs.Records) -> None:
+        """Fill ``records`` for all rows of ``y``; ``epochs`` names the integer tables valid from each row on."""
+        ...
 
 
 def _sum_of_rows(records: np.ndarray, rows: list[int]) -> np.ndarray:
@@ -79,7 +87,7 @@ class Solution(Shown):
         self.members = members
         self.remark = remark
         self.t = result.t
-        self._shared: tuple[outputs.Evaluator, outputs.Records] | None = None
+        self._shared: tuple[Fills, outputs.Records] | None = None
         samples = np.linspace(0, self.t.size - 1, min(self.t.size, CONFLICT_SAMPLES))
         self._conflict = self.find_conflict(np.unique(samples.astype(int)))
 
@@ -148,8 +156,12 @@ class Solution(Shown):
         part.result = replace(self.result, t=t, y=y, yp=np.empty((0, y.shape[1])), epochs=epochs)
         return part
 
-    def _evaluator(self) -> outputs.Evaluator:
+    def _evaluator(self) -> Fills:
         problem = self.problem
+        if self.members is not None and len(self.members.turn):
+            from gearmbs.dae.model.axis_outputs import AxisEvaluator
+
+            return AxisEvaluator(problem.idata, problem.rdata, problem.work_size, self.members)
         if self.members is not None:
             from gearmbs.dae.model.members import MemberEvaluator
 

@@ -1,0 +1,219 @@
+"""Bodies that turn about fixed axes, integrated by their angles alone: the same motions and reactions as with all."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.lumping import lumped
+from gearmbs.studies import Case, simulate_case
+from tests.mechanism.test_lumping import TIGHT, agree, exact_reactions
+from tests.mechanism.test_own_forces import maxwell
+
+SKEW = np.array([1.0, 2.0, 2.0]) / 3.0
+
+
+def rotor(driven: bool = False, swapped: bool = False) -> Mechanism:
+    """An eccentric rotor of two bodies on a skew axis in a bracket, with products of inertia, and a second one."""
+    m = Mechanism("rotor", gravity=(1.0, -2.0, -9.0))
+    bracket = m.body("bracket", 2.0, (0.1, 0.2, 0.3), position=(0.1, 0.0, -0.2))
+    m.fixed("foot", bracket, m.ground, at=(0.0, 0.1, -0.3), axis=(1.0, 1.0, 0.0))
+    hub = m.body(
+        "hub", 1.5, (0.02, 0.03, 0.04, 0.004, -0.006, 0.008), com=(0.02, -0.01, 0.03), position=(0.2, 0.1, 0.0),
+        orientation=Rotation.random(random_state=1).as_matrix(),
+    )  # fmt: skip
+    fan = m.body("fan", 0.4, (0.01, 0.012, 0.008), position=(0.4, 0.3, 0.1))
+    m.fixed("key", fan, hub, at=(0.3, 0.2, 0.0), axis=(0.0, 1.0, 1.0))
+    ends = (bracket, hub) if swapped else (hub, bracket)
+    pin = m.revolute("pin", *ends, at=(0.15, 0.05, 0.02), axis=SKEW)
+    if driven:
+        m.rotation("drive", pin, "3*TIME + 2*TIME**2 + 0.1*SIN(7*TIME)")
+    inertia = (0.01, 0.02, 0.025, 0.001, 0.002, 0.003)
+    wheel = m.body("wheel", 0.8, inertia, com=(0.03, 0.0, 0.01), position=(0.6, 0.0, 0.0))
+    m.revolute("pivot", wheel, m.ground, at=(0.6, 0.05, 0.0), axis=(0.0, 1.0, 1.0))
+    between = wheel.marker((0.1, 0.0, 0.02)), fan.marker((0.0, 0.1, 0.0))
+    m.spring_damper("tie", *between, stiffness=60.0, damping=0.5, length=0.2)
+    between = hub.marker((0.1, 0.0, 0.0)), bracket.marker((0.5, 0.2, 0.3))
+    m.spring_damper("stay", *between, stiffness=90.0, damping=1.0, length=0.3)
+    m.torque("motor", wheel, "0.5*SIN(3*TIME)", axis=(0.0, 0.0, 1.0))
+    return m
+
+
+def reduced(m: Mechanism):
+    one = lumped(m)
+    assert one is not None
+    problem, members = one.problem("SI2", 1.0)
+    return problem, members
+
+
+def is_reduced(m: Mechanism) -> bool:
+    return len(reduced(m)[1].turn) > 0
+
+
+@pytest.mark.parametrize("driven", [False, True])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_skew_eccentric_rotor(driven, swapped):
+    lump, full = (rotor(driven, swapped).simulate(1.0, lump=on, **TIGHT) for on in (True, False))
+    assert lump.problem.n == (2 if driven else 4)
+    agree(lump, full, 1e-6)
+    for k in (0, 7, 25, 50):
+        exact_reactions(lump, k)
+    assert np.abs(lump.constraint_violation).max() == 0.0
+    # what is left is the rule by which works are summed up between outputs
+    ours, theirs = lump.energy_balance(), full.energy_balance()
+    np.testing.assert_allclose(ours.imbalance, theirs.imbalance, atol=1e-7 * float(theirs.kinetic.max()))
+    assert float(np.abs(ours.imbalance).max()) < 1e-4 * float(theirs.kinetic.max())
+    np.testing.assert_allclose(lump.joint_angle("pin"), full.joint_angle("pin"), atol=1e-6)
+
+
+@pytest.mark.parametrize("integrator", ["GSTIFF", "IDA"])
+def test_other_integrators(integrator):
+    settings = {"tol": 1e-9, "rate": 50.0, "integrator": integrator}
+    lump, full = (rotor().simulate(0.5, lump=on, **settings) for on in (True, False))
+    assert lump.problem.n == 4
+    agree(lump, full, 1e-5)
+
+
+@pytest.mark.parametrize("formulation", ["I3", "SI1"])
+def test_other_formulations_keep_six_coordinates_and_the_message_says_so(formulation):
+    lump = rotor().simulate(0.1, lump=True, tol=1e-6, formulation=formulation)
+    assert lump.problem.n > 20
+    assert f"with {formulation}" in lump.message
+    agree(lump, rotor().simulate(0.1, tol=1e-6, formulation=formulation), 1e-3)
+
+
+def differences(problem, y, yp, t, cj):
+    """Return dG/dy + cj dG/dy' by central differences."""
+    out = np.zeros((problem.n, problem.n))
+    work = np.zeros(problem.work_size)
+    for k in range(problem.n):
+        sides = []
+        for sign in (1.0, -1.0):
+            step = sign * 1e-6 * max(1.0, abs(y[k]))
+            a, b, res = y.copy(), yp.copy(), np.zeros(problem.n)
+            a[k] += step
+            b[k] += cj * step
+            problem.residual(t, a, b, res, problem.idata, problem.rdata, work)
+            sides.append(res)
+        out[:, k] = (sides[0] - sides[1]) / (2e-6 * max(1.0, abs(y[k])))
+    return out
+
+
+def with_states() -> Mechanism:
+    """The rotor with states of expressions and of a kernel, loads that depend on them, and angles past full turns."""
+    m = rotor()
+    pin, pivot = m.joints["pin"], m.joints["pivot"]
+    m.torque("spin", m.bodies["hub"], "12*STEP(TIME, 0, 0, 0.2, 1)", axis=SKEW)
+    m.torsion_spring("wound", pin.i, pin.j, stiffness=0.05, damping=0.02)
+    m.differential_state("turned", f"20*(AZ({pin.i.name}, {pin.j.name}) - DIF(turned))")
+    m.differential_state("lag", f"WZ({pivot.i.name}, {pivot.j.name}) - 3*DIF(lag) + 0.1*DIF(turned)", start=0.2)
+    i, j = m.bodies["fan"].marker((0.1, 0.2, 0.3)), m.bodies["wheel"].marker()
+    m.load("pull", i, j, fx="1 + TIME", ty="-0.2*DIF(lag)")
+    m.axis_torque("filter", pivot.i, pivot.j, "-0.01*DIF(turned) - 0.1*DIF(lag)")
+    m.force(
+        "strut", maxwell, j, m.ground.marker((0.5, 0.3, 0.4)), parameters=(200.0, 20.0), states={"creep": 0.002},
+        diagnostics=[("spring", "J", "stored"), ("dashpot", "W", "dissipated")],
+    )  # fmt: skip
+    return m
+
+
+@pytest.mark.parametrize("make", [rotor, lambda: rotor(True), with_states])
+def test_jacobian(make):
+    problem, _ = reduced(make())
+    random = np.random.default_rng(3)
+    y, yp = random.uniform(-1.0, 1.0, problem.n), random.uniform(-1.0, 1.0, problem.n)
+    vals, t, cj = np.zeros(len(problem.indices)), 0.3, 7.0
+    problem.jacobian(t, y, yp, cj, vals, problem.idata, problem.rdata, np.zeros(problem.work_size))
+    dense = np.zeros((problem.n, problem.n))
+    columns = np.repeat(np.arange(problem.n), np.diff(problem.indptr))
+    dense[problem.indices, columns] = vals
+    expected = differences(problem, y, yp, t, cj)
+    np.testing.assert_allclose(dense, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_states_and_counted_angles():
+    lump, full = (with_states().simulate(0.8, lump=on, **TIGHT) for on in (True, False))
+    assert lump.problem.n == 7
+    agree(lump, full, 1e-5)
+    np.testing.assert_allclose(lump.state("lag"), full.state("lag"), atol=1e-7)
+    np.testing.assert_allclose(lump.evaluate("AZ(pin.I, pin.J)"), full.evaluate("AZ(pin.I, pin.J)"), atol=1e-6)
+    assert np.abs(lump.joint_angle("pin")).max() > 2.0 * np.pi
+
+
+@pytest.mark.parametrize("setting", [{}, {"misalignment": "1 deg"}, {"centre_distance_error": "3 mm"}], ids=str)
+@pytest.mark.parametrize("torque", ["100 N m", "200 N m"])
+def test_gear_cases(setting, torque):
+    """At the states of the reduced run all bodies' own equations give the same reactions and accelerations."""
+    case = Case(operation={"duration": 0.002, "torque": torque}, fault=setting, solver={"lump": True})
+    lump = simulate_case(case)
+    assert lump.problem.n == 2
+    for k in np.linspace(0, len(lump) - 1, 9).astype(int):
+        exact_reactions(lump, k)
+
+
+def a_reaction_in_a_load() -> Mechanism:
+    m = rotor()
+    pivot = m.joints["pivot"]
+    m.axis_torque("brake", pivot.i, pivot.j, f"0.01*JOINT(pin, 0, 4, {m.joints['pin'].j.name})")
+    return m
+
+
+def a_load_in_a_load() -> Mechanism:
+    m = rotor()
+    pivot = m.joints["pivot"]
+    m.axis_torque("first", pivot.i, pivot.j, "SIN(TIME)")
+    m.axis_torque("echo", m.joints["pin"].i, m.joints["pin"].j, f"0.1*SFORCE(first, 0, 8, {pivot.j.name})")
+    return m
+
+
+def a_coupler() -> Mechanism:
+    m = rotor()
+    m.gear("mesh", m.joints["pin"], m.joints["pivot"], -0.5)
+    return m
+
+
+def a_free_body() -> Mechanism:
+    m = rotor()
+    m.body("stone", 1.0, (0.1, 0.1, 0.1))
+    return m
+
+
+@pytest.mark.parametrize("make", [a_reaction_in_a_load, a_load_in_a_load, a_coupler, a_free_body])
+def test_what_is_not_so_simple_keeps_six_coordinates(make):
+    assert not is_reduced(make())
+    agree(make().simulate(0.2, lump=True, **TIGHT), make().simulate(0.2, **TIGHT), 1e-6)
+
+
+def test_without_a_fixed_joint():
+    """A physical pendulum: one angle, and the reactions of its pin by hand."""
+    m = Mechanism("pendulum", gravity=(0.0, 0.0, -9.81))
+    bob = m.body("bob", 2.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
+    m.revolute("pin", bob, m.ground, at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
+    lump, full = (m.simulate(1.0, lump=on, **TIGHT) for on in (True, False))
+    assert lump.problem.n == 2
+    agree(lump, full, 1e-7)
+    angle = np.arctan2(-lump.com_position("bob")[:, 2], lump.com_position("bob")[:, 0])
+    rate = lump.angular_velocity("bob")[:, 1]
+    alpha = 2.0 * 9.81 * np.cos(angle) / 2.1
+    np.testing.assert_allclose(lump.angular_acceleration("bob")[:, 1], alpha, rtol=1e-9, atol=1e-9)
+    along = lump.reaction("pin")[0] @ np.array([1.0, 0.0, 0.0]) * np.cos(angle)
+    along -= lump.reaction("pin")[0] @ np.array([0.0, 0.0, 1.0]) * np.sin(angle)
+    np.testing.assert_allclose(along, -2.0 * rate**2 - 2.0 * 9.81 * np.sin(angle), atol=1e-8)
+
+
+def test_a_second_bearing_is_redundant():
+    m = rotor()
+    m.revolute("end", m.bodies["hub"], m.bodies["bracket"], at=np.array([0.15, 0.05, 0.02]) + 0.4 * SKEW, axis=SKEW)
+    lump, full = m.simulate(0.3, lump=True, **TIGHT), m.simulate(0.3, **TIGHT)
+    assert lump.success
+    assert lump.problem.n == 4
+    assert lump.message.split("Removed as")[1] == full.message.split("Removed as")[1]
+    agree(lump, full, 1e-6)
+
+
+def test_a_driven_bodies_only_mechanism_has_nothing_to_integrate():
+    m = Mechanism("driven", gravity=(0.0, 0.0, -9.81))
+    bob = m.body("bob", 2.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
+    m.rotation("drive", m.revolute("pin", bob, m.ground, at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0)), "TIME**2")
+    assert not is_reduced(m)
+    agree(m.simulate(0.5, lump=True, **TIGHT), m.simulate(0.5, **TIGHT), 1e-8)
