@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gearmbs.dae.equations.modal_inertia import ModalInertia
+from gearmbs.dae.equations.modal_integrals import ModalInertia
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.geometry import Vector
 from gearmbs.mechanism.parts import Body, Marker

@@ -24,12 +24,11 @@ with sum_mn psi_k,m psi_l,n Y_min x Y_max in place of X_min x X_max for two mode
 
 from __future__ import annotations
 
-import numpy as np
-
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3
+from gearmbs.dae.equations.elastic_shapes import deform, shapes_of
 from gearmbs.dae.equations.modal_inertia import to_global
 from gearmbs.dae.equations.rotation import KIN_A, KIN_ADOT, KIN_AXES, KIN_DW, KIN_R, KIN_V, KIN_W
 
@@ -46,9 +45,6 @@ BIAS, AXES, PAIRS = 0, 6, 15
 """After the rows: the accelerations of P and of the rotation without those of the coordinates; the axes Y_c in body
 components; Y_x x Y_y, Y_x x Y_z and Y_y x Y_z."""
 TAIL = 24
-
-SMALL_TURN = 1e-3
-"""Angle below which the series of cosine and sine, three terms each, are exact to rounding."""
 
 
 def partials_size(modes: int) -> int:
@@ -88,70 +84,6 @@ def tail_of(f, at):
     return at[f, T.AT_PARTIAL] + PARTIALS * (3 + at[f, T.AT_MODES])
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def shapes_of(f, at, modal):
-    """Return phi_k and psi_k of elastic frame f: x, y and z of both, six rows with an entry for each mode."""
-    return matrix_at(modal, at[f, T.AT_SHAPE] + 3, 6, at[f, T.AT_MODES])
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def sine_and_cosine(angle):
-    """Return sine and cosine, of small angles by their series."""
-    if abs(angle) >= SMALL_TURN:
-        return np.sin(angle), np.cos(angle)
-    square = angle * angle
-    return angle * (1.0 - square * (1.0 / 6.0 - square / 120.0)), 1.0 - square * (0.5 - square / 24.0)
-
-
-@njit(cache=True, error_model="numpy")
-def deform(f, y, at, modal, axes, partial, s):
-    """Write where a marker has moved and turned in its body, and the axes of its rotation.
-
-    Parameters
-    ----------
-    f : int
-        Row of the frame.
-    y
-        Unknowns.
-    at, modal : ndarray
-        Places, and the table with the marker's shapes.
-    axes, partial : int, ndarray
-        Place of the axes Y_c, and the table of partial derivatives.
-    s : ndarray
-        Written: arm in ``s[0:3]``, its rate in ``s[3:6]``, the rates of the angles in ``s[6:9]``, R_x R_y R_z by
-        rows in ``s[9:18]``; body components.
-    """
-    n, first = at[f, T.AT_MODES], at[f, T.AT_SHAPE]
-    shape = shapes_of(f, at, modal)
-    amounts, rates = vector_at(y, at[f, T.AT_QF], n), vector_at(y, at[f, T.AT_VF], n)
-    x, y_, z = modal[first], modal[first + 1], modal[first + 2]
-    vx = vy = vz = ax = ay = az = wx = wy = wz = 0.0
-    for k in range(n):
-        amount, rate = amounts[k], rates[k]
-        x += shape[0, k] * amount
-        y_ += shape[1, k] * amount
-        z += shape[2, k] * amount
-        vx += shape[0, k] * rate
-        vy += shape[1, k] * rate
-        vz += shape[2, k] * rate
-        ax += shape[3, k] * amount
-        ay += shape[4, k] * amount
-        az += shape[5, k] * amount
-        wx += shape[3, k] * rate
-        wy += shape[4, k] * rate
-        wz += shape[5, k] * rate
-    s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8] = x, y_, z, vx, vy, vz, wx, wy, wz
-    sx, cx = sine_and_cosine(ax)
-    sy, cy = sine_and_cosine(ay)
-    sz, cz = sine_and_cosine(az)
-    partial[axes], partial[axes + 1], partial[axes + 2] = 1.0, 0.0, 0.0
-    partial[axes + 3], partial[axes + 4], partial[axes + 5] = 0.0, cx, sx
-    partial[axes + 6], partial[axes + 7], partial[axes + 8] = sy, -sx * cy, cx * cy
-    s[9], s[10], s[11] = cy * cz, -cy * sz, sy
-    s[12], s[13], s[14] = cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, -sx * cy
-    s[15], s[16], s[17] = sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy
-
-
 @njit(cache=True, error_model="numpy")
 def update_frame(f, y, at, modal, kin, partial, scratch, derivatives):
     """Fill the row of elastic frame f in the kinematics table and its partial derivatives.
@@ -165,13 +97,13 @@ def update_frame(f, y, at, modal, kin, partial, scratch, derivatives):
     kin, partial : ndarray
         Kinematics table, in which the body's row is up to date; table of partial derivatives.
     scratch : ndarray
-        36 places.
+        52 places.
     derivatives : bool
         Whether the partial derivatives are wanted: the residual needs none but ``AXES``.
     """
     body, row, s, own = kin[at[f, T.AT_BODY]], kin[f], vector_at(scratch, 0, 18), vector_at(scratch, 18, 18)
     axes = tail_of(f, at) + AXES
-    deform(f, y, at, modal, axes, partial, own)
+    deform(f, y, at, modal, axes, partial, vector_at(scratch, 18, 34))
     for c in range(3):
         s[15 + c] = own[6] * partial[axes + c] + own[7] * partial[axes + 3 + c] + own[8] * partial[axes + 6 + c]
     for c in range(3):

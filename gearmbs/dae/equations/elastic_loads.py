@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.lanes import LANES, lanes_at, put_lanes
 from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3, dot3
@@ -18,7 +19,8 @@ from gearmbs.dae.equations.elastic_coordinates import (
     place,
     turns_axis_of,
 )
-from gearmbs.dae.equations.elastic_frames import AXES, DP, DV, DW, DX, is_elastic, partials, shapes_of, tail_of
+from gearmbs.dae.equations.elastic_frames import AXES, DP, DV, DW, DX, is_elastic, partials, tail_of
+from gearmbs.dae.equations.elastic_shapes import shapes_of
 from gearmbs.dae.equations.entries import put
 from gearmbs.dae.equations.modal_inertia import to_body
 from gearmbs.dae.equations.rotation import KIN_AXES, KIN_FORCE, KIN_MOMENT, KIN_R, KIN_SHIFT, KIN_TURN
@@ -75,26 +77,52 @@ def bring_to_body(f, at, modal, kin, partial, scratch, out):
     row, body, n = kin[f], kin[at[f, T.AT_BODY]], at[f, T.AT_MODES]
     x, y, z = row[KIN_R] - body[KIN_R], row[KIN_R + 1] - body[KIN_R + 1], row[KIN_R + 2] - body[KIN_R + 2]
     shape, axes = shapes_of(f, at, modal), vector_at(partial, tail_of(f, at) + AXES, 9)
-    s = vector_at(scratch, 0, 9)
+    s = vector_at(scratch, 0, 18)
     for pair in range(2):
         # forces with moments, then mu's displacements with its rotations
         along, about = (KIN_FORCE, KIN_MOMENT) if pair == 0 else (KIN_SHIFT, KIN_TURN)
-        first, sign = (at[f, T.AT_PF], 1.0) if pair == 0 else (at[f, T.AT_QF], -1.0)
+        at_pair, sign = 9 * pair, 1.0 - 2.0 * pair
         for c in range(3):
             body[along + c] += row[along + c]
             body[about + c] += row[about + c]
         body[about] += y * row[along + 2] - z * row[along + 1]
         body[about + 1] += z * row[along] - x * row[along + 2]
         body[about + 2] += x * row[along + 1] - y * row[along]
-        to_body(body, row, along, s, 0)
-        to_body(body, row, about, s, 3)
+        to_body(body, row, along, s, at_pair)
+        to_body(body, row, about, s, at_pair + 6)
         for c in range(3):
-            s[6 + c] = sign * dot3(axes, 3 * c, s, 3)
-        fx, fy, fz, tx, ty, tz = sign * s[0], sign * s[1], sign * s[2], s[6], s[7], s[8]
-        total = vector_at(out, first, n)
-        for k in range(n):
-            push = shape[0, k] * fx + shape[1, k] * fy + shape[2, k] * fz
-            total[k] += push + shape[3, k] * tx + shape[4, k] * ty + shape[5, k] * tz
+            s[at_pair + c] *= sign
+            s[at_pair + 3 + c] = sign * dot3(axes, 3 * c, s, at_pair + 6)
+    forces, shifts = vector_at(out, at[f, T.AT_PF], n), vector_at(out, at[f, T.AT_QF], n)
+    add_modal_forces(shape, (s[0], s[1], s[2], s[3], s[4], s[5]), forces)
+    add_modal_forces(shape, (s[9], s[10], s[11], s[12], s[13], s[14]), shifts)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_modal_forces(shape, wrench, total):
+    """Add the forces on modes of a force and a moment along the axes of the rotation to ``total``.
+
+    Parameters
+    ----------
+    shape : ndarray, shape (6, n)
+        Of `gearmbs.dae.equations.elastic_shapes.shapes_of`.
+    wrench : tuple of float
+        Force and moment, six components.
+    total : ndarray, shape (n,)
+    """
+    x, y, z, a, b, c = wrench
+    n = total.size
+    rows = (
+        vector_at(shape, 0, n), vector_at(shape, n, n), vector_at(shape, 2 * n, n), vector_at(shape, 3 * n, n),
+        vector_at(shape, 4 * n, n), vector_at(shape, 5 * n, n),
+    )  # fmt: skip
+    for g in range(n // LANES):
+        push = lanes_at(rows[0], g) * x + lanes_at(rows[1], g) * y + lanes_at(rows[2], g) * z
+        push = push + lanes_at(rows[3], g) * a + lanes_at(rows[4], g) * b + lanes_at(rows[5], g) * c
+        put_lanes(total, g, lanes_at(total, g) + push)
+    for k in range(n // LANES * LANES, n):
+        push = shape[0, k] * x + shape[1, k] * y + shape[2, k] * z
+        total[k] += push + shape[3, k] * a + shape[4, k] * b + shape[5, k] * c
 
 
 @njit(cache=True, error_model="numpy")

@@ -15,7 +15,7 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.entries import COUNT, NUMBERS, PLACES, compressed, put
 from gearmbs.dae.equations.jacobian_constraints import row_entries, tape_row_entries
 from gearmbs.dae.equations.jacobian_loads import element_entries, load_entries, state_entries
-from gearmbs.dae.equations.modal_inertia import modal_body_entries
+from gearmbs.dae.equations.modal_entries import modal_body_entries
 from gearmbs.dae.equations.residual import S_PRODUCT, S_TERM
 from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, KIN_H
 from gearmbs.dae.equations.update import inertia_times, update_tables

@@ -67,7 +67,7 @@ def update_bodies(y, at, code, body, modal, kin, partial, scratch, derivatives):
     kin : ndarray
         Kinematics table.
     scratch : ndarray
-        36 places.
+        52 places.
     derivatives : bool
         Whether the velocities' derivatives and the accelerations of elastic frames are wanted.
     """

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.elastic_shapes import shape_table
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.force_elements import FRAME_COLUMNS, Diagnostic
-from gearmbs.dae.equations.modal_inertia import ModalInertia
+from gearmbs.dae.equations.modal_integrals import ModalInertia
 from gearmbs.dae.equations.unknowns import Counts
 from gearmbs.dae.model.model import Model, Names, frozen
 
@@ -82,7 +83,7 @@ class TableBuilder:
             # a modal body's marker is the origin of an elastic frame
             self.frame_body.append(body)
             self.shape_at.append(len(self.modal))
-            self.modal.extend(np.concatenate([position, *(np.ravel(np.transpose(part)) for part in shape)]).tolist())
+            self.modal.extend(shape_table(position, *shape).tolist())
             body, position = len(self.bodies) + len(self.frame_body) - 1, np.zeros(3)
         self.marker_body.append(body)
         self.marker_frame.append(np.concatenate([position, np.asarray(orientation, dtype=float).ravel()]))

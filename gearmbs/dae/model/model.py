@@ -15,7 +15,7 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.elastic_frames import partials_size
 from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.force_elements import FORCE_SIG, Diagnostic
-from gearmbs.dae.equations.modal_inertia import ModalInertia, present_size
+from gearmbs.dae.equations.modal_integrals import ModalInertia, present_size
 from gearmbs.dae.equations.rotation import KIN_COLUMNS
 from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, Counts, Unknown, named, offsets, places
 

@@ -19,7 +19,7 @@ from gearmbs.dae.results.evaluated import Evaluated
 from gearmbs.dae.results.frames import frame_motion
 
 if TYPE_CHECKING:
-    from gearmbs.dae.equations.modal_inertia import ModalInertia
+    from gearmbs.dae.equations.modal_integrals import ModalInertia
 
 
 def energy_balance(found: Evaluated) -> xr.Dataset:
