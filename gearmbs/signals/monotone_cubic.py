@@ -25,6 +25,7 @@ def monotone_cubic(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray, shape (m,) or (m, columns)
+        Each column on end in memory.
 
     References
     ----------
@@ -35,6 +36,6 @@ def monotone_cubic(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
 
     x, at = np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(at, dtype=float)
     columns = np.ascontiguousarray(y, dtype=float).reshape(x.size, -1)
-    out = np.empty((at.size, columns.shape[1]))
+    out = np.empty((columns.shape[1], at.size))
     interpolate(x, columns, at, out)
-    return out.reshape(at.shape + y.shape[1:])
+    return out.T.reshape(at.shape + y.shape[1:])

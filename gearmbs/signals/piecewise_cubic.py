@@ -49,25 +49,28 @@ def _derivative(x, y, k, c):
 
 @njit(void(_VEC, _MAT, _VEC, _MAT), cache=True, error_model="numpy", nogil=True)
 def interpolate(x, y, at, out):
-    """Write the interpolant of each column of y at the points ``at``."""
+    """Write the interpolant of each column of y at the points ``at`` to a row of ``out``."""
     n, m = y.shape
-    near, second, third = np.zeros(m), np.zeros(m), np.zeros(m)
-    known, k = -1, 0
-    for p in range(at.size):
+    end = np.zeros(m)
+    p, k, known = 0, 0, -2
+    while p < at.size:
         if not x[k] <= at[p]:
             k = 0
         if k + 1 < n - 1 and at[p] >= x[k + 1]:
             k += 1
             if k + 1 < n - 1 and at[p] >= x[k + 1]:
                 k = min(max(np.searchsorted(x, at[p], side="right") - 1, 0), n - 2)
-        if k != known:
-            h = x[k + 1] - x[k]
-            for c in range(m):
-                slope = (y[k + 1, c] - y[k, c]) / h
-                d0 = _derivative(x, y, k, c)
-                cubic = (d0 + _derivative(x, y, k + 1, c) - 2.0 * slope) / h
-                near[c], second[c], third[c] = d0, (slope - d0) / h - cubic, cubic / h
-            known = k
-        s = at[p] - x[k]
+        stop = p + 1
+        while stop < at.size and at[stop] >= x[k] and (at[stop] < x[k + 1] or k + 1 == n - 1):
+            stop += 1
+        h = x[k + 1] - x[k]
         for c in range(m):
-            out[p, c] = ((third[c] * s + second[c]) * s + near[c]) * s + y[k, c]
+            slope = (y[k + 1, c] - y[k, c]) / h
+            near = end[c] if k == known + 1 else _derivative(x, y, k, c)
+            end[c] = _derivative(x, y, k + 1, c)
+            cubic = (near + end[c] - 2.0 * slope) / h
+            second, third = (slope - near) / h - cubic, cubic / h
+            for q in range(p, stop):
+                s = at[q] - x[k]
+                out[c, q] = ((third * s + second) * s + near) * s + y[k, c]
+        p, known = stop, k

@@ -68,12 +68,16 @@ def factor_lanes(plan, factors, vals, growth):
             put_lanes(x, l_pos[q], zero)
             put_lanes(l_vals, q, l)
             grown = larger(grown, magnitude(l))
-    put_lanes(growth, 0, grown)
     left_src, left_limit = plan.left_src, plan.left_limit
+    over = all_lanes(-np.inf)
     for p in range(left_src.size):
-        for lane in range(LANES):
-            if not abs(vals[LANES * left_src[p] + lane]) <= left_limit[p]:
-                growth[lane] = np.inf
+        over = larger(over, magnitude(lanes_at(vals, left_src[p])) - left_limit[p])
+    put_lanes(growth, 0, over)
+    for lane in range(LANES):
+        # what is not a number counts, too
+        fits = growth[lane] <= 0.0
+        growth[lane] = 0.0 if fits else np.inf
+    put_lanes(growth, 0, lanes_at(growth, 0) + grown)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

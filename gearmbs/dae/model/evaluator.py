@@ -311,16 +311,10 @@ class Evaluator:
     def _evaluate(
         self, first: int, last: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records: Records
     ) -> int:
-        """Evaluate rows side by side, where the model allows it, and the rest one after the other."""
-        side = self._side_by_side(table) if t.size >= self.fewest_together else None
+        """Evaluate rows side by side, where there are enough and the model allows it, or one after the other."""
+        side = self._side_by_side(table) if t.size >= self.fewest_together and last - first >= LANES else None
         if side is not None:
-            together = first + LANES * ((last - first) // LANES)
-            done = side.evaluate(
-                first, together, t, y, self.pattern[2], table, self.rdata, self.work, records, self.growth
-            )
-            if done < together or done == last:
-                return done
-            first = done
+            return side.evaluate(first, last, t, y, self.pattern[2], table, self.rdata, self.work, records, self.growth)
         return self._evaluate_singly(first, last, t, y, table, records)
 
     def _side_by_side(self, table: np.ndarray) -> SideBySide | None:
