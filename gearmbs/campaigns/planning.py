@@ -17,6 +17,8 @@ from gearmbs.campaigns.plan import Plan
 from gearmbs.campaigns.settings import check_settings, texts, whole
 from gearmbs.campaigns.subjects.base import Subject, check_keep, make_subject
 
+FILES = ("file", "script", "routines")
+"""Settings of subjects that name files."""
 FAILURE_POLICIES = ("record", "tighter", "stop")
 
 
@@ -148,6 +150,12 @@ def load_plan(path: str | Path) -> Plan:
     if "base" in tree:
         subject["case"] = tree.pop("base")
     factors = [factor_from(table) for table in tree.pop("factor", [])]
+    if "factors" in tree:
+        raise CampaignError(f"{path}: factors is no entry of a plan's file; write [[factor]] above each of them")
+    for key in FILES:
+        # a file beside the plan's, wherever the command is given
+        if isinstance(subject.get(key), str) and (path.parent / subject[key]).is_file():
+            subject[key] = str(path.parent / subject[key])
     if "reuse" in tree:
         # a folder beside the plan's file, wherever the command is given
         tree["reuse"] = [str(path.parent / folder) for folder in texts(tree["reuse"], "reuse")]

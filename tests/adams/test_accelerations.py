@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearmbs.adams import DeckError, parse_deck, run_deck
+from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
 
 DECK = """accelerations
 UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=MILLIMETER, TIME=SECOND
@@ -82,3 +82,20 @@ def test_what_is_no_unknown_is_named():
             "DIFF/1, IC=0, FUNCTION=VARVAL(1)")  # fmt: skip
     with pytest.raises(DeckError, match="accelerations"):
         run(ASKED + "GCON/1, FUNCTION=ACCX(22)")
+
+
+def test_modes_of_a_free_body_whose_torque_follows_its_acceleration():
+    """One of the shifts about which the problem is inverted is lost in rounding."""
+    text = """free
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=MILLIMETER, TIME=SECOND
+PART/1, GROUND
+MARKER/10, PART=1
+PART/2, MASS=1, CM=20, IP=400,400,400, QG=0,0,20
+MARKER/20, PART=2
+MARKER/21, PART=2, QP=-10,-20,-30
+VTORQUE/1, I=21, RM=21, JFLOAT=9, TX=2.535*WDTZ(21)\\TY=0\\TZ=2.451
+MARKER/9, PART=1, FLOATING
+END
+"""
+    modes = run_deck(parse_deck(text), parse_script("a\nb\nLINEAR/EIGENSOL\n")).log[-1][1]
+    assert np.isfinite(modes.eigenvalues).all()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearmbs.campaigns import Campaign, CampaignError, DeckSubject, Factor, make_plan
+from gearmbs.campaigns import Campaign, CampaignError, DeckSubject, Factor, load_plan, make_plan
 from gearmbs.campaigns.canonical import PHYSICS
 from gearmbs.studies import Case, run_case
 
@@ -89,6 +89,38 @@ def test_a_deck_with_parameters(tmp_path):
     np.testing.assert_allclose(campaign.table["request_1.F2.last"], last, atol=2e-3)
     with pytest.raises(CampaignError, match="the places mass"):
         DeckSubject(deck, {}, end=1.0)
+
+
+def test_a_deck_in_a_plans_file(tmp_path):
+    """The deck, its script and its routines stand beside the plan; what is not supported is left out."""
+    deck = DECK.replace("I=2, J=4", "I=5, J=4").replace(
+        "SPRINGDAMPER/1, TRANSLATIONAL, I=2, J=1, K=100, LENGTH=0.5",
+        "SFORCE/1, TRANSLATIONAL, I=2, J=1, FUNCTION=USER(100)\nTIRE/1, J=1",
+    )
+    (tmp_path / "m.adm").write_text(deck)
+    (tmp_path / "m.acf").write_text("a\nb\nsimulate/dynamics, end=1, steps=10\n")
+    (tmp_path / "own.py").write_text(
+        "def sfosub(call):\n    return -call.parameters[0]*(call.sysfnc('DM', 2, 1)-0.5)\n"
+    )
+    text = (
+        'design = "grid"\nunit = 2\n[subject]\nkind = "deck"\nfile = "m.adm"\nscript = "m.acf"\nroutines = "own.py"\n'
+        "skip_unsupported = true\nparameters = { mass = 2.0 }\n[[factor]]\npath = 'mass'\nlow = 1.0\nhigh = 4.0\n"
+    )
+    (tmp_path / "p.toml").write_text(text)
+    plan = load_plan(tmp_path / "p.toml")
+    campaign = Campaign(tmp_path / "c", plan)
+    assert campaign.run(workers=0).failed == 0, campaign.failed().message.tolist()
+    last = 0.5 + 0.5 * np.cos(np.sqrt(100.0 / np.array([1.0, 4.0])))
+    np.testing.assert_allclose(campaign.table["request_1.F2.last"], last, atol=1e-5)
+    subject = plan.subject
+    again = DeckSubject.from_settings(subject.settings())
+    thing = subject.check({"mass": 2.0}, "c")
+    assert again.canonical(thing) == subject.canonical(thing)
+    (tmp_path / "own.py").write_text("def sfosub(call):\n    return 0.0\n")
+    assert DeckSubject.from_settings(subject.settings()).canonical(thing) != subject.canonical(thing)
+    (tmp_path / "p.toml").write_text(text.replace("[[factor]]", "[[factors]]"))
+    with pytest.raises(CampaignError, match=r"write \[\[factor\]\] above each"):
+        load_plan(tmp_path / "p.toml")
 
 
 def test_variables_of_a_deck_as_factors(tmp_path):

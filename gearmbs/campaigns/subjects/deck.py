@@ -37,6 +37,12 @@ class DeckSubject(Subject):
         Output steps.
     script : str, optional
         Text of a command script (.acf) to carry out instead, which may have places, too.
+    routines : path, optional
+        Python file with the routines that the deck's USER(...) call; what it holds is part of a case's key.
+    skip_unsupported : bool
+        Leave out what is not supported instead of refusing the deck.
+    name : str
+        File of the deck, for messages; beside it are the meshes and modal neutral files that it names.
 
     Raises
     ------
@@ -55,6 +61,9 @@ class DeckSubject(Subject):
         end: float | None = None,
         steps: int = 100,
         script: str | None = None,
+        routines: str | Path | None = None,
+        skip_unsupported: bool = False,
+        name: str = "model.adm",
     ) -> None:
         places = set(PLACE.findall(text)) | set(PLACE.findall(script or ""))
         others = set(parameters) - places
@@ -72,6 +81,9 @@ class DeckSubject(Subject):
             raise CampaignError("deck: give either the end of the analysis or a script")
         self.text, self.parameters = text, {k: float(v) for k, v in parameters.items()}
         self.end, self.steps, self.script = None if end is None else float(end), int(steps), script
+        self.name, self.skip_unsupported = str(name), bool(skip_unsupported)
+        self.routines = None if routines is None else Path(routines).resolve()
+        self.routines_digest = None if self.routines is None else _digest(self.routines)
 
     @classmethod
     def from_file(
@@ -82,15 +94,23 @@ class DeckSubject(Subject):
         end: float | None = None,
         steps: int = 100,
         script: str | Path | None = None,
+        **more: Any,
     ) -> DeckSubject:
-        """Return the subject of a deck in a file, with a script in another."""
+        """Return the subject of a deck in a file, with a script in another; what else it takes goes on."""
         commands = None if script is None else Path(script).read_text(encoding="utf-8", errors="replace")
-        text = Path(path).read_text(encoding="utf-8", errors="replace")
-        return cls(text, parameters, end=end, steps=steps, script=commands)
+        path = Path(path)
+        text = path.read_text(encoding="utf-8", errors="replace")
+        return cls(text, parameters, end=end, steps=steps, script=commands, name=str(path.resolve()), **more)
 
     def settings(self) -> dict[str, Any]:
         """Return the text and the values."""
         found: dict[str, Any] = {"text": self.text, "parameters": self.parameters, "steps": self.steps}
+        if self.name != "model.adm":
+            found["name"] = self.name
+        if self.routines is not None:
+            found["routines"] = str(self.routines)
+        if self.skip_unsupported:
+            found["skip_unsupported"] = True
         return found | ({"end": self.end} if self.script is None else {"script": self.script})
 
     @classmethod
@@ -124,19 +144,25 @@ class DeckSubject(Subject):
         found = {"deck": digest, "values": thing["values"], "end": self.end, "steps": self.steps}
         if self.script is not None:
             found["script"] = hashlib.sha256(self.script.encode()).hexdigest()
+        if self.routines_digest is not None:
+            found["routines"] = self.routines_digest
+        if self.skip_unsupported:
+            found["skip_unsupported"] = True
         return found
 
     def run(self, thing: dict[str, Any], progress: Callable[[float], None], keep: Sequence[str]) -> Any:
         """Run the deck and return its requests: arrays by name and column."""
-        from gearmbs.adams import parse_deck, parse_script, run_deck
+        from gearmbs.adams import load_routines, parse_deck, parse_script, run_deck
 
-        deck = parse_deck(thing["text"], "model.adm")
+        deck = parse_deck(thing["text"], self.name)
         for name, number in self.variables.items():
             set_variable(deck, number, thing["values"][name])
         if thing["script"] is not None:
-            result = run_deck(deck, parse_script(thing["script"], "model.acf"))
+            span: dict[str, Any] = {"acf": parse_script(thing["script"], str(Path(self.name).with_suffix(".acf")))}
         else:
-            result = run_deck(deck, end=self.end, steps=self.steps)
+            span = {"end": self.end, "steps": self.steps}
+        routines = None if self.routines is None else load_routines(self.routines)
+        result = run_deck(deck, allow_unsupported=self.skip_unsupported, routines=routines, **span)
         progress(1.0)
         if not result.success:
             raise RuntimeError("; ".join(str(m) for m in result.messages)[-2000:])
@@ -151,6 +177,13 @@ class DeckSubject(Subject):
                 found = {"last": x[-1], "mean": x.mean(), "rms": x.std(), "min": x.min(), "max": x.max()}
                 kept.numbers |= {f"{name}.{what}": float(value) for what, value in found.items()}
         return kept
+
+
+def _digest(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise CampaignError(f"deck: routines {path}: cannot be read ({error.strerror or error})") from error
 
 
 def _constant_variables(text: str, names: set[str]) -> dict[str, int]:

@@ -222,8 +222,18 @@ def _slow_first(balanced: Balanced, root: np.ndarray, zeros: int, slowest: np.nd
         order = np.argsort(np.abs(values), kind="stable")
         return values[order], vectors[:, order]
     rate = _least_rate(balanced, slowest)
-    for shift in SHIFTS:
-        values, vectors = _inverted(balanced, root, shift * rate)
+    found = False
+    for k, shift in enumerate(SHIFTS):
+        try:
+            values, vectors = _inverted(balanced, root, shift * rate)
+        except SingularModelError:
+            # the shift is an eigenvalue, or lost in rounding beside what was found
+            if found:
+                break
+            if k == len(SHIFTS) - 1:
+                raise
+            continue
+        found = True
         order = np.argsort(np.abs(values), kind="stable")[zeros:]
         values, vectors = values[order], vectors[:, order]
         least = float(np.abs(values).min(initial=np.inf))
@@ -246,14 +256,26 @@ def _least_rate(balanced: Balanced, slowest: np.ndarray) -> float:
 
 
 def _inverted(balanced: Balanced, root: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return all eigenvalues and motions u from the problem inverted about a real shift."""
+    """Return all eigenvalues and motions u from the problem inverted about a real shift.
+
+    Raises
+    ------
+    SingularModelError
+        If that is singular.
+    """
     n, total = root.shape[0], balanced.static.shape[0]
     mass = np.zeros((total, total))
     mass[:n, :n] = balanced.mass
     static = balanced.static + shift * balanced.first + shift**2 * mass
     couples = np.zeros((total, n))
     couples[:n] = root.T
-    inverse = np.linalg.solve(static, np.hstack([balanced.first + 2.0 * shift * mass, couples]))
+    try:
+        inverse = np.linalg.solve(static, np.hstack([balanced.first + 2.0 * shift * mass, couples]))
+    except np.linalg.LinAlgError as error:
+        raise SingularModelError(
+            "the linearised equations are singular: some motion has no eigenvalue, as where a load that follows an "
+            "acceleration takes its body's inertia away"
+        ) from error
     matrix = np.zeros((total + n, total + n))
     matrix[:total] = -inverse
     matrix[total:, :n] = root
