@@ -16,6 +16,9 @@ from gearmbs.flexible.beam import Slices
 from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
 from gearmbs.mechanism.modal import ShapeIntegrals
 
+ROUNDING = 1e-12
+"""Share of its largest by which a least moment of inertia may be negative."""
+
 
 def shape_integrals(model: FiniteElementModel, shapes: np.ndarray, properties: MassProperties) -> ShapeIntegrals:
     """Return the integrals of shapes about the centre of mass.
@@ -76,7 +79,9 @@ def of_mass_matrix(model: FiniteElementModel, shapes: np.ndarray, com: np.ndarra
 
 
 def lumps(model: FiniteElementModel) -> tuple[np.ndarray, np.ndarray]:
-    """Return masses and inertias at the nodes: row sums of the mass matrix, and its rotational blocks.
+    """Return masses and inertias at the nodes: row sums of the mass matrix, and those of its rotational blocks.
+
+    So the shares of a shaft's polar moment that couple neighbours are not lost.
 
     Returns
     -------
@@ -104,14 +109,17 @@ def nodal_lumps(count: int, dofs: np.ndarray, mass: sp.csc_array) -> tuple[np.nd
         row = (mass @ (chosen * 1.0)[:, None])[:, 0]
         np.add.at(masses[c], node[chosen], row[chosen])
     entries = mass.tocoo()
-    same = (
-        (node[entries.row] == node[entries.col])
-        & (node[entries.row] >= 0)
-        & (direction[entries.row] > 2)
-        & (direction[entries.col] > 2)
-    )
-    r, c = entries.row[same], entries.col[same]
-    inertias[node[r], direction[r] - 3, direction[c] - 3] = entries.data[same]
+    turning = (node >= 0) & (direction > 2)
+    both = turning[entries.row] & turning[entries.col]
+    row, column, value = entries.row[both], entries.col[both], entries.data[both]
+    np.add.at(inertias, (node[row], direction[row] - 3, direction[column] - 3), value)
+    inertias = 0.5 * (inertias + np.swapaxes(inertias, 1, 2))
+    # a node's own block is the fallback where its row sum is no inertia
+    principal = np.linalg.eigvalsh(inertias)
+    odd = principal[:, 0] < -ROUNDING * np.abs(principal).max(axis=1)
+    own = (node[row] == node[column]) & odd[node[row]]
+    inertias[odd] = 0.0
+    inertias[node[row[own]], direction[row[own]] - 3, direction[column[own]] - 3] = value[own]
     return masses.mean(axis=0), inertias
 
 

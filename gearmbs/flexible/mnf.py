@@ -17,9 +17,11 @@ from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.mnf_bytes import Reader, floats_bytes, ints_bytes, record_bytes, text_bytes
 from gearmbs.flexible.mnf_check import check_numbers
 from gearmbs.flexible.mnf_content import SI, ModalNeutralFile
-from gearmbs.flexible.modal_model import ModalModel
+from gearmbs.flexible.modal_model import ModalModel, Seat
 from gearmbs.progress import waiting
 
+SAME = 1e-12
+"""How far two places that move alike may differ, in m and in what a unit of a mode moves and turns them."""
 VERSION = b"\x00\x00\x01\x3c"
 HEADER = 0xA14
 """Bytes before the number of nodes."""
@@ -147,6 +149,8 @@ def write_mnf(path: str | Path, mnf: ModalNeutralFile) -> None:
 def mnf_of(model: ModalModel, title: str = "") -> ModalNeutralFile:
     """Return the modal neutral file of a modal body: its rigid motions, then its modes, in kg, m, s and N.
 
+    Seats become interface nodes.
+
     Parameters
     ----------
     model : ModalModel
@@ -161,6 +165,8 @@ def mnf_of(model: ModalModel, title: str = "") -> ModalNeutralFile:
     """
     if model.masses is None:
         raise FlexibleError(f"{model.name}: it has no masses at its nodes; a modal neutral file needs them")
+    model, interfaces = with_seat_nodes(model)
+    assert model.masses is not None
     p = model.properties
     arm = model.positions - p.com
     values, axes = np.linalg.eigh(p.inertia)
@@ -183,17 +189,60 @@ def mnf_of(model: ModalModel, title: str = "") -> ModalNeutralFile:
             [(k, r + 4, c + 4, j[r, c]) for k, j in zip(model.ids, model.inertias) for r in range(3)
              for c in range(r + 1) if r == c or j[r, c] != 0.0]
         )  # fmt: skip
-    seats = [
-        int(model.ids[np.argmin(np.linalg.norm(model.positions - s.position, axis=1))]) for s in model.seats.values()
-    ]
     origin = p.inertia + p.mass * (p.com @ p.com * np.eye(3) - np.outer(p.com, p.com))
     faces = [] if model.faces is None else [np.asarray(f) for f in model.faces]
     found = ModalNeutralFile(
         np.asarray(model.ids), model.positions, p.mass, p.com, origin, np.arange(1, n + 1), eigenvalues, shapes,
         model.masses, rows, SI, faces, np.eye(n),
-        np.array(sorted(set(seats)), dtype=int),
+        np.array(sorted(set(interfaces.values())), dtype=int),
     )  # fmt: skip
     return replace(found, header=_header(found, title or model.name))
+
+
+def with_seat_nodes(model: ModalModel) -> tuple[ModalModel, dict[str, int]]:
+    """Return the body with a node without mass for each seat that no node moves like, and the node of each seat.
+
+    Such seats are the middles of bores, places between nodes, and all whose rotation the nodes do not have.
+    """
+    nodes: dict[str, int] = {}
+    added: list[Seat] = []
+    following = int(model.ids.max()) + 1
+    for name, seat in model.seats.items():
+        row = int(np.argmin(np.linalg.norm(model.positions - seat.position, axis=1)))
+        if _moves_like(model, row, seat):
+            nodes[name] = int(model.ids[row])
+            continue
+        same = next((k for k, other in enumerate(added) if _alike(other, seat)), len(added))
+        if same == len(added):
+            added.append(seat)
+        nodes[name] = following + same
+    if not added:
+        return model, nodes
+    turned = np.zeros_like(model.moved) if model.turned is None else model.turned
+    count = len(added)
+    return replace(
+        model,
+        ids=np.concatenate([model.ids, following + np.arange(count)]),
+        positions=np.vstack([model.positions, [seat.position for seat in added]]),
+        moved=np.concatenate([model.moved, np.stack([seat.moved for seat in added], axis=1)], axis=1),
+        turned=np.concatenate([turned, np.stack([seat.turned for seat in added], axis=1)], axis=1),
+        masses=None if model.masses is None else np.concatenate([model.masses, np.zeros(count)]),
+        inertias=None if model.inertias is None else np.concatenate([model.inertias, np.zeros((count, 3, 3))]),
+    ), nodes  # fmt: skip
+
+
+def _moves_like(model: ModalModel, row: int, seat: Seat) -> bool:
+    """Return whether a node is where a seat is, and moves as it."""
+    turned = np.zeros_like(seat.turned) if model.turned is None else model.turned[:, row]
+    return _alike(Seat(model.positions[row], model.moved[:, row], turned), seat)
+
+
+def _alike(one: Seat, other: Seat) -> bool:
+    """Return whether two places are the same and move alike."""
+    return all(
+        np.allclose(getattr(one, part), getattr(other, part), rtol=SAME, atol=SAME)
+        for part in ("position", "moved", "turned")
+    )
 
 
 def _header(mnf: ModalNeutralFile, title: str = "") -> bytes:

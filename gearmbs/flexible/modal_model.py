@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -48,6 +48,14 @@ class Seat:
     moved: np.ndarray
     turned: np.ndarray
     turns: bool = True
+
+
+class Origin(NamedTuple):
+    """What a body of a mechanism was made of: its model, the level of coupling, and the modes' damping ratios."""
+
+    model: ModalModel
+    coupling: str
+    ratios: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,6 +299,7 @@ class ModalModel:
             label, p.mass, p.inertia, modes, self.shapes, integrals=self.integrals.coupled(coupling), com=p.com, **where
         )
         body.surface = self.surface
+        body.origin = Origin(self, coupling, ratios)
         values, axes = np.linalg.eigh(p.inertia)
         if values[0] < SLENDER * values[1] and not (self.stiffened and coupling == "full"):
             body.long_axis = axes[:, 0].copy()

@@ -274,6 +274,8 @@ class ModalBody(Body):
     surface : callable, optional
         Returns what is drawn of the body, with ``vertices``, ``triangles`` and ``moved`` as of
         :class:`gearmbs.flexible.BodySurface`, or None.
+    origin : Origin, optional
+        What :meth:`gearmbs.flexible.ModalModel.add_to` made it of, for those who write it into files.
     """
 
     modal: ModalInertia = None  # type: ignore[assignment]
@@ -284,6 +286,7 @@ class ModalBody(Body):
     long_axis: np.ndarray | None = None
     spin_limit: float = float("inf")
     surface: Callable[[], Any] | None = None
+    origin: Any = None
 
     def shape_at(self, marker: Marker) -> tuple[np.ndarray, np.ndarray]:
         """Return displacements, less the mean, and rotations at a marker by one unit of each mode, each (n, 3).

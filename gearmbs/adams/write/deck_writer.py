@@ -13,6 +13,7 @@ from gearmbs.adams.builders.constraints import JOINT_KINDS, JPRIM_KINDS
 from gearmbs.adams.parse.units import TABLES
 from gearmbs.adams.write.contacts import contact_statements
 from gearmbs.adams.write.elements import KEYWORDS, as_expressions, element_arguments, hidden, kept, states_of
+from gearmbs.adams.write.flexible import flex_body_arguments, nearest_node
 from gearmbs.adams.write.gear_solids import gear_solid_statements
 from gearmbs.adams.write.gears import gear_statements, is_gear_contact
 from gearmbs.adams.write.output import integrator_statement, request_statements
@@ -56,7 +57,8 @@ def write_deck(
 
     Contacts of solids become GRAPHICS and CONTACTs, meshes .obj files beside the deck. Contacts of gears with parallel
     axes become GFORCEs of IMPACT expressions along both lines of action; their friction and the contact of tooth
-    corners beyond the path of contact are left out, as comments say. Or they become CONTACTs of solids.
+    corners beyond the path of contact are left out, as comments say. Or they become CONTACTs of solids. Bodies that
+    deform by modes become FLEX_BODYs with modal neutral files beside the deck.
 
     Parameters
     ----------
@@ -165,6 +167,11 @@ class DeckWriter:
 
     def new_marker(self, body: Body, position: np.ndarray, axes: np.ndarray, floating: bool = False) -> int:
         """Write a marker on a body and return its id."""
+        if isinstance(body, ModalBody):
+            raise ModelError(
+                f"body '{body.name}': a force needs a {'floating ' * floating}marker on it, and it deforms; let the "
+                "force's J marker be on the other body"
+            )
         number_ = self._next_marker
         self._next_marker += 1
         arguments = [f"PART = {self.bodies[id(body)]}"]
@@ -275,6 +282,9 @@ class DeckWriter:
             n = self.bodies[id(body)]
             if body.is_ground:
                 self.statement(f"PART/{n}", ["GROUND"], "ground")
+            elif isinstance(body, ModalBody):
+                self._flex_body(body, n)
+                continue
             else:
                 self._part(body, n)
             for marker in body.markers:
@@ -282,11 +292,6 @@ class DeckWriter:
                 self.statement(f"MARKER/{self.markers[id(marker)]}", arguments, marker.name)
 
     def _part(self, body: Body, n: int) -> None:
-        if isinstance(body, ModalBody):
-            raise ModelError(
-                f"body '{body.name}': it deforms by modes, which decks written here cannot hold; put a rigid body "
-                "in its place (Mechanism.body) first"
-            )
         units = self.units
         own = self._center(body)
         cm = self.centers[id(body)] = self.markers[id(own)] if own is not None else self._next_marker
@@ -295,16 +300,35 @@ class DeckWriter:
         if not any(inertia[3:]):
             inertia = inertia[:3]
         arguments = [f"MASS = {number(body.mass / units.mass)}", f"CM = {cm}", f"IP = {listed(inertia)}"]
-        arguments += self._frame("QG", body.position, body.orientation)
-        arm = body.orientation @ body.com
-        velocity = (body.velocity + np.cross(body.angular_velocity, arm)) / units.factor("velocity")
-        spin = body.orientation.T @ body.angular_velocity / units.factor("angular_velocity")
-        arguments += [f"V{a} = {number(v)}" for a, v in zip("XYZ", velocity) if v != 0.0]
-        arguments += [f"W{a} = {number(v)}" for a, v in zip("XYZ", spin) if v != 0.0]
-        self.statement(f"PART/{n}", arguments, body.name)
+        self.statement(f"PART/{n}", [*arguments, *self._start(body)], body.name)
         if own is None:
             self._next_marker += 1
             self.statement(f"MARKER/{cm}", [f"PART = {n}", *self._frame("QP", body.com, np.eye(3))])
+
+    def _start(self, body: Body) -> list[str]:
+        """Return where a body starts, and the velocity of its centre of mass."""
+        arm = body.orientation @ body.com
+        velocity = (body.velocity + np.cross(body.angular_velocity, arm)) / self.units.factor("velocity")
+        spin = body.orientation.T @ body.angular_velocity / self.units.factor("angular_velocity")
+        return [
+            *self._frame("QG", body.position, body.orientation),
+            *(f"V{a} = {number(v)}" for a, v in zip("XYZ", velocity) if v != 0.0),
+            *(f"W{a} = {number(v)}" for a, v in zip("XYZ", spin) if v != 0.0),
+        ]
+
+    def _flex_body(self, body: ModalBody, n: int) -> None:
+        if not body.markers and body.origin is not None:
+            # something has to be asked for
+            marker = body.marker(nearest_node(body.origin.model), name=f"{body.name}.node")
+            self.markers[id(marker)] = self._next_marker
+            self._next_marker += 1
+        arguments, nodes = flex_body_arguments(self, body)
+        self.statement(f"FLEX_BODY/{n}", [*self._start(body), *arguments], body.name)
+        for marker in body.markers:
+            own = [f"FLEX_BODY = {n}", f"NODE_ID = {nodes[id(marker)]}"]
+            own += self._frame("QP", marker.position, marker.orientation)
+            self.statement(f"MARKER/{self.markers[id(marker)]}", own, marker.name)
+        self.centers[id(body)] = self.markers[id(body.markers[0])]
 
     @staticmethod
     def _center(body: Body) -> Marker | None:
