@@ -91,6 +91,61 @@ def test_forces_of_several_components():
     np.testing.assert_allclose(found.request(1)[:, 1:3], expected[:, 1:3], atol=2e-7)
 
 
+FREE = """spun
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/1, PART=1
+MARKER/10, PART=1, FLOATING
+PART/2, MASS=2, CM=20, IP=0.3,0.4,0.5, WX=1, WY=0.2
+MARKER/20, PART=2
+{torque}
+REQUEST/1, F2=WX(20,1,20)\\F3=WY(20,1,20)\\F4=WZ(20,1,20)\\F6=DX(20,1)\\F7=AZ(20,1)
+END
+"""
+TORQUES = "TX={0}*SIN(3*TIME)\\TY=-{0}*WY(20,1,20)\\TZ={0}*DX(20,1)"
+
+
+def test_torques_by_routines():
+    """VTORQUE, and the torques of a GFORCE."""
+
+    def torques(call):
+        (k,) = call.parameters
+        (_, wy, _), (x, *_) = call.sysary("RVEL", 20, 1, 20), call.sysary("DISP", 20, 1)
+        return k * math.sin(3 * call.time), -k * wy, k * x
+
+    def both(call):
+        return 0.5 * math.cos(call.time), 0.0, 0.0, *torques(call)
+
+    for written, called, routines in (
+        ("VTORQUE/1, I=20, JFLOAT=10, RM=20, " + TORQUES.format(0.2),
+         "VTORQUE/1, I=20, JFLOAT=10, RM=20, FUNCTION=USER(0.2)", {"vtosub": torques}),
+        ("GFORCE/1, I=20, JFLOAT=10, RM=20, FX=0.5*COS(TIME)\\FY=0\\FZ=0\\" + TORQUES.format(0.2),
+         "GFORCE/1, I=20, JFLOAT=10, RM=20, FUNCTION=USER(0.2)", {"GFORCE/1": both}),
+    ):  # fmt: skip
+        expected, found = (
+            run_deck(parse_deck(FREE.format(torque=text)), parse_script(SCRIPT), tol=1e-9, routines=routines)
+            for text in (written, called)
+        )
+        assert found.success
+        assert np.abs(expected.request(1)[-1, 1:4]).min() > 1e-2
+        np.testing.assert_allclose(found.request(1), expected.request(1), atol=2e-8)
+
+
+def test_a_sensor_by_a_routine_and_a_compiled_routine():
+    """The analysis ends where SENSUB passes its value; what numba has compiled is called with numbers and arrays."""
+    from numba import njit
+
+    @njit
+    def pulls(time, x, xd, u, parameters):
+        return parameters[0] * np.sin(5.0 * time)
+
+    text = PULLED.format("USER(2)") + "\nSENSOR/1, LE, VALUE=0.25, FUNCTION=USER(100), RETURN"
+    found = run(text, {"sfosub": pulls, "sensub": lambda call: 1.0 - call.time - 0.0 * call.sysfnc("DX", 20, 1)})
+    plain = run(PULLED.format("2*SIN(5*TIME)") + "\nSENSOR/1, LE, VALUE=0.25, FUNCTION=1-TIME, RETURN")
+    assert found.t[-1] == pytest.approx(0.75, abs=1e-9)
+    np.testing.assert_allclose(found.request(1), plain.request(1), atol=2e-7)
+
+
 def test_variables_states_motions_and_requests():
     text = """VARIABLE/1, FUNCTION=USER(0.3)
 DIFF/1, IC=1, FUNCTION=USER(-2)
@@ -134,6 +189,33 @@ def test_missing_routines_are_named_all_at_once():
     left = run(text, allow_unsupported=True)
     assert left.success
     assert left.request(1)[:, 1] == pytest.approx(100)
+
+
+def test_missing_routines_of_all_statements_are_named_at_once():
+    text = """VFORCE/1, I=20, JFLOAT=10, RM=1, FUNCTION=USER(1)
+VTORQUE/2, I=20, JFLOAT=10, RM=1, FUNCTION=USER(1)
+GFORCE/3, I=20, JFLOAT=10, RM=1, FUNCTION=USER(1)
+MOTION/4, JOINT=1, FUNCTION=USER(1)
+VARIABLE/5, FUNCTION=USER(1)
+DIFF/6, IC=0, FUNCTION=USER(1)
+REQUEST/7, FUNCTION=USER(1)
+SENSOR/8, EQ, VALUE=1, FUNCTION=USER(1), EVALUATE=USER(2)
+COUPLER/9, JOINTS=1,1, FUNCTION=USER(1)
+FIELD/10, I=20, J=1, FUNCTION=USER(1)
+CURVE/11, OPEN, FUNCTION=USER(1)
+GSE/12, NS=1, NO=1, X=1, Y=2, FUNCTION=USER(1)
+ARRAY/1, X, SIZE=1
+ARRAY/2, Y, SIZE=1
+"""
+    with pytest.raises(DeckError) as caught:
+        run(PULLED.format("USER(1)") + "\n" + text)
+    told = [d.message for d in caught.value.diagnostics]
+    words = """SFORCE/1: SFOSUB VFORCE/1: VFOSUB VTORQUE/2: VTOSUB GFORCE/3: GFOSUB MOTION/4: MOTSUB
+    VARIABLE/5: VARSUB DIFF/6: DIFSUB REQUEST/7: REQSUB SENSOR/8: SENSUB SENSOR/8: SEVSUB COUPLER/9: COUSUB
+    FIELD/10: FIESUB CURVE/11: CURSUB GSE/12: GSE_DERIV"""
+    pairs = words.split()
+    for label, name in zip(pairs[::2], pairs[1::2]):
+        assert any(one.startswith(label) and name in one and "missing" in one for one in told), (label, told)
 
 
 @pytest.mark.parametrize(
