@@ -34,12 +34,10 @@ INSTEAD: dict[str, str] = {
 INSTEAD_OF_FUNCTIONS: dict[str, str] = {
     "ARYSUM": "the sum of ARYVALs",
     "CURVE": "read where a CURVE has its id",
-    "CVCV": "a FORCE request at the IRM marker",
     "DELAY": "a TFSISO that approximates the delay",
     "INTERP": "CUBSPL or AKISPL of a SPLINE",
     "INVPSD": "a SPLINE of the signal",
     "NFORCE": "the forces of BEAM or FIELD",
-    "PTCV": "a FORCE request at the I marker",
     "RANDOM": "a SPLINE of the signal",
     "SENVAL": "read where a SENSOR has its id",
     "USER": "the routine in Python alone in the FUNCTION",

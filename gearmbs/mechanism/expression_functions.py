@@ -36,12 +36,14 @@ ELEMENT_FORCES = {
     "JOINT": "joint", "JPRIM": "jprim", "MOTION": "motion", "SFORCE": "sforce", "VFORCE": "vforce",
     "VTORQ": "vtorque", "GFORCE": "gforce", "BUSH": "bushing", "FIELD": "field", "SPDP": "springdamper",
     "GCON": "gcon", "COUPLER": "coupler", "GEAR": "gear", "BEAM": "beam", "FRICTION": "friction",
-    "CONTACT": "contact",
+    "CONTACT": "contact", "PTCV": "ptcv", "CVCV": "cvcv",
 }  # fmt: skip
+ON_CURVES = ("ptcv", "cvcv")
+"""Elements of several constraints, whose forces are put together when results are asked for."""
 EULER_SEQUENCES = ("123", "231", "312", "132", "213", "321", "121", "131", "212", "232", "313", "323")
 """Body-fixed sequences of ORIENT's systems 1 to 12."""
 UNSUPPORTED = frozenset(
-    "NFORCE CVCV PTCV CURVE INTERP INVPSD DELAY USER SENVAL MODE FXFREQ FXMODE "
+    "NFORCE CURVE INTERP INVPSD DELAY USER SENVAL MODE FXFREQ FXMODE "
     "UVX UVY UVZ DXYZ VXYZ WXYZ FXYZ TXYZ TRANS ARYSUM RANDOM".split()
 )
 """Functions of ADAMS that exist but are not evaluated here."""
@@ -246,7 +248,8 @@ class Lowering:
         kind = ELEMENT_FORCES[node.name]
         ref = self.ref(node.args[0])
         if (kind, ref) not in self.scope.forces:
-            self.fail(f"there is no {kind.upper()} {ref} whose force could be measured", node.args[0].at)
+            where = " here; it is known to a REQUEST only" if kind in ON_CURVES else ""
+            self.fail(f"there is no {kind.upper()} {ref} whose force could be measured{where}", node.args[0].at)
         side = self.literal(node, 1, 0, 1)
         component = self.literal(node, 2, 1, 8)
         rm = self.marker(node, 3)

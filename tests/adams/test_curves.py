@@ -63,8 +63,12 @@ def lift(angle, reach):
 def test_a_point_follows_a_cam():
     height = np.sqrt(RADIUS**2 - OFF**2) + 0.1
     cam = "CURVE/1, CLOSED, CURVE_POINTS, MATRIX=1\nPTCV/1, I=30, CURVE=1, RM=20, JFLOAT=32"
-    result = run_deck(deck(cam, height, matrix(1, circle(RADIUS, OFF))), end=1.5, steps=300)
+    asked = "\nREQUEST/2, F2=PTCV(1,0,2,0)\\F3=PTCV(1,0,3,0)\\F4=PTCV(1,1,3,0)"
+    result = run_deck(deck(cam + asked, height, matrix(1, circle(RADIUS, OFF))), end=1.5, steps=300)
     assert result.success
+    with pytest.raises(DeckError, match="PTCV PTCV_1 whose force could be measured here; it is known to a REQUEST only"):
+        run_deck(deck(cam + "\nSFORCE/7, ROTATIONAL, I=20, J=10, FUNCTION=PTCV(1,0,3,0)", height,
+                      matrix(1, circle(RADIUS, OFF))), end=0.1, steps=1)  # fmt: skip
     y, first, second = lift(SPEED * result.t, RADIUS)
     assert np.abs(result.request(1)[:, 1] - y).max() < 2e-5
     # the slope of a spline through points every 5 degrees: 2e-5 of it
@@ -74,6 +78,7 @@ def test_a_point_follows_a_cam():
     assert np.abs(np.abs(result.request(1)[:, 3]) - np.abs(torque)).max() < 1e-3 * np.abs(torque).max()
     # the force on the follower: its vertical part carries it, along the normal of the circle
     force = result.force("ptcv", 1)
+    np.testing.assert_allclose(result.request(2)[:, 1:4], force[:, [0, 1, 1]] * [1, 1, -1], atol=1e-12)
     assert np.abs(force[:, 1] - 1e-3 * MASS * (SPEED**2 * second + G)).max() < 1e-2
     centre = OFF * np.column_stack([np.cos(SPEED * result.t), np.sin(SPEED * result.t)])
     normal = np.column_stack([0 * y, y]) - centre
