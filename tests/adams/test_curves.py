@@ -66,7 +66,7 @@ def test_a_point_follows_a_cam():
     asked = "\nREQUEST/2, F2=PTCV(1,0,2,0)\\F3=PTCV(1,0,3,0)\\F4=PTCV(1,1,3,0)"
     result = run_deck(deck(cam + asked, height, matrix(1, circle(RADIUS, OFF))), end=1.5, steps=300)
     assert result.success
-    with pytest.raises(DeckError, match="PTCV PTCV_1 whose force could be measured here; it is known to a REQUEST only"):
+    with pytest.raises(DeckError, match="PTCV_1 whose force could be measured here; it is known to a REQUEST only"):
         run_deck(deck(cam + "\nSFORCE/7, ROTATIONAL, I=20, J=10, FUNCTION=PTCV(1,0,3,0)", height,
                       matrix(1, circle(RADIUS, OFF))), end=0.1, steps=1)  # fmt: skip
     y, first, second = lift(SPEED * result.t, RADIUS)
