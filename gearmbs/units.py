@@ -277,10 +277,16 @@ def _remedy(text: str, target: str) -> str:
     """Return what may have been meant by a text that cannot be read."""
     number, wanted = NUMBER.match(text), _common(target)
     unit = "" if number is None else text[number.end() :].strip()
-    known = [name for name in (*COMMON, target) if (found := _common(name)) and wanted and found[1] == wanted[1]]
-    near = difflib.get_close_matches(unit, known, 1, 0.5) if unit else []
+    known = [
+        name
+        for name in dict.fromkeys((*COMMON, target))
+        if (found := _common(name)) and wanted and found[1] == wanted[1]
+    ]
+    near = difflib.get_close_matches(unit, known, 3, 0.5) if unit else []
     if number is not None and near:
-        return f"did you mean '{number[0]} {near[0]}'?"
+        # of a unit of two letters one slip is as likely left out as exchanged
+        likely = near if len(unit) <= 2 else near[:1]
+        return "did you mean " + " or ".join(f"'{number[0]} {name}'" for name in likely) + "?"
     return f"write for example '1 {USUAL.get(target, target)}'"
 
 

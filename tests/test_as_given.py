@@ -39,7 +39,12 @@ def test_a_text_becomes_a_number_that_remembers_it():
 
 @pytest.mark.parametrize(
     ("text", "dimension", "meant"),
-    [("2 mmm", "length", "2 mm"), ("1500 rmp", "angular speed", "1500 rpm"), ("5 kHzz", "frequency", "5 kHz")],
+    [
+        ("2 mmm", "length", "2 mm"),
+        ("3 mn", "length", "3 m' or '3 um' or '3 mm"),
+        ("1500 rmp", "angular speed", "1500 rpm"),
+        ("5 kHzz", "frequency", "5 kHz"),
+    ],
 )
 def test_a_slip_in_a_unit_is_told_with_what_was_meant(text, dimension, meant):
     with pytest.raises(ValueError, match=f"did you mean '{meant}'"):

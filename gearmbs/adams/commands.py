@@ -33,6 +33,8 @@ def adams(
     with guarded():
         from gearmbs.adams import DeckError, load_routines, read_script, run_deck
 
+        if not model.is_file():
+            fail(f"there is no file '{model}'")
         if script is None and end is None:
             fail(f"give a script (.acf), or --end and --steps: gearmbs adams {model} --end 5 --steps 500")
         commands = read_script(script) if script is not None else None

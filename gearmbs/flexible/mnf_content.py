@@ -133,6 +133,11 @@ class ModalNeutralFile:
         name : str
         modes : int, optional
             How many elastic modes are kept, the slowest; default: all.
+
+        Raises
+        ------
+        FlexibleError
+            If there are none, or fewer than asked for.
         """
         unit = self.in_si()
         mass, length, time = unit["mass"], unit["length"], unit["time"]
@@ -150,6 +155,8 @@ class ModalNeutralFile:
         moved, turned = self.shapes[:, :, :3] * length, self.shapes[:, :, 3:]
         recovery = None if self.stresses is None else KnownStresses(moved, self.stresses)
         kept = self.elastic
+        if modes is not None and modes > kept.size > 0:
+            raise FlexibleError(f"{name}: modes = {modes}, but the file has {kept.size} elastic ones")
         if modes is not None:
             kept = kept[np.argsort(self.eigenvalues[kept, 1], kind="stable")][:modes]
         if kept.size == 0:

@@ -66,6 +66,11 @@ def test_everything_is_read():
         ("JOINT/1, I = 10, J = 20", 7, "its type \\(CONVEL, .* is missing"),
         ("JOINT/1, REV, SPH, I = 10, J = 20", 7, "both REVOLUTE and SPHERICAL"),
         ("JOINT/1, REV, I = 10, J = 10", 7, "I and J are both on PART/1"),
+        (
+            "CONTACT/1, IGEOM=1, JGEOM=2, IMPACT, STIFFNESS=1e5, DMAX=1, COULOMB_FRICTION, MU_STATIC=0.3",
+            7,
+            "COULOMB_FRICTION needs a value",
+        ),
         ("JOINT/1, REV, I = 1.5, J = 10", 7, "I: '1.5' is not an integer"),
         ("JOINT, REV, I = 10, J = 20", 7, "JOINT needs a slash"),
         ("JOINT/, REV, I = 10, J = 20", 7, "an id is missing"),

@@ -169,6 +169,9 @@ def test_files_are_named_by_the_script(tmp_path):
     outcome = runner.invoke(app, ["adams", str(tmp_path / "pend.adm")])
     assert outcome.exit_code == 1
     assert "or --end and --steps" in outcome.output.replace("\n", " ")
+    outcome = runner.invoke(app, ["adams", str(tmp_path / "missing.adm")])
+    assert outcome.exit_code == 1
+    assert "there is no file" in outcome.output.replace("\n", " ")
     outcome = runner.invoke(app, ["adams", str(tmp_path / "pend.adm"), str(tmp_path / "go.acf"), "--end", "1"])
     assert outcome.exit_code == 1
     assert "a script has its own end times" in outcome.output.replace("\n", " ")

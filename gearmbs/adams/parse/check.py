@@ -105,7 +105,8 @@ WHY = {
     st.Friction: "friction follows one law, see the documentation",
     st.Variable: "variables need no starting value",
     st.Contact: "solids press by depth and rub by speed alone",
-    st.Graphics: "a mesh is as fine as its file, and a Parasolid solid is cut within 0.001 of its diagonal",
+    st.Graphics: "planes that bodies touch have no edges; a mesh is as fine as its file, and a Parasolid solid is cut "
+    "within 0.001 of its diagonal",
     st.Joint: "a joint rubs by them only where it says FRICTION = ON; for friction write a FRICTION statement",
     st.Gse: "derivatives are made by differences",
     st.CurveStatement: "the points alone say how far the curve goes",

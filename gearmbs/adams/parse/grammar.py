@@ -220,6 +220,11 @@ class ArgumentReader:
         except ExpressionError as error:
             raise StatementError(f"{spec.keyword}: {error}", value_at) from error
         except StatementError as error:
+            # an argument without its value is taken for one more value of the argument before it
+            more = items(raw)[1:] if spec.kind in (REAL, INT, ID, WORD) else []
+            bare = next((found[1].keyword for part in more if (found := self.grammar.find(part))), None)
+            if bare is not None:
+                raise StatementError(f"{bare} needs a value: {bare} = ...", value_at) from error
             raise StatementError(f"{spec.keyword}: {error}", value_at) from error
         if spec.kind == TABLE:
             self.values[name] = (*self.values.get(name, ()), value)
