@@ -8,6 +8,7 @@ relief. In both cases rigid motions are taken out, since the frame carries them,
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -65,7 +66,8 @@ def reduce_model(
         Where the body is joined and loaded; default: its seats.
     modes : int, optional
         How many shapes are kept, the slowest; default: all of the reduction below ``max_frequency``. Of a shaft one
-        less where the last would be one half of a bending pair, for the shaft would get an axis of preference.
+        less where the last would be one half of a bending pair, for the shaft would get an axis of preference; a
+        warning says so.
     max_frequency : float or str, optional
         Shapes above are left out, Hz.
     internal : int, optional
@@ -123,7 +125,13 @@ def reduce_model(
             raise FlexibleError(
                 f"{model.name}: modes = {modes}, but the reduction has {keep.size}; ask for more internal modes"
             )
-        keep = keep[: _whole(values, modes) if model.slices is not None else modes]
+        whole = _whole(values, modes) if model.slices is not None else modes
+        if whole < modes <= keep.size:
+            warnings.warn(
+                f"{model.name}: {whole} modes are kept instead of {modes}, whose last is one half of a bending pair",
+                stacklevel=3,
+            )
+        keep = keep[:whole]
     if keep.size == 0:
         raise FlexibleError(
             f"{model.name}: no mode is below max_frequency = {limit} Hz; "
