@@ -168,3 +168,89 @@ def test_triangles_seen_from_inside_are_turned_round(solid):
 def test_what_is_no_solid_is_refused(vertices, triangles, says):
     with pytest.raises(ModelError, match=says):
         Mesh(vertices, triangles)
+
+
+BAR, KNIFE = Mesh(*Box((0.2, 0.02, 0.02)).facets()), 0.02 / np.sqrt(2.0)
+ROD = Cylinder(0.01, 0.2)
+LINEAR = Impact(1e6, 1.0, 0.0, 1e-4)
+
+
+def bar_or_rod(solid, turn, edge_on):
+    """Return the attitude that lays a bar or rod along x, turned about z, on a face or on an edge."""
+    lying = Rotation.from_rotvec([np.pi / 4 if edge_on else 0.0, 0, 0])
+    if isinstance(solid, Cylinder):
+        lying = Rotation.from_rotvec([0, np.pi / 2, 0])
+    return Rotation.from_rotvec([0, 0, turn]) * lying
+
+
+@pytest.mark.parametrize(
+    ("first", "edge_first", "second", "edge_second", "apart", "part"),
+    [
+        (BAR, False, BAR, False, 0.02, 1.0),
+        (Box((0.2, 0.02, 0.02)), False, BAR, False, 0.02, 1.0),
+        (ROD, False, ROD, False, 0.02, 1.0),
+        (BAR, True, ROD, False, 0.01 + KNIFE, 1.0),
+        # the faces at an edge stand at 45 degrees to the way: both the depth and the load are 1/sqrt(2) of it
+        (BAR, True, BAR, True, 2.0 * KNIFE, 0.5),
+    ],
+    ids=["bars", "box and bar", "rods", "edge on rod", "edge on edge"],
+)
+def test_what_crosses_without_a_vertex_inside_touches_from_the_first(
+    first, edge_first, second, edge_second, apart, part
+):
+    load = loads(first, second, LINEAR)
+    rng = np.random.default_rng(2)
+    for _ in range(6):
+        turn, place = np.pi / 2 + rng.uniform(-0.4, 0.4), 0.03 * rng.uniform(-1, 1, 2)
+        for depth in (1e-7, 1e-5, 1e-3):
+            frames = np.array(
+                [
+                    frame((*place, apart - depth), bar_or_rod(first, 0.0, edge_first)),
+                    frame((0, 0, 0), bar_or_rod(second, turn, edge_second)),
+                ]
+            )
+            wrench, told = load(frames)
+            assert wrench[2] == pytest.approx(part * 1e6 * depth, rel=0.1)
+            assert told[3] >= 1
+            assert np.abs(wrench[:2]).max() < 0.02 * wrench[2]
+
+
+@pytest.mark.parametrize("solid", [BAR, ROD], ids=["bars", "rods"])
+def test_the_load_of_edges_is_the_gradient_of_what_they_store(solid):
+    load = loads(solid, solid, ELASTIC)
+    rng = np.random.default_rng(9)
+    found = 0
+    while found < 10:
+        turns = [Rotation.random(random_state=rng), Rotation.identity()]
+        frames = np.array([frame(0.02 * rng.normal(size=3), turns[0]), frame((0, 0, 0), turns[1])])
+        wrench, told = load(frames)
+        if told[3] == 0 or told[4] > 1e-3:
+            continue
+        found += 1
+        size = np.linalg.norm(wrench[:3])
+        for k in range(6):
+            stored = []
+            for step in (-1e-8, 1e-8):
+                moved = frames.copy()
+                if k < 3:
+                    moved[0, k] += step
+                else:
+                    moved[0, 3:12] = (Rotation.from_rotvec(step * np.eye(3)[k - 3]) * turns[0]).as_matrix().ravel()
+                stored.append(load(moved)[1][0])
+            force = -(stored[1] - stored[0]) / 2e-8
+            assert force == pytest.approx(wrench[k], abs=2e-3 * size * (1.0 if k < 3 else 0.1))
+
+
+def test_a_stack_of_turned_blocks_stands():
+    law, friction = Impact(1e7, 1.5, 1e4, 1e-5), Coulomb(0.4, 0.3, 1e-3, 5e-3)
+    m = Mechanism("stack", gravity=(0, 0, -9.81))
+    low = m.body("low", 1.0, (1 / 600,) * 3, position=(0, 0, 0.0501))
+    turn = Rotation.from_rotvec([0, 0, 0.3]).as_matrix()
+    top = m.body("top", 1.0, (1 / 600,) * 3, position=(0.02, 0.01, 0.1503), orientation=turn)
+    block = Mesh(*CUBE)
+    m.contact("floor", low.marker(), block, m.ground.marker(), Box((1, 1, 0.2), offset=(0, 0, -0.1)), law, friction)
+    m.contact("blocks", top.marker(), block, low.marker(), block, law, friction)
+    solution = m.simulate(1.0, rate=200, tol=1e-6)
+    assert solution.com_position("top")[-1] == pytest.approx([0.02, 0.01, 0.15], abs=1e-3)
+    assert solution.contact("blocks")["normal_force"][-1] == pytest.approx(9.81, rel=1e-4)
+    assert solution.contact("floor")["normal_force"][-1] == pytest.approx(2 * 9.81, rel=1e-4)

@@ -25,6 +25,7 @@ from gearmbs.mechanism.contacts import (
     read_mesh,
     revolved,
 )
+from gearmbs.mechanism.contacts.kernel import SOLID
 from gearmbs.mechanism.contacts.shapes import volume
 from gearmbs.mechanism.forces.function_kernel import vary
 
@@ -216,7 +217,7 @@ def test_what_is_passed_over_from_afar_does_not_touch(name):
     a, b = FAR[name]
     rng = np.random.default_rng(11)
     culled, whole = Pair(a, b), Pair(a, b)
-    for solid in (2, 8):
+    for solid in (2, 2 + SOLID):
         whole.tables[1][whole.tables[0][1 + solid + 1] + 15] = 1e9
     touched = 0
     for _ in range(300):

@@ -166,7 +166,7 @@ def _faces(rows, pose_a, half_a, pose_b, half_b, k, swapped, origins, derivative
             continue
         row = rows[found]
         found += 1
-        row[pt.DEPTH], row[pt.POOL], row[pt.SWAPPED] = depth, 0.0, swapped
+        row[pt.DEPTH], row[pt.POOL], row[pt.SWAPPED], row[pt.GAIN] = depth, 0.0, swapped, 1.0
         before = polygon[c - 1 if c > 0 else count - 1]
         beside = _length(corner, polygon[(c + 1) % count]) + _length(corner, before)
         row[pt.WEIGHT] = (0.5 * beside + LEAST) / around
@@ -248,7 +248,7 @@ def _corner_moves(row, corner, side, n, face, origin_a, origin_b, work):
         else:
             rel[0] = rel[1] = rel[2] = 0.0
         sink = dot(n, rel) - dot(n, own)
-        row[pt.D_DEPTH + c] = sink
+        row[pt.D_DEPTH + c], row[pt.D_GAIN + c] = sink, 0.0
         for q in range(3):
             row[pt.D_NORMAL + 12 * q + c] = turn[q]
             row[pt.D_PLACE + 12 * q + c] = own[q] + 0.5 * (depth * turn[q] + sink * n[q])
@@ -299,7 +299,7 @@ def _edges(rows, pose_i, half_i, pose_j, half_j, pair, origins, derivatives, wor
     t = (dot(f, apart) - ef * dot(e, apart)) / (1.0 - ef * ef)
     depth = -dot(n, apart)
     row = rows[0]
-    row[pt.DEPTH], row[pt.WEIGHT], row[pt.POOL], row[pt.SWAPPED] = depth, 1.0, 0.0, 0.0
+    row[pt.DEPTH], row[pt.WEIGHT], row[pt.POOL], row[pt.SWAPPED], row[pt.GAIN] = depth, 1.0, 0.0, 0.0, 1.0
     for q in range(3):
         x[q] += s * e[q]
         y[q] += t * f[q]
@@ -359,7 +359,7 @@ def _edge_moves(row, e, f, n, x, y, origins, length, work):
         ds = dot(rest, along) / dot(e, along)
         _cross(e, n, along)
         dt = -dot(rest, along) / dot(f, along)
-        row[pt.D_DEPTH + c] = sink
+        row[pt.D_DEPTH + c], row[pt.D_GAIN + c] = sink, 0.0
         for q in range(3):
             row[pt.D_NORMAL + 12 * q + c] = dn[q]
             own = rel[q] if c < 6 else -rel[q]

@@ -13,6 +13,7 @@ from gearmbs.dae.equations.force_elements import Diagnostic
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.contacts import fields, kernel
 from gearmbs.mechanism.contacts.boxes import MOST
+from gearmbs.mechanism.contacts.edges import NODES, ROOM
 from gearmbs.mechanism.contacts.facet_tables import Facets
 from gearmbs.mechanism.contacts.loads import IMPACT, LAW_REALS, POISSON
 from gearmbs.mechanism.contacts.points import COLUMNS
@@ -33,6 +34,9 @@ from gearmbs.mechanism.quantities import quantity
 
 REVERSAL = 1e-3
 """Speed, m/s, about which the penalty goes over from compression to restitution."""
+LONG = 0.25
+"""Edges this long over half the thickness of another solid are looked at between their vertices: below it, a ball of
+this thickness is 0.4 % of it deep when the first vertex meets it."""
 CONVEX = (Ellipsoid, Box, Cylinder, Frustum, Torus)
 ANALYTIC = (Sphere, Ellipsoid, Box, Cylinder, Frustum, Torus, HalfSpace)
 
@@ -227,6 +231,17 @@ def table_sizes(shape: Shape) -> tuple[int, np.ndarray]:
     return fields.MESH, np.r_[0.5 * np.ptp(shape.vertices, axis=0), 0.0]
 
 
+def least_half(kind: int, sizes: np.ndarray) -> float:
+    """Return half of a solid's least extent along its axes, m; infinite for a half-space."""
+    a, b, c, _ = sizes
+    return {
+        fields.BALL: a,
+        fields.FRUSTUM: min(max(a, b), c),
+        fields.TORUS: b,
+        fields.HALF_SPACE: np.inf,
+    }.get(kind, min(a, b, c))
+
+
 def reach_of(kind: int, sizes: np.ndarray) -> float:
     """Return the radius of a ball about a solid's origin that holds it, m; infinite for a half-space."""
     a, b, c, _ = sizes
@@ -245,8 +260,8 @@ class _Tables:
     def __init__(self, law: Sequence[float]) -> None:
         assert len(law) == LAW_REALS
         self.pairs: list[list[int]] = []
-        self.triangles: list[np.ndarray] = []
-        self.n_triangles = 0
+        self.integers: list[np.ndarray] = []
+        self.n_integers = 0
         self.reals: list[np.ndarray] = [np.array(law)]
         self.n_reals = LAW_REALS
         self.most = 1
@@ -256,12 +271,14 @@ class _Tables:
         if exchanged:
             a, b = b, a
         faceted = family == kernel.FACETS
-        first = self._solid(a, faceted, family == kernel.CONVEX_PLANE)
-        second = self._solid(b, faceted, False)
+        first = self._solid(a, faceted, family == kernel.CONVEX_PLANE, least_half(*table_sizes(b)))
+        second = self._solid(b, faceted, False, least_half(*table_sizes(a)))
         self.pairs.append([family, int(exchanged), *first, *second])
-        self.most = max(self.most, first[2] + second[2], MOST if family == kernel.BOXES else 1)
+        room = min(ROOM, (1 + NODES) * (first[6] + second[6]))
+        self.most = max(self.most, first[2] + second[2] + room, MOST if family == kernel.BOXES else 1)
 
-    def _solid(self, shape: Shape, faceted: bool, supported: bool) -> list[int]:
+    def _solid(self, shape: Shape, faceted: bool, supported: bool, thin: float) -> list[int]:
+        """Append a solid, whose edges count if they are long against another half as thick as ``thin``, m."""
         kind, sizes = table_sizes(shape)
         if supported:
             sizes = reduced(kind, sizes)
@@ -273,12 +290,17 @@ class _Tables:
             # the origin goes to the middle of the box that holds it
             middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
             offset, vertices = offset + shape.axes @ middle, vertices - middle
-        made = Facets.of(vertices, triangles)
-        at, points, faces = self.n_reals, self.n_reals + kernel.SOLID_REALS, self.n_triangles
+        made = Facets.of(vertices, triangles, LONG * thin)
+        at, points = self.n_reals, self.n_reals + kernel.SOLID_REALS
         self._append(np.concatenate([shape.axes.ravel(), offset, sizes, made.reals()]))
-        self.triangles.append(made.triangles.ravel())
-        self.n_triangles += made.triangles.size
-        return [kind, at, len(vertices), points, len(triangles), faces]
+        faces, borders = self._append_integers(made.triangles), self._append_integers(made.edges)
+        return [kind, at, len(vertices), points, len(triangles), faces, len(made.edges), borders]
+
+    def _append_integers(self, values: np.ndarray) -> int:
+        """Append integers; return where they begin behind those of the pairs."""
+        self.integers.append(values.ravel())
+        self.n_integers += values.size
+        return self.n_integers - values.size
 
     def _append(self, values: np.ndarray) -> None:
         self.reals.append(values)
@@ -289,9 +311,9 @@ class _Tables:
         head = 1 + kernel.PAIR * len(self.pairs)
         table = np.array(self.pairs, dtype=np.int64)
         for solid in (2, 2 + kernel.SOLID):
-            table[:, solid + 5] += head
+            table[:, [solid + 5, solid + 7]] += head
         return (
-            np.concatenate([[len(self.pairs)], table.ravel(), *self.triangles]),
+            np.concatenate([[len(self.pairs)], table.ravel(), *self.integers]),
             np.concatenate(self.reals),
             self.most,
         )

@@ -10,8 +10,26 @@ from gearmbs.mechanism.contacts.meshes import BLOCK, TINY
 
 FLAT = 1e-6
 """Angle, rad, below which two triangles lie in one plane."""
+SHARP = 0.05
+"""Angle, rad, between the normals of two triangles from which on their edge is one: 48 segments around meet at 0.13."""
 LEAST = 1e-12
 """Least weight of a vertex over the largest: one at the end of slivers alone would divide nothing by nothing."""
+
+
+def normals_of(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the outward unit normals of triangles, shape (m, 3); zero of those without an area."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    return normals / np.maximum(np.linalg.norm(normals, axis=1), TINY)[:, None]
+
+
+def neighbours(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return edges, shape (n, 2), and of each the two triangles that it joins."""
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    order = np.lexsort(edges.T)
+    one, other = order[:-1], order[1:]
+    shared = np.all(edges[one] == edges[other], axis=1)
+    return edges[one[shared]], one[shared] % len(triangles), other[shared] % len(triangles)
 
 
 def plane_faces(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -19,14 +37,8 @@ def plane_faces(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1), TINY)[:, None]
-    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
-    order = np.lexsort(edges.T)
-    one, other = order[:-1], order[1:]
-    shared = np.all(edges[one] == edges[other], axis=1)
-    one, other = one[shared] % len(triangles), other[shared] % len(triangles)
+    normals = normals_of(vertices, triangles)
+    _, one, other = neighbours(triangles)
     bent = np.linalg.norm(np.cross(normals[one], normals[other]), axis=1)
     flat = (bent < FLAT) & (np.sum(normals[one] * normals[other], axis=1) > 0.0)
     joined = coo_array((np.ones(flat.sum()), (one[flat], other[flat])), shape=(len(triangles),) * 2)
@@ -78,6 +90,21 @@ def boxes_of(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return np.hstack([np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)])
 
 
+def outer_edges(vertices: np.ndarray, triangles: np.ndarray, longer: float) -> np.ndarray:
+    """Return vertices and plane faces of edges, longer than a length, m, that stand out of a solid, shape (n, 4)."""
+    if not len(triangles):
+        return np.zeros((0, 4), dtype=np.int64)
+    normals, faces = normals_of(vertices, triangles), plane_faces(vertices, triangles)
+    edges, one, other = neighbours(triangles)
+    bent = np.arctan2(
+        np.linalg.norm(np.cross(normals[one], normals[other]), axis=1), np.sum(normals[one] * normals[other], axis=1)
+    )
+    tip = vertices[triangles[other].sum(axis=1) - edges.sum(axis=1)]
+    outer = np.sum((tip - vertices[edges[:, 0]]) * normals[one], axis=1) < 0.0
+    kept = outer & (bent > SHARP) & (np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1) > longer)
+    return np.column_stack([edges, faces[one], faces[other]])[kept]
+
+
 @dataclass(frozen=True)
 class Facets:
     """A solid's vertices and triangles, in the order of their blocks, with the boxes of these.
@@ -88,16 +115,19 @@ class Facets:
     triangles : ndarray of int, shape (m, 3)
     boxes : tuple of ndarray, each of shape (blocks, 6)
         Of vertices, of triangles, and of the latter's boxes.
+    edges : ndarray of int, shape (edges, 4)
+        Both vertices and both plane faces of each edge that stands out.
     """
 
     vertices: np.ndarray
     weights: np.ndarray
     triangles: np.ndarray
     boxes: tuple[np.ndarray, ...]
+    edges: np.ndarray
 
     @classmethod
-    def of(cls, vertices: np.ndarray, triangles: np.ndarray) -> Facets:
-        """Sort a solid's vertices and triangles."""
+    def of(cls, vertices: np.ndarray, triangles: np.ndarray, longer: float) -> Facets:
+        """Sort a solid's vertices and triangles; edges are those longer than a length, m."""
         order = in_blocks(vertices)
         number = np.zeros(len(vertices), dtype=np.int64)
         number[order] = np.arange(len(vertices))
@@ -106,7 +136,8 @@ class Facets:
         corners = vertices[triangles]
         of_triangles = boxes_of(corners.min(axis=1), corners.max(axis=1))
         boxes = boxes_of(vertices, vertices), of_triangles, boxes_of(of_triangles[:, :3], of_triangles[:, 3:])
-        return cls(vertices, vertex_weights(vertices, triangles), triangles, boxes)
+        edges = outer_edges(vertices, triangles, longer)
+        return cls(vertices, vertex_weights(vertices, triangles), triangles, boxes, edges)
 
     def reals(self) -> np.ndarray:
         """Return their part of the table."""

@@ -14,7 +14,6 @@ from gearmbs.mechanism.contacts import points as pt
 from gearmbs.mechanism.contacts.fields import BALL, BOX, ELLIPSOID, FRUSTUM, MESH, TORUS, distance
 from gearmbs.mechanism.contacts.meshes import BLOCK, mesh_distance
 from gearmbs.mechanism.contacts.points import to_global
-from gearmbs.mechanism.contacts.smooth_pairs import by_distance
 
 BEARING = 0.8
 """Part of the largest depth below which a vertex bears less than 1e-17 of the load, by the norm in `loads`, whatever
@@ -180,7 +179,8 @@ def vertices_below(rows, count, first, swapped, solid_a, solid_b, work):
             for q in range(3):
                 row[pt.PLACE + q] = row[pt.VERTEX_PLACE + q] - 0.5 * phi * row[pt.NORMAL + q]
             row[pt.VERTEX] = row[pt.POOL] = first + v
-            row[pt.WEIGHT], row[pt.SWAPPED] = weights[v], swapped
+            row[pt.WEIGHT], row[pt.SWAPPED], row[pt.GAIN] = weights[v], swapped, 1.0
+            row[pt.ALONG], row[pt.ALONG + 1], row[pt.ALONG + 2] = 0.0, 0.0, 0.0
     return count
 
 
@@ -198,30 +198,3 @@ def without_idle(rows, count):
                 rows[kept, q] = rows[k, q]
         kept += 1
     return kept
-
-
-@njit(cache=True, error_model="numpy")
-def moved_with(rows, count, pose_a, pose_b, origins, work):
-    """Write how the points move with both bodies.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (points, COLUMNS)
-    count : int
-    pose_a, pose_b : ndarray, shape (12,)
-        Of the solids of the bodies of markers I and J, if a row is not swapped.
-    origins : ndarray, shape (2, 3)
-        Of the markers.
-    work : ndarray, shape (27,)
-    """
-    x, normal, hess = work[12:15], work[15:18], work[18:27]
-    for k in range(count):
-        row = rows[k]
-        for q in range(3):
-            x[q], normal[q] = row[pt.VERTEX_PLACE + q], row[pt.NORMAL + q]
-        for q in range(9):
-            hess[q] = row[pt.HESSIAN + q]
-        if row[pt.SWAPPED] == 0.0:
-            by_distance(row, x, 0.0, -row[pt.DEPTH], hess, normal, pose_b, origins[0], origins[1], True, work)
-        else:
-            by_distance(row, x, 0.0, -row[pt.DEPTH], hess, normal, pose_a, origins[1], origins[0], True, work)

@@ -3,7 +3,7 @@
 Integers: the number of pairs, then `PAIR` for each: family, whether the first solid is J's, and both solids. A solid is
 its kind, its place in the reals (axes, origin, sizes; of a faceted one the last size is the radius of a ball about it),
 number of vertices, their place (coordinates, weights, boxes of blocks of vertices, of triangles, and of these boxes),
-number of triangles, their place in the integers. Reals begin with the law.
+number of triangles, their place in the integers, number of edges, their place there. Reals begin with the law.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations.force_elements import DERIVATIVES, DIAGNOSTICS, FORCE_SIG, FRAME_A, FRAME_P
 from gearmbs.mechanism.contacts import points as pt
 from gearmbs.mechanism.contacts.boxes import SCRATCH, two_boxes
-from gearmbs.mechanism.contacts.facets import moved_with, vertices_below, without_idle
+from gearmbs.mechanism.contacts.edges import EDGE, edges_below, label_edges
+from gearmbs.mechanism.contacts.facet_moves import moved_with
+from gearmbs.mechanism.contacts.facets import vertices_below, without_idle
 from gearmbs.mechanism.contacts.fields import BOX, MESH, distance
 from gearmbs.mechanism.contacts.loads import LAW_REALS, press, share_out
 from gearmbs.mechanism.contacts.meshes import BLOCK
@@ -23,7 +25,7 @@ from gearmbs.mechanism.contacts.smooth_pairs import ball_and_solid, convex_and_p
 
 BALL_SOLID, CONVEX_PLANE, BOXES, FACETS = 0, 1, 2, 3
 """Families of pairs."""
-SOLID = 6
+SOLID = 8
 PAIR = 2 + 2 * SOLID
 SOLID_REALS = 16
 POSES = 24
@@ -93,11 +95,17 @@ def points_of(ints, reals, at, frames, rows, derivatives, labelled, work):
             return 0
         of_a, of_b = faceted(ints, reals, a, sizes_a, pose_a), faceted(ints, reals, b, sizes_b, pose_b)
         middle = vertices_below(rows, 0, 0, 0, of_a, of_b, scratch)
-        count = vertices_below(rows, middle, ints[a + 2], 1, of_b, of_a, scratch)
+        vertices = vertices_below(rows, middle, ints[a + 2], 1, of_b, of_a, scratch)
+        edges_a = vector_at(ints, ints[a + 7], EDGE * ints[a + 6])
+        edges_b = vector_at(ints, ints[b + 7], EDGE * ints[b + 6])
+        own = edges_below(rows, vertices, 0, edges_a, of_a, of_b, scratch)
+        count = edges_below(rows, own, 1, edges_b, of_b, of_a, scratch)
         if labelled:
             label_patches(rows, 0, middle, 0, of_a[5])
-            label_patches(rows, middle, count, ints[a + 2], of_b[5])
-            join_patches(rows, middle, count)
+            label_patches(rows, middle, vertices, ints[a + 2], of_b[5])
+            label_edges(rows, 0, middle, vertices, own, 0, edges_a)
+            label_edges(rows, middle, vertices, own, count, ints[a + 2], edges_b)
+            join_patches(rows, count)
         else:
             count = without_idle(rows, count)
         if derivatives:

@@ -146,7 +146,7 @@ def press(row, law, frames, wrench, diagnostics, jac, derivatives, work):
     work : ndarray, shape (36,)
         Scratch.
     """
-    share, depth, level = row[pt.SHARE], row[pt.DEPTH], row[pt.LEVEL]
+    share, depth, level = row[pt.SHARE] * row[pt.GAIN], row[pt.DEPTH], row[pt.LEVEL]
     place, n, u, arm, force = row[0:3], work[6:9], work[9:12], work[12:15], work[15:18]
     sign = -1.0 if row[pt.SWAPPED] != 0.0 else 1.0
     for q in range(3):
@@ -164,7 +164,7 @@ def press(row, law, frames, wrench, diagnostics, jac, derivatives, work):
         wrench[0, q] += force[q]
     add_cross(arm, force, wrench[0, 3:6])
     # shares of a norm weighed with depths sum to the level
-    diagnostics[0] += share * (depth / level) * stored
+    diagnostics[0] += row[pt.SHARE] * (depth / level) * stored
     diagnostics[1] += share * lost
     diagnostics[2] += share * f * m * speed**2
     diagnostics[4] = max(diagnostics[4], depth)
@@ -178,7 +178,8 @@ def press(row, law, frames, wrench, diagnostics, jac, derivatives, work):
         dp[0] = dp[1] = dp[2] = dn[0] = dn[1] = dn[2] = du[0] = du[1] = du[2] = 0.0
         if part < 6:
             column = (part + 6 * body + (6 if sign < 0.0 else 0)) % 12
-            d_level, d_share = row[pt.D_LEVEL + part + 6 * body], row[pt.D_SHARE + part + 6 * body]
+            d_level = row[pt.D_LEVEL + part + 6 * body]
+            d_share = row[pt.GAIN] * row[pt.D_SHARE + part + 6 * body] + row[pt.SHARE] * row[pt.D_GAIN + column]
             for q in range(3):
                 dp[q] = row[pt.D_PLACE + 12 * q + column]
                 dn[q] = sign * row[pt.D_NORMAL + 12 * q + column]

@@ -1,6 +1,6 @@
 """Patches of faceted solids: vertices in contact that a triangle of their own mesh joins.
 
-Vertices of the second solid join the patch of the vertex of the first that is next to them.
+Points of the second solid join the patch of the point of the first that is next to them.
 """
 
 from __future__ import annotations
@@ -56,11 +56,13 @@ def label_patches(rows, first, end, offset, triangles):
 
 
 @njit(cache=True, error_model="numpy")
-def join_patches(rows, middle, end):
-    """Give the vertices of the second solid, rows from ``middle`` on, the patch of the nearest of the first."""
-    for v in range(middle, end):
+def join_patches(rows, count):
+    """Give the points of the second solid the patch of the nearest of the first."""
+    for v in range(count):
         best = np.inf
-        for u in range(middle):
+        for u in range(count):
+            if rows[v, pt.SWAPPED] == 0.0 or rows[u, pt.SWAPPED] != 0.0:
+                continue
             square = 0.0
             for q in range(3):
                 square += (rows[u, pt.PLACE + q] - rows[v, pt.PLACE + q]) ** 2

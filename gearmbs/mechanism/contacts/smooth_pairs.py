@@ -50,7 +50,7 @@ def by_distance(row, centre, radius, phi, hess, normal, pose, origin_a, origin_b
             for q in range(3):
                 bent[q] += turn[q]
         sink = -dot(normal, rel)
-        row[pt.D_DEPTH + c] = sink
+        row[pt.D_DEPTH + c], row[pt.D_GAIN + c] = sink, 0.0
         if c >= 6:
             rel[0] = rel[1] = rel[2] = 0.0
         for q in range(3):
@@ -81,6 +81,7 @@ def ball_and_solid(row, pose_a, radius, kind, sizes, pose_b, origin_a, origin_b,
     local, grad, normal, hess = work[12:15], work[15:18], work[18:21], work[21:30]
     local_point(pose_b, pose_a[9:12], local)
     phi = distance(kind, sizes, local, grad, hess)
+    row[pt.GAIN] = 1.0
     to_global(pose_b, grad, normal)
     by_distance(
         row, pose_a[9:12], radius, phi, hess, normal, pose_b, origin_a, origin_b, derivatives and phi < radius, work
@@ -118,7 +119,7 @@ def convex_and_plane(row, kind, sizes, pose_a, pose_b, origin_a, origin_b, deriv
     for q in range(3):
         place[q] += pose_a[9 + q]
         depth -= normal[q] * (place[q] - pose_b[9 + q])
-    row[pt.DEPTH] = depth
+    row[pt.DEPTH], row[pt.GAIN] = depth, 1.0
     for q in range(3):
         row[pt.NORMAL + q] = normal[q]
         row[pt.PLACE + q] = place[q] + 0.5 * depth * normal[q]
@@ -128,7 +129,7 @@ def convex_and_plane(row, kind, sizes, pose_a, pose_b, origin_a, origin_b, deriv
     for c in range(12):
         relative(c, place, origin_a, origin_b, rel)
         sink = -dot(normal, rel)
-        row[pt.D_DEPTH + c] = sink
+        row[pt.D_DEPTH + c], row[pt.D_GAIN + c] = sink, 0.0
         turn[0] = turn[1] = turn[2] = 0.0
         bent[0] = bent[1] = bent[2] = 0.0
         if c % 6 >= 3:

@@ -76,7 +76,7 @@ def incidents(ints, reals, frames, out, work):
                 rate = -dot(n, u)
                 for q in range(3):
                     u[q] += rate * n[q]
-                f = rows[k, pt.SHARE] * normal_force(law, rows[k, pt.LEVEL], rate)[0]
+                f = rows[k, pt.SHARE] * rows[k, pt.GAIN] * normal_force(law, rows[k, pt.LEVEL], rate)[0]
                 m = friction_factor(law, np.sqrt(dot(u, u)))[0]
                 for q in range(3):
                     row[PLACE + q] += rows[k, pt.SHARE] * rows[k, pt.PLACE + q]
