@@ -17,7 +17,7 @@ import numpy as np
 
 from gearmbs._jit import njit
 from gearmbs.mechanism.contacts import points as pt
-from gearmbs.mechanism.contacts.facets import brought, from_solid, half_lengths, seen_from
+from gearmbs.mechanism.contacts.facets import LESS, brought, from_solid, half_lengths, seen_from, within
 from gearmbs.mechanism.contacts.fields import HALF_SPACE
 from gearmbs.mechanism.contacts.loads import NORM
 from gearmbs.mechanism.contacts.patches import row_of
@@ -140,6 +140,34 @@ def beside(p, q, move):
 
 
 @njit(cache=True, error_model="numpy")
+def _clear(p, q, length, solid, anchor, x, grad, hess, work):
+    """Return whether a segment is outside a solid, by its middle or a point before it that is farther off.
+
+    Parameters
+    ----------
+    p, q : ndarray
+        Ends, in the solid's frame, m.
+    length : float
+        m.
+    solid : tuple
+    anchor : ndarray, shape (4,)
+        In and out: a point and how far it is outside.
+    x, grad, hess, work : ndarray
+        As of `on_segment`.
+    """
+    for k in range(3):
+        x[k] = 0.5 * (p[k] + q[k])
+    if within(x, anchor, 0.5 * length):
+        return True
+    phi, _ = on_segment(p, q, 0.5, solid, x, grad, hess, work)
+    if phi > 0.0:
+        for k in range(3):
+            anchor[k] = x[k]
+        anchor[3] = phi
+    return phi * LESS > 0.5 * length
+
+
+@njit(cache=True, error_model="numpy")
 def edges_below(rows, count, swapped, edges, solid_a, solid_b, work):
     """Write points of edges of solid a that lie below the surface of solid b; return how many rows there are then.
 
@@ -159,7 +187,8 @@ def edges_below(rows, count, swapped, edges, solid_a, solid_b, work):
     half_lengths(solid_b[0], solid_b[1], half)
     seen_from(solid_a[2], solid_b[2], half, move)
     p, q, along, x, grad, hess = work[21:24], work[24:27], work[27:30], work[30:33], work[33:36], work[36:45]
-    before, after = work[45:48], work[48:51]
+    before, after, anchor = work[45:48], work[48:51], work[65:69]
+    anchor[3] = 0.0
     for e in range(0, edges.size, EDGE):
         one, other = places[3 * edges[e] : 3 * edges[e] + 3], places[3 * edges[e + 1] : 3 * edges[e + 1] + 3]
         if beside(one, other, move):
@@ -172,7 +201,9 @@ def edges_below(rows, count, swapped, edges, solid_a, solid_b, work):
         for k in range(3):
             along[k] = q[k] - p[k]
         length = np.sqrt(dot(along, along))
-        phi, within = deepest(p, q, low, high, length, solid_b, x, grad, hess, work[45:65])
+        if _clear(p, q, length, solid_b, anchor, x, grad, hess, work[45:59]):
+            continue
+        phi, is_within = deepest(p, q, low, high, length, solid_b, x, grad, hess, work[45:65])
         if phi >= 0.0:
             continue
         for k in range(-1, NODES):
@@ -181,7 +212,7 @@ def edges_below(rows, count, swapped, edges, solid_a, solid_b, work):
                 part = low + (high - low) * (k + 0.5) / NODES
                 phi, slope = on_segment(p, q, part, solid_b, x, grad, hess, work[45:59])
                 weight = _lies_flat(along, hess, slope / length, (high - low) * length, phi)
-            elif within:
+            elif is_within:
                 gain = np.sqrt(dot(grad, grad))
                 weight = DEEPEST if gain > VANISHED else 0.0
             if weight == 0.0 or count == rows.shape[0]:
