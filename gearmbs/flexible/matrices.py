@@ -124,6 +124,13 @@ def read_abaqus(
             raise FlexibleError(f"{label}: stiffness has {k.shape[0]} rows, mass {m.shape[0]}; one file is cut off")
         dofs: Any = 6 if size == 6 * len(ids) else 3
     else:
+        known = {tuple(row) for row in k_dofs.tolist()}
+        alone = next((row for row in m_dofs.tolist() if tuple(row) not in known), None)
+        if alone is not None:
+            raise FlexibleError(
+                f"{Path(stiffness).name}: it lacks direction {alone[1]} of node {alone[0]}, which has mass; the file "
+                "is cut off, or belongs to another model"
+            )
         dofs, k, m = _common(k_dofs, k, m_dofs, m)
     check_whole(Path(stiffness), k, dofs, "mass and no stiffness")
     check_whole(Path(mass), m, dofs, "stiffness and no mass")

@@ -253,6 +253,10 @@ def test_a_mass_file_of_abaqus_that_ends_early(tmp_path):
     files[1].write_text("".join(files[1].read_text().splitlines(True)[:15]))
     with pytest.raises(FlexibleError, match=r"m\.mtx: 9 displacements, from node 6 on, have stiffness and no mass"):
         read_abaqus(*files)
+    write_triplets(files[1], m, both=False, pairs=True)
+    files[0].write_text("".join(files[0].read_text().splitlines(True)[:40]))
+    with pytest.raises(FlexibleError, match=r"k\.mtx: it lacks direction \d of node \d, which has mass"):
+        read_abaqus(*files)
     half = np.diag([0.5] * 21 + [0.0] * 3)
     report = check_model(from_matrices(k, half, corners))
     assert any("3 displacements have no mass" in remark for remark in report.remarks)
