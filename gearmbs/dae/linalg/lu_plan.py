@@ -19,6 +19,7 @@ from gearmbs.dae.linalg.counted_entries import (
     scaled_entries,
     taken_pattern,
 )
+from gearmbs.dae.linalg.dense_tail import tail_of_plan, without_tail
 from gearmbs.dae.linalg.entry_lists import (
     columns_of,
     entries_in_order,
@@ -71,7 +72,7 @@ class LUPlan(Struct):
         For each level its operations: the number that is changed and the factors of the product that is taken off.
     div_ptr, div_to, div_by : ndarray
         For each level the numbers that become entries of L, and the pivots that they are divided by. All from ``a_to``
-        on are empty if there are nodes.
+        on are empty if there are nodes or a tail.
     node_end : ndarray
         For each column the end of its node: columns in a row whose rows below the node are the same.
     row_from, col_to : ndarray
@@ -82,8 +83,14 @@ class LUPlan(Struct):
         One for a proper pivot; zero for an equation and an unknown set aside because the matrix is nearly singular.
     left_src, left_limit : ndarray
         Entries left out, by their index in the CSC values, and the largest absolute values with which they may be.
+    limit : ndarray
+        The same by CSC values, infinite for entries that are planned for; empty if no entry is left out.
+    tail : int
+        First pivot of the dense tail, see `gearmbs.dae.linalg.dense_tail`; their number if there is none. Entries of L
+        and U inside the tail are in none of the lists.
     """
 
+    tail: int
     a_ptr: IntVector
     a_pos: IndexVector
     a_src: IndexVector
@@ -116,6 +123,7 @@ class LUPlan(Struct):
     kept: Vector
     left_src: IndexVector
     left_limit: Vector
+    limit: Vector
 
 
 PLAN_TYPE = LUPlan.numba_type
@@ -188,6 +196,7 @@ def analyse(
     drop: float = 0.0,
     counted: np.ndarray | None = None,
     negligible: float = NEGLIGIBLE,
+    with_tail: bool = True,
 ) -> LUPlan:
     """Choose pivots for a matrix and lay down the plan to factor every matrix of its pattern.
 
@@ -207,6 +216,8 @@ def analyse(
         others are left out of the plan, if they are many. Default: no entry is left out.
     negligible : float
         Size of an entry of the equilibrated matrix up to which it may stay left out.
+    with_tail : bool
+        Whether the last pivots may be taken as a full block; eight matrices side by side cannot have one.
 
     Returns
     -------
@@ -233,38 +244,46 @@ def analyse(
             break
         size *= 2
     if rank < n and not counted.all():
-        return analyse(indptr, indices, vals, scale, drop)
+        return analyse(indptr, indices, vals, scale, drop, with_tail=with_tail)
     if rank < n and drop == 0.0:
         rows, cols = chosen[:2]
         raise SingularMatrixError(rows[rank:], cols[rank:])
-    return _plan(rank, *chosen)
+    return _plan(with_tail, rank, *chosen)
 
 
 def _plan(
-    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left, left_limit
+    with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left,
+    left_limit,
 ) -> LUPlan:  # fmt: skip
     """Return the plan that follows from what `_choose` returns.
 
     Parameters
     ----------
+    with_tail
+        See `analyse`.
     rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left, left_limit
         See there.
     """
+    tail = tail_of_plan(rank, l_ptr, u_ptr) if with_tail else len(rows)
+    l_ptr, l_rows = without_tail(tail, l_ptr, l_rows)
+    u_ptr, u_cols = without_tail(tail, u_ptr, u_cols)
     row_place, col_place = places_of(rows), places_of(cols)
     a_ptr, a_pos, a_src, a_scale = entries_in_order(indptr, indices, row_scale, col_scale, cols, row_place)
     u_by_col, u_pos = upper_by_columns(u_ptr, u_cols, col_place)
     l_pos = lower_by_columns(l_ptr, l_rows, row_place)
     u_col, l_col = columns_of(u_by_col), columns_of(l_ptr)
     node_end = nodes(l_ptr, l_pos)
-    if has_nodes(node_end):
+    if has_nodes(node_end) or tail < len(rows):
         order = column_by_column(u_pos, u_col, l_pos, l_col)
     else:
         order = schedule(rank, a_ptr, a_pos, u_by_col, u_pos, u_col, l_ptr, l_pos, l_col)
     kept = np.zeros(len(rows))
     kept[:rank] = 1.0
+    limit = np.full(len(taken) + len(left) if len(left) else 0, np.inf)
+    limit[left] = left_limit
     return LUPlan(
         a_ptr=a_ptr, a_pos=a_pos, a_src=taken[a_src], a_scale=a_scale, u_ptr=u_by_col, u_pos=u_pos, l_ptr=l_ptr,
         l_pos=l_pos, u_col=u_col, l_col=l_col, node_end=node_end, row_from=rows.astype(np.uint32),
         col_to=cols.astype(np.uint32), row_scale=row_scale[rows], col_scale=col_scale[cols], kept=kept, left_src=left,
-        left_limit=left_limit, **order,
+        left_limit=left_limit, limit=limit, tail=tail, **order,
     )  # fmt: skip

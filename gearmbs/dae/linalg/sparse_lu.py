@@ -1,9 +1,9 @@
 """Sparse LU for a fixed pattern: numeric factorisations replayed along a plan without search.
 
 `factor` replays the plan of `gearmbs.dae.linalg.lu_plan` level by level, see `gearmbs.dae.linalg.schedule`, or, where
-columns are taken together as nodes, column by column (left-looking); `solve` applies it. Pivots stay frozen until a
-multiplier grows beyond `GROWTH_LIMIT`, a pivot vanishes, or an entry that was left out of the plan counts; then the
-caller analyses again with the current values.
+columns are taken together as nodes or as a dense tail, column by column (left-looking); `solve` applies it. Pivots stay
+frozen until a multiplier grows beyond `GROWTH_LIMIT`, a pivot vanishes, or an entry that was left out of the plan
+counts; then the caller analyses again with the current values.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ import numpy as np
 from numba import float64, int64, types
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.lanes import LANES
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 from gearmbs.dae.compiled.structs import Struct, Vector
+from gearmbs.dae.linalg.dense_tail import aligned_zeros, factor_tail, into_tail, padded, solve_tail
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
 from gearmbs.dae.linalg.nodes import has_nodes, through_node
 
@@ -35,12 +37,17 @@ class LUFactors(Struct):
         Inverse pivots by their places.
     x, w : ndarray, shape (n,)
         Scratch.
+    lower, upper, rest : ndarray
+        L and U of the dense tail, and its part of a right-hand side.
     """
 
     lu: Vector
     pivot_inv: Vector
     x: Vector
     w: Vector
+    lower: Vector
+    upper: Vector
+    rest: Vector
 
 
 FACTORS_TYPE = LUFactors.numba_type
@@ -49,11 +56,15 @@ FACTORS_TYPE = LUFactors.numba_type
 def new_factors(plan: LUPlan) -> LUFactors:
     """Return empty factors for a plan."""
     n = len(plan.row_from)
+    size = n - plan.tail
     return LUFactors(
         lu=np.zeros(len(plan.l_pos) + len(plan.u_pos) + n + 1),
         pivot_inv=np.zeros(n),
         x=np.zeros(n),
         w=np.zeros(n),
+        lower=aligned_zeros(padded(size) * size + LANES),
+        upper=aligned_zeros(padded(size) * size),
+        rest=aligned_zeros(padded(size)),
     )
 
 
@@ -135,10 +146,14 @@ def _factor_by_nodes(plan, factors, vals):
     x, lu, pivot_inv = factors.x, factors.lu, factors.pivot_inv
     a_pos, a_src, a_scale, l_pos = plan.a_pos, plan.a_src, plan.a_scale, plan.l_pos
     growth = 0.0
-    for k in range(x.shape[0]):
+    n, tail = x.shape[0], plan.tail
+    for k in range(n):
         for p in range(np.uint64(plan.a_ptr[k]), np.uint64(plan.a_ptr[k + 1])):
             x[a_pos[p]] = vals[a_src[p]] * a_scale[p]
         _act_by_nodes(plan, factors, k)
+        if k >= tail:
+            into_tail(tail, k, x, factors.upper, factors.rest.shape[0])
+            continue
         pivot = x[k]
         x[k] = 0.0
         if plan.kept[k] == 0.0:
@@ -156,6 +171,10 @@ def _factor_by_nodes(plan, factors, vals):
             lu[q] = l
             if not abs(l) <= growth:
                 growth = abs(l)
+    if tail < n:
+        grown = factor_tail(tail, factors.lower, factors.upper, pivot_inv)
+        if not grown <= growth:
+            growth = grown
     return growth
 
 
@@ -177,13 +196,12 @@ def factor(plan, factors, vals):
         Largest multiplier in L. Above `GROWTH_LIMIT`, infinite or NaN the pivots no longer fit, or an entry that was
         left out counts: analyse again.
     """
-    left_src, left_limit = plan.left_src, plan.left_limit
-    fits = True
-    for p in range(left_src.shape[0]):
-        fits &= abs(vals[left_src[p]]) <= left_limit[p]
+    limit, fits = plan.limit, True
+    for p in range(limit.shape[0]):
+        fits &= abs(vals[p]) <= limit[p]
     if not fits:
         return np.inf
-    if has_nodes(plan.node_end):
+    if has_nodes(plan.node_end) or plan.tail < factors.x.shape[0]:
         return _factor_by_nodes(plan, factors, vals)
     return _factor_by_levels(plan, factors, vals)
 
@@ -248,12 +266,17 @@ def solve(plan, factors, b, out):
     n = x.shape[0]
     for k in range(n):
         x[k] = b[row_from[k]] * row_scale[k]
-    if has_nodes(plan.node_end):
+    by_nodes = has_nodes(plan.node_end)
+    if by_nodes:
         _forward_by_nodes(plan, factors)
-        _backward_by_columns(plan, factors)
     else:
         for q in range(l_to.shape[0]):
             x[l_to[q]] -= lu[q] * x[l_by[q]]
+    if plan.tail < n:
+        solve_tail(plan.tail, factors.lower, factors.upper, pivot_inv, x, factors.rest)
+    if by_nodes:
+        _backward_by_columns(plan, factors)
+    else:
         upper, last = np.uint64(l_to.shape[0]), u_to.shape[0] - 1
         for m in range(u_to.shape[0]):
             p = np.uint64(last - m)
@@ -287,6 +310,9 @@ def solve_pair(plan, factors, pair):
         i, k, l = l_to[q], l_by[q], lu[q]
         pair[2, i] -= l * pair[2, k]
         pair[3, i] -= l * pair[3, k]
+    if plan.tail < n:
+        for m in range(2, 4):
+            solve_tail(plan.tail, factors.lower, factors.upper, pivot_inv, pair[m], factors.rest)
     upper, last = np.uint64(l_to.shape[0]), u_to.shape[0] - 1
     for m in range(u_to.shape[0]):
         p = np.uint64(last - m)

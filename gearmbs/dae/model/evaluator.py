@@ -357,7 +357,7 @@ class Evaluator:
         self.vals[:] = 0.0
         assemble(t, _turned(y, table, turn), slots, table, self.rdata, self.work.size, self.vals)
         try:
-            self.plan = analyse(indptr, indices, self.vals, np.ones(indptr.size - 1), counted=counted)
+            self.plan = analyse(indptr, indices, self.vals, np.ones(indptr.size - 1), counted=counted, with_tail=False)
         except SingularMatrixError as error:
             raise ModelError(
                 f"the equations are singular to rounding at t = {t[0]:.6g} s: look for masses and moments of inertia "

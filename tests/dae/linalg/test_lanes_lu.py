@@ -27,7 +27,7 @@ def test_each_lane_is_a_matrix_of_its_own(n, density):
     indptr, indices = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64)
     one = rng.uniform(0.5, 1.5, indices.size) + 3.0 * (indices == np.repeat(np.arange(n), np.diff(indptr)))
     vals = one[:, None] * rng.uniform(0.9, 1.1, (indices.size, LANES))
-    plan = analyse(indptr, indices, one, np.ones(n))
+    plan = analyse(indptr, indices, one, np.ones(n), with_tail=False)
     b = rng.standard_normal((n, LANES))
     growth, out = np.zeros(LANES), np.zeros((n, LANES))
     both(plan, new_lane_factors(plan), vals.ravel(), growth, b.ravel(), out.ravel())
@@ -45,3 +45,11 @@ def test_a_vanishing_pivot_is_told_of_its_lane_only():
     growth, b = np.zeros(LANES), np.ones(2 * LANES)
     both(plan, new_lane_factors(plan), vals.ravel(), growth, b, np.zeros(2 * LANES))
     assert [not g <= 1e5 for g in growth] == [lane == 5 for lane in range(LANES)]
+
+
+def test_a_dense_tail_is_refused():
+    n = 40
+    indptr, indices = np.arange(n + 1, dtype=np.int64) * n, np.tile(np.arange(n, dtype=np.int64), n)
+    vals = (np.ones((n, n)) + n * np.eye(n)).ravel()
+    with pytest.raises(ValueError, match="with_tail=False"):
+        new_lane_factors(analyse(indptr, indices, vals, np.ones(n)))
