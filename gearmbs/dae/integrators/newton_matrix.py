@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from gearmbs._jit import njit
 from gearmbs.dae.integrators.controller import meets_kinks
+from gearmbs.dae.integrators.history import copy
 from gearmbs.dae.integrators.run_state import REPIVOT, RUNNING
-from gearmbs.dae.linalg.sparse_lu import factor
+from gearmbs.dae.linalg.sparse_lu import fits, refactor
 
 GAMMA_DRIFT = 0.2
 GAMMA_DRIFT_AT_KINKS = 0.3
@@ -31,26 +32,53 @@ def evaluate_matrix(functions, st):
         jacobian(t, st.y, st.yp, 2.0 * gamma, slope, st.idata, st.rdata, st.work)
         st.jacobians += 1
         st.slope_age = 0
+        st.n_carried = 0
         for p in range(jac.shape[0]):
             slope[p] = (slope[p] - jac[p]) / gamma
+            if slope[p] != 0.0:
+                st.carried[st.n_carried] = p
+                st.n_carried += 1
     st.gamma_evaluated = gamma
+    copy(jac, st.matrix)
+    st.matrix_judged = False
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def carry_over(st):
+    """Bring the matrix to the step's leading coefficient: only entries with a slope depend on it."""
+    change = st.gamma - st.gamma_evaluated
+    jac, slope, matrix, carried = st.jac, st.jac_slope, st.matrix, st.carried
+    for m in range(st.n_carried):
+        p = carried[m]
+        matrix[p] = jac[p] + change * slope[p]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def leaves_little_out(st, plan):
+    """Return whether what a plan leaves out is negligible: all after an evaluation, then what has been carried over."""
+    limit, matrix, carried, small = plan.limit, st.matrix, st.carried, True
+    if limit.shape[0] == 0:
+        return True
+    if not st.matrix_judged:
+        st.matrix_judged = fits(plan, matrix)
+        return st.matrix_judged
+    for m in range(st.n_carried):
+        p = carried[m]
+        small &= abs(matrix[p]) <= limit[p]
+    return small
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def factor_matrix(st, plan, factors):
     """Factor the matrix carried over to the step's leading coefficient; return whether its plan still fits."""
+    carry_over(st)
     if plan.left_src.shape[0] > 0:
         # what is negligible at one step size need not be at another
         ratio = st.gamma / st.gamma_planned
         if ratio > PLANNED_RANGE or ratio * PLANNED_RANGE < 1.0:
             return False
-    change = st.gamma - st.gamma_evaluated
-    jac, slope, matrix = st.jac, st.jac_slope, st.matrix
-    for p in range(jac.shape[0]):
-        matrix[p] = jac[p] + change * slope[p]
-    growth = factor(plan, factors, matrix)
     st.factorizations += 1
-    return growth <= st.growth_limit
+    return leaves_little_out(st, plan) and refactor(plan, factors, st.matrix) <= st.growth_limit
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.dae.compiled.structs import IntVector, Matrix, Struct, Vector
+from gearmbs.dae.compiled.structs import IndexVector, IntVector, Matrix, Struct, Vector
 from gearmbs.dae.integrators.bdf import HISTORY
 
 # return codes of the compiled loop; zero and above are not failures
@@ -66,6 +66,8 @@ class RunState(Struct):
     jac, jac_slope, matrix : ndarray
         CSC values: the Newton matrix at its last evaluation, its derivative dG/dy' by the leading coefficient, and the
         matrix carried over to the current leading coefficient, which is the one that is factored.
+    carried : ndarray
+        Entries with a derivative by the leading coefficient, of which ``n_carried`` are taken.
     idata, rdata, work : ndarray
         Tables and scratch of the problem.
     stops : ndarray
@@ -130,6 +132,8 @@ class RunState(Struct):
     matrix_fresh: bool  # evaluated in this step
     matrix_age: int  # steps since its evaluation
     slope_age: int  # evaluations since that of its derivative by gamma
+    n_carried: int  # entries that depend on the leading coefficient
+    matrix_judged: bool  # whether what the plan leaves out has been looked at since the evaluation
     gamma_evaluated: float
     gamma_factored: float
     growth_limit: float  # growth of its factors beyond which pivots are chosen anew
@@ -189,6 +193,7 @@ class RunState(Struct):
     jac: Vector
     jac_slope: Vector
     matrix: Vector
+    carried: IndexVector
     idata: IntVector
     rdata: Vector
     work: Vector
@@ -230,6 +235,7 @@ def new_state(n: int, nnz: int, **given: np.ndarray) -> RunState:
         **dict.fromkeys(("jac", "jac_slope", "matrix"), nnz),
     }
     made = {}
+    given = {"carried": np.zeros(nnz, dtype=np.uint32), **given}
     for name in RunState.array_members:
         made[name] = given[name] if name in given else np.zeros(shapes.get(name, n))
     return RunState(**made)

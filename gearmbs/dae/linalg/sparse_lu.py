@@ -196,11 +196,21 @@ def factor(plan, factors, vals):
         Largest multiplier in L. Above `GROWTH_LIMIT`, infinite or NaN the pivots no longer fit, or an entry that was
         left out counts: analyse again.
     """
-    limit, fits = plan.limit, True
+    return refactor(plan, factors, vals) if fits(plan, vals) else np.inf
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def fits(plan, vals):
+    """Return whether the entries that a plan leaves out are negligible in the matrix with values ``vals``."""
+    limit, small = plan.limit, True
     for p in range(limit.shape[0]):
-        fits &= abs(vals[p]) <= limit[p]
-    if not fits:
-        return np.inf
+        small &= abs(vals[p]) <= limit[p]
+    return small
+
+
+@njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
+def refactor(plan, factors, vals):
+    """Factor as `factor` does, without a look at the entries that the plan leaves out."""
     if has_nodes(plan.node_end) or plan.tail < factors.x.shape[0]:
         return _factor_by_nodes(plan, factors, vals)
     return _factor_by_levels(plan, factors, vals)
