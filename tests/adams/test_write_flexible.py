@@ -71,6 +71,14 @@ def test_markers_off_the_nodes_become_nodes_without_mass(tmp_path):
     assert 3.0 < errors[0] / errors[1] < 5.0
 
 
+def test_a_body_without_markers_gets_one_in_the_deck_alone(tmp_path):
+    m = Mechanism("free")
+    body = SHAFT.modal_model(6).add_to(m, "shaft", damping=0.01, angular_velocity=(0.0, 2.0, 0.0))
+    spun = again(m, tmp_path / "deck.adm")
+    assert not body.markers
+    np.testing.assert_allclose(spun.angular_velocity(spun.system.body_names[0])[0], [0.0, 2.0, 0.0], atol=1e-12)
+
+
 def test_damping_of_each_mode_is_an_expression():
     ratios = np.array([0.01, 0.01, 0.02, 0.5, 0.5, 1.0])
     text = damping_text(ratios)

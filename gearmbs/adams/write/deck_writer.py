@@ -317,18 +317,19 @@ class DeckWriter:
         ]
 
     def _flex_body(self, body: ModalBody, n: int) -> None:
-        if not body.markers and body.origin is not None:
-            # something has to be asked for
-            marker = body.marker(nearest_node(body.origin.model), name=f"{body.name}.node")
-            self.markers[id(marker)] = self._next_marker
+        markers = list(body.markers)
+        if not markers and body.origin is not None:
+            # something has to be asked for; the mechanism does not get it
+            markers = [Marker(f"{body.name}.node", body, nearest_node(body.origin.model), np.eye(3))]
+            self.markers[id(markers[0])] = self._next_marker
             self._next_marker += 1
-        arguments, nodes = flex_body_arguments(self, body)
+        arguments, nodes = flex_body_arguments(self, body, markers)
         self.statement(f"FLEX_BODY/{n}", [*self._start(body), *arguments], body.name)
-        for marker in body.markers:
+        for marker in markers:
             own = [f"FLEX_BODY = {n}", f"NODE_ID = {nodes[id(marker)]}"]
             own += self._frame("QP", marker.position, marker.orientation)
             self.statement(f"MARKER/{self.markers[id(marker)]}", own, marker.name)
-        self.centers[id(body)] = self.markers[id(body.markers[0])]
+        self.centers[id(body)] = self.markers[id(markers[0])]
 
     @staticmethod
     def _center(body: Body) -> Marker | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,7 +25,9 @@ RIGID = 6
 """Rigid motions, which come first in the neutral files written here."""
 
 
-def flex_body_arguments(writer: WriterContext, body: ModalBody) -> tuple[list[str], dict[int, int]]:
+def flex_body_arguments(
+    writer: WriterContext, body: ModalBody, markers: Sequence[Marker]
+) -> tuple[list[str], dict[int, int]]:
     """Write the neutral file of a body and return what its statement says of it, and the nodes of its markers.
 
     Parameters
@@ -32,6 +35,8 @@ def flex_body_arguments(writer: WriterContext, body: ModalBody) -> tuple[list[st
     writer : WriterContext
     body : ModalBody
         Added by :meth:`gearmbs.flexible.ModalModel.add_to`.
+    markers : sequence of Marker
+        On it, that are written.
 
     Returns
     -------
@@ -61,7 +66,7 @@ def flex_body_arguments(writer: WriterContext, body: ModalBody) -> tuple[list[st
     if writer.path is None:
         raise ModelError(f"{label}: its modal neutral file stands beside the deck; give the deck's path")
     seats = dict(origin.model.seats)
-    for marker in body.markers:
+    for marker in markers:
         if isinstance(marker, ShapedMarker):
             raise ModelError(
                 f"{label}: {marker.name} has shapes of its own, as those of modal forces; a deck has markers at nodes"
@@ -83,7 +88,7 @@ def flex_body_arguments(writer: WriterContext, body: ModalBody) -> tuple[list[st
     if np.any(body.rate):
         arguments.append(f"VMODE = {listed(body.rate * writer.units.time)}")
     arguments.append(f"CRATIO = {damping_text(origin.ratios)}")
-    return arguments, {id(marker): nodes[_seat(marker)] for marker in body.markers}
+    return arguments, {id(marker): nodes[_seat(marker)] for marker in markers}
 
 
 def nearest_node(model: ModalModel) -> np.ndarray:
