@@ -18,9 +18,10 @@ TOLERANCE = 1e-9
 """So tight that rounding, which differs between machines, stays far below the comparison's 0.1 %."""
 
 
-def gmf_levels(workers: int | None = None) -> dict[str, dict[str, list[float]]]:
-    """Return the RMS of the first three mesh harmonics, m/s^2, by case and component."""
-    cases = paper_cases(base=make_case({"operation": {"duration": DURATION}, "solver": {"tolerance": TOLERANCE}}))
+def gmf_levels(workers: int | None = None, *, lump: bool = False) -> dict[str, dict[str, list[float]]]:
+    """Return the RMS of the first three mesh harmonics, m/s^2, by case and component; ``lump`` as in a case."""
+    solver = {"tolerance": TOLERANCE, "lump": lump}
+    cases = paper_cases(base=make_case({"operation": {"duration": DURATION}, "solver": solver}))
     levels = {}
     for case, record in zip(cases, run_cases(cases, workers=workers)):
         table = record["gmf_rms"].sel(way="orders")

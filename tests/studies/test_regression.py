@@ -11,9 +11,9 @@ from gearmbs.studies.regression import gmf_levels
 STORED = json.loads((Path(__file__).parent / "gmf_levels.json").read_text())
 
 
-@pytest.fixture(scope="module")
-def levels():
-    return gmf_levels(workers=2)
+@pytest.fixture(scope="module", params=[False, True], ids=["all bodies", "angles alone"])
+def levels(request):
+    return gmf_levels(workers=2, lump=request.param)
 
 
 @pytest.mark.parametrize("case", list(STORED["levels"]))
