@@ -331,9 +331,8 @@ class LoadMethods:
         SolidContact('floor', sphere and plane, I='ball.marker1', J='ground.marker1')
         """
         from gearmbs.mechanism.contacts.element import SolidContact
-        from gearmbs.mechanism.contacts.shapes import Shape
 
-        first, second = ((s,) if isinstance(s, Shape) else tuple(s) for s in (solids_i, solids_j))
+        first, second = (tuple(s) if isinstance(s, Sequence) else (s,) for s in (solids_i, solids_j))
         return self.add(SolidContact(name, i, j, first, second, law, friction))
 
 

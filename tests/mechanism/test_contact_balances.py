@@ -16,6 +16,7 @@ from gearmbs.mechanism.contacts import (
     HalfSpace,
     Impact,
     Mesh,
+    Poisson,
     SolidContact,
     Sphere,
     Torus,
@@ -254,3 +255,48 @@ def test_a_stack_of_turned_blocks_stands():
     assert solution.com_position("top")[-1] == pytest.approx([0.02, 0.01, 0.15], abs=1e-3)
     assert solution.contact("blocks")["normal_force"][-1] == pytest.approx(9.81, rel=1e-4)
     assert solution.contact("floor")["normal_force"][-1] == pytest.approx(2 * 9.81, rel=1e-4)
+
+
+def test_laws_read_texts_with_units():
+    assert Coulomb(0.2, 0.1, "1 mm/s", "5 mm/s").reals() == pytest.approx([0.2, 0.1, 1e-3, 5e-3])
+    assert Impact(1e6, 1.5, "0.5 N*s/mm", "0.1 mm").reals()[1:5] == pytest.approx([1e6, 1.5, 500.0, 1e-4])
+    assert Poisson("1 N/mm", 0.5).reals()[5:7] == pytest.approx([1e3, 0.5])
+    assert Sphere("1 mm", offset=("2 mm", 0, 0)).offset == pytest.approx([2e-3, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"law": Impact("1e6 N/m")}, "impact: stiffness"),
+        ({"law": Impact(np.inf)}, "all finite"),
+        ({"law": Impact(1e6, 0.5)}, "exponent 0.5 at least 1"),
+        ({"law": Poisson(1e6, "much")}, "poisson: restitution"),
+        ({"law": 1e6}, r"law = 1000000.0; give Impact\(...\) or Poisson"),
+        ({"friction": 0.3}, r"friction = 0.3; give Coulomb"),
+        ({"friction": Coulomb(0.1, 0.1, "2 kg")}, "coulomb: stiction: '2 kg'"),
+        ({"friction": Coulomb(0.1, 0.1, 2.0, 1.0)}, "no larger than transition"),
+        ({"solid": Sphere}, "is not a shape"),
+    ],
+)
+def test_what_is_no_contact_is_refused_where_it_is_given(given, says):
+    m = Mechanism("wrong")
+    law, friction = given.get("law", ELASTIC), given.get("friction")
+    i, j = m.body("ball", 1.0, (1, 1, 1)).marker(), m.ground.marker()
+    with pytest.raises(ModelError, match=says):
+        m.contact("floor", i, given.get("solid", Sphere(0.1)), j, HalfSpace(), law, friction)
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Sphere(0.1, offset=(1, 2)), "three finite lengths"),
+        (lambda: Sphere(0.1, offset=(0, 0, np.nan)), "three finite lengths"),
+        (lambda: Sphere(0.1, axes="z"), "sphere: axes"),
+        (lambda: Sphere(np.inf), "positive and finite"),
+        (lambda: extruded(np.zeros((4, 3)), 1.0), "at least three rows x, y"),
+        (lambda: extruded(np.array([[0, 0], [1, 0.0]]), 1.0), "at least three rows x, y"),
+    ],
+)
+def test_what_is_no_shape_is_refused(make, says):
+    with pytest.raises(ModelError, match=says):
+        make()

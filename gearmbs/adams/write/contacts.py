@@ -57,15 +57,16 @@ def touch(writer: WriterContext, name: str, sides: list[list[int]], laws: list[s
 def normal_law(writer: WriterContext, law: Impact | Poisson) -> list[str]:
     """Return the arguments of a normal law."""
     units = writer.units
+    _, stiffness, exponent, damping, depth, penalty, restitution, _ = law.reals()
     if isinstance(law, Poisson):
-        stiffness = law.penalty / units.factor("stiffness")
-        return ["POISSON", f"PENALTY = {number(stiffness)}", f"RESTITUTION_COEFFICIENT = {number(law.restitution)}"]
+        own = penalty / units.factor("stiffness")
+        return ["POISSON", f"PENALTY = {number(own)}", f"RESTITUTION_COEFFICIENT = {number(restitution)}"]
     return [
         "IMPACT",
-        f"STIFFNESS = {number(law.stiffness * units.length**law.exponent / units.force)}",
-        f"EXPONENT = {number(law.exponent)}",
-        f"DAMPING = {number(law.damping / units.factor('damping'))}",
-        f"DMAX = {number(law.full_depth / units.length)}",
+        f"STIFFNESS = {number(stiffness * units.length**exponent / units.force)}",
+        f"EXPONENT = {number(exponent)}",
+        f"DAMPING = {number(damping / units.factor('damping'))}",
+        f"DMAX = {number(depth / units.length)}",
     ]
 
 

@@ -41,6 +41,11 @@ CONVEX = (Ellipsoid, Box, Cylinder, Frustum, Torus)
 ANALYTIC = (Sphere, Ellipsoid, Box, Cylinder, Frustum, Torus, HalfSpace)
 
 
+def plain(value: Any, field: str) -> float:
+    """Return a number that has no unit to be given with it."""
+    return quantity(value, "dimensionless", field)
+
+
 @dataclass(frozen=True)
 class Impact:
     """f = k d^e + c STEP(d, 0, 0, d_max, 1) d', never negative: ADAMS's IMPACT.
@@ -49,25 +54,28 @@ class Impact:
     ----------
     stiffness, exponent : float
         k, N/m^e, and e, at least 1.
-    damping : float
+    damping : float or text with a unit
         c, N s/m.
-    full_depth : float
+    full_depth : float or text with a unit
         d_max, m, from which on damping acts in full.
     """
 
     stiffness: float
     exponent: float = 1.5
-    damping: float = 0.0
-    full_depth: float = 1e-4
+    damping: Any = 0.0
+    full_depth: Any = 1e-4
 
     def reals(self) -> list[float]:
         """Return the law's part of the table."""
-        if not self.stiffness > 0.0 or not self.exponent >= 1.0 or not self.damping >= 0.0 or not self.full_depth > 0.0:
+        k, e = plain(self.stiffness, "impact: stiffness, N/m^exponent"), plain(self.exponent, "impact: exponent")
+        c = quantity(self.damping, "N*s/m", "impact: damping")
+        full = quantity(self.full_depth, "length", "impact: full_depth")
+        if not (0.0 < k < np.inf and 1.0 <= e < np.inf and 0.0 <= c < np.inf and 0.0 < full < np.inf):
             raise ModelError(
-                f"impact: stiffness {self.stiffness} and full_depth {self.full_depth} must be positive, damping "
-                f"{self.damping} not negative, exponent {self.exponent} at least 1"
+                f"impact: stiffness {k} and full_depth {full} must be positive, damping {c} not negative, exponent {e} "
+                "at least 1, and all finite"
             )
-        return [float(IMPACT), self.stiffness, self.exponent, self.damping, self.full_depth, 0.0, 0.0, 1.0]
+        return [float(IMPACT), k, e, c, full, 0.0, 0.0, 1.0]
 
 
 @dataclass(frozen=True)
@@ -76,22 +84,21 @@ class Poisson:
 
     Attributes
     ----------
-    penalty : float
+    penalty : float or text with a unit
         p, N/m.
     restitution : float
         r, from 0 to 1.
     """
 
-    penalty: float
+    penalty: Any
     restitution: float
 
     def reals(self) -> list[float]:
         """Return the law's part of the table."""
-        if not self.penalty > 0.0 or not 0.0 <= self.restitution <= 1.0:
-            raise ModelError(
-                f"poisson: penalty {self.penalty} must be positive and restitution {self.restitution} from 0 to 1"
-            )
-        return [float(POISSON), 0.0, 1.0, 0.0, 1.0, self.penalty, self.restitution, REVERSAL]
+        p, r = quantity(self.penalty, "N/m", "poisson: penalty"), plain(self.restitution, "poisson: restitution")
+        if not 0.0 < p < np.inf or not 0.0 <= r <= 1.0:
+            raise ModelError(f"poisson: penalty {p} must be positive and finite, and restitution {r} from 0 to 1")
+        return [float(POISSON), 0.0, 1.0, 0.0, 1.0, p, r, REVERSAL]
 
 
 @dataclass(frozen=True)
@@ -101,7 +108,7 @@ class Coulomb:
     Attributes
     ----------
     static, dynamic : float
-    stiction, transition : float
+    stiction, transition : float or text with a unit
         Slip speeds, m/s.
     """
 
@@ -112,14 +119,15 @@ class Coulomb:
 
     def reals(self) -> list[float]:
         """Return the law's part of the table."""
-        stick = quantity(self.stiction, "velocity", "coulomb: stiction")
-        slip = quantity(self.transition, "velocity", "coulomb: transition")
-        if not (self.static >= 0.0 and self.dynamic >= 0.0 and 0.0 < stick <= slip):
+        stick = quantity(self.stiction, "speed", "coulomb: stiction")
+        slip = quantity(self.transition, "speed", "coulomb: transition")
+        static, dynamic = plain(self.static, "coulomb: static"), plain(self.dynamic, "coulomb: dynamic")
+        if not (0.0 <= static < np.inf and 0.0 <= dynamic < np.inf and 0.0 < stick <= slip < np.inf):
             raise ModelError(
-                f"coulomb: static {self.static} and dynamic {self.dynamic} must not be negative, stiction {stick} m/s "
-                f"positive and no larger than transition {slip} m/s"
+                f"coulomb: static {static} and dynamic {dynamic} must not be negative, stiction {stick} m/s "
+                f"positive and no larger than transition {slip} m/s, and all finite"
             )
-        return [self.static, self.dynamic, stick, max(slip, stick * (1.0 + 1e-9))]
+        return [static, dynamic, stick, max(slip, stick * (1.0 + 1e-9))]
 
 
 @dataclass(eq=False, repr=False)
@@ -160,7 +168,13 @@ class SolidContact(ForceElement):
             raise ModelError(f"contact '{self.name}': both sides are on body '{self.i.body.name}'")
         for a, b in product(self.solids_i, self.solids_j):
             pair_family(self.name, a, b)
+        if not isinstance(self.law, Impact | Poisson):
+            raise ModelError(f"contact '{self.name}': law = {self.law!r}; give Impact(...) or Poisson(...)")
+        if not isinstance(self.friction, Coulomb | None):
+            raise ModelError(f"contact '{self.name}': friction = {self.friction!r}; give Coulomb(...) or None")
         self.law.reals()
+        if self.friction is not None:
+            self.friction.reals()
 
     def compiled(self) -> Compiled:
         friction = [0.0, 0.0, 1.0, 2.0] if self.friction is None else self.friction.reals()

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gearmbs.dae.errors import ModelError
-from gearmbs.mechanism.quantities import quantity
+from gearmbs.mechanism.quantities import quantities, quantity
 
 SEGMENTS = 48
 """Around a solid of revolution that is cut into triangles."""
@@ -17,6 +17,8 @@ LEVELS = 24
 NOTHING = 1e-12
 """Part of the cube of its length that a solid's volume exceeds: that of a sheet is rounding."""
 TINY = 1e-300
+PLACED = {"axes": "dimensionless", "offset": "length"}
+"""Fields of a shape's place, and what they are."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -41,14 +43,16 @@ class Shape:
     def __post_init__(self) -> None:
         for name in self.lengths:
             value = quantity(getattr(self, name), "length", f"{self.kind}: {name}")
-            if not value > 0.0 and not (value == 0.0 and name in self.may_vanish):
-                raise ModelError(f"{self.kind}: {name} = {value} m; it must be positive")
+            if not 0.0 < value < np.inf and not (value == 0.0 and name in self.may_vanish):
+                raise ModelError(f"{self.kind}: {name} = {value} m; it must be positive and finite")
             object.__setattr__(self, name, value)
-        axes = np.asarray(self.axes, dtype=float)
+        axes, offset = (quantities(getattr(self, n), unit, f"{self.kind}: {n}") for n, unit in PLACED.items())
+        if offset.shape != (3,) or not np.isfinite(offset).all():
+            raise ModelError(f"{self.kind}: offset = {self.offset!r}; give three finite lengths, along x, y and z")
         if axes.shape != (3, 3) or not np.allclose(axes.T @ axes, np.eye(3), atol=1e-9) or np.linalg.det(axes) < 0.0:
             raise ModelError(f"{self.kind}: axes must be a rotation matrix")
         object.__setattr__(self, "axes", axes)
-        object.__setattr__(self, "offset", np.asarray(self.offset, dtype=float).reshape(3))
+        object.__setattr__(self, "offset", offset)
 
     def facets(self) -> tuple[np.ndarray, np.ndarray]:
         """Return vertices, shape (n, 3), m, and triangles, shape (m, 3), anticlockwise seen from outside."""
@@ -240,8 +244,8 @@ def positive_lengths(label: str, values: Any) -> np.ndarray:
     if isinstance(values, str) or not isinstance(values, (Sequence, np.ndarray)) or len(values) != 3:
         raise ModelError(f"{label} = {values!r}; give three lengths, along x, y and z")
     found = np.array([quantity(v, "length", label) for v in values])
-    if not np.all(found > 0.0):
-        raise ModelError(f"{label} = {tuple(values)}; all must be positive")
+    if not np.all((found > 0.0) & (found < np.inf)):
+        raise ModelError(f"{label} = {tuple(values)}; all must be positive and finite")
     return found
 
 
@@ -338,8 +342,11 @@ def extruded(profile: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray
     Raises
     ------
     ModelError
-        If the profile crosses itself.
+        If the profile crosses itself, or is none.
     """
+    profile = np.asarray(profile, dtype=float)
+    if profile.ndim != 2 or profile.shape[1] != 2 or len(profile) < 3:
+        raise ModelError(f"extrusion: its profile has the shape {profile.shape}; give at least three rows x, y")
     if np.allclose(profile[0], profile[-1]):
         profile = profile[:-1]
     x, y = profile.T
