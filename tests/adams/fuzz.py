@@ -43,7 +43,7 @@ from .mild_changes import mildly_changed
 from .mutations import mutated
 
 SECONDS = 20
-"""In which a deck must be done."""
+"""Of processor time in which a deck must be done."""
 CHECKED = "m\no\nSIMULATE/DYNAMICS, END=0.002, STEPS=2\n"
 IMPLICIT = "DIFF/1, IMPLICIT, IC=0.5, FUNCTION=DIF1(1)+DIF1(1)**3-COS(TIME)+DIF(1)\nREQUEST/1, F2=DIF1(1)\n"
 RUNS = [
@@ -183,17 +183,17 @@ def case(seed: int, share: float, mild: bool = False) -> tuple[str, str, random.
 
 @contextlib.contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Raise `Slow` after some time."""
+    """Raise `Slow` after some processor time."""
 
     def late(*_: object) -> None:
         raise Slow(f"longer than {seconds} s")
 
-    signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    signal.signal(signal.SIGPROF, late)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
 def outcome(seed: int, share: float, seconds: float = SECONDS, mild: bool = False) -> str:

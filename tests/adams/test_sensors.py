@@ -67,6 +67,13 @@ def test_dt_changes_the_outputs_and_print_adds_one():
     assert t == pytest.approx([0.0, 0.4, 0.5, 0.5, 0.8, 1.2], abs=1e-9)
 
 
+def test_a_sensor_that_fires_at_the_end_leaves_nothing_for_its_dt():
+    sensor = "SENSOR/1, GE, VALUE=1, FUNCTION=TIME, DT=0.01, PRINT"
+    t = run(sensor, "SIMULATE/DYNAMICS, END=1, STEPS=4\n").t
+    assert t[-1] == pytest.approx(1.0, abs=1e-9)
+    assert t.size <= 6
+
+
 def test_eq_fires_at_each_passage_and_ge_when_it_comes_from_below():
     """Thrown up with 10 m/s: at 3.75 m after 0.5 s and 1.5 s."""
     start = ", QG=0,0,0, VZ=10"

@@ -122,6 +122,8 @@ def up_to(times: np.ndarray, end: float) -> np.ndarray:
 def after(times: np.ndarray, now: float, fired: Sequence[st.Sensor]) -> np.ndarray:
     """Return the output times from a passage on, in steps of the last DT that is given."""
     end, span = times[-1], times[-1] - times[0]
+    if end - now <= SAME * span:
+        return np.array([now])
     steps = [s.dt for s in fired if s.dt is not None]
     if steps:
         count = int(np.floor((end - now) / steps[-1] * (1.0 + 1e-12)))
