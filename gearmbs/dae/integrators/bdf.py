@@ -114,7 +114,7 @@ def combination_norm(weights, count, hist, inv_weight):
         return _combination_norm(weights, hist, inv_weight, 6)
     if count == 7:
         return _combination_norm(weights, hist, inv_weight, 7)
-    return _combination_norm(weights, hist, inv_weight, count)
+    return _combination_norm(weights, hist, inv_weight, HISTORY)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
