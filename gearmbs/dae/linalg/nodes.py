@@ -64,7 +64,7 @@ def through_node(first, stop, size, l_ptr, l_vals, w):
     first, stop, size : int
         The columns, and the number of rows from the first on: the node's, then those below it.
     l_ptr, l_vals : ndarray
-        Of `LUPlan` and `LUFactors`.
+        Of `LUPlan`, and L column by column, as `LUFactors` begins with it.
     w : ndarray
         These rows, one after the other; changed.
     """

@@ -176,9 +176,9 @@ def column_by_column(
     u_pos: np.ndarray, u_col: np.ndarray, l_pos: np.ndarray, l_col: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Return the same fields for a matrix with nodes, whose factors stand as its columns do."""
-    none, nowhere = np.empty(0, dtype=np.uint32), np.zeros(0, dtype=np.int64)
+    none, no_bounds = np.empty(0, dtype=np.uint32), np.empty(0, dtype=np.int64)
     empty = dict.fromkeys(("a_to", "pivot_order", "op_to", "op_l", "op_u", "div_to", "div_by"), none)
     return {
         "l_to": l_pos, "l_by": l_col, "u_to": u_pos, "u_by": u_col, **empty,
-        **dict.fromkeys(("pivot_ptr", "op_ptr", "div_ptr"), nowhere),
+        **dict.fromkeys(("pivot_ptr", "op_ptr", "div_ptr"), no_bounds),
     }  # fmt: skip
