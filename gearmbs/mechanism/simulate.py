@@ -19,7 +19,6 @@ from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.results.stream import Stream
 from gearmbs.mechanism.locked import locking_remark
-from gearmbs.mechanism.lumping import lumped, why_not_lumped
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
 from gearmbs.mechanism.spin_check import warn_of_spin
@@ -183,10 +182,15 @@ def _prepared(
 
     The remark tells why not less is integrated.
     """
-    one = lumped(mechanism, t_start) if lump else None
+    one, why = None, ""
+    if lump:
+        # kernels of bodies that turn about fixed axes are compiled by those alone who ask for it
+        from gearmbs.mechanism.lumping import lumped, why_not_lumped
+
+        one = lumped(mechanism, t_start)
+        why = "" if one else why_not_lumped(mechanism)
     if one is None:
         system = mechanism.compile(t_start)
-        why = why_not_lumped(mechanism) if lump else ""
         return system, system.problem(formulation, rate_scale), None, why
     return one.whole, *one.problem(formulation, rate_scale), one.remark(formulation)
 
