@@ -53,6 +53,8 @@ def paper(
 ) -> None:
     """Reproduce the paper: six cases, GMF table, figures 5 and 7, report."""
     with guarded():
+        # on a busy machine imports alone take many seconds
+        typer.secho("gearmbs: the paper's six cases; loading", err=True)
         # nothing that compiles is imported before all options are known to be right
         from gearmbs.signals import COMPONENTS
         from gearmbs.studies.case import CaseError, make_case
