@@ -119,8 +119,9 @@ class Run:
         try:
             drop = DROP_TOLERANCES[st.drop_level]
             self.plan = analyse(
-                self.indptr, self.indices, st.matrix, self.scale, drop, self._entries_to_leave(), negligible
-            )
+                self.indptr, self.indices, st.matrix, self.scale, drop, self._entries_to_leave(), negligible,
+                with_tail=problem.small_entries,
+            )  # fmt: skip
             st.gamma_planned = st.gamma
         except SingularMatrixError as error:
             if st.steps > 0 and st.drop_rounds < DROP_ROUNDS_ALLOWED:

@@ -23,7 +23,7 @@ def new_lane_factors(plan: LUPlan) -> LaneFactors:
     """Return empty factors for a plan without a dense tail."""
     n = len(plan.row_from)
     if plan.tail < n:
-        raise ValueError("the plan has a dense tail; make it with with_tail=False")
+        raise ValueError("the plan has a dense tail; make it without")
     return LaneFactors(
         l_vals=np.zeros(LANES * len(plan.l_pos)),
         u_vals=np.zeros(LANES * len(plan.u_pos)),

@@ -196,7 +196,7 @@ def analyse(
     drop: float = 0.0,
     counted: np.ndarray | None = None,
     negligible: float = NEGLIGIBLE,
-    with_tail: bool = True,
+    with_tail: bool = False,
 ) -> LUPlan:
     """Choose pivots for a matrix and lay down the plan to factor every matrix of its pattern.
 
@@ -217,7 +217,8 @@ def analyse(
     negligible : float
         Size of an entry of the equilibrated matrix up to which it may stay left out.
     with_tail : bool
-        Whether the last pivots may be taken as a full block; eight matrices side by side cannot have one.
+        Whether the last pivots may be taken as a full block, as is worth it with modes; eight matrices side by side
+        cannot have one.
 
     Returns
     -------
