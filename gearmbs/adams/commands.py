@@ -24,6 +24,10 @@ def adams(
     redundancy: Annotated[
         str, typer.Option(help="Redundant constraints: keep what ADAMS keeps (adams), or what stands first (declared).")
     ] = "adams",
+    check: Annotated[
+        bool | None,
+        typer.Option(help="Solve motions again at a hundredth of ERROR and compare; default: if it takes a second."),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", help="Prefix of the files written; default: the script's, or the model's name."),
@@ -51,6 +55,7 @@ def adams(
                 progress=sys.stderr.isatty(),
                 redundancy=redundancy,
                 routines=None if routines is None else load_routines(routines),
+                check=check,
             )
         except DeckError as error:
             if error.result is not None and error.result.segments:

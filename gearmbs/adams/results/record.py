@@ -27,6 +27,8 @@ from gearmbs.mechanism.modal import ModalBody
 if TYPE_CHECKING:
     import xarray as xr
 
+    from gearmbs.adams.run.convergence import Doubt
+
 NEWTON = "Newton"
 """What solves analyses in which nothing is integrated."""
 
@@ -51,6 +53,8 @@ class Segment:
         How far the parts were moved at the start; None for statics, which moves them anyway.
     passage : tuple of float and str or None
         When constraints came to depend on each other, s, and which.
+    doubt : Doubt or None
+        What a smaller error changes.
     requests : dict of int to RequestSeries
         Values in the deck's units.
     wrenches : dict
@@ -74,6 +78,7 @@ class Segment:
     equilibrium: StaticResult | None = None
     assembly: Assembly | None = None
     passage: tuple[float, str] | None = None
+    doubt: Doubt | None = None
 
     @property
     def success(self) -> bool:
@@ -144,6 +149,9 @@ class RunRecord:
                 f"about TIME = {when / self.deck.units.time:.4g} the mechanism passed a position in which it locks or "
                 f"can branch: {rows} depend on each other there; what follows may depend on ERROR: try a smaller one"
             )
+        if segment.doubt is not None:
+            units = self.deck.units
+            found.append(segment.doubt.remark(units.time, units.length, self.unit("length")))
         return found
 
     @cached_property

@@ -23,6 +23,7 @@ from gearmbs.adams.results.record import NEWTON, Segment
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.results.result import AdamsResult
 from gearmbs.adams.results.tracks import tracks_of
+from gearmbs.adams.run.convergence import Doubt, doubt
 from gearmbs.adams.run.equilibria import equilibria_to_passage
 from gearmbs.adams.run.plant import plant_of
 from gearmbs.adams.run.samples import parts, renew, take_samples
@@ -72,6 +73,7 @@ def run_deck(
     progress: bool | Callable[[float], None] | None = None,
     redundancy: str = "adams",
     routines: Mapping[str, Callable] | None = None,
+    check: bool | None = None,
 ) -> AdamsResult:
     """Run an ADAMS deck.
 
@@ -98,6 +100,9 @@ def run_deck(
     routines : mapping, optional
         Python functions for the deck's USER(...), by statement ("SFORCE/3"), the name in ROUTINE=, or ADAMS's name
         (SFOSUB, ...); each takes a `gearmbs.adams.RoutineCall`.
+    check : bool, optional
+        Whether dynamic analyses are solved again at a hundredth of their error, and remarked if parts then go other
+        ways; without it those that take about a second at most are.
 
     Returns
     -------
@@ -117,7 +122,7 @@ def run_deck(
         raise DeckError(script.unsupported)
     result = AdamsResult(deck, script)
     session = Session.of(deck)
-    session.redundancy = redundancy
+    session.redundancy, session.check = redundancy, check
     command = Command(script.file)
     try:
         check_script(deck, script, allow_unsupported)
@@ -329,11 +334,24 @@ def _part(
     segment.variables = evaluator.variables()
     if kind not in ("STATICS", "INITIAL_CONDITIONS"):
         segment.passage = singular_passage(solution)
+    if kind in ("DYNAMICS", "TRANSIENT"):
+        segment.doubt = _doubt(session, segment)
     _remember(session, model, segment, evaluator)
     act(session, watch, segment, fired, evaluator)
     if kind not in ("STATICS", "INITIAL_CONDITIONS"):
         take_samples(session, evaluator, float(times[0]))
     return segment, fired
+
+
+def _doubt(session: Session, segment: Segment) -> Doubt | None:
+    """Return what a smaller error changes in a motion, where it is looked at."""
+    solution = segment.solution
+    times = solution.t / session.deck.units.time
+
+    def again(options: dict[str, Any]) -> Solution:
+        return _solve(session, segment.command, segment.kind, segment.model, times, options, False)[0]
+
+    return doubt(segment.model, solution, segment.options, again, session.check)
 
 
 def _to_passage(

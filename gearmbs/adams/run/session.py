@@ -49,6 +49,8 @@ class Session:
         Of GSEs by id: number of the next sample and the discrete states from then on.
     redundancy : str
         Which redundant rows are kept, see `gearmbs.mechanism.redundancy`.
+    check : bool or None
+        Whether dynamic analyses are solved again with a smaller error; None: if that costs little.
     """
 
     deck: Deck
@@ -61,6 +63,7 @@ class Session:
     sensed: dict[int, float] = field(default_factory=dict)
     pending: dict[int, tuple[int, tuple[float, ...]]] = field(default_factory=dict)
     redundancy: str = "adams"
+    check: bool | None = None
 
     @classmethod
     def of(cls, deck: Deck) -> Session:

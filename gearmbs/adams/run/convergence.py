@@ -1,0 +1,111 @@
+"""Whether a motion depends on the ERROR asked for: it is solved again at a hundredth, and where parts are is compared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gearmbs.adams.builders.model import AdamsModel
+from gearmbs.dae.errors import ModelError
+from gearmbs.dae.results.solution import Solution
+
+TIGHTER = 0.01
+TIGHTEST = 1e-13
+"""Least error asked for, near the rounding of the unknowns."""
+APART = 0.01
+"""Distance of two runs, of the largest displacement of a part, that is remarked."""
+STILL = 1e-6
+"""Largest displacement, of the largest coordinate, up to which nothing moves."""
+CHEAP = 2_000_000
+"""Steps times unknowns, about a second's work, of an analysis that is checked without being asked for."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """What a smaller error changes.
+
+    Attributes
+    ----------
+    since : float
+        When places begin to differ, s; if the second run did not reach the end, when it stopped.
+    tol : float
+        Error of the first run.
+    part : str
+        Which is farthest from its other place, at any time.
+    apart, at_end, moved : float
+        By how much, also at the end, and the largest displacement of any part, m.
+    stopped : str
+        Why the second run did not reach the end, "" if it did.
+    """
+
+    since: float
+    tol: float
+    part: str = ""
+    apart: float = 0.0
+    at_end: float = 0.0
+    moved: float = 0.0
+    stopped: str = ""
+
+    def remark(self, time: float, length: float, unit: str) -> str:
+        """Return a sentence, with the deck's units of time and length, in SI, and the latter's name."""
+        again = f"at a hundredth of ERROR = {self.tol:g}"
+        if self.stopped:
+            return (
+                f"{again} the run ends at TIME = {self.since / time:.4g}: {self.stopped} What follows here may not be "
+                "the motion of the model"
+            )
+        return (
+            f"{again} the motion is another from TIME = {self.since / time:.4g} on: {self.part} is up to "
+            f"{self.apart / length:.3g} {unit} elsewhere, {self.at_end / length:.3g} at the end, where parts move by "
+            f"{self.moved / length:.3g} at most; it amplifies small differences, or ERROR is too large: ask for a "
+            "smaller one"
+        )
+
+
+def doubt(
+    model: AdamsModel,
+    solution: Solution,
+    options: dict[str, Any],
+    again: Callable[[dict[str, Any]], Solution],
+    asked: bool | None,
+) -> Doubt | None:
+    """Solve an analysis again at a hundredth of its error; return what that changes, None if little or not looked at.
+
+    Parameters
+    ----------
+    model : AdamsModel
+    solution : Solution
+    options : dict
+        Of the integrator.
+    again : callable
+        Solves the analysis with other options.
+    asked : bool or None
+        Whether to look at it; None: if it costs little.
+    """
+    dear = solution.stats.steps * solution.problem.n > CHEAP
+    if asked is False or (asked is None and dear) or not solution.success or solution.t.size < 2:
+        return None
+    tol = max(TIGHTER * options["tol"], TIGHTEST)
+    if tol >= options["tol"]:
+        return None
+    try:
+        second = again({**options, "tol": tol})
+    except (ModelError, ArithmeticError) as error:
+        return Doubt(float(solution.t[0]), options["tol"], stopped=f"{error}.")
+    if not second.success:
+        return Doubt(float(second.t[-1]), options["tol"], stopped=second.message.partition(". ")[0].rstrip(".") + ".")
+    names = [name for name in model.mechanism.bodies if name in model.sources]
+    if not names:
+        return None
+    one, other = (np.stack([s.com_position(name) for name in names], axis=1) for s in (solution, second))
+    moved = max(float(np.linalg.norm(one - one[0], axis=2).max()), STILL * float(np.abs(one).max()))
+    apart = np.linalg.norm(one - other, axis=2)
+    off = np.flatnonzero(apart.max(axis=1) > APART * moved)
+    if off.size == 0:
+        return None
+    farthest = int(np.argmax(apart.max(axis=0)))
+    label, own = model.sources[names[farthest]].label(), apart[:, farthest]
+    return Doubt(float(solution.t[off[0]]), options["tol"], label, float(own.max()), float(own[-1]), moved)
