@@ -26,7 +26,7 @@ def adams(
     ] = "adams",
     check: Annotated[
         bool | None,
-        typer.Option(help="Solve motions again at a hundredth of ERROR and compare; default: if it takes a second."),
+        typer.Option(help="Solve motions again at a hundredth of ERROR and compare; default: unless they are long."),
     ] = None,
     out: Annotated[
         Path | None,

@@ -1,4 +1,4 @@
-"""Whether a motion depends on the ERROR asked for: it is solved again at a hundredth, and where parts are is compared."""
+"""Whether a motion depends on the ERROR asked for: it is solved again at a hundredth, and places of parts compared."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ APART = 0.01
 STILL = 1e-6
 """Largest displacement, of the largest coordinate, up to which nothing moves."""
 CHEAP = 2_000_000
-"""Steps times unknowns, about a second's work, of an analysis that is checked without being asked for."""
+"""Steps times unknowns of an analysis that is checked without being asked for: about a second, without meshes."""
 
 
 @dataclass(frozen=True)

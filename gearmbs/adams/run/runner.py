@@ -102,7 +102,7 @@ def run_deck(
         (SFOSUB, ...); each takes a `gearmbs.adams.RoutineCall`.
     check : bool, optional
         Whether dynamic analyses are solved again at a hundredth of their error, and remarked if parts then go other
-        ways; without it those that take about a second at most are.
+        ways; without it all but long ones are, see `gearmbs.adams.run.convergence.CHEAP`.
 
     Returns
     -------
