@@ -10,11 +10,16 @@ import numpy as np
 
 from gearmbs.adams.builders.model import AdamsModel
 from gearmbs.dae.errors import ModelError
+from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 
 TIGHTER = 0.01
-TIGHTEST = 1e-13
-"""Least error asked for, near the rounding of the unknowns."""
+TIGHTEST = 1e-11
+"""Least error asked for: what is smaller may be rounding."""
+TELLING = 1e-9
+"""Error up to which a second run that does not reach the end says nothing of the first."""
+LONGER = 20
+"""Steps of the second run, in those of the first, after which it is given up."""
 APART = 0.01
 """Distance of two runs, of the largest displacement of a part, that is remarked."""
 STILL = 1e-6
@@ -92,9 +97,11 @@ def doubt(
     if tol >= options["tol"]:
         return None
     try:
-        second = again({**options, "tol": tol})
+        second = again({**options, "tol": tol, "max_steps": LONGER * (solution.stats.steps + 100)})
     except (ModelError, ArithmeticError) as error:
         return Doubt(float(solution.t[0]), options["tol"], stopped=f"{error}.")
+    if second.status is Status.TOO_MANY_STEPS or (not second.success and tol < TELLING):
+        return None
     if not second.success:
         return Doubt(float(second.t[-1]), options["tol"], stopped=second.message.partition(". ")[0].rstrip(".") + ".")
     names = [name for name in model.mechanism.bodies if name in model.sources]
