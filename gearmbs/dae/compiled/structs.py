@@ -155,7 +155,8 @@ class Struct:
 
 def _words_of(name: str, value: np.ndarray, kind: np.dtype, dimensions: int) -> tuple[int, ...]:
     """Return address and shape of an array that becomes a member."""
-    if value.dtype is kind and value.ndim == dimensions and value.size:
+    # numba's arrays have data types that equal numpy's, but are not the same objects
+    if value.dtype == kind and value.ndim == dimensions and value.size:
         try:
             # a fifth of the time that numpy takes to tell
             return _address_of(_byte_of(value)), *value.shape
@@ -168,7 +169,8 @@ def _words_of(name: str, value: np.ndarray, kind: np.dtype, dimensions: int) -> 
             f"{name} must be a contiguous array of type {kind.str[1:]} with {dimensions} dimensions, "
             f"is one of {value.dtype} of shape {shape}"
         )
-    return value.__array_interface__["data"][0], *shape
+    # an empty array stands nowhere
+    return value.__array_interface__["data"][0] if value.size else 0, *shape
 
 
 def _rebuild(cls: type[Struct], members: dict[str, Any]) -> Struct:

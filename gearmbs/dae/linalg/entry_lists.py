@@ -7,6 +7,13 @@ from numba import float64, int64, types, uint32
 
 from gearmbs._jit import njit
 
+FIELDS_BY_COLUMNS = (
+    "a_ptr", "a_pos", "a_src", "a_scale", "u_ptr", "u_pos", "u_col", "l_pos", "l_col", "row_from", "col_to",
+    "row_scale", "col_scale", "kept",
+)  # fmt: skip
+"""Fields of a plan in the order in which `entry_lists` returns them."""
+L_POS = FIELDS_BY_COLUMNS.index("l_pos")
+
 _VEC = float64[::1]
 _IVEC = int64[::1]
 _UVEC = uint32[::1]
@@ -106,3 +113,41 @@ def columns_of(ptr):
         for p in range(ptr[k], ptr[k + 1]):
             columns[p] = k
     return columns
+
+
+@njit(
+    types.Tuple((_IVEC, _UVEC, _UVEC, _VEC, _IVEC, _UVEC, _UVEC, _UVEC, _UVEC, _UVEC, _UVEC, _VEC, _VEC, _VEC))(
+        int64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _VEC, _VEC, _UVEC, _IVEC, _IVEC
+    ),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def entry_lists(rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices):
+    """Return the fields of a plan that say column by column what is done, and where its pivots come from.
+
+    Parameters
+    ----------
+    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols
+        Of `gearmbs.dae.linalg.pivoting.choose_pivots`.
+    row_scale, col_scale, taken, indptr, indices
+        Scales, and the entries that the plan is made for.
+
+    Returns
+    -------
+    fields : tuple of ndarray
+        `FIELDS_BY_COLUMNS`, see `gearmbs.dae.linalg.lu_plan.LUPlan`.
+    """
+    n = rows.shape[0]
+    row_place, col_place = places_of(rows), places_of(cols)
+    a_ptr, a_pos, a_src, a_scale = entries_in_order(indptr, indices, row_scale, col_scale, cols, row_place)
+    for e in range(a_src.shape[0]):
+        a_src[e] = taken[a_src[e]]
+    u_by_col, u_pos = upper_by_columns(u_ptr, u_cols, col_place)
+    l_pos = lower_by_columns(l_ptr, l_rows, row_place)
+    kept = np.zeros(n)
+    kept[:rank] = 1.0
+    return (
+        a_ptr, a_pos, a_src, a_scale, u_by_col, u_pos, columns_of(u_by_col), l_pos, columns_of(l_ptr),
+        rows.astype(np.uint32), cols.astype(np.uint32), row_scale[rows], col_scale[cols], kept,
+    )  # fmt: skip

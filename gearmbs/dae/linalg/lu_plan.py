@@ -20,13 +20,7 @@ from gearmbs.dae.linalg.counted_entries import (
     taken_pattern,
 )
 from gearmbs.dae.linalg.dense_tail import tail_of_plan, without_tail
-from gearmbs.dae.linalg.entry_lists import (
-    columns_of,
-    entries_in_order,
-    lower_by_columns,
-    places_of,
-    upper_by_columns,
-)
+from gearmbs.dae.linalg.entry_lists import FIELDS_BY_COLUMNS, L_POS, entry_lists
 from gearmbs.dae.linalg.nodes import has_nodes, nodes
 from gearmbs.dae.linalg.pivoting import (
     CANCELLED,
@@ -268,23 +262,14 @@ def _plan(
     tail = tail_of_plan(rank, l_ptr, u_ptr) if with_tail else len(rows)
     l_ptr, l_rows = without_tail(tail, l_ptr, l_rows)
     u_ptr, u_cols = without_tail(tail, u_ptr, u_cols)
-    row_place, col_place = places_of(rows), places_of(cols)
-    a_ptr, a_pos, a_src, a_scale = entries_in_order(indptr, indices, row_scale, col_scale, cols, row_place)
-    u_by_col, u_pos = upper_by_columns(u_ptr, u_cols, col_place)
-    l_pos = lower_by_columns(l_ptr, l_rows, row_place)
-    u_col, l_col = columns_of(u_by_col), columns_of(l_ptr)
-    node_end = nodes(l_ptr, l_pos)
-    if has_nodes(node_end) or tail < len(rows):
-        order = column_by_column(u_pos, u_col, l_pos, l_col)
+    lists = entry_lists(rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices)
+    f = dict(zip(FIELDS_BY_COLUMNS, lists, strict=True), l_ptr=l_ptr, node_end=nodes(l_ptr, lists[L_POS]))
+    if has_nodes(f["node_end"]) or tail < len(rows):
+        order = column_by_column(f["u_pos"], f["u_col"], f["l_pos"], f["l_col"])
     else:
-        order = schedule(rank, a_ptr, a_pos, u_by_col, u_pos, u_col, l_ptr, l_pos, l_col)
-    kept = np.zeros(len(rows))
-    kept[:rank] = 1.0
+        order = schedule(
+            rank, f["a_ptr"], f["a_pos"], f["u_ptr"], f["u_pos"], f["u_col"], l_ptr, f["l_pos"], f["l_col"]
+        )
     limit = np.full(len(taken) + len(left) if len(left) else 0, np.inf)
     limit[left] = left_limit
-    return LUPlan(
-        a_ptr=a_ptr, a_pos=a_pos, a_src=taken[a_src], a_scale=a_scale, u_ptr=u_by_col, u_pos=u_pos, l_ptr=l_ptr,
-        l_pos=l_pos, u_col=u_col, l_col=l_col, node_end=node_end, row_from=rows.astype(np.uint32),
-        col_to=cols.astype(np.uint32), row_scale=row_scale[rows], col_scale=col_scale[cols], kept=kept, left_src=left,
-        left_limit=left_limit, limit=limit, tail=tail, **order,
-    )  # fmt: skip
+    return LUPlan(left_src=left, left_limit=left_limit, limit=limit, tail=tail, **f, **order)

@@ -110,9 +110,113 @@ def _operations(rank, a_ptr, a_pos, u_ptr, u_pos, l_ptr, l_pos, level, l_at, u_a
     return a_to, levels, op_to, op_l, op_u
 
 
-def _bounds(levels: np.ndarray, count: int) -> np.ndarray:
-    """Return where each of ``count`` levels begins and ends in a list sorted by them, shape (count + 1,)."""
-    return np.concatenate(([0], np.cumsum(np.bincount(levels, minlength=count))))
+@njit(_IVEC(_IVEC, int64, int64), cache=True, nogil=True, error_model="numpy")
+def _bounds(levels, size, count):
+    """Return where each of ``count`` levels begins and ends in a list of the first ``size`` sorted by them."""
+    bounds = np.zeros(count + 1, dtype=np.int64)
+    for e in range(size):
+        bounds[levels[e] + 1] += 1
+    for level in range(count):
+        bounds[level + 1] += bounds[level]
+    return bounds
+
+
+@njit(_UVEC(_UVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
+def _taken(items, order):
+    """Return items in an order."""
+    out = np.empty(order.shape[0], dtype=np.uint32)
+    for e in range(order.shape[0]):
+        out[e] = items[order[e]]
+    return out
+
+
+@njit(_IVEC(_IVEC, int64), cache=True, nogil=True, error_model="numpy")
+def _numbered(order, first):
+    """Return the number of each item if they are numbered from ``first`` on in an order."""
+    at = np.empty(order.shape[0], dtype=np.int64)
+    for e in range(order.shape[0]):
+        at[order[e]] = first + e
+    return at
+
+
+@njit(types.UniTuple(_IVEC, 2)(int64, _IVEC, _UVEC, _UVEC), cache=True, nogil=True, error_model="numpy")
+def _orders_of_substitution(n, order, u_pos, u_col):
+    """Return the order in which U is gone through, from its end; and pivots by level, those set aside last.
+
+    ``order`` sorts proper pivots by their levels.
+    """
+    size = u_pos.shape[0]
+    back = _sorted_by(_times(u_pos[::-1].copy(), u_col[::-1].copy(), n))
+    u_order = np.empty(size, dtype=np.int64)
+    for e in range(size):
+        u_order[size - 1 - e] = size - 1 - back[e]
+    by_level = np.empty(n, dtype=np.int64)
+    for k in range(n):
+        by_level[k] = order[k] if k < order.shape[0] else k
+    return u_order, by_level
+
+
+@njit(
+    types.Tuple((_UVEC, _UVEC, _UVEC, _UVEC, _UVEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _IVEC, _UVEC, _UVEC))(
+        int64, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _IVEC, _UVEC, _UVEC
+    ),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def _schedule(rank, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col):
+    """Return what `schedule` returns, in its order.
+
+    Parameters
+    ----------
+    rank, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col
+        See there.
+    """
+    n = l_ptr.shape[0] - 1
+    below, above = l_pos.shape[0], u_pos.shape[0]
+    level = _levels(u_ptr, u_pos)
+    count = 0
+    for k in range(rank):
+        count = max(count, level[k] + 1)
+    l_order = _sorted_by(_times(l_pos, l_col, n))
+    u_order, by_level = _orders_of_substitution(n, _sorted_by(level[:rank].copy()), u_pos, u_col)
+    l_at, u_at = _numbered(l_order, 0), _numbered(u_order, below)
+    pivot_at = _numbered(by_level, below + above)
+    a_to, levels, op_to, op_l, op_u = _operations(
+        rank, a_ptr, a_pos, u_ptr, u_pos, l_ptr, l_pos, level, l_at, u_at, pivot_at
+    )
+    order = _sorted_by(_times(op_to, op_u, below + above + n))
+    order = order[_sorted_by(levels[order])]
+    l_level = np.empty(below, dtype=np.int64)
+    for q in range(below):
+        l_level[q] = level[l_col[q]]
+    divided = _sorted_by(l_level)
+    div_to, div_by = np.empty(below, dtype=np.uint32), np.empty(below, dtype=np.uint32)
+    for e in range(below):
+        div_to[e] = l_at[divided[e]]
+        div_by[e] = pivot_at[l_col[divided[e]]]
+    return (
+        _taken(l_pos, l_order),
+        _taken(l_col, l_order),
+        _taken(u_pos, u_order),
+        _taken(u_col, u_order),
+        a_to,
+        _bounds(level, rank, count),
+        by_level.astype(np.uint32),
+        _bounds(levels, levels.shape[0], count),
+        _taken(op_to, order),
+        _taken(op_l, order),
+        _taken(op_u, order),
+        _bounds(l_level, below, count),
+        div_to,
+        div_by,
+    )
+
+
+FIELDS = (
+    "l_to", "l_by", "u_to", "u_by", "a_to", "pivot_ptr", "pivot_order", "op_ptr", "op_to", "op_l", "op_u", "div_ptr",
+    "div_to", "div_by",
+)  # fmt: skip
 
 
 def schedule(
@@ -136,40 +240,8 @@ def schedule(
     a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col : ndarray
         See `LUPlan`.
     """
-    n = len(l_ptr) - 1
-    level = _levels(u_ptr, u_pos)
-    count = int(level[:rank].max(initial=-1)) + 1
-    by_level = np.append(_sorted_by(level[:rank]), np.arange(rank, n))
-    # U is gone through from its end
-    l_order = _sorted_by(_times(l_pos, l_col, n))
-    u_order = (len(u_pos) - 1 - _sorted_by(_times(u_pos[::-1].copy(), u_col[::-1].copy(), n)))[::-1]
-    l_at, u_at, pivot_at = (np.empty(size, dtype=np.int64) for size in (len(l_pos), len(u_pos), n))
-    l_at[l_order] = np.arange(len(l_pos))
-    u_at[u_order] = len(l_pos) + np.arange(len(u_pos))
-    pivot_at[by_level] = len(l_pos) + len(u_pos) + np.arange(n)
-    a_to, levels, op_to, op_l, op_u = _operations(
-        rank, a_ptr, a_pos, u_ptr, u_pos, l_ptr, l_pos, level, l_at, u_at, pivot_at
-    )
-    order = _sorted_by(_times(op_to, op_u, len(l_pos) + len(u_pos) + n))
-    order = order[_sorted_by(levels[order])]
-    l_level = level[l_col]
-    divided = _sorted_by(l_level)
-    return {
-        "l_to": l_pos[l_order],
-        "l_by": l_col[l_order],
-        "u_to": u_pos[u_order],
-        "u_by": u_col[u_order],
-        "a_to": a_to,
-        "pivot_ptr": _bounds(level[:rank], count),
-        "pivot_order": by_level.astype(np.uint32),
-        "op_ptr": _bounds(levels, count),
-        "op_to": op_to[order],
-        "op_l": op_l[order],
-        "op_u": op_u[order],
-        "div_ptr": _bounds(l_level, count),
-        "div_to": l_at[divided].astype(np.uint32),
-        "div_by": pivot_at[l_col[divided]].astype(np.uint32),
-    }
+    fields = _schedule(rank, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col)
+    return dict(zip(FIELDS, fields, strict=True))
 
 
 def column_by_column(
