@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 
 from gearmbs._jit import njit
+from gearmbs.dae.equations import layout as tables
+from gearmbs.dae.equations.expression_loads import value
+from gearmbs.dae.equations.update import update_tables
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.integrators.events import STOP
 from gearmbs.dae.problem import EVENTS_SIG, DAEProblem
@@ -34,10 +37,20 @@ class StopAt:
 
 @njit(EVENTS_SIG, cache=True, nogil=True, error_model="numpy")
 def passes(t, y, yp, out, idata, rdata, work):
-    """Write by how much states exceed their values: both stand at the ends of the tables, their number last."""
+    """Write by how much states exceed their values: both stand at the ends of the tables, their number last.
+
+    An algebraic state is taken from its expression. Between the ends of a step the polynomial through its values would
+    pass where its function jumps later.
+    """
     count = idata[idata.size - 1]
+    tab = tables.unpack(idata, rdata, work)
+    update_tables(t, y, tab, False)
     for k in range(count):
-        out[k] = y[idata[idata.size - 1 - count + k]] - rdata[rdata.size - count + k]
+        place = idata[idata.size - 1 - count + k]
+        state = tab.state[place - idata[tables.H_Z]]
+        given = state[tables.STATE_KIND] != tables.STATE_DIFFERENTIAL and state[tables.STATE_TAPE] >= 0
+        now = value(state[tables.STATE_TAPE], t, y, tab) if given else y[place]
+        out[k] = now - rdata[rdata.size - count + k]
 
 
 def with_stops(problem: DAEProblem, names: Sequence[str], first: int, stops: Sequence[StopAt]) -> DAEProblem:

@@ -7,6 +7,7 @@ import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
 from gearmbs.adams.results.msg import message_text
+from gearmbs.adams.run.sensors import in_unit
 from gearmbs.mechanism import Mechanism, ModelError
 from gearmbs.mechanism.stops import StopAt
 
@@ -137,6 +138,41 @@ def test_stops_of_a_mechanism():
         m.simulate(1.0, stops=[StopAt("depth")])
     with pytest.raises(ModelError, match="WSTIFF or GSTIFF"):
         m.simulate(1.0, stops=[StopAt("height")], integrator="IDA")
+
+
+@pytest.mark.parametrize(("unit", "scale", "g"), [("SECOND", 1.0, "-10"), ("MILLISECOND", 1e-3, "-1E-5")])
+def test_a_sensor_fires_where_its_function_jumps(unit, scale, g):
+    """A sawtooth passes its value downwards after a quarter of each tooth, and jumps up through it at the end."""
+    tooth = 0.003 / scale
+    sensor = f"SENSOR/1, GE, VALUE={0.25 * tooth}, FUNCTION={0.5 * tooth}-MOD(TIME,{tooth}), RESTART, DT={tooth / 7}"
+    deck = DECK.format(sensor=sensor, start=", QG=0,0,10")
+    deck = deck.replace("TIME=SECOND", f"TIME={unit}").replace("KGRAV=-10", f"KGRAV={g}")
+    script = parse_script(f"m\no\nSIMULATE/DYNAMICS, END={6.2 * tooth}, STEPS=20\n")
+    result = run_deck(parse_deck(deck), script)
+    ends = [segment.solution.t[-1] for segment in result.segments]
+    # met at the start, too
+    expected = 0.003 * np.sort(np.r_[0.0, np.arange(6) + 0.25, np.arange(1, 7), 6.2])
+    assert message_text(result).count("is GE") == 7
+    np.testing.assert_allclose(ends, expected, rtol=1e-14)
+
+
+def test_a_sensor_fires_where_a_function_of_the_position_jumps():
+    """A body that falls through 5 m after 1 s: the sign of its height jumps there."""
+    result = run("SENSOR/1, LE, VALUE=-0.9, FUNCTION=IF(DZ(20)-5:-1,0,1), RETURN")
+    assert result.t[-1] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_sensor_that_puts_its_function_back_for_ever_is_ended():
+    sensor = "SENSOR/1, GE, VALUE=0.5, FUNCTION=TIME-SENVAL(1), EVALUATE=SENVAL(1)+1E-12, ERROR=1E-13"
+    with pytest.raises(DeckError, match=r"SENSOR/1: it fires again and again at TIME = 0\.5; what it evaluates"):
+        run(sensor)
+
+
+def test_times_are_rounded_upwards_to_the_unit():
+    times = np.random.default_rng(1).uniform(0.0, 10.0, 300)
+    found = np.array([in_unit(t, 1e-3) for t in times])
+    assert (found * 1e-3 >= times).all()
+    np.testing.assert_allclose(found, 1e3 * times, rtol=1e-15)
 
 
 SPRING = """pulled

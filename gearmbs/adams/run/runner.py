@@ -28,7 +28,7 @@ from gearmbs.adams.run.equilibria import equilibria_to_passage
 from gearmbs.adams.run.plant import plant_of
 from gearmbs.adams.run.samples import parts, renew, take_samples
 from gearmbs.adams.run.script_check import check_linear, check_script, is_sequence
-from gearmbs.adams.run.sensors import MOST, Watch, act, after, up_to
+from gearmbs.adams.run.sensors import Watch, act, after, in_unit, up_to
 from gearmbs.adams.run.session import Session, active_sensors, change, output_times, switch
 from gearmbs.dae.analyses.kinematic_analysis import kinematic
 from gearmbs.dae.analyses.modes import Modes
@@ -278,12 +278,12 @@ def _span(
             watch.note_passage(sensor, RequestEvaluator(segment.model, segment.solution))
         if any(s.halt for s in loud):
             return False, True
-        times = after(times, session.time, loud)
+        whole, times = times, after(times, session.time, loud)
         if not fired or times.size < 2 or any(s.back for s in loud):
             return True, any(s.back for s in loud)
-        watch.parts += 1
-        if watch.parts > MOST:
-            message = f"{fired[0].label()}: it fired {MOST} times in one analysis; its function chatters"
+        endless = watch.endless(whole, session.time)
+        if endless:
+            message = f"{fired[0].label()}: {endless}"
             raise DeckError([Diagnostic(ERROR, message, session.deck.file, fired[0].line)])
 
 
@@ -372,12 +372,13 @@ def _to_passage(
         return equilibria_to_passage(watch, model, times * scale, solution, STATIC_TOLERANCE)
     if solution.result.status != Status.TERMINAL_EVENT:
         return solution, []
-    end, fired = watch.passed(solution)
-    if up_to(times, end / scale).size < 2:
+    passage, fired = watch.passed(solution)
+    reached = up_to(times, in_unit(passage, scale))
+    if reached.size < 2:
         # at once, as where two sensors fire together
         return initial_conditions(model.mechanism.compile(float(times[0]) * scale)), fired
     # again, to end at the very time: the steps up to it are the same
-    return _solve(session, command, "DYNAMICS", model, up_to(times, end / scale), options, False)[0], fired
+    return _solve(session, command, "DYNAMICS", model, reached, options, False)[0], fired
 
 
 def _frozen(session: Session, model: AdamsModel) -> str | None:

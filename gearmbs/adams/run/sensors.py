@@ -23,6 +23,8 @@ from gearmbs.mechanism.stops import StopAt
 DIRECTIONS = {"GE": 1, "LE": -1, "EQ": 0}
 MOST = 10_000
 """Passages in one analysis after which a sensor is taken to chatter."""
+AT_ONCE = 100
+"""Passages at one time, besides one of each sensor, after which they are taken to go on there for ever."""
 SAME = 1e-9
 """Of the span of an analysis: output times nearer to a passage are that time."""
 
@@ -38,6 +40,8 @@ class Watch:
         By id of a sensor that has fired: the direction in which its function is expected to pass next.
     parts : int
         Carried out so far.
+    at_once : int
+        Parts in which time has not gone on, since the last in which it has.
     first_step : float or None
         That a STEPSIZE asks for, in the deck's unit.
     """
@@ -45,6 +49,7 @@ class Watch:
     sensors: list[st.Sensor]
     waits: dict[int, int] = field(default_factory=dict)
     parts: int = 0
+    at_once: int = 0
     first_step: float | None = None
 
     def stops(self) -> list[StopAt]:
@@ -102,6 +107,17 @@ class Watch:
                     del self.waits[sensor.id]
         return found
 
+    def endless(self, times: np.ndarray, now: float) -> str:
+        """Count a part that was to go through ``times`` and has ended at ``now``; say why there are too many, if so."""
+        self.parts += 1
+        self.at_once = self.at_once + 1 if now - times[0] <= SAME * (times[-1] - times[0]) else 0
+        if self.at_once > AT_ONCE + len(self.sensors):
+            return (
+                f"it fires again and again at TIME = {now:.9g}; what it evaluates there, or a jump of its function, "
+                "puts the function back behind its VALUE"
+            )
+        return f"it fired {MOST} times in one analysis; its function chatters" if self.parts > MOST else ""
+
     def note_passage(self, sensor: st.Sensor, evaluator: RequestEvaluator) -> None:
         """Expect a sensor's function back from where it went."""
         values = evaluator.state(sensor_state(sensor.id)) - sensor.value
@@ -111,6 +127,15 @@ class Watch:
         came = -1.0 if values.size < 2 else float(np.sign(values[-2]))
         rising = DIRECTIONS[sensor.relation] or (1 if came < 0.0 else -1)
         self.waits[sensor.id] = -rising
+
+
+def in_unit(time: float, scale: float) -> float:
+    """Return a time, s, in the deck's unit of ``scale`` seconds: rounded so that it is not before that time again.
+
+    A function that jumps has not passed yet a rounding error before it does.
+    """
+    found = time / scale
+    return found if found * scale >= time else float(np.nextafter(found, np.inf))
 
 
 def up_to(times: np.ndarray, end: float) -> np.ndarray:

@@ -8,7 +8,10 @@ from gearmbs._jit import njit
 from gearmbs.dae.dense_output import combine, lagrange_weights
 from gearmbs.dae.integrators.history import copy, rows_from, times_from
 
+SECANTS = 20
+"""Tries by secants; the root of a smooth function takes some ten."""
 ROOT_ITERATIONS = 80
+"""Tries in all; the last 60 halve what is left, to rounding whatever the function does: a jump has no root."""
 ROOT_EPS = 4e-16
 
 RECORD = 0
@@ -39,7 +42,7 @@ def write_outputs(t, st):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _root(functions, st, which):
-    """Return the time in the last step where event ``which`` changes sign (Illinois method on the polynomial).
+    """Return where in the last step event ``which`` changes sign: Illinois method on the polynomial, then bisection.
 
     ``st.g_new`` comes in with the event functions at the end of the step, and is overwritten.
     """
@@ -49,11 +52,11 @@ def _root(functions, st, which):
     fa = st.g_old[which]
     fb = g[which]
     side = 0
-    for _ in range(ROOT_ITERATIONS):
+    for k in range(ROOT_ITERATIONS):
         if fb == 0.0 or abs(b - a) <= ROOT_EPS * max(abs(a), abs(b)):
             break
         t = b - fb * (b - a) / (fb - fa)
-        if not (min(a, b) < t < max(a, b)):
+        if k >= SECANTS or not (min(a, b) < t < max(a, b)):
             t = 0.5 * (a + b)
             if t == a or t == b:
                 break

@@ -186,6 +186,19 @@ def test_directions_and_several_events():
     np.testing.assert_allclose(result.y_events[2][:, 1], 0.5, atol=1e-12)
 
 
+@pytest.mark.parametrize(("below", "above"), [(1.0, 1.0), (1e9, 1.0), (1.0, 1e9)])
+def test_a_jump_is_found_to_rounding(below, above):
+    """A function that jumps through zero has no root, and its values say nothing of where it jumps."""
+
+    def event(t, y, yp):
+        return -below if t < 0.7312 else above
+
+    event.terminal = True
+    result = solve_dae(falling, (0.0, 1.0), [10.0, 0.0], events=event)
+    assert result.t[-1] == pytest.approx(0.7312, rel=1e-15)
+    assert result.t[-1] >= 0.7312
+
+
 def test_restart_at_an_event():
     """A spring that acts on one side only: the run lands on each contact and starts afresh at order one there."""
 
