@@ -189,7 +189,8 @@ def limited(seconds: float) -> Iterator[None]:
         raise Slow(f"longer than {seconds} s")
 
     signal.signal(signal.SIGPROF, late)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
+    # again and again: one that is raised within a user's function may be taken for that function's error
+    signal.setitimer(signal.ITIMER_PROF, seconds, 1.0)
     try:
         yield
     finally:

@@ -35,7 +35,8 @@ from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, LUFactors, factor, new_fa
 from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 
-FIRST_CHUNK = 256
+FIRST_CHUNK = 16
+"""Accepted steps, so that the first Ctrl-C is heeded within a second where a step takes 60 ms."""
 CHUNK_SECONDS = 0.05
 SINGULAR_RETRIES = 8
 DROP_ROUNDS_ALLOWED = 3
@@ -257,9 +258,8 @@ class Run:
             return self.user_failure() if self.user_exception() is not None else failure
         elif code == s.BUFFER_FULL:
             self.records.drain()
-            if self.options.consumer is not None:
-                # its buffer is smaller than a chunk of steps
-                self._report()
+            # a chunk of small steps may be more than the buffer holds, and never end otherwise
+            self._report()
         return None
 
     def _report(self) -> None:

@@ -6,8 +6,11 @@ from dataclasses import dataclass
 
 WINDOW = 50_000
 """Steps that are looked at together."""
-HOPELESS = 1e12
-"""Steps to the end of the span, at the rate of the last window, from which on a run that does not speed up is ended."""
+HOPELESS = 1e10
+"""Steps to the end of the span, at the rate of the last window, from which on a run that does not speed up is ended.
+
+The smallest models take a day for so many, and what is kept of each, 24 bytes, comes to 240 GB.
+"""
 
 
 @dataclass

@@ -15,6 +15,12 @@ def test_a_run_that_creeps_is_stalled_after_two_windows():
     assert watch.progress == pytest.approx(1e-10)
 
 
+def test_the_bound_is_what_a_machine_can_keep():
+    """Of a deck that spins up: 50 000 steps of 8e-13 s each on the way to 0.05 s."""
+    watch = StallWatch(150_000, 1.09e-5, progress=1.7e-7)
+    assert watch.steps_needed(200_000, 1.09e-5 + 4.0e-8, 0.05) == pytest.approx(6.2e10, rel=0.01)
+
+
 def test_a_run_without_any_progress_is_stalled():
     watch = StallWatch(0, 0.0, progress=1e-12)
     assert watch.steps_needed(WINDOW, 0.0, 1.0) == np.inf
