@@ -26,7 +26,7 @@ def adams(
     ] = "adams",
     check: Annotated[
         bool | None,
-        typer.Option(help="Solve motions again at a hundredth of ERROR and compare; default: unless they are long."),
+        typer.Option(help="Solve motions again at a hundredth of ERROR and compare; default: if that is quick."),
     ] = None,
     out: Annotated[
         Path | None,

@@ -37,6 +37,7 @@ INSTEAD_OF_FUNCTIONS: dict[str, str] = {
     "DELAY": "a TFSISO that approximates the delay",
     "INTERP": "CUBSPL or AKISPL of a SPLINE",
     "INVPSD": "a SPLINE of the signal",
+    "MODE": "read in decks, without brackets",
     "NFORCE": "the forces of BEAM or FIELD",
     "RANDOM": "a SPLINE of the signal",
     "SENVAL": "read where a SENSOR has its id",

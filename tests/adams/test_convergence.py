@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gearmbs.adams import parse_deck, run_deck
+from gearmbs.adams.run import convergence
 
 DECK = """pendulum
 UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=MILLIMETER, TIME=SECOND
@@ -43,3 +44,9 @@ def test_one_that_hangs_and_swings_is_not(error):
 
 def test_it_can_be_left_away():
     assert not remarks(100, 1e-2, check=False)
+
+
+def test_it_is_left_away_where_it_takes_long_and_is_not_asked_for(monkeypatch):
+    monkeypatch.setattr(convergence, "CHEAP", 1000)
+    assert not remarks(100, 1e-2)
+    assert remarks(100, 1e-2, check=True)

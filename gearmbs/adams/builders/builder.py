@@ -16,7 +16,7 @@ import numpy as np
 from gearmbs.adams.builders.accelerations import FUNCTIONS, Accelerations
 from gearmbs.adams.builders.control import state_system
 from gearmbs.adams.builders.curve_data import curve_points
-from gearmbs.adams.builders.data_calls import translated
+from gearmbs.adams.builders.data_calls import Present, translated
 from gearmbs.adams.builders.frames import inertia_about_cm, marker_orientation, part_orientation
 from gearmbs.adams.builders.held_bodies import add_point_mass, hold
 from gearmbs.adams.builders.implicit import diff_name, implicit_states
@@ -82,10 +82,10 @@ class Builder:
         inactive: frozenset[tuple[str, int]],
         state: Mapping[tuple[str, int], BodyState],
         span: tuple[float, float],
-        sensed: Mapping[int, float],
+        present: Present,
     ) -> None:
         self.deck = deck
-        self.sensed = sensed
+        self.present = present
         self.span = span
         self.state = state
         self.units = deck.units
@@ -95,7 +95,7 @@ class Builder:
         # in decks a text is an expression in the deck's units, and checked with its line
         self.mechanism.reads_units = False
         self.mechanism.redundancy = "adams"
-        self.model = AdamsModel(self.mechanism, deck, sensed=sensed)
+        self.model = AdamsModel(self.mechanism, deck, present=present)
         self.accelerations = Accelerations(self)
         self.markers = Markers()
         self.joints: dict[int, Joint] = {}
@@ -252,7 +252,7 @@ class Builder:
                 return Number(0.0, call.at) if (kind, first.integer) in self.model.pairs else call
             return replaced(call, args=(Name(name, first.at), *call.args[1:]))
 
-        return translated(self.deck, self.sensed, source, rename)
+        return translated(self.deck, self.present, source, rename)
 
     # --- parts and markers --------------------------------------------------------------------------
 

@@ -1,9 +1,11 @@
-"""Functions of a deck's data elements in terms of those that mechanisms know: SENVAL, CURVE, ARYVAL of variables."""
+"""Functions of a deck in terms of those that mechanisms know: SENVAL, CURVE, ARYVAL of variables, MODE."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
 
 from gearmbs.adams.builders.control import state_systems
 from gearmbs.adams.builders.curve_data import curve_points
@@ -14,9 +16,34 @@ from gearmbs.mechanism.expression_syntax import Call, Chain, Name, Node, Number,
 from gearmbs.mechanism.expression_syntax import parse as parsed
 
 CONCERNED = re.compile(r"\b(SENVAL|CURVE|ARYVAL|DIF|DIF1)\s*\(", re.IGNORECASE)
+MODE = re.compile(r"\bMODE\b(?!\s*\()", re.IGNORECASE)
+
+MODES = {
+    "KINEMATICS": 1, "INITIAL_CONDITIONS": 3, "DYNAMICS": 4, "TRANSIENT": 4, "STATICS": 5, "QUASI_STATICS": 6,
+    "LINEAR": 7,
+}  # fmt: skip
+"""What MODE is in each analysis."""
 
 
-def data_call(deck: Deck, sensed: Mapping[int, float], call: Call) -> Node:
+class Present(NamedTuple):
+    """What functions of the deck ask for that is constant during an analysis.
+
+    Attributes
+    ----------
+    mode : int
+        Which analysis it is: MODE.
+    sensed : mapping of int to float
+        What sensors have evaluated, by id: SENVAL.
+    """
+
+    mode: int = MODES["DYNAMICS"]
+    sensed: Mapping[int, float] = MappingProxyType({})
+
+
+IN_DYNAMICS = Present()
+
+
+def data_call(deck: Deck, present: Present, call: Call) -> Node:
     """Return what a call stands for; others as they are.
 
     SENVAL(s) is the number that sensor s evaluated last, 0 before; ARYVAL(a, k) of an array of variables is VARVAL of
@@ -25,7 +52,7 @@ def data_call(deck: Deck, sensed: Mapping[int, float], call: Call) -> Node:
     """
     numbers = [a.integer if isinstance(a, Number) else None for a in call.args]
     if call.name == "SENVAL" and len(numbers) == 1 and numbers[0] in deck.of(st.Sensor):
-        return Number(sensed.get(numbers[0] or 0, 0.0), call.at)
+        return Number(present.sensed.get(numbers[0] or 0, 0.0), call.at)
     if call.name == "ARYVAL" and len(numbers) == 2 and numbers[0] is not None and numbers[1] is not None:
         array = deck.of(st.Array).get(numbers[0])
         if array is not None and 1 <= numbers[1] <= len(array.variables):
@@ -79,13 +106,14 @@ def _curve(deck: Deck, call: Call, numbers: list[int | None]) -> Node:
     return Chain(scale, (("*", value),), at)
 
 
-def translated(deck: Deck, sensed: Mapping[int, float], text: str, rename: Callable[[Call], Node] | None = None) -> str:
-    """Return an expression with the calls of data elements replaced, and then those that ``rename`` knows."""
+def translated(deck: Deck, present: Present, text: str, rename: Callable[[Call], Node] | None = None) -> str:
+    """Return an expression with MODE and calls of data elements replaced, and then those that ``rename`` knows."""
+    text = MODE.sub(str(present.mode), text)
     if rename is None and CONCERNED.search(text) is None:
         return text
 
     def both(call: Call) -> Node:
-        found = data_call(deck, sensed, call)
+        found = data_call(deck, present, call)
         return rename(found) if rename is not None and found is call else found
 
     return unparse(parsed(text), both)

@@ -9,6 +9,7 @@ from gearmbs.adams.builders.builder import Builder, Maker
 from gearmbs.adams.builders.constraints import CONSTRAINTS
 from gearmbs.adams.builders.contacts import CONTACTS
 from gearmbs.adams.builders.curves import CURVES
+from gearmbs.adams.builders.data_calls import IN_DYNAMICS, Present
 from gearmbs.adams.builders.fe_parts import add_fe_load, add_fe_part, add_node_marker
 from gearmbs.adams.builders.flexible import add_flex_body, add_flexible_marker
 from gearmbs.adams.builders.forces import FORCES
@@ -49,7 +50,7 @@ def build_model(
     inactive: frozenset[tuple[str, int]] = frozenset(),
     state: Mapping[tuple[str, int], BodyState] | None = None,
     span: tuple[float, float] = (0.0, 1.0),
-    sensed: Mapping[int, float] | None = None,
+    present: Present = IN_DYNAMICS,
 ) -> AdamsModel:
     """Build the mechanism of a deck.
 
@@ -65,8 +66,8 @@ def build_model(
     span : tuple of float
         Start of the analysis and about its end, in the deck's unit; motions given by their velocity or acceleration
         start from it.
-    sensed : mapping of int to float, optional
-        What sensors have evaluated, by id.
+    present : Present
+        What is constant during the analysis: its MODE, and what sensors have evaluated.
 
     Returns
     -------
@@ -79,7 +80,7 @@ def build_model(
     """
     if deck.unsupported and not allow_unsupported:
         raise DeckError(deck.unsupported)
-    builder = Builder(deck, inactive, state or {}, span, sensed or {})
+    builder = Builder(deck, inactive, state or {}, span, present)
     if builder.add_bodies(DEFORMING, ON_NODES):
         builder.name_elements()
         builder.add_data()

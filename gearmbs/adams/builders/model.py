@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gearmbs.adams.builders.control import state_systems
-from gearmbs.adams.builders.data_calls import translated
+from gearmbs.adams.builders.data_calls import IN_DYNAMICS, Present, translated
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
@@ -61,8 +60,8 @@ class AdamsModel:
         (kind, id) -> (I marker id, J marker id or None) of everything that transmits a force.
     sources : dict
         Name in the mechanism -> statement.
-    sensed : mapping of int to float
-        What sensors have evaluated.
+    present : Present
+        What is constant during the analysis.
     initial_motions : list
         Joints with initial conditions: joint, "rotation" or "translation", displacement and velocity in deck units.
     beams : dict of int to dict
@@ -74,7 +73,7 @@ class AdamsModel:
     names: dict[tuple[str, int], str] = field(default_factory=dict)
     pairs: dict[tuple[str, int], tuple[int, int | None]] = field(default_factory=dict)
     sources: dict[str, st.Statement] = field(default_factory=dict)
-    sensed: Mapping[int, float] = field(default_factory=dict)
+    present: Present = IN_DYNAMICS
     initial_motions: list[tuple[Joint, str, tuple[float, ...]]] = field(default_factory=list)
     beams: dict[int, dict[int, str]] = field(default_factory=dict)
 
@@ -86,13 +85,13 @@ class AdamsModel:
             markers[m.name.upper()] = marker_index[id(m)]
             if m.number is not None:
                 markers[m.number] = marker_index[id(m)]
-        variables = {v.id: translated(deck, self.sensed, v.function or "") for v in deck.of(st.Variable).values()}
+        variables = {v.id: translated(deck, self.present, v.function or "") for v in deck.of(st.Variable).values()}
         return Scope(
             markers=markers,
             marker_body=marker_body,
             variables=variables,  # type: ignore[arg-type]
             diffs={
-                d.id: None if d.implicit else translated(deck, self.sensed, d.function or "0")
+                d.id: None if d.implicit else translated(deck, self.present, d.function or "0")
                 for d in deck.of(st.Diff).values()
             }
             | {name: text for _, system in state_systems(deck) for name, text in zip(system.names, system.rates())},

@@ -137,7 +137,7 @@ class RequestEvaluator:
 
     def expression(self, text: str) -> np.ndarray:
         """Return the values of an expression over time, in the deck's units, shape (m,)."""
-        text = translated(self.model.deck, self.model.sensed, text)
+        text = translated(self.model.deck, self.model.present, text)
         tape = compile_expression(text, self.scope, accelerations=True)
         m = self.solution.t.size
         y = np.zeros((m, max(1, len(tape.algebraic))))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.adams.builders.control import hold_states
+from gearmbs.adams.builders.data_calls import MODES, Present
 from gearmbs.adams.builders.initial import part_states, with_initial_motions
 from gearmbs.adams.builders.mechanism import build_model
 from gearmbs.adams.builders.model import AdamsModel
@@ -102,7 +103,7 @@ def run_deck(
         (SFOSUB, ...); each takes a `gearmbs.adams.RoutineCall`.
     check : bool, optional
         Whether dynamic analyses are solved again at a hundredth of their error, and remarked if parts then go other
-        ways; without it all but long ones are, see `gearmbs.adams.run.convergence.CHEAP`.
+        ways; without it those are for which this takes about a second, see `gearmbs.adams.run.convergence.CHEAP`.
 
     Returns
     -------
@@ -304,7 +305,7 @@ def _part(
     model = None
     fired: list[st.Sensor] = []
     try:
-        model = _model(session, allow_unsupported, (session.time, float(times[-1])))
+        model = _model(session, allow_unsupported, (session.time, float(times[-1])), _mode(kind, times))
         options, note = _settings(session, tol)
         if kind == "STATICS":
             note = _frozen(session, model)
@@ -438,13 +439,13 @@ def _linear(session: Session, command: Linear, allow_unsupported: bool) -> Modes
     time = session.time * session.deck.units.time
 
     def build(given: Session) -> tuple[AdamsModel, System]:
-        made = _model(given, allow_unsupported, (session.time, session.time))
+        made = _model(given, allow_unsupported, (session.time, session.time), MODES["LINEAR"])
         return made, made.mechanism.compile(time)
 
     try:
         if command.statemat:
             return plant_of(session, command, build)
-        model = _model(session, allow_unsupported, (session.time, session.time))
+        model = _model(session, allow_unsupported, (session.time, session.time), MODES["LINEAR"])
         return linear_modes(model.mechanism, t=time)
     except (ModelError, ArithmeticError) as error:
         raise _failed(session, command, model, error) from error
@@ -468,17 +469,23 @@ def _line(model: AdamsModel | None, message: str) -> int:
     return min(places, default=(0, 0))[1]
 
 
-def _model(session: Session, allow_unsupported: bool, span: tuple[float, float]) -> AdamsModel:
+def _mode(kind: str, times: np.ndarray) -> int:
+    """Return the MODE of an analysis."""
+    return MODES["QUASI_STATICS" if kind == "STATICS" and times.size > 1 else kind]
+
+
+def _model(session: Session, allow_unsupported: bool, span: tuple[float, float], mode: int) -> AdamsModel:
     """Build the mechanism of the session's present state."""
+    present = Present(mode, session.sensed)
     inactive = frozenset(session.inactive)
     if session.state is None:
         session.state = {}
-        model = build_model(session.deck, allow_unsupported, inactive, span=span, sensed=session.sensed)
+        model = build_model(session.deck, allow_unsupported, inactive, span=span, present=present)
         model.mechanism.redundancy = session.redundancy
         if not model.initial_motions:
             return model
         session.state = with_initial_motions(model)
-    model = build_model(session.deck, allow_unsupported, inactive, session.state, span, session.sensed)
+    model = build_model(session.deck, allow_unsupported, inactive, session.state, span, present)
     model.mechanism.redundancy = session.redundancy
     model.mechanism.turns.update(session.turns)
     for name, state in zip(model.mechanism.state_names, model.mechanism.every_state):

@@ -126,7 +126,9 @@ def expression_errors(model: AdamsModel, session: Session) -> list[Diagnostic]:
             left_out = False
             try:
                 tape = compile_expression(
-                    translated(deck, {}, text), scope, accelerations=not isinstance(statement, (st.Motion, st.Gcon))
+                    translated(deck, model.present, text),
+                    scope,
+                    accelerations=not isinstance(statement, (st.Motion, st.Gcon)),
                 )
                 message = _misplaced(statement, text, tape)
             except ExpressionError as error:

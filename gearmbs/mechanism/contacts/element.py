@@ -192,6 +192,11 @@ class SolidContact(ForceElement):
             found += [((k, m), one, other) for one, other in product(*sides)]
         return found
 
+    def triangles(self) -> int:
+        """Return how many triangles the solids of faceted pairs have; those of a solid count in each of its pairs."""
+        faceted = [pair for _, *pair in self.pairs() if pair_family(self.name, *pair)[0] == kernel.FACETS]
+        return sum(len(shape.facets()[1]) for pair in faceted for shape in pair)
+
     def exact(self) -> bool:
         """Whether the geometry of all pairs is exact; else one is faceted."""
         pairs = product(self.solids_i, self.solids_j)
