@@ -60,8 +60,8 @@ class DAEProblem:
     n_events : int
         Number of event functions.
     hook_interval : callable, optional
-        Longest time that may pass, from the unknowns y, until ``hook`` is called again. For integrators that do not
-        call it after each step.
+        ``hook_interval(t, y, yp)`` returns the longest time that may pass until ``hook`` is called again. For
+        integrators that do not call it after each step.
     restart_rates : callable, optional
         ``restart_rates(t, y, yp, idata, rdata)`` returns y' consistent with y after ``hook`` has rewritten y.
     jacobian_residuals : int
@@ -92,7 +92,7 @@ class DAEProblem:
     hook: Callable | None = None
     events: Callable | None = None
     n_events: int = 0
-    hook_interval: Callable[[np.ndarray], float] | None = None
+    hook_interval: Callable[[float, np.ndarray, np.ndarray], float] | None = None
     restart_rates: Callable | None = None
     jacobian_residuals: int = 0
     small_entries: bool = False

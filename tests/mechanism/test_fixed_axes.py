@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gearmbs.dae.model.member_tables import TURN_ROOT
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.lumping import lumped
 from gearmbs.studies import Case, simulate_case
@@ -217,3 +218,48 @@ def test_a_driven_bodies_only_mechanism_has_nothing_to_integrate():
     m.rotation("drive", m.revolute("pin", bob, m.ground, at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0)), "TIME**2")
     assert not is_reduced(m)
     agree(m.simulate(0.5, lump=True, **TIGHT), m.simulate(0.5, **TIGHT), 1e-8)
+
+
+@pytest.mark.parametrize("level", ["displacement", "velocity", "acceleration"])
+@pytest.mark.parametrize("apart", [0.4, np.pi - 0.2, np.pi + 0.9])
+def test_a_motion_whose_x_axes_start_apart(apart, level):
+    """Beyond a quarter of a turn the motion holds them opposite; torque and power of the drive are then the same."""
+
+    def make() -> Mechanism:
+        m = Mechanism("driven", gravity=(0.0, -9.81, 0.0))
+        wheel = m.body("wheel", 1.0, (0.01, 0.012, 0.02, 0.001, -0.002, 0.001), com=(0.02, 0.01, 0.03))
+        on_wheel = wheel.marker((0.0, 0.0, 0.0), Rotation.from_euler("z", apart).as_matrix())
+        pin = m.revolute("pin", on_wheel, m.ground.marker((0.0, 0.0, 0.0)))
+        settings = {"displacement": {}, "velocity": {"start": 0.3}, "acceleration": {"start": 0.3, "rate": 2.0}}
+        function = "0.3 + 2*TIME + SIN(5*TIME)" if level == "displacement" else "3 + 20*TIME"
+        m.rotation("drive", pin, function, level=level, **settings[level])
+        arm = m.body("arm", 0.5, (0.01, 0.01, 0.01), com=(0.0, 0.05, 0.0), position=(1.0, 0.0, 0.0))
+        m.revolute("pivot", arm, m.ground, at=(1.0, 0.0, 0.0))
+        ends = wheel.marker((0.1, 0.05, 0.0)), arm.marker((-0.1, 0.02, 0.05))
+        m.spring_damper("tie", *ends, stiffness=50.0, damping=0.3, length=0.7)
+        return m
+
+    assert reduced(make())[1].turn[0, TURN_ROOT] == (1 if apart < 0.5 * np.pi else -1)
+    settings = TIGHT | {"t_start": 0.2}
+    lump, full = make().simulate(0.5, lump=True, **settings), make().simulate(0.5, **settings)
+    assert lump.problem.n == 2
+    agree(lump, full, 1e-6)
+    exact_reactions(lump, 7)
+    ours, theirs = lump.energy_balance(), full.energy_balance()
+    for name in theirs:
+        np.testing.assert_allclose(ours[name], theirs[name], atol=1e-6 * float(theirs.kinetic.max()))
+
+
+@pytest.mark.parametrize("lump", [False, True])
+@pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF", "IDA"])
+def test_turns_of_a_driven_body_that_turns_back_between_outputs(integrator, lump):
+    """The integral of a counted angle, 12 sin(9 t): z = 4/3 (1 - cos(9 t))."""
+    m = Mechanism("driven")
+    wheel = m.body("wheel", 1.0, (0.1, 0.1, 0.1))
+    pin = m.revolute("pin", wheel, m.ground, at=(0.0, 0.0, 0.0))
+    m.rotation("drive", pin, "12*SIN(9*TIME)")
+    m.differential_state("sum", f"AZ({pin.i.name}, {pin.j.name})")
+    slow = m.body("slow", 1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
+    m.revolute("pivot", slow, m.ground, at=(1.0, 0.0, 0.0))
+    solution = m.simulate(1.5, lump=lump, integrator=integrator, tol=1e-8, t_eval=(0.0, 0.7, 1.5))
+    np.testing.assert_allclose(solution.state("sum"), 4.0 / 3.0 * (1.0 - np.cos(9.0 * solution.t)), atol=1e-5)

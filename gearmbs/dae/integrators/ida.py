@@ -253,12 +253,12 @@ class _Run:
     def _loop(self, messages: _Messages) -> tuple[Status, str]:
         """Take steps until the end or a failure; return how the run has ended."""
         problem, rows = self.problem, self.rows
-        y = problem.y0
-        solver = self._start(y, problem.yp0)
+        y, yp = problem.y0, problem.yp0
+        solver = self._start(y, yp)
         while self.t < self.end:
             target = rows.next_time
             if problem.hook_interval is not None and not self.every_step:
-                target = min(target, self.t + problem.hook_interval(y))
+                target = min(target, self.t + problem.hook_interval(self.t, y, yp))
             answer = solver.step(target, method="onestep" if self.every_step else "normal", tstop=self.end)
             if not answer.success:
                 return self._failure(float(answer.t), messages.text or answer.message)

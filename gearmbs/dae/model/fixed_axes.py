@@ -14,6 +14,7 @@ from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.fixed_axes_jacobian import axes_jacobian, axes_pattern
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.equations.unknowns import SI2
+from gearmbs.dae.model.start import turns_of_one
 from gearmbs.dae.problem import DAEProblem
 
 if TYPE_CHECKING:
@@ -142,16 +143,22 @@ def fixed_axis_problem(system: System, axes: Sequence[Axis], rate_scale: float) 
         t0=system.t0,
         names=[*names, *(f"z({name})" for name in system.state_names)],
         hook=fx.axes_hook if counted else None,
-        hook_interval=_hook_interval(omega) if counted else None,
+        hook_interval=_hook_interval(omega, model, axes, (idata, rdata, size)) if counted else None,
     )
 
 
-def _hook_interval(omega: np.ndarray):
+def _hook_interval(omega: np.ndarray, model: Model, axes: Sequence[Axis], tables: tuple[np.ndarray, np.ndarray, int]):
     """Time in which no counted angle turns by half a turn."""
+    driven = [function for function in _functions(model, axes) if function >= 0]
+    idata, rdata, size = tables
+    work = np.zeros(size)
 
-    def interval(y: np.ndarray) -> float:
-        # two bodies may turn against each other: at most 2 rad between them
-        return 1.0 / max(float(np.abs(y[omega]).max(initial=0.0)), 1e-12)
+    def interval(t: float, y: np.ndarray, yp: np.ndarray) -> float:
+        turning = turns_of_one(y[omega], yp[omega])
+        if driven:
+            values = _function_values(t, y, idata, rdata, work)[driven]
+            turning = max(turning, turns_of_one(values[:, 1], values[:, 2]))
+        return 1.0 / max(turning, 1e-12)
 
     return interval
 
@@ -221,11 +228,16 @@ def _shared_once(lists: list[np.ndarray]) -> list[np.ndarray]:
 
 def _start_motions(system: System, axes: Sequence[Axis], idata: np.ndarray, rdata: np.ndarray, y, work) -> None:
     """Let the angles of prescribed turns count from the start."""
-    fx.axes_residual(system.t0, y, np.zeros(y.size), np.zeros(y.size), idata, rdata, work)
-    values = T.rows_in(work, int(idata[T.H_W_FUNCTION]), int(idata[T.H_FUNCTIONS]), T.FUNCTION_VALUES)
+    values = _function_values(system.t0, y, idata, rdata, work)
     for turn, function in zip(_turns_in(rdata, len(axes)), _functions(system.model, axes), strict=True):
         if function >= 0:
             turn[fx.TURN_START] = values[function, 0]
+
+
+def _function_values(t: float, y: np.ndarray, idata: np.ndarray, rdata: np.ndarray, work: np.ndarray) -> np.ndarray:
+    """Return the values of all functions of time and their first and second rates, (functions, 3)."""
+    fx.axes_residual(t, y, np.zeros(y.size), np.zeros(y.size), idata, rdata, work)
+    return T.rows_in(work, int(idata[T.H_W_FUNCTION]), int(idata[T.H_FUNCTIONS]), T.FUNCTION_VALUES)
 
 
 def _functions(model: Model, axes: Sequence[Axis]) -> list[int]:

@@ -208,14 +208,25 @@ def _hook_interval(model: Model, at: dict[str, int]):
     counted = bool(np.any(model.terms[:, T.TERM_TYPE] == ANGLE)) or any(tape.n_angles for tape in model.tapes)
     counted = counted or len(model.angles) > 0
 
-    def interval(y: np.ndarray) -> float:
+    def interval(t: float, y: np.ndarray, yp: np.ndarray) -> float:
         rate = np.abs(y[rates]).reshape(-1, 3)
         nearing = float(rate[:, 1].max(initial=0.0)) / 0.2
-        # two bodies may turn against each other: at most 2 rad between them
-        turning = float(rate.sum(axis=1).max(initial=0.0)) if counted else 0.0
+        turning = 0.0
+        if counted:
+            bent = np.abs(yp[rates]).reshape(-1, 3)
+            turning = turns_of_one(rate.sum(axis=1), bent.sum(axis=1))
         return 1.0 / max(nearing, turning, 1e-12)
 
     return interval
+
+
+def turns_of_one(rates: np.ndarray, accelerations: np.ndarray) -> float:
+    """Return how often a second (1/s) some angle may change by 1 rad, from its rate and its acceleration.
+
+    Two bodies that turn against each other turn by at most 2 rad then. The acceleration counts where a body comes to
+    rest and turns back.
+    """
+    return float((np.abs(rates) + np.sqrt(0.5 * np.abs(accelerations))).max(initial=0.0))
 
 
 def _state_rates(
