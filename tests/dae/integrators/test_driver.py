@@ -15,6 +15,7 @@ from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.wstiff import resume, solve_wstiff
 from gearmbs.dae.problem import JACOBIAN_SIG, RESIDUAL_SIG, DAEProblem
 from gearmbs.dae.result import Status
+from gearmbs.dae.solve import solve_dae
 from tests.dae.integrators.problems import pendulum, rotor
 
 TIMES = np.linspace(0.0, 3.0, 61)
@@ -103,6 +104,31 @@ def test_ctrl_c_keeps_what_was_computed_and_resumes_bit_identically(monkeypatch)
     assert_same(whole, rest)
     np.testing.assert_array_equal(whole.sol(TIMES), rest.sol(TIMES))
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_ctrl_c_is_heeded_in_the_first_steps():
+    """Where each step takes long, the first of them must not be hundreds."""
+    calls = []
+
+    def decay(t, y, yp, out):
+        if t > 0.0:
+            calls.append(t)
+            if len(calls) == 20:
+                os.kill(os.getpid(), signal.SIGINT)
+        out[0] = yp[0] + y[0]
+
+    result = solve_dae(decay, (0.0, 100.0), [1.0], rtol=1e-10, atol=1e-12)
+    assert result.status is Status.INTERRUPTED
+    assert result.stats.steps <= 16
+
+
+def test_progress_is_told_where_a_chunk_is_more_than_the_buffer_holds(monkeypatch):
+    monkeypatch.setattr(run, "FIRST_CHUNK", 10**9)
+    seen = []
+    result = solve_wstiff(pendulum(), TIMES, tol=1e-9, max_step=2e-4, progress=seen.append)
+    assert result.stats.steps > 10_000
+    assert len(seen) > 1
+    assert seen == sorted(seen)
 
 
 def test_resume_after_the_step_limit_and_refusal_after_success():
