@@ -186,9 +186,11 @@ class _Compiler:
                     if marker.number is not None:
                         markers[marker.number] = self.index(marker)
             forces: dict[tuple[str, int | str], tuple[int | str, int | str | None]] = {}
+            aliases: set[tuple[str, int | str]] = set()
             for joint in m.joints.values():
-                for kind in REACTION_KINDS.get(joint.kind, ("joint", "jprim")):
-                    forces[(kind, _upper(joint.name))] = (joint.i.name.upper(), joint.j.name.upper())
+                keys = [(kind, _upper(joint.name)) for kind in REACTION_KINDS.get(joint.kind, ("joint", "jprim"))]
+                forces.update(dict.fromkeys(keys, (joint.i.name.upper(), joint.j.name.upper())))
+                aliases.update(keys[1:])
             absent: set[tuple[str, int | str, int]] = set()
             for load in m.elements.values():
                 if len(load.markers) == 2:
@@ -212,6 +214,7 @@ class _Compiler:
                 plants={(kind, _upper(k)): v for (kind, k), v in m.plants.items()},
                 forces=forces,
                 absent=frozenset(absent),
+                aliases=frozenset(aliases),
                 units=m.units,
                 one_sided=True,
             )

@@ -264,6 +264,8 @@ class Lowering:
         shift = 3 if torque else 0
         found = []
         for (kind, ref), pair in self.scope.forces.items():
+            if (kind, ref) in self.scope.aliases:
+                continue
             first, second = (op.GLOBAL if m is None else self.scope.markers[m] for m in pair)
             if first == i and second == j:
                 found.append((kind, ref, shift))

@@ -143,6 +143,8 @@ class Scope:
         Elements whose forces JOINT, SFORCE, FX ... can ask for.
     absent : set of (kind, ref, 0 or 3)
         Elements without a force (0) or without a torque (3): it is zero.
+    aliases : set of (kind, ref)
+        Further names of forces that have another one: FX ... TM, sums between two markers, take each force once.
     units : Units
     one_sided : bool
         Only what elements exert at their I markers are unknowns; the J side follows from action and reaction at one
@@ -161,6 +163,7 @@ class Scope:
     plants: Mapping[tuple[str, Ref], Sequence[Ref]] = field(default_factory=dict)
     forces: Mapping[tuple[str, Ref], tuple[Ref, Ref | None]] = field(default_factory=dict)
     absent: frozenset[tuple[str, Ref, int]] = frozenset()
+    aliases: frozenset[tuple[str, Ref]] = frozenset()
     units: Units = Units()
     one_sided: bool = False
 

@@ -27,6 +27,27 @@ SFORCE/1, TRANSLATIONAL, I=21, J=11, ACTIONONLY
 , FUNCTION=VARVAL(1)-{STIFFNESS}*DX(20,1)-{DAMPING}*VX(20,1)
 END
 """
+LENGTH, INERTIA = 0.4, 0.1
+PENDULUM_AT_REST = f"""hangs along -y, and a torque may act on it
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/1, PART=1
+PART/2, MASS={MASS}, CM=20, IP={INERTIA},{INERTIA},{INERTIA}, QG=0,-{LENGTH},0
+MARKER/20, PART=2
+MARKER/21, PART=2, QP=0,{LENGTH},0
+JOINT/1, REVOLUTE, I=21, J=1
+VARIABLE/1, FUNCTION=0
+VARIABLE/2, FUNCTION=FX(21,1)
+VARIABLE/3, FUNCTION=JOINT(1,0,2,0)
+PINPUT/1, VARIABLES=1
+POUTPUT/1, VARIABLES=2,3
+SFORCE/1, ROTATIONAL, I=21, J=1, FUNCTION=-VARVAL(1)
+DIFF/1, IC=0, FUNCTION=FY(21,1)
+DIFF/2, IC=0, FUNCTION=JOINT(1,0,3,0)
+REQUEST/1, F2=DIF(1)\\F3=DIF(2)
+ACCGRAV/JGRAV=-9.81
+END
+"""
 
 
 def in_other_units(text: str) -> str:
@@ -179,3 +200,13 @@ def test_variables_and_lists_of_a_control_program_are_in_the_results(tmp_path):
     assert found["POUTPUT_1"].components == ("OUT1", "OUT2", "OUT3")
     with pytest.raises(KeyError, match="no values of VARIABLE/9; there are those of 1, 2, 3, 4"):
         result.variable(9)
+
+
+def test_the_force_between_two_markers_is_that_of_their_joint_once():
+    hung = PENDULUM_AT_REST
+    plant = linear_plant(parse_deck(hung))
+    # m g - F = 0 along the arm, and the force across it follows the torque: M / L (m L^2) / (m L^2 + I)
+    across = -1.0 / LENGTH * MASS * LENGTH**2 / (MASS * LENGTH**2 + INERTIA)
+    assert plant.d[:, 0] == pytest.approx([across, across], rel=1e-8)
+    result = run_deck(parse_deck(hung), parse_script("a\nb\nsimulate/dynamics, end=0.5, steps=5\n"))
+    assert result.request(1)[-1, 1:3] == pytest.approx(0.5 * MASS * 9.81, rel=1e-6)
