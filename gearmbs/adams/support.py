@@ -35,15 +35,33 @@ INSTEAD_OF_FUNCTIONS: dict[str, str] = {
     "ARYSUM": "the sum of ARYVALs",
     "CURVE": "read where a CURVE has its id",
     "DELAY": "a TFSISO that approximates the delay",
+    "DXYZ": "DX, DY and DZ",
+    "FXFREQ": "read in CRATIO of a FLEX_BODY",
+    "FXMODE": "read in CRATIO of a FLEX_BODY",
+    "FXYZ": "FX, FY and FZ",
     "INTERP": "CUBSPL or AKISPL of a SPLINE",
     "INVPSD": "a SPLINE of the signal",
     "MODE": "read in decks, without brackets",
     "NFORCE": "the forces of BEAM or FIELD",
     "RANDOM": "a SPLINE of the signal",
     "SENVAL": "read where a SENSOR has its id",
+    "TXYZ": "TX, TY and TZ",
     "USER": "the routine in Python alone in the FUNCTION",
+    "UVX": "DX, DY and DZ from the marker to one at 1 of its x axis",
+    "UVY": "DX, DY and DZ from the marker to one at 1 of its y axis",
+    "UVZ": "DX, DY and DZ from the marker to one at 1 of its z axis",
+    "VXYZ": "VX, VY and VZ",
+    "WXYZ": "WX, WY and WZ",
 }
-"""What to do instead of functions that are refused; of bodies with modes there is none in a deck."""
+"""What to do instead of functions that are refused."""
+
+INSTEAD_OF_COMMANDS: dict[str, str] = {
+    "CONTROL": "FILE/COMMAND for another script",
+    "FLEX_BODY": "the statement in the deck, with its final values",
+    "RELOAD": "one script for all analyses; each goes on from the one before",
+    "SAVE": "one script for all analyses; `.nc` and .res files keep the results",
+}
+"""What to do instead of commands that are refused."""
 
 
 def statement_rows() -> list[tuple[str, str, str, str, str]]:
@@ -60,11 +78,12 @@ def statement_rows() -> list[tuple[str, str, str, str, str]]:
     return sorted(rows)
 
 
-def command_rows() -> list[tuple[str, str]]:
-    """Return the commands of a script, each with whether it is read."""
-    rows = [(name, READ) for name in acf.COMMANDS]
-    rows += [(name, "read, with new values of the statement") for name in acf.CHANGEABLE]
-    rows += [(name, OVER) for name in acf.IGNORED_COMMANDS] + [(name, REFUSED) for name in acf.UNSUPPORTED_COMMANDS]
+def command_rows() -> list[tuple[str, str, str]]:
+    """Return the commands of a script, each with whether it is read and what to do instead."""
+    rows = [(name, READ, "") for name in acf.COMMANDS]
+    rows += [(name, "read, with new values of the statement", "") for name in acf.CHANGEABLE]
+    rows += [(name, OVER, "") for name in acf.IGNORED_COMMANDS]
+    rows += [(name, REFUSED, INSTEAD_OF_COMMANDS.get(name, "")) for name in acf.UNSUPPORTED_COMMANDS]
     return sorted(rows)
 
 
@@ -80,7 +99,8 @@ def support_table() -> str:
     """Return as Markdown what of ADAMS is read: statements, commands, functions; and what to do instead of others."""
     lines = ["| statement | | without effect | refused | instead |", "|---|---|---|---|---|"]
     lines += [f"| {name} | {how} | {idle} | {refused} | {way} |" for name, how, idle, refused, way in statement_rows()]
-    lines += ["", "| command | |", "|---|---|", *(f"| {name} | {how} |" for name, how in command_rows())]
+    lines += ["", "| command | | instead |", "|---|---|---|"]
+    lines += [f"| {name} | {how} | {way} |" for name, how, way in command_rows()]
     lines += ["", "| function | | instead |", "|---|---|---|"]
     lines += [f"| {name} | {how} | {way} |" for name, how, way in function_rows()]
     return "\n".join(lines)

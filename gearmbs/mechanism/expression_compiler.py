@@ -38,5 +38,7 @@ def compile_expression(text: str, scope: Scope, dimension: str = "number", accel
     result = builder.binary(op.MUL, builder.constant(scope.units.factor(dimension)), result)
     tape = builder.finish(result, text)
     if tape.level == op.LEVEL_ACCELERATION and not accelerations:
-        raise NotEvaluatedError(f"accelerations can only be asked for in a REQUEST, not in {shown(text)}")
+        raise NotEvaluatedError(
+            f"accelerations can be measured, and forces and equations of a deck may ask for them, not {shown(text)}"
+        )
     return tape

@@ -30,7 +30,7 @@ from tests.dae.equations.expressions.support import MARKER_BODY, MARKERS, time_s
         ("VARVAL(3)", "no VARIABLE 3"),
         ("JOINT(1,0,2,0)", "no JOINT 1"),
         ("CUBSPL(TIME,0,4)", "no SPLINE 4"),
-        ("ACCX(1)", "only be asked for in a REQUEST"),
+        ("ACCX(1)", "accelerations can be measured"),
         ("CONTACT(1,0,2,0)", "no CONTACT 1"),
         ("ORIENT(13,1,1)", "system 13 is not supported"),
         ("FX(1,2)", "no force or joint acts between MARKER 1 and MARKER 2"),
