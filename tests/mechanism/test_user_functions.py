@@ -7,6 +7,8 @@ import pickle
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 from gearmbs.mechanism import Mechanism, ModelError
 
@@ -145,3 +147,33 @@ def test_a_function_goes_to_another_process():
     copy = pickle.loads(pickle.dumps(own))
     assert copy.address
     assert copy.function(4.0) == 2.0
+
+
+@pytest.mark.parametrize("lump", [False, True])
+def test_functions_are_asked_where_the_motion_is_only(lump):
+    """A torque of ln t, 1/angle of a driven wheel, sqrt(s - 1) and 1/omega, from t = 1 and the angle 2 on."""
+    m = Mechanism("wheels")
+    pins = []
+    for name, turned, spin in (("driven", 2.0, 0.0), ("free", 0.0, 5.0)):
+        x = float(len(pins))
+        body = m.body(name, 1.0, (0.1, 0.1, 0.1), position=(x, 0.0, 0.0), angular_velocity=(0.0, 0.0, spin))
+        hub = body.marker((0.0, 0.0, 0.0), Rotation.from_euler("z", turned).as_matrix())
+        pins.append(m.revolute(f"pin_{name}", hub, m.ground.marker((x, 0.0, 0.0))))
+    m.rotation("drive", pins[0], "2*TIME")
+    m.differential_state("s", "1", start=2.0)
+    m.function("LN", math.log, count=1)
+    m.function("INV", lambda x: 1.0 / x)
+    m.function("ROOT", math.sqrt, count=1)
+    driven, free = (f"{pin.i.name}, {pin.j.name}" for pin in pins)
+    m.axis_torque(
+        "load", pins[1].i, pins[1].j, f"0.1*(LN(TIME) + INV(AZ({driven})) + ROOT(DIF(s) - 1) + INV(WZ({free})))"
+    )
+    solution = m.simulate(1.5, t_start=1.0, lump=lump, tol=1e-9)
+    assert solution.success, solution.message
+
+    def rate(t, w):
+        return np.log(t) + 0.5 / t + np.sqrt(t) + 1.0 / w
+
+    expected = solve_ivp(rate, (1.0, 1.5), [5.0], rtol=1e-11, atol=1e-11).y[0, -1]
+    assert solution.angular_velocity("free")[-1, 2] == pytest.approx(expected, rel=1e-7)
+    assert len(solution.reaction("pin_free")[0]) == len(solution)

@@ -265,12 +265,14 @@ def axes_jacobian(t, y, yp, cj, vals, idata, rdata, work):
         vals[0] = k
 
 
-def axes_pattern(idata: np.ndarray, rdata: np.ndarray, work_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (indptr, indices, slots): the CSC pattern and, for each entry in walking order, its place in it."""
-    n = int(idata[T.H_UNKNOWNS])
-    ask, y, places = idata.copy(), np.zeros(n), np.zeros(1)
+def axes_pattern(
+    idata: np.ndarray, rdata: np.ndarray, work_size: int, t: float, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (indptr, indices, slots); see `gearmbs.dae.equations.jacobian.pattern`."""
+    n = y.size
+    ask, yp, places = idata.copy(), np.zeros(n), np.zeros(1)
     for mode in (COUNT, PLACES):
         ask[T.H_MODE] = mode
         places = np.zeros(1 if mode == COUNT else 2 * int(places[0]))
-        axes_jacobian(0.0, y, y, 1.0, places, ask, rdata.copy(), np.zeros(work_size))
+        axes_jacobian(t, y, yp, 1.0, places, ask, rdata.copy(), np.zeros(work_size))
     return compressed(places.reshape(-1, 2).astype(np.int64), n)

@@ -128,14 +128,19 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
         vals[0] = k
 
 
-def pattern(idata: np.ndarray, rdata: np.ndarray, work_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (indptr, indices, slots): the CSC pattern and, for each entry in walking order, its place in it."""
-    n = int(idata[T.H_UNKNOWNS])
-    y, work, count = np.zeros(n), np.zeros(work_size), np.zeros(1)
+def pattern(
+    idata: np.ndarray, rdata: np.ndarray, work_size: int, t: float, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (indptr, indices, slots): the CSC pattern and, for each entry in walking order, its place in it.
+
+    It is that of any t and y; functions of the user may be defined at some only.
+    """
+    n = y.size
+    yp, work, count = np.zeros(n), np.zeros(work_size), np.zeros(1)
     ask = idata.copy()
     ask[T.H_MODE] = COUNT
-    jacobian(0.0, y, y, 1.0, count, ask, rdata.copy(), work)
+    jacobian(t, y, yp, 1.0, count, ask, rdata.copy(), work)
     places = np.zeros(2 * int(count[0]))
     ask[T.H_MODE] = PLACES
-    jacobian(0.0, y, y, 1.0, places, ask, rdata.copy(), work)
+    jacobian(t, y, yp, 1.0, places, ask, rdata.copy(), work)
     return compressed(places.reshape(-1, 2).astype(np.int64), n)

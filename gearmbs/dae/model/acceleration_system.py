@@ -108,7 +108,7 @@ class AccelerationSystem:
             y[int(idata[T.H_F]) :] = inner
         unknowns_from_pose(np.ascontiguousarray(place.pose), place.q_f, place.v_f, idata, rdata, work, y)
         if self._pattern is None:
-            self._pattern = evaluator.pattern(idata, rdata, size)
+            self._pattern = evaluator.pattern(idata, rdata, size, t, y)
         indptr, indices, slots = self._pattern
         n = indptr.size - 1
         vals = np.zeros(indices.size)

@@ -10,6 +10,8 @@ n . W is zero of a free group, and what the motion exerts of a driven one.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numba import float64, int64, void
 
@@ -63,6 +65,9 @@ from gearmbs.dae.model.member_tables import (
 )
 from gearmbs.dae.model.records import RECORDS_TYPE, Records
 from gearmbs.dae.model.side_by_side import deal
+
+if TYPE_CHECKING:
+    from gearmbs.dae.problem import DAEProblem
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
@@ -252,12 +257,12 @@ def evaluate_axes(first, last, t, y, idata, rdata, work, lanes, members, wide, r
 class AxisEvaluator:
     """Fills the records of all bodies and joints from the unknowns of groups that turn about fixed axes."""
 
-    def __init__(self, idata: np.ndarray, rdata: np.ndarray, work_size: int, members: Members) -> None:
+    def __init__(self, problem: DAEProblem, members: Members) -> None:
         self.members = members
-        self.rdata = rdata.copy()
-        self.work = np.zeros(work_size)
-        self.lanes = new_lane_tables(idata, 0)
-        self.wide = new_member_lanes(members, int(idata[T.H_FORCES]))
+        self.rdata = problem.rdata.copy()
+        self.work = np.zeros(problem.work_size)
+        self.lanes = new_lane_tables(problem.idata, 0)
+        self.wide = new_member_lanes(members, int(problem.idata[T.H_FORCES]))
 
     def fill(self, t: np.ndarray, y: np.ndarray, epochs, records: Records) -> None:
         """Fill ``records`` for all rows of ``y``; ``epochs`` names the integer tables valid from each row on."""

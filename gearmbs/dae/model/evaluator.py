@@ -31,6 +31,7 @@ from gearmbs.dae.model.records import FARTHEST, RECORDS_TYPE, Records, allow_rou
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.side_by_side import SideBySide
+    from gearmbs.dae.problem import DAEProblem
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
@@ -242,16 +243,16 @@ def _no_factors() -> tuple[LUPlan, LUFactors]:
     return plan, new_factors(plan)
 
 
-def pattern(idata, rdata, work_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (indptr, indices, slots) of the saddle-point matrix in CSC form."""
+def pattern(idata, rdata, work_size: int, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (indptr, indices, slots) of the saddle-point matrix in CSC form, the same at any t and y."""
     n = int(idata[T.H_COORDINATES] + idata[T.H_ROWS])
-    y, slots = np.zeros((1, int(idata[T.H_UNKNOWNS]))), np.zeros(1, dtype=np.int64)
+    slots = np.zeros(1, dtype=np.int64)
     ask = idata.copy()
     count = np.zeros(1)
     for mode in (COUNT, PLACES):
         ask[T.H_MODE] = mode
         places = count if mode == COUNT else np.zeros(2 * int(count[0]))
-        assemble(np.zeros(1), y, slots, ask, rdata.copy(), work_size, places)
+        assemble(np.array([t]), y[None, :], slots, ask, rdata.copy(), work_size, places)
     return compressed(places.reshape(-1, 2).astype(np.int64), n)
 
 
@@ -271,11 +272,11 @@ class Evaluator:
     Pieces are to be handed over in the order of time.
     """
 
-    def __init__(self, idata: np.ndarray, rdata: np.ndarray, work_size: int, members: Members | None = None) -> None:
+    def __init__(self, problem: DAEProblem, members: Members | None = None) -> None:
         self.members = members
-        self.pattern = pattern(idata, rdata, work_size)
-        self.rdata = rdata.copy()
-        self.work = np.zeros(work_size)
+        self.pattern = pattern(problem.idata, problem.rdata, problem.work_size, problem.t0, problem.y0)
+        self.rdata = problem.rdata.copy()
+        self.work = np.zeros(problem.work_size)
         self.vals = np.zeros(self.pattern[1].size)
         self.plan: LUPlan | None = None
         self.factors: LUFactors | None = None

@@ -122,7 +122,8 @@ def fixed_axis_problem(system: System, axes: Sequence[Axis], rate_scale: float) 
         system.problem("SI2", rate_scale)
     yp[omega], yp[phi] = -out[omega] / turns[free, fx.TURN_INERTIA], y[omega]
     yp[z] = -out[z] * differential[z]
-    indptr, indices = axes_pattern(idata, rdata, size)[:2]
+    indptr, indices, slots = axes_pattern(idata, rdata, size, system.t0, y)
+    idata = _with_slots(idata, slots)
     names = [f"{part}({system.body_names[k]})" for part in TRAILING for k in free]
     counted = len(model.angles) > 0 or any(tape.n_angles for tape in model.tapes)
     return DAEProblem(
@@ -198,7 +199,7 @@ def _watched_markers(idata: np.ndarray) -> np.ndarray:
 def _with_axes(
     model: Model, packed: tuple[np.ndarray, np.ndarray, int], axes: Sequence[Axis], free: list[int], turns: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Return the tables of the model with those of the axes behind them, and the size of the work array."""
+    """Return the tables of the model with those of the axes behind them, no slots yet, and the size of the work."""
     idata, rdata, size = packed
     shift = 2 * len(free) - int(idata[T.H_Z])
     for part in _shared_once(_unknowns_listed(idata)):
@@ -213,12 +214,14 @@ def _with_axes(
     table[:, fx.AXIS_FUNCTION] = _functions(model, axes)
     markers = _watched_markers(idata)
     rdata = np.concatenate([rdata, turns.ravel()])
+    ends = [len(markers), 0, len(axes)]
+    return np.concatenate([idata, table.ravel(), markers, ends]), rdata, size
 
-    def with_slots(slots: np.ndarray) -> np.ndarray:
-        return np.concatenate([idata, table.ravel(), markers, slots, [len(markers), len(slots), len(axes)]])
 
-    slots = axes_pattern(with_slots(np.zeros(0, dtype=np.int64)), rdata, size)[2]
-    return with_slots(slots), rdata, size
+def _with_slots(idata: np.ndarray, slots: np.ndarray) -> np.ndarray:
+    """Return the integers with the slots of the Jacobian."""
+    markers, _, axes = idata[-fx.COUNTS :]
+    return np.concatenate([idata[: -fx.COUNTS], slots, [markers, len(slots), axes]])
 
 
 def _shared_once(lists: list[np.ndarray]) -> list[np.ndarray]:
@@ -236,7 +239,10 @@ def _start_motions(system: System, axes: Sequence[Axis], idata: np.ndarray, rdat
 
 def _function_values(t: float, y: np.ndarray, idata: np.ndarray, rdata: np.ndarray, work: np.ndarray) -> np.ndarray:
     """Return the values of all functions of time and their first and second rates, (functions, 3)."""
-    fx.axes_residual(t, y, np.zeros(y.size), np.zeros(y.size), idata, rdata, work)
+    # no loads and states: they may not be defined where bodies have not been turned to
+    alone = idata.copy()
+    alone[[T.H_FORCES, T.H_STATES]] = 0
+    fx.axes_residual(t, y, np.zeros(y.size), np.zeros(y.size), alone, rdata, work)
     return T.rows_in(work, int(idata[T.H_W_FUNCTION]), int(idata[T.H_FUNCTIONS]), T.FUNCTION_VALUES)
 
 

@@ -7,6 +7,8 @@ and other loads are known: per joint no equation is left to be solved.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numba import float64, int64, void
 
@@ -40,6 +42,9 @@ PART = 512
 """Output times evaluated at a time, whose records fit the processor's cache."""
 
 _IVEC = int64[::1]
+if TYPE_CHECKING:
+    from gearmbs.dae.problem import DAEProblem
+
 _VEC = float64[::1]
 
 
@@ -351,9 +356,9 @@ class MemberEvaluator(Evaluator):
 
     members: Members
 
-    def __init__(self, idata: np.ndarray, rdata: np.ndarray, work_size: int, members: Members) -> None:
-        super().__init__(idata, rdata, work_size, members)
-        sizes = (int(idata[k]) for k in (T.H_BODIES, T.H_ROWS, T.H_FORCES, T.H_DIAGNOSTICS))
+    def __init__(self, problem: DAEProblem, members: Members) -> None:
+        super().__init__(problem, members)
+        sizes = (int(problem.idata[k]) for k in (T.H_BODIES, T.H_ROWS, T.H_FORCES, T.H_DIAGNOSTICS))
         bodies, rows, elements, diagnostics = sizes
         self.narrow = new_records(PART, bodies - 1, rows, elements, diagnostics)
 

@@ -97,7 +97,7 @@ def _algebraic_start(system: PosedModel, place: Configuration, t: float) -> np.n
     y, first, z = found.y, int(found.idata[T.H_F]), int(found.idata[T.H_Z])
     y[first:] = _inner(y, found.loads, found.idata)
     codes = euler_references(place.pose)
-    indptr, indices, slots = jacobian.pattern(found.idata, found.rdata, found.work.size)
+    indptr, indices, slots = jacobian.pattern(found.idata, found.rdata, found.work.size, t, y)
     idata, rdata, size = model.pack(I3, slots, codes)
     out, rest, vals, work = np.zeros(y.size), np.zeros(y.size), np.zeros(indices.size), np.zeros(size)
     places = np.concatenate([np.arange(first, z), z + algebraic])
@@ -161,14 +161,15 @@ def make_problem(system: PosedModel, formulation: str, rate_scale: float) -> DAE
     acc, lam, found = accelerations(system, system.start, system.t0)
     codes = euler_references(system.pose)
     idata, rdata, size = model.pack(form, codes=codes)
-    indptr, indices, slots = jacobian.pattern(idata, rdata, size)
-    idata, rdata, size = model.pack(form, slots, codes)
     at = model.layout(form)
-    y, yp, work = np.zeros(at["n"]), np.zeros(at["n"]), np.zeros(size)
+    y, yp = np.zeros(at["n"]), np.zeros(at["n"])
     first = int(found.idata[T.H_F])
     y[: at["lambda"]] = found.y[: at["lambda"]]
     y[at["F"] : at["mu"]] = found.y[first:]
     (yp if form == SI1 else y)[at["lambda"] : at["lambda"] + len(lam)] = lam
+    indptr, indices, slots = jacobian.pattern(idata, rdata, size, system.t0, y)
+    idata, rdata, size = model.pack(form, slots, codes)
+    work = np.zeros(size)
     differential = model.differential_states
     _state_rates(system, y, yp, slice(at["z"], at["mu"]), idata, rdata, work, (indptr, indices))
     _rates(y, yp, acc, system.t0, idata, rdata, work)

@@ -161,12 +161,12 @@ class Solution(Shown):
         if self.members is not None and len(self.members.turn):
             from gearmbs.dae.model.axis_outputs import AxisEvaluator
 
-            return AxisEvaluator(problem.idata, problem.rdata, problem.work_size, self.members)
+            return AxisEvaluator(problem, self.members)
         if self.members is not None:
             from gearmbs.dae.model.members import MemberEvaluator
 
-            return MemberEvaluator(problem.idata, problem.rdata, problem.work_size, self.members)
-        return outputs.Evaluator(problem.idata, problem.rdata, problem.work_size)
+            return MemberEvaluator(problem, self.members)
+        return outputs.Evaluator(problem)
 
     def _new_records(self, m: int) -> outputs.Records:
         system = self.system

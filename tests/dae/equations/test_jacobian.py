@@ -124,7 +124,7 @@ def unassembled_problem(m: Mechanism, formulation: str):
 
     system = m.compile()
     idata, rdata, size = system.model.pack(FORMULATIONS[formulation])
-    indptr, indices, slots = jacobian.pattern(idata, rdata, size)
+    indptr, indices, slots = jacobian.pattern(idata, rdata, size, 0.0, np.zeros(int(idata[T.H_UNKNOWNS])))
     idata, rdata, size = system.model.pack(FORMULATIONS[formulation], slots)
     return idata, rdata, size, indptr, indices, int(idata[T.H_UNKNOWNS])
 

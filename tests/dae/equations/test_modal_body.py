@@ -97,7 +97,7 @@ def test_jacobian_equals_central_differences(kind, formulation):
     model = joined(kind).compile().model
     form = FORMULATIONS[formulation]
     idata, rdata, size = model.pack(form)
-    indptr, indices, slots = exact.pattern(idata, rdata, size)
+    indptr, indices, slots = exact.pattern(idata, rdata, size, 0.0, np.zeros(int(idata[T.H_UNKNOWNS])))
     idata, rdata, size = model.pack(form, slots)
     n = int(idata[T.H_UNKNOWNS])
     rng = np.random.default_rng(7)
