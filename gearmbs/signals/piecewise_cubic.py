@@ -17,7 +17,7 @@ def _inner(h0, h1, left, right):
     if not left * right > 0.0:
         return 0.0
     w1, w2 = 2.0 * h1 + h0, h1 + 2.0 * h0
-    return (w1 + w2) / (w1 / left + w2 / right)
+    return (w1 + w2) * left * (right / (w1 * right + w2 * left))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -51,7 +51,8 @@ def _derivative(x, y, k, c):
 def interpolate(x, y, at, out):
     """Write the interpolant of each column of y at the points ``at`` to a row of ``out``."""
     n, m = y.shape
-    end = np.zeros(m)
+    # derivative at the end of the interval, difference over the next one
+    end, ahead = np.zeros(m), np.zeros(m)
     p, k, known = 0, 0, -2
     while p < at.size:
         if not x[k] <= at[p]:
@@ -64,12 +65,19 @@ def interpolate(x, y, at, out):
         while stop < at.size and at[stop] >= x[k] and (at[stop] < x[k + 1] or k + 1 == n - 1):
             stop += 1
         h = x[k + 1] - x[k]
+        follows, is_inner = k == known + 1, k + 2 < n
+        h_next = x[k + 2] - x[k + 1] if is_inner else h
+        per_h, per_next = 1.0 / h, 1.0 / h_next
         for c in range(m):
-            slope = (y[k + 1, c] - y[k, c]) / h
-            near = end[c] if k == known + 1 else _derivative(x, y, k, c)
-            end[c] = _derivative(x, y, k + 1, c)
-            cubic = (near + end[c] - 2.0 * slope) / h
-            second, third = (slope - near) / h - cubic, cubic / h
+            slope = ahead[c] if follows else (y[k + 1, c] - y[k, c]) * per_h
+            near = end[c] if follows else _derivative(x, y, k, c)
+            if is_inner:
+                ahead[c] = (y[k + 2, c] - y[k + 1, c]) * per_next
+                end[c] = _inner(h, h_next, slope, ahead[c])
+            else:
+                end[c] = _derivative(x, y, k + 1, c)
+            cubic = (near + end[c] - 2.0 * slope) * per_h
+            second, third = (slope - near) * per_h - cubic, cubic * per_h
             for q in range(p, stop):
                 s = at[q] - x[k]
                 out[c, q] = ((third * s + second) * s + near) * s + y[k, c]

@@ -85,15 +85,21 @@ def even_signal(
     if first < low or last > high:
         raise SignalError(f"start, stop: {start:g} to {stop:g} s is not within the times {t[0]:g} to {t[-1]:g} s")
     columns = values.reshape(t.size, -1)
+    # the filter has a gain of one: what does not change, as forces along the shafts of spur wheels, comes out as it is
+    changes = [column[0] != column[-1] or np.ptp(column) != 0.0 for column in columns.T]
+    changing = np.flatnonzero(changes)
     # each column on end, as the kernel takes it
     even = np.empty((columns.shape[1], high - low + 1)).T
+    even[:] = columns[0]
+    if changing.size < columns.shape[1]:
+        columns = np.ascontiguousarray(columns[:, changing])
     taps = decimation_taps(factor, factor * rate)
     weights = np.ascontiguousarray(taps[::-1])
-    for k in range(0, len(even), BLOCK):
+    for k in range(0, len(even) if changing.size else 0, BLOCK):
         rows = slice(k, min(k + BLOCK, len(even)))
         fine = _fine(t, columns, rate, factor, (low, high), (low + rows.start, low + rows.stop - 1), taps.size // 2)
-        for column, source in zip(even.T, fine.T, strict=True):
-            products(np.ascontiguousarray(source), weights, factor, column[rows])
+        for channel, source in zip(changing, fine.T, strict=True):
+            products(np.ascontiguousarray(source), weights, factor, even.T[channel, rows])
     return make_signal(
         np.ascontiguousarray(even[first - low : last - low + 1]),
         rate,

@@ -114,13 +114,13 @@ def _series(
     """Return the variables over time that are wanted."""
     rate = case.output_rate
     t = _even_times(case, known, *span, even=even) if forces is None else forces["time"].values
-    inside = (t >= span[0] - 0.5 / rate) & (t < span[1] - 0.5 / rate)
-    t = t[inside]
+    inside = slice(*np.searchsorted(t, [at - 0.5 / rate for at in span]))
+    t = t[inside].copy()
     values: dict[str, np.ndarray] = {}
     for name in FORCES:
         if name in wanted and forces is not None:
             first = list(forces["channel"].values).index(f"{name[-1]}x")
-            values[name] = forces.values[inside, first : first + 3]
+            values[name] = forces.values[inside, first : first + 3].copy()
     if "transmission_error" in wanted:
         values["transmission_error"] = monotone_cubic(known.t, known.error, t)
     values |= {name: np.interp(t, known.t, known.contact[name]) for name in SMOOTH if name in wanted}

@@ -31,6 +31,18 @@ def test_slow_tones_keep_their_values():
     assert out.attrs["teeth"] == (29, 29)
 
 
+@pytest.mark.parametrize("also", [[], [lambda t: np.sin(2000 * np.pi * t)]], ids=["all", "beside others"])
+def test_channels_that_do_not_change_stay_what_they_are(also):
+    t = uneven_times()
+    columns = [np.full(t.size, 0.1), *(function(t) for function in also), np.zeros(t.size)]
+    out = even_signal(t, np.stack(columns, axis=1), RATE, start=0.01, stop=0.09)
+    assert np.all(out.values[:, 0] == 0.1)
+    assert np.all(out.values[:, -1] == 0.0)
+    for column in columns[1:-1]:
+        alone = even_signal(t, column, RATE, start=0.01, stop=0.09)
+        np.testing.assert_array_equal(out.values[:, 1], alone.values[:, 0])
+
+
 def test_tones_above_half_the_rate_do_not_fold_back():
     """40 kHz sampled at 51.2 kHz would show at 11.2 kHz with its full amplitude."""
     t = uneven_times(least=1e-6)
