@@ -193,12 +193,20 @@ def joint_reaction(k, function, members, tab, lanes, wide):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def write_axes(first, count, wide, records):
-    """Write what is in lanes to ``count`` rows of the records from ``first`` on."""
-    rows = records.force.shape[1]
+def write_axes(first, count, members, wide, records):
+    """Write what is in lanes to ``count`` rows of the records from ``first`` on.
+
+    Of ``phi``, which begins with zeros, only the rates of motions are anything else.
+    """
+    rows, phi, columns = records.force.shape[1], uncounted(records.phi), records.phi.shape[1]
     deal(wide.pose, uncounted(records.pose), count, records.pose.shape[1], first)
     deal(wide.solution, uncounted(records.solution), count, records.solution.shape[1], first)
-    deal(wide.phi, uncounted(records.phi), count, records.phi.shape[1], first)
+    for a in range(members.turn.shape[0]):
+        row = members.turn[a, TURN_ROWS + 5]
+        if row >= 0:
+            c = ROW_RECORD * row + ROW_PARTIAL
+            for lane in range(count):
+                phi[columns * (first + lane) + c] = wide.phi[LANES * c + lane]
     deal(wide.force, uncounted(records.force), count, 3 * rows, first)
     deal(wide.moment, uncounted(records.moment), count, 3 * rows, first)
     for lane in range(count):
@@ -250,7 +258,7 @@ def evaluate_axes(first, last, t, y, idata, rdata, work, lanes, members, wide, r
         for a in range(axes.shape[0]):
             joint_reaction(a, axes[a, AXIS_FUNCTION], members, tab, lanes, wide)
         internal_reactions(members, tab, lanes, wide)
-        write_axes(k, count, wide, records)
+        write_axes(k, count, members, wide, records)
         k += count
 
 

@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 PART_SIZE = 2048
 """Output times whose records stay in the processor's cache, and outweigh what Python does for each part."""
 
+AXIS_PART_SIZE = 1024
+"""The same where nothing has to be prepared for a part, since all bodies turn about fixed axes."""
+
 CONFLICT_SAMPLES = 50
 """Outputs at which constraints removed as redundant are looked at."""
 

@@ -10,7 +10,7 @@ import numpy as np
 from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, Status
-from gearmbs.dae.results.solution import CONFLICT_SAMPLES, PART_SIZE, Solution
+from gearmbs.dae.results.solution import AXIS_PART_SIZE, CONFLICT_SAMPLES, PART_SIZE, Solution
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.member_tables import Members
@@ -34,6 +34,8 @@ class Stream:
 
     Attributes
     ----------
+    part_size : int
+        About how many steps a part has.
     conflict : str or None
         The first violation found of a constraint row removed as redundant.
     """
@@ -49,7 +51,8 @@ class Stream:
         nothing = np.empty((0, problem.n))
         result = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "")
         self.whole = Solution(system, problem, result, members)
-        self.whole.share(2 * PART_SIZE)
+        self.part_size = PART_SIZE if members is None or not len(members.turn) else AXIS_PART_SIZE
+        self.whole.share(2 * self.part_size)
         self.consumer = consumer
         self.conflict: str | None = None
         self.interval = (t_end - problem.t0) / CONFLICT_SAMPLES
@@ -58,7 +61,7 @@ class Stream:
     def __call__(self, t: np.ndarray, y: np.ndarray, idata: np.ndarray) -> None:
         """Hand on accepted steps and the integer table that is valid for them."""
         # in equal parts: a small rest would cost as much beside its evaluation as a full part
-        size = -(-t.size // max(1, round(t.size / PART_SIZE)))
+        size = -(-t.size // max(1, round(t.size / self.part_size)))
         for k in range(0, t.size, size):
             part = self.whole.over(t[k : k + size], y[k : k + size], [(0, idata)])
             if self.conflict is None and part.t[-1] >= self.next_look:
