@@ -1,7 +1,7 @@
 """Dense tail of a sparse LU: the last pivots, among which most entries have filled in, are taken as a full block.
 
-Among the last pivots of bodies with many modes, which share all loads and joints, half of the entries are there or fill
-in. Lists of places cost more there than the zeros they spare: a full block is worked on eight rows at a time.
+Among the last pivots of bodies with many modes, which share all loads and joints, most entries are there or fill in.
+Lists of places cost more there than the zeros they spare: a full block is worked on eight rows at a time.
 
 The block has a column a pivot, padded with zeros to whole lanes of rows. L and U stand apart, both with zeros where the
 other has its entries, so that lanes in which a diagonal lies are treated like all others.
@@ -14,8 +14,9 @@ from numba import float64, int64, types
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.lanes import LANES, all_lanes, lanes_at, larger, magnitude, put_lanes
+from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 
-SHARE = 0.5
+SHARE = 0.6
 """Share of entries among the last pivots from which on they are taken as a block: an entry of a list takes several
 times as long as one of a block."""
 SMALLEST = 24
@@ -30,10 +31,10 @@ def padded(size: int) -> int:
     return -(-size // LANES) * LANES
 
 
-def aligned_zeros(size: int) -> np.ndarray:
-    """Return zeros that begin where the processor reads lanes at once."""
+def aligned_zeros(size: int, place: int = 0) -> np.ndarray:
+    """Return zeros of which that in a place, and every eighth from there on, lies where the processor reads lanes."""
     room = np.zeros(size + LANES)
-    first = -room.ctypes.data // room.itemsize % LANES
+    first = (-room.ctypes.data // room.itemsize - place) % LANES
     return room[first : first + size]
 
 
@@ -61,6 +62,32 @@ def tail_of_plan(rank, l_ptr, u_ptr):
 def without_tail(tail: int, ptr: np.ndarray, items: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the entries below or right of each pivot without those of the tail's pivots."""
     return np.minimum(ptr, ptr[tail]), items[: ptr[tail]]
+
+
+def tail_entries(
+    tail: int, a_ptr: np.ndarray, a_pos: np.ndarray, a_src: np.ndarray, a_scale: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Part the entries of the matrix into those inside the tail and all others.
+
+    Parameters
+    ----------
+    tail, a_ptr, a_pos, a_src, a_scale
+        Of `gearmbs.dae.linalg.lu_plan.LUPlan`, with all entries.
+
+    Returns
+    -------
+    dict
+        The fields ``a_ptr``, ``a_pos``, ``a_src``, ``a_scale``, ``tail_at``, ``tail_src`` and ``tail_scale``.
+    """
+    n = len(a_ptr) - 1
+    columns = np.repeat(np.arange(n), np.diff(a_ptr))
+    inside = (columns >= tail) & (a_pos >= tail)
+    at = (columns[inside] - tail) * padded(n - tail) + a_pos[inside] - tail
+    return {
+        "a_ptr": np.searchsorted(columns[~inside], np.arange(n + 1)), "a_pos": a_pos[~inside],
+        "a_src": a_src[~inside], "a_scale": a_scale[~inside], "tail_at": at.astype(np.uint32),
+        "tail_src": a_src[inside], "tail_scale": a_scale[inside],
+    }  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True, fastmath={"contract"})
@@ -96,12 +123,13 @@ def _less_four(lower, upper, first, k, lanes, pair):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def into_tail(tail, k, x, upper, rows):
-    """Put column ``k`` of the tail, spread out in ``x``, into the block, and clear ``x``."""
-    at = (k - tail) * rows
-    for i in range(x.shape[0] - tail):
-        upper[at + i] = x[tail + i]
-        x[tail + i] = 0.0
+def fill_tail(plan, upper, vals):
+    """Write the entries of the matrix with values ``vals`` to the block, long before lanes of them are read."""
+    at, src, scale = plan.tail_at, plan.tail_src, plan.tail_scale
+    for b in range(upper.shape[0] // LANES):
+        put_lanes(upper, b, all_lanes(0.0))
+    for e in range(at.shape[0]):
+        upper[at[e]] = vals[src[e]] * scale[e]
 
 
 @njit(float64(int64, _VEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
@@ -158,33 +186,30 @@ def factor_tail(tail, lower, upper, pivot_inv):
         if k < size:
             _less_four(lower, upper, first, k, lanes, False)
     put_lanes(lower, lanes * size, grown)
-    growth = 0.0
+    top = int64(0)
     for i in range(rows * size, rows * size + LANES):
-        if not lower[i] <= growth:
-            growth = lower[i]
-    return growth
+        top = max(top, bits_of(lower[i]))
+    return double_of(top)
 
 
 @njit(
     types.void(int64, _VEC, _VEC, _VEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy", fastmath={"contract"}
 )
-def solve_tail(tail, lower, upper, pivot_inv, x, rest):
+def solve_tail(tail, lower, upper, pivot_inv, rest, x):
     """Solve with L and then with U in the tail, four columns at a time; the last division by pivots is left out.
 
     Parameters
     ----------
     tail, lower, upper, pivot_inv
         As of `factor_tail`.
-    x : ndarray
-        Right-hand side of the whole matrix; changed from ``tail`` on.
     rest : ndarray
-        Scratch: as many rows as the block has.
+        Right-hand side, as many rows as the block has; changed.
+    x : ndarray
+        Unknowns of the whole matrix, written from ``tail`` on.
     """
     size = pivot_inv.shape[0] - tail
     lanes = (size + LANES - 1) // LANES
     rows = LANES * lanes
-    for i in range(size):
-        rest[i] = x[tail + i]
     whole = size // 4 * 4
     for k in range(0, whole, 4):
         at = rows * k + k

@@ -19,8 +19,9 @@ from gearmbs.dae.linalg.counted_entries import (
     scaled_entries,
     taken_pattern,
 )
-from gearmbs.dae.linalg.dense_tail import tail_of_plan, without_tail
+from gearmbs.dae.linalg.dense_tail import tail_entries, tail_of_plan, without_tail
 from gearmbs.dae.linalg.entry_lists import FIELDS_BY_COLUMNS, L_POS, entry_lists
+from gearmbs.dae.linalg.front_blocks import front_blocks
 from gearmbs.dae.linalg.nodes import has_nodes, nodes
 from gearmbs.dae.linalg.pivoting import (
     CANCELLED,
@@ -37,6 +38,13 @@ _IVEC = int64[::1]
 _UVEC = uint32[::1]
 _MASK = boolean[::1]
 
+NO_TAIL = {
+    **dict.fromkeys(("tail_at", "tail_src", "block_at", "block_lane", "block_col"), np.zeros(0, dtype=np.uint32)),
+    **dict.fromkeys(("block_ptr", "lane_ptr"), np.zeros(0, dtype=np.int64)),
+    "tail_scale": np.zeros(0),
+}
+"""Fields of a plan without a dense tail."""
+
 
 class LUPlan(Struct):
     """Frozen pivots and index lists of one pattern, in pivot order.
@@ -48,12 +56,19 @@ class LUPlan(Struct):
         index in the CSC values.
     a_scale : ndarray
         Scale of each of these entries (row times column scale).
+    tail_at, tail_src, tail_scale : ndarray
+        The same of the entries inside the tail, which are not among these: their places in its block.
     u_ptr, u_pos : ndarray
         For each column the earlier pivots that act on it, ascending.
     l_ptr, l_pos : ndarray
         For each column the rows below the pivot.
     u_col, l_col : ndarray
         Column of each of these entries.
+    block_ptr, block_at, block_lane : ndarray
+        For each column the blocks of its entries below in the rows of the tail: where their numbers stand, and which
+        eight rows of the tail they are, see `gearmbs.dae.linalg.front_blocks`.
+    block_col, lane_ptr : ndarray
+        Column of each block in the order in which their numbers stand, and where those of each eight rows begin.
     l_to, l_by, u_to, u_by : ndarray
         Places that the entries of L and U change in a substitution, and by which, in the order in which the entries
         stand among the numbers of the factors: L, then U, which is gone through from its end, then the pivots.
@@ -81,7 +96,7 @@ class LUPlan(Struct):
         The same by CSC values, infinite for entries that are planned for; empty if no entry is left out.
     tail : int
         First pivot of the dense tail, see `gearmbs.dae.linalg.dense_tail`; their number if there is none. Entries of L
-        and U inside the tail are in none of the lists.
+        in its rows and of U inside it are in none of the lists.
     """
 
     tail: int
@@ -89,12 +104,20 @@ class LUPlan(Struct):
     a_pos: IndexVector
     a_src: IndexVector
     a_scale: Vector
+    tail_at: IndexVector
+    tail_src: IndexVector
+    tail_scale: Vector
     u_ptr: IntVector
     u_pos: IndexVector
     l_ptr: IntVector
     l_pos: IndexVector
     u_col: IndexVector
     l_col: IndexVector
+    block_ptr: IntVector
+    block_at: IndexVector
+    block_lane: IndexVector
+    block_col: IndexVector
+    lane_ptr: IntVector
     l_to: IndexVector
     l_by: IndexVector
     u_to: IndexVector
@@ -264,6 +287,12 @@ def _plan(
     u_ptr, u_cols = without_tail(tail, u_ptr, u_cols)
     lists = entry_lists(rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices)
     f = dict(zip(FIELDS_BY_COLUMNS, lists, strict=True), l_ptr=l_ptr, node_end=nodes(l_ptr, lists[L_POS]))
+    if tail < len(rows):
+        f |= tail_entries(tail, f["a_ptr"], f["a_pos"], f["a_src"], f["a_scale"])
+        f |= front_blocks(tail, l_ptr, f["l_pos"])
+        f["node_end"] = nodes(f["l_ptr"], f["l_pos"])
+    else:
+        f |= NO_TAIL
     if has_nodes(f["node_end"]) or tail < len(rows):
         order = column_by_column(f["u_pos"], f["u_col"], f["l_pos"], f["l_col"])
     else:

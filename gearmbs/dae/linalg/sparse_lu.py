@@ -12,10 +12,12 @@ import numpy as np
 from numba import float64, int64, types
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.lanes import LANES
+from gearmbs.dae.compiled.lanes import LANES, all_lanes, put_lanes
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 from gearmbs.dae.compiled.structs import Struct, Vector
-from gearmbs.dae.linalg.dense_tail import aligned_zeros, factor_tail, into_tail, padded, solve_tail
+from gearmbs.dae.compiled.views import vector_at
+from gearmbs.dae.linalg.dense_tail import aligned_zeros, factor_tail, fill_tail, padded, solve_tail
+from gearmbs.dae.linalg.front_blocks import act_by_blocks, into_blocks, open_tail
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
 from gearmbs.dae.linalg.nodes import has_nodes, through_node
 
@@ -35,8 +37,10 @@ class LUFactors(Struct):
         uses.
     pivot_inv : ndarray, shape (n,)
         Inverse pivots by their places.
-    x, w : ndarray, shape (n,)
-        Scratch.
+    x, w : ndarray
+        Scratch, a number each row; ``x`` is filled up to whole lanes of the tail's rows.
+    below : ndarray
+        L of the pivots before the dense tail in its rows, block by block.
     lower, upper, rest : ndarray
         L and U of the dense tail, and its part of a right-hand side.
     """
@@ -45,6 +49,7 @@ class LUFactors(Struct):
     pivot_inv: Vector
     x: Vector
     w: Vector
+    below: Vector
     lower: Vector
     upper: Vector
     rest: Vector
@@ -60,8 +65,9 @@ def new_factors(plan: LUPlan) -> LUFactors:
     return LUFactors(
         lu=np.zeros(len(plan.l_pos) + len(plan.u_pos) + n + 1),
         pivot_inv=np.zeros(n),
-        x=np.zeros(n),
+        x=aligned_zeros(plan.tail + padded(size), plan.tail),
         w=np.zeros(n),
+        below=aligned_zeros(LANES * len(plan.block_at)),
         lower=aligned_zeros(padded(size) * size + LANES),
         upper=aligned_zeros(padded(size) * size),
         rest=aligned_zeros(padded(size)),
@@ -143,17 +149,23 @@ def _act_by_nodes(plan, factors, k):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _factor_by_nodes(plan, factors, vals):
     """Factor the matrix with values ``vals`` column by column; return what `factor` does."""
-    x, lu, pivot_inv = factors.x, factors.lu, factors.pivot_inv
+    x, lu, pivot_inv, below, rest = factors.x, factors.lu, factors.pivot_inv, factors.below, factors.rest
     a_pos, a_src, a_scale, l_pos = plan.a_pos, plan.a_src, plan.a_scale, plan.l_pos
-    growth = 0.0
-    n, tail = x.shape[0], plan.tail
+    top, grown = int64(0), all_lanes(0.0)
+    n, tail = pivot_inv.shape[0], plan.tail
+    rows = rest.shape[0]
+    behind, upper = vector_at(x, tail, rows), vector_at(lu, l_pos.shape[0], plan.u_pos.shape[0])
+    if tail < n:
+        fill_tail(plan, factors.upper, vals)
     for k in range(n):
         for p in range(np.uint64(plan.a_ptr[k]), np.uint64(plan.a_ptr[k + 1])):
             x[a_pos[p]] = vals[a_src[p]] * a_scale[p]
         _act_by_nodes(plan, factors, k)
         if k >= tail:
-            into_tail(tail, k, x, factors.upper, factors.rest.shape[0])
+            act_by_blocks(plan, below, upper, k, vector_at(factors.upper, rows * (k - tail), rows))
             continue
+        if tail < n:
+            act_by_blocks(plan, below, upper, k, behind)
         pivot = x[k]
         x[k] = 0.0
         if plan.kept[k] == 0.0:
@@ -169,13 +181,15 @@ def _factor_by_nodes(plan, factors, vals):
             l = x[i] * inv
             x[i] = 0.0
             lu[q] = l
-            if not abs(l) <= growth:
-                growth = abs(l)
+            top = max(top, bits_of(abs(l)))
+        if tail < n:
+            grown = into_blocks(plan, below, k, inv, behind, grown)
     if tail < n:
-        grown = factor_tail(tail, factors.lower, factors.upper, pivot_inv)
-        if not grown <= growth:
-            growth = grown
-    return growth
+        put_lanes(rest, 0, grown)
+        for i in range(LANES):
+            top = max(top, bits_of(rest[i]))
+        top = max(top, bits_of(factor_tail(tail, factors.lower, factors.upper, pivot_inv)))
+    return double_of(top)
 
 
 @njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
@@ -211,7 +225,7 @@ def fits(plan, vals):
 @njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
 def refactor(plan, factors, vals):
     """Factor as `factor` does, without a look at the entries that the plan leaves out."""
-    if has_nodes(plan.node_end) or plan.tail < factors.x.shape[0]:
+    if has_nodes(plan.node_end) or plan.tail < factors.pivot_inv.shape[0]:
         return _factor_by_nodes(plan, factors, vals)
     return _factor_by_levels(plan, factors, vals)
 
@@ -221,7 +235,7 @@ def _forward_by_nodes(plan, factors):
     """Solve L x = x in ``factors.x``, the columns of a node together."""
     x, w, lu = factors.x, factors.w, factors.lu
     l_pos, l_ptr, node_end = plan.l_pos, plan.l_ptr, plan.node_end
-    n = x.shape[0]
+    n = factors.pivot_inv.shape[0]
     k = 0
     while k < n:
         end = node_end[k]
@@ -250,11 +264,19 @@ def _backward_by_columns(plan, factors):
     """Take from ``factors.x`` what the unknowns above the diagonal of U give, column by column."""
     x, lu, pivot_inv, u_pos, u_ptr = factors.x, factors.lu, factors.pivot_inv, plan.u_pos, plan.u_ptr
     upper = np.uint64(plan.l_pos.shape[0])
-    for m in range(x.shape[0]):
-        k = np.uint64(x.shape[0] - 1 - m)
+    n = pivot_inv.shape[0]
+    for m in range(n):
+        k = np.uint64(n - 1 - m)
         v = x[k] * pivot_inv[k]
         for p in range(np.uint64(u_ptr[k]), np.uint64(u_ptr[k + np.uint64(1)])):
             x[u_pos[p]] -= lu[upper + p] * v
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _solve_tail(plan, factors, x):
+    """Solve for the unknowns of the dense tail in ``x``, which is solved with L up to there."""
+    open_tail(plan.tail, plan.lane_ptr, plan.block_col, factors.below, x, factors.rest)
+    solve_tail(plan.tail, factors.lower, factors.upper, factors.pivot_inv, factors.rest, x)
 
 
 @njit(types.void(PLAN_TYPE, FACTORS_TYPE, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
@@ -273,7 +295,7 @@ def solve(plan, factors, b, out):
     x, lu, pivot_inv = factors.x, factors.lu, factors.pivot_inv
     l_to, l_by, u_to, u_by = plan.l_to, plan.l_by, plan.u_to, plan.u_by
     row_from, row_scale, col_to, col_scale = plan.row_from, plan.row_scale, plan.col_to, plan.col_scale
-    n = x.shape[0]
+    n = pivot_inv.shape[0]
     for k in range(n):
         x[k] = b[row_from[k]] * row_scale[k]
     by_nodes = has_nodes(plan.node_end)
@@ -283,7 +305,7 @@ def solve(plan, factors, b, out):
         for q in range(l_to.shape[0]):
             x[l_to[q]] -= lu[q] * x[l_by[q]]
     if plan.tail < n:
-        solve_tail(plan.tail, factors.lower, factors.upper, pivot_inv, x, factors.rest)
+        _solve_tail(plan, factors, vector_at(x, 0, n))
     if by_nodes:
         _backward_by_columns(plan, factors)
     else:
@@ -311,7 +333,7 @@ def solve_pair(plan, factors, pair):
     """
     lu, pivot_inv = factors.lu, factors.pivot_inv
     l_to, l_by, u_to, u_by = plan.l_to, plan.l_by, plan.u_to, plan.u_by
-    n = factors.x.shape[0]
+    n = pivot_inv.shape[0]
     for k in range(n):
         row, size = plan.row_from[k], plan.row_scale[k]
         pair[2, k] = pair[0, row] * size
@@ -322,7 +344,7 @@ def solve_pair(plan, factors, pair):
         pair[3, i] -= l * pair[3, k]
     if plan.tail < n:
         for m in range(2, 4):
-            solve_tail(plan.tail, factors.lower, factors.upper, pivot_inv, pair[m], factors.rest)
+            _solve_tail(plan, factors, pair[m])
     upper, last = np.uint64(l_to.shape[0]), u_to.shape[0] - 1
     for m in range(u_to.shape[0]):
         p = np.uint64(last - m)
