@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import gc
 import importlib
@@ -9,6 +10,9 @@ import sys
 from collections.abc import Iterator, Mapping
 from types import ModuleType
 from typing import Any
+
+# the interpreter looks for cycles among all modules once more while it ends, which takes as long as importing them
+atexit.register(gc.freeze)
 
 
 @contextlib.contextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import gc
 import os
 import signal
@@ -50,10 +49,8 @@ def main(
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     signal.signal(signal.SIGTERM, _interrupt)
-    # a command makes many objects and drops few: looking for cycles at every 700 of them costs a tenth of its start,
-    # looking for them once more at the end, among all modules, half a second
+    # a command makes many objects and drops few: looking for cycles at every 700 of them costs a tenth of its start
     gc.set_threshold(50_000, 20, 20)
-    atexit.register(gc.freeze)
     if version:
         import gearmbs
 
