@@ -12,7 +12,8 @@ from scipy.sparse import csc_array, issparse
 
 from gearmbs.dae.compiled.python_callback import PythonCallback
 from gearmbs.dae.integrators import differences
-from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse
+from gearmbs.dae.linalg.analyse import SingularMatrixError, analyse
+from gearmbs.dae.linalg.lu_plan import LUPlan
 from gearmbs.dae.linalg.sparse_lu import LUFactors, factor, new_factors, solve
 from gearmbs.dae.problem import DAEProblem
 

@@ -11,18 +11,16 @@ from __future__ import annotations
 
 import ctypes
 import inspect
+import math
 import operator
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, TypeAlias
+from types import MappingProxyType
+from typing import Any, ClassVar, Generic, Self, TypeAlias, TypeVar
 
 import numpy as np
-from llvmlite import ir
-from numba import from_dtype, types
-from numba.core import cgutils
-from numba.core.imputils import lower_getattr_generic, lower_setattr_generic
-from numba.core.typing.templates import AttributeTemplate
-from numba.extending import NativeValue, infer_getattr, models, register_model, typeof_impl, unbox
-from numba.np.arrayobj import make_array, populate_array
+from numba.extending import typeof_impl
+
+from gearmbs.dae.compiled.struct_types import StructType
 
 Vector: TypeAlias = np.ndarray
 """Annotation of a member: doubles with one dimension."""
@@ -37,38 +35,11 @@ SCALARS = {"float": "f8", "int": "i8", "bool": "?"}
 ARRAYS = {"Vector": ("f8", 1), "Matrix": ("f8", 2), "IntVector": ("i8", 1), "IndexVector": ("u4", 1)}
 _C_TYPES = {"f8": ctypes.c_double, "i8": ctypes.c_int64, "?": ctypes.c_bool}
 _CASTS = {"f8": float, "i8": int, "?": bool}
-_WORD = 8
 _byte_of: Callable[[Any], ctypes.c_char] = ctypes.c_char.from_buffer
 _address_of = ctypes.addressof
-
-
-class StructType(types.Type):
-    """Numba's type of a `Struct`.
-
-    Parameters
-    ----------
-    name : str
-        Name of the class.
-    scalars : tuple of (str, str)
-        Names and numpy kinds.
-    arrays : tuple of (str, str, int)
-        Names, numpy kinds and numbers of dimensions.
-    """
-
-    def __init__(self, name: str, scalars: tuple, arrays: tuple) -> None:
-        self.layout = np.dtype(
-            [*scalars, *((f"{a}:", "i8", (1 + dimensions,)) for a, _, dimensions in arrays)], align=True
-        )
-        self.members: dict[str, types.Type] = {field: from_dtype(np.dtype(kind)) for field, kind in scalars}
-        for field, kind, dimensions in arrays:
-            self.members[field] = types.Array(from_dtype(np.dtype(kind)), dimensions, "C")
-        super().__init__(name=f"{name}({scalars}, {arrays})")
-
-    def offset(self, member: str) -> int:
-        """Return the place of a scalar, or of an array's address and shape, in bytes."""
-        assert self.layout.fields is not None
-        key = member if member in self.layout.fields else f"{member}:"
-        return self.layout.fields[key][1]
+_NO_BLOCK: tuple[None, int, dict] = None, 0, {}
+LINE = 64
+"""Bytes of a line of the processor's cache."""
 
 
 class Struct:
@@ -117,22 +88,41 @@ class Struct:
             setattr(cls, name, property(operator.attrgetter(f"_record.{name}")))
 
     def __init__(self, **members: Any) -> None:
-        own = self.__dict__
-        record = own["_record"] = self._record_type()
-        own["_address"] = _address_of(record)
         missing = self.array_members.keys() - members.keys()
         if missing:
             raise TypeError(f"{type(self).__name__} is missing {', '.join(sorted(missing))}")
+        self._stand_in(self._record_type())
+        own = self.__dict__
         words: list[int] = []
         for name, (kind, dimensions, _) in self._arrays.items():
             own[name] = value = members.pop(name)
             words += _words_of(name, value, kind, dimensions)
-        getattr(record, "words:")[:] = words
+        getattr(own["_record"], "words:")[:] = words
         for name, value in members.items():
             setattr(self, name, value)
 
+    def _stand_in(self, record: ctypes.Structure) -> None:
+        """Keep scalars, addresses and shapes in a record."""
+        self.__dict__["_record"] = record
+        self.__dict__["_address"] = _address_of(record)
+
+    def with_members(self, **members: Any) -> Self:
+        """Return a struct with other values of some members, that shares all other arrays with this one."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other._stand_in(self._record_type.from_buffer_copy(self._record))
+        for name, value in members.items():
+            setattr(other, name, value)
+        return other
+
     def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"{type(self).__name__} has no member {name!r}")
+        room, first, places = self.__dict__.get("_block", _NO_BLOCK)
+        if name not in places:
+            raise AttributeError(f"{type(self).__name__} has no member {name!r}")
+        kind, shape, offset = places[name]
+        # made when Python first looks at it: compiled code goes by its address
+        array = self.__dict__[name] = np.ndarray(shape, kind, room, first + offset)
+        return array
 
     def __setattr__(self, name: str, value: Any) -> None:
         cast = self._casts.get(name)
@@ -151,6 +141,65 @@ class Struct:
             type(self),
             {name: getattr(self, name) for name in (*self.array_members, *self.scalar_members)},
         )
+
+
+S = TypeVar("S", bound=Struct)
+
+
+class BlockLayout(Generic[S]):
+    """Places of arrays in one block of memory, found once for some sizes; then a struct takes one allocation.
+
+    A short run is over in less time than Python needs to make fifty arrays one by one.
+
+    Parameters
+    ----------
+    kind : type of Struct
+    shapes : mapping of str to int or tuple of int
+        Arrays in the block, each from the start of a line of the cache on. All others are given to `new`.
+    on_line : mapping of str to int, optional
+        Of an array the item that stands at the start of a line, instead of the first.
+    """
+
+    def __init__(
+        self,
+        kind: type[S],
+        shapes: Mapping[str, int | tuple[int, ...]],
+        on_line: Mapping[str, int] = MappingProxyType({}),
+    ) -> None:
+        self.kind = kind
+        self.given = kind.array_members.keys() - shapes.keys()
+        self.places: dict[str, tuple[np.dtype, tuple[int, ...], int]] = {}
+        self.size = 0
+        record = kind._record_type
+        words = getattr(record, "words:").offset // 8
+        self.image = np.zeros(-(-ctypes.sizeof(record) // 8), dtype=np.int64)
+        self.is_address = np.zeros_like(self.image)
+        for name, size in shapes.items():
+            item, dimensions, place = kind._arrays[name]
+            shape = (size,) if isinstance(size, int) else size
+            before = on_line.get(name, 0) * item.itemsize
+            offset = -(-(self.size + before) // LINE) * LINE - before
+            self.places[name] = item, shape, offset
+            self.size = offset + item.itemsize * math.prod(shape)
+            first = words + place
+            self.image[first : first + 1 + dimensions] = offset, *shape
+            self.is_address[first] = 1
+
+    def new(self, **members: Any) -> S:
+        """Return a struct of zeros but for the members given: those arrays that are not in the block, and scalars."""
+        missing = self.given - members.keys()
+        if missing:
+            raise TypeError(f"{self.kind.__name__} is missing {', '.join(sorted(missing))}")
+        room = np.zeros(self.size + LINE, dtype=np.uint8)
+        address = _address_of(_byte_of(room))
+        first = -address % LINE
+        struct = object.__new__(self.kind)
+        image: Any = self.image + (address + first) * self.is_address
+        struct._stand_in(self.kind._record_type.from_buffer(image))
+        struct.__dict__["_block"] = room, first, self.places
+        for name, value in members.items():
+            setattr(struct, name, value)
+        return struct
 
 
 def _words_of(name: str, value: np.ndarray, kind: np.dtype, dimensions: int) -> tuple[int, ...]:
@@ -180,62 +229,3 @@ def _rebuild(cls: type[Struct], members: dict[str, Any]) -> Struct:
 @typeof_impl.register(Struct)
 def _typeof(value, context):
     return value.numba_type
-
-
-register_model(StructType)(models.OpaqueModel)
-
-
-@unbox(StructType)
-def _unbox(typ, value, c):
-    address = c.pyapi.object_getattr_string(value, "_address")
-    pointer = c.builder.inttoptr(c.pyapi.long_as_longlong(address), cgutils.voidptr_t)
-    c.pyapi.decref(address)
-    return NativeValue(pointer)
-
-
-@infer_getattr
-class _Members(AttributeTemplate):
-    key = StructType
-
-    def generic_resolve(self, typ, attribute):
-        return typ.members.get(attribute)
-
-
-def _place(builder, value, offset, pointee):
-    byte = ir.IntType(8)
-    place = builder.gep(value, [ir.Constant(ir.IntType(64), offset)], inbounds=True, source_etype=byte)
-    return builder.bitcast(place, pointee.as_pointer())
-
-
-@lower_getattr_generic(StructType)
-def _get(context, builder, typ, value, attribute):
-    member = typ.members[attribute]
-    offset = typ.offset(attribute)
-    if not isinstance(member, types.Array):
-        return context.unpack_value(builder, member, _place(builder, value, offset, context.get_data_type(member)))
-    word = ir.IntType(64)
-
-    def fixed(index):
-        # arrays are not replaced while compiled code runs
-        load = builder.load(_place(builder, value, offset + _WORD * index, word))
-        load.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return load
-
-    out = make_array(member)(context, builder)
-    item = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(member.dtype)))
-    shape = [fixed(1 + d) for d in range(member.ndim)]
-    strides = [item]
-    for size in shape[:0:-1]:
-        strides.insert(0, builder.mul(strides[0], size))
-    data = builder.inttoptr(fixed(0), context.get_data_type(member.dtype).as_pointer())
-    populate_array(out, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
-    return out._getvalue()
-
-
-@lower_setattr_generic(StructType)
-def _set(context, builder, signature, args, attribute):
-    typ, member = signature.args
-    if isinstance(member, types.Array):
-        raise NotImplementedError(f"arrays of {typ} are replaced in Python only")
-    place = _place(builder, args[0], typ.offset(attribute), context.get_data_type(member))
-    context.pack_value(builder, member, args[1], place)

@@ -14,6 +14,7 @@ import numpy as np
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.bound_functions import bind
+from gearmbs.dae.compiled.direct_calls import direct
 from gearmbs.dae.integrators import messages, start
 from gearmbs.dae.integrators import run_state as s
 from gearmbs.dae.integrators.initial_state import initial_state
@@ -22,6 +23,7 @@ from gearmbs.dae.integrators.records import Records
 from gearmbs.dae.integrators.rounding import rounding_level
 from gearmbs.dae.integrators.stall import StallWatch
 from gearmbs.dae.integrators.step import advance
+from gearmbs.dae.linalg.analyse import SingularMatrixError, analyse
 from gearmbs.dae.linalg.counted_entries import (
     FEWEST_ENTRIES,
     LEAVING_PLANS,
@@ -30,7 +32,7 @@ from gearmbs.dae.linalg.counted_entries import (
     RATE_ALLOWED,
     STEPS_A_PLAN,
 )
-from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse
+from gearmbs.dae.linalg.lu_plan import LUPlan
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, LUFactors, factor, new_factors, solve
 from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
@@ -134,7 +136,7 @@ class Run:
         if st.drop_level == 0:
             st.drop_rounds = 0
         self.factors = new_factors(self.plan)
-        growth = factor(self.plan, self.factors, st.matrix)
+        growth = direct(factor)(self.plan, self.factors, st.matrix)
         st.factorizations += 1
         st.growth_limit = max(GROWTH_LIMIT, 100.0 * growth)
         if negligible > NEGLIGIBLE and not self._converges_without(self.plan, self.factors):
@@ -155,7 +157,7 @@ class Run:
         error = np.random.default_rng(0).choice([-1.0, 1.0], self.problem.n) * scale
         res = np.zeros(self.problem.n)
         np.add.at(res, self.indices[left], self.state.matrix[left] * error[columns])
-        solve(plan, factors, res, error)
+        direct(solve)(plan, factors, res, error)
         return bool(np.abs(error / scale).max() <= RATE_ALLOWED)
 
     def _entries_to_leave(self) -> np.ndarray | None:
@@ -221,7 +223,7 @@ class Run:
         chunk = FIRST_CHUNK
         while True:
             tic = time.perf_counter()
-            code = advance(self.functions, self.state, self.plan, self.factors, chunk)
+            code = direct(advance)(self.functions, self.state, self.plan, self.factors, chunk)
             ending = self.user_failure() if self.user_exception() is not None else self._heed(code)
             if ending is not None:
                 return ending
@@ -236,7 +238,7 @@ class Run:
                 self._report()
                 elapsed = time.perf_counter() - tic
                 if elapsed < 0.5 * CHUNK_SECONDS:
-                    chunk *= 2
+                    chunk *= 8 if elapsed < CHUNK_SECONDS / 16 else 2
                 elif elapsed > 2.0 * CHUNK_SECONDS and chunk > 1:
                     chunk //= 2
 

@@ -8,7 +8,7 @@ from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.history import newest_point
 from gearmbs.dae.integrators.newton_matrix import SLOPE_MAX_AGE
 from gearmbs.dae.integrators.options import Options, event_rules
-from gearmbs.dae.integrators.run_state import KINK_MEMORY, RunState, new_state
+from gearmbs.dae.integrators.run_state import KINK_MEMORY, RunState, Sizes, state_layout
 from gearmbs.dae.integrators.weights import set_weights
 from gearmbs.dae.problem import DAEProblem
 
@@ -19,6 +19,9 @@ CONSUMED_BYTES = 2_000_000
 """Of steps handed to a consumer at a time: what stays in the processor's cache, and outweighs the call of Python's."""
 
 MOST_RECORDS = 8192
+TIMES_OF_RECORDS = 2048
+"""Steps of which times, sizes and orders alone are recorded."""
+
 EVENT_BUFFER = 64
 RATE_ALLOWED = 0.12
 RATE_ALLOWED_IF_DEAR = 0.2
@@ -45,26 +48,14 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     ValueError
         For tolerances that are not positive, and rules that do not fit the event functions.
     """
-    n = problem.n
     t0 = float(problem.t0)
     n_events = int(problem.n_events) if problem.events is not None else 0
-    st = new_state(
-        n,
-        len(problem.indices),
-        y=np.array(problem.y0, dtype=float),
-        yp=np.array(problem.yp0, dtype=float),
-        yp_start=np.array(problem.yp0, dtype=float),
-        **_masks(problem, options),
-        idata=np.array(problem.idata, dtype=np.int64),
-        rdata=np.array(problem.rdata, dtype=float),
-        work=np.zeros(max(1, problem.work_size)),
-        stops=np.array(sorted(b for b in options.breakpoints if t0 < b < t_end), dtype=float),
-        outputs=outputs,
-        y_out=np.empty((len(outputs), n)),
-        yp_out=np.empty((len(outputs), n)),
-        **_record_buffers(n, keep, options.consumer is not None),
-        **_event_buffers(n, n_events, options),
-    )
+    stops = sorted(b for b in options.breakpoints if t0 < b < t_end)
+    st = _empty_state(problem, outputs, stops, n_events, _rows_of_records(problem.n, keep, options), keep)
+    st.stops[:] = stops
+    _set_tables(st, problem)
+    _set_tolerances(st, problem, options)
+    _set_event_rules(st, n_events, options)
     st.t_end = t_end
     st.h_max = np.inf if options.max_step is None else options.max_step
     st.rtol = options.rtol
@@ -94,46 +85,61 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     return st
 
 
-def _masks(problem: DAEProblem, options: Options) -> dict[str, np.ndarray]:
-    """Return tolerances, and masks of the unknowns as numbers."""
-    atol = options.tol * np.asarray(problem.atol_scale, dtype=float)
-    if not (atol > 0).all():
-        raise ValueError(f"atol_scale must be positive, is {problem.atol_scale[int(np.argmin(atol))]:g} somewhere")
-    controlled = np.array(problem.error_mask, dtype=float)
-    differential = np.array(problem.differential, dtype=float)
-    return {
-        "atol": atol,
-        "controlled": controlled,
-        "tested": controlled.copy() if options.corrector == "modified" else np.ones(problem.n),
-        "differential": differential,
-        "coupled": np.maximum(controlled, differential),
-    }
+def _rows_of_records(n: int, keep: bool, options: Options) -> int:
+    """Return for how many accepted steps there is room between two calls of the compiled loop."""
+    if not keep:
+        return TIMES_OF_RECORDS
+    size = RECORD_BYTES if options.consumer is None else CONSUMED_BYTES
+    return min(max(size // (8 * n), 8 * HISTORY), MOST_RECORDS)
 
 
-def _record_buffers(n: int, keep: bool, consumed: bool) -> dict[str, np.ndarray]:
-    size = CONSUMED_BYTES if consumed else RECORD_BYTES
-    rows = int(np.clip(size // (8 * n), 8 * HISTORY, MOST_RECORDS)) if keep else MOST_RECORDS
-    return {
-        "record_t": np.zeros(rows),
-        "record_h": np.zeros(rows),
-        "record_order": np.zeros(rows, dtype=np.int64),
-        "record_y": np.zeros((rows if keep else 1, n)),
-    }
+def _empty_state(
+    problem: DAEProblem, outputs: np.ndarray, stops: list[float], n_events: int, records: int, keep: bool
+) -> RunState:
+    n = problem.n
+    sizes = Sizes(
+        n=n,
+        nnz=len(problem.indices),
+        idata=len(problem.idata),
+        rdata=len(problem.rdata),
+        work=problem.work_size,
+        stops=len(stops),
+        events=n_events,
+        crossings=EVENT_BUFFER + n_events,
+        records=records,
+    )
+    return state_layout(sizes).new(
+        outputs=outputs,
+        y_out=np.empty((len(outputs), n)),
+        yp_out=np.empty((len(outputs), n)),
+        record_y=np.empty((records if keep else 1, n)),
+    )
 
 
-def _event_buffers(n: int, n_events: int, options: Options) -> dict[str, np.ndarray]:
-    direction, action, left = event_rules(n_events, options)
-    crossings = EVENT_BUFFER + n_events
-    return {
-        "g_old": np.zeros(max(1, n_events)),
-        "g_new": np.zeros(max(1, n_events)),
-        "event_direction": direction,
-        "event_action": action,
-        "event_left": left,
-        "crossing_t": np.zeros(crossings),
-        "crossing_event": np.zeros(crossings, dtype=np.int64),
-        "crossing_y": np.zeros((crossings if n_events else 1, n)),
-    }
+def _set_tables(st: RunState, problem: DAEProblem) -> None:
+    """Copy the tables, which hooks and events may change, and the initial values."""
+    st.idata[:] = problem.idata
+    st.rdata[:] = problem.rdata
+    st.y[:] = problem.y0
+    st.yp[:] = st.yp_start[:] = problem.yp0
+
+
+def _set_tolerances(st: RunState, problem: DAEProblem, options: Options) -> None:
+    """Set tolerances, and masks of the unknowns as numbers."""
+    np.multiply(problem.atol_scale, options.tol, out=st.atol)
+    if not st.atol.min(initial=np.inf) > 0.0:
+        raise ValueError(f"atol_scale must be positive, is {problem.atol_scale[int(np.argmin(st.atol))]:g} somewhere")
+    st.controlled[:] = problem.error_mask
+    st.tested[:] = st.controlled if options.corrector == "modified" else 1.0
+    st.differential[:] = problem.differential
+    np.maximum(st.controlled, st.differential, out=st.coupled)
+
+
+def _set_event_rules(st: RunState, n_events: int, options: Options) -> None:
+    """Set which crossings count, what they do, and how many are left; default all, nothing, and one until a stop."""
+    st.event_left[:] = 1
+    for name, values in event_rules(n_events, options).items():
+        getattr(st, name)[:n_events] = values
 
 
 def _record_start(st: RunState) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -108,9 +110,9 @@ class Options:
     def __post_init__(self) -> None:
         _check_choice("method", self.method, METHODS)
         _check_choice("corrector", self.corrector, CORRECTORS)
-        if not (np.isfinite(self.tol) and self.tol > 0):
+        if not (math.isfinite(self.tol) and self.tol > 0):
             raise ValueError(f"tol (ERROR) must be positive, is {self.tol!r}")
-        if not (np.isfinite(self.rtol) and self.rtol >= 0):
+        if not (math.isfinite(self.rtol) and self.rtol >= 0):
             raise ValueError(f"rtol must not be negative, is {self.rtol!r}")
         if self.max_order is not None and not 1 <= self.max_order <= self.highest_order:
             kind = " for IDA" if self.uses_ida else ""
@@ -150,9 +152,10 @@ class Options:
         return IDA_MAX_ORDER if self.uses_ida else MAX_ORDER
 
     @staticmethod
-    def names(method: str) -> list[str]:
+    @cache
+    def names(method: str) -> tuple[str, ...]:
         """Return the options that a method takes, without ``method`` itself."""
-        return [f.name for f in fields(Options) if f.name != "method" and (method != "IDA" or f.name in IDA_TAKES)]
+        return tuple(f.name for f in fields(Options) if f.name != "method" and (method != "IDA" or f.name in IDA_TAKES))
 
     @classmethod
     def gather(cls, method: str | None, base: Options | None, settings: Mapping[str, Any], more: str = "") -> Options:
@@ -176,10 +179,10 @@ class Options:
         chosen = method if method is not None else base.method if base is not None else "WSTIFF"
         _check_choice("method", chosen, METHODS)
         known = cls.names(chosen)
-        unknown = sorted(set(settings) - set(known))
+        unknown = sorted(name for name in settings if name not in known)
         if unknown:
             raise ValueError(f"method={chosen!r} does not know {', '.join(unknown)}; {more}it takes {', '.join(known)}")
-        return replace(base if base is not None else cls(method=chosen), method=chosen, **settings)
+        return cls(method=chosen, **settings) if base is None else replace(base, method=chosen, **settings)
 
 
 def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
@@ -201,7 +204,9 @@ def output_times(t_eval: np.ndarray | None, t0: float, t_end: float | None) -> t
         outputs = np.empty(0)
     else:
         outputs = np.array(t_eval, dtype=float).ravel()
-        if not len(outputs) or not np.isfinite(outputs).all() or (np.diff(outputs) <= 0).any():
+        # what increases between finite ends is finite
+        finite = len(outputs) and math.isfinite(outputs[0]) and math.isfinite(outputs[-1])
+        if not finite or not (outputs[1:] > outputs[:-1]).all():
             raise ValueError("t_eval must be finite and strictly increasing, with at least one time")
         if outputs[0] < t0:
             raise ValueError(f"t_eval starts at {outputs[0]:g}, before the problem's t0 = {t0:g}")
@@ -209,33 +214,35 @@ def output_times(t_eval: np.ndarray | None, t0: float, t_end: float | None) -> t
             t_end = float(outputs[-1])
         elif outputs[-1] > t_end:
             raise ValueError(f"t_eval ends at {outputs[-1]:g}, after t_end = {t_end:g}")
-    if not (np.isfinite(t_end) and t_end > t0):
+    if not (math.isfinite(t_end) and t_end > t0):
         raise ValueError(f"the end time {t_end:g} must lie after the start {t0:g}")
     return outputs, float(t_end)
 
 
-def event_rules(n_events: int, options: Options) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return direction, action and count of each event, of at least one place; zeros and a count of one if not given.
+def event_rules(n_events: int, options: Options) -> dict[str, Sequence[int]]:
+    """Return the rules of events that are given, checked, by the fields of the state that they belong to.
 
     Raises
     ------
     ValueError
         For a list of the wrong length or with a value that means nothing.
     """
-
-    def rule(name: str, allowed: tuple[int, ...] | None, default: int) -> np.ndarray:
-        values = np.full(max(1, n_events), default, dtype=np.int64)
-        given = getattr(options, name)
-        if given is None:
-            return values
-        if len(given) != n_events:
-            raise ValueError(f"{name} has {len(given)} entries for {n_events} event functions")
-        for value in given:
+    given = {
+        "event_direction": (options.event_direction, (-1, 0, 1)),
+        "event_action": (options.event_action, (0, 1, 2)),
+        "event_left": (options.event_count, None),
+    }
+    rules = {}
+    for field, (values, allowed) in given.items():
+        if values is None:
+            continue
+        name = "event_count" if allowed is None else field
+        if len(values) != n_events:
+            raise ValueError(f"{name} has {len(values)} entries for {n_events} event functions")
+        for value in values:
             if allowed is not None and value not in allowed:
                 raise ValueError(f"{name} may hold {allowed}, has {value!r}")
             if allowed is None and (value != int(value) or value < 1):
                 raise ValueError(f"{name} may hold whole numbers from 1 on, has {value!r}")
-        values[:n_events] = given
-        return values
-
-    return rule("event_direction", (-1, 0, 1), 0), rule("event_action", (0, 1, 2), 0), rule("event_count", None, 1)
+        rules[field] = values
+    return rules

@@ -5,9 +5,10 @@ Its members are attributes, ``st.order``, ``st.y_pred``, in compiled code and in
 
 from __future__ import annotations
 
-import numpy as np
+from functools import lru_cache
+from typing import NamedTuple
 
-from gearmbs.dae.compiled.structs import IndexVector, IntVector, Matrix, Struct, Vector
+from gearmbs.dae.compiled.structs import BlockLayout, IndexVector, IntVector, Matrix, Struct, Vector
 from gearmbs.dae.integrators.bdf import HISTORY
 
 # return codes of the compiled loop; zero and above are not failures
@@ -31,6 +32,9 @@ KINK_MEMORY = 64
 
 MAX_NODES = 2 * HISTORY
 """Length of the vectors that hold coefficients of a step."""
+
+KNOWN_SIZES = 64
+"""Sets of sizes for which the places of arrays are kept."""
 
 
 class RunState(Struct):
@@ -218,24 +222,61 @@ class RunState(Struct):
 STATE_TYPE = RunState.numba_type
 
 
-def new_state(n: int, nnz: int, **given: np.ndarray) -> RunState:
-    """Return the state of a run of ``n`` unknowns with ``nnz`` entries in its matrix.
+PER_UNKNOWN = (
+    "y", "yp", "y_pred", "yp_pred", "res", "delta", "y_between", "yp_between", "yp_start", "w_error", "w_newton",
+    "weight", "atol", "controlled", "tested", "differential", "coupled",
+)  # fmt: skip
+PER_ENTRY = ("jac", "jac_slope", "matrix", "carried")
+COEFFICIENTS = ("value", "slope", "nodes")
+PER_EVENT = ("g_old", "g_new", "event_direction", "event_action", "event_left")
 
-    Parameters
+
+class Sizes(NamedTuple):
+    """Sizes of the arrays of a run.
+
+    Attributes
     ----------
     n, nnz : int
-    **given
-        Fields that are not zeros of a length that follows from ``n`` and ``nnz``.
+        Unknowns; entries of the matrix.
+    idata, rdata, work : int
+        Tables and scratch of the problem.
+    stops : int
+        Times to land on.
+    events, crossings, records : int
+        Event functions; places for crossings, and for accepted steps, between two calls of the compiled loop.
     """
-    shapes: dict[str, int | tuple[int, int]] = {
-        "window_t": WINDOW,
-        "window_y": WINDOW * n,
-        **dict.fromkeys(("value", "slope", "nodes"), MAX_NODES),
-        "respacing": (HISTORY, MAX_NODES),
-        **dict.fromkeys(("jac", "jac_slope", "matrix"), nnz),
-    }
-    made = {}
-    given = {"carried": np.zeros(nnz, dtype=np.uint32), **given}
-    for name in RunState.array_members:
-        made[name] = given[name] if name in given else np.zeros(shapes.get(name, n))
-    return RunState(**made)
+
+    n: int
+    nnz: int
+    idata: int
+    rdata: int
+    work: int
+    stops: int
+    events: int
+    crossings: int
+    records: int
+
+
+@lru_cache(maxsize=KNOWN_SIZES)
+def state_layout(sizes: Sizes) -> BlockLayout[RunState]:
+    """Return where the arrays of a state stand; outputs and ``record_y``, which outlive it or are large, are given."""
+    n, records, crossings = sizes.n, sizes.records, sizes.crossings
+    return BlockLayout(
+        RunState,
+        {
+            "window_t": WINDOW,
+            "window_y": WINDOW * n,
+            **dict.fromkeys(PER_UNKNOWN, n),
+            **dict.fromkeys(PER_ENTRY, sizes.nnz),
+            **dict.fromkeys(COEFFICIENTS, MAX_NODES),
+            "respacing": (HISTORY, MAX_NODES),
+            "idata": sizes.idata,
+            "rdata": sizes.rdata,
+            "work": max(1, sizes.work),
+            "stops": sizes.stops,
+            **dict.fromkeys(PER_EVENT, max(1, sizes.events)),
+            **dict.fromkeys(("crossing_t", "crossing_event"), crossings),
+            "crossing_y": (crossings if sizes.events else 1, n),
+            **dict.fromkeys(("record_t", "record_h", "record_order"), records),
+        },
+    )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gearmbs.dae.compiled.direct_calls import direct
 from gearmbs.dae.integrators import messages
 from gearmbs.dae.integrators.history import newest_point
 from gearmbs.dae.linalg.counted_entries import FEWEST_ENTRIES
@@ -51,7 +52,7 @@ def choose_steps(run: Run) -> None:
     st = run.state
     span = st.t_end - st.t
     natural = FIRST_OF_SPAN * span
-    speed = float(np.max(np.abs(st.yp_start) * st.w_error))
+    speed = float((np.abs(st.yp_start) * st.w_error).max())
     if speed > 0.0:
         natural = min(natural, FIRST_MOVE / speed)
     smallest = min(SMALLEST_OF_SPAN * span, SMALLEST_OF_FIRST * natural)
@@ -132,7 +133,7 @@ def _factors_with_plan(run: Run, h: float) -> bool:
         return False
     _evaluate_matrix(run, h)
     st.factorizations += 1
-    return bool(factor(run.plan, run.factors, st.matrix) <= st.growth_limit)
+    return bool(direct(factor)(run.plan, run.factors, st.matrix) <= st.growth_limit)
 
 
 def _residual(run: Run) -> None:
@@ -144,8 +145,8 @@ def _residual(run: Run) -> None:
 def _correction(run: Run) -> float:
     """Solve for the Newton correction of the start; return its size in units of the tolerance."""
     st = run.state
-    solve(run.plan, run.factors, st.res, st.delta)
-    return float(np.max(np.abs(st.delta) * st.w_error))
+    direct(solve)(run.plan, run.factors, st.res, st.delta)
+    return float((np.abs(st.delta) * st.w_error).max())
 
 
 def _shrink_while_moving(run: Run, h: float, move: float, limit: float) -> tuple[float, float]:
@@ -217,8 +218,8 @@ def _euler_error(run: Run, h: float) -> float:
     st.residuals += 1
     if not np.isfinite(st.res).all():
         return np.inf
-    solve(run.plan, run.factors, st.res, st.delta)
-    return 0.5 * float(np.max(np.abs(st.delta) * st.w_error * st.differential))
+    direct(solve)(run.plan, run.factors, st.res, st.delta)
+    return 0.5 * float((np.abs(st.delta) * st.w_error * st.differential).max())
 
 
 def _algebraic_note(run: Run) -> str:

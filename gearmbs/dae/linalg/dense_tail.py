@@ -31,13 +31,6 @@ def padded(size: int) -> int:
     return -(-size // LANES) * LANES
 
 
-def aligned_zeros(size: int, place: int = 0) -> np.ndarray:
-    """Return zeros of which that in a place, and every eighth from there on, lies where the processor reads lanes."""
-    room = np.zeros(size + LANES)
-    first = (-room.ctypes.data // room.itemsize - place) % LANES
-    return room[first : first + size]
-
-
 @njit(int64(int64, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
 def tail_of_plan(rank, l_ptr, u_ptr):
     """Return the first pivot of the dense tail, or the number of pivots if there is none.

@@ -1,42 +1,21 @@
-"""Plan of a sparse LU: pivots chosen on values, fill found once, and index lists along which matrices are factored.
-
-Entries that have been negligible so far can be left out of the plan; the numeric phase, `gearmbs.dae.linalg.sparse_lu`,
-looks at them, and as soon as one counts the caller analyses again.
-"""
+"""Plan of a sparse LU: index lists along which matrices of a pattern are factored, made once for the same pivots."""
 
 from __future__ import annotations
 
-import numpy as np
-from numba import boolean, float64, int64, types, uint32
+from functools import lru_cache
+from typing import NamedTuple
 
-from gearmbs._jit import njit
+import numpy as np
+
 from gearmbs.dae.compiled.structs import IndexVector, IntVector, Struct, Vector
-from gearmbs.dae.linalg.counted_entries import (
-    NEGLIGIBLE,
-    WHEN_PLANNED,
-    limits,
-    part_entries,
-    scaled_entries,
-    taken_pattern,
-)
 from gearmbs.dae.linalg.dense_tail import tail_entries, tail_of_plan, without_tail
 from gearmbs.dae.linalg.entry_lists import FIELDS_BY_COLUMNS, L_POS, entry_lists
 from gearmbs.dae.linalg.front_blocks import front_blocks
 from gearmbs.dae.linalg.nodes import has_nodes, nodes
-from gearmbs.dae.linalg.pivoting import (
-    CANCELLED,
-    GROWTH_ALLOWED,
-    LINES_TYPE,
-    THRESHOLDS,
-    choose_pivots,
-    new_lines,
-)
 from gearmbs.dae.linalg.schedule import column_by_column, schedule
 
-_VEC = float64[::1]
-_IVEC = int64[::1]
-_UVEC = uint32[::1]
-_MASK = boolean[::1]
+KNOWN = 16
+"""Choices of pivots whose plans are kept; those of the largest models take some megabytes each."""
 
 NO_TAIL = {
     **dict.fromkeys(("tail_at", "tail_src", "block_at", "block_lane", "block_col"), np.zeros(0, dtype=np.uint32)),
@@ -146,146 +125,45 @@ class LUPlan(Struct):
 PLAN_TYPE = LUPlan.numba_type
 
 
-class SingularMatrixError(ValueError):
-    """No pivot is left.
-
-    Attributes
-    ----------
-    rows, cols : ndarray of int
-        Equations and unknowns that could not be paired.
-    """
-
-    def __init__(self, rows: np.ndarray, cols: np.ndarray):
-        super().__init__(f"the matrix is singular: no pivot left for columns {cols.tolist()}, rows {rows.tolist()}")
-        self.rows = rows
-        self.cols = cols
-
-
-@njit(
-    types.Tuple((int64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _VEC, _VEC, _UVEC, _IVEC, _IVEC, _UVEC, _VEC))(
-        _IVEC, _IVEC, _VEC, _VEC, float64, _MASK, float64, LINES_TYPE, LINES_TYPE
-    ),
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def _choose(all_ptr, all_indices, vals, scale, drop, counted, negligible, columns, rows_left):
-    """Scale the matrix, leave out what is negligible and choose pivots.
+class _Pivots:
+    """Pivots, and the entries that they are chosen for: all that a plan follows from but its scales.
 
     Parameters
     ----------
-    all_ptr, all_indices, vals, scale, drop, counted, negligible
-        As the pattern and the others of `analyse`.
-    columns, rows_left
-        As in `choose_pivots`.
-
-    Returns
-    -------
-    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols
-        See `choose_pivots`; no rank where a pool was too small.
-    row_scale, col_scale, taken
-        Scales; entries of the matrix that the plan is made for.
-    indptr, indices
-        Their pattern.
-    left, left_limit
-        See `LUPlan`.
+    with_tail, rank, lists
+        As of `plan_from_pivots`; the lists from ``rows`` to ``u_cols``, then from ``taken`` to ``left``.
     """
-    row_scale, col_scale, all_scaled = scaled_entries(all_ptr, all_indices, vals, scale)
-    taken, left = part_entries(all_scaled, counted, WHEN_PLANNED * negligible)
-    indptr, indices, scaled = taken_pattern(all_ptr, all_indices, all_scaled, taken)
-    growth = np.inf
-    for threshold in THRESHOLDS:
-        if growth > GROWTH_ALLOWED:
-            rank, growth, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(
-                indptr, indices, scaled, drop, threshold, columns, rows_left
-            )
-    left_limit = limits(all_ptr, all_indices, left, row_scale, col_scale, negligible)
-    return (
-        rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left, left_limit
-    )  # fmt: skip
+
+    def __init__(self, with_tail: bool, rank: int, *lists: np.ndarray) -> None:
+        self.with_tail, self.rank, self.lists = with_tail, rank, lists
+        self._content = with_tail, rank, *(items.tobytes() for items in lists)
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Pivots) and self._content == other._content
 
 
-def analyse(
-    indptr: np.ndarray,
-    indices: np.ndarray,
-    vals: np.ndarray,
-    scale: np.ndarray,
-    drop: float = 0.0,
-    counted: np.ndarray | None = None,
-    negligible: float = NEGLIGIBLE,
-    with_tail: bool = False,
-) -> LUPlan:
-    """Choose pivots for a matrix and lay down the plan to factor every matrix of its pattern.
+class _Unscaled(NamedTuple):
+    """A plan with scales of one, and in which rows and columns of the matrix its scaled entries and pivots stand."""
 
-    Parameters
-    ----------
-    indptr, indices : ndarray of int64
-        CSC pattern, n columns.
-    vals : ndarray
-        Values on which pivots are chosen.
-    scale : ndarray, shape (n,)
-        Typical magnitude of each unknown.
-    drop : float
-        When positive, unknowns without a pivot larger than this fraction of their entries are set aside, each with an
-        equation: they come out of `solve` as zero.
-    counted : ndarray of bool, optional
-        Entries of the pattern that have counted in any matrix before; those that count in this one are marked. The
-        others are left out of the plan, if they are many. Default: no entry is left out.
-    negligible : float
-        Size of an entry of the equilibrated matrix up to which it may stay left out.
-    with_tail : bool
-        Whether the last pivots may be taken as a full block, as is worth it with modes; eight matrices side by side
-        cannot have one.
-
-    Returns
-    -------
-    LUPlan
-
-    Raises
-    ------
-    SingularMatrixError
-        If nothing may be dropped and the matrix is singular to working precision, with the rows and columns left over.
-    ValueError
-        If a value is not finite.
-    """
-    if not np.isfinite(vals).all():
-        raise ValueError("the matrix has entries that are not finite")
-    n = len(indptr) - 1
-    size = 3 * len(indices) + 4 * n
-    counted = np.ones(len(indices), dtype=bool) if counted is None else counted
-    while True:
-        lines = new_lines(n, size, True), new_lines(n, size, False)
-        rank, *chosen = _choose(
-            indptr, indices, vals, np.asarray(scale, dtype=float), max(drop, CANCELLED), counted, negligible, *lines
-        )
-        if rank >= 0:
-            break
-        size *= 2
-    if rank < n and not counted.all():
-        return analyse(indptr, indices, vals, scale, drop, with_tail=with_tail)
-    if rank < n and drop == 0.0:
-        rows, cols = chosen[:2]
-        raise SingularMatrixError(rows[rank:], cols[rank:])
-    return _plan(with_tail, rank, *chosen)
+    plan: LUPlan
+    entries: tuple[np.ndarray, np.ndarray]
+    of_tail: tuple[np.ndarray, np.ndarray]
+    pivots: tuple[np.ndarray, np.ndarray]
 
 
-def _plan(
-    with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left,
-    left_limit,
-) -> LUPlan:  # fmt: skip
-    """Return the plan that follows from what `_choose` returns.
-
-    Parameters
-    ----------
-    with_tail
-        See `analyse`.
-    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left, left_limit
-        See there.
-    """
+@lru_cache(maxsize=KNOWN)
+def _unscaled_plan(pivots: _Pivots) -> _Unscaled:
+    """Return the plan that follows from pivots, the same object for the same ones."""
+    with_tail, rank = pivots.with_tail, pivots.rank
+    rows, cols, l_ptr, l_rows, u_ptr, u_cols, taken, indptr, indices, left = pivots.lists
+    ones = np.ones(len(rows))
     tail = tail_of_plan(rank, l_ptr, u_ptr) if with_tail else len(rows)
     l_ptr, l_rows = without_tail(tail, l_ptr, l_rows)
     u_ptr, u_cols = without_tail(tail, u_ptr, u_cols)
-    lists = entry_lists(rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices)
+    lists = entry_lists(rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, ones, ones, taken, indptr, indices)
     f = dict(zip(FIELDS_BY_COLUMNS, lists, strict=True), l_ptr=l_ptr, node_end=nodes(l_ptr, lists[L_POS]))
     if tail < len(rows):
         f |= tail_entries(tail, f["a_ptr"], f["a_pos"], f["a_src"], f["a_scale"])
@@ -299,6 +177,47 @@ def _plan(
         order = schedule(
             rank, f["a_ptr"], f["a_pos"], f["u_ptr"], f["u_pos"], f["u_col"], l_ptr, f["l_pos"], f["l_col"]
         )
-    limit = np.full(len(taken) + len(left) if len(left) else 0, np.inf)
-    limit[left] = left_limit
-    return LUPlan(left_src=left, left_limit=left_limit, limit=limit, tail=tail, **f, **order)
+    none = np.empty(0)
+    plan = LUPlan(left_src=left, left_limit=none, limit=none, tail=tail, **f, **order)
+
+    def where(entries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        places = np.searchsorted(taken, entries)
+        return indices[places], np.searchsorted(indptr, places, side="right") - 1
+
+    return _Unscaled(plan, where(plan.a_src), where(plan.tail_src), (rows, cols))
+
+
+def plan_from_pivots(
+    with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left,
+    left_limit,
+) -> LUPlan:  # fmt: skip
+    """Return the plan that follows from pivots.
+
+    Thousands of runs of alike mechanisms choose the same pivots; the lists that follow from them are made once.
+
+    Parameters
+    ----------
+    with_tail : bool
+        Whether the last pivots may be taken as a full block.
+    rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols
+        Of `gearmbs.dae.linalg.pivoting.choose_pivots`.
+    row_scale, col_scale : ndarray, shape (n,)
+        Scales of equations and unknowns.
+    taken, indptr, indices : ndarray
+        Entries of the matrix that the plan is made for, and their pattern.
+    left, left_limit : ndarray
+        Entries left out, and the largest absolute values with which they may be.
+    """
+    known = _unscaled_plan(
+        _Pivots(with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, taken, indptr, indices, left)
+    )
+    (i, j), (p, q) = known.entries, known.pivots
+    scaled = {"a_scale": row_scale[i] * col_scale[j], "row_scale": row_scale[p], "col_scale": col_scale[q]}
+    if known.plan.tail < len(rows):
+        i, j = known.of_tail
+        scaled["tail_scale"] = row_scale[i] * col_scale[j]
+    if len(left):
+        limit = np.full(len(taken) + len(left), np.inf)
+        limit[left] = left_limit
+        scaled |= {"left_limit": left_limit, "limit": limit}
+    return known.plan.with_members(**scaled)

@@ -14,11 +14,13 @@ References
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numba import float64, int64, types
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.structs import IntVector, Struct, Vector
+from gearmbs.dae.compiled.structs import BlockLayout, IntVector, Struct, Vector
 
 THRESHOLDS = (0.01, 0.1, 0.5)
 """Fraction of its column's largest entry a pivot must reach; the next is taken where entries grow too much."""
@@ -29,6 +31,8 @@ CANCELLED = 1e-14
 SEARCH_LIMIT = 12
 EQUILIBRATION_SWEEPS = 8
 TINY = 1e-300
+SIZES = 64
+"""Sets of sizes for which the places of scratch are kept."""
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -102,12 +106,16 @@ class Lines(Struct):
     full: bool
 
 
+@lru_cache(maxsize=SIZES)
+def _layout(n: int, size: int, with_values: bool) -> BlockLayout[Lines]:
+    whole = dict.fromkeys(("start", "length", "after", "before"), n)
+    counts = dict.fromkeys(("room", "head"), n + 1)
+    return BlockLayout(Lines, {**whole, **counts, "pool": size, "vals": size if with_values else 1})
+
+
 def new_lines(n: int, size: int, with_values: bool) -> Lines:
     """Return ``n`` empty lines with a pool of ``size`` places."""
-    whole = {name: np.empty(n, dtype=np.int64) for name in ("start", "length", "after", "before")}
-    counts = {name: np.empty(n + 1, dtype=np.int64) for name in ("room", "head")}
-    pool = np.empty(size, dtype=np.int64)
-    return Lines(**whole, **counts, pool=pool, vals=np.empty(size if with_values else 1))
+    return _layout(n, size, with_values).new()
 
 
 LINES_TYPE = Lines.numba_type

@@ -8,20 +8,24 @@ counts; then the caller analyses again with the current values.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numba import float64, int64, types
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.lanes import LANES, all_lanes, put_lanes
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
-from gearmbs.dae.compiled.structs import Struct, Vector
+from gearmbs.dae.compiled.structs import BlockLayout, Struct, Vector
 from gearmbs.dae.compiled.views import vector_at
-from gearmbs.dae.linalg.dense_tail import aligned_zeros, factor_tail, fill_tail, padded, solve_tail
+from gearmbs.dae.linalg.dense_tail import factor_tail, fill_tail, padded, solve_tail
 from gearmbs.dae.linalg.front_blocks import act_by_blocks, into_blocks, open_tail
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
 from gearmbs.dae.linalg.nodes import has_nodes, through_node
 
 GROWTH_LIMIT = 1e5
+SIZES = 64
+"""Sets of sizes for which the places of numbers are kept."""
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
@@ -58,20 +62,26 @@ class LUFactors(Struct):
 FACTORS_TYPE = LUFactors.numba_type
 
 
+@lru_cache(maxsize=SIZES)
+def _layout(n: int, tail: int, entries: int, blocks: int) -> BlockLayout[LUFactors]:
+    """Return where the numbers stand: arrays, and of ``x`` the rows of the tail, where the processor reads lanes."""
+    rows = padded(n - tail)
+    sizes = {
+        "lu": entries + n + 1,
+        "pivot_inv": n,
+        "x": tail + rows,
+        "w": n,
+        "below": LANES * blocks,
+        "lower": rows * (n - tail) + LANES,
+        "upper": rows * (n - tail),
+        "rest": rows,
+    }
+    return BlockLayout(LUFactors, sizes, on_line={"x": tail})
+
+
 def new_factors(plan: LUPlan) -> LUFactors:
     """Return empty factors for a plan."""
-    n = len(plan.row_from)
-    size = n - plan.tail
-    return LUFactors(
-        lu=np.zeros(len(plan.l_pos) + len(plan.u_pos) + n + 1),
-        pivot_inv=np.zeros(n),
-        x=aligned_zeros(plan.tail + padded(size), plan.tail),
-        w=np.zeros(n),
-        below=aligned_zeros(LANES * len(plan.block_at)),
-        lower=aligned_zeros(padded(size) * size + LANES),
-        upper=aligned_zeros(padded(size) * size),
-        rest=aligned_zeros(padded(size)),
-    )
+    return _layout(len(plan.row_from), plan.tail, len(plan.l_pos) + len(plan.u_pos), len(plan.block_at)).new()
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

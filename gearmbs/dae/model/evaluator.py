@@ -23,8 +23,9 @@ from gearmbs.dae.equations.reactions import renew_reactions
 from gearmbs.dae.equations.residual import update
 from gearmbs.dae.equations.update import update_tables
 from gearmbs.dae.errors import ModelError
+from gearmbs.dae.linalg.analyse import SingularMatrixError, analyse
 from gearmbs.dae.linalg.counted_entries import FEWEST_ENTRIES, LEAVING_PLANS
-from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan, SingularMatrixError, analyse
+from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, LUFactors, factor, new_factors, solve, solve_pair
 from gearmbs.dae.model.member_tables import Members
 from gearmbs.dae.model.records import FARTHEST, RECORDS_TYPE, Records, allow_rounding, new_records

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from numba import float64, int64, njit
 
-from gearmbs.dae.compiled.structs import IntVector, Matrix, Struct, Vector
+from gearmbs._jit import njit as kernel
+from gearmbs.dae.compiled.direct_calls import direct
+from gearmbs.dae.compiled.structs import LINE, BlockLayout, IntVector, Matrix, Struct, Vector
 
 
 class Sample(Struct):
@@ -81,3 +83,68 @@ def test_unknown_and_missing_members_are_named():
         sample().size = 1.0
     with pytest.raises(AttributeError, match="no member 'size'"):
         _ = sample().size
+
+
+@kernel(float64(Sample.numba_type), cache=True)
+def first_of_rows(st):
+    """Change a scalar and return an entry."""
+    st.order += 1
+    return st.rows[0, 0]
+
+
+def in_block(**members) -> Sample:
+    return BlockLayout(Sample, {"y": 3, "marks": 2}, on_line={"y": 1}).new(rows=np.arange(6.0).reshape(2, 3), **members)
+
+
+def test_arrays_of_a_block_are_zeros_that_both_sides_see():
+    st = in_block(order=3)
+    assert work(st, 1) == 3.0 + 4.0 + 5.0
+    assert (st.h, st.order, st.open, st.marks[0]) == (0.5, 7, True, 3)
+    np.testing.assert_array_equal(st.y, [3.0, 4.0, 5.0])
+    st.y[:] = 1.0
+    assert work(st, 0) == 3.0 + 3.0
+    st.y = np.full(3, 10.0)
+    assert work(st, 0) == 30.0 + 3.0
+
+
+def test_arrays_of_a_block_stand_on_lines_of_the_cache_and_apart():
+    st = in_block()
+    assert st.y[1:].ctypes.data % LINE == 0
+    assert st.marks.ctypes.data % LINE == 0
+    st.marks[:] = -1
+    assert not st.y.any()
+    assert (st.rows == np.arange(6.0).reshape(2, 3)).all()
+
+
+def test_structs_of_one_layout_share_nothing_and_a_pickled_one_is_whole():
+    layout = BlockLayout(Sample, {"y": 3, "rows": (2, 3), "marks": 0})
+    one, other = layout.new(), layout.new()
+    one.y[:] = 1.0
+    assert not other.y.any()
+    back = pickle.loads(pickle.dumps(one))
+    assert back.rows.shape == (2, 3)
+    assert work(Sample(y=back.y, rows=back.rows, marks=np.zeros(1, dtype=np.int64)), 0) == 3.0
+
+
+def test_arrays_outside_a_block_have_to_be_given_and_no_others_are_there():
+    layout = BlockLayout(Sample, {"y": 3})
+    with pytest.raises(TypeError, match="missing marks, rows"):
+        layout.new()
+    with pytest.raises(AttributeError, match="no member 'size'"):
+        _ = in_block().size
+
+
+def test_other_members_leave_the_struct_they_come_from_alone():
+    st = sample()
+    other = st.with_members(y=np.full(3, 7.0), order=9)
+    assert (other.order, st.order) == (9, 3)
+    assert other.rows is st.rows
+    assert work(other, 0) == 21.0 + 3.0
+    np.testing.assert_array_equal(st.y, 1.0)
+
+
+def test_a_direct_call_is_the_same_call():
+    st = sample()
+    assert direct(first_of_rows)(st) == first_of_rows(st) == 0.0
+    assert st.order == 5
+    assert direct(first_of_rows) is direct(first_of_rows)

@@ -13,6 +13,7 @@ from gearmbs.dae.integrators import driver as run
 from gearmbs.dae.integrators import initial_state
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.wstiff import resume, solve_wstiff
+from gearmbs.dae.linalg.lu_plan import _unscaled_plan
 from gearmbs.dae.problem import JACOBIAN_SIG, RESIDUAL_SIG, DAEProblem
 from gearmbs.dae.result import Status
 from gearmbs.dae.solve import solve_dae
@@ -31,6 +32,17 @@ def assert_same(a, b):
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
 def test_same_run_twice_is_bit_identical(method):
     assert_same(*(solve_wstiff(pendulum(), TIMES, tol=1e-7, method=method) for _ in range(2)))
+
+
+def test_runs_before_do_not_show():
+    released, thrown = pendulum(), pendulum()
+    thrown.y0[3], thrown.yp0[:2] = 1.5, (0.0, 1.5)
+    _unscaled_plan.cache_clear()
+    first = solve_wstiff(released, TIMES, tol=1e-7)
+    other = solve_wstiff(thrown, TIMES, tol=1e-7)
+    assert_same(first, solve_wstiff(released, TIMES, tol=1e-7))
+    _unscaled_plan.cache_clear()
+    assert_same(other, solve_wstiff(thrown, TIMES, tol=1e-7))
 
 
 def test_chunking_does_not_show(monkeypatch):

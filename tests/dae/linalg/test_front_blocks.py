@@ -5,8 +5,8 @@ import pytest
 import scipy.sparse as sp
 
 from gearmbs.dae.compiled.lanes import LANES
+from gearmbs.dae.linalg.analyse import analyse
 from gearmbs.dae.linalg.front_blocks import front_blocks
-from gearmbs.dae.linalg.lu_plan import analyse
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, factor, new_factors
 
 

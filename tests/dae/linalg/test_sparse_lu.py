@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearmbs.dae.linalg.lu_plan import SingularMatrixError, analyse
+from gearmbs.dae.linalg.analyse import SingularMatrixError, analyse
 from gearmbs.dae.linalg.pivoting import GROWTH_ALLOWED, THRESHOLDS, choose_pivots, equilibrate, new_lines
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, factor, new_factors, solve
 
@@ -289,3 +289,24 @@ def test_what_only_rounding_keeps_from_being_singular_is_not_left_out():
     vals[4] += 1e-16
     with pytest.raises(SingularMatrixError):
         analyse(indptr, indices, vals, np.ones(3), counted=np.zeros(9, dtype=bool))
+
+
+@pytest.mark.parametrize("with_tail", [False, True])
+def test_lists_of_a_plan_are_made_once_for_the_same_pivots_and_scales_for_each_matrix(with_tail):
+    n, rng = 40, np.random.default_rng(3)
+    # the last rows and columns are full: they make a tail
+    a = np.diag(rng.uniform(3.0, 4.0, n))
+    a[10:, 10:] += rng.uniform(0.1, 0.2, (n - 10, n - 10))
+    indptr, indices, vals = csc(a)
+    larger = 256.0 * vals
+    one, other = (analyse(indptr, indices, v, np.ones(n), with_tail=with_tail) for v in (vals, larger))
+    assert (one.tail < n) is with_tail
+    assert other.l_pos is one.l_pos
+    assert not np.array_equal(one.row_scale, other.row_scale)
+    b = rng.standard_normal(n)
+    for plan, v in ((one, vals), (other, larger), (one, vals)):
+        factors, x = new_factors(plan), np.empty(n)
+        factor(plan, factors, v)
+        solve(plan, factors, b, x)
+        dense = sp.csc_array((v, indices, indptr)).toarray()
+        np.testing.assert_allclose(dense @ x, b, atol=1e-12)
