@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import errno
+import signal
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 import typer
 
@@ -20,6 +22,16 @@ def fail(message: str) -> None:
     """End with a message and exit status 1."""
     typer.secho(f"gearmbs: {message}", fg="red", err=True)
     raise typer.Exit(1)
+
+
+ended_by = signal.SIGINT
+"""The signal that asked the program to end, as the handler of `gearmbs.cli` notes it."""
+
+
+def end_interrupted(message: str) -> NoReturn:
+    """End with a message and the exit status of the signal: 130 after Ctrl-C, 143 after SIGTERM."""
+    typer.secho(f"gearmbs: {message}", err=True)
+    raise typer.Exit(128 + ended_by)
 
 
 COMMANDS = {

@@ -6,10 +6,12 @@ import gc
 import os
 import signal
 import sys
+from types import FrameType
 from typing import Annotated
 
 import typer
 
+from gearmbs import _command
 from gearmbs.adams.commands import adams, plant
 from gearmbs.campaigns.commands import app as campaign
 from gearmbs.identify.commands import identify
@@ -33,8 +35,9 @@ for command in (paper, run, sweep, bench, gearbox, resonance, campbell, *of_reco
 app.add_typer(campaign)
 
 
-def _interrupt(*_args) -> None:
+def _interrupt(number: int, _: FrameType | None) -> None:
     """Take a request to end like Ctrl-C, also where Ctrl-C is ignored, as in a background job."""
+    _command.ended_by = signal.Signals(number)
     if signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None):
         raise KeyboardInterrupt
     signal.raise_signal(signal.SIGINT)

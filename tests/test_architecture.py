@@ -67,7 +67,7 @@ EXCEPTIONS = {
     ("mechanism", "dae.integrators"): "simulate() chooses an integrator and passes its options on",
     ("adams", "gears"): "pairs are written as the contact forces of a deck",
     ("adams", "flexible"): "FLEX_BODY is read from its modal neutral file",
-    ("adams", "view"): "the wheels of a pair that is written as solids are those of the 3-D scenes",
+    ("adams", "view"): "wheels written as solids are those of the 3-D scenes; files that appear when they are whole",
     ("adams", "solids"): "the bodies of a deck's Parasolid file; the type alone",
     ("studies", "gearmbs"): "a result says which version made it",
     ("studies", "dae.analyses"): "the modes of a drivetrain; the type alone",
@@ -90,11 +90,12 @@ CIRCLES = {
         "methods of Mechanism, and the functions that carry them out",
     ("adams.builders.accelerations", "adams.builders.builder", "adams.builders.constraints", "adams.builders.contacts",
      "adams.builders.control", "adams.builders.curve_data", "adams.builders.curves", "adams.builders.data_calls",
-     "adams.builders.fe_parts",
+     "adams.builders.element_pairs", "adams.builders.fe_parts",
      "adams.builders.flexible", "adams.builders.flexible_data", "adams.builders.forces", "adams.builders.initial",
      "adams.builders.mechanism", "adams.builders.modal_forces", "adams.builders.modal_loads", "adams.builders.model",
      "adams.builders.held_bodies", "adams.builders.routine_calls",
-     "adams.builders.routines", "adams.builders.state_equations", "adams.builders.user_elements", "adams.parse.check",
+     "adams.builders.routines", "adams.builders.scopes",
+     "adams.builders.state_equations", "adams.builders.user_elements", "adams.parse.check",
      "adams.parse.deck", "adams.parse.readers"):
         "a deck builds its mechanism; types only, and one method",
     ("campaigns.campaign", "campaigns.exports", "campaigns.report", "campaigns.response", "campaigns.sensitivity"):

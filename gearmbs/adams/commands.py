@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from gearmbs._command import fail, guarded
+from gearmbs._command import end_interrupted, fail, guarded
 
 
 def adams(
@@ -61,8 +61,15 @@ def adams(
             if error.result is not None and error.result.segments:
                 typer.echo(f"wrote what was computed to {prefix}.req, .res, .msg, .nc")
             raise
+        except KeyboardInterrupt as interrupt:
+            partial = getattr(interrupt, "result", None)
+            if partial is None:
+                end_interrupted(f"the simulation of {model} was interrupted; files that were not whole are not there")
+            result = partial
         for message in result.messages:
             typer.echo(str(message))
+        if result.interrupted:
+            end_interrupted(f"wrote {', '.join(str(path) for path in result.files(prefix))}")
         if not result.success:
             fail(f"{model}: the analysis did not finish; see {prefix}.msg")
         typer.echo(f"wrote {prefix}.req, .res, .msg, .nc")

@@ -10,7 +10,9 @@ from gearmbs.mechanism.expression_library import FUNCTIONS
 from gearmbs.mechanism.expression_syntax import Scope, parse, shown
 
 
-def compile_expression(text: str, scope: Scope, dimension: str = "number", accelerations: bool = False) -> Tape:
+def compile_expression(
+    text: str, scope: Scope, dimension: str = "number", accelerations: bool = False, outline: bool = False
+) -> Tape:
     """Compile a function expression to a tape that returns SI values.
 
     Parameters
@@ -22,6 +24,8 @@ def compile_expression(text: str, scope: Scope, dimension: str = "number", accel
         What the value is ("force", "torque", "length", "angle", ...): its unit is converted to SI.
     accelerations : bool
         Allow ACCX, WDTX and their kin: only requests know accelerations.
+    outline : bool
+        Leave integrals without their tables: the tape shows what the expression depends on and is not to be evaluated.
 
     Returns
     -------
@@ -32,7 +36,7 @@ def compile_expression(text: str, scope: Scope, dimension: str = "number", accel
     ExpressionError
         When the text is malformed or names something the scope does not hold.
     """
-    builder = TapeBuilder(scope.marker_body)
+    builder = TapeBuilder(scope.marker_body, outline)
     lowering = Lowering(builder, scope, text, FUNCTIONS)
     result = lowering.node(parse(text))
     result = builder.binary(op.MUL, builder.constant(scope.units.factor(dimension)), result)

@@ -157,3 +157,28 @@ def test_only_what_touches_is_read():
 def test_what_is_wrong_is_named(change, message):
     with pytest.raises(DeckError, match=message):
         run_deck(parse_deck(deck().replace(*change)), end=0.1, steps=2)
+
+
+def test_what_solids_do_without_is_remarked_with_its_own_reason():
+    deck = parse_deck("""a plate, and solids on it
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/1, PART=1
+GRAPHICS/1, PLANE, RM=1, XMIN=-1, XMAX=1, YMIN=-1, YMAX=1
+PART/2, MASS=1, CM=2, IP=1,1,1
+MARKER/2, PART=2
+GRAPHICS/2, EXTERNAL, RM=2, FILE=ball.stl, FACETING_TOLERANCE=300
+GRAPHICS/3, EXTERNAL, RM=2, FILE=ball.xmt_txt, FACETING_TOLERANCE=300
+GRAPHICS/4, CYLINDER, CM=2, LENGTH=1, RADIUS=1, FACETING_TOLERANCE=300
+CONTACT/1, IGEOM=2,3,4, JGEOM=1, IMPACT, STIFFNESS=1E6, DAMPING=10, EXPONENT=1.5, DMAX=1E-4
+END
+""")
+    remarks = [d.message for d in deck.diagnostics if "without effect" in d.message]
+    assert remarks == [
+        "GRAPHICS/1: XMIN, XMAX, YMIN, YMAX without effect: a plane that bodies touch has no edges",
+        "GRAPHICS/2: FACETING_TOLERANCE without effect: a mesh is as fine as its file",
+        "GRAPHICS/3: FACETING_TOLERANCE without effect: a body of a Parasolid file is exact, or is cut within 0.001 of "
+        "its diagonal",
+        "GRAPHICS/4: FACETING_TOLERANCE without effect: the kind of the solid says into how many facets it is cut, if "
+        "any",
+    ]

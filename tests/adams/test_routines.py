@@ -265,3 +265,33 @@ def test_whatever_a_routine_raises_is_told_with_its_statement():
 
     with pytest.raises(DeckError, match="SFORCE/1: its routine fails: IndexError: list index out of range"):
         run(PULLED.format("USER(1)"), {"sfosub": broken})
+
+
+def test_commands_may_change_a_deck_with_routines_of_fields_couplers_and_systems():
+    deck = parse_deck("""routines in all places, and a force that changes
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/10, PART=1
+PART/2, MASS=1, CM=20, IP=1,1,1
+MARKER/20, PART=2
+PART/3, MASS=1, CM=30, IP=1,1,1
+MARKER/30, PART=3
+JOINT/1, TRANSLATIONAL, I=20, J=10
+JOINT/2, TRANSLATIONAL, I=30, J=10
+COUPLER/1, JOINTS=1,2, TYPE=T:T, FUNCTION=USER(1)
+FIELD/1, I=20, J=10, FUNCTION=USER(1)
+ARRAY/1, X, SIZE=1
+GSE/1, NS=1, X=1, FUNCTION=USER(1)
+SFORCE/1, TRANSLATIONAL, I=20, J=10, ACTIONONLY, FUNCTION=1
+END
+""")
+    routines = {
+        "COUSUB": lambda call: call.q[0] - 2.0 * call.q[1],
+        "FIESUB": lambda call: [0.0] * 6,
+        "GSE_DERIV": lambda call: [1.0],
+    }
+    script = parse_script("a\nb\nSIM/DYN, END=0.1, STEPS=5\nSFORCE/1, FUNCTION=0\nSIM/DYN, END=0.2, STEPS=5\n")
+    run = run_deck(deck, script, routines=routines)
+    assert run.success
+    acceleration = 1.0 / 1.25
+    assert run.segments[1].solution.com_velocity("PART_2")[-1, 2] == pytest.approx(0.1 * acceleration, rel=1e-6)

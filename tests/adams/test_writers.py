@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from gearmbs.adams import parse_deck, run_deck
-from gearmbs.adams.builders.model import KINDS
+from gearmbs.adams.builders.element_pairs import KINDS
 from gearmbs.adams.results.req import read_requests
 from gearmbs.adams.results.res import ENTITY_TYPES, NAMESPACE
 

@@ -17,13 +17,15 @@ from gearmbs.adams.builders.accelerations import FUNCTIONS, Accelerations
 from gearmbs.adams.builders.control import state_system
 from gearmbs.adams.builders.curve_data import curve_points
 from gearmbs.adams.builders.data_calls import Present, translated
+from gearmbs.adams.builders.element_pairs import KINDS, acts, joints_of, marker_pair, resting_joint
 from gearmbs.adams.builders.frames import inertia_about_cm, marker_orientation, part_orientation
 from gearmbs.adams.builders.held_bodies import add_point_mass, hold
 from gearmbs.adams.builders.implicit import diff_name, implicit_states
-from gearmbs.adams.builders.model import KINDS, AdamsModel, BodyState
+from gearmbs.adams.builders.model import AdamsModel, BodyState
+from gearmbs.adams.builders.scopes import sensor_state
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.check import MARKER_FIELDS, measured_markers
+from gearmbs.adams.parse.check import MARKER_FIELDS
 from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.readers import read_variables
@@ -50,11 +52,6 @@ Maker = Callable[["Builder", Any], None]
 """What adds a statement of one kind to a builder's mechanism."""
 
 
-def sensor_state(number: int) -> str:
-    """Return the name of the state that follows a SENSOR's function."""
-    return f"SENSOR_{number}"
-
-
 class LeftOutError(LookupError):
     """An element needs what was left out, since it is not supported."""
 
@@ -64,13 +61,6 @@ class Markers(dict[int, Marker]):
 
     def __missing__(self, ref: int) -> Marker:
         raise LeftOutError(f"with MARKER/{ref}, whose part is left out,")
-
-
-def joints_of(s: st.Statement) -> tuple[int, ...]:
-    """Return the joints without which an element cannot act."""
-    if isinstance(s, (st.Motion, st.Friction)) and s.joint is not None:
-        return (s.joint,)
-    return s.joints if isinstance(s, (st.Coupler, st.Gear)) else ()
 
 
 class Builder:
@@ -141,13 +131,7 @@ class Builder:
     # --- helpers ------------------------------------------------------------------------------------
 
     def active(self, kind: type[Any]) -> list[Any]:
-        keyword = st.KEYWORD_OF[kind]
-        group = self.deck.of(kind).values()
-        return [s for s in group if (keyword, s.id) not in self.inactive and self.resting_joint(s) is None]
-
-    def resting_joint(self, s: st.Statement) -> int | None:
-        """Return an inactive joint without which an element cannot act, None when there is none."""
-        return next((ref for ref in joints_of(s) if ("JOINT", ref) in self.inactive), None)
+        return [s for s in self.deck.of(kind).values() if acts(s, self.inactive)]
 
     def absent_marker(self, statement: st.Statement) -> int | None:
         """Return a marker of a statement that is left out with what it is on; None without one."""
@@ -199,42 +183,10 @@ class Builder:
             for statement in self.active(cls):
                 self.claim(statement, kind)
             for statement in self.deck.of(cls).values():
-                self.model.pairs[kind, statement.id] = self.marker_pair(statement)
-                joint = self.resting_joint(statement)
+                self.model.pairs[kind, statement.id] = marker_pair(self.deck, statement)
+                joint = resting_joint(statement, self.inactive)
                 if joint is not None and (st.KEYWORD_OF[cls], statement.id) not in self.inactive:
                     self.remark(WARNING, statement, f"rests while JOINT/{joint} is inactive", " ")
-
-    def marker_pair(self, s: Any) -> tuple[int, int | None]:
-        if isinstance(s, st.Motion) and s.joint is not None:
-            joint = self.deck.of(st.Joint)[s.joint]
-            return joint.i or 0, joint.j
-        if isinstance(s, st.Friction):
-            joint = self.deck.of(st.Joint)[s.joint or 0]
-            return joint.i or 0, joint.j
-        if isinstance(s, (st.Coupler, st.Gear)):
-            joint = self.deck.of(st.Joint)[s.joints[0]]
-            return joint.i or 0, joint.j
-        if isinstance(s, st.Gcon):
-            return self.gcon_pair(s)
-        if isinstance(s, st.Ptcv):
-            return s.i or 0, s.rm
-        if isinstance(s, st.Cvcv):
-            return s.irm or 0, s.jrm
-        if isinstance(s, st.Contact):
-            i, j = (self.deck.of(st.Graphics)[refs[0]].marker for refs in (s.igeom, s.jgeom))
-            return i or 0, j
-        if isinstance(s, (st.Vforce, st.Vtorque, st.Gforce)):
-            return s.i or 0, s.jfloat
-        if isinstance(s, st.Sforce) and s.action_only:
-            return s.i or 0, None
-        return s.i or 0, s.j
-
-    def gcon_pair(self, s: st.Gcon) -> tuple[int, int | None]:
-        """Return a general constraint's I marker and, when its expression names just one other, that one."""
-        used = measured_markers(s.function or "")
-        first = s.i if s.i is not None else (used[0] if used else 0)
-        others = [m for m in used if m != first]
-        return first, others[0] if len(others) == 1 else None
 
     def text(self, source: str) -> str:
         """Return an expression with element ids replaced by the mechanism's names."""

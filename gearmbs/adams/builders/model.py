@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearmbs.adams.builders.control import state_systems
-from gearmbs.adams.builders.data_calls import IN_DYNAMICS, Present, translated
+from gearmbs.adams.builders.data_calls import IN_DYNAMICS, Present
+from gearmbs.adams.builders.scopes import FORCE_AND_TORQUE, data_scope
 from gearmbs.adams.parse import statements as st
-from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.expression_syntax import Scope
 from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.parts import Marker
-
-KINDS: dict[type, str] = {
-    st.Joint: "joint", st.Jprim: "jprim", st.Motion: "motion", st.Sforce: "sforce", st.Vforce: "vforce",
-    st.Vtorque: "vtorque", st.Gforce: "gforce", st.Bushing: "bushing", st.Field: "field",
-    st.SpringDamper: "springdamper", st.Gcon: "gcon", st.Coupler: "coupler", st.Gear: "gear",
-    st.Beam: "beam", st.Friction: "friction", st.Contact: "contact",
-    st.Ptcv: "ptcv", st.Cvcv: "cvcv",
-}  # fmt: skip
-"""Kinds under which functions such as JOINT and SFORCE ask for an element's force."""
 
 
 class BodyState(NamedTuple):
@@ -79,31 +69,20 @@ class AdamsModel:
 
     def scope(self, marker_index: dict[int, int], marker_body: list[int]) -> Scope:
         """Return what the deck's expressions may name, for requests."""
-        deck = self.deck
         markers: dict[Any, int] = {}
         for m in markers_of(self.mechanism):
             markers[m.name.upper()] = marker_index[id(m)]
             if m.number is not None:
                 markers[m.number] = marker_index[id(m)]
-        variables = {v.id: translated(deck, self.present, v.function or "") for v in deck.of(st.Variable).values()}
-        return Scope(
+        data = data_scope(self.deck, self.present)
+        return replace(
+            data,
             markers=markers,
             marker_body=marker_body,
-            variables=variables,  # type: ignore[arg-type]
-            diffs={
-                d.id: None if d.implicit else translated(deck, self.present, d.function or "0")
-                for d in deck.of(st.Diff).values()
-            }
-            | {name: text for _, system in state_systems(deck) for name, text in zip(system.names, system.rates())},
-            splines={s.id: spline_data(s) for s in deck.of(st.Spline).values() if s.data_file is None}
-            | _curves(self.mechanism),
+            splines={**data.splines, **_curves(self.mechanism)},
             states=frozenset(str(k).upper() for k, state in self.mechanism.states.items() if state.algebraic),
-            arrays=self.mechanism.arrays,
-            functions=self.mechanism.functions,
-            plants=self.mechanism.plants,
             forces=dict(self.pairs),  # type: ignore[arg-type]
-            absent=frozenset((*key, base) for key in self.pairs if key not in self.names for base in (0, 3)),
-            units=deck.units,
+            absent=frozenset((*key, base) for key in self.pairs if key not in self.names for base in FORCE_AND_TORQUE),
         )
 
 

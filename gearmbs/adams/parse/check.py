@@ -105,14 +105,14 @@ WHY = {
     st.Friction: "friction follows one law, see the documentation",
     st.Variable: "variables need no starting value",
     st.Contact: "solids press by depth and rub by speed alone",
-    st.Graphics: "planes that bodies touch have no edges; a mesh is as fine as its file, and a Parasolid solid is cut "
-    "within 0.001 of its diagonal",
     st.Joint: "a joint rubs by them only where it says FRICTION = ON; for friction write a FRICTION statement",
     st.Gse: "derivatives are made by differences",
     st.CurveStatement: "the points alone say how far the curve goes",
     st.Cvcv: "the speeds follow from those of the parts",
-    st.Sensor: "the time is found to the last digits, and every analysis chooses its pivots anew",
+    st.Sensor: "the time is found to the last digits",
 }
+CODGEN = "every analysis chooses its pivots anew"
+MESH_FILES = (".stl", ".obj", ".shl", ".slp")
 
 
 def check(deck: Deck) -> list[Diagnostic]:
@@ -139,8 +139,8 @@ def check(deck: Deck) -> list[Diagnostic]:
         required = REQUIRED.get(cls, ())
         if cls is st.Marker and (statement.flex_body or statement.point_mass or statement.fe_part):  # type: ignore[attr-defined]
             required = ()
-        if getattr(statement, "data_file", None) or (cls is st.CurveStatement and "function" in statement.given):
-            # the file has them, or it is not supported, which is said below
+        if getattr(statement, "data_file", None) or _by_routine(statement):
+            # the file has them, or a routine of the user
             required = ()
         for name in required:
             if getattr(statement, name) in (None, ()):
@@ -185,6 +185,15 @@ def check(deck: Deck) -> list[Diagnostic]:
     return errors
 
 
+def _by_routine(statement: st.Statement) -> bool:
+    """Whether a statement takes from a routine of the user what others give by arguments."""
+    if isinstance(statement, st.CurveStatement):
+        return "function" in statement.given
+    return isinstance(statement, (st.Gse, st.Coupler, st.Field)) and (
+        "function" in statement.given and statement.function is None
+    )
+
+
 def refused_arguments(statement: st.Statement) -> list[str]:
     """Return the arguments of a statement that are not supported, but for those that switch something off."""
     names = UNSUPPORTED_ARGUMENTS.get(type(statement), ())
@@ -195,17 +204,19 @@ Fail = Callable[..., None]
 
 
 def _remark_idle(deck: Deck) -> None:
-    """Remark on arguments without effect, once for all statements of a kind that have the same ones."""
-    found: dict[tuple[type, tuple[str, ...]], list[st.Statement]] = {}
+    """Remark on arguments without effect: once for each reason, and all statements that have the same ones."""
+    found: dict[tuple[type, tuple[str, ...], str], list[st.Statement]] = {}
     for statement in deck:
-        idle = tuple(name for name in WITHOUT_EFFECT.get(type(statement), ()) if name in statement.given)
-        if idle:
-            found.setdefault((type(statement), idle), []).append(statement)
-    for (cls, idle), group in found.items():
-        names = ", ".join(specs_of(cls)[name].keyword for name in idle)
-        why = WHY.get(cls, "the program's own settings are tight enough")
+        reasons: dict[str, list[str]] = {}
+        for name in WITHOUT_EFFECT.get(type(statement), ()):
+            if name in statement.given:
+                reasons.setdefault(_why(statement, name), []).append(name)
+        for why, idle in reasons.items():
+            found.setdefault((type(statement), tuple(idle), why), []).append(statement)
+    for (cls, without, why), group in found.items():
+        names = ", ".join(specs_of(cls)[name].keyword for name in without)
         message = f"{_labels(group)}: {names} without effect: {why}"
-        deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, group[0].given[idle[0]]))
+        deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, group[0].given[without[0]]))
     bent = [b for b in deck.of(st.Beam).values() if b.formulation != "LINEAR"]
     if bent:
         message = (
@@ -213,6 +224,21 @@ def _remark_idle(deck: Deck) -> None:
             "small against the length"
         )
         deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, bent[0].given["formulation"]))
+
+
+def _why(statement: st.Statement, name: str) -> str:
+    """Return why an argument of a statement has no effect."""
+    if isinstance(statement, st.Sensor) and name == "codgen":
+        return CODGEN
+    if not isinstance(statement, st.Graphics):
+        return WHY.get(type(statement), "the program's own settings are tight enough")
+    if name != "faceting":
+        return "a plane that bodies touch has no edges" if statement.type == "PLANE" else "they are limits of a PLANE"
+    if statement.type != "EXTERNAL":
+        return "the kind of the solid says into how many facets it is cut, if any"
+    if (statement.data_file or "").lower().endswith(MESH_FILES):
+        return "a mesh is as fine as its file"
+    return "a body of a Parasolid file is exact, or is cut within 0.001 of its diagonal"
 
 
 def _labels(group: Sequence[st.Statement]) -> str:
@@ -294,7 +320,8 @@ def _check_constraints(deck: Deck, fail: Fail) -> None:
             if ref not in joints:
                 fail(coupler, f"there is no JOINT/{ref}", "joints")
         n = len(coupler.joints)
-        if coupler.joints and coupler.function is None and len(coupler.scales) not in (n - 1, n):
+        given = coupler.function is not None or _by_routine(coupler)
+        if coupler.joints and not given and len(coupler.scales) not in (n - 1, n):
             fail(coupler, f"SCALES needs {n - 1} or {n} values for {n} joints, got {len(coupler.scales)}", "scales")
         if coupler.type and len(coupler.type) != n:
             fail(coupler, f"TYPE needs {n} letters, got {len(coupler.type)}", "type")
@@ -315,7 +342,8 @@ def _check_forces(deck: Deck, fail: Fail) -> None:
         if friction.joint is not None and friction.joint not in deck.of(st.Joint):
             fail(friction, f"there is no JOINT/{friction.joint}", "joint")
     for field in deck.of(st.Field).values():
-        if field.kmatrix is None and field.cmatrix is None and field.function is None:
+        given = field.kmatrix or field.cmatrix or field.function or _by_routine(field)
+        if not given:
             fail(field, "give KMATRIX or CMATRIX")
 
 

@@ -36,6 +36,8 @@ def message_text(result: RunRecord) -> str:
             out += ["", "  E I G E N  A N A L Y S I S", "", *outcome.table().splitlines(), ""]
     for d in result.errors:
         out += _block("ERROR", str(d))
+    if result.interrupted:
+        out += [f"  {result.interrupted[0].upper()}{result.interrupted[1:]}.", ""]
     return "\n".join(out) + "\n"
 
 
@@ -56,7 +58,7 @@ def _segment(result: RunRecord, segment: Segment) -> list[str]:
         out += _integrated(segment, title, t, stats)
     for remark in result.remarks(segment):
         out += ["", *_block("WARNING", remark)]
-    if not s.success:
+    if not s.success and not segment.interrupted:
         out += ["", *_block("ERROR", s.message)]
     return [*out, "", "  End Simulation", ""]
 

@@ -20,6 +20,7 @@ from gearmbs.adams.results.tracks import TRACK_COLUMNS, TRACK_DIMENSIONS, track_
 from gearmbs.dae.analyses.modes import Modes
 from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.analyses.statics import StaticResult
+from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism.contacts import ContactTracks
 from gearmbs.mechanism.modal import ModalBody
@@ -85,6 +86,11 @@ class Segment:
         """True when the analysis reached its end."""
         return self.solution.success
 
+    @property
+    def interrupted(self) -> bool:
+        """True when somebody interrupted the analysis; what was computed until then is there."""
+        return self.solution.status is Status.INTERRUPTED
+
 
 @dataclass
 class RunRecord:
@@ -98,12 +104,15 @@ class RunRecord:
         The commands that were carried out, with what they gave.
     errors : list of Diagnostic
         What ended the script.
+    interrupted : str
+        A sentence on where somebody interrupted the run, "" if nobody did.
     """
 
     deck: Deck
     script: Script
     log: list[tuple[Command, Segment | Modes | LinearPlant | None]] = field(default_factory=list)
     errors: list[Diagnostic] = field(default_factory=list)
+    interrupted: str = ""
 
     @property
     def segments(self) -> list[Segment]:
@@ -123,7 +132,7 @@ class RunRecord:
     @property
     def success(self) -> bool:
         """True when the script was carried out and every analysis reached its end."""
-        return not self.errors and all(s.success for s in self.segments)
+        return not self.errors and not self.interrupted and all(s.success for s in self.segments)
 
     @property
     def messages(self) -> list[str]:
@@ -131,9 +140,9 @@ class RunRecord:
         found = [str(d) for d in folded((*self.deck.diagnostics, *self.script.diagnostics))]
         for segment in self.segments:
             found.extend(self.remarks(segment))
-            if not segment.success:
+            if not segment.success and not segment.interrupted:
                 found.append(segment.solution.message)
-        return found + [str(d) for d in self.errors]
+        return found + [str(d) for d in self.errors] + [self.interrupted] * bool(self.interrupted)
 
     def remarks(self, segment: Segment) -> list[str]:
         """Return what is to be said about an analysis: settings, parts that were moved, an equilibrium that is none."""

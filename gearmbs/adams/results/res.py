@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from gearmbs.adams.builders.model import KINDS
+from gearmbs.adams.builders.element_pairs import KINDS
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.results.record import FORCE_COLUMNS, PART_COLUMNS, PART_DIMENSIONS, POINT_COLUMNS, RunRecord
 from gearmbs.adams.results.tracks import TRACK_COLUMNS

@@ -11,6 +11,7 @@ from gearmbs.adams.results.record import RunRecord
 from gearmbs.adams.results.req import request_text
 from gearmbs.adams.results.res import results_text
 from gearmbs.dae.analyses.plant import FORMATS, LinearPlant
+from gearmbs.view.files import whole_file
 
 
 class AdamsResult(RunRecord):
@@ -30,6 +31,7 @@ class AdamsResult(RunRecord):
         """Write .req, .res, .msg and .nc files; the message file alone when no analysis was carried out.
 
         The plants of LINEAR/STATEMAT go to the .mat files that the commands name, or to PREFIX_plant1.mat and so on.
+        Each file appears when it is whole. Results of an interrupted run are named PREFIX.partial.
 
         Parameters
         ----------
@@ -40,19 +42,23 @@ class AdamsResult(RunRecord):
         -------
         list of Path
         """
-        prefix = Path(prefix)
-        prefix.parent.mkdir(parents=True, exist_ok=True)
-        texts = {".msg": message_text(self)}
+        files = self.files(prefix)
+        for path, content in zip(files, (message_text, request_text, results_text)):
+            with whole_file(path) as part:
+                part.write_text(content(self), encoding="utf-8", newline="\n")
         if self.segments:
-            texts |= {".req": request_text(self), ".res": results_text(self)}
-        files = [prefix.with_name(prefix.name + suffix) for suffix in texts]
-        for path, text in zip(files, texts.values()):
-            path.write_text(text, encoding="utf-8", newline="\n")
-        if self.segments:
-            files.append(prefix.with_name(prefix.name + ".nc"))
             # in memory first: the format's library ends the program where the disk is full
-            files[-1].write_bytes(self.to_dataset().to_netcdf(engine="h5netcdf"))
-        return files + self._write_plants(prefix)
+            data = self.to_dataset().to_netcdf(engine="h5netcdf")
+            with whole_file(files[-1]) as part:
+                part.write_bytes(data)
+        return files + self._write_plants(Path(prefix))
+
+    def files(self, prefix: str | Path) -> list[Path]:
+        """Return the names of the message file and, if there are any, of the files of results."""
+        prefix = Path(prefix)
+        results = prefix.name + (".partial" if self.interrupted else "")
+        endings = (".req", ".res", ".nc") if self.segments else ()
+        return [prefix.with_name(f"{prefix.name}.msg"), *(prefix.with_name(results + ending) for ending in endings)]
 
     def _write_plants(self, prefix: Path) -> list[Path]:
         found = [(c, p) for c, p in self.log if isinstance(c, Linear) and isinstance(p, LinearPlant)]

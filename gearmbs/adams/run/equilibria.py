@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.adams.builders.builder import sensor_state
 from gearmbs.adams.builders.model import AdamsModel
+from gearmbs.adams.builders.scopes import sensor_state
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.run.sensors import SAME, Watch, up_to

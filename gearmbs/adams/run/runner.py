@@ -108,7 +108,8 @@ def run_deck(
     Returns
     -------
     AdamsResult
-        Also when an integration failed: see its ``success`` and ``messages``.
+        Also when an integration failed or was interrupted by Ctrl-C: see its ``success`` and ``messages``. A
+        KeyboardInterrupt elsewhere, as between two analyses, goes on to the caller and has it as its ``result``.
 
     Raises
     ------
@@ -132,6 +133,8 @@ def run_deck(
                 break
             if not _carry_out(command, session, result, tol, allow_unsupported, progress):
                 break
+        if result.segments and result.segments[-1].interrupted:
+            result.interrupted = _interruption(deck, result, command)
     except DeckError as error:
         result.errors.extend(error.diagnostics)
         error.result = result
@@ -142,6 +145,10 @@ def run_deck(
         result.errors.extend(failed.diagnostics)
         failed.result = result
         raise failed from error
+    except KeyboardInterrupt as interrupt:
+        result.interrupted = _interruption(deck, result, command)
+        interrupt.result = result  # type: ignore[attr-defined]
+        raise
     except BaseException as error:
         message = str(error) or type(error).__name__
         result.errors.append(Diagnostic(ERROR, message, command.file, command.line))
@@ -151,6 +158,18 @@ def run_deck(
         if out is not None:
             result.write(out)
     return result
+
+
+def _interruption(deck: Deck, result: AdamsResult, command: Command) -> str:
+    """Return a sentence on where a run was interrupted."""
+    times = [segment.solution.t for segment in result.segments if segment.solution.t.size]
+    reached = f"at TIME = {times[-1][-1] / deck.units.time:.6g}" if times else "before its first output"
+    where = f", in command {command.text or type(command).__name__.lower()}" if command.line else ""
+    end = command.end if isinstance(command, Simulate) else None
+    asked = f" of {end:.6g}" if times and end is not None else ""
+    return (
+        f"the simulation of {deck.file} was interrupted {reached}{asked}{where}; what was computed until then is kept"
+    )
 
 
 def _carry_out(
@@ -272,6 +291,8 @@ def _span(
             # the command stands there already, for what may go wrong
             result.log.pop()
         result.log.append((command, segment))
+        if session.interrupted:
+            raise KeyboardInterrupt
         if not segment.success:
             return False, True
         loud = [s for s in fired if not watch.silent(s)]
@@ -350,7 +371,9 @@ def _doubt(session: Session, segment: Segment) -> Doubt | None:
     times = solution.t / session.deck.units.time
 
     def again(options: dict[str, Any]) -> Solution:
-        return _solve(session, segment.command, segment.kind, segment.model, times, options, False)[0]
+        second = _solve(session, segment.command, segment.kind, segment.model, times, options, False)[0]
+        session.interrupted |= second.status is Status.INTERRUPTED
+        return second
 
     return doubt(segment.model, solution, segment.options, again, session.check)
 
@@ -379,7 +402,8 @@ def _to_passage(
         # at once, as where two sensors fire together
         return initial_conditions(model.mechanism.compile(float(times[0]) * scale)), fired
     # again, to end at the very time: the steps up to it are the same
-    return _solve(session, command, "DYNAMICS", model, reached, options, False)[0], fired
+    again = _solve(session, command, "DYNAMICS", model, reached, options, False)[0]
+    return again, [] if again.status is Status.INTERRUPTED else fired
 
 
 def _frozen(session: Session, model: AdamsModel) -> str | None:

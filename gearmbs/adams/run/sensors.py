@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gearmbs.adams.builders.builder import sensor_state
+from gearmbs.adams.builders.scopes import sensor_state
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.results.record import Segment
 from gearmbs.adams.results.requests import RequestEvaluator

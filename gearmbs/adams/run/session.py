@@ -51,6 +51,8 @@ class Session:
         Which redundant rows are kept, see `gearmbs.mechanism.redundancy`.
     check : bool or None
         Whether dynamic analyses are solved again with a smaller error; None: if that costs little.
+    interrupted : bool
+        Whether somebody interrupted such a second solution: the run is to end where the first has.
     """
 
     deck: Deck
@@ -64,6 +66,7 @@ class Session:
     pending: dict[int, tuple[int, tuple[float, ...]]] = field(default_factory=dict)
     redundancy: str = "adams"
     check: bool | None = None
+    interrupted: bool = False
 
     @classmethod
     def of(cls, deck: Deck) -> Session:

@@ -8,7 +8,7 @@ import numpy as np
 
 from gearmbs._jit import njit
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.dae.equations.time_functions import smooth_step
+from gearmbs.dae.equations.time_functions import cubic, smooth_step
 
 
 @njit("UniTuple(float64, 3)(int64, float64, float64)", cache=True, error_model="numpy", nogil=True)
@@ -202,3 +202,29 @@ def unwrap_angle(angle, reference):
     """Return ``angle`` plus the multiple of 2 pi that brings it nearest to ``reference``."""
     two_pi = 2.0 * math.pi
     return angle + two_pi * np.floor((reference - angle) / two_pi + 0.5)
+
+
+PIECEWISE = frozenset(
+    [op.AINT, op.ANINT, op.STEP01, op.STEP5_01, op.HAVERSINE01, op.POSITIVE_PART, op.UNIT_STEP, op.POWER_INT]
+)
+"""Operations that `unary` hands on."""
+
+
+def unary_python(code: int, a: float, p: float) -> tuple[float, ...]:
+    """Evaluate a one-operand operation on a constant without compiling anything: its value, and some derivatives."""
+    if code == op.STEP01:
+        return (cubic.py_func(min(max(a, 0.0), 1.0))[0],)
+    if code == op.STEP5_01:
+        return (smooth_step.py_func(a, 1)[1],)
+    return (_piecewise if code in PIECEWISE else unary).py_func(code, a, p)
+
+
+def binary_python(code: int, a: float, b: float) -> tuple[float, ...]:
+    """Evaluate a two-operand operation on constants without compiling anything: its value, and some of its partials."""
+    if code == op.POW and not (a > 0.0 or b == math.floor(b) or (a == 0.0 and b > 0.0)):
+        return (math.nan,)
+    if code in (op.POW, op.POSITIVE_POWER):
+        return (a**b if a > 0.0 or code == op.POW else 0.0,)
+    if code == op.ATAN2:
+        return (math.atan2(a, b),)
+    return binary.py_func(code, a, b)

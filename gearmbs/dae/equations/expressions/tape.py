@@ -13,7 +13,7 @@ from gearmbs.dae.equations.expressions.errors import ExpressionError
 from gearmbs.dae.equations.expressions.evaluate_second import JACOBIAN_AT
 from gearmbs.dae.equations.expressions.integrals import integral_table, time_value
 from gearmbs.dae.equations.expressions.measures import LEAF_WORK
-from gearmbs.dae.equations.expressions.scalar import binary, unary
+from gearmbs.dae.equations.expressions.scalar import binary_python, unary_python
 from gearmbs.dae.equations.expressions.spline_data import SplineData, spline_table
 
 _LEAF_LEVEL = {
@@ -119,9 +119,18 @@ class Tape:
 
 
 class TapeBuilder:
-    """Collect instructions; equal ones are shared and constant ones folded."""
+    """Collect instructions; equal ones are shared and constant ones folded.
 
-    def __init__(self, marker_body: Sequence[int]) -> None:
+    Parameters
+    ----------
+    marker_body : sequence of int
+        Row of the kinematics table of every marker.
+    outline : bool
+        Leave integrals without their tables; the tape cannot be evaluated then.
+    """
+
+    def __init__(self, marker_body: Sequence[int], outline: bool = False) -> None:
+        self._outline = outline
         self._marker_body = marker_body
         self._code: list[tuple[int, ...]] = []
         self._known: dict[tuple[int, ...], int] = {}
@@ -160,7 +169,7 @@ class TapeBuilder:
         """Return the register of a one-operand operation."""
         value = self.value_of(a)
         if value is not None and code not in (op.UNWRAP, op.INTEGRAL):
-            return self.constant(self._fold(unary.py_func, code, value, float(parameter)))
+            return self.constant(self._fold(unary_python, code, value, float(parameter)))
         if code == op.NEG and self._code[a][0] == op.NEG:
             return self._code[a][1]
         return self._emit(code, a, parameter)
@@ -169,7 +178,7 @@ class TapeBuilder:
         """Return the register of a two-operand operation."""
         va, vb = self.value_of(a), self.value_of(b)
         if va is not None and vb is not None:
-            return self.constant(self._fold(_binary_python, code, va, vb))
+            return self.constant(self._fold(binary_python, code, va, vb))
         if code == op.MUL:
             if va == 1.0:
                 return b
@@ -284,6 +293,8 @@ class TapeBuilder:
             raise ExpressionError("only a function of TIME, itself without an integral, can be integrated")
         if not end > start:
             raise ExpressionError(f"the end {end} of the span must be later than its start {start}")
+        if self._outline:
+            return self._emit(op.INTEGRAL, a, 0)
         work = np.zeros(tape.work_size)
         register = int(tape.ints[op.HEAD_RESULT])
 
@@ -404,14 +415,3 @@ def _operands(c: tuple[int, ...]) -> range:
     if code <= op.LAST_UNARY:
         return range(1, 2)
     return range(1, 3) if code <= op.LAST_BINARY else range(1, 5)
-
-
-def _binary_python(code: int, a: float, b: float) -> tuple[float, ...]:
-    """Evaluate a two-operand operation on constants without compiling anything."""
-    if code == op.POW and not (a > 0.0 or b == math.floor(b) or (a == 0.0 and b > 0.0)):
-        return (math.nan,)
-    if code in (op.POW, op.POSITIVE_POWER):
-        return (a**b if a > 0.0 or code == op.POW else 0.0,)
-    if code == op.ATAN2:
-        return (math.atan2(a, b),)
-    return binary.py_func(code, a, b)
