@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 from gearmbs import cli
 from gearmbs.adams import DeckError, parse_deck, parse_script, read_results, run_deck
 from gearmbs.adams.run import runner
+from gearmbs.dae.integrators import driver
 from tests.adams.decks import PENDULUM
 
 
@@ -25,6 +26,9 @@ def keep_handlers(monkeypatch):
 
 def signal_at(monkeypatch, time, number, analysis=1):
     """Send this process a signal when an analysis has passed a time."""
+    # as often as on a slow machine
+    monkeypatch.setattr(driver, "FIRST_CHUNK", 20)
+    monkeypatch.setattr(driver, "CHUNK_SECONDS", 0.0)
     original, calls, sent = runner._solve, [], []
 
     def solve(session, command, kind, model, times, options, progress, stops=()):
