@@ -7,103 +7,20 @@ P - P_RM - A_RM c(s) = 0. That the runner is in equilibrium says that nothing ac
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gearmbs.dae.errors import ModelError
+from gearmbs.mechanism.curve_starts import point_speed, touching_parameters, touching_speeds
 from gearmbs.mechanism.parts import Marker
+from gearmbs.mechanism.spline_curve import Curve
 
 if TYPE_CHECKING:
-    from scipy.interpolate import CubicSpline
-
+    from gearmbs.mechanism.joints import Joint
     from gearmbs.mechanism.mechanism import Mechanism
 
-WRAPPED = 20
-"""Points by which a closed curve is continued beyond its ends: what a natural end does to a cubic spline falls by a
-factor of 3.7 from each point to the next."""
-SAMPLES = 40
-"""Between two points, where the nearest point is looked for first."""
-FLAT = 1e-9
-"""Extent in z, of all, below which a curve is plane."""
 AXES = "XYZ"
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """A cubic spline through points.
-
-    Attributes
-    ----------
-    points : array_like, shape (n, 3)
-        In the mechanism's unit of length; at least four. Those of a closed curve begin and end in one place, or do not
-        hold the first one again.
-    closed : bool
-    """
-
-    points: Any
-    closed: bool = False
-
-    def __post_init__(self) -> None:
-        points = np.asarray(self.points, dtype=float)
-        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-            raise ModelError(f"curve: points have the shape {points.shape}; give rows of x, y and z")
-        if self.closed and not np.allclose(points[0], points[-1], atol=1e-6 * np.ptp(points, axis=0).max()):
-            points = np.vstack([points, points[:1]])
-        elif self.closed:
-            points = np.vstack([points[:-1], points[:1]])
-        if len(points) < 4:
-            raise ModelError(f"curve: {len(points)} points; give at least four")
-        if not np.linalg.norm(np.diff(points, axis=0), axis=1).min() > 0.0:
-            raise ModelError("curve: two points in succession are the same")
-        object.__setattr__(self, "points", points)
-
-    @property
-    def knots(self) -> np.ndarray:
-        """Parameter of each point: length along the chords from the first, shape (n,)."""
-        return np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(self.points, axis=0), axis=1))]
-
-    @property
-    def length(self) -> float:
-        """Largest parameter."""
-        return float(self.knots[-1])
-
-    @property
-    def plane(self) -> bool:
-        """Whether z is the same everywhere."""
-        return bool(np.ptp(self.points[:, 2]) <= FLAT * np.ptp(self.points, axis=0).max())
-
-    def tables(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return parameters and points of the splines: a closed curve goes on beyond its ends."""
-        s, c = self.knots, self.points
-        if not self.closed:
-            return s, c
-        n = len(s) - 1
-        number = np.arange(-WRAPPED, n + WRAPPED + 1)
-        return s[number % n] + self.length * (number // n), c[number % n]
-
-    def spline(self) -> CubicSpline:
-        """Return the curve as a function of its parameter."""
-        from scipy.interpolate import CubicSpline
-
-        s, c = self.tables()
-        return CubicSpline(s, c, bc_type="natural")
-
-    def nearest(self, place: np.ndarray) -> float:
-        """Return the parameter of the point next to a place."""
-        curve = self.spline()
-        s = np.concatenate([np.linspace(a, b, SAMPLES, endpoint=False) for a, b in zip(self.knots, self.knots[1:])])
-        s = np.append(s, self.length)
-        best = float(s[np.argmin(np.sum((curve(s) - place) ** 2, axis=1))])
-        first, second = curve.derivative(1), curve.derivative(2)
-        for _ in range(10):
-            apart, tangent = curve(best) - place, first(best)
-            slope = tangent @ tangent + apart @ second(best)
-            if slope <= 0.0:
-                break
-            best -= float(apart @ tangent / slope)
-        return best % self.length if self.closed else min(max(best, 0.0), self.length)
 
 
 def add_curve(mechanism: Mechanism, name: str, curve: Curve) -> None:
@@ -122,8 +39,8 @@ def component(name: str, curve: Curve, axis: int, parameter: str, order: int = 0
     return f'CUBSPL({parameter}, 0, "{name}.{AXES[axis]}"' + (f", {order})" if order else ")")
 
 
-def add_runner(mechanism: Mechanism, name: str, start: float, speed: float = 0.0) -> str:
-    """Add a runner that travels along the ground's z; return its travel as an expression.
+def add_runner(mechanism: Mechanism, name: str, start: float, speed: float) -> tuple[Joint, str]:
+    """Add a runner that travels along the ground's z; return its slot, and its travel as an expression.
 
     Parameters
     ----------
@@ -138,14 +55,14 @@ def add_runner(mechanism: Mechanism, name: str, start: float, speed: float = 0.0
         velocity=(0.0, 0.0, speed * units.length / units.time),
     )  # fmt: skip
     own, base = body.marker(name=f"{name}.I"), mechanism.ground.marker(name=f"{name}.J")
-    mechanism.joint("translational", f"{name}.slot", own, base)
-    return f'DZ("{own.name}", "{base.name}", "{base.name}")'
+    slot = mechanism.joint("translational", f"{name}.slot", own, base)
+    return slot, f'DZ("{own.name}", "{base.name}", "{base.name}")'
 
 
 def point_on_curve(
     mechanism: Mechanism, name: str, point: Marker, rm: Marker, curve: Curve, start: float | None = None,
-    speed: float = 0.0,
-) -> None:  # fmt: skip
+    speed: float | None = None,
+) -> Joint:  # fmt: skip
     """Keep a marker's origin on a curve given in the frame of another; ADAMS's PTCV.
 
     Parameters
@@ -157,8 +74,13 @@ def point_on_curve(
     curve : Curve
     start : float, optional
         Parameter at the start; default: that of the nearest point.
-    speed : float
-        Its rate at the start.
+    speed : float, optional
+        Its rate at the start; default: that of the velocities of both bodies.
+
+    Returns
+    -------
+    Joint
+        In which the runner travels: its translation is the parameter.
 
     Raises
     ------
@@ -169,16 +91,18 @@ def point_on_curve(
         raise ModelError(f"curve '{name}': both markers are on body '{rm.body.name}'")
     apart = rm.global_orientation().T @ (point.global_position() - rm.global_position())
     start = curve.nearest(apart / mechanism.units.length) if start is None else start
+    speed = point_speed(point, rm, curve, start, mechanism.units) if speed is None else speed
     add_curve(mechanism, name, curve)
-    travel = add_runner(mechanism, f"{name}.runner", start, speed)
+    slot, travel = add_runner(mechanism, f"{name}.runner", start, speed)
     for k, axis in enumerate(AXES):
         place = f'D{axis}("{point.name}", "{rm.name}", "{rm.name}")'
         mechanism.general_constraint(f"{name}.{axis}", f"{place} - {component(name, curve, k, travel)}")
+    return slot
 
 
 def curve_on_curve(
     mechanism: Mechanism, name: str, rm_i: Marker, curve_i: Curve, rm_j: Marker, curve_j: Curve,
-    starts: tuple[float, float] | None = None,
+    starts: tuple[float, float] | None = None, speeds: tuple[float, float] | None = None,
 ) -> None:  # fmt: skip
     """Keep two plane curves in touch; ADAMS's CVCV. Something else keeps both planes parallel.
 
@@ -192,7 +116,9 @@ def curve_on_curve(
         In whose xy planes the curves lie.
     curve_i, curve_j : Curve
     starts : tuple of float, optional
-        Parameters at the start; default: where the curves come nearest.
+        Parameters at the start; default: where the curves touch.
+    speeds : tuple of float, optional
+        Their rates at the start; default: those of the velocities of both bodies.
 
     Raises
     ------
@@ -204,11 +130,13 @@ def curve_on_curve(
     for curve in (curve_i, curve_j):
         if not curve.plane:
             raise ModelError(f"curves '{name}': a curve leaves the xy plane of its marker; both must be plane")
-    starts = _nearest_parameters(mechanism, rm_i, curve_i, rm_j, curve_j) if starts is None else starts
+    units = mechanism.units
+    starts = touching_parameters(rm_i, curve_i, rm_j, curve_j, units) if starts is None else starts
+    speeds = touching_speeds(rm_i, curve_i, rm_j, curve_j, starts, units) if speeds is None else speeds
     add_curve(mechanism, f"{name}.I", curve_i)
     add_curve(mechanism, f"{name}.J", curve_j)
-    first = add_runner(mechanism, f"{name}.runner I", starts[0])
-    second = add_runner(mechanism, f"{name}.runner J", starts[1])
+    _, first = add_runner(mechanism, f"{name}.runner I", starts[0], speeds[0])
+    _, second = add_runner(mechanism, f"{name}.runner J", starts[1], speeds[1])
     angle = f'AZ("{rm_i.name}", "{rm_j.name}")'
     c, s = f"COS({angle})", f"SIN({angle})"
 
@@ -227,22 +155,4 @@ def curve_on_curve(
     mechanism.general_constraint(f"{name}.tangent", parallel)
 
 
-def _nearest_parameters(
-    mechanism: Mechanism, rm_i: Marker, curve_i: Curve, rm_j: Marker, curve_j: Curve
-) -> tuple[float, float]:
-    """Return where two curves come nearest, by turns from the point of I that is nearest to any of J."""
-    turn = rm_j.global_orientation().T @ rm_i.global_orientation()
-    shift = rm_j.global_orientation().T @ (rm_i.global_position() - rm_j.global_position()) / mechanism.units.length
-    one, other = curve_i.spline(), curve_j.spline()
-    s = np.linspace(0.0, curve_i.length, SAMPLES * len(curve_i.points))
-    t = np.linspace(0.0, curve_j.length, SAMPLES * len(curve_j.points))
-    points, others = one(s) @ turn.T + shift, other(t)
-    from scipy.spatial import cKDTree
-
-    distances, near = cKDTree(others).query(points)
-    best = int(np.argmin(distances))
-    p, q = float(s[best]), float(t[near[best]])
-    for _ in range(20):
-        q = curve_j.nearest(turn @ one(p) + shift)
-        p = curve_i.nearest(turn.T @ (other(q) - shift))
-    return p, q
+__all__ = ["Curve", "curve_on_curve", "point_on_curve"]

@@ -44,6 +44,11 @@ class Marker:
         """Return the axes (columns) at the initial position, global components."""
         return self.body.orientation @ self.orientation
 
+    def velocity_at(self, place: np.ndarray) -> np.ndarray:
+        """Return the velocity at the start of the point of the marker's body that is at a global place, m/s."""
+        body = self.body
+        return body.velocity + np.cross(body.angular_velocity, place - body.position)
+
     def __repr__(self) -> str:
         return f"Marker({self.name!r} on {self.body.name!r} at {np.array2string(self.position, precision=6)})"
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from gearmbs.mechanism import Mechanism, ModelError
+from gearmbs.mechanism import Mechanism, ModelError, expression
 
 
 def mass_on_a_spring(force, functions=()):
@@ -177,3 +177,18 @@ def test_functions_are_asked_where_the_motion_is_only(lump):
     expected = solve_ivp(rate, (1.0, 1.5), [5.0], rtol=1e-11, atol=1e-11).y[0, -1]
     assert solution.angular_velocity("free")[-1, 2] == pytest.approx(expected, rel=1e-7)
     assert len(solution.reaction("pin_free")[0]) == len(solution)
+
+
+def test_the_integral_of_a_function_of_time():
+    """Beside one of positions, of which it does not ask; its derivatives are the function and its rate."""
+    m = Mechanism("integral")
+    body = m.body("body", 2.0, (1, 1, 1), velocity=(1, 0, 0))
+    asked = []
+    m.function("push", lambda t: math.cos(3 * t))
+    m.function("room", lambda x: asked.append(x) or 0.0)
+    m.translation("along", m.translational("slide", body, m.ground, axis=(1, 0, 0)),
+                  expression("ROOM(0*TIME) + INTEGRAL(PUSH(TIME), 0, 1)"))  # fmt: skip
+    found = m.simulate(1.5, rate=20, tol=1e-8)
+    np.testing.assert_allclose(found.com_position("body")[:, 0], np.sin(3 * found.t) / 3, atol=1e-9)
+    np.testing.assert_allclose(found.com_velocity("body")[:, 0], np.cos(3 * found.t), atol=1e-7)
+    assert not np.isnan(asked).any()

@@ -212,13 +212,9 @@ def _start(b: Builder, i: Marker, j: Marker, axis: int, rotational: bool) -> tup
         rate = float(e @ (i.body.angular_velocity - j.body.angular_velocity))
         return angle, rate / b.units.factor("angular_velocity")
     apart = i.global_position() - j.global_position()
-    rate = float(e @ (_velocity(i) - _velocity(j)) + apart @ np.cross(j.body.angular_velocity, e))
+    velocities = [m.velocity_at(m.global_position()) for m in (i, j)]
+    rate = float(e @ (velocities[0] - velocities[1]) + apart @ np.cross(j.body.angular_velocity, e))
     return float(e @ apart) / b.units.length, rate / b.units.factor("velocity")
-
-
-def _velocity(marker: Marker) -> np.ndarray:
-    body = marker.body
-    return body.velocity + np.cross(body.angular_velocity, marker.global_position() - body.position)
 
 
 def _displacement(b: Builder, s: st.Motion, text: str, start: tuple[float, float]) -> str:

@@ -26,22 +26,42 @@ def _parameter(b: Builder, curve: Curve, disp: Any, rm: Marker, icm: int | None)
     return curve.nearest(given)
 
 
+def _kept(b: Builder, runner: str) -> tuple[float | None, float | None]:
+    """Return parameter and rate with which the analysis before has left a runner; None where it did not run."""
+    state = b.state.get((runner, 0))
+    if state is None:
+        return None, None
+    return float(state.position[2]) / b.units.length, float(state.velocity[2]) / b.units.factor("velocity")
+
+
 def add_ptcv(b: Builder, s: st.Ptcv) -> None:
-    """PTCV; after the first analysis it starts where the point is."""
+    """PTCV; after the first analysis it goes on from where the point is."""
     curve, rm = curve_points(b.deck, s.curve), b.markers[s.rm or 0]
-    start = None if b.state else _parameter(b, curve, s.disp, rm, s.icm)
-    speed = 0.0 if b.state or s.vel is None else s.vel
-    point_on_curve(b.mechanism, b.model.names["ptcv", s.id], b.markers[s.i or 0], rm, curve, start, speed)
+    name = b.model.names["ptcv", s.id]
+    start, speed = _kept(b, f"{name}.runner")
+    if not b.state:
+        start = _parameter(b, curve, s.disp, rm, s.icm)
+    slot = point_on_curve(b.mechanism, name, b.markers[s.i or 0], rm, curve, start, speed)
+    b.model.sources[slot.name] = s
+    if s.vel is not None and not b.state:
+        at = float(slot.i.global_position()[2]) / b.units.length
+        rate = s.vel / float(np.linalg.norm(curve.spline()(at, 1)))
+        b.model.initial_motions.append((slot, "translation", (at, rate)))
 
 
 def add_cvcv(b: Builder, s: st.Cvcv) -> None:
-    """CVCV; after the first analysis it starts where the curves touch."""
+    """CVCV; after the first analysis it goes on from where the curves touch."""
     first, second = curve_points(b.deck, s.icurve), curve_points(b.deck, s.jcurve)
     i, j = b.markers[s.irm or 0], b.markers[s.jrm or 0]
-    starts = None
-    if not b.state and s.idisp is not None and s.jdisp is not None:
+    name = b.model.names["cvcv", s.id]
+    at_i, speed_i = _kept(b, f"{name}.runner I")
+    at_j, speed_j = _kept(b, f"{name}.runner J")
+    starts = speeds = None
+    if at_i is not None and at_j is not None and speed_i is not None and speed_j is not None:
+        starts, speeds = (at_i, at_j), (speed_i, speed_j)
+    elif not b.state and s.idisp is not None and s.jdisp is not None:
         starts = _parameter(b, first, s.idisp, i, s.iicm) or 0.0, _parameter(b, second, s.jdisp, j, s.jicm) or 0.0
-    curve_on_curve(b.mechanism, b.model.names["cvcv", s.id], i, first, j, second, starts)
+    curve_on_curve(b.mechanism, name, i, first, j, second, starts, speeds)
 
 
 CURVES: dict[type, Callable[[Builder, Any], None]] = {st.Ptcv: add_ptcv, st.Cvcv: add_cvcv}

@@ -44,10 +44,11 @@ def part_states(
     """
     found = {}
     for row, (name, body) in zip(pose, model.mechanism.bodies.items()):
-        if name not in model.sources:
-            # a runner on a curve, which starts where its point is
-            continue
         axes = row[POSE_A:POSE_V].reshape(3, 3)
+        if name not in model.sources:
+            # a runner on a curve is a body without a statement
+            found[name, 0] = BodyState(row[POSE_R:POSE_A].copy(), axes, row[POSE_V:POSE_W].copy(), np.zeros(3))
+            continue
         source = model.sources[name]
         q_f, v_f = (modal or {}).get(name, (np.zeros(0), np.zeros(0)))
         com, push = body.com, np.zeros(3)

@@ -71,7 +71,7 @@ class RoutineCall:
         Displacements of the joints of a COUPLER; rotations in rad.
     displacement, velocity : ndarray, shape (6,)
         Of I of a FIELD, as seen from J: DX, DY, DZ, AX, AY, AZ and VX, VY, VZ, WX, WY, WZ.
-    alpha : float
+    alpha : float or None
         Parameter of a CURVE.
     loads : ndarray, shape (6 + n, cases)
         Load cases of the FLEX_BODY of an MFORCE.
@@ -89,7 +89,7 @@ class RoutineCall:
     q: np.ndarray = field(default_factory=_empty)
     displacement: np.ndarray = field(default_factory=_empty)
     velocity: np.ndarray = field(default_factory=_empty)
-    alpha: float = 0.0
+    alpha: float | None = None
     loads: np.ndarray = field(default_factory=_empty)
     _values: dict[str, float] = field(default_factory=dict)
     _draw: np.random.Generator = field(default_factory=np.random.default_rng)
@@ -139,6 +139,10 @@ class RoutineCall:
         return size
 
 
+class WrongResultError(ValueError):
+    """A routine returns something else than the numbers of its statement."""
+
+
 class Caller:
     """Calls a routine with the quantities of its element and those it asks for, once for all of its results.
 
@@ -169,8 +173,10 @@ class Caller:
         quantities: Mapping[str, int] | None = None,
     ) -> None:
         self.deck, self.statement, self.parameters, self.count = deck, statement, parameters, count
-        self.routine = _compiled(routine) if hasattr(routine, "py_func") else routine
+        self.routine = callable_with_call(routine)
         self.quantities = dict(quantities or {})
+        if hasattr(routine, "py_func"):
+            self._check_indices(callable_with_call(routine.py_func, compiled=True))
         self.asked = list(dict.fromkeys(itertools.chain(*self._rehearsed())))
         self._last: tuple[tuple[float, ...], tuple[float, ...]] | None = None
 
@@ -180,17 +186,34 @@ class Caller:
             s.id, s.label(), self.parameters, time, rehearsal, _values=values, _draw=draw, _deck=self.deck
         )
 
+    def _rehearsal(self, seed: int) -> RoutineCall:
+        """Return a call with numbers of no meaning."""
+        draw = np.random.default_rng(seed)
+        call = self._call(float(draw.uniform(0.0, 1.0)), True, {}, draw)
+        for name, size in self.quantities.items():
+            setattr(call, name, draw.uniform(0.1, 1.0, size))
+        return call
+
+    def _check_indices(self, plain: Routine) -> None:
+        """Refuse a function that numba compiles if it reads beyond its arrays, which would not be seen there."""
+        try:
+            plain(self._rehearsal(0))
+        except IndexError as error:
+            raise ValueError(f"fails: {error}; a compiled function is given time, x, xd, u and parameters") from error
+        except Exception:
+            # plain Python may not have all that numba has
+            return
+
     def _rehearsed(self) -> Iterator[list[str]]:
         for seed in range(REHEARSALS):
-            draw = np.random.default_rng(seed)
-            call = self._call(float(draw.uniform(0.0, 1.0)), True, {}, draw)
-            for name, size in self.quantities.items():
-                setattr(call, name, draw.uniform(0.1, 1.0, size))
+            call = self._rehearsal(seed)
             try:
                 self._results(call)
+            except WrongResultError:
+                raise
             except (ArithmeticError, ValueError) as error:
                 # numbers of no meaning may have no root; what it asked for before counts
-                if seed == REHEARSALS - 1 and not call._values:
+                if seed == REHEARSALS - 1 and not call._values and not self.quantities:
                     raise ValueError(f"fails: {error}") from error
             except Exception as error:
                 # whatever a user's function raises is told with its statement
@@ -199,10 +222,16 @@ class Caller:
 
     def _results(self, call: RoutineCall) -> tuple[float, ...]:
         found = self.routine(call)
-        values = tuple(float(v) for v in np.atleast_1d(np.asarray(found, dtype=float)))
+        try:
+            values = np.asarray(found, dtype=float).ravel().tolist()
+        except (TypeError, ValueError):
+            values = None
+        many = "one number" if self.count == 1 else f"{self.count} numbers"
+        if found is None or values is None:
+            raise WrongResultError(f"returns {found!r}, it must return {many}")
         if len(values) != self.count:
-            raise ValueError(f"returns {len(values)} numbers, it must return {self.count}")
-        return values
+            raise WrongResultError(f"returns {len(values)} numbers, it must return {self.count}")
+        return tuple(values)
 
     def results(self, arguments: Sequence[float]) -> tuple[float, ...]:
         """Return what the routine gives for time, the element's quantities and those it asks for."""
@@ -242,12 +271,20 @@ _NEVER = np.random.default_rng(0)
 """Draws of calls that are no rehearsals, which make none."""
 
 
-def _compiled(routine: Any) -> Routine:
-    """Return a routine that calls a function compiled by numba with numbers and arrays."""
+def callable_with_call(routine: Any, compiled: bool | None = None) -> Routine:
+    """Return a routine that takes a call, of one that numba has compiled, which takes numbers and arrays.
+
+    What the element gives stands in ``u`` then: the displacements of a COUPLER, displacement and velocity of a FIELD,
+    the parameter of a CURVE.
+    """
+    if not (hasattr(routine, "py_func") if compiled is None else compiled):
+        return routine
 
     def called(call: RoutineCall) -> Any:
         more = (call.xdot,) if call.xdot.size else ()
-        return routine(call.time, call.x, call.xd, call.u, np.array(call.parameters), *more)
+        alpha = [] if call.alpha is None else [call.alpha]
+        given = np.concatenate([call.u, call.q, call.displacement, call.velocity, alpha])
+        return routine(call.time, call.x, call.xd, given, np.array(call.parameters), *more)
 
     return called
 

@@ -76,7 +76,11 @@ def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: 
         statement, group = use.statement, made.items[type(use.statement)]
         refused = f"{statement.label()}: FUNCTION is not supported"
         made.diagnostics = [d for d in made.diagnostics if not d.message.startswith(refused)]
-        found, missing = _found(use, known)
+        try:
+            found, missing = _found(use, known)
+        except ValueError as error:
+            problems.append(_wrong(deck, statement, error))
+            continue
         if missing:
             word, are = ("routine", "is") if len(missing) == 1 else ("routines", "are")
             message = f"{statement.label()}: its {word} {', '.join(missing)} {are} missing; give it in routines"
@@ -90,14 +94,17 @@ def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: 
         try:
             group[statement.id] = _with_function(made, group[statement.id], use, found)
         except ValueError as error:
-            message = f"{statement.label()}: its routine {error}"
-            problems.append(Diagnostic(ERROR, message, deck.file, statement.line))
+            problems.append(_wrong(deck, statement, error))
     if any(d.severity == ERROR for d in problems) or (problems and not allow_missing):
         raise DeckError(problems)
     made.diagnostics.extend(problems)
     if any(isinstance(s, LEFT_OUT) for s in gone):
         made.diagnostics.extend(without_readers(made, gone))
     return made
+
+
+def _wrong(deck: Deck, statement: st.Statement, error: ValueError) -> Diagnostic:
+    return Diagnostic(ERROR, f"{statement.label()}: its routine {error}", deck.file, statement.line)
 
 
 def load_routines(path: str | Path) -> dict[str, Routine]:
@@ -178,7 +185,9 @@ def _found(use: _Use, known: Mapping[str, Any]) -> tuple[dict[str, Routine], lis
             known = {**known, **{f"{s.label()}.{part}".upper(): routine for part, routine in own.items()}}
     for part, names in wanted:
         routine = next((known[name] for name in names if name in known), None)
-        if callable(routine):
+        if routine is not None and not callable(routine):
+            raise ValueError(f"is {routine!r}, which cannot be called")
+        if routine is not None:
             found[part] = routine
         else:
             missing.append(names[1])

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall
+from gearmbs.adams.builders.routine_calls import Caller, Routine, RoutineCall, callable_with_call
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.mechanism.user_functions import UserFunction
@@ -41,10 +41,15 @@ def bind_curve(
     high = 1.0 if s.maxpar is None else s.maxpar
     if not low < high:
         raise ValueError(f"has no range: MINPAR = {low:g}, MAXPAR = {high:g}")
+    routine = callable_with_call(found[""])
     rows = []
     for alpha in np.linspace(low, high, SAMPLES):
         call = RoutineCall(s.id, s.label(), parameters, alpha=float(alpha), _deck=deck)
-        point = np.asarray(found[""](call), dtype=float)
+        try:
+            point = np.asarray(routine(call), dtype=float)
+        except Exception as error:
+            # whatever a user's function raises is told with its statement
+            raise ValueError(f"fails at alpha = {alpha:g}: {type(error).__name__}: {error}") from error
         if point.shape != (3,) or not np.isfinite(point).all():
             raise ValueError(f"returns {point}; it must return x, y and z")
         rows.append((float(alpha), *(float(v) for v in point)))

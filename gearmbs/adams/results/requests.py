@@ -24,6 +24,7 @@ from gearmbs.mechanism.compile import starting_angles
 from gearmbs.mechanism.expression_compiler import compile_expression
 from gearmbs.mechanism.expression_series import evaluate_series
 from gearmbs.mechanism.expression_syntax import Scope
+from gearmbs.mechanism.user_functions import raised_errors
 
 COLUMNS = {
     "DISPLACEMENT": ("DM", "DX", "DY", "DZ", "", "PSI", "THETA", "PHI"),
@@ -122,6 +123,8 @@ class RequestEvaluator:
         ------
         ExpressionError
             When a column names something that does not exist.
+        ModelError
+            When a routine of the user fails.
         """
         values = np.zeros((self.solution.t.size, 8))
         for column, text in enumerate(request_texts(request, self._ypr)):
@@ -136,7 +139,13 @@ class RequestEvaluator:
         return RequestSeries(request, column_names(request, self._ypr), values)
 
     def expression(self, text: str) -> np.ndarray:
-        """Return the values of an expression over time, in the deck's units, shape (m,)."""
+        """Return the values of an expression over time, in the deck's units, shape (m,).
+
+        Raises
+        ------
+        ModelError
+            When a routine of the user fails.
+        """
         text = translated(self.model.deck, self.model.present, text)
         tape = compile_expression(text, self.scope, accelerations=True)
         m = self.solution.t.size
@@ -148,10 +157,11 @@ class RequestEvaluator:
         angles = np.zeros((3, max(1, tape.n_angles)))
         angles[0, : tape.n_angles] = starting_angles(tape, self._turns, self._marker_named)
         out = np.zeros(m)
-        evaluate_series(
-            tape.ints, tape.floats, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
-            angles, np.zeros(max(1, tape.gradient_size)), np.zeros(tape.work_size), out,
-        )  # fmt: skip
+        with raised_errors(self.model.mechanism.functions.values()):
+            evaluate_series(
+                tape.ints, tape.floats, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
+                angles, np.zeros(max(1, tape.gradient_size)), np.zeros(tape.work_size), out,
+            )  # fmt: skip
         return out
 
     def variables(self) -> dict[int, np.ndarray]:

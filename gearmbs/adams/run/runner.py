@@ -189,7 +189,11 @@ def _carry_out(
     elif isinstance(command, Linear):
         result.log[-1] = (command, _linear(session, command, allow_unsupported))
     elif isinstance(command, Simulate):
-        return _simulate(session, command, result, tol, allow_unsupported, progress)
+        try:
+            return _simulate(session, command, result, tol, allow_unsupported, progress)
+        except ModelError as error:
+            # a routine of the user that only results ask for
+            raise _failed(session, command, None, error) from error
     return True
 
 
@@ -479,11 +483,14 @@ def _failed(session: Session, command: Command, model: AdamsModel | None, error:
     """Return an error with the line of the statement it names and the command it happened in."""
     text = str(error)
     where = f" (in {command.file}:{command.line})" if command.line else ""
-    return DeckError([Diagnostic(ERROR, text + where, session.deck.file, _line(model, text))])
+    return DeckError([Diagnostic(ERROR, text + where, session.deck.file, _line(session.deck, model, text))])
 
 
-def _line(model: AdamsModel | None, message: str) -> int:
+def _line(deck: Deck, model: AdamsModel | None, message: str) -> int:
     """Return the line of the first statement a message names, 0 when it names none."""
+    called = next((s for s in deck if f"'{s.label()}: USER'" in message), None)
+    if called is not None:
+        return called.line
     sources = model.sources if model is not None else {}
     places = []
     for name, statement in sources.items():

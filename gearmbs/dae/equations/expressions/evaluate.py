@@ -7,8 +7,8 @@ time are in `evaluate_time`, Hessians in `evaluate_second`.
 from __future__ import annotations
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.python_callback import call_address
 from gearmbs.dae.equations.expressions import opcodes as op
+from gearmbs.dae.equations.expressions.external import external
 from gearmbs.dae.equations.expressions.integrals import integral
 from gearmbs.dae.equations.expressions.marker_motion import KIN_V, KIN_W
 from gearmbs.dae.equations.expressions.measure_gradients import (
@@ -81,18 +81,6 @@ def _leaf_value(ints, at, kin, acc, marker_body, marker_frame, y, w):
     else:
         relative_vector(code, ints[at + 1], ints[at + 2], ints[at + 3], kin, acc, marker_body, marker_frame, w)
     return resolve(ints[at + 4], ints[at + 5], kin, marker_body, marker_frame, w)
-
-
-@njit("float64(int64[::1], int64, float64, int64, float64[::1])", cache=True, nogil=True)
-def external(ints, at, t, order, work):
-    """Call a function of the user with its arguments; value and derivatives stay in its scratch at the end of work."""
-    count = ints[at + 2]
-    begin = work.size - ints[op.HEAD_EXTERNAL] + ints[at + 3]
-    given, found = work[begin : begin + count], work[begin + count :]
-    for i in range(count):
-        given[i] = work[ints[ints[at + 1] + i]]
-    call_address(ints[at + 4], t, given, given, float(order), found)
-    return found[0]
 
 
 @njit("int64(int64[::1], int64, float64[::1])", cache=True, nogil=True)

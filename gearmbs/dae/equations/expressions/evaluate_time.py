@@ -6,7 +6,8 @@ import math
 
 from gearmbs._jit import njit
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.dae.equations.expressions.evaluate import TABLES, external, selected
+from gearmbs.dae.equations.expressions.evaluate import TABLES, selected
+from gearmbs.dae.equations.expressions.external import external
 from gearmbs.dae.equations.expressions.integrals import integral
 from gearmbs.dae.equations.expressions.scalar import binary, unary
 from gearmbs.dae.equations.expressions.splines import spline_value

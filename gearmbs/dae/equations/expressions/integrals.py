@@ -13,6 +13,7 @@ import numpy as np
 
 from gearmbs._jit import njit
 from gearmbs.dae.equations.expressions import opcodes as op
+from gearmbs.dae.equations.expressions.external import external
 from gearmbs.dae.equations.expressions.scalar import binary, unary
 from gearmbs.dae.equations.expressions.splines import spline_value
 
@@ -25,7 +26,10 @@ MOST_PANELS = 1 << 15
 
 @njit("float64(int64[::1], float64[::1], float64, int64, float64[::1])", cache=True, nogil=True, error_model="numpy")
 def time_value(ints, floats, t, register, w):
-    """Return a register of a tape at time t; what does not depend on time alone is NaN."""
+    """Return a register of a tape at time t; what does not depend on time alone is NaN.
+
+    Scratch of functions of the user is at the end of ``w``, as in the evaluators.
+    """
     at = ints[op.HEAD_CODE]
     for k in range(register + 1):
         code = ints[at]
@@ -41,6 +45,11 @@ def time_value(ints, floats, t, register, w):
             w[k] = spline_value(floats, ints[at + 3], ints[at + 4], w[ints[at + 1]], w[ints[at + 2]])[0]
         elif code <= op.LAST_BINARY:
             w[k] = binary(code, w[ints[at + 1]], w[ints[at + 2]])[0]
+        elif code == op.EXTERNAL:
+            known = True
+            for i in range(ints[at + 2]):
+                known = known and not np.isnan(w[ints[ints[at + 1] + i]])
+            w[k] = external(ints, at, t, 0, w) if known else np.nan
         else:
             c = w[ints[at + 1]]
             w[k] = w[ints[at + 2]] if c < 0.0 else (w[ints[at + 4]] if c > 0.0 else w[ints[at + 3]])

@@ -1,0 +1,178 @@
+"""Routines of the user that return or raise what they should not, and those of motions by their rates."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numba import njit
+
+from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
+
+HEAD = """routines
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/1, PART=1
+MARKER/10, PART=1, FLOATING
+PART/2, MASS=2, CM=20, IP=0.3,0.4,0.5, QG=0.1,0.2,0.3, WX=1, WY=0.2, VX=0.1
+MARKER/20, PART=2
+"""
+STATEMENTS = {
+    "sfosub": ("SFORCE/1, TRANSLATIONAL, I=20, J=1, ACTIONONLY, FUNCTION=USER(1)", 1),
+    "vfosub": ("VFORCE/1, I=20, JFLOAT=10, RM=1, FUNCTION=USER(1)", 3),
+    "vtosub": ("VTORQUE/1, I=20, JFLOAT=10, RM=1, FUNCTION=USER(1)", 3),
+    "gfosub": ("GFORCE/1, I=20, JFLOAT=10, RM=1, FUNCTION=USER(1)", 6),
+    "fiesub": ("FIELD/1, I=20, J=1, FUNCTION=USER(1)", 6),
+    "varsub": ("VARIABLE/1, FUNCTION=USER(1)", 1),
+    "difsub": ("DIFF/1, IC=0, FUNCTION=USER(1)", 1),
+    "reqsub": ("REQUEST/1, FUNCTION=USER(1)", 8),
+    "sensub": ("SENSOR/1, GE, VALUE=9, FUNCTION=USER(1), PRINT", 1),
+}
+
+
+def run(text, routines, script="m\no\nSIMULATE/DYNAMICS, END=1, STEPS=10\n", head=HEAD):
+    return run_deck(parse_deck(head + text + "\nEND\n"), parse_script(script), tol=1e-9, routines=routines)
+
+
+def message(text, routines, **more):
+    with pytest.raises(DeckError) as caught:
+        run(text, routines, **more)
+    (only,) = caught.value.diagnostics
+    return only.line, only.message
+
+
+@pytest.mark.parametrize("name", STATEMENTS)
+def test_what_is_no_result_is_named_before_anything_is_run(name):
+    text, count = STATEMENTS[name]
+    label = text.split(",")[0]
+    many = "one number" if count == 1 else f"{count} numbers"
+
+    def asked(call):
+        return call.sysfnc("DX", 20, 1)
+
+    for routine, told in (
+        (lambda call: (asked(call),) * (count + 1), f"returns {count + 1} numbers, it must return {count}"),
+        (lambda call: asked(call) and None, f"returns None, it must return {many}"),
+        (lambda call: "none", f"returns 'none', it must return {many}"),
+        (lambda call: {}[asked(call) < 0.0], "fails: KeyError: False"),
+        (3, "is 3, which cannot be called"),
+    ):
+        assert message(text, {name: routine}) == (8, f"{label}: its routine {told}")
+
+
+@pytest.mark.parametrize("name", ["varsub", "reqsub"])
+def test_what_fails_only_in_results_is_named(name):
+    """The motion does not need it, but a column of it must not end as NaN with success."""
+    text, count = STATEMENTS[name]
+
+    def late(call):
+        value = call.sysfnc("DX", 20, 1)
+        if call.time > 0.5 and not call.rehearsal:
+            raise KeyError("table")
+        return (value,) * count
+
+    line, told = message(text, {name: late})
+    assert line == 8
+    assert told.startswith(f"function '{text.split(',')[0]}: USER': KeyError: 'table'")
+
+
+def test_what_a_sensor_evaluates_may_fail():
+    text = "SENSOR/1, GE, VALUE=0.7, FUNCTION=TIME, EVALUATE=USER(1), RETURN"
+
+    def evaluated(call):
+        return 1.0 / (1.0 if call.rehearsal else 0.0)
+
+    line, told = message(text, {"sevsub": evaluated})
+    assert (line, "ZeroDivisionError" in told) == (8, True)
+
+
+@pytest.mark.parametrize(
+    ("routine", "told"),
+    [
+        (lambda call: {}[1], "fails at alpha = 0: KeyError: 1"),
+        (lambda call: None, "returns nan; it must return x, y and z"),
+        (lambda call: (call.alpha, 0.0), "returns [0. 0.]; it must return x, y and z"),
+    ],
+)
+def test_curves_by_routines_that_fail_are_named(routine, told):
+    text = "CURVE/1, OPEN, MINPAR=0, MAXPAR=1, FUNCTION=USER(1)\nPTCV/1, I=20, CURVE=1, RM=1"
+    assert message(text, {"cursub": routine}) == (8, f"CURVE/1: its routine {told}")
+
+
+PENDULUM = """routines
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/1, PART=1
+MARKER/12, PART=1, REULER=0,90D,0
+PART/2, MASS=2, CM=20, IP=1,1,1, QG=0.5,0,0
+MARKER/20, PART=2
+MARKER/21, PART=2, QP=-0.5,0,0, REULER=0,90D,0
+JOINT/1, REVOLUTE, I=21, J=12
+ACCGRAV/KGRAV=-9.81
+REQUEST/1, F2=AZ(21,12)\\F3=WZ(21,12,12)\\F4=WDTZ(21,12,12)\\F6=MOTION(1,0,8,12)
+"""
+
+
+@pytest.mark.parametrize(("level", "atol"), [("", 1e-4), ("VELOCITY, ", 1e-5), ("ACCELERATION, ", 1e-9)])
+def test_motions_by_rates_from_routines(level, atol):
+    """Displacement, rate, change and torque are those of the written function; differences are made of the rest."""
+    text = "MOTION/1, JOINT=1, " + level + "FUNCTION={}"
+
+    def motion(call):
+        return 0.5 * math.sin(call.parameters[0] * call.time) + 0.1 * call.time**2
+
+    written = run(text.format("0.5*SIN(7*TIME)+0.1*TIME**2"), {}, head=PENDULUM)
+    found = run(text.format("USER(7)"), {"motsub": motion}, head=PENDULUM)
+    assert found.success
+    np.testing.assert_allclose(found.request(1), written.request(1), atol=atol)
+
+
+@njit
+def compiled_coupler(time, x, xd, u, parameters):
+    return u[0] - parameters[0] * u[1]
+
+
+@njit
+def compiled_field(time, x, xd, u, parameters):
+    return -parameters[0] * u[:6] - 0.1 * u[6:]
+
+
+@njit
+def compiled_circle(time, x, xd, u, parameters):
+    return np.array([np.cos(u[0]), np.sin(u[0]), 0.0])
+
+
+SHAFTS = """PART/3, MASS=1, CM=30, IP=2,2,3, QG=1,0,0
+MARKER/30, PART=3
+MARKER/31, PART=1, QP=1,0,0
+JOINT/1, TRANSLATIONAL, I=20, J=1
+JOINT/2, REVOLUTE, I=30, J=31
+SFORCE/1, ROTATIONAL, I=30, J=31, ACTIONONLY, FUNCTION=3
+COUPLER/1, JOINTS=1,2, {}
+REQUEST/1, F2=DZ(20,1)\\F3=AZ(30,31)
+"""
+
+
+def test_compiled_routines_are_given_what_their_element_gives():
+    expected = run(SHAFTS.format("SCALES=1,-0.4"), {})
+    found = run(SHAFTS.format("FUNCTION=USER(0.4)"), {"cousub": compiled_coupler})
+    assert np.ptp(found.request(1)[:, 1]) > 0.1
+    np.testing.assert_allclose(np.diff(found.request(1), axis=0), np.diff(expected.request(1), axis=0), atol=1e-8)
+
+    field = "FIELD/1, I=20, J=1, {}\nREQUEST/1, F2=DX(20,1)\\F3=WX(20,1)\\F4=DZ(20,1)"
+    found = run(field.format("FUNCTION=USER(3)"), {"fiesub": compiled_field})
+    expected = run(field.format("FUNCTION=USER(3)"),
+                   {"fiesub": lambda call: -3.0 * call.displacement - 0.1 * call.velocity})  # fmt: skip
+    np.testing.assert_allclose(found.request(1), expected.request(1), atol=1e-9)
+
+    curve = "CURVE/1, CLOSED, MINPAR=0, MAXPAR=6.283185307179586, FUNCTION=USER(1)\nREQUEST/1, F2=CURVE(TIME,0,2,1)"
+    np.testing.assert_allclose(np.sin(found.t), run(curve, {"cursub": compiled_circle}).request(1)[:, 1], atol=1e-7)
+
+
+def test_a_compiled_routine_that_reads_beyond_its_arrays_is_named():
+    """Compiled code would read what stands in memory there."""
+    line, told = message(STATEMENTS["varsub"][0], {"varsub": compiled_coupler})
+    assert line == 8
+    assert told.startswith("VARIABLE/1: its routine fails: index 0 is out of bounds")
+    assert told.endswith("a compiled function is given time, x, xd, u and parameters")
