@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from gearmbs.flexible.ansys import read_ansys
     from gearmbs.flexible.beam import BeamSection, shear_coefficient
     from gearmbs.flexible.bodies import box_housing, planet_carrier, thin_rimmed_wheel
-    from gearmbs.flexible.check import ModelReport, ReductionReport, check_model, check_reduction
+    from gearmbs.flexible.check import ModelReport, check_model
     from gearmbs.flexible.damping import damping_ratios
     from gearmbs.flexible.errors import FlexibleError
     from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gearmbs.flexible.nastran_modes import read_op2_modes
     from gearmbs.flexible.nastran_stress import read_op2_stresses
     from gearmbs.flexible.reduction import reduce_model
+    from gearmbs.flexible.reduction_check import ReductionReport, check_reduction
     from gearmbs.flexible.rotor import Campbell, Rotor, Support, UnbalanceResponse, WhirlModes
     from gearmbs.flexible.shaft import Disc, Shaft, ShaftSection
     from gearmbs.flexible.solid import block_mesh, nodes_where, ring_mesh, solid_model
@@ -98,7 +99,7 @@ late(
         "ModalModel": ".modal_model",
         "ModalNeutralFile": ".mnf_content",
         "ModelReport": ".check",
-        "ReductionReport": ".check",
+        "ReductionReport": ".reduction_check",
         "Rotor": ".rotor",
         "Seat": ".modal_model",
         "Shaft": ".shaft",
@@ -111,7 +112,7 @@ late(
         "block_mesh": ".solid",
         "box_housing": ".bodies",
         "check_model": ".check",
-        "check_reduction": ".check",
+        "check_reduction": ".reduction_check",
         "damping_ratios": ".damping",
         "from_matrices": ".matrices",
         "mnf_of": ".mnf",

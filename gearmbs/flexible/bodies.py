@@ -29,7 +29,7 @@ def thin_rimmed_wheel(
     width: Quantity,
     web: Quantity,
     *,
-    modes: int = 12,
+    modes: int | None = None,
     around: int = 24,
     material: ElasticMaterial = STEEL,
     name: str = "wheel",
@@ -37,8 +37,9 @@ def thin_rimmed_wheel(
     """Return a wheel with a web that is thinner than hub and rim, about z, centred on the origin.
 
     Its seats are ``"bore"``, whose face moves as a rigid body, and ``"rim"``, which follows the outer face on average:
-    the place of the teeth. A rim that turns and shifts against its hub is what a thin web adds to a rigid wheel; modes
-    with two and more waves round about are in the model, but a single seat does not feel them.
+    the place of the teeth; both are at the origin, so that markers are made by :meth:`ModalModel.seat_marker`. A rim
+    that turns and shifts against its hub is what a thin web adds to a rigid wheel; modes with two and more waves round
+    about are in the model, but a single seat does not feel them.
 
     Parameters
     ----------
@@ -46,8 +47,10 @@ def thin_rimmed_wheel(
         Diameters, m: of the bore, of the hub, inside the rim, and outside (the root circle of the teeth).
     width, web : float or str
         Of hub and rim, and the thickness of the web in their middle, m.
-    modes, around : int
-        Shapes that are kept, and elements round about.
+    modes : int, optional
+        Shapes that are kept; default: all of the reduction, for the slowest twist a wheel less than its web does.
+    around : int
+        Elements round about.
     material : ElasticMaterial
     name : str
 
@@ -79,7 +82,7 @@ def planet_carrier(
     pin_circle: Quantity,
     pin: Quantity,
     *,
-    modes: int = 20,
+    modes: int | None = None,
     material: ElasticMaterial = STEEL,
     name: str = "carrier",
 ) -> ModalModel:
@@ -96,8 +99,8 @@ def planet_carrier(
         Number of pins.
     pin_circle, pin : float or str
         Diameters of the circle of the pins and of a pin, m.
-    modes : int
-        Shapes that are kept.
+    modes : int, optional
+        Shapes that are kept; default: all of the reduction, for the slowest do not twist the disc under its pins.
     material : ElasticMaterial
     name : str
 
@@ -135,7 +138,7 @@ def box_housing(
     bearing: Quantity,
     *,
     divisions: tuple[int, int, int] = (6, 4, 4),
-    modes: int = 40,
+    modes: int | None = 40,
     material: ElasticMaterial = STEEL,
     name: str = "housing",
 ) -> ModalModel:
@@ -156,8 +159,8 @@ def box_housing(
         Outer diameter of the bearings, m.
     divisions : tuple of 3 ints
         Elements between the walls.
-    modes : int
-        Shapes that are kept.
+    modes : int, optional
+        Shapes that are kept; all of the reduction if None.
     material : ElasticMaterial
     name : str
 

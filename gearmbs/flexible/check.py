@@ -1,17 +1,13 @@
-"""Checks of finite-element models and of their reductions, as tables people can read."""
+"""Checks of finite-element models, as tables people can read."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.linalg as spl
 
 from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
-from gearmbs.flexible.interfaces import resolve
-from gearmbs.flexible.modal_model import ModalModel
-from gearmbs.flexible.reduction import GROUNDED, attachment_modes, free_modes
+from gearmbs.flexible.reduction import GROUNDED, free_modes
 
 MOTIONS = ("x", "y", "z", "rot x", "rot y", "rot z")
 
@@ -68,51 +64,6 @@ class ModelReport:
         return "\n".join(lines)
 
 
-@dataclass(frozen=True, eq=False)
-class ReductionReport:
-    """How near a reduction is to its finite elements.
-
-    Attributes
-    ----------
-    frequencies, exact : ndarray, shape (n,)
-        Of the free body, Hz: reduced, and of the finite elements.
-    similarity : ndarray, shape (n,)
-        Modal assurance criterion of each reduced mode with the best of the exact ones, 0 to 1.
-    flexibility : dict of str to float
-        Of each seat, the share of the flexibility of the free body there, under forces, that the reduction has lost.
-    turning : dict of str to float
-        The same under torques, of seats that turn: what a joint needs that holds the seat's direction.
-    """
-
-    frequencies: np.ndarray
-    exact: np.ndarray
-    similarity: np.ndarray
-    flexibility: dict[str, float]
-    turning: dict[str, float]
-
-    @property
-    def errors(self) -> np.ndarray:
-        """Relative errors of the frequencies, shape (n,)."""
-        return self.frequencies / self.exact - 1.0
-
-    def converged_up_to(self, tolerance: float = 0.01) -> float:
-        """Return the frequency, Hz, up to which errors stay below a tolerance."""
-        bad = np.flatnonzero(np.abs(self.errors) > tolerance)
-        return float(self.frequencies[-1] if bad.size == 0 else self.frequencies[bad[0] - 1] if bad[0] else 0.0)
-
-    def __repr__(self) -> str:
-        head = "mode    reduced, Hz      exact, Hz    error, %   MAC"
-        rows = [
-            f"{k + 1:4d} {a:14.4f} {b:14.4f} {100 * (a / b - 1):11.4f} {s:5.3f}"
-            for k, (a, b, s) in enumerate(zip(self.frequencies, self.exact, self.similarity))
-        ]
-        lost = []
-        for key, share in self.flexibility.items():
-            torques = f", {100 * self.turning[key]:.3g} % under torques" if key in self.turning else ""
-            lost.append(f"seat {key}: {100 * share:.3g} % of its static flexibility is lost under forces{torques}")
-        return "\n".join([head, *rows, *lost, f"errors below 1 % up to {self.converged_up_to():.6g} Hz"])
-
-
 def check_model(model: FiniteElementModel, count: int = 6) -> ModelReport:
     """Return the report of a model: mass properties, grounding, rigid modes.
 
@@ -159,57 +110,3 @@ def check_model(model: FiniteElementModel, count: int = 6) -> ModelReport:
     size = float(np.linalg.norm(np.ptp(model.positions, axis=0)))
     remarks += properties.doubts(size)
     return ModelReport(model.name, properties, masses, energy, frequencies, massless, remarks)
-
-
-def check_reduction(model: FiniteElementModel, reduced: ModalModel, interfaces=None) -> ReductionReport:
-    """Compare a reduction with its finite elements: free frequencies, shapes, static flexibility of the seats.
-
-    Slow modes have little of the flexibility under torques; a body clamped at a seat is too stiff by what is lost.
-
-    Parameters
-    ----------
-    model : FiniteElementModel
-    reduced : ModalModel
-    interfaces : iterable, optional
-        As given to :func:`reduce_model`; default: the model's seats.
-    """
-    parts = resolve(model, list(model.seats) if interfaces is None else interfaces)
-    k, m = parts.expand.T @ model.stiffness @ parts.expand, parts.expand.T @ model.mass @ parts.expand
-    gram = parts.expand.T @ parts.expand
-    rigid = spl.splu(sp.csc_matrix(gram)).solve(np.asarray(parts.expand.T @ model.rigid_motion()))
-    n = reduced.modes
-    squared, vectors = free_modes(sp.csc_array(k), sp.csc_array(m), rigid, n)
-    exact, _ = model.field(np.asarray(parts.expand @ vectors))
-    a, b = reduced.moved.reshape(n, -1), exact.reshape(vectors.shape[1], -1)
-    mac = (a @ b.T) ** 2 / np.outer((a**2).sum(axis=1), (b**2).sum(axis=1))
-    # a pair of equal modes shares its shapes
-    frequencies = np.sqrt(squared) / (2 * np.pi)
-    same = np.abs(frequencies[:, None] - frequencies) < 1e-4 * frequencies
-    grouped = np.array([(mac[:, same[:, j]]).sum(axis=1) for j in range(frequencies.size)]).T
-    return ReductionReport(
-        reduced.frequencies,
-        frequencies,
-        np.minimum(grouped.max(axis=1), 1.0),
-        *_lost(sp.csc_array(k), sp.csc_array(m), parts, rigid, reduced),
-    )
-
-
-def _lost(k, m, parts, rigid: np.ndarray, reduced: ModalModel) -> tuple[dict[str, float], dict[str, float]]:
-    """Return how much of the flexibility of the free body at each seat is lacking, under forces and under torques."""
-    forces: dict[str, float] = {}
-    torques: dict[str, float] = {}
-    if not parts.places:
-        return forces, torques
-    shapes = attachment_modes(k, m, rigid, parts.constraints)
-    inertial = m @ rigid
-    shapes = shapes - rigid @ np.linalg.solve(rigid.T @ inertial, inertial.T @ shapes)
-    exact = np.diag(parts.constraints @ shapes)
-    stiff = (2 * np.pi * reduced.frequencies) ** 2
-    for key, (_, rows) in parts.places.items():
-        seat = reduced.seats[key]
-        for out, three, motion in ((forces, rows[:3], seat.moved), (torques, rows[3:], seat.turned)):
-            there = three >= 0
-            whole = exact[three[there]].sum()
-            if whole > 0.0:
-                out[key] = float(1.0 - (motion[:, there] ** 2 / stiff[:, None]).sum() / whole)
-    return forces, torques

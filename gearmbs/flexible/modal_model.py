@@ -16,10 +16,14 @@ from gearmbs.flexible.stress import StressModes, StressRecovery
 from gearmbs.flexible.stress_recovery import KnownStresses
 from gearmbs.flexible.surface import BodySurface, faceted_surface, hull_surface, revolved_surface
 from gearmbs.mechanism import Mechanism, ModalBody, Mode, ShapeIntegrals
+from gearmbs.mechanism.modal import COUPLING, ShapedMarker
 
 REACH = 1e-4
 """How far a marker may be from a node, as a share of the body's size."""
 
+
+LEVELS = (*COUPLING, "rigid")
+"""Levels of coupling between deformation and motion, from all terms to none."""
 
 SLENDER = 0.2
 """A body whose least moment of inertia is a smaller share of the next has a long axis."""
@@ -42,12 +46,16 @@ class Seat:
         Displacement and rotation by one unit of each mode.
     turns : bool
         Whether its rotation is known.
+    flexibility : ndarray, shape (6, 6), optional
+        Displacement and rotation by unit forces and torques there, of the finite elements free in space, m/N and rad/(N
+        m); NaN in directions that the seat lacks.
     """
 
     position: np.ndarray
     moved: np.ndarray
     turned: np.ndarray
     turns: bool = True
+    flexibility: np.ndarray | None = None
 
 
 class Origin(NamedTuple):
@@ -147,9 +155,21 @@ class ModalModel:
             If no node is near.
         """
         point = np.asarray(point, dtype=float)
-        for seat in self.seats.values():
-            if seat.turns and np.linalg.norm(seat.position - point) <= REACH * self.size:
-                return seat.moved, seat.turned
+        here = {
+            key: seat
+            for key, seat in self.seats.items()
+            if seat.turns and np.linalg.norm(seat.position - point) <= REACH * self.size
+        }
+        if here:
+            first, *others = here.values()
+            if any(
+                not np.array_equal(first.moved, s.moved) or not np.array_equal(first.turned, s.turned) for s in others
+            ):
+                raise FlexibleError(
+                    f"{self.name}: the seats {', '.join(here)} are at one place and move differently; "
+                    "make the marker by its seat's name: seat_marker(body, name)"
+                )
+            return first.moved, first.turned
         if self.line:
             return self._on_line(point)
         distance = np.linalg.norm(self.positions - point, axis=1)
@@ -220,7 +240,7 @@ class ModalModel:
             i.mass[np.ix_(k, k)], i.momentum[k], i.angular_momentum[k], i.cross[np.ix_(k, k)], i.first[k],
             i.second[np.ix_(k, k)],
         )  # fmt: skip
-        seats = {key: Seat(s.position, s.moved[k], s.turned[k], s.turns) for key, s in self.seats.items()}
+        seats = {key: replace(s, moved=s.moved[k], turned=s.turned[k]) for key, s in self.seats.items()}
         turned = None if self.turned is None else self.turned[k]
         return replace(
             self, frequencies=self.frequencies[k], integrals=integrals, moved=self.moved[k], turned=turned, seats=seats
@@ -244,6 +264,37 @@ class ModalModel:
             total = flexibility.sum(axis=0)
             shares.append((flexibility[:, total > 0] / total[total > 0]).max(axis=1, initial=0.0))
         return np.max(shares, axis=0)
+
+    def lost_turning(
+        self, point: npt.ArrayLike, axis: npt.ArrayLike, turned: np.ndarray | None = None
+    ) -> tuple[str, float]:
+        """Return the seat at a point, and the share that the modes lack of its flexibility under a torque.
+
+        Parameters
+        ----------
+        point : array_like of 3 floats
+            m, in the frame of the nodes.
+        axis : array_like of 3 floats
+            Of the torque, of length 1.
+        turned : ndarray, shape (n, 3), optional
+            Rotation by one unit of each mode, to tell seats at one place apart.
+
+        Returns
+        -------
+        str, float
+            An empty name and zero where there is no seat, or one whose exact flexibility is not known.
+        """
+        place, along = np.asarray(point, dtype=float), np.asarray(axis, dtype=float)
+        for key, seat in self.seats.items():
+            if seat.flexibility is None or np.linalg.norm(seat.position - place) > REACH * self.size:
+                continue
+            if turned is not None and not np.allclose(turned, seat.turned, atol=1e-9 * np.abs(seat.turned).max()):
+                continue
+            exact = float(along @ seat.flexibility[3:, 3:] @ along)
+            if exact > 0.0:
+                kept = ((seat.turned @ along) ** 2 / (2 * np.pi * self.frequencies) ** 2).sum()
+                return key, float(1.0 - kept / exact)
+        return "", 0.0
 
     def by_participation(self, least: float = 1e-4, *, torques: bool = False) -> ModalModel:
         """Return the body without the modes whose `participation` is below ``least``."""
@@ -284,6 +335,8 @@ class ModalModel:
         """
         p = self.properties
         label = name or self.name
+        if coupling not in LEVELS:
+            raise FlexibleError(f"{label}: coupling = {coupling!r}; choose one of {', '.join(LEVELS)}")
         if coupling == "rigid":
             return mechanism.body(label, p.mass, p.inertia, com=p.com, **where)  # type: ignore[return-value]
         ratios = damping_ratios(self.frequencies, damping)
@@ -299,12 +352,49 @@ class ModalModel:
             label, p.mass, p.inertia, modes, self.shapes, integrals=self.integrals.coupled(coupling), com=p.com, **where
         )
         body.surface = self.surface
+        body.lost_turning = self.lost_turning
         body.origin = Origin(self, coupling, ratios)
         values, axes = np.linalg.eigh(p.inertia)
         if values[0] < SLENDER * values[1] and not (self.stiffened and coupling == "full"):
             body.long_axis = axes[:, 0].copy()
             body.spin_limit = SPIN_SHARE * 2 * np.pi * float(self.frequencies.min())
         return body
+
+    def seat_marker(
+        self,
+        body: ModalBody,
+        seat: str,
+        orientation: npt.ArrayLike | None = None,
+        *,
+        axis: npt.ArrayLike | None = None,
+        name: str | None = None,
+    ) -> ShapedMarker:
+        """Add a marker that moves with a seat, also where several seats are at one place, as hub and rim of a wheel.
+
+        Parameters
+        ----------
+        body : ModalBody
+            As `add_to` returned it.
+        seat : str
+        orientation, axis, name
+            As of :meth:`gearmbs.mechanism.Body.marker`.
+
+        Raises
+        ------
+        FlexibleError
+            If there is no such seat, or its rotation is not known.
+        """
+        place = self.place(seat)
+        chosen = self.seats[seat]
+        if not chosen.turns:
+            raise FlexibleError(f"{self.name}: seat '{seat}' has no rotation; take a seat of more nodes")
+        plain = body.marker(place, orientation, axis=axis, name=name or f"{body.name}.{seat}")  # type: ignore[arg-type]
+        body.markers.remove(plain)
+        marker = ShapedMarker(
+            plain.name, body, plain.position, plain.orientation, moved=chosen.moved, turned=chosen.turned
+        )
+        body.markers.append(marker)
+        return marker
 
     def modal_load(self, forces: Mapping[str | int, tuple[npt.ArrayLike, npt.ArrayLike]]) -> np.ndarray:
         """Return the load that forces and torques at seats and nodes are to the undeformed body.
@@ -323,7 +413,8 @@ class ModalModel:
         out = np.zeros(6 + self.modes)
         for where, (force, torque) in forces.items():
             place = self.place(where)
-            moved, turned = self.shapes(place)
+            seat = self.seats.get(where) if isinstance(where, str) else None
+            moved, turned = self.shapes(place) if seat is None or not seat.turns else (seat.moved, seat.turned)
             f, t = np.asarray(force, dtype=float), np.asarray(torque, dtype=float)
             out += np.concatenate([f, t + np.cross(place, f), moved @ f + turned @ t])
         return out

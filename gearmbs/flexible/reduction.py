@@ -132,6 +132,7 @@ def reduce_model(
                 stacklevel=3,
             )
         keep = keep[:whole]
+    exact = {} if preload is not None else static_flexibility(k, m, rigid, parts)
     if keep.size == 0:
         raise FlexibleError(
             f"{model.name}: no mode is below max_frequency = {limit} Hz; "
@@ -139,6 +140,8 @@ def reduce_model(
         )
     frequencies = np.sqrt(values[keep]) / (2 * np.pi)
     found = as_modal_model(model, parts, properties, frequencies, shapes[:, keep], name or model.name)
+    seats = {key: replace(seat, flexibility=exact.get(key)) for key, seat in found.seats.items()}
+    found = replace(found, seats=seats)
     return (
         found
         if spin_stiffness is None
@@ -345,6 +348,22 @@ def attachment_modes(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, constr
     # any solution of the singular system will do: rigid motions are taken out afterwards
     solve = _saddle(k, sp.csr_array(inertial.T / np.abs(inertial).max()))
     return np.column_stack([solve(balanced[:, c])[: k.shape[0]] for c in range(b)])
+
+
+def static_flexibility(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, parts: Resolved) -> dict[str, np.ndarray]:
+    """Return how each seat of the free body moves and turns by unit loads there, (6, 6); NaN where it does not."""
+    if not parts.places:
+        return {}
+    shapes = attachment_modes(k, m, rigid, parts.constraints)
+    inertial = m @ rigid
+    shapes = shapes - rigid @ np.linalg.solve(rigid.T @ inertial, inertial.T @ shapes)
+    whole = parts.constraints @ shapes
+    out = {}
+    for key, (_, rows) in parts.places.items():
+        six, there = np.full((6, 6), np.nan), rows >= 0
+        six[np.ix_(there, there)] = whole[np.ix_(rows[there], rows[there])]
+        out[key] = six
+    return out
 
 
 def orthonormal(

@@ -16,6 +16,7 @@ from gearmbs.dae.analyses.statics import StaticResult
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.modal import ModalBody
+from gearmbs.mechanism.seat_check import warn_of_stiff_seats
 from gearmbs.progress import waiting
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ def static_equilibrium(
         If joints have friction: it does not help to find the equilibrium.
     """
     _warn_of_friction(mechanism)
+    warn_of_stiff_seats(mechanism.joints, mechanism.elements)
     result = _statics.static_equilibrium(mechanism.compile(t), tol=tol, max_iterations=max_iterations)
     if move:
         place(mechanism, result)
@@ -126,6 +128,7 @@ def quasi_static(mechanism: Mechanism, t_eval: np.ndarray, *, tol: float = 1e-10
     if times.ndim != 1 or times.size == 0 or not np.all(np.isfinite(times)):
         raise ModelError("t_eval: give a sequence of finite times")
     _warn_of_friction(mechanism)
+    warn_of_stiff_seats(mechanism.joints, mechanism.elements)
     return _sequence.quasi_static(mechanism.compile(float(times[0])), times, tol=tol)
 
 
@@ -150,6 +153,7 @@ def linear_modes(mechanism: Mechanism, *, t: float = 0.0, at: StaticResult | str
     ModelError
         If the mechanism cannot be assembled, or a free motion has no inertia.
     """
+    warn_of_stiff_seats(mechanism.joints, mechanism.elements)
     if isinstance(at, str):
         if at not in ("initial", "equilibrium"):
             raise ModelError(f"at = {at!r}; choose 'initial', 'equilibrium' or give a StaticResult")

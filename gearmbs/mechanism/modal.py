@@ -274,6 +274,9 @@ class ModalBody(Body):
     surface : callable, optional
         Returns what is drawn of the body, with ``vertices``, ``triangles`` and ``moved`` as of
         :class:`gearmbs.flexible.BodySurface`, or None.
+    lost_turning : callable, optional
+        ``lost_turning(point, axis, turned)`` returns the seat there whose rotations these are, and the share that the
+        modes lack of its flexibility under a torque; :func:`simulate` warns of it.
     origin : Origin, optional
         What :meth:`gearmbs.flexible.ModalModel.add_to` made it of, for those who write it into files.
     """
@@ -286,6 +289,7 @@ class ModalBody(Body):
     long_axis: np.ndarray | None = None
     spin_limit: float = float("inf")
     surface: Callable[[], Any] | None = None
+    lost_turning: Callable[..., tuple[str, float]] | None = None
     origin: Any = None
 
     def shape_at(self, marker: Marker) -> tuple[np.ndarray, np.ndarray]:

@@ -21,6 +21,7 @@ from gearmbs.dae.results.stream import Stream
 from gearmbs.mechanism.locked import locking_remark
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
+from gearmbs.mechanism.seat_check import warn_of_stiff_seats
 from gearmbs.mechanism.spin_check import warn_of_spin
 from gearmbs.mechanism.stops import StopAt, stop_options, with_stops
 from gearmbs.mechanism.user_functions import raised_errors
@@ -146,6 +147,7 @@ def simulate(
     problem.advice = {**ADVICE, **(advice or {})}
     remark = " ".join(text for text in (locking_remark(mechanism, system), lumping if asked else "") if text)
     stream = None if consumer is None else Stream(system, problem, float(t_eval[-1]), consumer, members)
+    warn_of_stiff_seats(mechanism.joints, mechanism.elements)
     bar = time_bar(progress, mechanism.name, float(t_eval[0]), float(t_eval[-1]))
     with bar as report, raised_errors(mechanism.functions.values()):
         result = _integrated(name, problem, t_eval, every_step, stream, tol=tol, progress=report, **options)

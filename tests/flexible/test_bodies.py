@@ -1,10 +1,12 @@
 """Wheels, carriers and housings made of few dimensions."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 from gearmbs.bearings import Bearing, RollingBearing
-from gearmbs.flexible import FlexibleError, box_housing, planet_carrier, thin_rimmed_wheel
+from gearmbs.flexible import ElasticMaterial, FlexibleError, box_housing, planet_carrier, thin_rimmed_wheel
 from gearmbs.mechanism import Mechanism, static_equilibrium
 
 pytest.importorskip("skfem")
@@ -30,6 +32,51 @@ def test_a_wheel_has_the_mass_of_its_section_and_a_web_that_gives_way():
     # the rim tilts against the hub on its web: the stiffness of a plate grows like the third power, of the whole less
     ratio = thick.frequencies[0] / thin.frequencies[0]
     assert 1.5 < ratio < 3.0
+
+
+def test_hub_and_rim_of_a_wheel_are_seats_of_their_own():
+    """A torque between them twists hub, web and rim, each T / (4 pi G t) (1/a^2 - 1/b^2) between its radii a and b."""
+    steel = ElasticMaterial()
+    web = 0.018
+    wheel = thin_rimmed_wheel("20 mm", "40 mm", "90 mm", "100 mm", "20 mm", web, around=24)
+    m = Mechanism("wheel")
+    body = wheel.add_to(m)
+    bore = wheel.seat_marker(body, "bore")
+    m.fixed("shaft", bore, m.ground.marker())
+    rim = wheel.seat_marker(body, "rim")
+    m.load("teeth", rim, m.ground.marker(), rm=m.ground.marker(), tz=100.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = static_equilibrium(m).solution
+    radii, widths = np.array([0.01, 0.02, 0.045, 0.05]), np.array([0.02, web, 0.02])
+    exact = 100.0 / (4 * np.pi * steel.shear_modulus) * (-np.diff(radii**-2.0) / widths).sum()
+    assert found.deflection(rim)[1][0, 2] - found.deflection(bore)[1][0, 2] == pytest.approx(exact, rel=0.08)
+    with pytest.raises(FlexibleError, match=r"bore, rim are at one place.*seat_marker"):
+        wheel.shapes(wheel.place("rim"))
+    with pytest.raises(FlexibleError, match="no seat 'tooth'"):
+        wheel.seat_marker(body, "tooth")
+
+
+def test_a_carrier_is_twisted_by_its_planets():
+    """With the slowest modes alone it is rigid in torsion, and says so; all of the reduction have it."""
+    twist = {}
+    for modes in (12, None):
+        carrier = planet_carrier("30 mm", "120 mm", "12 mm", 3, "80 mm", "24 mm", modes=modes)
+        m = Mechanism("carrier")
+        body = carrier.add_to(m)
+        m.fixed("shaft", body.marker(carrier.place("bore")), m.ground.marker())
+        for k in range(3):
+            turn = 2 * np.pi * k / 3
+            pin = body.marker(carrier.place(f"pin {k + 1}"), name=f"pin {k + 1}")
+            m.load(f"push {k}", pin, m.ground.marker(), rm=m.ground.marker(), fx=float(-1000 * np.sin(turn)),
+                   fy=float(1000 * np.cos(turn)))  # fmt: skip
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            found = static_equilibrium(m).solution
+        assert any("seat 'bore'" in str(w.message) for w in caught) == (modes == 12)
+        twist[modes] = found.marker_position("pin 1")[0, 1]
+    assert twist[12] < 1e-3 * twist[None]
+    assert twist[None] > 1e-7
 
 
 def test_a_carrier_twists_by_its_pins_as_it_is_round():

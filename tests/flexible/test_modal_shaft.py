@@ -212,3 +212,9 @@ def test_steps_are_those_of_the_whole_matrix(torque, monkeypatch):
     whole = [steps(tol) for tol in tolerances]
     assert max(whole) < 300
     np.testing.assert_allclose(taken, whole, rtol=0.05)
+
+
+def test_an_unknown_level_of_coupling_is_refused_with_all_that_there_are():
+    model = Shaft([ShaftSection(1.0, 0.05)], seats={"A": 0.0, "B": 1.0}).modal_model(4)
+    with pytest.raises(FlexibleError, match=r"coupling = 'half'; choose one of full, partial, constant, rigid"):
+        model.add_to(Mechanism("m"), coupling="half")

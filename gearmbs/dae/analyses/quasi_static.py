@@ -8,7 +8,9 @@ import numpy as np
 
 from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution, Snapshot
 from gearmbs.dae.analyses.instant import Instant
-from gearmbs.dae.analyses.statics import Relaxation, static_equilibrium
+from gearmbs.dae.analyses.load_steps import equilibrium
+from gearmbs.dae.analyses.relaxation import Relaxation
+from gearmbs.dae.analyses.statics import static_equilibrium
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.results.solution import Solution
 
@@ -67,7 +69,7 @@ def quasi_static(system: System, times: np.ndarray, *, tol: float = 1e-10, max_i
                 # no equilibrium nearby: let it fall to the next one
                 instant.t = float(target)
                 try:
-                    iterations, _ = Relaxation(instant, tol).run(max_iterations)
+                    iterations, _ = equilibrium(Relaxation(instant, tol), max_iterations)
                 except ModelError as error:
                     raise type(error)(f"at t = {instant.t:.6g} s: {error}") from error
                 last = True
