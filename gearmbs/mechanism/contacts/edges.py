@@ -17,7 +17,7 @@ import numpy as np
 
 from gearmbs._jit import njit
 from gearmbs.mechanism.contacts import points as pt
-from gearmbs.mechanism.contacts.facets import LESS, brought, from_solid, half_lengths, seen_from, within
+from gearmbs.mechanism.contacts.facets import LESS, brought, from_solid, half_lengths, largest_depth, seen_from, within
 from gearmbs.mechanism.contacts.fields import HALF_SPACE
 from gearmbs.mechanism.contacts.loads import NORM
 from gearmbs.mechanism.contacts.patches import row_of
@@ -33,6 +33,8 @@ bears DEEPEST^(1/q), 0.95, of that of a vertex."""
 HALVINGS = 40
 RESOLVED = 1e-12
 """Interval at which a search ends, m, if not by so many halvings before."""
+SAME = 1e-15
+"""Distances, m, that are the same but for rounding."""
 STEEP = 0.03
 """Slope of the distance along an edge from which on it does not lie flat, and its nodes count for nothing."""
 VANISHED = 1e-6
@@ -80,8 +82,10 @@ def on_segment(p, q, part, solid, x, grad, hess, work):
 
 
 @njit(cache=True, error_model="numpy")
-def deepest(p, q, low, high, length, solid, x, grad, hess, work):
+def deepest(p, q, low, high, length, floor, solid, x, grad, hess, work):
     """Write the deepest point of a segment, with g as gradient; return its distance and whether it is no end.
+
+    Where it cannot be deeper than ``floor``, the distance is 1 and nothing is written.
 
     Parameters
     ----------
@@ -91,6 +95,8 @@ def deepest(p, q, low, high, length, solid, x, grad, hess, work):
         Parts of the segment between which to look.
     length : float
         Of the segment, m.
+    floor : float
+        Depth from which on points count, m.
     solid : tuple
     x, grad, hess : ndarray
         Out.
@@ -101,26 +107,34 @@ def deepest(p, q, low, high, length, solid, x, grad, hess, work):
     phi_high, slope_high = on_segment(p, q, high, solid, x, grad, hess, rest)
     for k in range(3):
         after[k] = grad[k]
-    phi, slope_low = on_segment(p, q, low, solid, x, grad, hess, rest)
+    phi_low, slope_low = on_segment(p, q, low, solid, x, grad, hess, rest)
     # no distance changes by more than the way
-    if phi + phi_high > (high - low) * length:
+    if phi_low + phi_high + 2.0 * floor > (high - low) * length:
         return 1.0, False
     if slope_low >= 0.0 or slope_high <= 0.0:
-        return min(phi, phi_high), False
+        return min(phi_low, phi_high), False
     for k in range(3):
         before[k] = grad[k]
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
+    for attempt in range(HALVINGS):
+        middle, bent = 0.5 * (low + high), -np.inf
+        if attempt % 2 == 0:
+            # where both tangents meet: between two plane faces the very place
+            middle = low + (phi_high - phi_low - slope_high * (high - low)) / (slope_low - slope_high)
+            middle = min(max(middle, low), high)
+            bent = phi_low + slope_low * (middle - low)
         phi, slope = on_segment(p, q, middle, solid, x, grad, hess, rest)
-        if phi > 0.5 * (high - low) * length:
-            return 1.0, False
+        if abs(phi - bent) < SAME:
+            high = middle
+            break
         side = before if slope < 0.0 else after
         for k in range(3):
             side[k] = grad[k]
         if slope < 0.0:
-            low, slope_low = middle, slope
+            low, slope_low, phi_low = middle, slope, phi
         else:
-            high, slope_high = middle, slope
+            high, slope_high, phi_high = middle, slope, phi
+        if phi_low + phi_high + 2.0 * floor > (high - low) * length:
+            return 1.0, False
         if (high - low) * length < RESOLVED:
             break
     phi, _ = on_segment(p, q, high, solid, x, grad, hess, rest)
@@ -140,35 +154,36 @@ def beside(p, q, move):
 
 
 @njit(cache=True, error_model="numpy")
-def _clear(p, q, length, solid, anchor, x, grad, hess, work):
-    """Return whether a segment is outside a solid, by its middle or a point before it that is farther off.
+def _clear(p, q, low, high, length, floor, solid, anchor, x, grad, hess, work):
+    """Return whether part of a segment is less than ``floor`` below a surface, by its middle or a point farther off.
 
     Parameters
     ----------
     p, q : ndarray
         Ends, in the solid's frame, m.
-    length : float
-        m.
+    low, high, length, floor : float
+        As of `deepest`.
     solid : tuple
     anchor : ndarray, shape (4,)
         In and out: a point and how far it is outside.
     x, grad, hess, work : ndarray
         As of `on_segment`.
     """
+    middle, reach = 0.5 * (low + high), 0.5 * (high - low) * length
     for k in range(3):
-        x[k] = 0.5 * (p[k] + q[k])
-    if within(x, anchor, 0.5 * length):
+        x[k] = p[k] + middle * (q[k] - p[k])
+    if within(x, anchor, reach - floor):
         return True
-    phi, _ = on_segment(p, q, 0.5, solid, x, grad, hess, work)
+    phi, _ = on_segment(p, q, middle, solid, x, grad, hess, work)
     if phi > 0.0:
         for k in range(3):
             anchor[k] = x[k]
         anchor[3] = phi
-    return phi * LESS > 0.5 * length
+    return (phi + floor) * LESS > reach
 
 
 @njit(cache=True, error_model="numpy")
-def edges_below(rows, count, swapped, edges, solid_a, solid_b, work):
+def edges_below(rows, count, swapped, edges, solid_a, solid_b, bearing, work):
     """Write points of edges of solid a that lie below the surface of solid b; return how many rows there are then.
 
     Parameters
@@ -178,6 +193,7 @@ def edges_below(rows, count, swapped, edges, solid_a, solid_b, work):
     count, swapped : int
     edges : ndarray of int, shape (EDGE edges,)
     solid_a, solid_b : tuple
+    bearing : float
         As of `gearmbs.mechanism.contacts.facets.vertices_below`.
     work : ndarray, shape (80,)
     """
@@ -189,6 +205,7 @@ def edges_below(rows, count, swapped, edges, solid_a, solid_b, work):
     p, q, along, x, grad, hess = work[21:24], work[24:27], work[27:30], work[30:33], work[33:36], work[36:45]
     before, after, anchor = work[45:48], work[48:51], work[65:69]
     anchor[3] = 0.0
+    floor = bearing * largest_depth(rows, count)
     for e in range(0, edges.size, EDGE):
         one, other = places[3 * edges[e] : 3 * edges[e] + 3], places[3 * edges[e + 1] : 3 * edges[e + 1] + 3]
         if beside(one, other, move):
@@ -201,22 +218,29 @@ def edges_below(rows, count, swapped, edges, solid_a, solid_b, work):
         for k in range(3):
             along[k] = q[k] - p[k]
         length = np.sqrt(dot(along, along))
-        if _clear(p, q, length, solid_b, anchor, x, grad, hess, work[45:59]):
+        if _clear(p, q, low, high, length, floor, solid_b, anchor, x, grad, hess, work[45:59]):
             continue
-        phi, is_within = deepest(p, q, low, high, length, solid_b, x, grad, hess, work[45:65])
+        phi, is_within = deepest(p, q, low, high, length, floor, solid_b, x, grad, hess, work[45:65])
         if phi >= 0.0:
             continue
+        between, least = (high - low) * length / NODES, -np.inf
         for k in range(-1, NODES):
             gain, weight = 1.0, 0.0
             if k >= 0:
+                least -= between
+                if k > 0 and least > -floor:
+                    # too near the node before to be so deep
+                    continue
                 part = low + (high - low) * (k + 0.5) / NODES
                 phi, slope = on_segment(p, q, part, solid_b, x, grad, hess, work[45:59])
+                least = phi
                 weight = _lies_flat(along, hess, slope / length, (high - low) * length, phi)
             elif is_within:
                 gain = np.sqrt(dot(grad, grad))
                 weight = DEEPEST if gain > VANISHED else 0.0
-            if weight == 0.0 or count == rows.shape[0]:
+            if weight == 0.0 or -phi < floor or count == rows.shape[0]:
                 continue
+            floor = max(floor, -bearing * phi)
             row = rows[count]
             row[pt.POOL], row[pt.WEIGHT], row[pt.SWAPPED] = rows.shape[0] + count, weight, swapped
             row[pt.FACES], row[pt.FACES + 1], row[pt.VERTEX] = edges[e + 2], edges[e + 3], e

@@ -1,6 +1,7 @@
 """Where faceted solids touch: vertices of one below the surface of the other.
 
-Most vertices are known to be outside without their distance. They are passed over in blocks whose box is beside that of
+Points that bear no load need not be found: those less deep than `BEARING` of the deepest so far. Most vertices are
+known to be outside, or less deep, without their distance. They are passed over in blocks whose box is beside that of
 the other solid, and where a point nearby is farther from it than from them: a distance changes by no more than its
 point moves.
 """
@@ -84,8 +85,8 @@ def from_solid(solid, x, grad, hess, work):
 
 
 @njit(cache=True, error_model="numpy")
-def block_clear(solid, block, move, anchor, work):
-    """Return whether a block of vertices is outside the solid whose place in their frame ``move`` is.
+def block_clear(solid, block, move, anchor, floor, work):
+    """Return whether all of a block of vertices is less than ``floor`` below the solid whose place ``move`` is.
 
     Parameters
     ----------
@@ -96,6 +97,8 @@ def block_clear(solid, block, move, anchor, work):
     move : ndarray, shape (18,)
     anchor : ndarray, shape (4,)
         In and out: a point and how far it is outside.
+    floor : float
+        Depth, m, below which a point bears nothing; 0 if all below the surface are asked for.
     work : ndarray, shape (35,)
     """
     for q in range(3):
@@ -108,14 +111,14 @@ def block_clear(solid, block, move, anchor, work):
         square += (block[3 + q] - middle[q]) ** 2
     radius = np.sqrt(square)
     brought(move, middle, local)
-    if within(local, anchor, radius):
+    if within(local, anchor, radius - floor):
         return True
     phi = from_solid(solid, local, work[6:9], work[9:18], work[18:32])
     if phi > 0.0:
         for q in range(3):
             anchor[q] = local[q]
         anchor[3] = phi
-    return phi * LESS > radius
+    return (phi + floor) * LESS > radius
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -128,7 +131,7 @@ def within(x, anchor, radius):
 
 
 @njit(cache=True, error_model="numpy")
-def vertices_below(rows, count, first, swapped, solid_a, solid_b, work):
+def vertices_below(rows, count, first, swapped, solid_a, solid_b, bearing, work):
     """Write the vertices of solid a that lie below the surface of solid b; return how many rows there are then.
 
     Parameters
@@ -139,6 +142,8 @@ def vertices_below(rows, count, first, swapped, solid_a, solid_b, work):
         Rows that are there, what to add to numbers of vertices.
     solid_a, solid_b : tuple
         Kind, sizes, pose, vertices, weights, triangles, boxes of vertices, of triangles, and of these of each.
+    bearing : float
+        Part of the largest depth of all rows below which points may be left out; 0 for none.
     work : ndarray, shape (75,)
     """
     pose_a, places, weights, boxes = solid_a[2], solid_a[3], solid_a[4], solid_a[6]
@@ -152,14 +157,15 @@ def vertices_below(rows, count, first, swapped, solid_a, solid_b, work):
         return count
     for q in range(3):
         anchor[q] = move[9 + q]
+    floor = bearing * largest_depth(rows, count)
     for block in range(boxes.size // 6):
-        if block_clear(solid_b, boxes[6 * block : 6 * block + 6], move, anchor, work[0:35]):
+        if block_clear(solid_b, boxes[6 * block : 6 * block + 6], move, anchor, floor, work[0:35]):
             continue
         for v in range(BLOCK * block, min(BLOCK * (block + 1), weights.size)):
             brought(move, places[3 * v : 3 * v + 3], local)
             if abs(local[0]) > half[0] or abs(local[1]) > half[1] or abs(local[2]) > half[2]:
                 continue
-            if within(local, anchor, 0.0):
+            if within(local, anchor, -floor):
                 continue
             phi = from_solid(solid_b, local, grad, hess, work[0:14])
             if phi >= 0.0:
@@ -167,6 +173,9 @@ def vertices_below(rows, count, first, swapped, solid_a, solid_b, work):
                     anchor[q] = local[q]
                 anchor[3] = phi
                 continue
+            if -phi < floor:
+                continue
+            floor = max(floor, -bearing * phi)
             row = rows[count]
             count += 1
             to_global(pose_a, places[3 * v : 3 * v + 3], row[pt.VERTEX_PLACE : pt.VERTEX_PLACE + 3])
@@ -184,12 +193,19 @@ def vertices_below(rows, count, first, swapped, solid_a, solid_b, work):
     return count
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def largest_depth(rows, count):
+    """Return the largest depth of points."""
+    deepest = 0.0
+    for k in range(count):
+        deepest = max(deepest, rows[k, pt.DEPTH])
+    return deepest
+
+
 @njit(cache=True, error_model="numpy")
 def without_idle(rows, count):
     """Move the points that bear a load to the first rows; return how many there are."""
-    deepest, kept = 0.0, 0
-    for k in range(count):
-        deepest = max(deepest, rows[k, pt.DEPTH])
+    deepest, kept = largest_depth(rows, count), 0
     for k in range(count):
         if rows[k, pt.DEPTH] < BEARING * deepest:
             continue

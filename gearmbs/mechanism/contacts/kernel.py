@@ -15,7 +15,7 @@ from gearmbs.mechanism.contacts import points as pt
 from gearmbs.mechanism.contacts.boxes import SCRATCH, two_boxes
 from gearmbs.mechanism.contacts.edges import EDGE, edges_below, label_edges
 from gearmbs.mechanism.contacts.facet_moves import moved_with
-from gearmbs.mechanism.contacts.facets import vertices_below, without_idle
+from gearmbs.mechanism.contacts.facets import BEARING, vertices_below, without_idle
 from gearmbs.mechanism.contacts.fields import BOX, MESH, distance
 from gearmbs.mechanism.contacts.loads import LAW_REALS, press, share_out
 from gearmbs.mechanism.contacts.meshes import BLOCK
@@ -94,12 +94,13 @@ def points_of(ints, reals, at, frames, rows, derivatives, labelled, work):
         if far_from(ints[a], sizes_a, pose_a, pose_b[9:12], sizes_b[3], scratch):
             return 0
         of_a, of_b = faceted(ints, reals, a, sizes_a, pose_a), faceted(ints, reals, b, sizes_b, pose_b)
-        middle = vertices_below(rows, 0, 0, 0, of_a, of_b, scratch)
-        vertices = vertices_below(rows, middle, ints[a + 2], 1, of_b, of_a, scratch)
+        bearing = 0.0 if labelled else BEARING
+        middle = vertices_below(rows, 0, 0, 0, of_a, of_b, bearing, scratch)
+        vertices = vertices_below(rows, middle, ints[a + 2], 1, of_b, of_a, bearing, scratch)
         edges_a = vector_at(ints, ints[a + 7], EDGE * ints[a + 6])
         edges_b = vector_at(ints, ints[b + 7], EDGE * ints[b + 6])
-        own = edges_below(rows, vertices, 0, edges_a, of_a, of_b, scratch)
-        count = edges_below(rows, own, 1, edges_b, of_b, of_a, scratch)
+        own = edges_below(rows, vertices, 0, edges_a, of_a, of_b, bearing, scratch)
+        count = edges_below(rows, own, 1, edges_b, of_b, of_a, bearing, scratch)
         if labelled:
             label_patches(rows, 0, middle, 0, of_a[5])
             label_patches(rows, middle, vertices, ints[a + 2], of_b[5])

@@ -14,18 +14,25 @@ BLOCK = 16
 space."""
 
 
-@njit(cache=True, error_model="numpy")
-def nearest_of_triangle(x, a, b, c, out):
-    """Write the nearest point of a triangle; return on which feature it lies."""
-    d1 = d2 = d3 = d4 = d5 = d6 = 0.0
-    for q in range(3):
-        ab, ac = b[q] - a[q], c[q] - a[q]
-        d1 += ab * (x[q] - a[q])
-        d2 += ac * (x[q] - a[q])
-        d3 += ab * (x[q] - b[q])
-        d4 += ac * (x[q] - b[q])
-        d5 += ab * (x[q] - c[q])
-        d6 += ac * (x[q] - c[q])
+@njit(cache=True, error_model="numpy", forceinline=True)
+def nearest_of_triangle(x, places, a, b, c, out):
+    """Write the nearest point of a triangle; return on which feature it lies.
+
+    Parameters
+    ----------
+    x : ndarray, shape (3,)
+    places : ndarray
+    a, b, c : int
+        Where the coordinates of the corners begin in ``places``.
+    out : ndarray, shape (3,)
+    """
+    ax, ay, az = places[a], places[a + 1], places[a + 2]
+    bx, by, bz = places[b] - ax, places[b + 1] - ay, places[b + 2] - az
+    cx, cy, cz = places[c] - ax, places[c + 1] - ay, places[c + 2] - az
+    px, py, pz = x[0] - ax, x[1] - ay, x[2] - az
+    d1, d2 = bx * px + by * py + bz * pz, cx * px + cy * py + cz * pz
+    bb, bc, cc = bx * bx + by * by + bz * bz, bx * cx + by * cy + bz * cz, cx * cx + cy * cy + cz * cz
+    d3, d4, d5, d6 = d1 - bb, d2 - bc, d1 - bc, d2 - cc
     va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
     feature = FACE
     if d1 <= 0.0 and d2 <= 0.0:
@@ -44,8 +51,7 @@ def nearest_of_triangle(x, a, b, c, out):
     else:
         total = max(va + vb + vc, TINY)
         v, w = vb / total, vc / total
-    for q in range(3):
-        out[q] = a[q] + v * (b[q] - a[q]) + w * (c[q] - a[q])
+    out[0], out[1], out[2] = ax + v * bx + w * cx, ay + v * by + w * cy, az + v * bz + w * cz
     return feature
 
 
@@ -88,13 +94,13 @@ def nearest_in_block(x, places, triangles, block, best, straight, found):
     """
     near, normal = found[8:11], found[11:14]
     for k in range(3 * BLOCK * block, min(3 * BLOCK * (block + 1), triangles.size), 3):
-        a = places[3 * triangles[k] : 3 * triangles[k] + 3]
-        b = places[3 * triangles[k + 1] : 3 * triangles[k + 1] + 3]
-        c = places[3 * triangles[k + 2] : 3 * triangles[k + 2] + 3]
-        kind = nearest_of_triangle(x, a, b, c, near)
+        kind = nearest_of_triangle(x, places, 3 * triangles[k], 3 * triangles[k + 1], 3 * triangles[k + 2], near)
         square = (x[0] - near[0]) ** 2 + (x[1] - near[1]) ** 2 + (x[2] - near[2]) ** 2
         if square > best * (1.0 + 1e-12):
             continue
+        a = places[3 * triangles[k] : 3 * triangles[k] + 3]
+        b = places[3 * triangles[k + 1] : 3 * triangles[k + 1] + 3]
+        c = places[3 * triangles[k + 2] : 3 * triangles[k + 2] + 3]
         for q in range(3):
             q1, q2 = (q + 1) % 3, (q + 2) % 3
             normal[q] = (b[q1] - a[q1]) * (c[q2] - a[q2]) - (b[q2] - a[q2]) * (c[q1] - a[q1])
