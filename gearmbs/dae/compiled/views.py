@@ -69,3 +69,9 @@ def uncounted(array):
     view must not outlive the array.
     """
     return vector_at(array, 0, array.size)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def uncounted_rows(table):
+    """Return a view of a whole matrix without its reference count, as `uncounted` of a vector."""
+    return matrix_at(table, 0, table.shape[0], table.shape[1])

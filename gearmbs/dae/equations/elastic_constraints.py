@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.views import uncounted, uncounted_rows
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3, dot3
 from gearmbs.dae.equations.elastic_coordinates import (
@@ -82,6 +83,8 @@ def put_row(
     y, at, partial : ndarray
         Unknowns, their places, the frames' partial derivatives.
     """
+    slot, vals, y, partial, at = uncounted(slot), uncounted(vals), uncounted(y), uncounted(partial), uncounted_rows(at)
+    g, g_t, hess = uncounted(g), uncounted(g_t), uncounted(hess)
     total = 0
     for a in range(n_frames):
         total += coordinates(frames[a], at)
@@ -92,11 +95,11 @@ def put_row(
         b = frames[a]
         if linear == 3 and is_elastic(b, at):
             k = put_linear_side(
-                mode, slot, vals, k, b, g, g_t, 6 * a, coef, row, lam, mu, factor, rate_rows, at, partial
+                mode, slot, vals, k, b, g, g_t, 6 * a, coef, row[0], row[1], lam, mu, factor, rate_rows, at, partial
             )  # fmt: skip
             continue
         for i in range(coordinates(b, at)):
-            # the gradient of a sum of linear sides is a unit vector for good
+            # the gradient of a sum of linear sides is constant
             if is_idle(b, i, (linear >> a) & 1 == 1, at, partial) or (linear == 3 and i < 3 and g[6 * a + i] == 0.0):
                 continue
             side[count], own[count] = a, i
@@ -138,7 +141,9 @@ def put_seconds(
     rates : ndarray, shape (m,)
         Derivatives of the row's rate by the coordinates; changed.
     """
-    s = np.empty(3)
+    slot, vals, y, partial, at = uncounted(slot), uncounted(vals), uncounted(y), uncounted(partial), uncounted_rows(at)
+    g, side, own, rates = uncounted(g), uncounted(side), uncounted(own), uncounted(rates)
+    along, left, s = uncounted_rows(along), uncounted_rows(left), np.empty(3)
     for p in range(side.size):
         b, i = frames[side[p]], own[p]
         force, position, speed = place(b, i, FORCE, at), place(b, i, POSITION, at), y[place(b, i, VELOCITY, at)]
@@ -167,10 +172,12 @@ def put_seconds(
 
 
 @njit(cache=True, error_model="numpy")
-def put_linear_side(mode, slot, vals, k, b, g, g_t, first, coef, row, lam, mu, factor, rate_rows, at, partial):
+def put_linear_side(
+    mode, slot, vals, k, b, g, g_t, first, coef, row_lam, row_mu, lam, mu, factor, rate_rows, at, partial
+):
     """Hand over what elastic frame b gives to a row that is a sum of sides linear in displacements; see `put_row`.
 
-    With g the constant gradient, the second derivatives are g . (X_lo x P_hi) = (g x X_lo) . P_hi, of angles with
+    With g the constant gradient, the second derivatives are g . (X_lo x P_hi) = X_lo . (P_hi x g), of angles with
     angles or modes, and the derivatives of the rate are g . dV.
 
     Parameters
@@ -179,13 +186,14 @@ def put_linear_side(mode, slot, vals, k, b, g, g_t, first, coef, row, lam, mu, f
         The frame.
     first : int
         Where its part of the gradients ``g`` and ``g_t`` begins.
+    row_lam, row_mu : int
+        Places of lambda and mu in y.
     """
-    turned = np.empty(9)
+    slot, vals, partial, at = uncounted(slot), uncounted(vals), uncounted(partial), uncounted_rows(at)
     d = partials(b, at, partial)
-    for c in range(3):
-        cross3(g, first, d[c], DX, turned, 3 * c)
+    gx, gy, gz = g[first], g[first + 1], g[first + 2]
     for i in range(coordinates(b, at)):
-        # the gradient is a unit vector for good
+        # the gradient is constant
         if is_idle(b, i, True, at, partial) or (i < 3 and g[first + i] == 0.0):
             continue
         force, position = place(b, i, FORCE, at), place(b, i, POSITION, at)
@@ -195,14 +203,20 @@ def put_linear_side(mode, slot, vals, k, b, g, g_t, first, coef, row, lam, mu, f
         else:
             rate = dot3(g, first, d[i - 3], DV) + dot6(g_t, first, d[i - 3], DP)
         slope, rate = coef * slope, coef * rate
-        k = put(mode, slot, vals, k, row[0], position, slope)
-        k = put(mode, slot, vals, k, force, row[0], factor * slope)
+        k = put(mode, slot, vals, k, row_lam, position, slope)
+        k = put(mode, slot, vals, k, force, row_lam, factor * slope)
         if rate_rows:
-            k = put(mode, slot, vals, k, position, row[1], -factor * slope)
-            k = put(mode, slot, vals, k, row[1], place(b, i, VELOCITY, at), slope)
-            k = put(mode, slot, vals, k, row[1], position, rate)
+            k = put(mode, slot, vals, k, position, row_mu, -factor * slope)
+            k = put(mode, slot, vals, k, row_mu, place(b, i, VELOCITY, at), slope)
+            k = put(mode, slot, vals, k, row_mu, position, rate)
+        if i < 3:
+            continue
+        # P x g
+        p = d[i - 3]
+        x, y_, z = p[DP + 1] * gz - p[DP + 2] * gy, p[DP + 2] * gx - p[DP] * gz, p[DP] * gy - p[DP + 1] * gx
         for j in range(3, min(i + 1, 6)):
-            value = coef * dot3(turned, 3 * (j - 3), d[i - 3], DP)
+            a = d[j - 3]
+            value = coef * (a[DX] * x + a[DX + 1] * y_ + a[DX + 2] * z)
             other_force, other = place(b, j, FORCE, at), place(b, j, POSITION, at)
             k = put(mode, slot, vals, k, other_force, position, lam * value)
             if rate_rows:

@@ -101,20 +101,6 @@ def turns(d):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def turns_axis_of(x, y):
-    """Return whether one mode turns an axis of rotation of another, given their rows of the partial derivatives."""
-    return (x[PSI] != 0.0 and (y[PSI + 1] != 0.0 or y[PSI + 2] != 0.0)) or (x[PSI + 1] != 0.0 and y[PSI + 2] != 0.0)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def axis_change(b, x, y, g, k, at, partial):
-    """Return g . dX/dq, g in ``g[k:k+3]``: the axis of the mode with row ``y`` changed by the mode with row ``x``."""
-    pairs = tail_of(b, at) + PAIRS
-    total = x[PSI] * y[PSI + 1] * dot3(g, k, partial, pairs) + x[PSI] * y[PSI + 2] * dot3(g, k, partial, pairs + 3)
-    return total + x[PSI + 1] * y[PSI + 2] * dot3(g, k, partial, pairs + 6)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
 def is_idle(b, i, blind, at, partial):
     """Return whether coordinate i of a frame's body is a mode that does not move the frame, and if not blind turns it.
 

@@ -6,20 +6,18 @@ import numpy as np
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.lanes import LANES, lanes_at, put_lanes
-from gearmbs.dae.compiled.views import vector_at
+from gearmbs.dae.compiled.views import uncounted, uncounted_rows, vector_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3, dot3
 from gearmbs.dae.equations.elastic_coordinates import (
     FORCE,
     POSITION,
     VELOCITY,
-    axis_change,
     coordinates,
     is_idle,
     place,
-    turns_axis_of,
 )
-from gearmbs.dae.equations.elastic_frames import AXES, DP, DV, DW, DX, is_elastic, partials, tail_of
+from gearmbs.dae.equations.elastic_frames import AXES, DP, DV, DW, DX, PAIRS, PSI, is_elastic, partials, tail_of
 from gearmbs.dae.equations.elastic_shapes import shapes_of
 from gearmbs.dae.equations.entries import put
 from gearmbs.dae.equations.modal_inertia import to_body
@@ -156,17 +154,18 @@ def put_load(mode, slot, vals, k, f, sign, force, torque, point, s, at, marker_b
     s : ndarray
         Arm, force and moment of `wrench_at`, then scratch: 18 places.
     """
+    slot, vals, s, partial = uncounted(slot), uncounted(vals), uncounted(s), uncounted(partial)
+    at, kin, frame = uncounted_rows(at), uncounted_rows(kin), uncounted_rows(frame)
     d = partials(f, at, partial)
     owner = marker_body[point]
-    for i in range(coordinates(f, at)):
+    for i in range(3):
+        if force >= 0:
+            k = put(mode, slot, vals, k, place(f, i, FORCE, at), force + i, -sign)
+    for c in range(3 + at[f, T.AT_MODES]):
+        i = c + 3
         row = place(f, i, FORCE, at)
         if is_idle(f, i, False, at, partial):
             continue
-        if i < 3:
-            if force >= 0:
-                k = put(mode, slot, vals, k, row, force + i, -sign)
-            continue
-        c = i - 3
         # P_c . F + X_c . (r x F + N): by F it is P_c + X_c x r, by the arm r it is F x X_c
         cross3(d[c], DX, s, 0, s, 9)
         for m in range(3):
@@ -174,27 +173,57 @@ def put_load(mode, slot, vals, k, f, sign, force, torque, point, s, at, marker_b
                 k = put(mode, slot, vals, k, row, force + m, -sign * (d[c, DP + m] + s[9 + m]))
             if torque >= 0:
                 k = put(mode, slot, vals, k, row, torque + m, -sign * d[c, DX + m])
-        for j in range(3, coordinates(f, at)):
-            e = j - 3
-            if is_idle(f, j, False, at, partial):
-                continue
-            value = 0.0
-            if min(c, e) >= 3:
-                # displacements are linear
-                if not turns_axis_of(d[e], d[c]):
-                    continue
-                value = axis_change(f, d[e], d[c], s, 6, at, partial)
-            else:
-                cross3(d[min(c, e)], DX, d[max(c, e)], DP, s, 12)
-                value = dot3(s, 12, s, 3)
-                if e < c:
-                    cross3(d[e], DX, d[c], DX, s, 12)
-                    value += dot3(s, 12, s, 6)
-            k = put(mode, slot, vals, k, row, place(f, j, POSITION, at), -value)
+        k = put_turned(mode, slot, vals, k, f, c, s, at, partial)
         if force >= 0 and owner != f:
             cross3(s, 3, d[c], DX, s, 9)
             k = put_arm(mode, slot, vals, k, row, f, point, s, 1.0, at, marker_body, kin, frame, partial, True)
             k = put_arm(mode, slot, vals, k, row, owner, point, s, -1.0, at, marker_body, kin, frame, partial, False)
+    return k
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def put_turned(mode, slot, vals, k, f, c, s, at, partial):
+    """Hand over the entries by which a load on frame f changes as coordinates turn what it acts along.
+
+    Of two angles all, of an angle and mode c both, of two modes those of mode c, whose axis the others turn. With the
+    coordinate that comes first an angle these are (X_lo x P_hi) . F, and by it (X_lo x X_hi) . M besides.
+
+    Parameters
+    ----------
+    c : int
+        Angle or mode: row of the partial derivatives.
+    s : ndarray
+        Force and moment in ``s[3:9]``, then scratch: 15 places.
+    """
+    d = partials(f, at, partial)
+    row = place(f, c + 3, FORCE, at)
+    if c < 3:
+        for e in range(3):
+            cross3(d[min(c, e)], DX, d[max(c, e)], DP, s, 9)
+            value = dot3(s, 9, s, 3)
+            if e < c:
+                cross3(d[e], DX, d[c], DX, s, 9)
+                value += dot3(s, 9, s, 6)
+            k = put(mode, slot, vals, k, row, place(f, e + 3, POSITION, at), -value)
+        return k
+    position = place(f, c + 3, POSITION, at)
+    cross3(d[c], DP, s, 3, s, 9)
+    cross3(d[c], DX, s, 6, s, 12)
+    for e in range(3):
+        along, about = dot3(d[e], DX, s, 9), dot3(d[e], DX, s, 12)
+        k = put(mode, slot, vals, k, row, place(f, e + 3, POSITION, at), -(along + about))
+        k = put(mode, slot, vals, k, place(f, e + 3, FORCE, at), position, -along)
+    own = d[c]
+    if own[PSI + 1] == 0.0 and own[PSI + 2] == 0.0:
+        return k
+    # displacements are linear; a rotation about x turns the axes of those about y and z, one about y that of z
+    pairs, first = tail_of(f, at) + PAIRS, place(f, 6, POSITION, at)
+    by_x = own[PSI + 1] * dot3(s, 6, partial, pairs) + own[PSI + 2] * dot3(s, 6, partial, pairs + 3)
+    by_y = own[PSI + 2] * dot3(s, 6, partial, pairs + 6)
+    for e in range(at[f, T.AT_MODES]):
+        x, y = d[3 + e, PSI], d[3 + e, PSI + 1]
+        if x != 0.0 or (y != 0.0 and own[PSI + 2] != 0.0):
+            k = put(mode, slot, vals, k, row, first + e, -(x * by_x + y * by_y))
     return k
 
 
@@ -215,20 +244,28 @@ def put_arm(mode, slot, vals, k, row, b, point, s, sign, at, marker_body, kin, f
     s : ndarray
         Scratch from the 13th place on.
     """
-    for i in range(coordinates(b, at)):
-        if i < 3:
-            value = s[9 + i]
-        elif is_idle(b, i, True, at, partial):
+    if b == 0:
+        return k
+    slot, vals, s, partial, at = uncounted(slot), uncounted(vals), uncounted(s), uncounted(partial), uncounted_rows(at)
+    # copied out, or they would be read anew after each number that is written
+    x, y, z = sign * s[9], sign * s[10], sign * s[11]
+    position, turn = at[b, T.AT_R], at[b, T.AT_THETA]
+    k = put(mode, slot, vals, k, row, position, x)
+    k = put(mode, slot, vals, k, row, position + 1, y)
+    k = put(mode, slot, vals, k, row, position + 2, z)
+    if not is_elastic(b, at):
+        for c in range(0 if to_origin else 3):
+            cross3(kin[b], KIN_AXES + 3 * c, frame[point], T.MK_ARM, s, 12)
+            k = put(mode, slot, vals, k, row, turn + c, x * s[12] + y * s[13] + z * s[14])
+        return k
+    # markers of a modal body are at the origins of their frames
+    d, first = partials(b, at, partial), at[b, T.AT_QF]
+    for c in range(d.shape[0]):
+        p = d[c]
+        if c >= 3 and is_idle(b, c + 3, True, at, partial):
             continue
-        elif is_elastic(b, at):
-            # markers of a modal body are at the origins of their frames
-            value = dot3(s, 9, partials(b, at, partial)[i - 3], DP)
-        elif to_origin:
-            continue
-        else:
-            cross3(kin[b], KIN_AXES + 3 * (i - 3), frame[point], T.MK_ARM, s, 12)
-            value = dot3(s, 9, s, 12)
-        k = put(mode, slot, vals, k, row, place(b, i, POSITION, at), sign * value)
+        value = x * p[DP] + y * p[DP + 1] + z * p[DP + 2]
+        k = put(mode, slot, vals, k, row, turn + c if c < 3 else first + c - 3, value)
     return k
 
 
@@ -245,6 +282,7 @@ def put_chain(mode, slot, vals, k, row, f, d, col, sign, at, kin, partial):
     sign : float
         Factor of ``d``.
     """
+    slot, vals, d, partial, at = uncounted(slot), uncounted(vals), uncounted(d), uncounted(partial), uncounted_rows(at)
     for c in range(3):
         k = put(mode, slot, vals, k, row, at[f, T.AT_R] + c, sign * d[col + c])
         k = put(mode, slot, vals, k, row, at[f, T.AT_U] + c, sign * d[col + 6 + c])

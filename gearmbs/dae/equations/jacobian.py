@@ -110,7 +110,8 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
             tab.scratch[S_PRODUCT + l] = y[tab.at[b, T.AT_EPS] + l]
         k = body_entries(mode, b, cj, tab, slot, vals, k)
         if tab.at[b, T.AT_MODES] > 0:
-            k = modal_body_entries(mode, cj, y, tab.at[b], tab.modal, tab.partial, tab.kin[b], slot, vals, k)
+            s = vector_at(tab.scratch, S_TERM, 30)
+            k = modal_body_entries(mode, cj, y, tab.at[b], tab.modal, tab.partial, tab.kin[b], s, slot, vals, k)
     for r in range(idata[T.H_ROWS]):
         k = row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k)
         if tab.row[r, T.ROW_TAPE] >= 0:
@@ -121,9 +122,9 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
             k = load_entries(mode, tab.marker_body[row[T.FORCE_I]], 1.0, row, y, tab, slot, vals, k)
             k = load_entries(mode, tab.marker_body[row[T.FORCE_J]], -1.0, row, y, tab, slot, vals, k)
         k = element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k)
-    for s in range(idata[T.H_STATES]):
-        if tab.state[s, T.STATE_TAPE] >= 0:
-            k = state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k)
+    for z in range(idata[T.H_STATES]):
+        if tab.state[z, T.STATE_TAPE] >= 0:
+            k = state_entries(mode, t, z, y, cj, idata, tab, slot, vals, k)
     if mode == COUNT:
         vals[0] = k
 

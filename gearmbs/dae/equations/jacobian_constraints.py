@@ -10,7 +10,7 @@ from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_hessians import HESSIAN_BLOCKS, hessian
-from gearmbs.dae.equations.elastic_constraints import put_row
+from gearmbs.dae.equations.elastic_constraints import put_linear_side, put_row
 from gearmbs.dae.equations.elastic_frames import is_elastic, touches_elastic
 from gearmbs.dae.equations.entries import put
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_HESSIAN, S_TERM, S_VECTOR
@@ -22,6 +22,15 @@ from gearmbs.dae.equations.update import euler_component
 def linear_sides(kind):
     """Return on which sides (1: I, 2: J) a term is linear in the displacement and blind to the rotation of a frame."""
     return 3 if kind == terms.POINT else 1 if kind == terms.DOT2 else 0
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def is_linear(term, marker_body, bodies):
+    """Return whether a term is a sum of elastic frames' displacements times constants: axes on the ground stay."""
+    i, j = marker_body[term[T.TERM_I]], marker_body[term[T.TERM_J]]
+    if term[T.TERM_TYPE] == terms.DOT2:
+        return j == 0
+    return term[T.TERM_TYPE] == terms.POINT and (i == 0 or i >= bodies) and (j == 0 or j >= bodies)
 
 
 @njit(cache=True, error_model="numpy")
@@ -191,8 +200,18 @@ def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
     for j in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
         coef = tab.coef[j]
         terms.gradient(j, tab.term, tab.fval, tab.reference, tab.marker_body, tab.kin, tab.frame, s, g, gt)
+        elastic = frames_are_elastic and touches_elastic(tab.term[j], tab.marker_body, tab.code.size)
+        if elastic and is_linear(tab.term[j], tab.marker_body, tab.code.size):
+            for side in range(2):
+                b = tab.marker_body[tab.term[j, T.TERM_I + side]]
+                if b > 0:
+                    k = put_linear_side(
+                        mode, slot, vals, k, b, g, gt, 6 * side, coef, lam, mu, lam_value, mu_value, factor,
+                        rate_rows, tab.at, tab.partial,
+                    )  # fmt: skip
+            continue
         hessian(j, tab.term, tab.fval, tab.marker_body, tab.kin, tab.frame, hess, s)
-        if frames_are_elastic and touches_elastic(tab.term[j], tab.marker_body, tab.code.size):
+        if elastic:
             k = elastic_term_entries(
                 mode, j, coef, lam_value, mu_value, factor, rate_rows, lam, mu, y, g, gt, tab, slot, vals, k
             )

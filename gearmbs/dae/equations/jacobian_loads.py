@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.views import matrix_at, vector_at
+from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
 from gearmbs.dae.equations import layout as T
@@ -40,6 +40,7 @@ def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, tab, slot
     tab
         Named views of the tables, up to date with y.
     """
+    slot, vals, d = uncounted(slot), uncounted(vals), uncounted(d)
     for q in range(bodies):
         b = tab.extra_i[first + q]
         if b == 0:
@@ -162,6 +163,7 @@ def load_entries(mode, b, sign, row, y, tab, slot, vals, k):
     """
     if b == 0:
         return k
+    slot, vals, y = uncounted(slot), uncounted(vals), uncounted(y)
     at = tab.at[b]
     u, p, th = at[T.AT_U], at[T.AT_P], at[T.AT_THETA]
     f, n = row[T.FORCE_F], row[T.FORCE_N]

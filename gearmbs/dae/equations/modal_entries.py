@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.views import uncounted
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import dot3
 from gearmbs.dae.equations.entries import put
@@ -14,7 +13,7 @@ from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, KIN_W
 
 
 @njit(cache=True, error_model="numpy")
-def modal_body_entries(mode, cj, y, at, modal, partial, kin_row, slot, vals, k):
+def modal_body_entries(mode, cj, y, at, modal, partial, kin_row, s, slot, vals, k):
     """Hand over the entries of a body's modal inertia, stiffness and damping; return the number of the next entry.
 
     Entries whose integrals are all zero, and stay so, are left out.
@@ -27,11 +26,14 @@ def modal_body_entries(mode, cj, y, at, modal, partial, kin_row, slot, vals, k):
         Factor of y'.
     at, modal, partial, kin_row
         The body's places, the table of all integrals, the present state, its row of the kinematics table.
+    s : ndarray
+        Scratch, 30 places.
     """
+    slot, vals, s = uncounted(slot), uncounted(vals), uncounted(s)
+    at, modal, partial, kin_row = uncounted(at), uncounted(modal), uncounted(partial), uncounted(kin_row)
     n, p, e, th = at[T.AT_MODES], at[T.AT_P], at[T.AT_EPS], at[T.AT_THETA]
     pf, vf, qf = at[T.AT_PF], at[T.AT_VF], at[T.AT_QF]
     change, h, gyro = present(partial, at[T.AT_PARTIAL], n)
-    s = np.empty(30)
     to_body(kin_row, kin_row, KIN_W, s, 0)
     for c in range(3):
         to_body(kin_row, kin_row, KIN_AXES + 3 * c, s, 12 + 3 * c)
@@ -62,7 +64,7 @@ def modal_body_entries(mode, cj, y, at, modal, partial, kin_row, slot, vals, k):
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def pair_entries(mode, i, at, modal, s, slot, vals, k):
     """Hand over the entries of mode i with all modes; return the number of the next entry.
 

@@ -20,7 +20,7 @@ from gearmbs.dae.compiled.lanes import LANES, all_lanes, lanes_at, put_lanes
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import dot3
-from gearmbs.dae.equations.modal_integrals import PRESENT, diagonals, integrals, moving, present, stride
+from gearmbs.dae.equations.modal_integrals import APART, PRESENT, diagonals, integrals, moving, present, stride
 from gearmbs.dae.equations.rotation import KIN_A, KIN_H, KIN_W
 
 
@@ -123,7 +123,7 @@ def add_momentum(y, at, partial, kin_row):
 @njit(cache=True, error_model="numpy", forceinline=True)
 def has_diagonals(modal, at):
     """Return whether M, K and D of a body are diagonal."""
-    return modal[at[T.AT_MODAL] + 9] > 0.0
+    return modal[at[T.AT_MODAL] + APART] > 0.0
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -16,8 +16,12 @@ from gearmbs.dae.compiled.views import matrix_at, vector_at
 STIFF, TURNED, SPUN, HEAVY = 1, 2, 4, 8
 """What two modes have in common: entries of p_f by q_f, p_f by v_f, v_f by q_f, and v_f by v_f."""
 
+APART = 9
+"""Behind J0 in the head of the table: 1 if M, K and D are diagonal."""
+LISTED = 10
+"""How many lanes are listed."""
 HEAD = 12
-"""Numbers before the integrals: J0, whether M, K and D are diagonal, how many lanes are listed."""
+"""Numbers before the integrals."""
 
 SYMMETRIC = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 """Entries of a symmetric matrix in the order in which they are stored."""
@@ -93,9 +97,11 @@ class ModalInertia:
         pairs += TURNED * (self.damping.astype(bool) | self.c1.any(axis=2)) + SPUN * self.c1.any(axis=2).T
         pairs += HEAVY * self.mass.astype(bool)
         lists = _in_lanes(np.concatenate([second, turned], axis=1))
-        head = [float(apart), float(len(lists[1])), 0.0]
+        head = np.zeros(HEAD)
+        head[:APART] = np.ravel(inertia)
+        head[APART], head[LISTED] = apart, len(lists[1])
         diagonals = [_padded(np.diag(part)) for part in parts]
-        pieces: tuple = (inertia, head, _padded(first), second, turned, *parts, pairs, *diagonals, *lists)
+        pieces: tuple = (head, _padded(first), second, turned, *parts, pairs, *diagonals, *lists)
         return np.concatenate([np.ravel(piece) for piece in pieces])
 
 
@@ -180,7 +186,7 @@ def moving(modal, at, n):
     head = vector_at(modal, at, HEAD)
     counts = at + HEAD + 9 * wide + 16 * n * n + 3 * wide
     modes = counts + PRESENT * (wide // LANES)
-    listed = int(head[10])
+    listed = int(head[LISTED])
     return (
         head,
         vector_at(modal, at + HEAD, 9 * wide),

@@ -13,7 +13,7 @@ import numpy as np
 from numba import float64, int64, types
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.lanes import LANES, all_lanes, lanes_at, larger, magnitude, put_lanes
+from gearmbs.dae.compiled.lanes import LANES, all_lanes, lanes_at, larger_number, magnitude, put_lanes
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 
 SHARE = 0.6
@@ -21,6 +21,10 @@ SHARE = 0.6
 times as long as one of a block."""
 SMALLEST = 24
 """Pivots that are worth a block."""
+
+BELOW = np.tril(np.ones((LANES, LANES)), -1).T.ravel()
+"""For each row of a lane ones in the rows below it; the same above."""
+ABOVE = np.triu(np.ones((LANES, LANES)), 1).T.ravel()
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -57,32 +61,6 @@ def without_tail(tail: int, ptr: np.ndarray, items: np.ndarray) -> tuple[np.ndar
     return np.minimum(ptr, ptr[tail]), items[: ptr[tail]]
 
 
-def tail_entries(
-    tail: int, a_ptr: np.ndarray, a_pos: np.ndarray, a_src: np.ndarray, a_scale: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Part the entries of the matrix into those inside the tail and all others.
-
-    Parameters
-    ----------
-    tail, a_ptr, a_pos, a_src, a_scale
-        Of `gearmbs.dae.linalg.lu_plan.LUPlan`, with all entries.
-
-    Returns
-    -------
-    dict
-        The fields ``a_ptr``, ``a_pos``, ``a_src``, ``a_scale``, ``tail_at``, ``tail_src`` and ``tail_scale``.
-    """
-    n = len(a_ptr) - 1
-    columns = np.repeat(np.arange(n), np.diff(a_ptr))
-    inside = (columns >= tail) & (a_pos >= tail)
-    at = (columns[inside] - tail) * padded(n - tail) + a_pos[inside] - tail
-    return {
-        "a_ptr": np.searchsorted(columns[~inside], np.arange(n + 1)), "a_pos": a_pos[~inside],
-        "a_src": a_src[~inside], "a_scale": a_scale[~inside], "tail_at": at.astype(np.uint32),
-        "tail_src": a_src[inside], "tail_scale": a_scale[inside],
-    }  # fmt: skip
-
-
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True, fastmath={"contract"})
 def _through_four(lower, first, column, rows, upper):
     """Return the entries of a column of U in rows ``first`` to ``first + 3``: L^-1 times what stands there."""
@@ -116,13 +94,13 @@ def _less_four(lower, upper, first, k, lanes, pair):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def fill_tail(plan, upper, vals):
-    """Write the entries of the matrix with values ``vals`` to the block, long before lanes of them are read."""
-    at, src, scale = plan.tail_at, plan.tail_src, plan.tail_scale
-    for b in range(upper.shape[0] // LANES):
-        put_lanes(upper, b, all_lanes(0.0))
-    for e in range(at.shape[0]):
-        upper[at[e]] = vals[src[e]] * scale[e]
+def largest_in(room, place, grown):
+    """Return the largest of lanes without a sign, NaN if one is; a place of ``room`` is overwritten by them."""
+    put_lanes(room, place, grown)
+    top = int64(0)
+    for i in range(LANES * place, LANES * place + LANES):
+        top = max(top, bits_of(room[i]))
+    return double_of(top)
 
 
 @njit(float64(int64, _VEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
@@ -143,12 +121,12 @@ def factor_tail(tail, lower, upper, pivot_inv):
     Returns
     -------
     growth : float
-        Largest multiplier, infinite where a pivot vanishes.
+        Largest multiplier, infinite where a pivot vanishes, NaN if one is not finite.
     """
     size = pivot_inv.shape[0] - tail
     lanes = (size + LANES - 1) // LANES
     rows = LANES * lanes
-    grown = all_lanes(0.0)
+    grown, spoiled = all_lanes(0.0), all_lanes(0.0)
     for first in range(0, size, 4):
         last = min(first + 4, size)
         for k in range(first, last):
@@ -161,15 +139,16 @@ def factor_tail(tail, lower, upper, pivot_inv):
                 return np.inf
             inverse = 1.0 / pivot
             pivot_inv[tail + k] = inverse
-            own = k // LANES
-            for b in range(own, lanes):
-                put_lanes(lower, lanes * k + b, lanes_at(upper, lanes * k + b) * inverse)
-            for i in range(LANES * own, k + 1):
-                lower[rows * k + i] = 0.0
-            for i in range(k, LANES * (own + 1)):
-                upper[rows * k + i] = 0.0
-            for b in range(own, lanes):
-                grown = larger(grown, magnitude(lanes_at(lower, lanes * k + b)))
+            own, place = lanes * k + k // LANES, k % LANES
+            for b in range(own, lanes * (k + 1)):
+                l = lanes_at(upper, b) * inverse
+                if b == own:
+                    # numbers written one by one could not be read as lanes at once
+                    l = l * lanes_at(BELOW, place)
+                put_lanes(lower, b, l)
+                grown = larger_number(magnitude(l), grown)
+                spoiled = spoiled + l * 0.0
+            put_lanes(upper, own, lanes_at(upper, own) * lanes_at(ABOVE, place))
         if last == size:
             break
         k = last
@@ -178,11 +157,7 @@ def factor_tail(tail, lower, upper, pivot_inv):
             k += 2
         if k < size:
             _less_four(lower, upper, first, k, lanes, False)
-    put_lanes(lower, lanes * size, grown)
-    top = int64(0)
-    for i in range(rows * size, rows * size + LANES):
-        top = max(top, bits_of(lower[i]))
-    return double_of(top)
+    return largest_in(lower, lanes * size, grown + spoiled)
 
 
 @njit(

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gearmbs.dae.compiled.structs import IndexVector, IntVector, Struct, Vector
-from gearmbs.dae.linalg.dense_tail import tail_entries, tail_of_plan, without_tail
+from gearmbs.dae.linalg.dense_tail import tail_of_plan, without_tail
 from gearmbs.dae.linalg.entry_lists import FIELDS_BY_COLUMNS, L_POS, entry_lists
-from gearmbs.dae.linalg.front_blocks import front_blocks
+from gearmbs.dae.linalg.front_blocks import entries_in_blocks, front_blocks, operations_on_blocks
 from gearmbs.dae.linalg.nodes import has_nodes, nodes
 from gearmbs.dae.linalg.schedule import column_by_column, schedule
 
@@ -18,8 +18,11 @@ KNOWN = 16
 """Choices of pivots whose plans are kept; those of the largest models take some megabytes each."""
 
 NO_TAIL = {
-    **dict.fromkeys(("tail_at", "tail_src", "block_at", "block_lane", "block_col"), np.zeros(0, dtype=np.uint32)),
-    **dict.fromkeys(("block_ptr", "lane_ptr"), np.zeros(0, dtype=np.int64)),
+    **dict.fromkeys(
+        ("tail_at", "tail_src", "block_col", "act_to", "act_by", "act_u", "part_at", "part_col"),
+        np.zeros(0, dtype=np.uint32),
+    ),
+    **dict.fromkeys(("lane_ptr", "act_ptr", "part_ptr"), np.zeros(0, dtype=np.int64)),
     "tail_scale": np.zeros(0),
 }
 """Fields of a plan without a dense tail."""
@@ -36,21 +39,25 @@ class LUPlan(Struct):
     a_scale : ndarray
         Scale of each of these entries (row times column scale).
     tail_at, tail_src, tail_scale : ndarray
-        The same of the entries inside the tail, which are not among these: their places in its block.
+        The same of the entries in the rows of the tail, which are not among these: their places in its blocks.
     u_ptr, u_pos : ndarray
         For each column the earlier pivots that act on it, ascending.
     l_ptr, l_pos : ndarray
         For each column the rows below the pivot.
     u_col, l_col : ndarray
         Column of each of these entries.
-    block_ptr, block_at, block_lane : ndarray
-        For each column the blocks of its entries below in the rows of the tail: where their numbers stand, and which
-        eight rows of the tail they are, see `gearmbs.dae.linalg.front_blocks`.
     block_col, lane_ptr : ndarray
-        Column of each block in the order in which their numbers stand, and where those of each eight rows begin.
+        Columns of the blocks of eight rows of the tail below the pivots before it, in the order in which they stand,
+        see `gearmbs.dae.linalg.front_blocks`, and where those of each eight rows begin.
+    act_ptr, act_to, act_by, act_u : ndarray
+        For each step, a level of columns or one, its operations on blocks: the block that is changed, and the block
+        and the entry of U, among the numbers of the factors, whose product is taken off.
+    part_ptr, part_at, part_col : ndarray
+        For each step the blocks that become part of L, and their columns.
     l_to, l_by, u_to, u_by : ndarray
         Places that the entries of L and U change in a substitution, and by which, in the order in which the entries
-        stand among the numbers of the factors: L, then U, which is gone through from its end, then the pivots.
+        stand among the numbers of the factors: L, then U, then the pivots. It is that of a substitution, with the
+        ``u_tail`` entries of U in the tail's columns first; where there are nodes, U is gone through from its end.
     a_to : ndarray
         Where the entries of the matrix stand among these numbers.
     pivot_ptr, pivot_order : ndarray
@@ -60,7 +67,7 @@ class LUPlan(Struct):
         For each level its operations: the number that is changed and the factors of the product that is taken off.
     div_ptr, div_to, div_by : ndarray
         For each level the numbers that become entries of L, and the pivots that they are divided by. All from ``a_to``
-        on are empty if there are nodes or a tail.
+        on are empty if there are nodes.
     node_end : ndarray
         For each column the end of its node: columns in a row whose rows below the node are the same.
     row_from, col_to : ndarray
@@ -79,6 +86,7 @@ class LUPlan(Struct):
     """
 
     tail: int
+    u_tail: int
     a_ptr: IntVector
     a_pos: IndexVector
     a_src: IndexVector
@@ -92,11 +100,15 @@ class LUPlan(Struct):
     l_pos: IndexVector
     u_col: IndexVector
     l_col: IndexVector
-    block_ptr: IntVector
-    block_at: IndexVector
-    block_lane: IndexVector
     block_col: IndexVector
     lane_ptr: IntVector
+    act_ptr: IntVector
+    act_to: IndexVector
+    act_by: IndexVector
+    act_u: IndexVector
+    part_ptr: IntVector
+    part_at: IndexVector
+    part_col: IndexVector
     l_to: IndexVector
     l_by: IndexVector
     u_to: IndexVector
@@ -165,20 +177,23 @@ def _unscaled_plan(pivots: _Pivots) -> _Unscaled:
     u_ptr, u_cols = without_tail(tail, u_ptr, u_cols)
     lists = entry_lists(rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, ones, ones, taken, indptr, indices)
     f = dict(zip(FIELDS_BY_COLUMNS, lists, strict=True), l_ptr=l_ptr, node_end=nodes(l_ptr, lists[L_POS]))
-    if tail < len(rows):
-        f |= tail_entries(tail, f["a_ptr"], f["a_pos"], f["a_src"], f["a_scale"])
-        f |= front_blocks(tail, l_ptr, f["l_pos"])
+    n, blocks = len(rows), None
+    if tail < n:
+        fields, blocks = front_blocks(tail, l_ptr, f["l_pos"])
+        f |= fields | entries_in_blocks(tail, blocks.keys, f["a_ptr"], f["a_pos"], f["a_src"], f["a_scale"])
         f["node_end"] = nodes(f["l_ptr"], f["l_pos"])
+    if has_nodes(f["node_end"]):
+        order, step, u_at = column_by_column(tail, f["u_pos"], f["u_col"], f["l_pos"], f["l_col"], n)
     else:
-        f |= NO_TAIL
-    if has_nodes(f["node_end"]) or tail < len(rows):
-        order = column_by_column(f["u_pos"], f["u_col"], f["l_pos"], f["l_col"])
-    else:
-        order = schedule(
-            rank, f["a_ptr"], f["a_pos"], f["u_ptr"], f["u_pos"], f["u_col"], l_ptr, f["l_pos"], f["l_col"]
+        order, step, u_at = schedule(
+            rank, tail, f["a_ptr"], f["a_pos"], f["u_ptr"], f["u_pos"], f["u_col"], f["l_ptr"], f["l_pos"], f["l_col"]
         )
-    none = np.empty(0)
-    plan = LUPlan(left_src=left, left_limit=none, limit=none, tail=tail, **f, **order)
+    if blocks is None:
+        f |= NO_TAIL
+    else:
+        f |= operations_on_blocks(tail, step, f["u_ptr"], f["u_pos"], u_at, blocks)
+    none, u_tail = np.empty(0), np.count_nonzero(f["u_col"] >= tail)
+    plan = LUPlan(left_src=left, left_limit=none, limit=none, tail=tail, u_tail=u_tail, **f, **order)
 
     def where(entries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         places = np.searchsorted(taken, entries)

@@ -4,6 +4,8 @@ Columns that do not act on each other form a level, and are eliminated in one lo
 number. The pivots, the operations and, for each number that they change, their order are those of the column by column
 form: the factors and solutions are the same to the last bit. Within a level, as within a substitution, operations are
 sorted by the earliest time at which what they need is there.
+
+Columns of a dense tail form one level, the last: they act on each other in its block.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ _UVEC = uint32[::1]
 
 
 @njit(_IVEC(_IVEC), cache=True, nogil=True, error_model="numpy")
-def _sorted_by(keys):
+def sorted_by(keys):
     """Return the order that sorts small keys, equal ones as they stand."""
     largest = 0
     for key in keys:
@@ -36,7 +38,7 @@ def _sorted_by(keys):
 
 
 @njit(_IVEC(_UVEC, _UVEC, int64), cache=True, nogil=True, error_model="numpy")
-def _times(to, by, count):
+def earliest_times(to, by, count):
     """Return the earliest time of each operation on ``count`` numbers, changing ``to`` by means of ``by`` in turn."""
     ready, times = np.zeros(count, dtype=np.int64), np.empty(to.shape[0], dtype=np.int64)
     for e in range(to.shape[0]):
@@ -111,7 +113,7 @@ def _operations(rank, a_ptr, a_pos, u_ptr, u_pos, l_ptr, l_pos, level, l_at, u_a
 
 
 @njit(_IVEC(_IVEC, int64, int64), cache=True, nogil=True, error_model="numpy")
-def _bounds(levels, size, count):
+def bounds_of(levels, size, count):
     """Return where each of ``count`` levels begins and ends in a list of the first ``size`` sorted by them."""
     bounds = np.zeros(count + 1, dtype=np.int64)
     for e in range(size):
@@ -122,7 +124,7 @@ def _bounds(levels, size, count):
 
 
 @njit(_UVEC(_UVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
-def _taken(items, order):
+def taken_in_order(items, order):
     """Return items in an order."""
     out = np.empty(order.shape[0], dtype=np.uint32)
     for e in range(order.shape[0]):
@@ -139,17 +141,21 @@ def _numbered(order, first):
     return at
 
 
-@njit(types.UniTuple(_IVEC, 2)(int64, _IVEC, _UVEC, _UVEC), cache=True, nogil=True, error_model="numpy")
-def _orders_of_substitution(n, order, u_pos, u_col):
-    """Return the order in which U is gone through, from its end; and pivots by level, those set aside last.
+@njit(types.UniTuple(_IVEC, 2)(int64, int64, _IVEC, _UVEC, _UVEC), cache=True, nogil=True, error_model="numpy")
+def _orders_of_substitution(n, tail, order, u_pos, u_col):
+    """Return the order in which U is gone through, the tail's columns first; and pivots by level, those set aside last.
 
     ``order`` sorts proper pivots by their levels.
     """
     size = u_pos.shape[0]
-    back = _sorted_by(_times(u_pos[::-1].copy(), u_col[::-1].copy(), n))
-    u_order = np.empty(size, dtype=np.int64)
+    times = earliest_times(u_pos[::-1].copy(), u_col[::-1].copy(), n)
+    behind = 0
     for e in range(size):
-        u_order[size - 1 - e] = size - 1 - back[e]
+        behind = max(behind, times[e] + 1)
+    for e in range(size):
+        if u_col[size - 1 - e] < tail:
+            times[e] += behind
+    u_order = size - 1 - sorted_by(times)
     by_level = np.empty(n, dtype=np.int64)
     for k in range(n):
         by_level[k] = order[k] if k < order.shape[0] else k
@@ -157,59 +163,81 @@ def _orders_of_substitution(n, order, u_pos, u_col):
 
 
 @njit(
-    types.Tuple((_UVEC, _UVEC, _UVEC, _UVEC, _UVEC, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _UVEC, _IVEC, _UVEC, _UVEC))(
-        int64, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _IVEC, _UVEC, _UVEC
-    ),
+    types.Tuple(
+        (
+            _UVEC,
+            _UVEC,
+            _UVEC,
+            _UVEC,
+            _UVEC,
+            _IVEC,
+            _UVEC,
+            _IVEC,
+            _UVEC,
+            _UVEC,
+            _UVEC,
+            _IVEC,
+            _UVEC,
+            _UVEC,
+            _IVEC,
+            _IVEC,
+        )
+    )(int64, int64, _IVEC, _UVEC, _IVEC, _UVEC, _UVEC, _IVEC, _UVEC, _UVEC),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def _schedule(rank, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col):
+def _schedule(rank, tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col):
     """Return what `schedule` returns, in its order.
 
     Parameters
     ----------
-    rank, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col
+    rank, tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col
         See there.
     """
     n = l_ptr.shape[0] - 1
     below, above = l_pos.shape[0], u_pos.shape[0]
     level = _levels(u_ptr, u_pos)
-    count = 0
-    for k in range(rank):
+    pivots, count = min(rank, tail), 0
+    for k in range(pivots):
         count = max(count, level[k] + 1)
-    l_order = _sorted_by(_times(l_pos, l_col, n))
-    u_order, by_level = _orders_of_substitution(n, _sorted_by(level[:rank].copy()), u_pos, u_col)
+    if tail < n:
+        level[tail:] = count
+        count += 1
+    l_order = sorted_by(earliest_times(l_pos, l_col, n))
+    u_order, by_level = _orders_of_substitution(n, tail, sorted_by(level[:pivots].copy()), u_pos, u_col)
     l_at, u_at = _numbered(l_order, 0), _numbered(u_order, below)
     pivot_at = _numbered(by_level, below + above)
     a_to, levels, op_to, op_l, op_u = _operations(
         rank, a_ptr, a_pos, u_ptr, u_pos, l_ptr, l_pos, level, l_at, u_at, pivot_at
     )
-    order = _sorted_by(_times(op_to, op_u, below + above + n))
-    order = order[_sorted_by(levels[order])]
+    order = sorted_by(earliest_times(op_to, op_u, below + above + n))
+    order = order[sorted_by(levels[order])]
     l_level = np.empty(below, dtype=np.int64)
     for q in range(below):
         l_level[q] = level[l_col[q]]
-    divided = _sorted_by(l_level)
+    divided = sorted_by(l_level)
     div_to, div_by = np.empty(below, dtype=np.uint32), np.empty(below, dtype=np.uint32)
     for e in range(below):
         div_to[e] = l_at[divided[e]]
         div_by[e] = pivot_at[l_col[divided[e]]]
     return (
-        _taken(l_pos, l_order),
-        _taken(l_col, l_order),
-        _taken(u_pos, u_order),
-        _taken(u_col, u_order),
+        taken_in_order(l_pos, l_order),
+        taken_in_order(l_col, l_order),
+        taken_in_order(u_pos, u_order),
+        taken_in_order(u_col, u_order),
         a_to,
-        _bounds(level, rank, count),
+        bounds_of(level, pivots, count),
         by_level.astype(np.uint32),
-        _bounds(levels, levels.shape[0], count),
-        _taken(op_to, order),
-        _taken(op_l, order),
-        _taken(op_u, order),
-        _bounds(l_level, below, count),
+        bounds_of(levels, levels.shape[0], count),
+        taken_in_order(op_to, order),
+        taken_in_order(op_l, order),
+        taken_in_order(op_u, order),
+        bounds_of(l_level, below, count),
         div_to,
         div_by,
+        level,
+        u_at,
     )
 
 
@@ -217,10 +245,13 @@ FIELDS = (
     "l_to", "l_by", "u_to", "u_by", "a_to", "pivot_ptr", "pivot_order", "op_ptr", "op_to", "op_l", "op_u", "div_ptr",
     "div_to", "div_by",
 )  # fmt: skip
+STEP, U_AT = len(FIELDS), len(FIELDS) + 1
+"""Behind these in what `_schedule` returns."""
 
 
 def schedule(
     rank: int,
+    tail: int,
     a_ptr: np.ndarray,
     a_pos: np.ndarray,
     u_ptr: np.ndarray,
@@ -229,28 +260,37 @@ def schedule(
     l_ptr: np.ndarray,
     l_pos: np.ndarray,
     l_col: np.ndarray,
-) -> dict[str, np.ndarray]:
-    """Return the fields of a `gearmbs.dae.linalg.lu_plan.LUPlan` that say in which order a matrix without nodes is
-    factored, from those that say column by column what is done.
+) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
+    """Return in which order a matrix without nodes is factored, from what is done column by column.
 
     Parameters
     ----------
     rank : int
         Proper pivots.
-    a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col : ndarray
-        See `LUPlan`.
+    tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col
+        See `gearmbs.dae.linalg.lu_plan.LUPlan`; without what is in the rows of a tail.
+
+    Returns
+    -------
+    fields : dict
+        Of a plan.
+    step : ndarray of int, shape (n,)
+        Level of each column.
+    u_at : ndarray of int
+        Where the entries of U stand among the numbers of the factors.
     """
-    fields = _schedule(rank, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col)
-    return dict(zip(FIELDS, fields, strict=True))
+    found = _schedule(rank, tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col)
+    return dict(zip(FIELDS, found[:STEP], strict=True)), found[STEP], found[U_AT]
 
 
 def column_by_column(
-    u_pos: np.ndarray, u_col: np.ndarray, l_pos: np.ndarray, l_col: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Return the same fields for a matrix with nodes, whose factors stand as its columns do."""
+    tail: int, u_pos: np.ndarray, u_col: np.ndarray, l_pos: np.ndarray, l_col: np.ndarray, n: int
+) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
+    """Return the same for a matrix with nodes, whose factors stand as its n columns do, each a level of its own."""
     none, no_bounds = np.empty(0, dtype=np.uint32), np.empty(0, dtype=np.int64)
     empty = dict.fromkeys(("a_to", "pivot_order", "op_to", "op_l", "op_u", "div_to", "div_by"), none)
-    return {
+    fields = {
         "l_to": l_pos, "l_by": l_col, "u_to": u_pos, "u_by": u_col, **empty,
         **dict.fromkeys(("pivot_ptr", "op_ptr", "div_ptr"), no_bounds),
     }  # fmt: skip
+    return fields, np.minimum(np.arange(n), tail), len(l_pos) + np.arange(len(u_pos))

@@ -1,8 +1,8 @@
 """Sparse LU for a fixed pattern: numeric factorisations replayed along a plan without search.
 
 `factor` replays the plan of `gearmbs.dae.linalg.lu_plan` level by level, see `gearmbs.dae.linalg.schedule`, or, where
-columns are taken together as nodes or as a dense tail, column by column (left-looking); `solve` applies it. Pivots stay
-frozen until a multiplier grows beyond `GROWTH_LIMIT`, a pivot vanishes, or an entry that was left out of the plan
+columns are taken together as nodes, column by column, see `gearmbs.dae.linalg.by_columns`; `solve` applies it. Pivots
+stay frozen until a multiplier grows beyond `GROWTH_LIMIT`, a pivot vanishes, or an entry that was left out of the plan
 counts; then the caller analyses again with the current values.
 """
 
@@ -14,14 +14,22 @@ import numpy as np
 from numba import float64, int64, types
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.lanes import LANES, all_lanes, put_lanes
+from gearmbs.dae.compiled.lanes import LANES, all_lanes
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 from gearmbs.dae.compiled.structs import BlockLayout, Struct, Vector
 from gearmbs.dae.compiled.views import vector_at
-from gearmbs.dae.linalg.dense_tail import factor_tail, fill_tail, padded, solve_tail
-from gearmbs.dae.linalg.front_blocks import act_by_blocks, into_blocks, open_tail
+from gearmbs.dae.linalg.by_columns import backward_by_columns, factor_by_columns, forward_by_nodes
+from gearmbs.dae.linalg.dense_tail import padded, solve_tail
+from gearmbs.dae.linalg.front_blocks import (
+    act_on_blocks,
+    divide_blocks,
+    factor_behind,
+    fill_blocks,
+    open_tail,
+    tail_in,
+)
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
-from gearmbs.dae.linalg.nodes import has_nodes, through_node
+from gearmbs.dae.linalg.nodes import has_nodes
 
 GROWTH_LIMIT = 1e5
 SIZES = 64
@@ -43,19 +51,18 @@ class LUFactors(Struct):
         Inverse pivots by their places.
     x, w : ndarray
         Scratch, a number each row; ``x`` is filled up to whole lanes of the tail's rows.
-    below : ndarray
-        L of the pivots before the dense tail in its rows, block by block.
-    lower, upper, rest : ndarray
-        L and U of the dense tail, and its part of a right-hand side.
+    blocks : ndarray
+        L of the pivots before the dense tail in its rows, block by block; then U of the tail.
+    lower, rest : ndarray
+        L of the dense tail, and its part of a right-hand side.
     """
 
     lu: Vector
     pivot_inv: Vector
     x: Vector
     w: Vector
-    below: Vector
+    blocks: Vector
     lower: Vector
-    upper: Vector
     rest: Vector
 
 
@@ -71,9 +78,8 @@ def _layout(n: int, tail: int, entries: int, blocks: int) -> BlockLayout[LUFacto
         "pivot_inv": n,
         "x": tail + rows,
         "w": n,
-        "below": LANES * blocks,
+        "blocks": LANES * blocks + rows * (n - tail),
         "lower": rows * (n - tail) + LANES,
-        "upper": rows * (n - tail),
         "rest": rows,
     }
     return BlockLayout(LUFactors, sizes, on_line={"x": tail})
@@ -81,124 +87,46 @@ def _layout(n: int, tail: int, entries: int, blocks: int) -> BlockLayout[LUFacto
 
 def new_factors(plan: LUPlan) -> LUFactors:
     """Return empty factors for a plan."""
-    return _layout(len(plan.row_from), plan.tail, len(plan.l_pos) + len(plan.u_pos), len(plan.block_at)).new()
+    return _layout(len(plan.row_from), plan.tail, len(plan.l_pos) + len(plan.u_pos), len(plan.block_col)).new()
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _factor_by_levels(plan, factors, vals):
     """Factor the matrix with values ``vals`` level by level; return what `factor` does."""
-    lu, pivot_inv = factors.lu, factors.pivot_inv
+    lu, pivot_inv, blocks = factors.lu, factors.pivot_inv, factors.blocks
     a_to, a_src, a_scale, pivot_order = plan.a_to, plan.a_src, plan.a_scale, plan.pivot_order
     op_to, op_l, op_u, div_to, div_by = plan.op_to, plan.op_l, plan.op_u, plan.div_to, plan.div_by
-    n = pivot_inv.shape[0]
+    n, steps, tail = pivot_inv.shape[0], plan.op_ptr.shape[0] - 1, plan.tail
     pivots = np.uint64(plan.l_to.shape[0] + plan.u_to.shape[0])
     for e in range(lu.shape[0]):
         lu[e] = 0.0
+    if tail < n:
+        fill_blocks(plan, blocks, vals)
     for e in range(a_to.shape[0]):
         lu[a_to[e]] = vals[a_src[e]] * a_scale[e]
-    regular, top = True, int64(0)
-    for m in range(plan.op_ptr.shape[0] - 1):
+    regular, top, grown = True, int64(0), (all_lanes(0.0), all_lanes(0.0))
+    for m in range(steps):
         for e in range(np.uint64(plan.op_ptr[m]), np.uint64(plan.op_ptr[m + 1])):
             lu[op_to[e]] -= lu[op_l[e]] * lu[op_u[e]]
         for k in range(np.uint64(plan.pivot_ptr[m]), np.uint64(plan.pivot_ptr[m + 1])):
             pivot = lu[pivots + k]
             regular &= pivot != 0.0
-            lu[pivots + k] = 1.0 / pivot
+            inverse = 1.0 / pivot
+            lu[pivots + k] = inverse
+            pivot_inv[pivot_order[k]] = inverse
         for e in range(np.uint64(plan.div_ptr[m]), np.uint64(plan.div_ptr[m + 1])):
             l = lu[div_to[e]] * lu[div_by[e]]
             lu[div_to[e]] = l
             top = max(top, bits_of(abs(l)))
+        if tail < n and m < steps - 1:
+            act_on_blocks(plan, blocks, lu, m)
+            grown = divide_blocks(plan, blocks, pivot_inv, m, grown)
     if not regular:
         return np.inf
-    for k in range(n):
-        pivot_inv[pivot_order[k]] = lu[pivots + np.uint64(k)] if plan.kept[k] != 0.0 else 0.0
-    return double_of(top)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _act_by_nodes(plan, factors, k):
-    """Eliminate from column k, spread out in ``factors.x``, what the earlier pivots act on it, and store U's part.
-
-    The columns of a node act together.
-    """
-    x, w, lu = factors.x, factors.w, factors.lu
-    l_ptr, l_pos, u_pos, node_end = plan.l_ptr, plan.l_pos, plan.u_pos, plan.node_end
-    upper = np.uint64(l_pos.shape[0])
-    p, last = np.uint64(plan.u_ptr[k]), np.uint64(plan.u_ptr[k + 1])
-    while p < last:
-        j = np.uint64(u_pos[p])
-        end = node_end[j]
-        if end - np.int64(j) == 1:
-            u = x[j]
-            x[j] = 0.0
-            lu[upper + p] = u
-            p += np.uint64(1)
-            if u != 0.0:
-                for q in range(np.uint64(l_ptr[j]), np.uint64(l_ptr[j + np.uint64(1)])):
-                    x[l_pos[q]] -= lu[q] * u
-            continue
-        # the column has all rows of the node from this one on
-        stop, rows = np.uint64(min(end, k)), np.uint64(end) - j
-        below = np.uint64(l_ptr[end - 1])
-        size = rows + np.uint64(l_ptr[end]) - below
-        for i in range(rows):
-            w[i] = x[j + i]
-            x[j + i] = 0.0
-        for i in range(rows, size):
-            w[i] = 0.0
-        through_node(np.int64(j), np.int64(stop), np.int64(size), l_ptr, lu, w)
-        for i in range(stop - j):
-            lu[upper + p + i] = w[i]
-        for i in range(stop - j, rows):
-            x[j + i] = w[i]
-        for i in range(size - rows):
-            x[l_pos[below + i]] += w[rows + i]
-        p += stop - j
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _factor_by_nodes(plan, factors, vals):
-    """Factor the matrix with values ``vals`` column by column; return what `factor` does."""
-    x, lu, pivot_inv, below, rest = factors.x, factors.lu, factors.pivot_inv, factors.below, factors.rest
-    a_pos, a_src, a_scale, l_pos = plan.a_pos, plan.a_src, plan.a_scale, plan.l_pos
-    top, grown = int64(0), all_lanes(0.0)
-    n, tail = pivot_inv.shape[0], plan.tail
-    rows = rest.shape[0]
-    behind, upper = vector_at(x, tail, rows), vector_at(lu, l_pos.shape[0], plan.u_pos.shape[0])
+    for k in range(np.uint64(plan.pivot_ptr[steps]), np.uint64(n)):
+        pivot_inv[pivot_order[k]] = 0.0
     if tail < n:
-        fill_tail(plan, factors.upper, vals)
-    for k in range(n):
-        for p in range(np.uint64(plan.a_ptr[k]), np.uint64(plan.a_ptr[k + 1])):
-            x[a_pos[p]] = vals[a_src[p]] * a_scale[p]
-        _act_by_nodes(plan, factors, k)
-        if k >= tail:
-            act_by_blocks(plan, below, upper, k, vector_at(factors.upper, rows * (k - tail), rows))
-            continue
-        if tail < n:
-            act_by_blocks(plan, below, upper, k, behind)
-        pivot = x[k]
-        x[k] = 0.0
-        if plan.kept[k] == 0.0:
-            pivot_inv[k] = 0.0
-            x[:] = 0.0
-            continue
-        if pivot == 0.0:
-            return np.inf
-        inv = 1.0 / pivot
-        pivot_inv[k] = inv
-        for q in range(np.uint64(plan.l_ptr[k]), np.uint64(plan.l_ptr[k + 1])):
-            i = l_pos[q]
-            l = x[i] * inv
-            x[i] = 0.0
-            lu[q] = l
-            top = max(top, bits_of(abs(l)))
-        if tail < n:
-            grown = into_blocks(plan, below, k, inv, behind, grown)
-    if tail < n:
-        put_lanes(rest, 0, grown)
-        for i in range(LANES):
-            top = max(top, bits_of(rest[i]))
-        top = max(top, bits_of(factor_tail(tail, factors.lower, factors.upper, pivot_inv)))
+        top = max(top, bits_of(factor_behind(plan, factors, steps - 1, grown)))
     return double_of(top)
 
 
@@ -235,58 +163,17 @@ def fits(plan, vals):
 @njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
 def refactor(plan, factors, vals):
     """Factor as `factor` does, without a look at the entries that the plan leaves out."""
-    if has_nodes(plan.node_end) or plan.tail < factors.pivot_inv.shape[0]:
-        return _factor_by_nodes(plan, factors, vals)
+    if has_nodes(plan.node_end):
+        return factor_by_columns(plan, factors, vals)
     return _factor_by_levels(plan, factors, vals)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _forward_by_nodes(plan, factors):
-    """Solve L x = x in ``factors.x``, the columns of a node together."""
-    x, w, lu = factors.x, factors.w, factors.lu
-    l_pos, l_ptr, node_end = plan.l_pos, plan.l_ptr, plan.node_end
-    n = factors.pivot_inv.shape[0]
-    k = 0
-    while k < n:
-        end = node_end[k]
-        if end - k == 1:
-            v = x[k]
-            if v != 0.0:
-                for q in range(np.uint64(l_ptr[k]), np.uint64(l_ptr[k + 1])):
-                    x[l_pos[q]] -= lu[q] * v
-        else:
-            first, rows, below = np.uint64(k), np.uint64(end - k), np.uint64(l_ptr[end - 1])
-            size = rows + np.uint64(l_ptr[end]) - below
-            for i in range(rows):
-                w[i] = x[first + i]
-            for i in range(rows, size):
-                w[i] = 0.0
-            through_node(k, end, np.int64(size), l_ptr, lu, w)
-            for i in range(rows):
-                x[first + i] = w[i]
-            for i in range(size - rows):
-                x[l_pos[below + i]] += w[rows + i]
-        k = end
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _backward_by_columns(plan, factors):
-    """Take from ``factors.x`` what the unknowns above the diagonal of U give, column by column."""
-    x, lu, pivot_inv, u_pos, u_ptr = factors.x, factors.lu, factors.pivot_inv, plan.u_pos, plan.u_ptr
-    upper = np.uint64(plan.l_pos.shape[0])
-    n = pivot_inv.shape[0]
-    for m in range(n):
-        k = np.uint64(n - 1 - m)
-        v = x[k] * pivot_inv[k]
-        for p in range(np.uint64(u_ptr[k]), np.uint64(u_ptr[k + np.uint64(1)])):
-            x[u_pos[p]] -= lu[upper + p] * v
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _solve_tail(plan, factors, x):
     """Solve for the unknowns of the dense tail in ``x``, which is solved with L up to there."""
-    open_tail(plan.tail, plan.lane_ptr, plan.block_col, factors.below, x, factors.rest)
-    solve_tail(plan.tail, factors.lower, factors.upper, factors.pivot_inv, factors.rest, x)
+    blocks = factors.blocks
+    open_tail(plan.tail, plan.lane_ptr, plan.block_col, blocks, x, factors.rest)
+    solve_tail(plan.tail, factors.lower, tail_in(plan, blocks), factors.pivot_inv, factors.rest, x)
 
 
 @njit(types.void(PLAN_TYPE, FACTORS_TYPE, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
@@ -310,22 +197,29 @@ def solve(plan, factors, b, out):
         x[k] = b[row_from[k]] * row_scale[k]
     by_nodes = has_nodes(plan.node_end)
     if by_nodes:
-        _forward_by_nodes(plan, factors)
+        forward_by_nodes(plan, factors)
     else:
         for q in range(l_to.shape[0]):
             x[l_to[q]] -= lu[q] * x[l_by[q]]
     if plan.tail < n:
         _solve_tail(plan, factors, vector_at(x, 0, n))
+    upper, known = np.uint64(l_to.shape[0]), np.uint64(n)
     if by_nodes:
-        _backward_by_columns(plan, factors)
+        backward_by_columns(plan, factors)
     else:
-        upper, last = np.uint64(l_to.shape[0]), u_to.shape[0] - 1
-        for m in range(u_to.shape[0]):
-            p = np.uint64(last - m)
+        first, known = np.uint64(plan.u_tail), np.uint64(plan.tail)
+        for k in range(known, np.uint64(n)):
+            x[k] *= pivot_inv[k]
+        for p in range(first):
+            x[u_to[p]] -= lu[upper + p] * x[u_by[p]]
+        for p in range(first, np.uint64(u_to.shape[0])):
             k = u_by[p]
             x[u_to[p]] -= lu[upper + p] * (x[k] * pivot_inv[k])
-    for k in range(n):
+    for k in range(known):
         out[col_to[k]] = x[k] * pivot_inv[k] * col_scale[k]
+        x[k] = 0.0
+    for k in range(known, np.uint64(n)):
+        out[col_to[k]] = x[k] * col_scale[k]
         x[k] = 0.0
 
 
@@ -355,9 +249,9 @@ def solve_pair(plan, factors, pair):
     if plan.tail < n:
         for m in range(2, 4):
             _solve_tail(plan, factors, pair[m])
-    upper, last = np.uint64(l_to.shape[0]), u_to.shape[0] - 1
+    upper, last, by_nodes = np.uint64(l_to.shape[0]), u_to.shape[0] - 1, has_nodes(plan.node_end)
     for m in range(u_to.shape[0]):
-        p = np.uint64(last - m)
+        p = np.uint64(last - m if by_nodes else m)
         i, k, u = u_to[p], u_by[p], lu[upper + p]
         pair[2, i] -= u * (pair[2, k] * pivot_inv[k])
         pair[3, i] -= u * (pair[3, k] * pivot_inv[k])
