@@ -40,6 +40,8 @@ _address_of = ctypes.addressof
 _NO_BLOCK: tuple[None, int, dict] = None, 0, {}
 LINE = 64
 """Bytes of a line of the processor's cache."""
+KEPT_LAYOUTS = 64
+"""Sets of sizes for which a kind of struct keeps its layout."""
 
 
 class Struct:

@@ -19,8 +19,8 @@ CONSUMED_BYTES = 2_000_000
 """Of steps handed to a consumer at a time: what stays in the processor's cache, and outweighs the call of Python's."""
 
 MOST_RECORDS = 8192
-TIMES_OF_RECORDS = 2048
-"""Steps of which times, sizes and orders alone are recorded."""
+MOST_TIMES = 2048
+"""Records where times, sizes and orders alone are kept."""
 
 EVENT_BUFFER = 64
 RATE_ALLOWED = 0.12
@@ -88,7 +88,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
 def _rows_of_records(n: int, keep: bool, options: Options) -> int:
     """Return for how many accepted steps there is room between two calls of the compiled loop."""
     if not keep:
-        return TIMES_OF_RECORDS
+        return MOST_TIMES
     size = RECORD_BYTES if options.consumer is None else CONSUMED_BYTES
     return min(max(size // (8 * n), 8 * HISTORY), MOST_RECORDS)
 

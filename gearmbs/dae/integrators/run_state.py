@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import NamedTuple
 
-from gearmbs.dae.compiled.structs import BlockLayout, IndexVector, IntVector, Matrix, Struct, Vector
+from gearmbs.dae.compiled.structs import KEPT_LAYOUTS, BlockLayout, IndexVector, IntVector, Matrix, Struct, Vector
 from gearmbs.dae.integrators.bdf import HISTORY
 
 # return codes of the compiled loop; zero and above are not failures
@@ -32,9 +32,6 @@ KINK_MEMORY = 64
 
 MAX_NODES = 2 * HISTORY
 """Length of the vectors that hold coefficients of a step."""
-
-KNOWN_SIZES = 64
-"""Sets of sizes for which the places of arrays are kept."""
 
 
 class RunState(Struct):
@@ -257,7 +254,7 @@ class Sizes(NamedTuple):
     records: int
 
 
-@lru_cache(maxsize=KNOWN_SIZES)
+@lru_cache(maxsize=KEPT_LAYOUTS)
 def state_layout(sizes: Sizes) -> BlockLayout[RunState]:
     """Return where the arrays of a state stand; outputs and ``record_y``, which outlive it or are large, are given."""
     n, records, crossings = sizes.n, sizes.records, sizes.crossings

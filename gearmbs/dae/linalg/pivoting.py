@@ -20,7 +20,7 @@ import numpy as np
 from numba import float64, int64, types
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.structs import BlockLayout, IntVector, Struct, Vector
+from gearmbs.dae.compiled.structs import KEPT_LAYOUTS, BlockLayout, IntVector, Struct, Vector
 
 THRESHOLDS = (0.01, 0.1, 0.5)
 """Fraction of its column's largest entry a pivot must reach; the next is taken where entries grow too much."""
@@ -31,8 +31,6 @@ CANCELLED = 1e-14
 SEARCH_LIMIT = 12
 EQUILIBRATION_SWEEPS = 8
 TINY = 1e-300
-SIZES = 64
-"""Sets of sizes for which the places of scratch are kept."""
 
 _VEC = float64[::1]
 _IVEC = int64[::1]
@@ -106,7 +104,7 @@ class Lines(Struct):
     full: bool
 
 
-@lru_cache(maxsize=SIZES)
+@lru_cache(maxsize=KEPT_LAYOUTS)
 def _layout(n: int, size: int, with_values: bool) -> BlockLayout[Lines]:
     whole = dict.fromkeys(("start", "length", "after", "before"), n)
     counts = dict.fromkeys(("room", "head"), n + 1)

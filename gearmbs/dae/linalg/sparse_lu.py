@@ -16,7 +16,7 @@ from numba import float64, int64, types
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.lanes import LANES, all_lanes
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
-from gearmbs.dae.compiled.structs import BlockLayout, Struct, Vector
+from gearmbs.dae.compiled.structs import KEPT_LAYOUTS, BlockLayout, Struct, Vector
 from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.linalg.by_columns import backward_by_columns, factor_by_columns, forward_by_nodes
 from gearmbs.dae.linalg.dense_tail import padded, solve_tail
@@ -32,8 +32,6 @@ from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
 from gearmbs.dae.linalg.nodes import has_nodes
 
 GROWTH_LIMIT = 1e5
-SIZES = 64
-"""Sets of sizes for which the places of numbers are kept."""
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]
@@ -69,7 +67,7 @@ class LUFactors(Struct):
 FACTORS_TYPE = LUFactors.numba_type
 
 
-@lru_cache(maxsize=SIZES)
+@lru_cache(maxsize=KEPT_LAYOUTS)
 def _layout(n: int, tail: int, entries: int, blocks: int) -> BlockLayout[LUFactors]:
     """Return where the numbers stand: arrays, and of ``x`` the rows of the tail, where the processor reads lanes."""
     rows = padded(n - tail)
