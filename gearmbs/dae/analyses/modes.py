@@ -18,7 +18,7 @@ import numpy as np
 from gearmbs.dae.analyses.eigenvalues import spectrum
 from gearmbs.dae.analyses.instant import Instant
 from gearmbs.dae.analyses.linearised import reduce
-from gearmbs.dae.analyses.turning import angular_velocities
+from gearmbs.dae.analyses.turning import angular_velocities, spinning_modes
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.system import System
@@ -106,7 +106,8 @@ def linear_modes(system: System) -> Modes:
     Warns
     -----
     UserWarning
-        If a body with modal coordinates spins: they turn with it, so that its own modes are not those of its whirl.
+        If a body with modal coordinates spins that is not alike about this axis: they turn with it, so that its own
+        modes are not those of its whirl.
     """
     instant = Instant(system, "I3")
     instant.y = instant.settle(instant.y)
@@ -134,18 +135,21 @@ def linear_modes(system: System) -> Modes:
 
 
 def _warn_of_turning_modes(instant: Instant) -> None:
-    speeds = np.linalg.norm(angular_velocities(instant), axis=1)
-    names = [
-        n
-        for n, speed, modes in zip(instant.system.body_names, speeds, instant.system.model.counts.modes, strict=True)
-        if modes and speed > 0.0
-    ]
-    if names:
-        message = (
-            f"{', '.join(names)} spins and has modal coordinates, which turn with it: frequencies of its own modes are "
-            "those seen from the body; whirl and critical speeds of a shaft are found by gearmbs.flexible.Rotor"
+    names = instant.system.body_names
+    for k, _, found in spinning_modes(instant, angular_velocities(instant)):
+        if found is None:
+            reason = "is not alike about the axis it spins about"
+        elif not found.gyroscopic:
+            reason = "has a coupling without gyroscopic terms (take coupling='full')"
+        elif not found.known:
+            reason = "has modes of several waves round about"
+        else:
+            continue
+        warnings.warn(
+            f"{names[k]} spins and {reason}: modal coordinates that turn with it have their frequencies as seen from "
+            "the body; whirl and critical speeds of a shaft by its sections are found by gearmbs.flexible.Rotor",
+            stacklevel=3,
         )
-        warnings.warn(message, stacklevel=3)
 
 
 def _unit(shapes: np.ndarray) -> np.ndarray:

@@ -16,6 +16,9 @@ Virtual work of small rotations puts T^T before the equations, which become
 D and S the derivatives of the loads and constraint forces with respect to the velocities and the coordinates. The
 rates T', A1' and A0' are taken along a steady rotation, each body about its present angular velocity. Where all that
 turns is alike about its axis the coefficients are constant, and the eigenvalues are those of the whirl.
+
+Modal coordinates of a body that is alike about its axis are described likewise, delta q_f = exp(-Omega t G) delta r
+with the generator G of `gearmbs.dae.analyses.whirl`, which is a further block of T.
 """
 
 from __future__ import annotations
@@ -24,8 +27,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import expm
 
 from gearmbs.dae.analyses.instant import ROUNDING, Instant
+from gearmbs.dae.analyses.whirl import Generator, generator
+from gearmbs.dae.equations.rotation import POSE_A, POSE_V
 
 EPS = float(np.finfo(float).eps)
 
@@ -74,8 +80,11 @@ def turning(instant: Instant) -> Turning | None:
     if not fastest > 0.0:
         return None
     step = TURN / fastest
+    spins = spinning_modes(instant, velocities)
     places = [_moved(instant, y, velocities, k * step) for k in range(-REACH, REACH + 1)]
-    transforms = np.array([_transform(instant, place) for place in places])
+    transforms = np.array(
+        [_transform(instant, place, spins, k * step) for k, place in zip(range(-REACH, REACH + 1), places, strict=True)]
+    )
     middle = range(REACH - 2, REACH + 3)
     rates = np.array([_rate(transforms[k - 2 : k + 3], step) for k in middle])
     momenta = [_momenta(instant, places[k]) for k in middle]
@@ -127,7 +136,21 @@ def _moved(instant: Instant, y: np.ndarray, velocities: np.ndarray, time: float)
     return out
 
 
-def _transform(instant: Instant, y: np.ndarray) -> np.ndarray:
+def spinning_modes(instant: Instant, velocities: np.ndarray) -> list[tuple[int, float, Generator | None]]:
+    """Return of each body with modes that turns its number, its angular speed, and how its modes turn with it."""
+    inertia = instant.system.model.modal_inertia[1:]
+    axes = instant.pose()[:, POSE_A:POSE_V].reshape(-1, 3, 3)
+    out = []
+    for k, (modal, velocity) in enumerate(zip(inertia, velocities, strict=True)):
+        speed = float(np.linalg.norm(velocity))
+        if modal is not None and speed > 0.0:
+            out.append((k, speed, generator(modal, axes[k].T @ velocity / speed)))
+    return out
+
+
+def _transform(
+    instant: Instant, y: np.ndarray, spins: list[tuple[int, float, Generator | None]], time: float
+) -> np.ndarray:
     """Return T for all coordinates."""
     first = instant.at["R"]
     n = instant.at["lambda"] - first
@@ -136,6 +159,11 @@ def _transform(instant: Instant, y: np.ndarray) -> np.ndarray:
     for k, inverse in enumerate(inverses):
         at = instant.at["theta"] - first + 3 * k
         out[at : at + 3, at : at + 3] = inverse
+    starts = np.concatenate([[0], np.cumsum(instant.system.model.modes[1:])]) + instant.at["q_f"] - first
+    for k, speed, found in spins:
+        if found is not None:
+            own = slice(int(starts[k]), int(starts[k + 1]))
+            out[own, own] = expm(-speed * time * found.matrix)
     return out
 
 
