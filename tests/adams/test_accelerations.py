@@ -99,3 +99,57 @@ END
 """
     modes = run_deck(parse_deck(text), parse_script("a\nb\nLINEAR/EIGENSOL\n")).log[-1][1]
     assert np.isfinite(modes.eigenvalues).all()
+
+
+LOOP = """PART/2, MASS=2, CM=20, IP=1,1,1, QG=0.1,0,0
+MARKER/20, PART=2
+MARKER/21, PART=2, ZP=1.1,0,0
+MARKER/11, PART=1, ZP=1,0,0
+JOINT/1, TRANSLATIONAL, I=21, J=11
+VARIABLE/1, FUNCTION=0.5*VARVAL(9)
+VARIABLE/9, FUNCTION=2*ACCX(20,1,1)
+ARRAY/1, U, VARIABLES=1
+ARRAY/2, X, SIZE=1
+ARRAY/3, Y, SIZE=1
+{system}
+SFORCE/1, TRANSLATIONAL, I=21, J=11, ACTIONONLY, FUNCTION=-50*DX(20,1)-{output}
+REQUEST/1, F2=DX(20,1)\\F3=VX(20,1)
+"""
+ONE = "MATRIX/{}, FULL=RORDER, ROWS=1, COLUMNS=1, VALUES={}\n"
+ROUTINES = {
+    "GSE/1": {
+        "deriv": lambda call: 4 * (call.u[0] - call.x[0]),
+        "output": lambda call: 0.5 * call.x[0] + 0.3 * call.u[0],
+    },
+    "asked/1": lambda call: 4 * (call.sysfnc("VARVAL", 1) - call.x[0]),
+    "shown/1": lambda call: 0.5 * call.x[0] + 0.3 * call.sysary("U", 1)[0],
+}
+
+
+@pytest.mark.parametrize(
+    ("system", "output"),
+    [
+        ("LSE/1, X=2, U=1, Y=3, A=1, B=2, C=3, D=4\n" + ONE.format(1, -4) + ONE.format(2, 4) + ONE.format(3, 0.5)
+         + ONE.format(4, 0.3), "ARYVAL(3,1)"),
+        ("TFSISO/1, X=2, U=1, Y=3, NUMERATOR=3.2,0.3, DENOMINATOR=4,1", "ARYVAL(3,1)"),
+        ("GSE/1, NS=1, NO=1, X=2, U=1, Y=3, FUNCTION=USER(1)", "ARYVAL(3,1)"),
+        ("GSE/2, NS=1, NO=1, X=2, Y=3, FUNCTION=USER(1)\\INTERFACE=l::asked/1, l::shown/1", "ARYVAL(3,1)"),
+        ("DIFF/1, IC=0, FUNCTION=4*(ARYVAL(1,1)-DIF(1))", "(0.5*DIF(1)+0.3*ARYVAL(1,1))"),
+    ],
+    ids=["LSE", "TFSISO", "GSE", "GSE that asks", "DIFF"],
+)  # fmt: skip
+def test_accelerations_go_through_arrays_into_systems(system, output):
+    """A filter of an accelerometer whose output acts on the mass that carries it."""
+    from scipy.integrate import solve_ivp
+
+    deck = parse_deck("loop\nUNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND\nPART/1, GROUND\n"
+                      "MARKER/1, PART=1\n" + LOOP.format(system=system, output=output) + "END\n")  # fmt: skip
+    result = run_deck(deck, end=1.0, steps=20, tol=1e-9, routines=ROUTINES)
+    assert result.success
+
+    def motion(t, y):
+        a = (-50.0 * y[0] - 0.5 * y[2]) / 2.3
+        return y[1], a, 4.0 * (a - y[2])
+
+    exact = solve_ivp(motion, (0.0, 1.0), (0.1, 0.0, 0.0), t_eval=result.t, rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(result.request(1)[:, 1:3], exact.y[:2].T, atol=2e-9)

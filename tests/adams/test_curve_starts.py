@@ -133,3 +133,41 @@ END
         # of I about its marker, of J about its own
         assert tz == pytest.approx(force * cross(p - turned(theta[k]) @ OFF, n), abs=1e-4 * abs(force))
         assert uz == pytest.approx(-force * cross(q, n), abs=1e-4 * abs(force))
+
+
+def test_a_point_on_a_ring_that_turns_freely():
+    """Momentum and energy, of a ring about a point beside its middle, over three analyses."""
+    text = """PART/2, MASS=2, CM=20, IP=1,1,1.5, WZ=3
+MARKER/20, PART=2
+MARKER/23, PART=2, QP=0.3,0,0, REULER=30D,0,0
+JOINT/1, REVOLUTE, I=20, J=1
+PART/3, MASS=0.7, CM=30, IP=0.1,0.1,0.1, QG=1.3,0,0, VY=4.5
+MARKER/30, PART=3
+CURVE/1, CLOSED, MATRIX=1
+PTCV/1, I=30, CURVE=1, RM=23
+REQUEST/1, F2=DX(30,1)\\F3=DY(30,1)\\F4=VX(30,1)\\F6=VY(30,1)\\F7=WZ(20,1)\\F8=AZ(20,1)
+END
+"""
+    deck = parse_deck(HEAD.format("METER") + matrix(1, 1.0, 1.0) + text)
+    result = run_deck(deck, parse_script(THRICE), tol=1e-9)
+    x, y, vx, vy, w, a = result.request(1)[:, [1, 2, 3, 5, 6, 7]].T
+    np.testing.assert_allclose(0.7 * (x * vy - y * vx) + 1.5 * w, 0.7 * 1.3 * 4.5 + 4.5, rtol=1e-7)
+    np.testing.assert_allclose(0.35 * (vx**2 + vy**2) + 0.75 * w**2, 0.35 * 4.5**2 + 6.75, rtol=1e-7)
+    np.testing.assert_allclose(np.hypot(x - 0.3 * np.cos(a), y - 0.3 * np.sin(a)), 1.0, atol=1e-7)
+
+
+def test_a_point_that_runs_off_an_open_curve_is_remarked():
+    points = np.column_stack([np.linspace(0.0, 1.0, 11), np.zeros(11), np.zeros(11)])
+    values = ",".join(f"{v:g}" for v in points.ravel())
+    text = f"""MATRIX/1, FULL=RORDER, ROWS=11, COLUMNS=3, VALUES={values}
+PART/2, MASS=2, CM=20, IP=1,1,1, QG=0.5,0,0, VX=1
+MARKER/20, PART=2
+CURVE/1, OPEN, MATRIX=1
+PTCV/1, I=20, CURVE=1, RM=1
+END
+"""
+    script = "m\no\nSIMULATE/DYNAMICS, END=0.4, STEPS=4\nSIMULATE/DYNAMICS, END=0.8, STEPS=4\n"
+    result = run_deck(parse_deck(HEAD.format("METER") + text), parse_script(script))
+    assert result.success
+    (told,) = result.messages
+    assert told.startswith("PTCV/1: at TIME = 0.6 it is off the end of its curve")

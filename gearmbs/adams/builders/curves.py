@@ -34,6 +34,12 @@ def _kept(b: Builder, runner: str) -> tuple[float | None, float | None]:
     return float(state.position[2]) / b.units.length, float(state.velocity[2]) / b.units.factor("velocity")
 
 
+def _note_runner(b: Builder, s: st.Statement, runner: str, curve: Curve) -> None:
+    """Remember a runner that can leave its curve."""
+    if not curve.closed:
+        b.model.runners[runner] = s, curve.length * b.units.length
+
+
 def add_ptcv(b: Builder, s: st.Ptcv) -> None:
     """PTCV; after the first analysis it goes on from where the point is."""
     curve, rm = curve_points(b.deck, s.curve), b.markers[s.rm or 0]
@@ -43,6 +49,7 @@ def add_ptcv(b: Builder, s: st.Ptcv) -> None:
         start = _parameter(b, curve, s.disp, rm, s.icm)
     slot = point_on_curve(b.mechanism, name, b.markers[s.i or 0], rm, curve, start, speed)
     b.model.sources[slot.name] = s
+    _note_runner(b, s, f"{name}.runner", curve)
     if s.vel is not None and not b.state:
         at = float(slot.i.global_position()[2]) / b.units.length
         rate = s.vel / float(np.linalg.norm(curve.spline()(at, 1)))
@@ -62,6 +69,8 @@ def add_cvcv(b: Builder, s: st.Cvcv) -> None:
     elif not b.state and s.idisp is not None and s.jdisp is not None:
         starts = _parameter(b, first, s.idisp, i, s.iicm) or 0.0, _parameter(b, second, s.jdisp, j, s.jicm) or 0.0
     curve_on_curve(b.mechanism, name, i, first, j, second, starts, speeds)
+    _note_runner(b, s, f"{name}.runner I", first)
+    _note_runner(b, s, f"{name}.runner J", second)
 
 
 CURVES: dict[type, Callable[[Builder, Any], None]] = {st.Ptcv: add_ptcv, st.Cvcv: add_cvcv}

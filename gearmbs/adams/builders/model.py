@@ -54,6 +54,8 @@ class AdamsModel:
         What is constant during the analysis.
     initial_motions : list
         Joints with initial conditions: joint, "rotation" or "translation", displacement and velocity in deck units.
+    runners : dict
+        Name of a runner on an open curve -> its statement and the curve's length, m.
     beams : dict of int to dict
         Id of an FE_PART that was built -> label of a node -> name of its body.
     """
@@ -65,6 +67,7 @@ class AdamsModel:
     sources: dict[str, st.Statement] = field(default_factory=dict)
     present: Present = IN_DYNAMICS
     initial_motions: list[tuple[Joint, str, tuple[float, ...]]] = field(default_factory=list)
+    runners: dict[str, tuple[st.Statement, float]] = field(default_factory=dict)
     beams: dict[int, dict[int, str]] = field(default_factory=dict)
 
     def scope(self, marker_index: dict[int, int], marker_body: list[int]) -> Scope:

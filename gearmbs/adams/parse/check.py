@@ -208,6 +208,9 @@ def _remark_idle(deck: Deck) -> None:
     found: dict[tuple[type, tuple[str, ...], str], list[st.Statement]] = {}
     for statement in deck:
         reasons: dict[str, list[str]] = {}
+        if isinstance(statement, st.CurveStatement) and _by_routine(statement):
+            # its routine gives the points from MINPAR to MAXPAR
+            continue
         for name in WITHOUT_EFFECT.get(type(statement), ()):
             if name in statement.given:
                 reasons.setdefault(_why(statement, name), []).append(name)

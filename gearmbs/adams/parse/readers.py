@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from gearmbs.adams.errors import UNSUPPORTED, Diagnostic
 from gearmbs.adams.parse import statements as st
@@ -29,7 +30,12 @@ def read_variables(deck: Deck, requests: bool = True) -> set[int]:
         for name, spec in specs_of(type(statement)).items()
         if spec.kind == EXPRESSION and (text := getattr(statement, name)) is not None
     ]
-    plants: dict[str, Mapping[int, st.Plant]] = {"PINVAL": deck.of(st.PlantInput), "POUVAL": deck.of(st.PlantOutput)}
+    for kind in (st.Lse, st.Tfsiso, st.Gse):
+        for system in deck.of(kind).values():
+            waiting += _inputs(deck, system)
+    lists: dict[str, Mapping[int, st.Plant | st.Array]] = {
+        "PINVAL": deck.of(st.PlantInput), "POUVAL": deck.of(st.PlantOutput), "ARYVAL": deck.of(st.Array),
+    }  # fmt: skip
     while waiting:
         for node in walk(parse(waiting.pop())):
             first = node.args[0] if isinstance(node, Call) and node.args else None
@@ -38,14 +44,24 @@ def read_variables(deck: Deck, requests: bool = True) -> set[int]:
             members: tuple[int, ...] = ()
             if node.name == "VARVAL":
                 members = (first.integer,)
-            elif node.name in plants and first.integer in plants[node.name]:
-                members = plants[node.name][first.integer].variables
+            elif node.name in lists and first.integer in lists[node.name]:
+                members = lists[node.name][first.integer].variables
             for member in members:
                 variable = deck.of(st.Variable).get(member)
                 if variable is not None and member not in read:
                     read.add(member)
                     waiting.append(variable.function or "0")
     return read
+
+
+def _inputs(deck: Deck, system: Any) -> list[str]:
+    """Return what a system of states reads, as expressions: its inputs, and what its routines ask for."""
+    inputs = deck.of(st.Array).get(system.u or 0)
+    callers = (system.callers or {}).values() if isinstance(system, st.Gse) else ()
+    return [
+        *(f"VARVAL({ref})" for ref in (inputs.variables if inputs is not None else ())),
+        *(text for caller in callers for text in caller.asked),
+    ]
 
 
 def without_readers(deck: Deck, gone: Sequence[st.Statement]) -> list[Diagnostic]:

@@ -25,6 +25,7 @@ from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.results.result import AdamsResult
 from gearmbs.adams.results.tracks import tracks_of
 from gearmbs.adams.run.convergence import Doubt, doubt
+from gearmbs.adams.run.curve_ends import off_the_end
 from gearmbs.adams.run.equilibria import equilibria_to_passage
 from gearmbs.adams.run.plant import plant_of
 from gearmbs.adams.run.samples import parts, renew, take_samples
@@ -358,6 +359,7 @@ def _part(
         segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
     segment.tracks = tracks_of(model, solution)
     segment.variables = evaluator.variables()
+    segment.note = "\n".join(filter(None, [note, *off_the_end(model, solution)])) or None
     if kind not in ("STATICS", "INITIAL_CONDITIONS"):
         segment.passage = singular_passage(solution)
     if kind in ("DYNAMICS", "TRANSIENT"):
