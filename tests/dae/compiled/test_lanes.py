@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.lanes import LANES, all_lanes, deal_eight, lanes_at, larger, magnitude, put_lanes
+from gearmbs.dae.compiled.lanes import (
+    LANES,
+    all_lanes,
+    deal_eight,
+    lanes_at,
+    larger,
+    larger_number,
+    magnitude,
+    put_lanes,
+)
 
 
 @njit(error_model="numpy")
@@ -39,6 +48,20 @@ def test_the_larger_of_a_number_and_nan_is_nan(place):
     out = np.zeros((5, LANES))
     combine(a, out)
     assert np.isnan(out[2]).tolist() == [lane == 3 for lane in range(LANES)]
+
+
+@njit(error_model="numpy")
+def compare(a, out):
+    put_lanes(out, 0, larger_number(lanes_at(a, 0), lanes_at(a, 1)))
+
+
+def test_the_larger_number_is_the_second_beside_nan():
+    first, second = np.random.default_rng(2).uniform(-2.0, 2.0, (2, LANES))
+    first[1] = second[4] = first[6] = second[6] = np.nan
+    out = np.zeros((1, LANES))
+    compare(np.array([first, second]), out)
+    numbers = ~np.isnan(first) & ~np.isnan(second)
+    np.testing.assert_array_equal(out[0], np.where(numbers, np.maximum(first, second), second))
 
 
 @njit(error_model="numpy")
