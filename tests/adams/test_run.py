@@ -243,3 +243,24 @@ END
     result = run_deck(parse_deck(text), script)
     assert result.request(1)[:, 1] == pytest.approx(-20 * result.t, abs=1e-6)
     assert result.request(1)[:, 2] == pytest.approx(20 * result.t, abs=1e-6)
+
+
+CRANK = (
+    "PART/2,MASS=1,CM=20,IP=1,1,1,QG=.5,0,0\nMARKER/20,PART=2\nMARKER/21,PART=2,QP=-.5,0,0\nMARKER/22,PART=2,QP=.5,0,0\n"
+    "MARKER/11,PART=1,QP=1,0,0\nJOINT/1,REVOLUTE,I=21,J=10"
+)
+
+
+def test_parts_that_their_joints_lock_are_named():
+    result = run(model(f"{CRANK}\nJOINT/2,REVOLUTE,I=22,J=11\nACCGRAV/JGRAV=-9.81"), 0.1, 2)
+    assert [m for m in result.messages if "Body 'PART_2' cannot move: 'JOINT_1' and 'JOINT_2' together" in m]
+
+
+@pytest.mark.parametrize("direction", ["TRANSLATIONAL", "ROTATIONAL"])
+def test_motions_are_along_what_their_joint_allows(direction):
+    deck = parse_deck(model(f"{CRANK}\nMOTION/1,JOINT=1,{direction},FUNCTION=TIME"))
+    if direction == "ROTATIONAL":
+        assert run_deck(deck, end=0.1, steps=2).success
+        return
+    with pytest.raises(DeckError, match="TRANSLATIONAL is not what JOINT/1 allows: it is revolute; write ROTATIONAL"):
+        run_deck(deck, end=0.1, steps=2)

@@ -91,6 +91,12 @@ def test_a_deck_with_parameters(tmp_path):
         DeckSubject(deck, {}, end=1.0)
 
 
+def test_impossible_values_of_a_deck_come_before_any_case(tmp_path):
+    plan = make_plan(DeckSubject(DECK, {"mass": 1.0}, end=1.0), [Factor("mass", -1.0, 4.0)], "grid", unit=2)
+    with pytest.raises(CampaignError, match=r"1 of 2 corners(?s:.*)mass = -1: corner 0: .*MASS = -1.0; it cannot be"):
+        Campaign(tmp_path / "c", plan)
+
+
 def test_a_deck_in_a_plans_file(tmp_path):
     """The deck, its script and its routines stand beside the plan; what is not supported is left out."""
     deck = DECK.replace("I=2, J=4", "I=5, J=4").replace(

@@ -190,6 +190,9 @@ def add_motion(b: Builder, s: st.Motion) -> None:
         raise ValueError(f"JOINT/{s.joint} is not active")
     if joint.kind not in ("revolute", "translational", "cylindrical"):
         raise ValueError(f"JOINT/{s.joint} is {joint.kind}; it must be revolute, translational or cylindrical")
+    only = {"revolute": "ROTATIONAL", "translational": "TRANSLATIONAL"}.get(joint.kind)
+    if only and s.direction not in (only, None):
+        raise ValueError(f"{s.direction} is not what JOINT/{s.joint} allows: it is {joint.kind}; write {only}")
     rotational = joint.kind == "revolute" or (joint.kind == "cylindrical" and s.direction == "ROTATIONAL")
     if joint.kind == "cylindrical" and s.direction is None:
         raise ValueError("give ROTATION or TRANSLATION for a motion of a cylindrical joint")

@@ -212,7 +212,9 @@ def _remark_idle(deck: Deck) -> None:
             # its routine gives the points from MINPAR to MAXPAR
             continue
         for name in WITHOUT_EFFECT.get(type(statement), ()):
-            if name in statement.given:
+            # a CURVE's routine is asked from MINPAR to MAXPAR
+            ranges = isinstance(statement, st.CurveStatement) and _by_routine(statement)
+            if name in statement.given and not ranges:
                 reasons.setdefault(_why(statement, name), []).append(name)
         for why, idle in reasons.items():
             found.setdefault((type(statement), tuple(idle), why), []).append(statement)

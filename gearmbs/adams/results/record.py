@@ -147,6 +147,9 @@ class RunRecord:
     def remarks(self, segment: Segment) -> list[str]:
         """Return what is to be said about an analysis: settings, parts that were moved, an equilibrium that is none."""
         found = [segment.note] if segment.note else []
+        of_model = segment.solution.remark
+        if of_model and next(s for s in self.segments if s.solution.remark == of_model) is segment:
+            found.append(of_model)
         time = float(segment.solution.t[0] / self.deck.units.time)
         if segment.assembly is not None and segment.assembly.far:
             found.append(segment.assembly.remark(time, self.unit("length")))

@@ -132,11 +132,19 @@ class DeckSubject(Subject):
         return "1"
 
     def check(self, data: dict[str, Any], name: str) -> dict[str, Any]:
-        """Return the deck's text with the values in their places, and the values."""
+        """Return the deck, its text and script with the values in their places, and these; refuse impossible ones."""
+        from gearmbs.adams import DeckError, parse_deck
+
         values = {key: float(value) for key, value in data.items()}
         text = PLACE.sub(lambda match: f"{values[match[1]]:.17G}", self.text)
         script = None if self.script is None else PLACE.sub(lambda match: f"{values[match[1]]:.17G}", self.script)
-        return {"text": text, "script": script, "values": values}
+        try:
+            deck = parse_deck(text, self.name)
+        except DeckError as error:
+            raise CampaignError(f"{name}: {error}") from error
+        for variable, number in self.variables.items():
+            set_variable(deck, number, values[variable])
+        return {"deck": deck, "text": text, "script": script, "values": values}
 
     def canonical(self, thing: dict[str, Any]) -> Any:
         """Return the digest of the template, the values and the span."""
@@ -152,17 +160,14 @@ class DeckSubject(Subject):
 
     def run(self, thing: dict[str, Any], progress: Callable[[float], None], keep: Sequence[str]) -> Any:
         """Run the deck and return its requests: arrays by name and column."""
-        from gearmbs.adams import load_routines, parse_deck, parse_script, run_deck
+        from gearmbs.adams import load_routines, parse_script, run_deck
 
-        deck = parse_deck(thing["text"], self.name)
-        for name, number in self.variables.items():
-            set_variable(deck, number, thing["values"][name])
         if thing["script"] is not None:
             span: dict[str, Any] = {"acf": parse_script(thing["script"], str(Path(self.name).with_suffix(".acf")))}
         else:
             span = {"end": self.end, "steps": self.steps}
         routines = None if self.routines is None else load_routines(self.routines)
-        result = run_deck(deck, allow_unsupported=self.skip_unsupported, routines=routines, **span)
+        result = run_deck(thing["deck"], allow_unsupported=self.skip_unsupported, routines=routines, **span)
         progress(1.0)
         if not result.success:
             raise RuntimeError("; ".join(str(m) for m in result.messages)[-2000:])
