@@ -160,3 +160,23 @@ def test_damping_by_frequency_and_number_of_the_mode():
     found = modal_ratios("IF(FXFREQ-100:0.01,0.02,0.1)", np.array([50.0, 100.0, 500.0]), numbers)
     np.testing.assert_allclose(found, [0.01, 0.02, 0.1])
     np.testing.assert_allclose(modal_ratios("0.01*FXMODE(1)", np.ones(3), numbers), [0.07, 0.08, 0.09])
+
+
+def test_the_way_that_the_refusal_of_matrices_names_leads_to_a_body(tmp_path):
+    """Stiffness and mass with a table of nodes become a neutral file, and that a body of a deck."""
+    from gearmbs.flexible import Interface, from_matrices, mnf_of, reduce_model
+    from tests.flexible.test_files import cube
+
+    corners, k, m = cube()
+    faces = [Interface("foot", [1, 2, 3, 4], "average"), Interface("head", [5, 6, 7, 8], "average")]
+    model = reduce_model(from_matrices(k, m, corners), faces)
+    write_mnf(tmp_path / "cube.mnf", mnf_of(model))
+    deck = tmp_path / "cube.adm"
+    text = "cube\nUNITS/FORCE=NEWTON,MASS=KILOGRAM,LENGTH=METER,TIME=SECOND\nPART/1,GROUND\n"
+    deck.write_text(text + "FLEX_BODY/2,MATRICES=1,2,3\nMATRIX/1,ROWS=1,COLUMNS=1,VALUES=1\nEND\n")
+    with pytest.raises(DeckError, match=r"MATRICES alone.*MNF_FILE = .*write_mnf"):
+        read_deck(deck).to_mechanism()
+    deck.write_text(text + "FLEX_BODY/2,MNF_FILE=cube.mnf\nMARKER/3,FLEX_BODY=2,NODE_ID=1\nEND\n")
+    (body,) = read_deck(deck).to_mechanism().bodies.values()
+    np.testing.assert_allclose(body.origin.model.frequencies, model.frequencies, rtol=1e-9)
+    np.testing.assert_allclose(body.mass, model.properties.mass, rtol=1e-9)

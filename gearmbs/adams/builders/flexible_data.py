@@ -83,7 +83,11 @@ def _neutral_file(deck: Deck, s: st.FlexBody) -> ModalNeutralFile:
     from gearmbs.flexible import FlexibleError, read_mnf
 
     if s.mnf_file is None:
-        raise ValueError("MNF_FILE is missing; bodies from MATRICES alone, MD DB and BDF files are not read")
+        raise ValueError(
+            "MNF_FILE is missing; bodies from MATRICES alone, whose order and layout are not published, MD DB and BDF "
+            "files are not read. Write MNF_FILE = the body's modal neutral file; of matrices with a table of nodes one "
+            "is made by gearmbs.flexible: write_mnf(path, mnf_of(reduce_model(from_matrices(k, m, positions), faces)))"
+        )
     path = Path(s.mnf_file.replace("\\", "/"))
     if "://" in s.mnf_file:
         raise ValueError(f"MNF_FILE = {s.mnf_file}: no database of ADAMS/Car is looked up; give the path of the file")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 WIDTH = 78
 """Characters in a line."""
@@ -48,3 +49,8 @@ def _break(text: str, limit: int, is_list: bool) -> int:
         elif text[k - 1] in "+-*/" and text[k - 2] == " ":
             operator = k
     return comma if is_list else operator or comma
+
+
+def upper(key: Any) -> Any:
+    """Return the name of a part as expressions have it, in capital letters; a number as it is."""
+    return key.upper() if isinstance(key, str) else key
