@@ -171,3 +171,39 @@ END
     assert result.success
     (told,) = result.messages
     assert told.startswith("PTCV/1: at TIME = 0.6 it is off the end of its curve")
+
+
+CAM = """PART/2, MASS=1, CM=20, IP=1,1,1
+MARKER/20, PART=2
+JOINT/1, REVOLUTE, I=20, J=1{ic}
+{drive}
+PART/3, MASS=1, CM=30, IP=1,1,1, QG=0,0.9539392014169456,0
+MARKER/30, PART=3
+MARKER/31, PART=3, REULER=0,90D,0
+MARKER/15, PART=1, REULER=0,90D,0
+MARKER/23, PART=2, QP=0.3,0,0
+JOINT/2, TRANSLATIONAL, I=31, J=15
+CURVE/1, CLOSED, MATRIX=1
+PTCV/1, I=30, CURVE=1, RM=23{vel}
+REQUEST/1, F2=DY(30,1)\\F3=VY(30,1)\\F4=WZ(20,1)
+END
+"""
+
+
+def cam(**given):
+    text = CAM.format(**({"ic": "", "drive": "", "vel": ""} | given))
+    return run_deck(parse_deck(HEAD.format("METER") + matrix(1, 1.0, 1.0) + text), end=0.5, steps=10, tol=1e-9)
+
+
+def test_a_speed_that_contradicts_what_drives_the_cam_is_left_out():
+    drive = "MOTION/1, JOINT=1, FUNCTION=3*TIME"
+    expected, found = cam(drive=drive), cam(drive=drive, vel=", VEL=0")
+    assert not expected.messages
+    (told,) = found.messages
+    assert "PTCV/1: VEL is left out" in told
+    np.testing.assert_allclose(found.request(1), expected.request(1), atol=1e-8)
+    # over the cam the point runs back as fast as the cam turns
+    alone = cam(ic=", IC=0,3")
+    assert alone.request(1)[0, 1:4] == pytest.approx([math.sqrt(0.91), 0.9, 3.0], abs=1e-4)
+    free = cam(vel=", VEL=-3")
+    assert free.request(1)[0, 3] == pytest.approx(3.0, abs=2e-3)

@@ -7,25 +7,73 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from gearmbs.adams.builders.model import AdamsModel, BodyState
+from gearmbs.adams.errors import ERROR, WARNING, DeckError, Diagnostic
+from gearmbs.adams.parse import statements as st
 from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
+from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.functions import polynomial
+from gearmbs.mechanism.joints import Joint
 from gearmbs.mechanism.modal import ModalBody
 
 
 def with_initial_motions(model: AdamsModel) -> dict[tuple[str, int], BodyState]:
-    """Return the state in which every joint with initial conditions has them."""
+    """Return the state in which every joint with initial conditions has them.
+
+    Speeds along curves that contradict the others are left out, with a remark in the deck: where something else
+    drives the point, there is no choice.
+
+    Raises
+    ------
+    DeckError
+        If those of joints cannot be met.
+    """
+    deck, sources = model.deck, model.sources
+    of_joints = [m for m in model.initial_motions if not isinstance(sources[m[0].name], st.Ptcv)]
+    along = [sources[m[0].name] for m in model.initial_motions if m not in of_joints]
+    if along:
+        try:
+            return _started(model, model.initial_motions)
+        except ModelError:
+            for s in along:
+                message = f"{s.label()}: VEL is left out: it contradicts other constraints, motions or initial speeds"
+                deck.diagnostics.append(Diagnostic(WARNING, message, deck.file, s.given["vel"]))
+    try:
+        return _started(model, of_joints)
+    except ModelError as error:
+        joint = sources[of_joints[0][0].name] if of_joints else along[0]
+        message = f"{joint.label()}: its initial conditions cannot be met: {error}"
+        raise DeckError([Diagnostic(ERROR, message, deck.file, joint.line)]) from error
+
+
+Motions = Sequence[tuple[Joint, str, tuple[float, ...]]]
+
+
+def _started(model: AdamsModel, motions: Motions) -> dict[tuple[str, int], BodyState]:
+    """Return the state with some initial motions, which the mechanism then has; without them if they do not go.
+
+    Raises
+    ------
+    ModelError
+        If they cannot be met.
+    """
     units = model.deck.units
     mechanism = model.mechanism
-    for k, (joint, kind, value) in enumerate(model.initial_motions):
+    made = []
+    for k, (joint, kind, value) in enumerate(motions):
         rate = value[1] if len(value) > 1 else 0.0
         name = f"initial condition {k + 1} of {joint.name}"
         if kind == "rotation":
-            mechanism.rotation(name, joint, polynomial([value[0], rate / units.time]))
+            made.append(mechanism.rotation(name, joint, polynomial([value[0], rate / units.time])))
         else:
             start, speed = value[0] * units.length, rate * units.factor("velocity")
-            mechanism.translation(name, joint, polynomial([start, speed]))
-    system = mechanism.compile(0.0)
-    system.initialise()
+            made.append(mechanism.translation(name, joint, polynomial([start, speed])))
+    try:
+        system = mechanism.compile(0.0)
+        system.initialise()
+    except ModelError:
+        for motion in made:
+            del mechanism.joints[motion.name]
+        raise
     return part_states(model, system.pose)
 
 

@@ -16,10 +16,9 @@ from gearmbs.adams.builders.forces import FORCES
 from gearmbs.adams.builders.initial import with_initial_motions
 from gearmbs.adams.builders.modal_forces import add_mforce
 from gearmbs.adams.builders.model import AdamsModel, BodyState
-from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError, Diagnostic
+from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, DeckError
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism import Mechanism
 
 DEFORMING: dict[type, Maker] = {st.FlexBody: add_flex_body, st.FePart: add_fe_part}
@@ -34,13 +33,7 @@ def build_mechanism(
     """Return the mechanism a deck describes, its joints with the initial conditions given; see :func:`build_model`."""
     model = build_model(deck, allow_unsupported, inactive)
     if model.initial_motions:
-        try:
-            start = with_initial_motions(model)
-        except ModelError as error:
-            joint = model.sources[model.initial_motions[0][0].name]
-            message = f"{joint.label()}: its initial conditions cannot be met: {error}"
-            raise DeckError([Diagnostic(ERROR, message, deck.file, joint.line)]) from error
-        model = build_model(deck, allow_unsupported, inactive, start)
+        model = build_model(deck, allow_unsupported, inactive, with_initial_motions(model))
     return model.mechanism
 
 
