@@ -20,7 +20,7 @@ def test_robertson_over_eleven_decades(tol, method):
     problem = robertson()
     result = solve_dae(problem.fun, SPAN, problem.y0, rtol=tol, atol=tol * problem.atol, t_eval=[1e11], method=method)
     assert result.success, result.message
-    assert problem.error(result.y[-1]) < 60.0 * tol
+    assert problem.error(result.y[-1]) < min(60.0 * tol, 20.0 * tol + 2e-7)
     ida = solve_dae(
         problem.fun, SPAN, problem.y0, rtol=tol, atol=tol * problem.atol, t_eval=[1e11], method="IDA", max_steps=100_000
     )
