@@ -179,3 +179,26 @@ def test_a_compiled_routine_that_reads_beyond_its_arrays_is_named():
     assert line == 8
     assert told.startswith("VARIABLE/1: its routine fails: index 0 is out of bounds")
     assert told.endswith("a compiled function is given time, x, xd, u and parameters")
+
+
+SETS = {
+    "DISP": ("DX(20,30,30)", "DY(20,30,30)", "DZ(20,30,30)", "PSI(20,30)", "THETA(20,30)", "PHI(20,30)"),
+    "RDISP": ("PSI(20,30)", "THETA(20,30)", "PHI(20,30)"),
+    "VEL": ("VX(20,30,30,30)", "VY(20,30,30,30)", "VZ(20,30,30,30)", "WX(20,30,30)", "WY(20,30,30)", "WZ(20,30,30)"),
+    "RVEL": ("WX(20,30,30)", "WY(20,30,30)", "WZ(20,30,30)"),
+    "ACC": ("ACCX(20,30,30,30)", "ACCY(20,30,30,30)", "ACCZ(20,30,30,30)", "WDTX(20,30,30,30)", "WDTY(20,30,30,30)",
+            "WDTZ(20,30,30,30)"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_sets_of_quantities_take_all_the_markers_of_adams(name):
+    """I, J, K and L are given alike to all of a set, as ADAMS does, whose angles and spins take fewer."""
+    ids = (20, 30, 30, 30)[: 3 if "DISP" in name else 4]
+    text = "PART/3, MASS=1, CM=30, IP=1,1,1, QG=1,0,0, WZ=0.7, VX=0.2\nMARKER/30, PART=3, REULER=10D,20D,30D\n"
+    text += "BUSHING/1, I=20, J=30, K=9,8,7, KT=3,2,1, C=0,0,0, CT=0,0,0\nREQUEST/1, FUNCTION=USER(1)\nREQUEST/2"
+    for k, function in enumerate(SETS[name], 1):
+        text += ("\n, " if k == 1 else "\\\n, ") + f"F{k}={function}"
+    found = run(text, {"reqsub": lambda call: (*call.sysary(name, *ids), *[0.0] * (8 - len(SETS[name])))})
+    assert np.ptp(found.request(2)[:, : len(SETS[name])], axis=0).min() > 1e-3
+    np.testing.assert_array_equal(found.request(1), found.request(2))

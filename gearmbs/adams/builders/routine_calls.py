@@ -36,6 +36,8 @@ SYSARY = {
     "RFORCE": ("TX", "TY", "TZ"),
 }
 """Functions of a set of values that SYSARY returns by its name."""
+MOST_IDS = {"PSI": 2, "THETA": 2, "PHI": 2, "WX": 3, "WY": 3, "WZ": 3}
+"""Ids that these functions take of those of their set, which are I, J, K and L."""
 ARRAYS = ("ARRAY", "X", "Y", "U")
 """Names under which SYSARY returns the values of an ARRAY."""
 
@@ -107,6 +109,8 @@ class RoutineCall:
     def sysary(self, name: str, *ids: int) -> tuple[float, ...]:
         """Return a set of values by its name, for instance ``sysary("TDISP", 12, 10, 10)``: DX, DY, DZ.
 
+        Ids are those of markers I, J, K along whose axes components are taken, and L in whose frame rates are seen.
+
         ``sysary("ARRAY", 3)`` returns what ARRAY/3 holds: numbers, variables, states or outputs.
         """
         if name.upper() in ARRAYS:
@@ -114,7 +118,8 @@ class RoutineCall:
             return tuple(self.sysfnc("ARYVAL", number, k + 1) for k in range(self._size(number)))
         if name.upper() not in SYSARY:
             raise ValueError(f"SYSARY has no {name!r}; it has {', '.join((*SYSARY, *ARRAYS))}")
-        return tuple(self.sysfnc(one, *ids) for one in SYSARY[name.upper()])
+        given = _flat(ids)
+        return tuple(self.sysfnc(one, *given[: MOST_IDS.get(one)]) for one in SYSARY[name.upper()])
 
     def gtaray(self, number: int) -> tuple[float, ...]:
         """Return the numbers of an ARRAY."""
