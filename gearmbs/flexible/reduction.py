@@ -99,6 +99,7 @@ def reduce_model(
     m = sp.csc_array(parts.expand.T @ model.mass @ parts.expand)
     count = internal if internal is not None else modes if modes is not None else 20
     rigid = _rigid_of(model, parts)
+    static = None
     if method == "free":
         basis = np.hstack([free_modes(k, m, rigid, count)[1], attachment_modes(k, m, rigid, parts.constraints)])
     else:
@@ -106,7 +107,8 @@ def reduce_model(
         while count < held_values.size and _same(held_values, count):
             count += 1
         held = held[:, :count]
-        basis = np.hstack([constraint_modes(k, parts.constraints), held])
+        static = constraint_modes(k, parts.constraints)
+        basis = np.hstack([static, held])
     values, shapes = orthonormal(k, m, basis, rigid)
     if preload is not None:
         full = parts.expand @ shapes
@@ -132,7 +134,7 @@ def reduce_model(
                 stacklevel=3,
             )
         keep = keep[:whole]
-    exact = {} if preload is not None else static_flexibility(k, m, rigid, parts)
+    exact = {} if preload is not None else static_flexibility(k, m, rigid, parts, static)
     if keep.size == 0:
         raise FlexibleError(
             f"{model.name}: no mode is below max_frequency = {limit} Hz; "
@@ -350,12 +352,26 @@ def attachment_modes(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, constr
     return np.column_stack([solve(balanced[:, c])[: k.shape[0]] for c in range(b)])
 
 
-def static_flexibility(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, parts: Resolved) -> dict[str, np.ndarray]:
-    """Return how each seat of the free body moves and turns by unit loads there, (6, 6); NaN where it does not."""
+def static_flexibility(
+    k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, parts: Resolved, static: np.ndarray | None = None
+) -> dict[str, np.ndarray]:
+    """Return how each seat of the free body moves and turns by unit loads there, (6, 6); NaN where it does not.
+
+    With the static shapes of the interfaces, if they are given, no more is solved than the responses of the held body
+    to the inertia of rigid motions: loads at the seats, balanced by inertia, deform the body in the span of both.
+    """
     if not parts.places:
         return {}
-    shapes = attachment_modes(k, m, rigid, parts.constraints)
     inertial = m @ rigid
+    if static is None:
+        shapes = attachment_modes(k, m, rigid, parts.constraints)
+    else:
+        solve = _saddle(k, parts.constraints)
+        span = np.hstack([static, *(solve(column)[: k.shape[0], None] for column in inertial.T)])
+        span = span - rigid @ np.linalg.solve(rigid.T @ inertial, inertial.T @ span)
+        span /= np.linalg.norm(span, axis=0).clip(min=1e-300)
+        loads = parts.constraints @ span
+        shapes = span @ np.linalg.lstsq(span.T @ (k @ span), loads.T, rcond=1e-13)[0]
     shapes = shapes - rigid @ np.linalg.solve(rigid.T @ inertial, inertial.T @ shapes)
     whole = parts.constraints @ shapes
     out = {}
