@@ -88,6 +88,7 @@ CIRCLES = {
     ("mechanism.analyses", "mechanism.compile", "mechanism.friction", "mechanism.locked", "mechanism.lumping",
      "mechanism.measures", "mechanism.mechanism", "mechanism.redundancy", "mechanism.simulate"):
         "methods of Mechanism, and the functions that carry them out",
+    ("flexible.modal_model", "flexible.point_shapes"): "methods of ModalModel, and the functions that carry them out",
     ("adams.builders.accelerations", "adams.builders.builder", "adams.builders.constraints", "adams.builders.contacts",
      "adams.builders.control", "adams.builders.curve_data", "adams.builders.curves", "adams.builders.data_calls",
      "adams.builders.element_pairs", "adams.builders.fe_parts",

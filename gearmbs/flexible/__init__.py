@@ -19,13 +19,14 @@ if TYPE_CHECKING:
     from gearmbs.flexible.matrix_text import read_nodes
     from gearmbs.flexible.mnf import mnf_of, read_mnf, write_mnf
     from gearmbs.flexible.mnf_content import ModalNeutralFile
-    from gearmbs.flexible.modal_model import ModalModel, Seat
+    from gearmbs.flexible.modal_model import ModalModel
     from gearmbs.flexible.nastran import read_op2, read_op4
     from gearmbs.flexible.nastran_modes import read_op2_modes
     from gearmbs.flexible.nastran_stress import read_op2_stresses
     from gearmbs.flexible.reduction import reduce_model
     from gearmbs.flexible.reduction_check import ReductionReport, check_reduction
     from gearmbs.flexible.rotor import Campbell, Rotor, Support, UnbalanceResponse, WhirlModes
+    from gearmbs.flexible.seats import Seat
     from gearmbs.flexible.shaft import Disc, Shaft, ShaftSection
     from gearmbs.flexible.solid import block_mesh, nodes_where, ring_mesh, solid_model
     from gearmbs.flexible.stress import StressModes
@@ -101,7 +102,7 @@ late(
         "ModelReport": ".check",
         "ReductionReport": ".reduction_check",
         "Rotor": ".rotor",
-        "Seat": ".modal_model",
+        "Seat": ".seats",
         "Shaft": ".shaft",
         "ShaftSection": ".shaft",
         "StressModes": ".stress",

@@ -17,7 +17,8 @@ from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.mnf_bytes import Reader, floats_bytes, ints_bytes, record_bytes, text_bytes
 from gearmbs.flexible.mnf_check import check_numbers
 from gearmbs.flexible.mnf_content import SI, ModalNeutralFile
-from gearmbs.flexible.modal_model import ModalModel, Seat
+from gearmbs.flexible.modal_model import ModalModel
+from gearmbs.flexible.seats import Seat
 from gearmbs.progress import waiting
 
 SAME = 1e-12

@@ -8,7 +8,8 @@ import numpy as np
 
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import MassProperties
-from gearmbs.flexible.modal_model import ModalModel, Seat
+from gearmbs.flexible.modal_model import ModalModel
+from gearmbs.flexible.seats import Seat
 from gearmbs.flexible.stress import StressModes
 from gearmbs.flexible.stress_recovery import KnownStresses
 from gearmbs.mechanism import ShapeIntegrals

@@ -12,15 +12,13 @@ import numpy.typing as npt
 from gearmbs.flexible.damping import Damping, damping_ratios
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import MassProperties
+from gearmbs.flexible.point_shapes import section_motion, shapes_at
+from gearmbs.flexible.seats import REACH, Seat
 from gearmbs.flexible.stress import StressModes, StressRecovery
 from gearmbs.flexible.stress_recovery import KnownStresses
 from gearmbs.flexible.surface import BodySurface, faceted_surface, hull_surface, revolved_surface
 from gearmbs.mechanism import Mechanism, ModalBody, Mode, ShapeIntegrals
 from gearmbs.mechanism.modal import COUPLING, ShapedMarker
-
-REACH = 1e-4
-"""How far a marker may be from a node, as a share of the body's size."""
-
 
 LEVELS = (*COUPLING, "rigid")
 """Levels of coupling between deformation and motion, from all terms to none."""
@@ -32,30 +30,6 @@ SPIN_SHARE = 0.3 * 0.157
 """Spin across the long axis, as a share of the first frequency of the free body, above which stiffening is missed.
 
 That is 0.3 of the first frequency of the same bar held at one end, which is 0.157 of its free one."""
-
-
-@dataclass(frozen=True, eq=False)
-class Seat:
-    """A named place of a modal body.
-
-    Attributes
-    ----------
-    position : ndarray, shape (3,)
-        m, in the frame of the nodes.
-    moved, turned : ndarray, shape (n, 3)
-        Displacement and rotation by one unit of each mode.
-    turns : bool
-        Whether its rotation is known.
-    flexibility : ndarray, shape (6, 6), optional
-        Displacement and rotation by unit forces and torques there, of the finite elements free in space, m/N and rad/(N
-        m); NaN in directions that the seat lacks.
-    """
-
-    position: np.ndarray
-    moved: np.ndarray
-    turned: np.ndarray
-    turns: bool = True
-    flexibility: np.ndarray | None = None
 
 
 class Origin(NamedTuple):
@@ -152,55 +126,9 @@ class ModalModel:
         Raises
         ------
         FlexibleError
-            If no node is near.
+            If no node is near, or seats are there that move differently.
         """
-        point = np.asarray(point, dtype=float)
-        here = {
-            key: seat
-            for key, seat in self.seats.items()
-            if seat.turns and np.linalg.norm(seat.position - point) <= REACH * self.size
-        }
-        if here:
-            first, *others = here.values()
-            if any(
-                not np.array_equal(first.moved, s.moved) or not np.array_equal(first.turned, s.turned) for s in others
-            ):
-                raise FlexibleError(
-                    f"{self.name}: the seats {', '.join(here)} are at one place and move differently; "
-                    "make the marker by its seat's name: seat_marker(body, name)"
-                )
-            return first.moved, first.turned
-        if self.line:
-            return self._on_line(point)
-        distance = np.linalg.norm(self.positions - point, axis=1)
-        k = int(np.argmin(distance))
-        if distance[k] > REACH * self.size:
-            raise FlexibleError(
-                f"{self.name}: there is no node at {np.array2string(point, precision=6)} m; the nearest, "
-                f"{self.ids[k]}, is {distance[k]:.4g} m away. Put the marker on a node, place(number), or "
-                f"reduce with an interface there"
-            )
-        if self.turned is not None:
-            return self.moved[:, k], self.turned[:, k]
-        return self.moved[:, k], self._fitted(k, distance)
-
-    def _fitted(self, k: int, distance: np.ndarray) -> np.ndarray:
-        """Return the rotation of the nearest neighbours of a node by least squares."""
-        near = np.argsort(np.linalg.norm(self.positions - self.positions[k], axis=1))[: min(9, len(self.ids))]
-        arm = self.positions[near] - self.positions[k]
-        if np.linalg.matrix_rank(arm, tol=1e-6 * max(self.size, 1e-300)) < 2:
-            return np.zeros((self.modes, 3))
-        moved = self.moved[:, near] - self.moved[:, k : k + 1]
-        rows = np.zeros((arm.shape[0], 3, 3))
-        for c in range(3):
-            rows[:, :, c] = np.cross(np.eye(3)[c], arm)
-        solved, *_ = np.linalg.lstsq(rows.reshape(-1, 3), moved.reshape(self.modes, -1).T, rcond=None)
-        return solved.T
-
-    def _on_line(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the motion of a point that turns with its section of a beam."""
-        moved, turned = self.section_motion(point[2])
-        return moved + np.cross(turned, np.array([point[0], point[1], 0.0])), turned
+        return shapes_at(self, point)
 
     def section_motion(self, at: float) -> tuple[np.ndarray, np.ndarray]:
         """Return displacement of the middle, and rotation, of the section of a beam at z, by each mode, each (n, 3).
@@ -210,27 +138,7 @@ class ModalModel:
         FlexibleError
             Off the shaft.
         """
-        z = self.positions[:, 2]
-        if not z[0] - REACH * self.size <= at <= z[-1] + REACH * self.size:
-            raise FlexibleError(
-                f"{self.name}: z = {at:.6g} m is off the shaft, which reaches from {z[0]:.6g} to {z[-1]:.6g} m"
-            )
-        k = int(np.clip(np.searchsorted(z, at) - 1, 0, z.size - 2))
-        length = z[k + 1] - z[k]
-        x = np.clip((at - z[k]) / length, 0.0, 1.0)
-        a, b = self.moved[:, k], self.moved[:, k + 1]
-        assert self.turned is not None
-        ta, tb = self.turned[:, k], self.turned[:, k + 1]
-        moved, turned = (1 - x) * a + x * b, (1 - x) * ta + x * tb
-        h = [1 - 3 * x**2 + 2 * x**3, x - 2 * x**2 + x**3, 3 * x**2 - 2 * x**3, x**3 - x**2]
-        g = [6 * x * (x - 1), 1 - 4 * x + 3 * x**2, -6 * x * (x - 1), 3 * x**2 - 2 * x]
-        moved, turned = moved.copy(), turned.copy()
-        for plane, axis, sign in ((0, 1, 1.0), (1, 0, -1.0)):
-            ends = (a[:, plane], sign * length * ta[:, axis], b[:, plane], sign * length * tb[:, axis])
-            moved[:, plane] = sum(w * e for w, e in zip(h, ends))
-            # slopes with shear differ from rotations: keep the nodes' rotations, the field's change between
-            turned[:, axis] = sign / length * sum(w * e for w, e in zip(g, ends))
-        return moved, turned
+        return section_motion(self, at)
 
     def selected(self, chosen: npt.ArrayLike) -> ModalModel:
         """Return the body with some of its modes, counted from 0."""

@@ -22,7 +22,8 @@ from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
 from gearmbs.flexible.integrals import lumps, shape_integrals
 from gearmbs.flexible.interfaces import Interface, Resolved, resolve
-from gearmbs.flexible.modal_model import ModalModel, Seat
+from gearmbs.flexible.modal_model import ModalModel
+from gearmbs.flexible.seats import Seat
 from gearmbs.mechanism.quantities import quantity
 from gearmbs.progress import waiting
 from gearmbs.units import Quantity

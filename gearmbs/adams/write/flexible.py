@@ -52,7 +52,7 @@ def flex_body_arguments(
     """
     from gearmbs.flexible.errors import FlexibleError
     from gearmbs.flexible.mnf import mnf_of, with_seat_nodes, write_mnf
-    from gearmbs.flexible.modal_model import Seat
+    from gearmbs.flexible.seats import Seat
 
     label = f"body '{body.name}'"
     origin = body.origin
