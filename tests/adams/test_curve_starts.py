@@ -207,3 +207,24 @@ def test_a_speed_that_contradicts_what_drives_the_cam_is_left_out():
     assert alone.request(1)[0, 1:4] == pytest.approx([math.sqrt(0.91), 0.9, 3.0], abs=1e-4)
     free = cam(vel=", VEL=-3")
     assert free.request(1)[0, 3] == pytest.approx(3.0, abs=2e-3)
+
+
+def test_the_message_file_says_how_given_velocities_were_changed(tmp_path):
+    """Two shafts of 1 and 2 kg m^2, the second to turn back half as fast: 2 rad/s of the first do not fit."""
+    text = """PART/2, MASS=2, CM=20, IP=1,1,1, WZ=2
+MARKER/20, PART=2
+JOINT/1, REVOLUTE, I=20, J=1
+PART/3, MASS=1, CM=30, IP=2,2,2, QG=1,0,0
+MARKER/30, PART=3
+MARKER/31, PART=1, QP=1,0,0
+JOINT/2, REVOLUTE, I=30, J=31
+COUPLER/1, JOINTS=1,2, SCALES=1,2
+END
+"""
+    told = []
+    for spin in ("", ", WZ=-1"):
+        changed = text.replace("QG=1,0,0\n", f"QG=1,0,0{spin}\n", 1)
+        run_deck(parse_deck(HEAD.format("METER") + changed), end=0.1, steps=1, out=tmp_path / "shafts")
+        told.append((tmp_path / "shafts.msg").read_text())
+    assert "which did not fit the constraints: 4.000E-01 rad/sec (PART/2)." in told[0]
+    assert "changes of given velocities" not in told[1]

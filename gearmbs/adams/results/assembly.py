@@ -14,6 +14,11 @@ FAR = 1e-3
 TURNED = np.deg2rad(0.1)
 """Rotation worth a warning, rad."""
 
+ROUNDED = 1e-9
+"""Change of a velocity, of it, that is none."""
+GIVEN = frozenset("vx vy vz wx wy wz".split())
+"""Arguments by which a statement gives velocities."""
+
 
 @dataclass(frozen=True)
 class Assembly:
@@ -29,6 +34,10 @@ class Assembly:
         Which parts they are, "" without any.
     far : bool
         Whether that is more than the rounded numbers of a deck explain.
+    speed, spin : float
+        Largest changes of velocities that the deck gives, in its units.
+    fastest, most_spun : str
+        Which parts they are, "" if none was changed.
     """
 
     distance: float = 0.0
@@ -36,6 +45,10 @@ class Assembly:
     farthest: str = ""
     most_turned: str = ""
     far: bool = False
+    speed: float = 0.0
+    spin: float = 0.0
+    fastest: str = ""
+    most_spun: str = ""
 
     def remark(self, time: float, unit: str) -> str:
         """Return a sentence on parts that were moved far, "" when none was."""
@@ -50,7 +63,7 @@ class Assembly:
 def assembly_of(model: AdamsModel, solution: Solution) -> Assembly:
     """Compare where the parts were put with where a solution starts."""
     bodies = model.mechanism.bodies
-    distances, angles = {}, {}
+    distances, angles, speeds, spins = {}, {}, {"": 0.0}, {"": 0.0}
     for name, body in bodies.items():
         if name not in model.sources:
             # a runner on a curve, which is no part
@@ -60,6 +73,9 @@ def assembly_of(model: AdamsModel, solution: Solution) -> Assembly:
         # |A - B| = 2 sqrt(2) sin(angle/2)
         apart = float(np.linalg.norm(solution.orientation(name)[0] - body.orientation))
         angles[label] = 2.0 * float(np.arcsin(min(1.0, apart / np.sqrt(8.0))))
+        if GIVEN & set(model.sources[name].given):
+            speeds[label] = _change(body.centre_of_mass()[1], solution.com_velocity(name)[0])
+            spins[label] = _change(body.angular_velocity, solution.angular_velocity(name)[0])
     if not bodies:
         return Assembly()
     places = np.array([m.global_position() for m in markers_of(model.mechanism)])
@@ -67,4 +83,15 @@ def assembly_of(model: AdamsModel, solution: Solution) -> Assembly:
     farthest, most_turned = max(distances, key=distances.__getitem__), max(angles, key=angles.__getitem__)
     distance, angle = distances[farthest], angles[most_turned]
     far = distance > FAR * size or angle > TURNED
-    return Assembly(distance / model.deck.units.length, angle, farthest, most_turned, far)
+    fastest, most_spun = max(speeds, key=speeds.__getitem__), max(spins, key=spins.__getitem__)
+    units = model.deck.units
+    return Assembly(
+        distance / units.length, angle, farthest, most_turned, far, speeds[fastest] / units.factor("velocity"),
+        spins[most_spun] / units.factor("angular_velocity"), fastest, most_spun,
+    )  # fmt: skip
+
+
+def _change(given: np.ndarray, found: np.ndarray) -> float:
+    """Return by how much a velocity differs from that given, 0 where only by rounding."""
+    change = float(np.linalg.norm(found - given))
+    return change if change > ROUNDED * float(np.linalg.norm(given)) else 0.0

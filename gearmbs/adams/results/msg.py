@@ -141,8 +141,17 @@ def _initial_conditions(result: RunRecord, segment: Segment, time: float) -> lis
             )
         out.append(f"  Assembled in {report.position_iterations} iterations{largest}.")
     out += ["", "  End Displacement Initial Conditions", ""]
+    changed = segment.assembly
     for what in ("Velocity", "Acceleration"):
-        out += ["", f"  Begin {what} Initial Conditions", "", "", f"  End {what} Initial Conditions", ""]
+        out += ["", f"  Begin {what} Initial Conditions", ""]
+        if what == "Velocity" and changed is not None and changed.speed + changed.spin > 0.0:
+            both = (
+                (changed.speed, result.unit("velocity"), changed.fastest),
+                (changed.spin, result.unit("angular_velocity"), changed.most_spun),
+            )
+            largest = " and ".join(f"{size:.3E} {unit} ({part})" for size, unit, part in both if size > 0.0)
+            out.append(f"  Largest changes of given velocities, which did not fit the constraints: {largest}.")
+        out += ["", f"  End {what} Initial Conditions", ""]
     if np.any(~np.isfinite(segment.solution.com_acceleration(segment.solution.system.body_names[0])[0])):
         out.append("  The initial accelerations are not finite.")
     return out
