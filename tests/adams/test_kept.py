@@ -45,8 +45,9 @@ def test_interrupted_scripts_keep_what_ran(tmp_path, monkeypatch):
     script = parse_script("SIM/DYN, END=0.1, STEPS=10\nLINEAR/EIGENSOL\n")
     with pytest.raises(KeyboardInterrupt, match="stopped by hand"):
         run_deck(parse_deck(model(FREE)), script, tmp_path / "run")
-    assert "stopped by hand" in (tmp_path / "run.msg").read_text()
-    with xr.open_dataset(tmp_path / "run.nc", engine="h5netcdf") as data:
+    message = (tmp_path / "run.msg").read_text()
+    assert "was interrupted at TIME = 0.1, in command LINEAR/EIGENSOL" in message
+    with xr.open_dataset(tmp_path / "run.partial.nc", engine="h5netcdf") as data:
         assert data.sizes["time"] == 11
 
 
