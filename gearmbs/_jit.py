@@ -2,7 +2,7 @@
 
 numba's own ``njit`` with a signature compiles or loads at decoration, so that importing a module costs as much as using
 all of it; it compiles every helper as if Python called it; and its cache sees only the file a function stands in. A
-`Kernel` is a dispatcher that differs in these four points:
+`Kernel` is a dispatcher that differs in these five points:
 
 * A declared signature is looked at when the kernel is first called or first compiled into a caller.
 * A kernel that Python calls is an *entry*: machine code with a wrapper for Python. A kernel that kernels call is a
@@ -10,6 +10,7 @@ all of it; it compiles every helper as if Python called it; and its cache sees o
 * Entries and parts are kept in `gearmbs._kernel_cache` under a digest of all they are made of: their own code, the code
   of the kernels they call, and the constants they name. What has not changed is never compiled again, and nothing
   that has changed is ever found.
+* A kernel may be *late*: its callers find it when they first call it; see `gearmbs._late_kernels`.
 * An index that is computed counts from the start of an array; see `gearmbs._counted_indices`.
 
 The decorator is used like numba's. Literal integers among the arguments count as plain integers, so that a helper
@@ -32,10 +33,11 @@ from numba.core.untyped_passes import ExtractByteCode
 from gearmbs import _kernel_cache as cache
 from gearmbs._counted_indices import CountedIndices
 from gearmbs._kernel_library import EntryLibrary, PartLibrary
+from gearmbs._late_kernels import late_part
 from gearmbs.compile import compile_missing
 
 
-def njit(signature_or_function: Any = None, *, cache: bool = False, **options: Any) -> Any:
+def njit(signature_or_function: Any = None, *, cache: bool = False, late: bool = False, **options: Any) -> Any:
     """Compile a function for use from Python and from other kernels.
 
     Parameters
@@ -44,6 +46,9 @@ def njit(signature_or_function: Any = None, *, cache: bool = False, **options: A
         As of `numba.njit`: the function, or one signature, by type or as text.
     cache : bool
         Without it this is numba's own decorator: compiled at once and for this process only.
+    late : bool
+        Whether compiled callers look for the kernel when they first call it; see `gearmbs._late_kernels`. It needs a
+        signature.
     **options
         Further options of `numba.njit`: ``nogil``, ``error_model``, ``fastmath``, ``forceinline``.
 
@@ -56,7 +61,7 @@ def njit(signature_or_function: Any = None, *, cache: bool = False, **options: A
         return numba.njit(*arguments, **options)
     if callable(signature_or_function) and not sigutils.is_signature(signature_or_function):
         return Kernel(signature_or_function, None, options)
-    return lambda function: Kernel(function, signature_or_function, options)
+    return lambda function: Kernel(function, signature_or_function, options, late)
 
 
 class _Overloads(collections.OrderedDict):
@@ -83,10 +88,13 @@ class Kernel(CPUDispatcher):
         The only signature; without it the types of the arguments decide.
     options : dict
         Options of `numba.njit`.
+    late : bool
+        See `njit`.
     """
 
-    def __init__(self, function: Callable, declared: Any, options: dict[str, Any]) -> None:
+    def __init__(self, function: Callable, declared: Any, options: dict[str, Any], late: bool = False) -> None:
         self.declared = declared
+        self.late = late
         self.options = options
         self._normalised: tuple | None = None
         self._parts: dict[tuple, Any] = {}
@@ -169,7 +177,7 @@ class Kernel(CPUDispatcher):
             found = self._parts.get(args)
             if found is None:
                 with self._compiling_counter:
-                    found = self._parts[args] = self._part(args)
+                    found = self._parts[args] = late_part(self) if self.late else self._part(args)
                 self.targetctx.insert_user_function(found.key, found.fndesc, [found.library])
             return found
 
@@ -187,7 +195,7 @@ class Kernel(CPUDispatcher):
         return part
 
     def _compile(self, library: Any, args: tuple, result: Any, name: str) -> Any:
-        flags = compiler.Flags()
+        flags = _Flags()
         self.targetdescr.options.parse_as_flags(flags, self.targetoptions)
         library.customise(flags)
         code = library(self.targetctx.codegen(), self.py_func.__qualname__)
@@ -199,6 +207,21 @@ class Kernel(CPUDispatcher):
         if compiled.typing_error is not None:
             raise compiled.typing_error
         return compiled
+
+
+class _Flags(compiler.Flags):
+    """Numba's flags, compared in less time: it looks up each call of its own functions by all of them."""
+
+    __slots__ = ()
+
+    def __hash__(self) -> int:
+        return _HASH_OF_FLAGS
+
+    def __eq__(self, other: object) -> bool:
+        return (isinstance(other, _Flags) and self._values == other._values) or super().__eq__(other)
+
+
+_HASH_OF_FLAGS = hash(compiler.Flags())
 
 
 class _Pipeline(compiler.Compiler):

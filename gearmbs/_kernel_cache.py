@@ -36,7 +36,7 @@ from numba.core import config, dispatcher, serialize
 FORMAT = "3"
 """To be raised when the files or what they hold change."""
 
-MAKERS = ("_jit", "_counted_indices", "_kernel_library", "_kernel_cache")
+MAKERS = ("_jit", "_counted_indices", "_kernel_library", "_kernel_cache", "_late_kernels")
 """Modules of this package that make what is kept; an edit of theirs makes all of it anew."""
 
 OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
@@ -153,6 +153,9 @@ def _token(value: Any, names: list[str]) -> str:
         plain = value.py_func if isinstance(value, dispatcher.Dispatcher) else value
         if not _inside(plain.__module__):
             return f"{plain.__module__}.{plain.__qualname__}"
+        if getattr(value, "late", False):
+            # its callers hold its address only
+            return f"late {plain.__module__}:{plain.__name__} {_declared(value)}"
         # what a plain function stands for in compiled code is told elsewhere in its module
         return identity(value) + ("" if plain is not value else _source(plain.__module__))
     if isinstance(value, np.ndarray):

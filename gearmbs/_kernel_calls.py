@@ -70,9 +70,9 @@ def address(kernel: Kernel) -> str:
 
 @cache
 def callees(kernel: Kernel) -> tuple[Kernel, ...]:
-    """Return the kernels that a kernel names."""
+    """Return the kernels that a kernel names and is compiled with."""
     plain = kernel.py_func
-    return tuple(_kernels_of(set(_names(plain.__code__)), plain.__globals__))
+    return tuple(k for k in _kernels_of(set(_names(plain.__code__)), plain.__globals__) if not k.late)
 
 
 def below(kernel: Kernel) -> set[Kernel]:

@@ -43,6 +43,14 @@ class _Linked(JITCodeLibrary):
             self.lasting &= not isinstance(library, _Ready) and getattr(library, "lasting", True)
             super().add_linking_library(library)
 
+    def _optimize_functions(self, module: Any) -> None:
+        """Simplify what a module defines; numba also sets up passes for each function that it declares."""
+        module.data_layout = self._codegen._data_layout
+        manager, passes = self._codegen._function_pass_manager()
+        for function in module.functions:
+            if not function.is_declaration:
+                manager.run(function, passes)
+
     def _link_others(self) -> None:
         for library in dict.fromkeys(self._linking_libraries):
             self._reload_init.update(library._reload_init)

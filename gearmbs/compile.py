@@ -99,7 +99,8 @@ def compile_missing(kernel: Kernel) -> bool:
     if _failures or HELPER in os.environ or package != __package__ or not cache.writable(package):
         return False
     loaded = [name for name in list(sys.modules) if name.partition(".")[0] == package]
-    wanted = entries(kernels(loaded), loaded)
+    # who needs one late kernel needs others
+    wanted = [k for k in entries(kernels(loaded), loaded) if k.late == kernel.late]
     start = time.perf_counter()
     told = 0.0
 
@@ -110,7 +111,7 @@ def compile_missing(kernel: Kernel) -> bool:
             told = now
             print(f"gearmbs: {line.partition(' ')[0]} kernels after {now:.0f} s", file=sys.stderr, flush=True)
 
-    _say_once("compiling the numerical kernels that are needed, once")
+    _say_once("compiling numerical kernels that are not on disk yet; they are kept there")
     try:
         compile_entries([*{kernel, *wanted}], report)
     except (RuntimeError, OSError) as error:

@@ -15,7 +15,7 @@ import gearmbs
 ROOT = Path(gearmbs.__file__).parent
 
 SUPPORT = {"_command", "_counted_indices", "_deprecation", "_jit", "_kept", "_kernel_cache", "_kernel_calls",
-           "_kernel_library", "_lazy", "_shown", "compile", "progress", "saving", "units"}  # fmt: skip
+           "_kernel_library", "_late_kernels", "_lazy", "_shown", "compile", "progress", "saving", "units"}  # fmt: skip
 """Modules of the top that any package may use: compilation, lazy imports, how objects show themselves and are saved,
 progress, units."""
 

@@ -337,3 +337,51 @@ def test_kernels_as_arguments(package):
     expression = "sys.modules['smallpackage'].twice(callers.caller)"
     assert package.call(expression) == [15.0, ["caller", "scaled"]]
     assert package.call(expression) == [15.0, []]
+
+
+LATE = """
+
+@njit("float64(float64)", cache=True, late=True)
+def seldom(x):
+    if x < 0.0:
+        raise ValueError("negative")
+    return scaled(x)
+
+@njit("float64(float64)", cache=True)
+def cautious(x):
+    return x if 0.0 <= x < 10.0 else seldom(x)
+
+@njit("float64(float64)", cache=True, late=True)
+def impossible(x):
+    return x.nothing
+
+@njit("float64(float64)", cache=True)
+def hopeful(x):
+    return impossible(x) if x > 0.0 else x
+
+def tried(kernel, x):
+    try:
+        return kernel(x)
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+"""
+
+
+def test_late_kernels(package):
+    """What a caller need not call is not compiled for it; an edit of it leaves the caller as it is."""
+    package.edit("callers", "    return x[k]\n", "    return x[k]\n" + LATE)
+    assert package.call("callers.cautious(3.0)") == [3.0, ["cautious"]]
+    assert package.call("callers.cautious(11.0)") == [22.0, ["scaled", "seldom"]]
+    assert package.call("[callers.cautious(11.0), callers.cautious(12.0)]") == [[22.0, 24.0], []]
+    assert package.call("callers.tried(callers.cautious, -1.0)") == ["ValueError: negative", []]
+    package.edit("numbers", "FACTOR = 2.0", "FACTOR = 3.0")
+    assert package.call("callers.cautious(3.0)") == [3.0, []]
+    assert package.call("callers.cautious(11.0)") == [33.0, ["scaled", "seldom"]]
+
+
+def test_late_kernels_that_cannot_be_compiled(package):
+    """The caller raises an error, and does so again when it is called again."""
+    package.edit("callers", "    return x[k]\n", "    return x[k]\n" + LATE)
+    answer, _ = package.call("[callers.hopeful(-1.0), *[callers.tried(callers.hopeful, 1.0) for _ in range(2)]]")
+    expected = "RuntimeError: smallpackage.callers:impossible could not be compiled; what went wrong was printed"
+    assert answer == [-1.0, expected, expected]

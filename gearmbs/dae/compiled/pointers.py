@@ -18,6 +18,7 @@ from numba.extending import intrinsic
 VEC = types.float64[::1]
 MAT = types.float64[:, ::1]
 IVEC = types.int64[::1]
+IMAT = types.int64[:, ::1]
 F8 = types.float64
 I8 = types.int64
 

@@ -10,8 +10,10 @@ per output time, it gives reaction forces that are free of the integrator's nois
 from __future__ import annotations
 
 import numpy as np
+from numba import types
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.pointers import F8, I8, IVEC, VEC
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
@@ -88,7 +90,7 @@ def apply_load(b, sign, row, wrench, at, marker_body, kin, frame, partial, scrat
         rhs[k + 3 + c] += sign * (s[3 + c] + wrench[3 + c])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(types.UniTuple(F8, 4)(I8, F8, VEC, T.TABLES, VEC), cache=True, late=True, error_model="numpy")
 def tape_row_rates(k, t, y, tab, room):
     """Return value, rate, partial time derivative and quadratic part of a row given by tape k.
 
@@ -174,7 +176,7 @@ def put_inertia(mode, slot, vals, k, i, mass, j):
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(I8(I8, IVEC, VEC, I8, VEC, IVEC, VEC, VEC, VEC, VEC), cache=True, late=True, error_model="numpy")
 def put_modal_body(mode, slot, vals, k, y, at, modal, partial, kin_row, rhs):
     """Hand over the modal inertia of a body and add its forces to ``rhs``; return the number of the next entry.
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import types
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.pointers import F8, I8, IMAT, IVEC, MAT, VEC
 from gearmbs.dae.compiled.views import uncounted, uncounted_rows
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3, dot3
@@ -171,7 +173,12 @@ def put_seconds(
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    I8(I8, IVEC, VEC, I8, I8, VEC, VEC, I8, F8, I8, I8, F8, F8, F8, types.boolean, IMAT, VEC),
+    cache=True,
+    late=True,
+    error_model="numpy",
+)
 def put_linear_side(
     mode, slot, vals, k, b, g, g_t, first, coef, row_lam, row_mu, lam, mu, factor, rate_rows, at, partial
 ):
@@ -228,7 +235,7 @@ def put_linear_side(
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(I8(I8, IVEC, VEC, I8, I8, I8, VEC, I8, F8, IMAT, MAT, VEC), cache=True, late=True, error_model="numpy")
 def put_spatial(mode, slot, vals, k, row, f, g, h, coef, at, kin, partial):
     """Hand over Phi_q of one elastic frame in the acceleration system, and its mirror image.
 
@@ -255,7 +262,7 @@ def put_spatial(mode, slot, vals, k, row, f, g, h, coef, at, kin, partial):
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(F8(I8, VEC, I8, IMAT, VEC), cache=True, late=True, error_model="numpy")
 def bias_rate(f, g, h, at, partial):
     """Return what a frame's acceleration without those of the coordinates adds to the second rate of a constraint."""
     first = tail_of(f, at) + BIAS

@@ -24,7 +24,10 @@ with sum_mn psi_k,m psi_l,n Y_min x Y_max in place of X_min x X_max for two mode
 
 from __future__ import annotations
 
+from numba import types
+
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.pointers import I8, IMAT, MAT, VEC
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3
@@ -84,7 +87,7 @@ def tail_of(f, at):
     return at[f, T.AT_PARTIAL] + PARTIALS * (3 + at[f, T.AT_MODES])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(types.void(I8, VEC, IMAT, VEC, MAT, VEC, VEC, types.boolean), cache=True, late=True, error_model="numpy")
 def update_frame(f, y, at, modal, kin, partial, scratch, derivatives):
     """Fill the row of elastic frame f in the kinematics table and its partial derivatives.
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import types
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.lanes import LANES, lanes_at, put_lanes
+from gearmbs.dae.compiled.pointers import F8, I8, IMAT, IVEC, MAT, VEC
 from gearmbs.dae.compiled.views import uncounted, uncounted_rows, vector_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import cross3, dot3
@@ -45,7 +47,7 @@ def wrench_at(f, point, force, torque, sign, marker_body, kin, frame, s):
         s[6 + c] += sign * torque[c]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(types.void(I8, F8, IVEC, VEC, IVEC, MAT, MAT, VEC), cache=True, late=True, error_model="numpy")
 def load_at(f, sign, row, y, marker_body, kin, frame, s):
     """As `wrench_at` for the F and N that a force element has in y.
 
@@ -69,7 +71,7 @@ def load_at(f, sign, row, y, marker_body, kin, frame, s):
     wrench_at(f, row[T.FORCE_I], force, torque, sign, marker_body, kin, frame, s)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(types.void(I8, IMAT, VEC, MAT, VEC, VEC, VEC), cache=True, late=True, error_model="numpy")
 def bring_to_body(f, at, modal, kin, partial, scratch, out):
     """Bring the forces added up for elastic frame f to its body and to the modes: eq. (5), and mu in eq. (6)."""
     row, body, n = kin[f], kin[at[f, T.AT_BODY]], at[f, T.AT_MODES]
@@ -123,7 +125,7 @@ def add_modal_forces(shape, wrench, total):
         total[k] += push + shape[3, k] * a + shape[4, k] * b + shape[5, k] * c
 
 
-@njit(cache=True, error_model="numpy")
+@njit(types.void(I8, VEC, IMAT, MAT, VEC, VEC), cache=True, late=True, error_model="numpy")
 def apply_frame_load(f, s, at, kin, partial, rhs):
     """Add the spatial and modal forces of force ``s[3:6]`` and moment ``s[6:9]`` at elastic frame f."""
     t = np.empty(6)
@@ -139,7 +141,12 @@ def apply_frame_load(f, s, at, kin, partial, rhs):
         rhs[at[f, T.AT_V_MODES] + m] += dot3(d[3 + m], DP, s, 3) + dot3(d[3 + m], DX, s, 6)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    I8(I8, IVEC, VEC, I8, I8, F8, I8, I8, I8, VEC, IMAT, IVEC, MAT, MAT, VEC),
+    cache=True,
+    late=True,
+    error_model="numpy",
+)
 def put_load(mode, slot, vals, k, f, sign, force, torque, point, s, at, marker_body, kin, frame, partial):
     """Hand over the entries of a load on elastic frame f in the rows of eq. (5); return the next entry's number.
 
@@ -227,7 +234,12 @@ def put_turned(mode, slot, vals, k, f, c, s, at, partial):
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    I8(I8, IVEC, VEC, I8, I8, I8, I8, VEC, F8, IMAT, IVEC, MAT, MAT, VEC, types.boolean),
+    cache=True,
+    late=True,
+    error_model="numpy",
+)
 def put_arm(mode, slot, vals, k, row, b, point, s, sign, at, marker_body, kin, frame, partial, to_origin):
     """Hand over ``sign`` times the derivatives of ``s[9:12]`` . x by the coordinates of frame b.
 
@@ -269,7 +281,7 @@ def put_arm(mode, slot, vals, k, row, b, point, s, sign, at, marker_body, kin, f
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(I8(I8, IVEC, VEC, I8, I8, I8, VEC, I8, F8, IMAT, MAT, VEC), cache=True, late=True, error_model="numpy")
 def put_chain(mode, slot, vals, k, row, f, d, col, sign, at, kin, partial):
     """Hand over the entries of one row that depends on elastic frame f; return the number of the next entry.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from numba import types
 
 from gearmbs._jit import njit
-from gearmbs.dae.compiled.pointers import F8, IVEC, MAT, VEC, address, caller
+from gearmbs.dae.compiled.pointers import F8, I8, IVEC, MAT, VEC, address, caller
 from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import layout as T
 
@@ -104,9 +104,10 @@ def update_references(t, y, tab, moving):
             update(ints, floats, t, tab.kin, tab.marker_body, tab.marker, y, ref, tab.tape_work)
             m = ref.size
             a = tab.tape[k, T.TAPE_REFERENCE] + m
-            tab.extra_r[a : a + m] = ref
             rates = vector_at(tab.extra_r, a + m, m)
-            rates[:] = 0.0
+            # one by one: setting a slice compiles how numba tells of shapes that differ, which takes 2 s
+            for c in range(m):
+                tab.extra_r[a + c], rates[c] = ref[c], 0.0
             if moving:
                 grad = tail(tab, gradient_size(tab.tape[k]))
                 find = angle_rates_at(tab.tape[k, ANGLE_RATES])
@@ -246,7 +247,7 @@ def line_direction_columns(row, f, ex, ey, ez, length, tab, jac):
             add_projector_columns(jac, q, factor, ex, ey, ez, tab.frame, marker)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(types.void(IVEC, F8, VEC, T.TABLES, VEC, MAT, I8), cache=True, late=True, error_model="numpy")
 def load(row, t, y, tab, wrench, jac, want_jac):
     """Fill F and N of an expression element and, if wanted, their derivatives.
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import types
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.pointers import F8, I8, IVEC, VEC
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
@@ -33,7 +35,12 @@ def is_linear(term, marker_body, bodies):
     return term[T.TERM_TYPE] == terms.POINT and (i == 0 or i >= bodies) and (j == 0 or j >= bodies)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    I8(I8, I8, F8, F8, F8, F8, types.boolean, I8, I8, VEC, VEC, VEC, T.TABLES, IVEC, VEC, I8),
+    cache=True,
+    late=True,
+    error_model="numpy",
+)
 def elastic_term_entries(mode, j, coef, lam, mu, factor, rate_rows, row_lam, row_mu, y, g, gt, tab, slot, vals, k):
     """Entries of a constraint term between frames of which one at least is elastic; see `row_entries`.
 
@@ -221,7 +228,7 @@ def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(I8(I8, F8, I8, VEC, VEC, F8, IVEC, T.TABLES, IVEC, VEC, I8), cache=True, late=True, error_model="numpy")
 def tape_row_entries(mode, t, r, y, yp, cj, idata, tab, slot, vals, k):
     """Entries of a constraint row given by an expression.
 

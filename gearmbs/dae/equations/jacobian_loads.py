@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.pointers import F8, I8, IVEC, VEC
 from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
@@ -62,7 +63,7 @@ def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, tab, slot
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(I8(I8, F8, I8, VEC, F8, IVEC, T.TABLES, IVEC, VEC, I8), cache=True, late=True, error_model="numpy")
 def state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k):
     """Entries of the equation of one user-defined state.
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections import namedtuple
 
 import numpy as np
+from numba import types
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.pointers import IMAT, IVEC, MAT, VEC
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations.rotation import KIN_COLUMNS
 
@@ -234,6 +236,14 @@ Tables = namedtuple(
     "at code marker_body row term force function extra_i slot state tape angle "
     "gravity body marker coef function_r extra_r reference winding seen modal kin frame fval scratch tape_work partial",
 )
+TABLES = types.NamedTuple(
+    (
+        IMAT, IVEC, IVEC, IMAT, IMAT, IMAT, IMAT, IVEC, IVEC, IMAT, IMAT, IMAT,
+        VEC, MAT, MAT, VEC, VEC, VEC, VEC, VEC, VEC, VEC, MAT, MAT, MAT, VEC, VEC, VEC,
+    ),
+    Tables,
+)  # fmt: skip
+"""Type of what `unpack` returns, for the signatures of late kernels."""
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.pointers import F8, I8, IVEC, VEC
 from gearmbs.dae.compiled.views import uncounted
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import dot3
@@ -12,7 +13,7 @@ from gearmbs.dae.equations.modal_integrals import HEAVY, SPUN, STIFF, TURNED, in
 from gearmbs.dae.equations.rotation import KIN_ADOT, KIN_AXES, KIN_W
 
 
-@njit(cache=True, error_model="numpy")
+@njit(I8(I8, F8, VEC, IVEC, VEC, VEC, VEC, VEC, IVEC, VEC, I8), cache=True, late=True, error_model="numpy")
 def modal_body_entries(mode, cj, y, at, modal, partial, kin_row, s, slot, vals, k):
     """Hand over the entries of a body's modal inertia, stiffness and damping; return the number of the next entry.
 

@@ -14,9 +14,11 @@ linear in q if all integrals are given; leaving some out gives another Lagrangia
 from __future__ import annotations
 
 import numpy as np
+from numba import types
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.lanes import LANES, all_lanes, lanes_at, put_lanes
+from gearmbs.dae.compiled.pointers import IVEC, VEC
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraint_terms import dot3
@@ -52,7 +54,7 @@ def to_global(kin_row, v, i, out, k):
         out[k + c] = kin_row[a] * x + kin_row[a + 1] * y + kin_row[a + 2] * z
 
 
-@njit(cache=True, error_model="numpy")
+@njit(types.void(VEC, IVEC, VEC, VEC, VEC), cache=True, late=True, error_model="numpy")
 def update_inertia(y, at, modal, partial, body_row):
     """Write J(q) to the body's row and dJ/dq, H and sum_l C1_kl v_l to its place in ``partial``."""
     n, place = at[T.AT_MODES], at[T.AT_PARTIAL]
@@ -104,7 +106,7 @@ def inertia_change(change, k, w, i, out, j):
     out[j + 2] = change[2, k] * x + change[4, k] * y + change[5, k] * z
 
 
-@njit(cache=True, error_model="numpy")
+@njit(types.void(VEC, IVEC, VEC, VEC), cache=True, late=True, error_model="numpy")
 def add_momentum(y, at, partial, kin_row):
     """Add sum_k H_k v_k to the angular momentum h of the body's row."""
     n, v = at[T.AT_MODES], at[T.AT_VF]
@@ -137,7 +139,7 @@ def row_product(matrix, apart, k, y, i):
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(types.void(VEC, IVEC, VEC, VEC, VEC), cache=True, late=True, error_model="numpy")
 def set_modal_momenta(y, at, modal, partial, kin_row):
     """Write p_f = dT/dv_f to y."""
     n = at[T.AT_MODES]
@@ -150,7 +152,7 @@ def set_modal_momenta(y, at, modal, partial, kin_row):
         y[at[T.AT_PF] + k] = turning + row_product(mass, apart, k, y, at[T.AT_VF])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(types.void(VEC, VEC, IVEC, VEC, VEC, VEC, VEC), cache=True, late=True, error_model="numpy")
 def modal_residual(y, yp, at, modal, partial, kin_row, out):
     """Write the rows p_f' - L_qf, p_f - L_vf and v_f - q_f' of a body; loads and constraints are added elsewhere.
 

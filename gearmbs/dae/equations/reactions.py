@@ -12,8 +12,10 @@ multipliers' places in y.
 from __future__ import annotations
 
 import numpy as np
+from numba import types
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.pointers import I8, IVEC, MAT, VEC
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
@@ -153,7 +155,7 @@ def add_term_columns(k, factor, depends, tab, jac, s):
         add_distance_columns(jac, qi, qj, factor, i, j, tab, s)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(types.void(IVEC, VEC, I8, T.TABLES, VEC, VEC, MAT, I8), cache=True, late=True, error_model="numpy")
 def reaction_wrench(row, multipliers, first_multiplier, tab, room, wrench, jac, want_jac):
     """Fill F and N of a REACTION element and, if wanted, their derivatives.
 

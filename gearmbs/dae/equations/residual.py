@@ -22,8 +22,10 @@ lambda and mu.
 from __future__ import annotations
 
 import numpy as np
+from numba import types
 
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.pointers import F8, I8, VEC
 from gearmbs.dae.compiled.views import matrix_at, uncounted, vector_at
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations import expression_loads
@@ -133,7 +135,7 @@ def add_wrenches(bodies, at, modal, kin, partial, scratch, out):
             out[th + c] -= terms.dot3(row, KIN_AXES + 3 * c, row, KIN_TURN)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(types.UniTuple(F8, 2)(I8, F8, F8, F8, VEC, T.TABLES, VEC), cache=True, late=True, error_model="numpy")
 def add_tape_row(k, t, lam, mu, y, tab, out):
     """Add the constraint forces of a row given by tape k; return its value and rate."""
     row = tab.tape[k]

@@ -180,7 +180,8 @@ def _evaluate(
             if passes == 0 and not unchanged(vals, factored, allowed):
                 if not factor(plan, factors, vals) <= growth:
                     return k
-                factored[:] = vals
+                for p in range(vals.size):
+                    factored[p] = vals[p]
             if not projected:
                 records.strayed[k] = project(t[k], at, phi, plan, factors, pair, idata, tab)
                 projected = True
