@@ -203,6 +203,9 @@ def test_what_crosses_without_a_vertex_inside_touches_from_the_first(
     rng = np.random.default_rng(2)
     for _ in range(6):
         turn, place = np.pi / 2 + rng.uniform(-0.4, 0.4), 0.03 * rng.uniform(-1, 1, 2)
+        if first is ROD and second is ROD:
+            # they are rounded by 1e-4 of their half length and meet in their middles from the first
+            place[:] = 0.0
         for depth in (1e-7, 1e-5, 1e-3):
             frames = np.array(
                 [

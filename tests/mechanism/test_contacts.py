@@ -97,6 +97,17 @@ PAIRS = {
     "box on box": (Box((0.2, 0.2, 0.2)), Box((1, 1, 1)), (0.02, 0.01, 0.598), turned(1e-3, 5e-4, 0.3)),
     "edge on edge": (Box((0.2, 0.2, 1)), Box((1, 0.2, 0.2)), (0.01, 0.0, 0.28), turned(0.8, 0, 0) @ turned(0, 0.75, 0)),
     "cylinder on box": (Cylinder(0.1, 0.3), Box((1, 1, 1)), (0.02, 0.01, 0.648), turned(1e-3, 2e-3, 0.3)),
+    "box below cylinder": (Box((1, 1, 1)), Cylinder(0.1, 0.3), (0.02, 0.01, -0.648), turned(1e-3, 2e-3, 0.3)),
+    "cylinder on an edge": (Cylinder(0.1, 0.3), Box((1, 1, 1)), (0.53, 0.01, 0.588), turned(np.pi / 2 + 1e-5, 0, 0.3)),
+    "rim on an edge": (Cylinder(0.1, 0.3), Box((1, 1, 1)), (0.505, 0.1, 0.635), turned(0.5, 0.4, 0.3)),
+    "cylinder on a corner": (Cylinder(0.1, 0.3), Box((1, 1, 1)), (0.53, 0.52, 0.56), turned(1.2, 0.5, 0.3)),
+    "corner on a frustum": (Box((0.2, 0.2, 0.2)), Frustum(0.4, 0.2, 0.4), (0.1, 0.15, 0.36), turned(0.6, 0.5, 0.3)),
+    "ellipsoid on an edge": (Ellipsoid((0.3, 0.2, 0.1)), Box((1, 1, 1)), (0.52, 0.01, 0.58), turned(0.1, 0.4, 0.3)),
+    "parallel cylinders": (Cylinder(0.1, 0.3), Cylinder(0.2, 0.4), (0.18, 0.23, 0.05), turned(2e-5, 1e-5, 0)),
+    "crossed cylinders": (Cylinder(0.1, 0.6), Cylinder(0.2, 0.8), (0.29, 0.05, 0.1), turned(1.0, 0.1, 0)),
+    "cylinder on cylinder": (Cylinder(0.1, 0.3), Cylinder(0.2, 0.4), (0.02, 0.05, 0.348), turned(1e-4, 2e-4, 0)),
+    "frustum on ellipsoid": (Frustum(0.1, 0.2, 0.4), Ellipsoid((0.3, 0.2, 0.1)), (0.0, 0.1, 0.27), turned(0.1, 0.4, 0)),
+    "two ellipsoids": (Ellipsoid((0.3, 0.2, 0.1)), Ellipsoid((0.2, 0.3, 0.1)), (0.1, 0.1, 0.18), turned(0.3, 0.2, 0)),
     "mesh on plane": (Mesh(*Box((0.2, 0.3, 0.4)).facets()), HalfSpace(), (0.02, 0.01, 0.198), turned(1e-3, 5e-4, 0)),
     "sphere on mesh": (Sphere(0.1), Mesh(*Box((1, 1, 1)).facets()), (0.02, 0.01, 0.598), turned(1e-3, 5e-4, 0)),
 }
@@ -203,7 +214,7 @@ def test_a_stool_of_two_legs_has_two_patches():
 
 
 FAR = {
-    "cylinder and box": (Cylinder(0.1, 0.3), Box((1, 1, 1))),
+    "torus and box": (Torus(0.3, 0.05), Box((1, 1, 1))),
     "torus and cylinder": (Torus(0.3, 0.05), Cylinder(0.2, 0.4)),
     "mesh and plane": (Mesh(*Box((0.2, 0.3, 0.4)).facets(), offset=(0.5, 0, 0)), HalfSpace()),
     "mesh and frustum": (Mesh(*Box((0.2, 0.3, 0.4)).facets()), Frustum(0.2, 0.1, 0.4)),

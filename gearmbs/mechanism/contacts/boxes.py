@@ -95,9 +95,40 @@ def two_boxes(rows, pose_i, half_i, pose_j, half_j, origins, derivatives, work):
             best, which = gap, 6 + k
     if which >= 6:
         return _edges(rows, pose_i, half_i, pose_j, half_j, which - 6, origins, derivatives, work)
-    if which >= 3:
-        return _faces(rows, pose_i, half_i, pose_j, half_j, which - 3, 0, origins, derivatives, work)
-    return _faces(rows, pose_j, half_j, pose_i, half_i, which, 1, origins, derivatives, work)
+    swapped = 0 if which >= 3 else 1
+    k, n = which % 3, work[12:15]
+    axis_of(pose_i if swapped else pose_j, k, n)
+    if (dot(apart, n) < 0.0) != (swapped == 1):
+        for q in range(3):
+            n[q] = -n[q]
+    if swapped == 0:
+        return _faces(rows, pose_i, half_i, pose_j, half_j, k, 0, origins, derivatives, work)
+    return _faces(rows, pose_j, half_j, pose_i, half_i, k, 1, origins, derivatives, work)
+
+
+@njit(cache=True, error_model="numpy")
+def box_on_plane(rows, pose_a, half_a, pose_b, swapped, origins, derivatives, work):
+    """Write the points at which a box touches the half-space below a plane: a face without sides; return how many.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (at least MOST, COLUMNS)
+        Out.
+    pose_a, half_a : ndarray
+        Axes and centre of the box, half lengths.
+    pose_b : ndarray, shape (12,)
+        Axes and origin of the plane.
+    swapped : int
+        1 if the box is that of marker J.
+    origins : ndarray, shape (2, 3)
+    derivatives : bool
+    work : ndarray, shape (SCRATCH,)
+    """
+    endless = work[3:6]
+    endless[0] = endless[1] = np.inf
+    endless[2] = 0.0
+    axis_of(pose_b, 2, work[12:15])
+    return _faces(rows, pose_a, half_a, pose_b, endless, 2, swapped, origins, derivatives, work)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -109,24 +140,18 @@ def _cross(a, b, out):
 
 @njit(cache=True, error_model="numpy")
 def _faces(rows, pose_a, half_a, pose_b, half_b, k, swapped, origins, derivatives, work):
-    """Cut the face of box a that looks against face k of box b; see `two_boxes` for the other arguments.
+    """Cut the face of box a that looks against the face of box b with the normal n in ``work[12:15]``.
 
     Parameters
     ----------
     rows, pose_a, half_a, pose_b, half_b, origins, derivatives, work
         As in `two_boxes`.
     k : int
-        Axis of box b.
+        Axis of box b along n.
     swapped : int
         1 if box a is that of marker J.
     """
-    n, apart, face, centre = work[12:15], work[0:3], work[15:18], work[18:21]
-    axis_of(pose_b, k, n)
-    for q in range(3):
-        apart[q] = pose_a[9 + q] - pose_b[9 + q]
-    if dot(apart, n) < 0.0:
-        for q in range(3):
-            n[q] = -n[q]
+    n, face, centre = work[12:15], work[15:18], work[18:21]
     most, cut = 0.0, 0
     for c in range(3):
         axis_of(pose_a, c, face)

@@ -37,7 +37,8 @@ REVERSAL = 1e-3
 LONG = 0.25
 """Edges this long over half the thickness of another solid are looked at between their vertices: below it, a ball of
 this thickness is 0.4 % of it deep when the first vertex meets it."""
-CONVEX = (Ellipsoid, Box, Cylinder, Frustum, Torus)
+ROUND = (Ellipsoid, Cylinder, Frustum)
+"""Convex solids that roll."""
 ANALYTIC = (Sphere, Ellipsoid, Box, Cylinder, Frustum, Torus, HalfSpace)
 
 
@@ -221,12 +222,18 @@ def pair_family(name: str, a: Shape, b: Shape) -> tuple[int, bool]:
         return kernel.BALL_SOLID, True
     if isinstance(a, HalfSpace) and isinstance(b, HalfSpace):
         raise ModelError(f"contact '{name}': two planes cannot touch; give one side a solid")
-    if isinstance(b, HalfSpace) and isinstance(a, CONVEX):
+    if isinstance(b, HalfSpace) and isinstance(a, (*ROUND, Torus)):
         return kernel.CONVEX_PLANE, False
-    if isinstance(a, HalfSpace) and isinstance(b, CONVEX):
+    if isinstance(a, HalfSpace) and isinstance(b, (*ROUND, Torus)):
         return kernel.CONVEX_PLANE, True
-    if isinstance(a, Box) and isinstance(b, Box):
+    if isinstance(a, Box) and isinstance(b, Box | HalfSpace):
         return kernel.BOXES, False
+    if isinstance(a, HalfSpace) and isinstance(b, Box):
+        return kernel.BOXES, True
+    if isinstance(a, ROUND) and isinstance(b, (*ROUND, Box)):
+        return kernel.CONVEX, False
+    if isinstance(a, Box) and isinstance(b, ROUND):
+        return kernel.CONVEX, True
     return kernel.FACETS, False
 
 
@@ -290,8 +297,9 @@ class _Tables:
         if exchanged:
             a, b = b, a
         faceted = family == kernel.FACETS
-        first = self._solid(a, faceted, family == kernel.CONVEX_PLANE, least_half(*table_sizes(b)))
-        second = self._solid(b, faceted, False, least_half(*table_sizes(a)))
+        rounded = family in (kernel.CONVEX_PLANE, kernel.CONVEX)
+        first = self._solid(a, faceted, rounded, least_half(*table_sizes(b)))
+        second = self._solid(b, faceted, rounded and isinstance(b, ROUND), least_half(*table_sizes(a)))
         self.pairs.append([family, int(exchanged), *first, *second])
         room = min(ROOM, (1 + NODES) * (first[6] + second[6]))
         self.most = max(self.most, first[2] + second[2] + room, MOST if family == kernel.BOXES else 1)

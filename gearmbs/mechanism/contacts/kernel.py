@@ -12,18 +12,19 @@ from gearmbs._jit import njit
 from gearmbs.dae.compiled.views import matrix_at, vector_at
 from gearmbs.dae.equations.force_elements import DERIVATIVES, DIAGNOSTICS, FORCE_SIG, FRAME_A, FRAME_P
 from gearmbs.mechanism.contacts import points as pt
-from gearmbs.mechanism.contacts.boxes import SCRATCH, two_boxes
+from gearmbs.mechanism.contacts.boxes import SCRATCH, box_on_plane, two_boxes
+from gearmbs.mechanism.contacts.convex_pairs import convex_pair
 from gearmbs.mechanism.contacts.edges import EDGE, edges_below, label_edges
 from gearmbs.mechanism.contacts.facet_moves import moved_with
 from gearmbs.mechanism.contacts.facets import BEARING, vertices_below, without_idle
-from gearmbs.mechanism.contacts.fields import BOX, MESH, distance
+from gearmbs.mechanism.contacts.fields import BOX, HALF_SPACE, MESH, distance
 from gearmbs.mechanism.contacts.loads import LAW_REALS, press, share_out
 from gearmbs.mechanism.contacts.meshes import BLOCK
 from gearmbs.mechanism.contacts.patches import join_patches, label_patches, patches_in
 from gearmbs.mechanism.contacts.points import local_point
 from gearmbs.mechanism.contacts.smooth_pairs import ball_and_solid, convex_and_plane
 
-BALL_SOLID, CONVEX_PLANE, BOXES, FACETS = 0, 1, 2, 3
+BALL_SOLID, CONVEX_PLANE, BOXES, FACETS, CONVEX = 0, 1, 2, 3, 4
 """Families of pairs."""
 SOLID = 8
 PAIR = 2 + 2 * SOLID
@@ -86,6 +87,8 @@ def points_of(ints, reals, at, frames, rows, derivatives, labelled, work):
         origins[1, q] = frames[1, FRAME_P + q]
     scratch = vector_at(work, GEOMETRY, SCRATCH)
     sizes_a, sizes_b = solid_a[12:16], solid_b[12:16]
+    if family == BOXES and ints[b] == HALF_SPACE:
+        return box_on_plane(rows, pose_a, sizes_a, pose_b, first, origins, derivatives, scratch)
     if family == BOXES:
         return two_boxes(rows, pose_a, sizes_a, pose_b, sizes_b, origins, derivatives, scratch)
     if family == FACETS:
@@ -117,6 +120,10 @@ def points_of(ints, reals, at, frames, rows, derivatives, labelled, work):
     if family == BALL_SOLID:
         ball_and_solid(
             row, pose_a, sizes_a[0], ints[b], sizes_b, pose_b, origins[first], origins[second], derivatives, scratch
+        )
+    elif family == CONVEX:
+        convex_pair(
+            row, ints[a], sizes_a, pose_a, ints[b], sizes_b, pose_b, origins[first], origins[second], derivatives, scratch
         )
     else:
         convex_and_plane(row, ints[a], sizes_a, pose_a, pose_b, origins[first], origins[second], derivatives, scratch)

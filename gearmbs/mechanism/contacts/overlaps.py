@@ -1,0 +1,253 @@
+"""By how much two convex solids overlap along a direction, and the direction in which they overlap least.
+
+In the frame of solid b, with the supports of both, two solids overlap along the unit vector n from b to a by
+
+    o(n) = n . (y_b - y_a),   y_b outermost of b along n,   y_a outermost of a along -n.
+
+The depth D is the least overlap: moved by D along n the two touch. On the unit sphere, with U the directions at right
+angles to n and S = h_ww of both, the slope of o is U^T (y_b - y_a) and its second derivative U^T (S_a + S_b) U - o.
+
+The supports are those of `gearmbs.mechanism.contacts.supports`, with rounded edges, but for a box as solid b. Its o has
+a kink where a component of n vanishes. n stays there while y_a is between the sides of the box across this axis: a face
+has two such components, an edge one, a corner none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearmbs._jit import njit
+from gearmbs.mechanism.contacts.fields import BOX
+from gearmbs.mechanism.contacts.points import dot
+from gearmbs.mechanism.contacts.supports import support
+
+MOVE, Y_A, S_A, Y_B, S_B, BASIS, FREE, SIDE = 0, 12, 15, 24, 27, 36, 42, 45
+"""Work: axes and centre of a in b's frame, outermost points and how they move with n, directions n may take, which
+components of n may differ from zero (1, 0), and to which side."""
+LOCAL = 48
+"""Scratch of `overlap`: direction, point and second derivative in a's frame."""
+TRIAL = 63
+WAY = 66
+WORK = 69
+SEARCHES = 80
+"""Steps at most; about ten are usual."""
+WIDEST = 0.3
+"""Largest change of n along one direction in a step, rad."""
+RESOLVED = 1e-14
+"""Part of the solids' size to which slopes of o vanish."""
+
+
+@njit(cache=True, error_model="numpy")
+def place_in(pose_a, pose_b, work):
+    """Write the axes and the centre of solid a in the frame of b."""
+    for r in range(3):
+        work[MOVE + 9 + r] = 0.0
+        for q in range(3):
+            work[MOVE + 9 + r] += pose_b[3 * q + r] * (pose_a[9 + q] - pose_b[9 + q])
+        for c in range(3):
+            work[MOVE + 3 * r + c] = 0.0
+            for q in range(3):
+                work[MOVE + 3 * r + c] += pose_b[3 * q + r] * pose_a[3 * q + c]
+
+
+@njit(cache=True, error_model="numpy")
+def overlap(kind_a, sizes_a, kind_b, sizes_b, n, work):
+    """Return o(n); write the outermost points of both and how they move with n."""
+    move, w, y, hess = work[MOVE : MOVE + 12], work[LOCAL : LOCAL + 3], work[LOCAL + 3 : LOCAL + 6], work[54:63]
+    for c in range(3):
+        w[c] = -(move[c] * n[0] + move[3 + c] * n[1] + move[6 + c] * n[2])
+    support(kind_a, sizes_a, w, y, hess)
+    for r in range(3):
+        work[Y_A + r] = move[9 + r] + move[3 * r] * y[0] + move[3 * r + 1] * y[1] + move[3 * r + 2] * y[2]
+    for r in range(3):
+        b0 = move[3 * r] * hess[0] + move[3 * r + 1] * hess[3] + move[3 * r + 2] * hess[6]
+        b1 = move[3 * r] * hess[1] + move[3 * r + 1] * hess[4] + move[3 * r + 2] * hess[7]
+        b2 = move[3 * r] * hess[2] + move[3 * r + 1] * hess[5] + move[3 * r + 2] * hess[8]
+        for c in range(3):
+            work[S_A + 3 * r + c] = b0 * move[3 * c] + b1 * move[3 * c + 1] + b2 * move[3 * c + 2]
+    if kind_b == BOX:
+        for q in range(3):
+            work[Y_B + q] = work[SIDE + q] * sizes_b[q]
+        for q in range(9):
+            work[S_B + q] = 0.0
+    else:
+        support(kind_b, sizes_b, n, work[Y_B : Y_B + 3], work[S_B : S_B + 9])
+    return (
+        n[0] * (work[Y_B] - work[Y_A]) + n[1] * (work[Y_B + 1] - work[Y_A + 1]) + n[2] * (work[Y_B + 2] - work[Y_A + 2])
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def set_free(kind_b, n, work):
+    """Make n a unit vector and note which of its components may differ from zero."""
+    size = np.sqrt(dot(n, n))
+    for q in range(3):
+        n[q] /= size
+        work[FREE + q] = 0.0 if kind_b == BOX and n[q] == 0.0 else 1.0
+        work[SIDE + q] = np.sign(n[q]) if kind_b == BOX else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def directions(n, work):
+    """Write unit vectors at right angles to n along which it may turn; return how many (0 to 2)."""
+    u, v = work[BASIS : BASIS + 3], work[BASIS + 3 : BASIS + 6]
+    free = work[FREE] + work[FREE + 1] + work[FREE + 2]
+    if free < 1.5:
+        return 0
+    if free < 2.5:
+        i = 0 if work[FREE] > 0.0 else 1
+        k = 2 if work[FREE + 2] > 0.0 else 1
+        u[0] = u[1] = u[2] = 0.0
+        u[i], u[k] = -n[k], n[i]
+        return 1
+    k = 0
+    for q in range(1, 3):
+        if abs(n[q]) < abs(n[k]):
+            k = q
+    for q in range(3):
+        u[q] = (1.0 if q == k else 0.0) - n[k] * n[q]
+    size = np.sqrt(dot(u, u))
+    for q in range(3):
+        u[q] /= size
+    for q in range(3):
+        v[q] = n[(q + 1) % 3] * u[(q + 2) % 3] - n[(q + 2) % 3] * u[(q + 1) % 3]
+    return 2
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def bent(work, a, b):
+    """Return b^T (S_a + S_b) a."""
+    total = 0.0
+    for q in range(3):
+        for p in range(3):
+            total += b[q] * (work[S_A + 3 * q + p] + work[S_B + 3 * q + p]) * a[p]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def newton_step(n, o, many, widest, work, out):
+    """Write the way to turn n, in the frame of b; return the slope of o and what o is expected to fall by.
+
+    Along the principal directions of the second derivative, by Newton's method where it is positive and down the slope
+    where it is not, and by no more than ``widest``.
+    """
+    u, v = work[BASIS : BASIS + 3], work[BASIS + 3 : BASIS + 6]
+    gu = gv = sine = 0.0
+    cosine = 1.0
+    for q in range(3):
+        gu += u[q] * (work[Y_B + q] - work[Y_A + q])
+        gv += v[q] * (work[Y_B + q] - work[Y_A + q]) if many == 2 else 0.0
+    huu = bent(work, u, u) - o
+    low = high = huu
+    if many == 2:
+        huv, hvv = bent(work, u, v), bent(work, v, v) - o
+        angle = 0.5 * np.arctan2(2.0 * huv, huu - hvv)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        high = cosine * cosine * huu + 2.0 * cosine * sine * huv + sine * sine * hvv
+        low = sine * sine * huu - 2.0 * cosine * sine * huv + cosine * cosine * hvv
+    one, other = cosine * gu + sine * gv, -sine * gu + cosine * gv
+    first = -one / max(abs(high), max(abs(one) / widest, 1e-300))
+    second = -other / max(abs(low), max(abs(other) / widest, 1e-300)) if many == 2 else 0.0
+    for q in range(3):
+        out[q] = (cosine * first - sine * second) * u[q]
+        if many == 2:
+            out[q] += (sine * first + cosine * second) * v[q]
+    for q in range(3):
+        if work[FREE + q] > 0.0 and n[q] == 0.0 and out[q] * work[SIDE + q] < 0.0:
+            # a component that was let go has one side only, down the slope
+            part = widest / np.sqrt(gu * gu + gv * gv)
+            for p in range(3):
+                out[p] = -part * (gu * u[p] + (gv * v[p] if many == 2 else 0.0))
+            return np.sqrt(gu * gu + gv * gv), widest * np.sqrt(gu * gu + gv * gv)
+    return np.sqrt(gu * gu + gv * gv), -(one * first + other * second)
+
+
+@njit(cache=True, error_model="numpy")
+def turn_by(n, way, kind_b, work, out):
+    """Write n turned along ``way``, no farther than to where a component of n against a box vanishes; return if so."""
+    part, at = 1.0, -1
+    if kind_b == BOX:
+        for q in range(3):
+            if work[FREE + q] > 0.0 and (n[q] + way[q]) * work[SIDE + q] < 0.0 and n[q] / -way[q] < part:
+                part, at = n[q] / -way[q], q
+    for q in range(3):
+        out[q] = 0.0 if q == at else n[q] + part * way[q]
+    size = np.sqrt(dot(out, out))
+    for q in range(3):
+        out[q] /= size
+    return at
+
+
+@njit(cache=True, error_model="numpy")
+def release(sizes_b, size, work):
+    """Let that component of n go which the outermost point of a is farthest beyond the sides of a box; return if any."""
+    most, at = RESOLVED * size, -1
+    for q in range(3):
+        beyond = abs(work[Y_A + q]) - sizes_b[q]
+        if work[FREE + q] == 0.0 and beyond > most:
+            most, at = beyond, q
+    if at >= 0:
+        work[FREE + at] = 1.0
+        work[SIDE + at] = np.sign(work[Y_A + at])
+    return at >= 0
+
+
+@njit(cache=True, error_model="numpy")
+def least_overlap(kind_a, sizes_a, kind_b, sizes_b, n, work):
+    """Turn n to where the overlap is least nearby; return it, or what is not positive once the solids are apart.
+
+    Parameters
+    ----------
+    kind_a, sizes_a, kind_b, sizes_b : int, ndarray
+        Of both solids, as in `gearmbs.mechanism.contacts.supports`; of a box b its half lengths.
+    n : ndarray, shape (3,)
+        In and out: unit vector from b to a, in b's frame, as `set_free` leaves it.
+    work : ndarray, shape (WORK,)
+        With the place of a; out: the points and directions of n.
+    """
+    trial, way = work[TRIAL : TRIAL + 3], work[WAY : WAY + 3]
+    widest = WIDEST
+    o = overlap(kind_a, sizes_a, kind_b, sizes_b, n, work)
+    size = np.sqrt(dot(work[Y_B : Y_B + 3], work[Y_B : Y_B + 3])) + abs(o)
+    for _ in range(SEARCHES):
+        if o <= 0.0:
+            return o
+        many = directions(n, work)
+        slope, fall = newton_step(n, o, many, widest, work, way) if many > 0 else (0.0, 0.0)
+        if slope <= RESOLVED * size:
+            if kind_b == BOX and release(sizes_b, size, work):
+                widest = WIDEST
+                continue
+            return o
+        at = turn_by(n, way, kind_b, work, trial)
+        side = work[SIDE + max(at, 0)]
+        if at >= 0:
+            work[SIDE + at] = 0.0
+        there = overlap(kind_a, sizes_a, kind_b, sizes_b, trial, work)
+        better = there < o
+        if not better and fall < 1e-12 * size:
+            # the fall drowns in rounding: the slope decides
+            total = 0.0
+            for k in range(many):
+                s = 0.0
+                for q in range(3):
+                    s += work[BASIS + 3 * k + q] * (work[Y_B + q] - work[Y_A + q])
+                total += s * s
+            better = np.sqrt(total) < slope
+            if not better:
+                if at >= 0:
+                    work[SIDE + at] = side
+                return overlap(kind_a, sizes_a, kind_b, sizes_b, n, work)
+        if better:
+            for q in range(3):
+                n[q] = trial[q]
+            if at >= 0:
+                work[FREE + at] = 0.0
+            o = there
+            widest = min(2.0 * widest, WIDEST)
+            continue
+        if at >= 0:
+            work[SIDE + at] = side
+        widest = 0.25 * min(widest, np.sqrt(dot(way, way)))
+        o = overlap(kind_a, sizes_a, kind_b, sizes_b, n, work)
+    return o
