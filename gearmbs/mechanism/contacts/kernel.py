@@ -123,7 +123,17 @@ def points_of(ints, reals, at, frames, rows, derivatives, labelled, work):
         )
     elif family == CONVEX:
         convex_pair(
-            row, ints[a], sizes_a, pose_a, ints[b], sizes_b, pose_b, origins[first], origins[second], derivatives, scratch
+            row,
+            ints[a],
+            sizes_a,
+            pose_a,
+            ints[b],
+            sizes_b,
+            pose_b,
+            origins[first],
+            origins[second],
+            derivatives,
+            scratch,
         )
     else:
         convex_and_plane(row, ints[a], sizes_a, pose_a, pose_b, origins[first], origins[second], derivatives, scratch)

@@ -164,7 +164,7 @@ def newton_step(n, o, many, widest, work, out):
 
 @njit(cache=True, error_model="numpy")
 def turn_by(n, way, kind_b, work, out):
-    """Write n turned along ``way``, no farther than to where a component of n against a box vanishes; return if so."""
+    """Write n turned along ``way``, to where a component of n against a box vanishes at most; return which, or -1."""
     part, at = 1.0, -1
     if kind_b == BOX:
         for q in range(3):
@@ -180,7 +180,7 @@ def turn_by(n, way, kind_b, work, out):
 
 @njit(cache=True, error_model="numpy")
 def release(sizes_b, size, work):
-    """Let that component of n go which the outermost point of a is farthest beyond the sides of a box; return if any."""
+    """Let the component of n go across whose sides of a box the outermost point of a is farthest; return if any."""
     most, at = RESOLVED * size, -1
     for q in range(3):
         beyond = abs(work[Y_A + q]) - sizes_b[q]
