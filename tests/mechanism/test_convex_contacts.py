@@ -19,8 +19,10 @@ from gearmbs.mechanism.contacts import (
     Frustum,
     HalfSpace,
     Impact,
+    Mesh,
     SolidContact,
     Sphere,
+    Torus,
 )
 from tests.mechanism.test_contact_balances import CUBE, ELASTIC, LINEAR, frame, loads
 
