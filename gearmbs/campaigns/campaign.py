@@ -337,5 +337,6 @@ def _needed() -> None:
     missing = [name for name in ("pyarrow", "zarr") if find_spec(name) is None]
     if missing:
         raise CampaignError(
-            f"campaigns need {' and '.join(missing)}; install the extra: pip install 'gearmbs[campaigns]'"
+            f"campaigns need {' and '.join(missing)}; install the extra: pip install 'gearmbs[campaigns]', "
+            "in a checkout pip install '.[campaigns]'"
         )

@@ -78,6 +78,26 @@ class Plan:
     on_failure: str = "record"
     reuse: tuple[str, ...] = ()
 
+    def __str__(self) -> str:
+        size = f", n = {self.n}" if self.n else ""
+        head = f"plan of a {self.subject.kind}: {self.design}{size}, seed {self.seed}, {self.dimensions} dimensions"
+        lines = [f"  {factor.name}: {self._shown(factor)}" for factor in self.factors]
+        lines += [f"  where {constraint}" for constraint in self.constraints]
+        return "\n".join([head, *lines, f"  keeps {', '.join(self.keep) or 'nothing'}"])
+
+    def _shown(self, factor: AnyFactor) -> str:
+        """Return what a factor may be, as text."""
+        if isinstance(factor, Choice):
+            return f"{'each' if factor.crossed else 'one'} of {', '.join(factor.options)}"
+        if not isinstance(factor, Factor):
+            return f"{factor.draws} draws, seed {factor.seed}"
+        unit = self.subject.unit_of(factor.path)
+        suffix = "" if unit == "1" else f" {unit}"
+        if factor.values:
+            return f"one of {', '.join(map(str, factor.values))}{suffix}"
+        scale = ", logarithmic" if factor.scale == "log" else ""
+        return f"{factor.low:g} to {factor.high:g}{suffix}{', whole' if factor.whole else ''}{scale}"
+
     @property
     def dimensions(self) -> int:
         """Coordinates of the unit cube."""

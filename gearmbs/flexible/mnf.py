@@ -45,9 +45,17 @@ def read_mnf(path: str | Path) -> ModalNeutralFile:
     ------
     FlexibleError
         For another version or byte order, a file that is cut off, numbers that cannot be, nodes that differ between
-        blocks: with the block and the byte at which it happens. Nothing is returned of such a file.
+        blocks: with the block and the byte at which it happens. Nothing is returned of such a file. Also if there is
+        no such file.
     """
-    data = Path(path).read_bytes()
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        what = "there is no such file" if isinstance(error, FileNotFoundError) else f"{error.strerror}"
+        raise FlexibleError(
+            f"path = '{path}': {what}; give a modal neutral file (.mnf), as finite element programs and "
+            "gearmbs.flexible.write_mnf write it"
+        ) from None
     label = f"{Path(path).name}"
     if data[:4] == VERSION[::-1]:
         raise FlexibleError(

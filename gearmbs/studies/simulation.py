@@ -15,7 +15,7 @@ from gearmbs.gears.contact_element import contact_kernels
 from gearmbs.mechanism.simulate import simulate
 from gearmbs.studies import rig
 from gearmbs.studies.attributes import attributes_of, bearing_attributes
-from gearmbs.studies.case import Case, CaseError
+from gearmbs.studies.case import Case, CaseError, Operation, Solver
 from gearmbs.studies.evaluation import check_variables, evaluate, time_series
 from gearmbs.studies.limits import check_record, edge, slip
 from gearmbs.studies.measured import Measured, Recorder, measure, rows_of_record
@@ -188,6 +188,7 @@ def run_case(
     *,
     mechanism: Mechanism | None = None,
     variables: Collection[str] | None = None,
+    **settings: Any,
 ) -> xr.Dataset:
     """Simulate a case and return its record: a pure function of the case.
 
@@ -201,6 +202,8 @@ def run_case(
         seats and mesh by their names. Default: the case's own.
     variables : collection of str, optional
         Evaluate only these of the variables below, with the same values; default all.
+    **settings
+        None: what else there is to set, such as ``lump``, belongs to the case, and is refused here by its place there.
 
     Returns
     -------
@@ -220,6 +223,8 @@ def run_case(
     SimulationFailed
         If the integrator stops early or teeth slip past each other; the exception carries the solution so far.
     """
+    for name, value in settings.items():
+        raise CaseError(_misplaced(name, value))
     if not isinstance(case, Case):
         raise CaseError(f"case: is a {type(case).__name__}; make a case of tables by make_case, of a file by load_case")
     check_record(case)
@@ -238,6 +243,15 @@ def run_case(
         raise SimulationFailed(str(failure), solution, case, known) from None
     dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
     return dataset
+
+
+def _misplaced(name: str, value: Any) -> str:
+    """Return what is said of a setting of a case that is given to a function instead."""
+    for table, section in (("solver", Solver), ("operation", Operation)):
+        if name in section.model_fields:
+            given = f"{table}={{{name!r}: {value!r}}}"
+            return f"{name}: is a setting of the case's {table}; give run_case(case.changed({given}))"
+    return f"{name}: run_case takes a case, progress, mechanism and variables; settings belong to the case"
 
 
 def _load_kernels(case: Case) -> None:

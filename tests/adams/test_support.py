@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gearmbs.adams import DeckError, parse_deck, support_table
+from gearmbs.adams import DeckError, parse_deck, run_deck, support_table
 from gearmbs.adams import support as table
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import UNSUPPORTED_ARGUMENTS
@@ -64,3 +64,46 @@ def test_the_page_shows_the_table():
     text = support_table()
     assert "| BEAM | read |" in text
     assert "| TIRE | refused | | | a GFORCE" in " ".join(text.split())
+
+
+LEFT_OUT = """elements that are left out, and what asks for them
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+MARKER/10, PART=1
+PART/2, MASS=1, CM=20, IP=1,1,1
+MARKER/20, PART=2
+JOINT/1, REVOLUTE, I=20, J=10
+MATERIAL/1, YOUNGS_MODULUS=2E11, POISSONS_RATIO=0.3, DENSITY=7800
+FE_PART/4, TYPE=2DOTHER, NODE_LABELS=1,2, COORDINATES=1,0,0,0,0,0,0,2,1,0,0,0,0,0
+, SECTION=1,25,50,50,0,80,2,25,50,50,0,80, MATERIAL=1
+MARKER/40, FE_PART=4, NODE_LABEL=1
+SFORCE/2, TRANSLATIONAL, I=20, J=10, ACTIONONLY, FUNCTION=USER(1)
+SFORCE/3, TRANSLATIONAL, I=20, J=10, ACTIONONLY, FUNCTION=1+VARVAL(5)
+SFORCE/4, TRANSLATIONAL, I=20, J=40, FUNCTION=1
+NFORCE/3, I=20
+VARIABLE/5, FUNCTION=SFORCE(2,0,1,0)
+SENSOR/1, FUNCTION=SFORCE(2,0,1,0), GE, VALUE=10, HALT
+REQUEST/1, F2=DX(20,10)
+REQUEST/2, F2=SFORCE(2,0,2,0)
+REQUEST/3, F2=NFORCE(3,0,2,0)
+REQUEST/4, F2=VARVAL(5)
+REQUEST/5, F2=DX(40,10)
+REQUEST/6, DISPLACEMENT, I=40, J=10
+REQUEST/7, F2=SFORCE(4,0,2,0)
+REQUEST/8, F2=FX(20,10,0)
+END
+"""
+
+
+def test_what_asks_for_elements_that_are_left_out_is_left_out(tmp_path):
+    deck = parse_deck(LEFT_OUT)
+    with pytest.raises(DeckError):
+        run_deck(deck, end=0.1, steps=5)
+    result = run_deck(deck, end=0.1, steps=5, out=tmp_path / "run", allow_unsupported=True)
+    assert result.success
+    assert sorted(result.segments[0].requests) == [1, 8]
+    needs = {"REQUEST/2": "SFORCE/2", "REQUEST/3": "NFORCE/3", "REQUEST/4": "VARIABLE/5", "REQUEST/5": "MARKER/40",
+             "REQUEST/6": "MARKER/40", "REQUEST/7": "SFORCE/4", "SFORCE/3": "VARIABLE/5",
+             "SENSOR/1": "SFORCE/2"}  # fmt: skip
+    for label, need in needs.items():
+        assert any(f"{label}: it needs {need}, which is left out" in str(d) for d in result.deck.diagnostics), label

@@ -148,3 +148,15 @@ def test_a_folder_holds_one_campaign(tmp_path):
 def test_names_of_columns_are_different():
     with pytest.raises(CampaignError, match="names of their own"):
         make_plan(function(), [*ranges(), Factor("x1", 0.0, 1.0)], n=4)
+
+
+def test_a_plan_is_printed_as_what_it_does():
+    factors = [
+        Factor("operation.torque", "50 N m", "200 N m", scale="log"),
+        Factor("operation.speed", values=("500 rpm", "600 rpm")),
+    ]
+    lines = str(make_plan(Case(), factors, n=8)).splitlines()
+    assert lines[0] == "plan of a pair: sobol, n = 8, seed 0, 2 dimensions"
+    assert lines[1] == "  operation.torque: 50 to 200 N m, logarithmic"
+    assert lines[2].startswith("  operation.speed: one of 52.3")
+    assert lines[-1] == "  keeps harmonics"

@@ -114,3 +114,8 @@ def test_a_broken_file_is_refused_or_read_whole(files, kind):
                 assert [a.shape for a in found] == [a.shape for a in whole], f"{kind} with another byte {at}"
         finally:
             path.write_bytes(data)
+
+
+def test_a_modal_neutral_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(FlexibleError, match=r"path = '.*absent.mnf': there is no such file; give a modal neutral file"):
+        read_mnf(tmp_path / "absent.mnf")

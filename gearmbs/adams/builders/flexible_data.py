@@ -95,12 +95,12 @@ def _neutral_file(deck: Deck, s: st.FlexBody) -> ModalNeutralFile:
         path = Path(deck.file).parent / path
     key = str(path)
     if key not in deck.modal_files:
+        if not path.exists():
+            raise ValueError(f"MNF_FILE = {s.mnf_file}: No such file or directory; looked for {path}")
         try:
             deck.modal_files[key] = read_mnf(path)
         except FlexibleError as error:
             raise ValueError(str(error)) from error
-        except OSError as error:
-            raise ValueError(f"MNF_FILE = {s.mnf_file}: {error.strerror}; looked for {path}") from error
     return deck.modal_files[key]
 
 

@@ -84,7 +84,8 @@ class AdamsModel:
             marker_body=marker_body,
             splines={**data.splines, **_curves(self.mechanism)},
             states=frozenset(str(k).upper() for k, state in self.mechanism.states.items() if state.algebraic),
-            forces=dict(self.pairs),  # type: ignore[arg-type]
+            # an element at a marker that is left out is left out, too
+            forces={key: pair for key, pair in self.pairs.items() if all(not m or m in markers for m in pair)},
             absent=frozenset((*key, base) for key in self.pairs if key not in self.names for base in FORCE_AND_TORQUE),
         )
 

@@ -43,9 +43,6 @@ BINDERS: dict[type, tuple[str, Callable]] = {
 EVALUATED = "SEVSUB"
 """That of what a SENSOR evaluates when it fires."""
 
-LEFT_OUT = (st.Variable, st.Diff, st.Gse, st.CurveStatement)
-"""Statements that others read: these are left out with them."""
-
 
 def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: bool = False) -> Deck:
     """Return a deck in which the functions USER(...) call Python functions.
@@ -57,7 +54,8 @@ def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: 
         By statement ("SFORCE/3"), by the name in ROUTINE= or INTERFACE= behind any library's, or by ADAMS's name
         (SFOSUB, ...). Those of a GSE also as one mapping of "deriv", "output" and "update".
     allow_missing : bool
-        Leave out statements whose routine is missing, and those that read them, instead of refusing.
+        Leave out statements whose routine is missing, and those that read them or what is not supported, instead of
+        refusing.
 
     Raises
     ------
@@ -66,7 +64,7 @@ def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: 
     """
     known = {name.upper(): routine for name, routine in (routines or {}).items()}
     users = [use for s in deck for use in _uses(s)]
-    if not users:
+    if not users and not (allow_missing and deck.unsupported):
         return deck
     made = replace(deck, items={kind: dict(group) for kind, group in deck.items.items()})
     made.diagnostics, made.functions = list(deck.diagnostics), dict(deck.functions)
@@ -98,7 +96,7 @@ def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: 
     if any(d.severity == ERROR for d in problems) or (problems and not allow_missing):
         raise DeckError(problems)
     made.diagnostics.extend(problems)
-    if any(isinstance(s, LEFT_OUT) for s in gone):
+    if allow_missing:
         made.diagnostics.extend(without_readers(made, gone))
     return made
 

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from gearmbs.adams.errors import UNSUPPORTED, Diagnostic
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.check import measured_markers
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
+from gearmbs.mechanism.expression_functions import ELEMENT_FORCES
 from gearmbs.mechanism.expression_syntax import Call, Number, parse, walk
+
+Key = tuple[str, int]
+"""Name and id of a statement."""
+WITH_ANOTHER = "which is left out"
+_LABEL = re.compile(r"([A-Z_]+)/(\d+)")
 
 
 def read_variables(deck: Deck, requests: bool = True) -> set[int]:
@@ -64,17 +72,35 @@ def _inputs(deck: Deck, system: Any) -> list[str]:
     ]
 
 
-def without_readers(deck: Deck, gone: Sequence[st.Statement]) -> list[Diagnostic]:
+def left_out(deck: Deck) -> dict[Key, str]:
+    """Return the labels of what is not supported and not in a deck any more, by name and id, also of their markers."""
+    keys, absent = set(), {}
+    for diagnostic in deck.unsupported:
+        found = _LABEL.match(diagnostic.message)
+        if found is None:
+            continue
+        keyword, number = found.group(1), int(found.group(2))
+        keys.add((keyword, number))
+        there = keyword in st.STATEMENTS and number in deck.of(st.STATEMENTS[keyword])
+        if not there or WITH_ANOTHER in diagnostic.message:
+            absent[keyword, number] = found.group()
+    absent |= {("MARKER", m.id): m.label() for m in deck.of(st.Marker).values() if m.owner() in keys}
+    return absent
+
+
+def without_readers(deck: Deck, gone: Sequence[st.Statement] = ()) -> list[Diagnostic]:
     """Take out of a deck what reads statements that were left out, and return a remark on each.
 
     Lists of a control program merely lose those members.
     """
     remarks = []
-    absent = {(type(s), s.id): s.label() for s in gone}
+    absent = left_out(deck) | {(s.keyword, s.id): s.label() for s in gone}
     for s in gone:
         if isinstance(s, st.Gse):
-            absent |= {(st.Array, ref): f"ARRAY/{ref}" for ref in (s.x, s.y, s.xd) if ref is not None}
-    reads = {(type(statement), statement.id): _reads(statement) for statement in deck}
+            absent |= {("ARRAY", ref): f"ARRAY/{ref}" for ref in (s.x, s.y, s.xd) if ref is not None}
+    if not absent:
+        return []
+    reads = {(type(statement), statement.id): needed_by(statement) for statement in deck}
     found = True
     while found:
         found = False
@@ -84,43 +110,47 @@ def without_readers(deck: Deck, gone: Sequence[st.Statement]) -> list[Diagnostic
                 continue
             found = True
             del deck.items[type(statement)][statement.id]
-            absent[type(statement), statement.id] = statement.label()
+            absent[statement.keyword, statement.id] = statement.label()
             message = f"{statement.label()}: it needs {need}, which is left out"
             remarks.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.line))
     lists: tuple[type[st.Plant], ...] = (st.PlantInput, st.PlantOutput)
     for kind in lists:
         group = deck.items.get(kind, {})
         for number, plant in group.items():
-            kept = tuple(v for v in plant.variables if (st.Variable, v) not in absent)
+            kept = tuple(v for v in plant.variables if ("VARIABLE", v) not in absent)
             group[number] = replace(plant, variables=kept)
     return remarks
 
 
-READ_BY: dict[str, type] = {
-    "VARVAL": st.Variable, "DIF": st.Diff, "DIF1": st.Diff, "ARYVAL": st.Array, "CURVE": st.CurveStatement,
-    "SENVAL": st.Sensor,
+READ_BY = {
+    "VARVAL": "VARIABLE", "DIF": "DIFF", "DIF1": "DIFF", "ARYVAL": "ARRAY", "CURVE": "CURVE", "SENVAL": "SENSOR",
 }  # fmt: skip
-"""Statements that functions read by id; of CURVE it is the last argument."""
+"""Statements that functions read by id; of CURVE it is the last argument. Those of forces have the elements' names."""
+
+ASKED = frozenset(READ_BY) | frozenset(ELEMENT_FORCES) | frozenset(st.UNSUPPORTED)
 
 
-def _reads(statement: st.Statement) -> set[tuple[type, int]]:
-    """Return what a statement reads by its id, and in its expressions."""
-    found: set[tuple[type, int]] = set()
+def needed_by(statement: st.Statement) -> set[Key]:
+    """Return what a statement reads by its id, and in its expressions, by name and id."""
+    found: set[Key] = set()
     if isinstance(statement, st.Array):
-        found |= {(st.Variable, ref) for ref in statement.variables}
+        found |= {("VARIABLE", ref) for ref in statement.variables}
     if isinstance(statement, (st.Lse, st.Tfsiso, st.Gse)) and statement.u is not None:
-        found.add((st.Array, statement.u))
+        found.add(("ARRAY", statement.u))
     for name in ("curve", "icurve", "jcurve"):
         ref = getattr(statement, name, None)
         if ref is not None:
-            found.add((st.CurveStatement, ref))
+            found.add(("CURVE", ref))
+    if isinstance(statement, st.Request):
+        found |= {("MARKER", ref) for ref in (statement.i, statement.j, statement.rm) if ref}
     for name, spec in specs_of(type(statement)).items():
         text = getattr(statement, name)
         if spec.kind != EXPRESSION or text is None:
             continue
+        found |= {("MARKER", ref) for ref in measured_markers(text)}
         for node in walk(parse(text)):
-            if isinstance(node, Call) and node.name in READ_BY and node.args:
+            if isinstance(node, Call) and node.args and node.name in ASKED:
                 which = node.args[-1 if node.name == "CURVE" else 0]
                 if isinstance(which, Number) and which.integer is not None:
-                    found.add((READ_BY[node.name], which.integer))
+                    found.add((READ_BY.get(node.name, node.name), which.integer))
     return found

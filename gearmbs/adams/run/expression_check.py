@@ -8,11 +8,11 @@ from gearmbs.adams.builders.control import state_system
 from gearmbs.adams.builders.data_calls import IN_DYNAMICS, Present, translated
 from gearmbs.adams.builders.fe_parts import SHARE
 from gearmbs.adams.builders.flexible import modal_ratios
-from gearmbs.adams.errors import ERROR, WARNING, Diagnostic
+from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import EXPRESSION, specs_of
-from gearmbs.adams.parse.readers import read_variables
+from gearmbs.adams.parse.readers import left_out, needed_by, read_variables
 from gearmbs.adams.run.session import Session
 from gearmbs.dae.equations.expressions.errors import ExpressionError, NotEvaluatedError
 from gearmbs.dae.equations.expressions.opcodes import LEVEL_TIME
@@ -42,21 +42,26 @@ def expression_errors(deck: Deck, session: Session, scope: Scope, present: Prese
     present : Present
     """
     found = []
-    read = read_variables(deck)
+    read, absent = read_variables(deck), left_out(deck)
     told: set[str] = set()
     for statement in sorted(deck, key=lambda s: not isinstance(s, INTO_OTHERS)):
         if (st.KEYWORD_OF[type(statement)], statement.id) in session.inactive:
             continue
+        if absent and isinstance(statement, st.Request):
+            needed = sorted(needed_by(statement) & absent.keys())
+            if needed:
+                _leave_out(session, statement, absent[needed[0]])
+                continue
         for name, spec in specs_of(type(statement)).items():
             text = getattr(statement, name)
             if spec.kind != EXPRESSION or text is None:
                 continue
-            left_out = False
+            unread = False
             try:
                 what = _wrong(deck, statement, text, scope, present)
             except ExpressionError as error:
                 what = str(error)
-                left_out = isinstance(error, NotEvaluatedError) and statement.id not in read
+                unread = isinstance(error, NotEvaluatedError) and statement.id not in read
             except ValueError:
                 # of a CURVE, which is said of its own statement
                 continue
@@ -65,7 +70,7 @@ def expression_errors(deck: Deck, session: Session, scope: Scope, present: Prese
             own = (deck.file, statement.given.get(name, statement.line))
             file, line = session.places.get((type(statement), statement.id, name), own)
             message = f"{statement.label()}: {spec.keyword}: {what}"
-            if left_out and isinstance(statement, st.Variable):
+            if unread and isinstance(statement, st.Variable):
                 message += "; nothing that is computed here reads it, so it is left out"
                 remark = Diagnostic(WARNING, message, file, line)
                 if remark not in session.deck.diagnostics:
@@ -92,6 +97,15 @@ def _system_errors(deck: Deck, session: Session) -> list[Diagnostic]:
             except ValueError as error:
                 found.append(Diagnostic(ERROR, f"{statement.label()}: {error}", deck.file, statement.line))
     return found
+
+
+def _leave_out(session: Session, request: st.Request, need: str) -> None:
+    """Say that a REQUEST is left out with what it asks for."""
+    session.unasked.add(request.id)
+    message = f"{request.label()}: it needs {need}, which is left out"
+    remark = Diagnostic(UNSUPPORTED, message, session.deck.file, request.line)
+    if remark not in session.deck.diagnostics:
+        session.deck.diagnostics.append(remark)
 
 
 def _wrong(deck: Deck, statement: st.Statement, text: str, scope: Scope, present: Present) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -128,7 +129,11 @@ def run_deck(
     session.redundancy, session.check = redundancy, check
     command = Command(script.file)
     try:
-        check_script(deck, script, allow_unsupported)
+        unasked = check_script(deck, script, allow_unsupported)
+        if unasked:
+            requests = {n: request for n, request in deck.of(st.Request).items() if n not in unasked}
+            result.deck = replace(deck, items={**deck.items, st.Request: requests})
+            session.deck = Session.of(result.deck).deck
         for command in script:
             if isinstance(command, Stop):
                 break

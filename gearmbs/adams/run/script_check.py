@@ -19,7 +19,7 @@ SINGLE = ("STATICS", "INITIAL_CONDITIONS", "DISPLACEMENT", "VELOCITY", "ACCELERA
 """Analyses that need no span of time."""
 
 
-def check_script(deck: Deck, script: Script, allow_unsupported: bool = False) -> None:
+def check_script(deck: Deck, script: Script, allow_unsupported: bool = False) -> set[int]:
     """Check everything about a script that is known before it is run.
 
     The elements it switches and changes must be there, its times must go on, the mechanism of the first analysis must
@@ -33,22 +33,30 @@ def check_script(deck: Deck, script: Script, allow_unsupported: bool = False) ->
     allow_unsupported : bool
         Whether what is not supported is left out.
 
+    Returns
+    -------
+    set of int
+        REQUESTs that are left out with what they ask for.
+
     Raises
     ------
     DeckError
         With all that is wrong.
     """
+    unasked: set[int] = set()
     for model_errors in (_errors_of_expressions, _errors_of_model):
-        errors = _gone_through(deck, script, allow_unsupported, model_errors)
+        session = Session.of(deck)
+        errors = _gone_through(session, script, allow_unsupported, model_errors)
         if errors:
             raise DeckError(list(dict.fromkeys(errors)))
+        unasked |= session.unasked
+    return unasked
 
 
 def _gone_through(
-    deck: Deck, script: Script, allow_unsupported: bool, model_errors: Callable[[Session, bool], list[Diagnostic]]
+    session: Session, script: Script, allow_unsupported: bool, model_errors: Callable[[Session, bool], list[Diagnostic]]
 ) -> list[Diagnostic]:
     """Return what is wrong with a script's commands, and with the deck as it is at each of its analyses."""
-    session = Session.of(deck)
     errors: list[Diagnostic] = []
     checked = False
     for command in script:

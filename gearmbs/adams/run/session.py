@@ -53,6 +53,8 @@ class Session:
         Whether dynamic analyses are solved again with a smaller error; None: if that costs little.
     interrupted : bool
         Whether somebody interrupted such a second solution: the run is to end where the first has.
+    unasked : set of int
+        REQUESTs that are left out with what they ask for, by id.
     """
 
     deck: Deck
@@ -67,6 +69,7 @@ class Session:
     redundancy: str = "adams"
     check: bool | None = None
     interrupted: bool = False
+    unasked: set[int] = field(default_factory=set)
 
     @classmethod
     def of(cls, deck: Deck) -> Session:

@@ -231,10 +231,15 @@ def _try_one(
 def _check_arguments(label: str, what: str, function: Any, expected: tuple[str, ...]) -> None:
     if not callable(function):
         raise ModelError(f"{label}: {what} = {function!r} is not a function")
+    signature = inspect.signature(function)
     try:
-        inspect.signature(function).bind(*expected)
-    except TypeError as error:
-        raise ModelError(f"{label}: {what} has to take the arguments ({', '.join(expected)}): {error}") from None
+        signature.bind(*expected)
+    except TypeError:
+        taken = list(signature.parameters)
+        raise ModelError(
+            f"{label}: {what} has to take {len(expected)} arguments ({', '.join(expected)}), it takes {len(taken)} "
+            f"({', '.join(taken)})"
+        ) from None
 
 
 def _compiled(label: str, what: str, function: Any, signature: Any, expected: tuple[str, ...]) -> Any:
