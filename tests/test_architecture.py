@@ -97,7 +97,7 @@ CIRCLES = {
      "adams.builders.held_bodies", "adams.builders.routine_calls",
      "adams.builders.routines", "adams.builders.scopes",
      "adams.builders.state_equations", "adams.builders.user_elements", "adams.parse.check",
-     "adams.parse.deck", "adams.parse.readers"):
+     "adams.parse.deck", "adams.parse.readers", "adams.parse.refused"):
         "a deck builds its mechanism; types only, and one method",
     ("campaigns.campaign", "campaigns.exports", "campaigns.report", "campaigns.response", "campaigns.sensitivity"):
         "methods of Campaign, and the functions that carry them out",

@@ -17,6 +17,11 @@ SHOWN_LABELS = 4
 SHOWN = 20
 """Messages a DeckError prints; the others are counted."""
 
+LEAVE_OUT = (
+    "--skip-unsupported (in Python allow_unsupported=True) leaves out what is unsupported and what reads it, with a "
+    "remark on each"
+)
+
 
 @dataclass(frozen=True)
 class Diagnostic:
@@ -65,6 +70,12 @@ def folded(diagnostics: Sequence[Diagnostic]) -> list[Diagnostic]:
     return found
 
 
+def left_out(diagnostics: Sequence[Diagnostic]) -> list[str]:
+    """Return the names of the statements that are not supported, or not wholly, in the order of the remarks."""
+    matches = (_LABELLED.match(d.message) for d in diagnostics if d.severity == UNSUPPORTED)
+    return list(dict.fromkeys(f"{m.group(1)}/{m.group(2)}" for m in matches if m is not None))
+
+
 def labels_of(labels: Sequence[str]) -> str:
     """Return the names of statements, the first few of many."""
     shown = ", ".join(labels[:SHOWN_LABELS])
@@ -91,4 +102,6 @@ class DeckError(ValueError):
         lines = [str(d) for d in shown[:SHOWN]]
         if len(shown) > SHOWN:
             lines.append(f"... and {len(shown) - SHOWN} more")
+        if any(d.severity == UNSUPPORTED for d in shown):
+            lines[-1:] = [f"{lines[-1]} ({LEAVE_OUT})"] if len(lines) == 1 else [lines[-1], LEAVE_OUT]
         super().__init__("\n".join(lines))

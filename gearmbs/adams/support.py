@@ -10,50 +10,12 @@ from gearmbs.adams.parse import commands as acf
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import UNSUPPORTED_ARGUMENTS, WITHOUT_EFFECT
 from gearmbs.adams.parse.grammar import CHOICE, specs_of
-from gearmbs.adams.parse.remedies import INSTEAD_OF_ARGUMENTS
+from gearmbs.adams.parse.remedies import INSTEAD, INSTEAD_OF_ARGUMENTS, INSTEAD_OF_FUNCTIONS
 from gearmbs.mechanism.expression_functions import BINARY, ELEMENT_FORCES, UNARY
 from gearmbs.mechanism.expression_functions import UNSUPPORTED as REFUSED_FUNCTIONS
 from gearmbs.mechanism.expression_library import FUNCTIONS
 
 READ, OVER, REFUSED = "read", "read over", "refused"
-
-INSTEAD: dict[str, str] = {
-    "CLEARANCE": "a REQUEST with DM between two markers; CONTACT tells how deep solids press",
-    "EXTERNAL_SYSTEM": "a GSE with routines in Python",
-    "MREQUEST": "a REQUEST for each marker",
-    "NFORCE": "BEAM or FIELD between neighbouring PARTs",
-    "NODE": "it belongs to a FLEX_BODY",
-    "NORMAL_MODE_ANALYSIS": "LINEAR/EIGENSOL in the script",
-    "PSTATE": "none needed: LINEAR chooses the coordinates",
-    "SURFACE": "a mesh in an EXTERNAL solid of GRAPHICS",
-    "TIRE": "a GFORCE with a routine in Python",
-    "UCON": "a GCON with an expression, or a COUPLER with a routine",
-}
-"""What to do instead of statements that are refused."""
-
-INSTEAD_OF_FUNCTIONS: dict[str, str] = {
-    "ARYSUM": "the sum of ARYVALs",
-    "CURVE": "read where a CURVE has its id",
-    "DELAY": "a TFSISO that approximates the delay",
-    "DXYZ": "DX, DY and DZ",
-    "FXFREQ": "read in CRATIO of a FLEX_BODY",
-    "FXMODE": "read in CRATIO of a FLEX_BODY",
-    "FXYZ": "FX, FY and FZ",
-    "INTERP": "CUBSPL or AKISPL of a SPLINE",
-    "INVPSD": "a SPLINE of the signal",
-    "MODE": "read in decks, without brackets",
-    "NFORCE": "the forces of BEAM or FIELD",
-    "RANDOM": "a SPLINE of the signal",
-    "SENVAL": "read where a SENSOR has its id",
-    "TXYZ": "TX, TY and TZ",
-    "USER": "the routine in Python alone in the FUNCTION",
-    "UVX": "DX, DY and DZ from the marker to one at 1 of its x axis",
-    "UVY": "DX, DY and DZ from the marker to one at 1 of its y axis",
-    "UVZ": "DX, DY and DZ from the marker to one at 1 of its z axis",
-    "VXYZ": "VX, VY and VZ",
-    "WXYZ": "WX, WY and WZ",
-}
-"""What to do instead of functions that are refused."""
 
 INSTEAD_OF_COMMANDS: dict[str, str] = {
     "CONTROL": "FILE/COMMAND for another script",

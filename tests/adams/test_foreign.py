@@ -46,7 +46,9 @@ def test_friction_may_say_inactive_during_statics():
 @pytest.mark.parametrize("name", ["SURFACE", "NODE", "CLEARANCE"])
 def test_statements_of_adams_are_not_taken_for_misspelt_others(name):
     deck = parse_deck(with_lines(f"{name}/1, I=0201\n"))
-    assert [d.message for d in deck.unsupported] == [f"{name}/1 is not supported; it changes the motion"]
+    assert [d.message.partition("; instead")[0] for d in deck.unsupported] == [
+        f"{name}/1 is not supported; it changes the motion"
+    ]
 
 
 def test_libraries_of_subroutines_are_remarked():

@@ -15,7 +15,7 @@ from gearmbs.adams.builders.user_elements import bind_coupler, bind_curve, bind_
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, DeckError, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.adams.parse.readers import without_readers
+from gearmbs.adams.parse.refused import without_refused
 from gearmbs.mechanism.expression_syntax import Call, Negative, Node, Number, parse
 
 ROUTINES: dict[type, tuple[str, tuple[str, ...]]] = {
@@ -45,7 +45,10 @@ EVALUATED = "SEVSUB"
 
 
 def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: bool = False) -> Deck:
-    """Return a deck in which the functions USER(...) call Python functions.
+    """Return a deck in which the functions USER(...) call Python functions, without what is not supported.
+
+    What uses functions that are not supported, and what reads it, is taken out, and remarked in the deck's diagnostics:
+    a run refuses these unless it is asked to leave them out.
 
     Parameters
     ----------
@@ -60,14 +63,13 @@ def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: 
     Raises
     ------
     DeckError
-        Naming all routines that are missing, and what is wrong with the others.
+        Naming all routines that are missing, with what else is not supported, and what is wrong with the others.
     """
     known = {name.upper(): routine for name, routine in (routines or {}).items()}
     users = [use for s in deck for use in _uses(s)]
-    if not users and not (allow_missing and deck.unsupported):
-        return deck
     made = replace(deck, items={kind: dict(group) for kind, group in deck.items.items()})
     made.diagnostics, made.functions = list(deck.diagnostics), dict(deck.functions)
+    made.left_out = set(deck.left_out)
     problems = []
     gone: list[st.Statement] = []
     for use in users:
@@ -93,11 +95,11 @@ def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: 
             group[statement.id] = _with_function(made, group[statement.id], use, found)
         except ValueError as error:
             problems.append(_wrong(deck, statement, error))
-    if any(d.severity == ERROR for d in problems) or (problems and not allow_missing):
+    if any(d.severity == ERROR for d in problems):
         raise DeckError(problems)
-    made.diagnostics.extend(problems)
-    if allow_missing:
-        made.diagnostics.extend(without_readers(made, gone))
+    made.diagnostics.extend([*problems, *without_refused(made, gone, readers=allow_missing)])
+    if problems and not allow_missing:
+        raise DeckError(sorted(made.unsupported, key=lambda d: d.line))
     return made
 
 

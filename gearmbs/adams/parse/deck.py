@@ -39,6 +39,8 @@ class Deck:
         Functions that routines of the user have become, by name.
     modal_files : dict
         Modal neutral files that have been read, by path.
+    left_out : set of (statement name, id)
+        What was taken out since it is not supported, or reads what is not.
     """
 
     title: str = ""
@@ -48,6 +50,7 @@ class Deck:
     unread: dict[tuple[str, int], RawStatement] = field(default_factory=dict)
     functions: dict[str, UserFunction] = field(default_factory=dict)
     modal_files: dict[str, ModalNeutralFile] = field(default_factory=dict)
+    left_out: set[tuple[str, int]] = field(default_factory=set)
 
     def of(self, kind: type[S]) -> dict[int, S]:
         """Return the statements of one class by id."""

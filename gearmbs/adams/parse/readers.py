@@ -94,10 +94,18 @@ def without_readers(deck: Deck, gone: Sequence[st.Statement] = ()) -> list[Diagn
     Lists of a control program merely lose those members.
     """
     remarks = []
-    absent = left_out(deck) | {(s.keyword, s.id): s.label() for s in gone}
+    absent = left_out(deck)
+
+    def leave_out(s: st.Statement) -> None:
+        absent[s.keyword, s.id] = s.label()
+        deck.left_out.add((s.keyword, s.id))
+        for name in ("x", "y", "xd") if isinstance(s, (st.Lse, st.Tfsiso, st.Gse)) else ():
+            ref = getattr(s, name, None)
+            if ref is not None:
+                absent["ARRAY", ref] = f"ARRAY/{ref}"
+
     for s in gone:
-        if isinstance(s, st.Gse):
-            absent |= {("ARRAY", ref): f"ARRAY/{ref}" for ref in (s.x, s.y, s.xd) if ref is not None}
+        leave_out(s)
     if not absent:
         return []
     reads = {(type(statement), statement.id): needed_by(statement) for statement in deck}
@@ -110,7 +118,7 @@ def without_readers(deck: Deck, gone: Sequence[st.Statement] = ()) -> list[Diagn
                 continue
             found = True
             del deck.items[type(statement)][statement.id]
-            absent[statement.keyword, statement.id] = statement.label()
+            leave_out(statement)
             message = f"{statement.label()}: it needs {need}, which is left out"
             remarks.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.line))
     lists: tuple[type[st.Plant], ...] = (st.PlantInput, st.PlantOutput)
@@ -124,6 +132,7 @@ def without_readers(deck: Deck, gone: Sequence[st.Statement] = ()) -> list[Diagn
 
 READ_BY = {
     "VARVAL": "VARIABLE", "DIF": "DIFF", "DIF1": "DIFF", "ARYVAL": "ARRAY", "CURVE": "CURVE", "SENVAL": "SENSOR",
+    "SPDP": "SPRINGDAMPER", "BUSH": "BUSHING", "VTORQ": "VTORQUE",
 }  # fmt: skip
 """Statements that functions read by id; of CURVE it is the last argument. Those of forces have the elements' names."""
 
@@ -137,6 +146,8 @@ def needed_by(statement: st.Statement) -> set[Key]:
         found |= {("VARIABLE", ref) for ref in statement.variables}
     if isinstance(statement, (st.Lse, st.Tfsiso, st.Gse)) and statement.u is not None:
         found.add(("ARRAY", statement.u))
+    if isinstance(statement, st.Contact):
+        found |= {("GRAPHICS", ref) for ref in (*statement.igeom, *statement.jgeom)}
     for name in ("curve", "icurve", "jcurve"):
         ref = getattr(statement, name, None)
         if ref is not None:

@@ -1,4 +1,4 @@
-"""What to do instead of arguments that are refused."""
+"""What to do instead of statements, arguments and functions that are refused."""
 
 from __future__ import annotations
 
@@ -25,6 +25,44 @@ INSTEAD_OF_ARGUMENTS: dict[tuple[str, str], str] = {
 }
 """What to do instead of arguments that are refused."""
 
+INSTEAD: dict[str, str] = {
+    "CLEARANCE": "a REQUEST with DM between two markers; CONTACT tells how deep solids press",
+    "EXTERNAL_SYSTEM": "a GSE with routines in Python",
+    "MREQUEST": "a REQUEST for each marker",
+    "NFORCE": "BEAM or FIELD between neighbouring PARTs",
+    "NODE": "it belongs to a FLEX_BODY",
+    "NORMAL_MODE_ANALYSIS": "LINEAR/EIGENSOL in the script",
+    "PSTATE": "none needed: LINEAR chooses the coordinates",
+    "SURFACE": "a mesh in an EXTERNAL solid of GRAPHICS",
+    "TIRE": "a GFORCE with a routine in Python",
+    "UCON": "a GCON with an expression, or a COUPLER with a routine",
+}
+"""What to do instead of statements that are refused."""
+
+INSTEAD_OF_FUNCTIONS: dict[str, str] = {
+    "ARYSUM": "the sum of ARYVALs",
+    "CURVE": "read where a CURVE has its id",
+    "DELAY": "a TFSISO that approximates the delay",
+    "DXYZ": "DX, DY and DZ",
+    "FXFREQ": "read in CRATIO of a FLEX_BODY",
+    "FXMODE": "read in CRATIO of a FLEX_BODY",
+    "FXYZ": "FX, FY and FZ",
+    "INTERP": "CUBSPL or AKISPL of a SPLINE",
+    "INVPSD": "a SPLINE of the signal",
+    "MODE": "MODE without brackets",
+    "NFORCE": "the forces of BEAM or FIELD",
+    "RANDOM": "a SPLINE of the signal",
+    "SENVAL": "read where a SENSOR has its id",
+    "TXYZ": "TX, TY and TZ",
+    "USER": "the routine in Python alone in the FUNCTION",
+    "UVX": "DX, DY and DZ from the marker to one at 1 of its x axis",
+    "UVY": "DX, DY and DZ from the marker to one at 1 of its y axis",
+    "UVZ": "DX, DY and DZ from the marker to one at 1 of its z axis",
+    "VXYZ": "VX, VY and VZ",
+    "WXYZ": "WX, WY and WZ",
+}
+"""What to do instead of functions that are refused."""
+
 FRICTION_OF_JOINTS = (
     (("mu_stat_rot", "mu_stat_trans"), "MU_STATIC"),
     (("mu_dyn_rot", "mu_dyn_trans"), "MU_DYNAMIC"),
@@ -34,6 +72,16 @@ FRICTION_OF_JOINTS = (
 """Arguments of a JOINT with friction, the first given one of each counts, and those of a FRICTION statement."""
 SIZES = {"SPHERICAL": "BALL_RADIUS", "TRANSLATIONAL": ""}
 """Argument of FRICTION for the radius of a joint, where it is not PIN_RADIUS."""
+
+
+def instead_of_statement(name: str) -> str:
+    """Return a clause on what to do instead of a statement that is refused, "" where there is nothing."""
+    return f"; instead: {INSTEAD[name]}" if name in INSTEAD else ""
+
+
+def instead_of_function(name: str) -> str:
+    """Return a clause on what to write instead of a function that is refused, "" where there is nothing."""
+    return f"; instead: {INSTEAD_OF_FUNCTIONS[name]}" if name in INSTEAD_OF_FUNCTIONS else ""
 
 
 def refused_message(statement: st.Statement, name: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.adams.errors import folded
+from gearmbs.adams.errors import folded, left_out
 from gearmbs.adams.parse.commands import Command, Simulate
 from gearmbs.adams.results.record import NEWTON, RunRecord, Segment
 from gearmbs.adams.results.rows import row_text
@@ -18,12 +18,20 @@ TABLE_HEAD = """\
    ___________  ___________   ___________  ___________   _________    ________"""
 
 
+MERELY_READ = frozenset(
+    "REQUEST MREQUEST VARIABLE ARRAY CLEARANCE NODE NORMAL_MODE_ANALYSIS PSTATE PINPUT POUTPUT".split()
+)
+"""Statements that move nothing themselves; what reads them is named as well."""
 INDEX = {"I3": "INDEX-3", "SI2": "stabilized INDEX-2", "SI1": "stabilized INDEX-1"}
 
 
 def message_text(result: RunRecord) -> str:
     """Return the content of the message file: remarks on the model, then the commands in their order."""
     out = [RULE, f"|{'Model Title':^77}|", f"|{'=' * 77}|", f"|{result.deck.title[:75]:^77}|", RULE, ""]
+    without = [label for label in left_out(result.deck.diagnostics) if label.split("/")[0] not in MERELY_READ]
+    if without:
+        text = f"The model is run without {', '.join(without)}, or parts of these: its motion is not that of the deck."
+        out += _block("ERROR", text)
     for d in folded((*result.deck.diagnostics, *result.script.diagnostics)):
         out += _block("ERROR" if d.severity == "unsupported" else "WARNING", str(d))
     for command, outcome in result.log:

@@ -47,6 +47,8 @@ def check_script(deck: Deck, script: Script, allow_unsupported: bool = False) ->
     for model_errors in (_errors_of_expressions, _errors_of_model):
         session = Session.of(deck)
         errors = _gone_through(session, script, allow_unsupported, model_errors)
+        if not allow_unsupported:
+            errors += deck.unsupported
         if errors:
             raise DeckError(list(dict.fromkeys(errors)))
         unasked |= session.unasked

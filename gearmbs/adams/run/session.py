@@ -13,6 +13,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import check, refused_arguments
 from gearmbs.adams.parse.commands import Change, Simulate, Switch, apply_change
 from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.refused import refused_functions
 
 AT_START: dict[type, frozenset[str]] = {
     st.Part: frozenset("qg reuler zg xg vx vy vz wx wy wz vm wm exact".split()),
@@ -98,12 +99,12 @@ def switch(session: Session, command: Switch) -> None:
         If the deck does not have it.
     """
     keyword, number = command.element or "", command.id or 0
-    if keyword in st.UNSUPPORTED:
+    if keyword in st.UNSUPPORTED or (keyword, number) in session.deck.left_out:
         return
     there = session.deck.of(st.STATEMENTS[keyword])
     low, high = command.range or (number, number)
     numbers = [n for n in there if low <= n <= high]
-    if not numbers:
+    if not numbers and not any(name == keyword and low <= n <= high for name, n in session.deck.left_out):
         label = f"{keyword}/{number}" if number else keyword
         label += f" from {low} to {high}" if command.range else ""
         raise DeckError([Diagnostic(ERROR, f"there is no {label} in the deck", command.file, command.line)])
@@ -121,6 +122,15 @@ def change(session: Session, command: Change, allow_unsupported: bool) -> None:
     """
     new = command.statement
     assert new is not None
+    if (st.KEYWORD_OF[type(new)], new.id) in session.deck.left_out:
+        return
+    functions = [message for _, message in refused_functions(new, tuple(new.given))]
+    if functions and not allow_unsupported:
+        raise DeckError([Diagnostic(UNSUPPORTED, message, command.file, command.line) for message in functions])
+    if functions:
+        for message in functions:
+            _remark(session, Diagnostic(UNSUPPORTED, f"{message}; the command is left out", command.file, command.line))
+        return
     late = AT_START.get(type(new), frozenset()) & set(new.given)
     if late and session.state is not None and not allow_unsupported:
         what = ", ".join(sorted(name.upper() for name in late))
@@ -152,6 +162,11 @@ def change(session: Session, command: Change, allow_unsupported: bool) -> None:
         session.deck.__dict__.pop("units", None)
         raise DeckError([Diagnostic(d.severity, d.message, command.file, command.line) for d in wrong])
     session.places.update({(type(new), new.id, name): (command.file, line) for name, line in new.given.items()})
+
+
+def _remark(session: Session, remark: Diagnostic) -> None:
+    if remark not in session.deck.diagnostics:
+        session.deck.diagnostics.append(remark)
 
 
 def output_times(session: Session, command: Simulate) -> np.ndarray:
