@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from gearmbs.adams.errors import UNSUPPORTED, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
@@ -44,7 +46,7 @@ def refused_functions(statement: st.Statement, names: tuple[str, ...] | None = N
     return list(found.values())
 
 
-def without_refused(deck: Deck, gone: list[st.Statement], readers: bool) -> list[Diagnostic]:
+def without_refused(deck: Deck, gone: Sequence[st.Statement], readers: bool) -> list[Diagnostic]:
     """Take out of a deck what uses functions that are not supported and what reads it; return remarks on them.
 
     A VARIABLE that nothing reads stays: it is remarked where expressions are checked.
@@ -53,13 +55,14 @@ def without_refused(deck: Deck, gone: list[st.Statement], readers: bool) -> list
     ----------
     deck : Deck
         Changed in place.
-    gone : list of Statement
+    gone : sequence of Statement
         What has been taken out before, for other reasons.
     readers : bool
         Whether to remark on those that merely read what is taken out.
     """
+    others = without_readers(deck, gone)
     read = read_variables(deck)
-    gone = list(gone)
+    refused = []
     remarks = []
     for statement in list(deck):
         if isinstance(statement, st.Variable) and statement.id not in read:
@@ -70,6 +73,6 @@ def without_refused(deck: Deck, gone: list[st.Statement], readers: bool) -> list
             remarks.append(Diagnostic(UNSUPPORTED, message, deck.file, line))
         if told:
             del deck.items[type(statement)][statement.id]
-            gone.append(statement)
-    others = without_readers(deck, gone)
+            refused.append(statement)
+    others += without_readers(deck, refused) if refused else []
     return remarks + (others if readers else [])
