@@ -59,7 +59,7 @@ def adams(
             )
         except DeckError as error:
             if error.result is not None and error.result.segments:
-                typer.echo(f"wrote what was computed to {prefix}.req, .res, .msg, .nc")
+                typer.echo(f"wrote what was computed to {', '.join(map(str, error.result.files(prefix)))}")
             raise
         except KeyboardInterrupt as interrupt:
             partial = getattr(interrupt, "result", None)

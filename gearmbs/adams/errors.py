@@ -92,9 +92,12 @@ class DeckError(ValueError):
         Every place that is wrong.
     result : AdamsResult or None
         The analyses of a script that were carried out before, when it was being run.
+    kept : Segment or None
+        What the analysis in which a routine of the user failed computed until then.
     """
 
     result: Any = None
+    kept: Any = None
 
     def __init__(self, diagnostics: Sequence[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -129,7 +130,8 @@ def simulate(
     Raises
     ------
     ModelError
-        If the model or an option is wrong, or the mechanism cannot be assembled.
+        If the model or an option is wrong, or the mechanism cannot be assembled; if a function of the user fails, its
+        ``solution`` has what was computed until then.
     """
     if consumer is not None and not every_step:
         raise ModelError("consumer: it takes the integrator's own steps; give every_step=True, too")
@@ -149,8 +151,15 @@ def simulate(
     stream = None if consumer is None else Stream(system, problem, float(t_eval[-1]), consumer, members)
     warn_of_stiff_seats(mechanism.joints, mechanism.elements)
     bar = time_bar(progress, mechanism.name, float(t_eval[0]), float(t_eval[-1]))
-    with bar as report, raised_errors(mechanism.functions.values()):
-        result = _integrated(name, problem, t_eval, every_step, stream, tol=tol, progress=report, **options)
+    result = None
+    try:
+        with bar as report, raised_errors(mechanism.functions.values()):
+            result = _integrated(name, problem, t_eval, every_step, stream, tol=tol, progress=report, **options)
+    except ModelError as error:
+        if result is not None and stream is None:
+            cut = replace(result, status=Status.USER_ERROR, message=str(error))
+            error.solution = Solution(system, problem, cut, members, remark)
+        raise
     solution = Solution(system, problem, result, members, remark)
     if stream is not None:
         return _closed(stream, solution, name)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import inspect
+import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -132,11 +134,20 @@ class UserFunction:
             self.errors.clear()
             if not isinstance(error, Exception):
                 raise error
-            raise ModelError(f"function '{self.name}': {type(error).__name__}: {error}") from error
+            where = "; ".join(filter(None, [place_of(error), *getattr(error, "__notes__", ())]))
+            told = f"{type(error).__name__}: {error}" + (f" ({where})" if where else "")
+            raise ModelError(f"function '{self.name}': {told}") from error
 
     def __getstate__(self) -> dict[str, Any]:
         # an address means nothing in another process
         return {**self.__dict__, "_callback": None, "errors": []}
+
+
+def place_of(error: BaseException) -> str:
+    """Return file and line of the user's code in which an error arose, "" if it arose in none."""
+    own = str(Path(__file__).parents[1])
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith((own, "<"))]
+    return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else ""
 
 
 def _at(x: list[float], moves: dict[int, float]) -> list[float]:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
+import sys
 
 import numpy as np
 import pytest
 from numba import njit
 
-from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
+from gearmbs.adams import DeckError, load_routines, parse_deck, parse_script, run_deck
 
+REHEARSED = f"{__file__}, line "
 HEAD = """routines
 UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
 PART/1, GROUND
@@ -55,10 +58,12 @@ def test_what_is_no_result_is_named_before_anything_is_run(name):
         (lambda call: (asked(call),) * (count + 1), f"returns {count + 1} numbers, it must return {count}"),
         (lambda call: asked(call) and None, f"returns None, it must return {many}"),
         (lambda call: "none", f"returns 'none', it must return {many}"),
-        (lambda call: {}[asked(call) < 0.0], "fails: KeyError: False"),
+        (lambda call: {}[asked(call) < 0.0], f"fails: KeyError: False ({REHEARSED}"),
         (3, "is 3, which cannot be called"),
     ):
-        assert message(text, {name: routine}) == (8, f"{label}: its routine {told}")
+        line, found = message(text, {name: routine})
+        assert line == 8
+        assert re.sub(r"\d+; in a rehearsal.*", "", found) == f"{label}: its routine {told}"
 
 
 @pytest.mark.parametrize("name", ["varsub", "reqsub"])
@@ -202,3 +207,44 @@ def test_sets_of_quantities_take_all_the_markers_of_adams(name):
     found = run(text, {"reqsub": lambda call: (*call.sysary(name, *ids), *[0.0] * (8 - len(SETS[name])))})
     assert np.ptp(found.request(2)[:, : len(SETS[name])], axis=0).min() > 1e-3
     np.testing.assert_array_equal(found.request(1), found.request(2))
+
+
+FALLING = (
+    HEAD.replace("WX=1, WY=0.2, VX=0.1", "VX=0.1")
+    + "SFORCE/1, TRANSLATIONAL, I=20, J=1, ACTIONONLY, FUNCTION=USER(1)\n"
+)
+
+
+def test_what_was_computed_until_a_routine_fails_is_kept(tmp_path):
+    """Time, the routine's own line, the deck's line; results under their partial name, as those of a whole run."""
+    (tmp_path / "table.py").write_text("def ends(t):\n    raise ValueError('table ends')\n")
+    (tmp_path / "own.py").write_text(
+        "from table import ends\n\ndef sfosub(call):\n    if call.time > 0.3 and not call.rehearsal:\n"
+        "        ends(call.time)\n    return 2.0 * call.sysfnc('DX', 20, 1)\n"
+    )
+    deck = parse_deck(FALLING + "REQUEST/1, F2=DX(20,1)\nEND\n")
+    routines = load_routines(tmp_path / "own.py")
+    assert str(tmp_path) not in sys.path
+    with pytest.raises(DeckError) as caught:
+        run_deck(deck, end=1.0, steps=50, tol=1e-9, routines=routines, out=tmp_path / "run")
+    (told,) = caught.value.diagnostics
+    assert told.line == 8
+    assert re.search(r"ValueError: table ends \(.*table\.py, line 2; at TIME = 0\.3\d*\)", told.message)
+    assert sorted(p.name for p in tmp_path.glob("run*")) == [
+        "run.msg", "run.partial.nc", "run.partial.req", "run.partial.res",
+    ]  # fmt: skip
+    kept = caught.value.result
+    assert 0.2 < kept.t[-1] <= 0.3
+    assert not kept.success
+    whole = run_deck(deck, end=0.3, steps=15, tol=1e-9, routines=routines)
+    np.testing.assert_allclose(kept.request(1), whole.request(1)[: kept.t.size], atol=1e-7)
+    assert (tmp_path / "run.msg").read_text().count("table ends") == 1
+
+
+def test_a_routine_that_fails_in_rehearsal_says_so():
+    def sfosub(call):
+        raise ValueError("no table")
+
+    line, told = message("SFORCE/1, TRANSLATIONAL, I=20, J=1, ACTIONONLY, FUNCTION=USER(1)", {"sfosub": sfosub})
+    assert line == 8
+    assert "in a rehearsal, where numbers have no meaning: see call.rehearsal" in told

@@ -19,7 +19,7 @@ import numpy as np
 
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.deck import Deck
-from gearmbs.mechanism.user_functions import UserFunction
+from gearmbs.mechanism.user_functions import UserFunction, place_of
 
 SYSARY = {
     "DISP": ("DX", "DY", "DZ", "PSI", "THETA", "PHI"),
@@ -219,10 +219,10 @@ class Caller:
             except (ArithmeticError, ValueError) as error:
                 # numbers of no meaning may have no root; what it asked for before counts
                 if seed == REHEARSALS - 1 and not call._values and not self.quantities:
-                    raise ValueError(f"fails: {error}") from error
+                    raise ValueError(f"fails: {error}{_in_rehearsal(error)}") from error
             except Exception as error:
                 # whatever a user's function raises is told with its statement
-                raise ValueError(f"fails: {type(error).__name__}: {error}") from error
+                raise ValueError(f"fails: {type(error).__name__}: {error}{_in_rehearsal(error)}") from error
             yield list(call._values)
 
     def _results(self, call: RoutineCall) -> tuple[float, ...]:
@@ -249,7 +249,11 @@ class Caller:
             call = self._call(arguments[0], False, dict(zip(self.asked, rest)), _NEVER)
             for name, values in given.items():
                 setattr(call, name, values)
-            self._last = arguments, self._results(call)
+            try:
+                self._last = arguments, self._results(call)
+            except Exception as error:
+                error.add_note(f"at TIME = {arguments[0]:.6g}")
+                raise
         return self._last[1]
 
     def arguments(self, quantities: Sequence[str] = ()) -> list[str]:
@@ -270,6 +274,12 @@ class Caller:
             functions[key] = UserFunction(label, value, count=len(arguments))
             out.append(f"{key}({', '.join(arguments)})")
         return out
+
+
+def _in_rehearsal(error: Exception) -> str:
+    """Return where a routine failed, and that it was given numbers of no meaning."""
+    place = place_of(error)
+    return f" ({f'{place}; ' if place else ''}in a rehearsal, where numbers have no meaning: see call.rehearsal)"
 
 
 _NEVER = np.random.default_rng(0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import runpy
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -108,7 +109,7 @@ def _wrong(deck: Deck, statement: st.Statement, error: ValueError) -> Diagnostic
 
 
 def load_routines(path: str | Path) -> dict[str, Routine]:
-    """Return the functions that a Python file defines, by name, as routines.
+    """Return the functions that a Python file defines, by name, as routines; it may import what stands beside it.
 
     Raises
     ------
@@ -116,10 +117,13 @@ def load_routines(path: str | Path) -> dict[str, Routine]:
         If it cannot be read or run, or defines none.
     """
     path = Path(path)
+    sys.path.insert(0, str(path.resolve().parent))
     try:
         space = runpy.run_path(str(path))
     except Exception as error:
         raise ValueError(f"{path}: {type(error).__name__}: {error}") from error
+    finally:
+        sys.path.remove(str(path.resolve().parent))
     found: dict[str, Routine] = {k: v for k, v in space.items() if k[0] != "_" and _defined_here(v)}
     if not found:
         raise ValueError(f"{path}: it defines no functions; write for example def sfosub(call): ...")

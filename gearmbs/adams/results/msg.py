@@ -66,7 +66,7 @@ def _segment(result: RunRecord, segment: Segment) -> list[str]:
         out += _integrated(segment, title, t, stats)
     for remark in result.remarks(segment):
         out += ["", *_block("WARNING", remark)]
-    if not s.success and not segment.interrupted:
+    if not s.success and not result.partial:
         out += ["", *_block("ERROR", s.message)]
     return [*out, "", "  End Simulation", ""]
 

@@ -135,12 +135,17 @@ class RunRecord:
         return not self.errors and not self.interrupted and all(s.success for s in self.segments)
 
     @property
+    def partial(self) -> bool:
+        """True when somebody interrupted the run, or a routine of the user failed: results are there until then."""
+        return bool(self.interrupted) or any(s.solution.status is Status.USER_ERROR for s in self.segments)
+
+    @property
     def messages(self) -> list[str]:
         """What was left out, ignored or went wrong, one sentence each."""
         found = [str(d) for d in folded((*self.deck.diagnostics, *self.script.diagnostics))]
         for segment in self.segments:
             found.extend(self.remarks(segment))
-            if not segment.success and not segment.interrupted:
+            if not segment.success and not self.partial:
                 found.append(segment.solution.message)
         return found + [str(d) for d in self.errors] + [self.interrupted] * bool(self.interrupted)
 

@@ -31,7 +31,8 @@ class AdamsResult(RunRecord):
         """Write .req, .res, .msg and .nc files; the message file alone when no analysis was carried out.
 
         The plants of LINEAR/STATEMAT go to the .mat files that the commands name, or to PREFIX_plant1.mat and so on.
-        Each file appears when it is whole. Results of an interrupted run are named PREFIX.partial.
+        Each file appears when it is whole. Results of a run that was interrupted, or in
+        which a routine of the user failed, are named PREFIX.partial.
 
         Parameters
         ----------
@@ -56,7 +57,7 @@ class AdamsResult(RunRecord):
     def files(self, prefix: str | Path) -> list[Path]:
         """Return the names of the message file and, if there are any, of the files of results."""
         prefix = Path(prefix)
-        results = prefix.name + (".partial" if self.interrupted else "")
+        results = prefix.name + (".partial" if self.partial else "")
         endings = (".req", ".res", ".nc") if self.segments else ()
         return [prefix.with_name(f"{prefix.name}.msg"), *(prefix.with_name(results + ending) for ending in endings)]
 

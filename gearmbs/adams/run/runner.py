@@ -20,17 +20,15 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Change, Command, Linear, Script, Simulate, Stop, Switch, read_script
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.reader import read_deck
-from gearmbs.adams.results.assembly import assembly_of
 from gearmbs.adams.results.record import NEWTON, Segment
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.results.result import AdamsResult
-from gearmbs.adams.results.tracks import tracks_of
 from gearmbs.adams.run.convergence import Doubt, doubt
-from gearmbs.adams.run.curve_ends import off_the_end
 from gearmbs.adams.run.equilibria import equilibria_to_passage
 from gearmbs.adams.run.plant import plant_of
 from gearmbs.adams.run.samples import parts, renew, take_samples
 from gearmbs.adams.run.script_check import check_linear, check_script, is_sequence
+from gearmbs.adams.run.segments import kept_until, segment_of
 from gearmbs.adams.run.sensors import Watch, act, after, in_unit, up_to
 from gearmbs.adams.run.session import Session, active_sensors, change, output_times, switch
 from gearmbs.dae.analyses.kinematic_analysis import kinematic
@@ -38,7 +36,6 @@ from gearmbs.dae.analyses.modes import Modes
 from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.analyses.quasi_static import initial_conditions, quasi_static
 from gearmbs.dae.analyses.statics import StaticResult, static_equilibrium
-from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.errors import ModelError
 from gearmbs.dae.model.system import System
 from gearmbs.dae.result import Status
@@ -143,6 +140,8 @@ def run_deck(
             result.interrupted = _interruption(deck, result, command)
     except DeckError as error:
         result.errors.extend(error.diagnostics)
+        if error.kept is not None:
+            result.log[-1] = (command, error.kept)
         error.result = result
         raise
     except ModelError as error:
@@ -335,6 +334,7 @@ def _part(
         kind = "INITIAL_CONDITIONS"
     model = None
     fired: list[st.Sensor] = []
+    options: dict[str, Any] = {}
     try:
         model = _model(session, allow_unsupported, (session.time, float(times[-1])), _mode(kind, times))
         options, note = _settings(session, tol)
@@ -349,22 +349,11 @@ def _part(
         if watch.sensors:
             solution, fired = _to_passage(session, command, watch, model, times, options, solution)
     except (ModelError, ArithmeticError) as error:
-        raise _failed(session, command, model, error) from error
+        failed = _failed(session, command, model, error)
+        failed.kept = kept_until(session, command, kind, model, error, options)
+        raise failed from error
 
-    evaluator = RequestEvaluator(model, solution)
-    segment = Segment(command, kind, model, solution, options, note, equilibrium=equilibrium)
-    if kind != "STATICS":
-        segment.assembly = assembly_of(model, solution)
-    for request in session.deck.of(st.Request).values():
-        try:
-            segment.requests[request.id] = evaluator.request(request)
-        except ExpressionError as error:
-            raise DeckError([Diagnostic(ERROR, str(error), session.deck.file, request.line)]) from error
-    for kind_id in model.pairs:
-        segment.wrenches[kind_id] = evaluator.wrench(*kind_id)[:, :6]
-    segment.tracks = tracks_of(model, solution)
-    segment.variables = evaluator.variables()
-    segment.note = "\n".join(filter(None, [note, *off_the_end(model, solution)])) or None
+    segment, evaluator = segment_of(session, command, kind, model, solution, options, note, equilibrium)
     if kind not in ("STATICS", "INITIAL_CONDITIONS"):
         segment.passage = singular_passage(solution)
     if kind in ("DYNAMICS", "TRANSIENT"):
