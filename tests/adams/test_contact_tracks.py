@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from gearmbs.adams import parse_deck, read_deck, run_deck
+from gearmbs.adams.results.facets import FacetedTouch, facets_remark
 from gearmbs.adams.results.res import NAMESPACE
 from gearmbs.adams.results.tracks import TRACK_COLUMNS
-from gearmbs.mechanism.contacts import Box
+from gearmbs.mechanism.contacts import Box, Cylinder
 
 from .test_contacts import IMPACT, PLANE, deck
 from .test_curves import matrix
@@ -181,3 +182,49 @@ def test_a_contact_that_rests_has_no_track():
     result = run_deck(parse_deck(deck(60.0)), end=0.05, steps=5)
     assert result.tracks(1).shape == (6, 0, len(TRACK_COLUMNS))
     assert "contact_1_tracks" not in result.to_dataset()
+
+
+ROLLER = """{name}
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=MILLIMETER, TIME=SECOND
+PART/1, GROUND
+MARKER/1, PART=1
+PART/2, MASS=2, CM=2, IP=7900,2500,7900, QG=0,0,49.9, VX=1000, WY=20
+MARKER/2, PART=2
+MARKER/3, PART=2, QP=0,-100,0, ZP=0,1,0
+GRAPHICS/1, {floor}
+GRAPHICS/2, {solid}
+CONTACT/1, IGEOM=2, JGEOM=1, IMPACT, STIFFNESS=1E4, DAMPING=1, DMAX=0.1, EXPONENT=1.5
+ACCGRAV/KGRAV=-9810
+END
+"""
+
+
+def test_what_rolls_on_facets_is_remarked(tmp_path):
+    """A cylinder of 48 segments leaves the round by r (1 - cos(pi/48)); an exact one and a block do not."""
+    (tmp_path / "roller.obj").write_text(obj(*Cylinder(50, 200).facets()))
+    (tmp_path / "block.obj").write_text(obj(*Box((100, 100, 100)).facets()))
+    mesh = "EXTERNAL, RM=2, FILE={}"
+    found = {}
+    for name, floor, solid in (
+        ("facets", "PLANE, RM=1", mesh.format("roller.obj")),
+        ("block", "PLANE, RM=1", mesh.format("block.obj")),
+        ("exact", "PLANE, RM=1", "CYLINDER, CM=3, LENGTH=200, RADIUS=50"),
+    ):
+        path = tmp_path / f"{name}.adm"
+        path.write_text(ROLLER.format(name=name, floor=floor, solid=solid))
+        result = run_deck(path, end=0.02, steps=10)
+        assert result.success
+        found[name] = [m for m in result.messages if "facets" in m]
+    assert not found["block"]
+    assert not found["exact"]
+    (remark,) = found["facets"]
+    assert "CONTACT/1: GRAPHICS/2 and GRAPHICS/1 are cut into" in remark
+    assert f"up to {50.0 * (1.0 - np.cos(np.pi / 48)):.3g} mm" in remark
+
+
+def test_one_remark_names_many_faceted_contacts():
+    touches = [FacetedTouch(f"CONTACT/{k}", "GRAPHICS/1", "GRAPHICS/2", 100 * k, 1e-4, 1e-5 * k) for k in range(1, 7)]
+    remark = facets_remark(touches, 1e-3, "mm")
+    assert remark.startswith("CONTACT/1: GRAPHICS/1 and GRAPHICS/2 are cut into 100 triangles")
+    assert "by up to 0.1 mm, while they sink in by 0.01; so are" in remark
+    assert "GRAPHICS/1 and GRAPHICS/2 of CONTACT/4 and 2 more." in remark

@@ -15,6 +15,7 @@ from gearmbs.adams.parse.commands import Command, Script, Simulate
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.units import RESULT_NAMES, unit_names
 from gearmbs.adams.results.assembly import Assembly
+from gearmbs.adams.results.facets import FacetedTouch, facets_remark
 from gearmbs.adams.results.requests import RequestSeries
 from gearmbs.adams.results.tracks import TRACK_COLUMNS, TRACK_DIMENSIONS, track_table
 from gearmbs.dae.analyses.modes import Modes
@@ -56,6 +57,8 @@ class Segment:
         When constraints came to depend on each other, s, and which.
     doubt : Doubt or None
         What a smaller error changes.
+    facets : list of FacetedTouch
+        Of a dynamic analysis: pairs of round solids in facets that touched.
     requests : dict of int to RequestSeries
         Values in the deck's units.
     wrenches : dict
@@ -80,6 +83,7 @@ class Segment:
     assembly: Assembly | None = None
     passage: tuple[float, str] | None = None
     doubt: Doubt | None = None
+    facets: list[FacetedTouch] = field(default_factory=list)
 
     @property
     def success(self) -> bool:
@@ -166,8 +170,10 @@ class RunRecord:
                 f"about TIME = {when / self.deck.units.time:.4g} the mechanism passed a position in which it locks or "
                 f"can branch: {rows} depend on each other there; what follows may depend on ERROR: try a smaller one"
             )
+        units = self.deck.units
+        if segment.facets and segment is next(s for s in self.segments if s.facets):
+            found.append(facets_remark(segment.facets, units.length, self.unit("length")))
         if segment.doubt is not None:
-            units = self.deck.units
             found.append(segment.doubt.remark(units.time, units.length, self.unit("length")))
         return found
 

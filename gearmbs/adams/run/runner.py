@@ -20,6 +20,7 @@ from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Change, Command, Linear, Script, Simulate, Stop, Switch, read_script
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.reader import read_deck
+from gearmbs.adams.results.facets import faceted_touches
 from gearmbs.adams.results.record import NEWTON, Segment
 from gearmbs.adams.results.requests import RequestEvaluator
 from gearmbs.adams.results.result import AdamsResult
@@ -357,6 +358,7 @@ def _part(
     if kind not in ("STATICS", "INITIAL_CONDITIONS"):
         segment.passage = singular_passage(solution)
     if kind in ("DYNAMICS", "TRANSIENT"):
+        segment.facets = faceted_touches(model, segment.tracks)
         segment.doubt = _doubt(session, segment)
     _remember(session, model, segment, evaluator)
     act(session, watch, segment, fired, evaluator)

@@ -14,7 +14,7 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.contacts import fields, kernel
 from gearmbs.mechanism.contacts.boxes import MOST
 from gearmbs.mechanism.contacts.edges import NODES, ROOM
-from gearmbs.mechanism.contacts.facet_tables import Facets
+from gearmbs.mechanism.contacts.facet_tables import Facets, sagitta
 from gearmbs.mechanism.contacts.loads import IMPACT, LAW_REALS, POISSON
 from gearmbs.mechanism.contacts.points import COLUMNS
 from gearmbs.mechanism.contacts.shapes import (
@@ -197,6 +197,17 @@ class SolidContact(ForceElement):
         """Return how many triangles the solids of faceted pairs have; those of a solid count in each of its pairs."""
         faceted = [pair for _, *pair in self.pairs() if pair_family(self.name, *pair)[0] == kernel.FACETS]
         return sum(len(shape.facets()[1]) for pair in faceted for shape in pair)
+
+    def round_facets(self) -> list[tuple[tuple[int, int], int, float]]:
+        """Return of faceted pairs with a round solid the numbers of both, their triangles and largest sagitta, m."""
+        found = []
+        for numbers, a, b in self.pairs():
+            if pair_family(self.name, a, b)[0] == kernel.FACETS:
+                cut = [facets for facets in (a.facets(), b.facets()) if len(facets[1])]
+                most = max(sagitta(*facets) for facets in cut)
+                if most > 0.0:
+                    found.append((numbers, sum(len(facets[1]) for facets in cut), most))
+        return found
 
     def exact(self) -> bool:
         """Whether the geometry of all pairs is exact; else one is faceted."""

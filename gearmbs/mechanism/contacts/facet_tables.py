@@ -12,6 +12,8 @@ FLAT = 1e-6
 """Angle, rad, below which two triangles lie in one plane."""
 SHARP = 0.05
 """Angle, rad, between the normals of two triangles from which on their edge is one: 48 segments around meet at 0.13."""
+ROUND = 0.6
+"""Angle, rad, between the normals of two triangles up to which they stand for a round surface: ten or more around."""
 LEAST = 1e-12
 """Least weight of a vertex over the largest: one at the end of slivers alone would divide nothing by nothing."""
 
@@ -43,6 +45,23 @@ def plane_faces(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     flat = (bent < FLAT) & (np.sum(normals[one] * normals[other], axis=1) > 0.0)
     joined = coo_array((np.ones(flat.sum()), (one[flat], other[flat])), shape=(len(triangles),) * 2)
     return connected_components(joined, directed=False)[1]
+
+
+def sagitta(vertices: np.ndarray, triangles: np.ndarray) -> float:
+    """Return by how much triangles leave the round surface they stand for, m; 0 of a solid of plane faces.
+
+    Between two of the width w that meet at the angle a, w/2 tan(a/4): r (1 - cos(pi/n)) of n around the radius r.
+    """
+    edges, one, other = neighbours(triangles)
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    normals = normals_of(vertices, triangles)
+    sine = np.linalg.norm(np.cross(normals[one], normals[other]), axis=1)
+    bent = np.arctan2(sine, np.sum(normals[one] * normals[other], axis=1))
+    length = np.maximum(np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1), TINY)
+    width = np.minimum(doubled[one], doubled[other]) / length
+    met = (bent > FLAT) & (bent < ROUND)
+    return float(np.max(0.5 * width * np.tan(0.25 * bent), initial=0.0, where=met))
 
 
 def vertex_weights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -322,16 +322,32 @@ def merged(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.
     return vertices[first[used]], back.reshape(-1, 3)
 
 
-def revolved(radii: np.ndarray, z: np.ndarray, closed: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Return the facets of a profile, from below to above, turned about z; ``closed`` joins its end to its start."""
-    phi = 2.0 * np.pi * np.arange(SEGMENTS) / SEGMENTS
+def revolved(radii: Any, z: Any, closed: bool = False, segments: int = SEGMENTS) -> tuple[np.ndarray, np.ndarray]:
+    """Return the facets of a profile, from below to above, turned about z.
+
+    Parameters
+    ----------
+    radii, z : array_like, shape (n,)
+        m.
+    closed : bool
+        Whether its end joins its start.
+    segments : int
+        Around the axis, at least 3: the facets leave the round by radius (1 - cos(pi / segments)).
+
+    Raises
+    ------
+    ModelError
+    """
+    if segments != int(segments) or segments < 3:
+        raise ModelError(f"revolution: segments = {segments}; give a whole number, at least 3")
+    phi = 2.0 * np.pi * np.arange(segments) / segments
     n = len(radii)
-    vertices = np.stack([np.outer(radii, np.cos(phi)), np.outer(radii, np.sin(phi)), np.outer(z, np.ones(SEGMENTS))])
+    vertices = np.stack([np.outer(radii, np.cos(phi)), np.outer(radii, np.sin(phi)), np.outer(z, np.ones(segments))])
     triangles = []
     for k in range(n if closed else n - 1):
-        for m in range(SEGMENTS):
-            a, b = k * SEGMENTS + m, k * SEGMENTS + (m + 1) % SEGMENTS
-            c, d = (k + 1) % n * SEGMENTS + m, (k + 1) % n * SEGMENTS + (m + 1) % SEGMENTS
+        for m in range(segments):
+            a, b = k * segments + m, k * segments + (m + 1) % segments
+            c, d = (k + 1) % n * segments + m, (k + 1) % n * segments + (m + 1) % segments
             triangles += [(a, b, d), (a, d, c)]
     return merged(vertices.transpose(1, 2, 0).reshape(-1, 3), np.array(triangles))
 
