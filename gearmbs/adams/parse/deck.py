@@ -93,4 +93,7 @@ class Deck:
         from gearmbs.adams.builders.mechanism import build_mechanism
         from gearmbs.adams.builders.routines import bound
 
-        return build_mechanism(bound(self, routines, allow_unsupported), allow_unsupported=allow_unsupported)
+        made = bound(self, routines, allow_unsupported)
+        mechanism = build_mechanism(made, allow_unsupported=allow_unsupported)
+        self.diagnostics.extend(d for d in made.diagnostics if d not in self.diagnostics)
+        return mechanism
