@@ -53,7 +53,12 @@ def place_in(pose_a, pose_b, work):
 @njit(cache=True, error_model="numpy")
 def overlap(kind_a, sizes_a, kind_b, sizes_b, n, work):
     """Return o(n); write the outermost points of both and how they move with n."""
-    move, w, y, hess = work[MOVE : MOVE + 12], work[LOCAL : LOCAL + 3], work[LOCAL + 3 : LOCAL + 6], work[54:63]
+    move, w, y, hess = (
+        work[MOVE : MOVE + 12],
+        work[LOCAL : LOCAL + 3],
+        work[LOCAL + 3 : LOCAL + 6],
+        work[LOCAL + 6 : TRIAL],
+    )
     for c in range(3):
         w[c] = -(move[c] * n[0] + move[3 + c] * n[1] + move[6 + c] * n[2])
     support(kind_a, sizes_a, w, y, hess)
