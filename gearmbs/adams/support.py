@@ -16,6 +16,9 @@ from gearmbs.mechanism.expression_functions import UNSUPPORTED as REFUSED_FUNCTI
 from gearmbs.mechanism.expression_library import FUNCTIONS
 
 READ, OVER, REFUSED = "read", "read over", "refused"
+READ_THERE = "read, see the last column"
+OF_DECKS = frozenset("CURVE FXFREQ FXMODE MODE SENVAL USER".split())
+"""Functions that decks have in some places or forms."""
 
 INSTEAD_OF_COMMANDS: dict[str, str] = {
     "CONTROL": "FILE/COMMAND for another script",
@@ -53,7 +56,8 @@ def function_rows() -> list[tuple[str, str, str]]:
     """Return name, whether it is read and what to do instead, of the functions of expressions."""
     read = {*UNARY, *BINARY, *ELEMENT_FORCES, *FUNCTIONS}
     rows = [(name, READ, "") for name in read]
-    rows += [(name, REFUSED, INSTEAD_OF_FUNCTIONS.get(name, "")) for name in REFUSED_FUNCTIONS - read]
+    for name in REFUSED_FUNCTIONS - read:
+        rows.append((name, READ_THERE if name in OF_DECKS else REFUSED, INSTEAD_OF_FUNCTIONS.get(name, "")))
     return sorted(rows)
 
 

@@ -125,7 +125,8 @@ def test_static_analyses_of_friction_are_remarked_on(argument, words):
     script = ("SIM/DYN, END=3, STEPS=3", "SIM/STATICS")
     result = run(body, *script)
     assert [m for m in result.messages if any(w in m for w in words)] or not words
-    assert not words or len(result.messages) == 1
+    others = [m for m in result.messages if "MAX_STICTION_DEFORMATION" not in m]
+    assert not words or len(others) == 1
     np.testing.assert_allclose(result.part(2)[-1, :3], result.part(2)[-2, :3], atol=1e-6)
 
 

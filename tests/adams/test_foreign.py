@@ -232,7 +232,7 @@ def test_friction_takes_any_word_for_when_it_rests():
     for word, remarked in (("STATIC_EQUILIBRIUM", False), ("NEVER", True)):
         line = (
             "FRICTION/1, JOINT=1, MU_STATIC=0.3, MU_DYNAMIC=0.2, PIN_RADIUS=0.01, INPUTS=NONE, "
-            f"FRICTION_TORQUE_PRELOAD=1, INACTIVE_DURING={word}\n"
+            f"FRICTION_TORQUE_PRELOAD=1, MAX_STICTION_DEFORMATION=1E-4, INACTIVE_DURING={word}\n"
         )
         result = run_deck(parse_deck(with_lines(line)), parse_script("m\no\nsimulate/statics\n"))
         assert any("friction" in m.lower() for m in result.messages) == remarked

@@ -28,6 +28,8 @@ from gearmbs.adams.parse.reader import GRAMMARS, read_statement, resolve_stateme
 from gearmbs.adams.parse.source import CONTINUED, RawStatement, read_file, statements
 
 _HEAD = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(/)?\s*(?:(\d{1,18})(?![\dA-Za-z_.]))?\s*")
+ONLY_IN_DECKS = ("UNITS", "COUPLER", "CURVE", "FLEX_BODY", "GEAR", "GRAPHICS", "GSE", "LSE", "MATRIX", "TFSISO")
+"""Statements that no command changes."""
 SIMULATIONS = "DYNAMICS KINEMATICS STATICS TRANSIENT INITIAL_CONDITIONS ACCELERATION DISPLACEMENT VELOCITY"
 ELEMENTS = (
     "ACCGRAV BEAM BUSHING CONTACT COUPLER CVCV DIFF FE_LOAD FIELD FRICTION GCON GEAR GFORCE JOINT JPRIM MFORCE MOTION "
@@ -256,6 +258,10 @@ def _read(script: Script, raw: RawStatement, errors: list[Diagnostic]) -> Comman
         fail(f"expected a command such as SIMULATE/DYNAMICS, found {raw.text.strip()[:40]!r}", raw.line)
         return None
     name = resolve_statement(match.group(1), _NAMES)
+    deck_only = resolve_statement(match.group(1), ONLY_IN_DECKS)
+    if name is None and deck_only is not None:
+        fail(f"{deck_only} is a statement of the deck (.adm), no command of a script; put it there", raw.line)
+        return None
     if name is None:
         near = difflib.get_close_matches(match.group(1).upper()[:40], _NAMES, 1)
         message = unknown_statement(match.group(1), _NAMES) if not near else f"unknown command; did you mean {near[0]}?"

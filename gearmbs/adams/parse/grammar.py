@@ -7,6 +7,7 @@ as they stay unambiguous among the statement's own.
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 from dataclasses import dataclass, field, fields
@@ -115,6 +116,11 @@ class Grammar:
             return f"{word.upper()} is ambiguous: it could be {', '.join(found)}"
         return f"unknown argument {word.upper()}; it is not one of {', '.join(self.words)}"
 
+    def mistyped(self, word: str) -> str | None:
+        """Return that a word is no argument, and which it may have been meant to be; None if it resembles none."""
+        near = difflib.get_close_matches(word.upper()[:40], list(self.words), 1) if word[:1].isalpha() else []
+        return f"unknown argument {word.upper()[:40]}; did you mean {near[0]}?" if near else None
+
 
 class ArgumentReader:
     """Reads the arguments of one statement."""
@@ -154,7 +160,8 @@ class ArgumentReader:
                 self._flag(match, name, spec, choice, start)
                 continue
             if match.group(2) is None:
-                raise StatementError(f"{spec.keyword} needs a value: {spec.keyword} = ...", start)
+                values = " or ".join(spec.choices) or "..."
+                raise StatementError(f"{spec.keyword} needs a value: {spec.keyword} = {values}", start)
             value_at = self.at
             raw_value = self._value(spec)
             self._store(name, spec, raw_value, start, value_at)
@@ -225,6 +232,9 @@ class ArgumentReader:
             bare = next((found[1].keyword for part in more if (found := self.grammar.find(part))), None)
             if bare is not None:
                 raise StatementError(f"{bare} needs a value: {bare} = ...", value_at) from error
+            unknown = next((why for part in more if (why := self.grammar.mistyped(part))), None)
+            if unknown is not None:
+                raise StatementError(unknown, value_at) from error
             raise StatementError(f"{spec.keyword}: {error}", value_at) from error
         if spec.kind == TABLE:
             self.values[name] = (*self.values.get(name, ()), value)

@@ -11,6 +11,7 @@ from gearmbs.adams.errors import ERROR, IGNORED, UNSUPPORTED, WARNING, DeckError
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.check import check
 from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.defaults import remark_defaults
 from gearmbs.adams.parse.grammar import ArgumentReader, Grammar, StatementError
 from gearmbs.adams.parse.remedies import instead_of_statement
 from gearmbs.adams.parse.source import RawStatement, read_file, statements
@@ -73,6 +74,7 @@ def parse_deck(text: str, file: str = "<deck>") -> Deck:
         errors += check(deck)
     if errors:
         raise DeckError(sorted(errors, key=lambda d: d.line))
+    remark_defaults(deck)
     _count_ignored(deck)
     return deck
 

@@ -14,6 +14,8 @@ FAR = 1e-3
 TURNED = np.deg2rad(0.1)
 """Rotation worth a warning, rad."""
 
+LEAST_ANGLE = 1e-9
+"""Rotation that is none but rounding, rad."""
 ROUNDED = 1e-9
 """Change of a velocity, of it, that is none."""
 GIVEN = frozenset("vx vy vz wx wy wz".split())
@@ -54,10 +56,10 @@ class Assembly:
         """Return a sentence on parts that were moved far, "" when none was."""
         if not self.far:
             return ""
-        return (
-            f"at TIME = {time:g} the parts did not fit their joints and motions and were moved: {self.farthest} by "
-            f"{self.distance:.4g} {unit}, {self.most_turned} by {np.rad2deg(self.angle):.4g} degrees"
-        )
+        moved = [f"{self.farthest} by {self.distance:.4g} {unit}"] if self.distance > 0.0 else []
+        if self.angle > LEAST_ANGLE or not moved:
+            moved.append(f"{self.most_turned} by {np.rad2deg(self.angle):.4g} degrees")
+        return f"at TIME = {time:g} the parts did not fit their joints and motions and were moved: {', '.join(moved)}"
 
 
 def assembly_of(model: AdamsModel, solution: Solution) -> Assembly:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 
 from gearmbs.adams.builders.control import state_system
@@ -18,10 +20,12 @@ from gearmbs.dae.equations.expressions.errors import ExpressionError, NotEvaluat
 from gearmbs.dae.equations.expressions.opcodes import LEVEL_TIME
 from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.mechanism.expression_compiler import compile_expression
-from gearmbs.mechanism.expression_syntax import Scope, shown
+from gearmbs.mechanism.expression_syntax import Call, Number, Scope, parse, shown, walk
 
 SOME_MODE = np.array([17.3]), np.array([7.0])
 """A frequency and a number with which CRATIO is tried, before the file with those of the modes is read."""
+OF_DATA: dict[str, type[st.Statement]] = {"SENVAL": st.Sensor, "CURVE": st.CurveStatement}
+"""Functions whose last argument is the id of such a statement."""
 INTO_OTHERS = (st.Variable, st.Diff)
 """Statements whose expressions are written into those of others, with what is wrong there: they come first."""
 
@@ -56,12 +60,14 @@ def expression_errors(deck: Deck, session: Session, scope: Scope, present: Prese
             text = getattr(statement, name)
             if spec.kind != EXPRESSION or text is None:
                 continue
-            unread = False
+            unread, said = False, ""
             try:
                 what = _wrong(deck, statement, text, scope, present)
             except ExpressionError as error:
-                what = str(error)
                 unread = isinstance(error, NotEvaluatedError) and statement.id not in read
+                unread = unread and isinstance(statement, st.Variable)
+                said = str(error)
+                what = said if unread else _absent_data(deck, text) or said
             except ValueError:
                 # of a CURVE, which is said of its own statement
                 continue
@@ -70,13 +76,13 @@ def expression_errors(deck: Deck, session: Session, scope: Scope, present: Prese
             own = (deck.file, statement.given.get(name, statement.line))
             file, line = session.places.get((type(statement), statement.id, name), own)
             message = f"{statement.label()}: {spec.keyword}: {what}"
-            if unread and isinstance(statement, st.Variable):
+            if unread:
                 message += "; nothing that is computed here reads it, so it is left out"
                 remark = Diagnostic(WARNING, message, file, line)
                 if remark not in session.deck.diagnostics:
                     session.deck.diagnostics.append(remark)
                 continue
-            told.add(what)
+            told |= {what, said}
             found.append(Diagnostic(ERROR, message, file, line))
     systems = _system_errors(deck, session)
     if systems:
@@ -106,6 +112,17 @@ def _leave_out(session: Session, request: st.Request, need: str) -> None:
     remark = Diagnostic(UNSUPPORTED, message, session.deck.file, request.line)
     if remark not in session.deck.diagnostics:
         session.deck.diagnostics.append(remark)
+
+
+def _absent_data(deck: Deck, text: str) -> str:
+    """Return which SENSOR or CURVE an expression reads that is not there, "" if there is none."""
+    with contextlib.suppress(ExpressionError):
+        for node in walk(parse(text)):
+            kind = OF_DATA.get(node.name) if isinstance(node, Call) else None
+            which = node.args[-1] if kind is not None and isinstance(node, Call) and node.args else None
+            if kind is not None and isinstance(which, Number) and which.integer not in deck.of(kind):
+                return f"there is no {st.KEYWORD_OF[kind]}/{which.integer} for {node.name}"
+    return ""
 
 
 def _wrong(deck: Deck, statement: st.Statement, text: str, scope: Scope, present: Present) -> str:
