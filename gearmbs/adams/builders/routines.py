@@ -99,6 +99,9 @@ def bound(deck: Deck, routines: Mapping[str, Any] | None = None, allow_missing: 
     if any(d.severity == ERROR for d in problems):
         raise DeckError(problems)
     made.diagnostics.extend([*problems, *without_refused(made, gone, readers=allow_missing)])
+    if not users and made.left_out == deck.left_out:
+        # as it was: remarks on the run are to be found in the user's own deck
+        return deck
     if problems and not allow_missing:
         raise DeckError(sorted(made.unsupported, key=lambda d: d.line))
     return made
