@@ -105,9 +105,8 @@ class Recorder:
         self._early.append((part.t.copy(), part.result.y.copy(), part.result.epochs[0][1]))
         if part.t[-1] < self._begin:
             return
-        early = self._kept()
-        wanted = rows_of_record(self.case, early.t)
-        self._columns = [self.columns(piece) for piece in early.parts(wanted)]
+        wanted = rows_of_record(self.case, np.concatenate([t for t, _, _ in self._early]))
+        self._columns = [self.columns(piece) for piece in self._kept(wanted).parts()]
 
     def measured(self) -> Measured:
         """Return what the record is made from: all steps inside the span of its filters, some before."""
@@ -119,13 +118,20 @@ class Recorder:
         columns = [self.columns(part) for part in early.parts()]
         return self.joined([*columns, *(c for c in self._columns if c.t[0] > early.t[-1])])
 
-    def _kept(self) -> Solution:
-        """Return the solution over the steps whose unknowns were kept."""
+    def _kept(self, wanted: np.ndarray | None = None) -> Solution:
+        """Return the solution over the steps whose unknowns were kept, or over some of them, by increasing numbers."""
         assert self._model is not None
         times, rows, tables = zip(*self._early, strict=True)
-        starts = np.cumsum([0, *(t.size for t in times[:-1])])
-        epochs = [(int(k), table) for k, table in zip(starts, tables, strict=True)]
-        return self._model.over(np.concatenate(times), np.concatenate(rows), epochs)
+        ends = np.cumsum([t.size for t in times])
+        wanted = np.arange(ends[-1]) if wanted is None else wanted
+        places = np.searchsorted(wanted, [0, *ends])
+        inside = [wanted[a:b] - end + t.size for a, b, end, t in zip(places, places[1:], ends, times)]
+        epochs = [(int(k), table) for k, table in zip(places, tables)]
+        return self._model.over(
+            np.concatenate([t[k] for t, k in zip(times, inside)]),
+            np.concatenate([y[k] for y, k in zip(rows, inside)]),
+            epochs,
+        )
 
     def columns(self, part: Solution) -> _Columns:
         """Return what is recorded of one part of a solution."""

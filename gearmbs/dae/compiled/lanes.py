@@ -122,6 +122,19 @@ def all_lanes(typingctx, number):
     return LANES_TYPE(types.float64), codegen
 
 
+@intrinsic
+def lanes_of(typingctx, a, b, c, d, e, f, g, h):
+    """Return lanes that hold eight numbers in turn."""
+
+    def codegen(context, builder, sig, args):
+        lanes = ir.Constant(_VECTOR, ir.Undefined)
+        for k, number in enumerate(args):
+            lanes = builder.insert_element(lanes, number, ir.Constant(ir.IntType(32), k))
+        return lanes
+
+    return LANES_TYPE(*[types.float64] * LANES), codegen
+
+
 def _call(builder: Any, name: str, args: tuple) -> Any:
     """Return what a function of LLVM's makes of vectors."""
     kind = ir.FunctionType(_VECTOR, [_VECTOR] * len(args))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from gearmbs._jit import njit
+from gearmbs.dae.compiled.lanes import LANES
+from gearmbs.dae.compiled.sines import put_turns
 from gearmbs.dae.compiled.views import vector_at
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations import time_functions
@@ -24,12 +24,11 @@ from gearmbs.dae.equations.rotation import (
     matrix_of,
 )
 
+TURNS_OF_TWO = 2 * LANES
+"""Places for sines and cosines of the angles of two bodies."""
 
-@njit(
-    "void(float64[::1], float64[::1], float64[::1], int64, float64[::1], int64, float64[::1])",
-    cache=True,
-    error_model="numpy",
-)
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def inertia_times(kin_row, body_row, v, i, out, k, s):
     """Write J_global v to ``out[k:k+3]``; ``s`` has three scratch places."""
     for c in range(3):
@@ -72,19 +71,24 @@ def update_bodies(y, at, code, body, modal, kin, partial, scratch, derivatives):
         Whether the velocities' derivatives and the accelerations of elastic frames are wanted.
     """
     update_ground(kin)
+    moment = vector_at(scratch, TURNS_OF_TWO, 3)
     for b in range(1, code.size):
         if at[b, T.AT_MODES] > 0:
             update_inertia(y, at[b], modal, partial, body[b])
-        u, e, r, th = at[b, T.AT_U], at[b, T.AT_EPS], at[b, T.AT_R], at[b, T.AT_THETA]
+        place = 3 * ((b - 1) % 2)
+        if place == 0:
+            put_turns(y, at[b, T.AT_THETA], at[min(b + 1, code.size - 1), T.AT_THETA], scratch)
+        u, e, r = at[b, T.AT_U], at[b, T.AT_EPS], at[b, T.AT_R]
         row = kin[b]
         for c in range(3):
             row[KIN_R + c] = y[r + c]
             row[KIN_V + c] = y[u + c]
-        psi, theta, phi = y[th], y[th + 1], y[th + 2]
-        turn_1, turn_2 = (np.cos(psi), np.sin(psi)), (np.cos(theta), np.sin(theta))
-        matrix_of(turn_1, turn_2, (np.cos(phi), np.sin(phi)), code[b], row, KIN_A)
+        turn_1 = scratch[LANES + place], scratch[place]
+        turn_2 = scratch[LANES + place + 1], scratch[place + 1]
+        turn_3 = scratch[LANES + place + 2], scratch[place + 2]
+        matrix_of(turn_1, turn_2, turn_3, code[b], row, KIN_A)
         axes_of(turn_1, turn_2, y[e], y[e + 1], y[e + 2], row)
-        inertia_times(row, body[b], row, KIN_W, row, KIN_H, scratch)
+        inertia_times(row, body[b], row, KIN_W, row, KIN_H, moment)
         if at[b, T.AT_MODES] > 0:
             add_momentum(y, at[b], partial, row)
     for f in range(code.size, at.shape[0]):

@@ -80,7 +80,9 @@ class Records:
         st, n = self.state, self.problem.n
         t, h, order = (np.concatenate(parts) for parts in zip(*self.steps, strict=True))
         is_step = order > 0
-        stats.t_steps, stats.h_steps, stats.orders = t[is_step], h[is_step], order[is_step]
+        # the start comes first, and mostly nothing but steps after it
+        taken = slice(1, None) if is_step[1:].all() and not is_step[0] else is_step
+        stats.t_steps, stats.h_steps, stats.orders = t[taken], h[taken], order[taken]
         rows = np.concatenate(self.row_blocks) if self.row_blocks else None
         consumed = self.options.consumer is not None
         sol = DenseOutput(t, rows, order) if rows is not None and not consumed else None

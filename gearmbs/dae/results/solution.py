@@ -219,8 +219,14 @@ class Solution(Shown):
         """
         rows = np.arange(self.t.size) if rows is None else np.asarray(rows)
         known = self.__dict__.get("_records")
-        room = self._new_records(min(size, rows.size)) if known is None else None
-        evaluator = self._evaluator() if known is None else None
+        evaluator: Fills | None = None
+        room: outputs.Records | None = None
+        if known is None:
+            most = min(size, rows.size)
+            if self._shared is not None and most <= len(self._shared[1].pose):
+                evaluator, room = self._shared
+            else:
+                evaluator, room = self._evaluator(), self._new_records(most)
         for k in range(0, rows.size, size):
             wanted = rows[k : k + size]
             places = [int(np.searchsorted(wanted, row)) for row, _ in self.result.epochs]
