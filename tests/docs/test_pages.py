@@ -16,7 +16,7 @@ from gearmbs.studies.planetary import load_planetary
 from tests.docs.support import DOCS, ROOT, blocks, links, notebooks, pages, run_blocks
 
 ALL = [ROOT / "README.md", *pages()]
-QUICK = ("own_dae.md", "own_mechanism.md", "measured.md", "adams.md")
+QUICK = ("own_dae.md", "own_mechanism.md", "measured.md", "adams.md", "adams_contact.md")
 WITH_EXAMPLES = [p for p in pages() if any(b.language == "python" for b in blocks(p))]
 DOCTESTS = [p for p in ALL if ">>> " in p.read_text(encoding="utf-8")]
 
