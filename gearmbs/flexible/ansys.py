@@ -15,6 +15,7 @@ from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import FiniteElementModel
 from gearmbs.flexible.matrices import FileUnits
 from gearmbs.flexible.matrix_text import Path_, read_nodes
+from gearmbs.units import Quantity
 
 LEAST = 4 * 512
 """Bytes of the headers of a binary file."""
@@ -27,9 +28,9 @@ def read_ansys(
     nodes: Path_ | tuple[npt.ArrayLike, npt.ArrayLike],
     *,
     name: str | None = None,
-    length: float = 1.0,
-    force: float = 1.0,
-    mass_unit: float = 1.0,
+    length: Quantity = 1.0,
+    force: Quantity = 1.0,
+    mass_unit: Quantity = 1.0,
 ) -> FiniteElementModel:
     """Return a model from the assembled matrices of Ansys, read by ansys-mapdl-reader (``pip install gearmbs[ansys]``).
 
@@ -41,8 +42,8 @@ def read_ansys(
     nodes : str or Path, or (ids, positions)
         Result file (``.rst``) or archive (``.cdb``) of the same mesh, a table of number, x, y, z, or both arrays.
     name : str, optional
-    length, force, mass_unit : float
-        SI values of the units: 1e-3, 1.0, 1e3 for mm, N, t.
+    length, force, mass_unit : float or str
+        The file's units: SI values, or names as ``"mm"``, ``"N"``, ``"t"``.
 
     Raises
     ------
@@ -77,7 +78,7 @@ def read_ansys(
     if len(ids) != len(positions):
         raise FlexibleError(f"{file.name}: {len(ids)} numbers of nodes for {len(positions)} positions")
     used = np.isin(ids, dofs[:, 0])
-    units = FileUnits(length, force, mass_unit)
+    units = FileUnits.of(length, force, mass_unit)
     return units.model(k, m, positions[used], rows, ids[used], name or file.stem)
 
 

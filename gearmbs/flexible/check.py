@@ -107,6 +107,5 @@ def check_model(model: FiniteElementModel, count: int = 6) -> ModelReport:
     values = np.linalg.eigvalsh(properties.inertia)
     if values[0] < 0.0 or values[2] > (1 + 1e-6) * (values[0] + values[1]):
         remarks.append(f"principal moments of inertia {values} kg m^2 are those of no body: nodes and mass do not fit")
-    size = float(np.linalg.norm(np.ptp(model.positions, axis=0)))
-    remarks += properties.doubts(size)
+    remarks += model.unit_doubts(properties)
     return ModelReport(model.name, properties, masses, energy, frequencies, massless, remarks)

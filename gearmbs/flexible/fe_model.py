@@ -16,6 +16,13 @@ LARGE = 100.0
 DENSE = 1e5
 """Mass over the cube of the diagonal, kg/m^3, above which units are doubted: no solid has a quarter of it."""
 
+FAST = 4e4
+"""Wave speed of a body, m/s, above which units are doubted: diamond has 34 000, steel 14 000 and its bars 5200."""
+SLOW = 500.0
+"""Wave speed, m/s, below which the units of a body are doubted that is heavier than any metal."""
+HEAVY = 3e4
+"""Density, kg/m^3, above which a body is heavier than any metal: osmium has 22 600."""
+
 
 @dataclass(frozen=True, eq=False)
 class MassProperties:
@@ -34,6 +41,17 @@ class MassProperties:
     mass: float
     com: np.ndarray
     inertia: np.ndarray
+
+    @property
+    def least_density(self) -> float:
+        """Mass over the volume of the solid ellipsoid of the same inertia, kg/m^3; infinite where that is flat.
+
+        Of all bodies of one mass that are nowhere denser than a limit this one has the least inertia, so that no body
+        is less dense everywhere.
+        """
+        spread = np.linalg.eigvalsh(0.5 * np.trace(self.inertia) * np.eye(3) - self.inertia) / self.mass
+        volume = 4.0 / 3.0 * np.pi * np.sqrt(np.prod(5.0 * np.maximum(spread, 0.0)))
+        return float(self.mass / volume) if volume > 0.0 else float("inf")
 
     def doubts(self, size: float) -> list[str]:
         """Return what speaks against the units of a body whose diagonal is ``size``, m; empty if nothing does."""
@@ -177,6 +195,29 @@ class FiniteElementModel:
         com = np.array([first[1, 2] - first[2, 1], first[2, 0] - first[0, 2], first[0, 1] - first[1, 0]]) / (2 * mass)
         inertia = m[3:, 3:] - mass * (com @ com * np.eye(3) - np.outer(com, com))
         return MassProperties(mass, com, 0.5 * (inertia + inertia.T))
+
+    def wave_speed(self, properties: MassProperties) -> float:
+        """Return the wave speed of the body, m/s: of its stiffness against unit strain in all directions, by its mass.
+
+        All lines grow alike, so that nothing bends or twists whatever the elements are: of bars it is sqrt(E / rho), of
+        solids sqrt(9 K / rho) with the bulk modulus K. Masses that are no solid's, and soft joints, make it smaller.
+        """
+        grown = np.zeros(len(self.dofs))
+        node, direction = self.dofs[:, 0], self.dofs[:, 1]
+        shift = (direction < 3) & (node >= 0)
+        grown[shift] = (self.positions - properties.com)[node[shift], direction[shift]]
+        return float(np.sqrt(max(grown @ (self.stiffness @ grown), 0.0) / properties.mass))
+
+    def unit_doubts(self, properties: MassProperties) -> list[str]:
+        """Return what speaks against the units that the model was read with; empty if nothing does."""
+        out = properties.doubts(float(np.linalg.norm(np.ptp(self.positions, axis=0))))
+        speed, density = self.wave_speed(properties), properties.least_density
+        remedy = "give the units of length, force and mass of the file (mm, N, t of many)"
+        if speed > FAST:
+            out.append(f"waves run at {speed:.3g} m/s in it, faster than in any material: {remedy}")
+        elif speed < SLOW and density > HEAVY:
+            out.append(f"it has {density:.3g} kg/m^3 or more, and waves run at {speed:.3g} m/s in it: {remedy}")
+        return out
 
     def field(self, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return displacements and rotations of the nodes for vectors of the degrees of freedom.

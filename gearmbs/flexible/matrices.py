@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import FiniteElementModel
 from gearmbs.flexible.matrix_text import Path_, check_last_line, check_whole, read_nodes, read_triplets, text_lines
+from gearmbs.units import Quantity, to_si
 
 
 def from_matrices(
@@ -90,9 +91,9 @@ def read_abaqus(
     nodes: Path_,
     *,
     name: str | None = None,
-    length: float = 1.0,
-    force: float = 1.0,
-    mass_unit: float = 1.0,
+    length: Quantity = 1.0,
+    force: Quantity = 1.0,
+    mass_unit: Quantity = 1.0,
 ) -> FiniteElementModel:
     """Return a model from the matrices that Abaqus writes (``*MATRIX OUTPUT``, formats COORDINATE and MATRIX INPUT).
 
@@ -104,8 +105,8 @@ def read_abaqus(
     nodes : str or Path
         Input file with the nodes.
     name : str, optional
-    length, force, mass_unit : float
-        SI values of the units of length, force and mass: 1e-3, 1.0, 1e3 for mm, N, t.
+    length, force, mass_unit : float or str
+        Units of length, force and mass, SI values or names: 1e-3, 1.0, 1e3 or ``"mm"``, ``"N"``, ``"t"``.
 
     Raises
     ------
@@ -134,7 +135,7 @@ def read_abaqus(
         dofs, k, m = _common(k_dofs, k, m_dofs, m)
     check_whole(Path(stiffness), k, dofs, "mass and no stiffness")
     check_whole(Path(mass), m, dofs, "stiffness and no mass")
-    return FileUnits(length, force, mass_unit).model(k, m, positions, dofs, ids, label)
+    return FileUnits.of(length, force, mass_unit).model(k, m, positions, dofs, ids, label)
 
 
 def read_calculix(path: Path_, nodes: Path_, *, name: str | None = None) -> FiniteElementModel:
@@ -182,6 +183,28 @@ class FileUnits(NamedTuple):
     length: float = 1.0
     force: float = 1.0
     mass: float = 1.0
+
+    @classmethod
+    def of(cls, length: Quantity = 1.0, force: Quantity = 1.0, mass: Quantity = 1.0) -> FileUnits:
+        """Return the units that were given: SI values, or texts as ``"mm"`` and ``"0.1 mm"``.
+
+        Raises
+        ------
+        FlexibleError
+            If one is not positive and finite, or of another dimension.
+        """
+        found = []
+        given = (("length", "length", length), ("force", "force", force), ("mass_unit", "mass", mass))
+        for field, dimension, value in given:
+            bare = isinstance(value, str) and value.strip()[:1].isalpha()
+            try:
+                number = float(to_si(f"1 {value.strip()}" if bare else value, dimension, field))
+            except (TypeError, ValueError) as error:
+                raise FlexibleError(str(error)) from None
+            if not 0.0 < number < np.inf:
+                raise FlexibleError(f"{field} = {value!r}; give the file's unit, above zero: 1e-3, or by name as 'mm'")
+            found.append(number)
+        return cls(*found)
 
     def model(
         self, stiffness: Any, mass: Any, positions: npt.ArrayLike, dofs: Any, ids: npt.ArrayLike | None, name: str

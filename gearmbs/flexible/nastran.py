@@ -19,6 +19,7 @@ from gearmbs.flexible.fe_model import FiniteElementModel
 from gearmbs.flexible.matrices import FileUnits
 from gearmbs.flexible.matrix_text import Path_
 from gearmbs.flexible.nastran_files import GridTable, assembly_table, check_end, op2_tables, pyyeti_module
+from gearmbs.units import Quantity
 
 
 def read_op4(
@@ -31,9 +32,9 @@ def read_op4(
     stiffness: str = "kxx",
     mass: str = "mxx",
     name: str | None = None,
-    length: float = 1.0,
-    force: float = 1.0,
-    mass_unit: float = 1.0,
+    length: Quantity = 1.0,
+    force: Quantity = 1.0,
+    mass_unit: Quantity = 1.0,
 ) -> FiniteElementModel:
     """Return a model from matrices in a Nastran OP4 file, read by pyyeti (``pip install gearmbs[fem]``).
 
@@ -51,8 +52,8 @@ def read_op4(
         (EXTSEOUT), with boundary points, modal points and coordinate systems.
     stiffness, mass : str
         Names of the matrices.
-    length, force, mass_unit : float
-        SI values of the file's units.
+    length, force, mass_unit : float or str
+        The file's units: SI values, or names as ``"mm"``.
 
     Raises
     ------
@@ -67,7 +68,7 @@ def read_op4(
     except Exception as error:
         raise FlexibleError(f"{file.name}: it cannot be read as OP4 ({type(error).__name__}: {error})") from None
     matrices = [_named(found, wanted, file) for wanted in (stiffness, mass)]
-    units = FileUnits(length, force, mass_unit)
+    units = FileUnits.of(length, force, mass_unit)
     if assembly is not None:
         table = assembly_table(Path(assembly))
         return _model_of(table, matrices, name or file.stem, file, units)
@@ -83,9 +84,9 @@ def read_op2(
     mass: str = "mgg",
     dofs: Sequence[tuple[int, int]] | np.ndarray | None = None,
     name: str | None = None,
-    length: float = 1.0,
-    force: float = 1.0,
-    mass_unit: float = 1.0,
+    length: Quantity = 1.0,
+    force: Quantity = 1.0,
+    mass_unit: Quantity = 1.0,
 ) -> FiniteElementModel:
     """Return a model from matrices in a Nastran op2 file with its grid points (``PARAM,POST,-1`` and OUTPUT2).
 
@@ -99,8 +100,8 @@ def read_op2(
         Grid point and direction of each row, point 0 for modal coordinates; default: the g-set, six a grid point and
         one a scalar point, in the order of their numbers.
     name : str, optional
-    length, force, mass_unit : float
-        SI values of the file's units.
+    length, force, mass_unit : float or str
+        The file's units: SI values, or names as ``"mm"``.
 
     Raises
     ------
@@ -113,7 +114,7 @@ def read_op2(
     matrices = [_named(found, wanted, file) for wanted in (stiffness, mass)]
     if dofs is not None:
         table = GridTable(table.ids, table.positions, table.axes, np.asarray(dofs, dtype=int))
-    return _model_of(table, matrices, name or file.stem, file, FileUnits(length, force, mass_unit))
+    return _model_of(table, matrices, name or file.stem, file, FileUnits.of(length, force, mass_unit))
 
 
 def _model_of(table: GridTable, matrices: list[Any], name: str, file: Path, units: FileUnits) -> FiniteElementModel:

@@ -12,10 +12,12 @@ import scipy.sparse as sp
 
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.integrals import nodal_lumps
+from gearmbs.flexible.matrices import FileUnits
 from gearmbs.flexible.matrix_text import Path_
 from gearmbs.flexible.mnf_content import SI, ModalNeutralFile
 from gearmbs.flexible.nastran_files import GridTable, op2_tables, pyyeti_module
 from gearmbs.flexible.nastran_stress import grid_stresses
+from gearmbs.units import Quantity
 
 MODES = ("OUGV1", "OUGV1PAT", "OUG1")
 """Data blocks of mode shapes, in displacement coordinate systems."""
@@ -34,8 +36,8 @@ def read_op2_modes(
     masses: Any = None,
     *,
     inertias: npt.ArrayLike | None = None,
-    length: float = 1.0,
-    mass_unit: float = 1.0,
+    length: Quantity = 1.0,
+    mass_unit: Quantity = 1.0,
     stresses: bool = False,
 ) -> ModalNeutralFile:
     """Return the modes of a Nastran op2 file as the content of a modal neutral file, in SI.
@@ -53,8 +55,8 @@ def read_op2_modes(
         basic coordinate system. Default: MGG of the file.
     inertias : array_like, shape (N, 3, 3), optional
         Of the grid points.
-    length, mass_unit : float
-        SI values of the file's units. Time is in seconds.
+    length, mass_unit : float or str
+        The file's units: SI values, or names as ``"mm"``. Time is in seconds.
     stresses : bool
         Whether the stresses of the modes are read, too, as :func:`read_op2_stresses` does: the body then has
         :meth:`~gearmbs.flexible.ModalModel.stress_modes`.
@@ -69,6 +71,7 @@ def read_op2_modes(
     FlexibleError
         If pyyeti is not installed, the file is cut off or lacks a block, or masses and modes do not fit.
     """
+    length, _, mass_unit = FileUnits.of(length, 1.0, mass_unit)
     file = Path(path)
     blocks = op2_tables(file, ["MGG"] if masses is None else [])
     table = GridTable.of(blocks["uset"])

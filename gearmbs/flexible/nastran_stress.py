@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from gearmbs.flexible.errors import FlexibleError
+from gearmbs.flexible.matrices import FileUnits
 from gearmbs.flexible.matrix_text import Path_
 from gearmbs.flexible.nastran_files import GridTable, op2_tables, pyyeti_module
 from gearmbs.flexible.stress import COMPONENTS, StressModes
+from gearmbs.units import Quantity
 
 BLOCKS = ("OES1X1", "OES1X", "OES1")
 """Data blocks of stresses, in which each mode and kind of element has an identification and a record."""
@@ -24,7 +26,7 @@ NUMBERS = [1, 9, 15, 2, 10, 16]
 """Words of a place that hold the stresses xx, yy, zz, xy, yz, zx; the first word is the grid point."""
 
 
-def read_op2_stresses(path: Path_, *, length: float = 1.0, force: float = 1.0) -> StressModes:
+def read_op2_stresses(path: Path_, *, length: Quantity = 1.0, force: Quantity = 1.0) -> StressModes:
     """Return the stresses of the modes of a Nastran op2 file, as ``STRESS(PLOT)=ALL`` writes them in SOL 103.
 
     They are those at the corners of solid elements (CHEXA, CPENTA, CPYRAM, CTETRA) in the basic coordinate system. A
@@ -34,8 +36,8 @@ def read_op2_stresses(path: Path_, *, length: float = 1.0, force: float = 1.0) -
     ----------
     path : str or Path
         With grid points, as for :func:`read_op2_modes`, and stresses (OES1X1 or OES1).
-    length, force : float
-        SI values of the file's units.
+    length, force : float or str
+        The file's units: SI values, or names as ``"mm"``.
 
     Returns
     -------
@@ -53,6 +55,7 @@ def read_op2_stresses(path: Path_, *, length: float = 1.0, force: float = 1.0) -
         If pyyeti is not installed, the file is cut off, has no such stresses, or they are in other coordinate systems.
     """
     file = Path(path)
+    length, force, _ = FileUnits.of(length, force)
     return grid_stresses(file, GridTable.of(op2_tables(file, [])["uset"]), length, force)
 
 

@@ -8,6 +8,7 @@ relief. In both cases rigid motions are taken out, since the frame carries them,
 
 from __future__ import annotations
 
+import contextlib
 import warnings
 from collections.abc import Iterable
 from dataclasses import replace
@@ -36,6 +37,16 @@ PAIR = 1e-7
 
 MULTIPLE = 8
 """Most equal modes: two planes of bending times equal spans between seats."""
+
+SHIFTS = (1e-7, 1e-9)
+"""Shifts below zero from which free modes are iterated, against the mean stiffness over the mean mass.
+
+Iterations are few where the shift is below the first elastic mode, as the first is of all bodies but thin ones. A shift
+far below it costs digits: the unit roundoff times their ratio, which is 1e-11 for the first of them.
+"""
+
+RESTARTS = 8
+"""Restarts after which the next shift is tried; three do where the shift is below the first elastic mode."""
 
 METHODS = ("craig-bampton", "free")
 
@@ -96,6 +107,9 @@ def reduce_model(
     parts = resolve(model, list(model.seats) if interfaces is None else interfaces)
     properties = model.mass_properties()
     _check_free(model)
+    doubts = model.unit_doubts(properties)
+    if doubts:
+        warnings.warn(f"{model.name}: {'; '.join(doubts)}", stacklevel=3)
     k = sp.csc_array(parts.expand.T @ model.stiffness @ parts.expand)
     m = sp.csc_array(parts.expand.T @ model.mass @ parts.expand)
     count = internal if internal is not None else modes if modes is not None else 20
@@ -322,11 +336,19 @@ def free_modes(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, count: int) 
     if r <= DENSE or wanted > r // 2:
         values, vectors = _dense_modes(k.toarray(), m.toarray(), wanted)
     else:
-        shift = -1e-4 * np.abs(k.diagonal()).mean() / max(np.abs(m.diagonal()).mean(), 1e-300)
-        start = np.random.default_rng(0).standard_normal(r)
-        values, vectors = spl.eigsh(sp.csc_matrix(k), wanted, sp.csc_matrix(m), sigma=shift, v0=start)
+        values, vectors = _shifted_modes(sp.csc_matrix(k), sp.csc_matrix(m), wanted)
     order = np.argsort(values)[rigid.shape[1] :]
     return np.maximum(values[order], 0.0), vectors[:, order]
+
+
+def _shifted_modes(k: sp.csc_matrix, m: sp.csc_matrix, wanted: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest eigenvalues and vectors, iterated from the first shift below zero that is near enough."""
+    stiff = np.abs(k.diagonal()).mean() / max(np.abs(m.diagonal()).mean(), 1e-300)
+    start = np.random.default_rng(0).standard_normal(k.shape[0])
+    for share in SHIFTS[:-1]:
+        with contextlib.suppress(spl.ArpackNoConvergence):
+            return spl.eigsh(k, wanted, m, sigma=-share * stiff, v0=start, maxiter=RESTARTS)
+    return spl.eigsh(k, wanted, m, sigma=-SHIFTS[-1] * stiff, v0=start)
 
 
 def _dense_modes(k: np.ndarray, m: np.ndarray, wanted: int) -> tuple[np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 import os
 import re
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import scipy.sparse as sp
 
 from gearmbs.flexible import (
     FlexibleError,
+    Interface,
     Shaft,
     ShaftSection,
     check_model,
@@ -24,6 +26,7 @@ from gearmbs.flexible import (
     reduce_model,
     write_mnf,
 )
+from gearmbs.flexible.fe_model import MassProperties
 from gearmbs.mechanism import Mechanism
 
 MNF = os.environ.get("GEARMBS_MNF_FILES")
@@ -242,6 +245,56 @@ def test_abaqus_and_calculix_matrices(tmp_path, both, pairs):
         np.testing.assert_allclose(found.frequencies, expected, rtol=1e-12)
 
 
+def millimetres(tmp_path):
+    """Return the files of a steel bar in mm, N, t, and the bar."""
+    model = bar()
+    turned = np.where(model.dofs[:, 1] < 3, 1e-3, 1.0)
+    paths = [tmp_path / name for name in ("k.mtx", "m.mtx", "n.inp")]
+    for path, matrix in zip(paths, (model.stiffness.toarray(), model.mass.toarray())):
+        # work in N mm, time in s
+        coo = sp.coo_array(1e3 * matrix * np.outer(turned, turned))
+        path.write_text("".join(f"{i + 1} {j + 1} {v:.17g}\n" for i, j, v in zip(coo.row, coo.col, coo.data)))
+    write_nodes(paths[2], 1e3 * model.positions)
+    return paths, model
+
+
+def test_wrong_units_of_a_file_are_warned_of(tmp_path):
+    paths, model = millimetres(tmp_path)
+    parts = [Interface("end", [1])]
+    expected = reduce_model(model, [Interface("end", [model.ids[0]])], modes=4).frequencies
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for units in ((1e-3, 1.0, 1e3), ("mm", "N", "t"), ("1 mm", "1e-3 kN", "1000 kg")):
+            found = read_abaqus(*paths, **dict(zip(("length", "force", "mass_unit"), units)))
+            np.testing.assert_allclose(reduce_model(found, parts, modes=4).frequencies, expected, rtol=1e-6)
+            assert check_model(found).good
+            np.testing.assert_allclose(found.wave_speed(found.mass_properties()), np.sqrt(210e9 / 7850), rtol=0.02)
+    inches = {"length": 0.0254, "force": 4.448, "mass_unit": 175.1}
+    for wrong in ({}, {"length": 1e-3}, {"length": 1e-3, "force": 1e3, "mass_unit": 1e3}, inches):
+        with pytest.warns(UserWarning, match=r"waves run at .* m/s in it, faster than in any material: give the units"):
+            found = reduce_model(read_abaqus(*paths, **wrong), parts, modes=4)
+        assert not check_model(read_abaqus(*paths, **wrong)).good
+    with pytest.warns(UserWarning, match=r"it has .* kg/m\^3 or more, and waves run at 16\d m/s in it: give the units"):
+        reduce_model(read_abaqus(*paths, length=1e-3, mass_unit=1e6), parts, modes=4)
+    for wrong, message in (
+        ({"length": -1}, "length = -1; give the file's unit, above zero"),
+        ({"length": 0}, "length = 0; give the file's unit, above zero"),
+        ({"force": np.inf}, "force = inf; give"),
+        ({"mass_unit": "mm"}, "mass_unit: '1 mm' is in mm where a quantity in kg is expected"),
+        ({"length": None}, "length: got None"),
+    ):
+        with pytest.raises(FlexibleError, match=message):
+            read_abaqus(*paths, **wrong)
+
+
+def test_no_body_is_less_dense_than_its_ellipsoid_of_inertia():
+    inertia = 0.4 * 2.0 * 0.1**2 * np.eye(3)
+    ball = MassProperties(2.0, np.zeros(3), inertia)
+    np.testing.assert_allclose(ball.least_density, 2.0 / (4 / 3 * np.pi * 0.1**3), rtol=1e-12)
+    assert MassProperties(2.0, np.zeros(3), np.zeros((3, 3))).least_density == np.inf
+    assert bar().mass_properties().least_density < 7850.0
+
+
 def test_a_mass_file_of_abaqus_that_ends_early(tmp_path):
     """It ends with a whole line and a whole node, so that only the nodes of the stiffness tell."""
     corners, k, m = cube()
@@ -352,8 +405,6 @@ def test_models_that_are_no_free_bodies_are_refused_or_remarked():
 
 @pytest.mark.skipif(ROTOR is None, reason="GEARMBS_ROTOR_FILES names no folder with the public matrices of a rotor")
 def test_public_rotor_of_abaqus():
-    from gearmbs.flexible import Interface
-
     folder = Path(ROTOR or "")
     files = [folder / f"rotorDiscTest{end}" for end in ("STIF1.mtx", "MASS1.mtx", ".inp")]
     model = read_abaqus(*files, force=0.01)

@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+import scipy.linalg
+import scipy.sparse.linalg
 
 from gearmbs.flexible import ElasticMaterial, FlexibleError, Interface, check_model, reduce_model
+from gearmbs.flexible.reduction import RESTARTS
 from gearmbs.flexible.solid import block_mesh, nodes_where, ring_mesh, solid_model
 
 skfem = pytest.importorskip("skfem")
@@ -34,6 +37,19 @@ def test_a_thin_ring_has_the_frequencies_of_the_closed_form():
     for n in (2, 3):
         closed = np.sqrt(e * thick**2 / 12 * n**2 * (n**2 - 1) ** 2 / (rho * radius**4 * (n**2 + 1))) / (2 * np.pi)
         assert np.sum(np.abs(frequencies / closed - 1) < 0.02) == 2
+
+
+@pytest.mark.parametrize("thickness", [0.02, 0.002, 0.0004])
+def test_modes_of_thin_plates_take_few_iterations(monkeypatch, thickness):
+    """Against all eigenvalues, as far as these are known: to the roundoff of the largest."""
+    model = solid_model(block_mesh((0.3, 0.2, thickness), (6, 4, 1)))
+    every = scipy.linalg.eigh(model.stiffness.toarray(), model.mass.toarray(), eigvals_only=True)
+    expected, known = every[6:12], 4 * np.finfo(float).eps * every[-1]
+    eigsh = scipy.sparse.linalg.eigsh
+    # what does not converge so soon is raised
+    monkeypatch.setattr(scipy.sparse.linalg, "eigsh", lambda *a, **b: eigsh(*a, **{**b, "maxiter": RESTARTS}))
+    found = (2 * np.pi * check_model(model).frequencies[6:]) ** 2
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=known)
 
 
 def test_a_housing_with_seats():
