@@ -118,9 +118,10 @@ def _absent_data(deck: Deck, text: str) -> str:
     """Return which SENSOR or CURVE an expression reads that is not there, "" if there is none."""
     with contextlib.suppress(ExpressionError):
         for node in walk(parse(text)):
-            kind = OF_DATA.get(node.name) if isinstance(node, Call) else None
-            which = node.args[-1] if kind is not None and isinstance(node, Call) and node.args else None
-            if kind is not None and isinstance(which, Number) and which.integer not in deck.of(kind):
+            if not isinstance(node, Call) or node.name not in OF_DATA:
+                continue
+            kind, which = OF_DATA[node.name], node.args[-1] if node.args else None
+            if isinstance(which, Number) and which.integer not in deck.of(kind):
                 return f"there is no {st.KEYWORD_OF[kind]}/{which.integer} for {node.name}"
     return ""
 
