@@ -70,7 +70,6 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.has_hook = problem.hook is not None
     st.keep_rows = keep
     st.step_in_weights = bool((st.tested > st.coupled).any())
-    st.untested = bool((st.tested == 0.0).any())
     st.t = t0
     st.order = 1
     st.since_refused = KINK_MEMORY

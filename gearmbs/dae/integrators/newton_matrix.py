@@ -11,9 +11,6 @@ from gearmbs.dae.linalg.sparse_lu import fits, refactor
 GAMMA_DRIFT = 0.2
 GAMMA_DRIFT_AT_KINKS = 0.3
 """Larger where steps change so often that factors serve but a few of them."""
-GAMMA_DRIFT_UNTESTED = 0.15
-"""Smaller where the corrector does not look at all unknowns, such as multipliers: what factors of another coefficient
-leave in these costs more iterations, fresh matrices and steps than are saved."""
 MATRIX_MAX_AGE = 50
 SLOPE_MAX_AGE = 20
 RATE_OF_FRESH = 0.1
@@ -99,8 +96,7 @@ def form_matrix(functions, st, plan, factors):
         st.h = st.h_wanted
         return REPIVOT
     drift = st.gamma / st.gamma_factored
-    at_kinks = GAMMA_DRIFT_UNTESTED if st.untested else GAMMA_DRIFT_AT_KINKS
-    allowed = 1.0 + (at_kinks if meets_kinks(st) else GAMMA_DRIFT)
+    allowed = 1.0 + (GAMMA_DRIFT_AT_KINKS if meets_kinks(st) else GAMMA_DRIFT)
     whole_again = st.drop_level > 0 and st.drop_age >= DROPPED_STEPS
     wanted = st.matrix_wanted or st.matrix_age >= MATRIX_MAX_AGE or whole_again
     if not (wanted or drift > allowed or drift < 1.0 / allowed):

@@ -102,7 +102,6 @@ class RunState(Struct):
     has_hook: bool
     keep_rows: bool  # whether y of every step is recorded
     step_in_weights: bool  # whether the size of the step enters the weights of the corrector test
-    untested: bool  # whether the corrector test leaves unknowns out
     # where the run stands
     t: float  # end of the last accepted step
     h: float  # size wanted of the next step
