@@ -56,20 +56,37 @@ def agree(one, other, tolerance: float = 1e-10) -> None:
         np.testing.assert_allclose(a, b, rtol=0.0, atol=tolerance * max(1.0, np.abs(b).max()), err_msg=name)
 
 
+def moved_by_rounding(solution) -> list[np.ndarray]:
+    """Return how far the last digit of the unknowns moves each row of the records evaluated one after the other."""
+    last_digit = np.random.default_rng(7).integers(-1, 2, (4, *solution.result.y.shape)) * np.finfo(float).eps
+    exact = solution.result.y.copy()
+    alone, _ = records(solution, False)
+    moved = [np.zeros(len(a)) for a in alone]
+    for change in last_digit:
+        solution.result.y[:] = exact * (1.0 + change)
+        for most, a, b in zip(moved, alone, records(solution, False)[0], strict=True):
+            np.maximum(most, np.abs(a - b).reshape(len(a), -1).max(axis=1, initial=0.0), out=most)
+    solution.result.y[:] = exact
+    return moved
+
+
 @pytest.mark.parametrize("build", [slider_crank, coupled, tree])
 @pytest.mark.parametrize("tol", [1e-4, 1e-10])
 def test_records_are_those_of_one_output_after_the_other(build, tol):
     """At a loose tolerance all outputs are projected; 203 of them leave three beyond the last eight.
 
     From one to the next bodies turn too far for the factors of the output before, with which outputs one after the
-    other are else projected nearly as well.
+    other are else projected nearly as well. Where joints of the tree are near a singular position, the last digit of
+    the unknowns moves reactions of 1e6 by 1e-3: both ways are right to that.
     """
     solution = build().simulate(10.1, rate=20.0, tol=tol)
     assert solution.success, solution.message
     together, _ = records(solution, True)
     alone, _ = records(solution, False)
     assert solution.t.size % LANES == 3
-    agree(together, alone)
+    for name, a, b, moved in zip(together._fields, together, alone, moved_by_rounding(solution), strict=True):
+        apart = np.abs(a - b).reshape(len(a), -1).max(axis=1, initial=0.0)
+        assert np.all(apart <= 1e-10 * max(1.0, np.abs(b).max()) + moved), name
 
 
 @pytest.mark.parametrize("tol", [1e-4, 1e-10])
