@@ -20,7 +20,8 @@ Flexible bodies
 Rolling bearings
     `Bearing`, `RollingBearing`
 Mechanisms
-    `Mechanism`, `JointFriction`, `simulate`, `static_equilibrium`, `linear_modes`, `Solution`
+    `Mechanism`, `JointFriction`, `simulate`, `static_equilibrium`, `quasi_static`, `linear_modes`,
+    `Solution`
 Differential-algebraic equations
     `solve_dae`, `DAEProblem`, `DAEResult`, `Status`
 Signals
@@ -62,7 +63,7 @@ if TYPE_CHECKING:
         planetary,
         planetary_mechanism,
     )
-    from gearmbs.mechanism import JointFriction, Mechanism, linear_modes, simulate, static_equilibrium
+    from gearmbs.mechanism import JointFriction, Mechanism, linear_modes, quasi_static, simulate, static_equilibrium
     from gearmbs.saving import save
     from gearmbs.signals import (
         analyse,
@@ -162,6 +163,7 @@ __all__ = [
     "order_track_plot",
     "planetary",
     "planetary_mechanism",
+    "quasi_static",
     "read_deck",
     "read_signal",
     "record_signal",
@@ -241,6 +243,7 @@ late(
         "order_track_plot": ".view",
         "planetary": ".gears",
         "planetary_mechanism": ".gears",
+        "quasi_static": ".mechanism",
         "read_deck": ".adams",
         "read_signal": ".signals",
         "record_signal": ".studies",

@@ -28,7 +28,7 @@ def warn_of_stiff_seats(joints: Mapping[str, Joint], elements: Mapping[str, Any]
     Of a joint the directions count about which it holds the seat, of a mesh the axis of the wheel. Seats whose exact
     flexibility is not known, as of modal neutral files, are passed over.
     """
-    worst: dict[str, tuple[float, str, str, str, int]] = {}
+    worst: dict[ModalBody, dict[str, tuple[float, str, str]]] = {}
     for part, marker, axes in _held(joints, elements):
         body = marker.body
         if not isinstance(body, ModalBody) or body.lost_turning is None:
@@ -36,13 +36,19 @@ def warn_of_stiff_seats(joints: Mapping[str, Joint], elements: Mapping[str, Any]
         turned = body.shape_at(marker)[1] if axes else None
         for axis in axes:
             seat, share = body.lost_turning(marker.position, marker.orientation @ axis, turned)
-            if share > max(MOST_LOST, worst.get(body.name, (0.0,))[0]):
-                worst[body.name] = (share, seat, part, _kind(body, marker.orientation @ axis), body.modal.modes)
-    for name, (share, seat, part, kind, count) in worst.items():
+            kind = _kind(body, marker.orientation @ axis)
+            if share > max(MOST_LOST, worst.get(body, {}).get(kind, (0.0,))[0]):
+                worst.setdefault(body, {})[kind] = share, seat, part
+    for body, kinds in worst.items():
+        lost = ", ".join(
+            f"{100 * share:.0f} % of the flexibility {kind} of seat '{seat}', which '{part}' holds or turns"
+            for kind, (share, seat, part) in kinds.items()
+        )
+        meshes = any(part in elements for _, _, part in kinds.values())
         warnings.warn(
-            f"body '{name}': its {count} modes lack {100 * share:.0f} % of the flexibility {kind} of seat '{seat}', "
-            f"which '{part}' holds or turns; it is too stiff there. Keep more modes: all (leave modes= out), or those "
-            "that matter (by_participation(torques=True)); or let the wheel be a Disc of its shaft, which needs fewer",
+            f"body '{body.name}': its {body.modal.modes} modes lack {lost}; it is too stiff there. Keep more modes: "
+            "all (leave modes= out), or, of all, those that matter (by_participation(torques=True))"
+            + ("; or let the wheel be a Disc of its shaft, which needs fewer" if meshes else ""),
             stacklevel=4,
         )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -37,8 +38,9 @@ def campbell(
     ----------
     modes : array_like, object with `frequencies`, or callable
         Natural frequencies in Hz: of shape (modes,) for modes that do not depend on the speed, (speeds, modes) for
-        those that do; a mechanism, whose modes are those of its initial position, or the result of `linear_modes`, or
-        one for each speed; or a function of the speed in rad/s that returns any of them. Modes are followed from speed
+        those that do; a mechanism, whose modes are those of its initial position and speeds, or the result of
+        `linear_modes`, or one for each speed; or a function of the speed in rad/s that returns any of them, as whirl
+        needs. Modes are followed from speed
         to speed in the order of their frequencies; rigid motions are left out.
     speeds : sequence
         Increasing, rad/s or texts such as "1500 rpm"; two or more.
@@ -60,6 +62,11 @@ def campbell(
     ------
     SignalError
         If speeds do not increase, or modes and speeds do not fit together.
+
+    Warns
+    -----
+    UserWarning
+        If one mechanism stands for all speeds and has bodies that spin or deform.
     """
     omega = np.array([_speed(speed) for speed in speeds])
     if omega.size < 2 or np.any(np.diff(omega) <= 0.0) or omega[0] < 0.0:
@@ -140,6 +147,7 @@ def _frequencies(modes: Any, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray 
                 found.append(_modes_of(modes(float(speed))))
                 tell((i + 1) / omega.size)
         modes = found
+    _warn_of_whirl(modes)
     modes = _modes_of(modes)
     if hasattr(modes, "frequencies"):
         modes = [modes] * omega.size
@@ -165,6 +173,27 @@ def _frequencies(modes: Any, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray 
     if frequency.ndim != 2 or frequency.shape[0] != omega.size or not frequency.shape[1]:
         raise SignalError(f"modes: shape {frequency.shape} does not fit {omega.size} speeds; give (speeds, modes)")
     return frequency, damping
+
+
+def _warn_of_whirl(mechanism: Any) -> None:
+    """Warn of modes of one mechanism for all speeds where gyroscopic moments may change them with the speed."""
+    if not callable(getattr(mechanism, "linear_modes", None)):
+        return
+    # what a hinge holds turns without whirling
+    hinges = [joint for joint in getattr(mechanism, "joints", {}).values() if joint.kind == "revolute"]
+    held = {marker.body.name for joint in hinges for marker in (joint.i, joint.j)}
+    found = [
+        name for name, body in getattr(mechanism, "bodies", {}).items()
+        if hasattr(body, "modal") or (name not in held and np.any(body.angular_velocity))
+    ]  # fmt: skip
+    if found:
+        more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+        warnings.warn(
+            "modes: those of the mechanism at its initial speeds are taken at all speeds, though body "
+            f"'{found[0]}'{more} deforms or spins; for whirl give a function of the speed that builds the mechanism, "
+            "campbell(lambda speed: build(speed), speeds)",
+            stacklevel=4,
+        )
 
 
 def _modes_of(thing: Any) -> Any:

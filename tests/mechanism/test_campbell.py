@@ -44,3 +44,27 @@ def test_a_function_of_the_speed_may_return_mechanisms():
 def test_it_is_drawn_in_one_line(orders):
     figure = campbell_plot(torsional(), speeds=["0 rpm", "1000 rpm"], orders=orders)
     assert_readable(figure, overlap=0.3)
+
+
+def spinning_disc(speed: float) -> Mechanism:
+    """A disc in the middle of two equal bushings that spins about z; alike about x and y at rest."""
+    m = Mechanism("spinning disc")
+    disc = m.body("disc", 1.0, (0.01, 0.01, 0.02), angular_velocity=(0.0, 0.0, speed))
+    for side in (-0.1, 0.1):
+        m.bushing(f"at {side}", disc.marker((0, 0, side)), m.ground.marker((0, 0, side)), stiffness=(1e5, 1e5, 1e5))
+    return m
+
+
+def test_one_mechanism_for_all_speeds_is_warned_of_where_it_may_whirl(recwarn):
+    """Of J_t s^2 - i J_p omega s + k_r = 0 the roots split with the speed; the modes at one speed do not."""
+    with pytest.warns(UserWarning, match="body 'disc' deforms or spins; for whirl give a function of the speed"):
+        flat = campbell(spinning_disc(100.0), [0.0, 500.0])
+    recwarn.clear()
+    diagram = campbell(spinning_disc, [0.0, 500.0])
+    campbell(torsional(), [0.0, 500.0])
+    assert not recwarn.list
+    assert np.ptp(flat["frequency"].values, axis=0).max() == 0.0
+    tilting, gyroscopic = np.sqrt(2e5 * 0.1**2 / 0.01), 0.02 / 0.01 * 500.0 / 2.0
+    split = np.hypot(tilting, gyroscopic) + np.array([-1.0, 1.0]) * gyroscopic
+    for frequency in split / (2.0 * np.pi):
+        assert np.abs(diagram["frequency"].values[1] - frequency).min() < 1e-6 * frequency

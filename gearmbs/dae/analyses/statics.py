@@ -13,7 +13,7 @@ positions from afar, for sigma = 0 Newton's method. sigma follows how well the l
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -75,6 +75,10 @@ class StaticResult:
         return self.pose[self._index(body), POSE_R:POSE_A]
 
     position = former_name("position", com_position, "it is the centre of mass; write com_position")
+
+    def marker_position(self, marker: Any) -> np.ndarray:
+        """Return the origin of a marker, shape (3,), m, global; by marker or name, or of a body's own frame."""
+        return self.solution.marker_position(marker)[0]
 
     def orientation(self, body: str) -> np.ndarray:
         """Return the rotation matrix of a body, shape (3, 3)."""

@@ -55,8 +55,11 @@ def test_hanging_mass_sinks_by_weight_over_stiffness():
 
 @pytest.mark.parametrize("start", [np.pi / 2, -0.3, 2.8, 3.1])
 def test_pendulum_comes_to_rest_below_its_pin(start):
-    found = static_equilibrium(pendulum(start))
+    mechanism = pendulum(start)
+    found = static_equilibrium(mechanism)
     assert found.com_position("rod") == pytest.approx([0, 0, -0.8], abs=1e-8)
+    assert found.marker_position(mechanism.joints["pin"].i) == pytest.approx([0, 0, 0], abs=1e-8)
+    assert found.marker_position(mechanism.bodies["rod"]) == pytest.approx([0, 0, -0.8], abs=1e-8)
     # the pin carries the weight
     assert found.reactions["pin"][0] == pytest.approx([0, 0, 1.5 * G], abs=1e-8)
     assert found.stable
