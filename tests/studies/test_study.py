@@ -178,8 +178,20 @@ def test_only_lines_at_multiples_of_the_mesh_frequency():
 @pytest.mark.parametrize("fault", [{}, {"centre_distance_error": "3 mm"}, {"misalignment": "1 deg"}])
 def test_floor_between_the_lines_at_the_study_settings(fault):
     """1000 rpm, friction, a sampling rate that is no multiple of the mesh frequency: what lies between the lines below
-    6.4 kHz is the integrator's tolerance; sharp edges of the contact folded back would lie at -22 to -52 dB."""
+    6.4 kHz is the integrator's tolerance; sharp edges of the contact folded back would lie at -22 to -52 dB.
+
+    The largest line of a noise floor scatters from -71.7 to -76.7 dB where the tolerance changes by 3 %: the median of
+    three near tolerances is taken.
+    """
     case = Case(operation={"run_up": 0.05, "settling": 0.05, "duration": 0.25}, fault=fault)
+    near = [case.solver.used_tolerance * part for part in (0.97, 1.0, 1.03)]
+    floor = np.median([floor_between_the_lines(case.changed(solver={"tolerance": tol})) for tol in near], axis=0)
+    assert floor[0] < -72.0
+    assert floor[1] < -52.0
+
+
+def floor_between_the_lines(case: Case) -> np.ndarray:
+    """Return the largest of what lies between the lines below 6.4 kHz against the first, of x and y of a force, dB."""
     force = run_case(case)["force_2"].values[:, :2]
     spectrum = np.abs(
         np.fft.rfft((force - force.mean(axis=0)) * blackmanharris(len(force), sym=False)[:, None], axis=0)
@@ -189,9 +201,7 @@ def test_floor_between_the_lines_at_the_study_settings(fault):
     width = 6.0 * frequency[1]
     between = spectrum[(apart > width) & (frequency > width) & (frequency < 6400.0)].max(axis=0)
     first = spectrum[np.abs(frequency - case.mesh_frequency) < width].max(axis=0)
-    floor = 20.0 * np.log10(between / first)
-    assert floor[0] < -72.0
-    assert floor[1] < -52.0
+    return 20.0 * np.log10(between / first)
 
 
 def test_failure_keeps_what_was_computed(monkeypatch):
