@@ -16,6 +16,8 @@ GRID_BLOCKS = ("GEOM1", "BGPDT", "EQEXIN")
 ORDERS: tuple[Literal["little", "big"], ...] = ("little", "big")
 FIRST_RECORDS = {"OP4": (24, 48), "op2": (4, 8)}
 """Sizes in bytes that the first record of a binary file may have, by words of 4 and 8 bytes."""
+PRINTED = bytes(range(32, 127)) + b"\t\r\n"
+"""What a text file consists of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,22 +133,30 @@ def check_end(file: Path, kind: str) -> None:
     Raises
     ------
     FlexibleError
-        If there is no file, or a record is cut off or ends otherwise than it began, with its byte.
+        If there is no file, a record is cut off or ends otherwise than it began, or the file ends between the records
+        of a matrix or a data block, with its byte.
+
+    Notes
+    -----
+    A matrix of OP4 begins with a record of its size, columns first. Each other record begins with the number of its
+    column, and the last one of the matrix says one more than it has.
     """
     if not file.is_file():
         raise FlexibleError(f"{file.name}: there is no such file")
     total = file.stat().st_size
     with file.open("rb") as opened:
         head = opened.read(200)
-        if kind == "OP4" and head and head.isascii() and b"\x00" not in head:
+        if kind == "OP4" and head and not head.translate(None, PRINTED):
             return
         order = next((o for o in ORDERS if int.from_bytes(head[:4], o) in FIRST_RECORDS[kind]), None)
         if order is None:
             raise FlexibleError(f"{file.name}: byte 0: {head[:4].hex()} begins no {kind} file of Nastran")
-        at, size = 0, 0
+        at, size, begun, columns = 0, 0, 0, None
+        word = 8 if int.from_bytes(head[:4], order) == FIRST_RECORDS[kind][1] else 4
         while at < total:
             opened.seek(at)
             size = int.from_bytes(opened.read(4), order)
+            first = int.from_bytes(opened.read(min(word, size)), order)
             if at + 8 + size > total:
                 raise FlexibleError(
                     f"{file.name}: byte {at}: a record of {size} bytes is cut off; the file is not whole"
@@ -154,7 +164,15 @@ def check_end(file: Path, kind: str) -> None:
             opened.seek(at + 4 + size)
             if int.from_bytes(opened.read(4), order) != size:
                 raise FlexibleError(f"{file.name}: byte {at}: a record of {size} bytes does not end where it says")
+            if columns is None:
+                begun, columns = at, first
+            elif first > columns:
+                columns = None
             at += 8 + size
+        if kind == "OP4" and columns is not None:
+            raise FlexibleError(
+                f"{file.name}: byte {begun}: a matrix of {columns} columns is cut off; the file is not whole"
+            )
         opened.seek(total - 4 - size)
         if kind == "op2" and any(opened.read(size)):
             raise FlexibleError(f"{file.name}: byte {total - size - 8}: it ends within a data block; it is not whole")
