@@ -147,6 +147,8 @@ def make_folder(path: str | Path, plan: Plan) -> Folder:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.exists() and (not path.is_dir() or any(path.iterdir())):
+            if (path / "plan.json").exists():  # another maker's, moved here since the first look
+                return _taken_up(path, plan)
             raise CampaignError(f"{path}: holds something else than a campaign; choose another folder")
         # made aside and moved in one piece: whoever makes the same campaign at this moment finds it whole or not at all
         aside = path.resolve().parent / f".{path.resolve().name}.{uuid.uuid4().hex[:8]}.partial"

@@ -6,6 +6,7 @@ says who is at work, so that two workers rarely do the same; should they, they w
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import platform
@@ -29,7 +30,7 @@ class Claim:
 
     def beat(self) -> None:
         """Give a sign of life."""
-        if self.path.exists():
+        with contextlib.suppress(FileNotFoundError):
             os.utime(self.path)
 
     def release(self) -> None:

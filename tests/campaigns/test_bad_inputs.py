@@ -188,6 +188,26 @@ def test_made_by_several_at_once(tmp_path):
     assert Campaign(tmp_path / "c").folder.case_count == 64
 
 
+@pytest.mark.parametrize("moment", ["mkdir", "iterdir", "rename"])
+def test_made_by_another_at_any_moment(tmp_path, monkeypatch, moment):
+    """The other maker is done just before this one makes the parent, looks into the folder, or moves its own there."""
+    whole, real, begun = tmp_path / "c", getattr(Path, moment), []
+
+    def late(self, *args, **options):
+        if not begun:
+            begun.append(self)
+            _make(str(whole))
+        return real(self, *args, **options)
+
+    whole.mkdir()
+    monkeypatch.setattr(Path, moment, late)
+    _make(str(whole))
+    assert begun
+    monkeypatch.undo()
+    assert [p.name for p in tmp_path.iterdir()] == ["c"]
+    assert Campaign(whole).folder.case_count == 64
+
+
 def test_places_that_will_not_do(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(CampaignError, match="holds something else than a campaign"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import re
 import shlex
 
@@ -18,7 +17,6 @@ from tests.docs.support import DOCS, ROOT, blocks, links, notebooks, pages, run_
 ALL = [ROOT / "README.md", *pages()]
 QUICK = ("own_dae.md", "own_mechanism.md", "measured.md", "adams.md", "adams_contact.md")
 WITH_EXAMPLES = [p for p in pages() if any(b.language == "python" for b in blocks(p))]
-DOCTESTS = [p for p in ALL if ">>> " in p.read_text(encoding="utf-8")]
 
 
 def name_of(path) -> str:
@@ -62,17 +60,11 @@ def test_commands_exist_with_their_options(path):
                 assert {w for w in rest if w.startswith("--")} <= known, line
 
 
-@pytest.mark.parametrize("path", DOCTESTS, ids=name_of)
-def test_doctests(path, in_folder):
-    failed, count = doctest.testfile(str(path), module_relative=False, optionflags=doctest.ELLIPSIS)
-    assert count
-    assert not failed
-
-
 def test_pages_are_of_one_kind():
-    """A page is a notebook or has plain examples, since the two are run in different ways."""
+    """A page is a notebook or has plain examples, since the two are run in different ways; none has doctests."""
     for path in notebooks():
         assert not any(b.language == "python" for b in blocks(path)), path
+    assert not [p for p in ALL if ">>> " in p.read_text(encoding="utf-8")]
 
 
 def test_no_page_is_outside_the_tables_of_contents():
