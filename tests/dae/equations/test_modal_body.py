@@ -166,22 +166,34 @@ def test_free_flight_conserves_momentum_angular_momentum_and_energy(formulation,
     np.testing.assert_allclose(solution.energy_balance().elastic, strain, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("integrator", "tol"), [("WSTIFF", 1e-11), pytest.param("IDA", 1e-12, marks=pytest.mark.slow)])
-def test_tumbling_for_a_hundred_seconds(integrator, tol):
-    """No damping: energy and angular momentum about the centre of mass, summed over the mass points."""
+@pytest.mark.parametrize(
+    ("integrator", "tolerances", "factor"),
+    [("WSTIFF", (1e-9, 1e-10), 100), pytest.param("IDA", (1e-7, 1e-8), 4000, marks=pytest.mark.slow)],
+)
+def test_tumbling_for_a_hundred_seconds(integrator, tolerances, factor):
+    """No damping: energy and angular momentum about the centre of mass, summed over the mass points.
+
+    What they stray is error of the integrator alone, so it falls with the tolerance: 15 times the tolerance are
+    measured of WSTIFF, 1000 times of IDA. The tolerances are far above where rounding collapses the steps (IDA: 1e-12,
+    with some libraries).
+    """
     m, body = with_cloud(velocity=(0.3, -0.2, 0.5), angular_velocity=(2.0, -3.0, 1.5))
     points = [body.marker(point, name=f"P{k}") for k, point in enumerate(POINTS)]
-    solution = m.simulate(100.0, rate=2, integrator=integrator, tol=tol)
-    assert solution.success
-    place = np.array([solution.marker_position(p) for p in points])
-    speed = np.array([solution.marker_velocity(p) for p in points])
-    place = place - np.average(place, axis=0, weights=MASSES)
-    drift = np.average(speed, axis=0, weights=MASSES)
-    angular = np.einsum("p,pti->ti", MASSES, np.cross(place, speed - drift))
-    strain = 0.5 * solution.modal_coordinates("cloud") ** 2 @ [300.0, 600.0]
-    energy = 0.5 * np.einsum("p,pti,pti->t", MASSES, speed, speed) + strain
-    np.testing.assert_allclose(energy, energy[0], rtol=1e-9)
-    assert np.abs(angular - angular[0]).max() < 1e-9 * np.linalg.norm(angular[0])
+    strays = []
+    for tol in tolerances:
+        solution = m.simulate(100.0, rate=2, integrator=integrator, tol=tol)
+        assert solution.success
+        place = np.array([solution.marker_position(p) for p in points])
+        speed = np.array([solution.marker_velocity(p) for p in points])
+        place = place - np.average(place, axis=0, weights=MASSES)
+        drift = np.average(speed, axis=0, weights=MASSES)
+        angular = np.einsum("p,pti->ti", MASSES, np.cross(place, speed - drift))
+        strain = 0.5 * solution.modal_coordinates("cloud") ** 2 @ [300.0, 600.0]
+        energy = 0.5 * np.einsum("p,pti,pti->t", MASSES, speed, speed) + strain
+        turned = np.abs(angular - angular[0]).max() / np.linalg.norm(angular[0])
+        strays.append([np.abs(energy / energy[0] - 1).max(), turned])
+    assert np.all(np.array(strays) < factor * np.array(tolerances)[:, None])
+    assert np.all(np.array(strays[1]) < 0.4 * np.array(strays[0]))
 
 
 def test_two_masses_on_a_spring_vibrate_at_their_reduced_mass():
