@@ -5,6 +5,7 @@ modules in strings.
 """
 
 import ast
+import re
 from functools import cache
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import pytest
 import gearmbs
 
 ROOT = Path(gearmbs.__file__).parent
+PAGE = Path(__file__).parent.parent / "docs" / "architecture.md"
 
 SUPPORT = {"_command", "_counted_indices", "_deprecation", "_jit", "_kept", "_kernel_cache", "_kernel_calls",
            "_kernel_library", "_late_kernels", "_lazy", "_shown", "compile", "progress", "saving", "units"}  # fmt: skip
@@ -172,6 +174,16 @@ def test_every_package_has_its_place():
 def test_every_exception_is_needed():
     used = {(room(name), room(target)) for name, targets in arrows().items() for target in targets}
     assert set(EXCEPTIONS) <= used
+
+
+def test_the_page_has_the_same_table():
+    """Its columns: package, what it imports, and single purposes as "`package`: purpose"."""
+    rows = re.findall(r"^\| `([\w.]+)` \|([^|]*)\|([^|]*)\|$", PAGE.read_text(encoding="utf-8"), re.M)
+    told = {package: (imports, purposes) for package, imports, purposes in rows if package in MAY_KNOW}
+    assert set(told) == set(MAY_KNOW)
+    for package, (imports, purposes) in told.items():
+        assert set(re.findall(r"`([\w.]+)`", imports)) == MAY_KNOW[package], package
+        assert set(re.findall(r"`([\w.]+)`: ", purposes)) == {b for a, b in EXCEPTIONS if a == package}, package
 
 
 def test_dae_does_not_know_gears_by_name():
