@@ -35,7 +35,6 @@ for _report_kind in ("VibrationReport", "ComparisonReport", "BearingReport", "Pl
     WRITERS[_report_kind] = WRITERS["AnalysisReport"]
 REPORT_FACTS = ("source", "rate", "duration", "teeth", "speed", "speed_origin", "gmf", "missing", "notes")
 """Attributes of reports that go into JSON beside their tables; speeds in rad/s."""
-SIGNAL_ENDINGS = (".csv", ".gz", ".mat", ".uff", ".unv", ".wav", ".nc", ".h5", ".hdf5", ".tdms")
 FIGURE_ENDINGS = (".png", ".svg", ".pdf")
 
 
@@ -84,7 +83,8 @@ def _saved(thing: Any, path: Path) -> Path | list[Path]:
     if name:
         return _by_ending(thing, path, type(thing).__name__, WRITERS[name])
     if "DataArray" in kinds:
-        return _by_ending(thing, path, "signal", dict.fromkeys(SIGNAL_ENDINGS, "gearmbs.signals:write_signal"))
+        endings = importlib.import_module("gearmbs.signals.io").written_endings()
+        return _by_ending(thing, path, "signal", dict.fromkeys(endings, "gearmbs.signals:write_signal"))
     if "Figure" in kinds:
         return _by_ending(thing, path, "figure", dict.fromkeys(FIGURE_ENDINGS, "gearmbs.saving:_figure"))
     own: Callable | None = getattr(thing, "save", None)
@@ -95,7 +95,8 @@ def _saved(thing: Any, path: Path) -> Path | list[Path]:
 
 
 def _by_ending(thing: Any, path: Path, kind: str, writers: dict[str, str]) -> Path | list[Path]:
-    writer = writers.get(path.suffix.lower())
+    endings = ("".join(path.suffixes[-parts:]).lower() for parts in (2, 1))  # of two parts: ".csv.gz"
+    writer = next((writers[ending] for ending in endings if ending in writers), None)
     if writer is None:
         *others, last = writers
         known = f"{', '.join(others)} or {last}" if others else last

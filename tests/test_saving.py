@@ -10,6 +10,7 @@ import xarray as xr
 
 import gearmbs as gm
 from gearmbs.mechanism import Mechanism
+from gearmbs.signals.io import SUFFIXES, written_endings
 from gearmbs.view import film, gear_scene, spectrum_plot
 from gearmbs.view.figure_style import new_figure
 
@@ -58,13 +59,35 @@ def test_everything_is_saved_with_one_word(tmp_path):
     [
         (gm.Case(), "case.nc", "a Case is saved as .toml"),
         (gm.GearSpec(20, "2 mm"), "wheel.png", "a GearSpec is saved as .dxf, .step, .stp or .stl"),
-        (signal(), "signal.docx", "a signal is saved as .csv, .gz"),
+        (signal(), "signal.docx", "a signal is saved as .csv, .txt"),
         (new_figure(), "figure", "a figure is saved as .png, .svg or .pdf"),
     ],
 )
 def test_endings_that_will_not_do_are_named(thing, name, words, tmp_path):
     with pytest.raises(ValueError, match=words):
         gm.save(thing, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("ending", written_endings())
+def test_signals_are_saved_as_all_that_is_written(ending, tmp_path):
+    """What `write_signal` takes, `save` takes; an archive of numpy is called one."""
+    needed = {"tdms": "nptdms", "uff58": "pyuff", "parquet": "pyarrow"}.get(SUFFIXES[ending])
+    if needed:
+        pytest.importorskip(needed)
+    one = signal()
+    path = gm.save(one, tmp_path / f"level.2{ending}")
+    np.testing.assert_allclose(gm.read_signal(path), one, rtol=1e-6)
+    assert 1 / float(gm.read_signal(path)["time"].diff("time").mean()) == pytest.approx(640.0)
+
+
+def test_no_archive_is_called_an_array(tmp_path):
+    words = r"an \.npy file holds one array without rate and units; write \.npz"
+    for options in ({}, {"format": "npy"}):
+        with pytest.raises(ValueError, match=words):
+            gm.write_signal(signal(), tmp_path / "x.npy", **options)
+    with pytest.raises(ValueError, match=r"a signal is saved as \.csv, \.txt"):
+        gm.save(signal(), tmp_path / "x.npy")
     assert not list(tmp_path.iterdir())
 
 

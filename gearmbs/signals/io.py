@@ -48,7 +48,7 @@ FORMATS = (
     "feather",
     "lvm",
 )
-"""Formats of files that are read; all but feather and lvm are written, too."""
+"""Formats of files that are read; all but feather and lvm are written, too, npy as .npz."""
 READ_ONLY = ("feather", "lvm")
 SUFFIXES = {
     ".csv": "csv",
@@ -233,6 +233,8 @@ def write_signal(
     format = _format(path, format)
     if format in READ_ONLY:
         raise SignalFileError(path, f"{format} files are read, not written; write for instance .csv, .mat or .tdms")
+    if format == "npy" and path.suffix.lower() == ".npy":
+        raise SignalFileError(path, "an .npy file holds one array without rate and units; write .npz, which holds all")
     record = record_of(as_signal(signal))
     if not path.parent.is_dir():
         raise SignalFileError(path, f"there is no folder {path.parent}; make it first")
@@ -250,6 +252,11 @@ def write_signal(
     finally:
         part.unlink(missing_ok=True)
     return path
+
+
+def written_endings() -> tuple[str, ...]:
+    """Return the endings that `write_signal` takes."""
+    return tuple(e for e, format in SUFFIXES.items() if format not in READ_ONLY and e != ".npy")
 
 
 def checked_format(path: Path, format: str | None) -> tuple[str, str]:

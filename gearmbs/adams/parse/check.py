@@ -10,6 +10,7 @@ from gearmbs.adams.parse.data import spline_data
 from gearmbs.adams.parse.deck import Deck
 from gearmbs.adams.parse.grammar import CHOICE, EXPRESSION, specs_of
 from gearmbs.adams.parse.remedies import refused_message
+from gearmbs.adams.parse.statements_data import REQUEST_TYPES
 from gearmbs.mechanism.expression_syntax import Call, Number, parse, walk
 
 REQUIRED: dict[type, tuple[str, ...]] = {
@@ -404,7 +405,8 @@ def _check_data(deck: Deck, fail: Fail) -> None:
                     fail(plant, f"there is no VARIABLE/{ref}", "variables")
     for request in deck.of(st.Request).values():
         if request.type is None and not any(request.functions()) and request.function is None:
-            fail(request, "give DISPLACEMENT, VELOCITY, ACCELERATION or FORCE, or F1 to F8")
+            *others, last = REQUEST_TYPES
+            fail(request, f"give {', '.join(others)} or {last}, or F1 to F8")
         if request.type is not None and request.i is None:
             fail(request, "I is missing")
 

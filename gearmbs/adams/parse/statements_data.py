@@ -85,13 +85,43 @@ class PlantOutput(Plant, keyword="POUTPUT"):
 
 
 @dataclass(frozen=True)
+class RequestType:
+    """A standard type of REQUEST.
+
+    Attributes
+    ----------
+    number : int
+        In request files.
+    functions : tuple of str
+        Functions behind the eight columns.
+    dimensions : tuple of str
+        Of the first four columns and of the others.
+    """
+
+    number: int
+    functions: tuple[str, str, str, str, str, str, str, str]
+    dimensions: tuple[str, str]
+
+
+REQUEST_TYPES = {
+    "DISPLACEMENT": RequestType(1, ("DM", "DX", "DY", "DZ", "", "PSI", "THETA", "PHI"), ("length", "angle")),
+    "VELOCITY": RequestType(2, ("VM", "VX", "VY", "VZ", "WM", "WX", "WY", "WZ"), ("velocity", "angular_velocity")),
+    "ACCELERATION": RequestType(
+        3, ("ACCM", "ACCX", "ACCY", "ACCZ", "WDTM", "WDTX", "WDTY", "WDTZ"), ("acceleration", "angular_acceleration")
+    ),
+    "FORCE": RequestType(4, ("FM", "FX", "FY", "FZ", "TM", "TX", "TY", "TZ"), ("force", "torque")),
+}
+"""All that reads, checks, evaluates or writes a REQUEST takes its type from here."""
+
+
+@dataclass(frozen=True)
 class Request(Statement):
     """REQUEST: what the request file holds."""
 
     type: str | None = arg(
         "type",
         CHOICE,
-        choices="DISPLACEMENT VELOCITY ACCELERATION FORCE",
+        choices=" ".join(REQUEST_TYPES),
         aliases="D:DISPLACEMENT V:VELOCITY A:ACCELERATION F:FORCE",
     )
     i: int | None = arg("I", ID)

@@ -13,6 +13,7 @@ from gearmbs.adams.errors import Diagnostic, folded
 from gearmbs.adams.parse import statements as st
 from gearmbs.adams.parse.commands import Command, Script, Simulate
 from gearmbs.adams.parse.deck import Deck
+from gearmbs.adams.parse.statements_data import REQUEST_TYPES
 from gearmbs.adams.parse.units import RESULT_NAMES, unit_names
 from gearmbs.adams.results.assembly import Assembly
 from gearmbs.adams.results.facets import FacetedTouch, facets_remark
@@ -304,12 +305,7 @@ class RunRecord:
         if request.type is None:
             given = request.cunits
             return tuple(given[k] if k < len(given) and given[k] else "no_units" for k in range(8))
-        first, second = {
-            "DISPLACEMENT": ("length", "angle"),
-            "VELOCITY": ("velocity", "angular_velocity"),
-            "ACCELERATION": ("acceleration", "angular_acceleration"),
-            "FORCE": ("force", "torque"),
-        }[request.type]
+        first, second = REQUEST_TYPES[request.type].dimensions
         return (self.unit(first),) * 4 + (self.unit(second),) * 4
 
     def unit(self, dimension: str) -> str:

@@ -12,10 +12,12 @@ from datetime import datetime
 import numpy as np
 
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.statements_data import REQUEST_TYPES
 from gearmbs.adams.parse.units import unit_names
 from gearmbs.adams.results.record import RunRecord
 
-TYPES = {"DISPLACEMENT": 1, "VELOCITY": 2, "ACCELERATION": 3, "FORCE": 4, None: 5}
+OF_EXPRESSIONS = 5
+"""The type of a request by F1 to F8."""
 KEPT = (1, 2, 3, 5, 6, 7)
 """Columns that are written."""
 UNIT_CODES = {"MILLIMETER": "MM", "METER": "M", "CENTIMETER": "CM", "INCH": "IN", "FOOT": "FT"}
@@ -47,7 +49,7 @@ def request_text(result: RunRecord, now: datetime | None = None) -> str:
     lines.append(f"{len(requests):>5}{name:>17} {factor:.15E}")
     for number, request in requests.items():
         comment = (request.comment or request.name or "")[:80]
-        kind = TYPES[request.type]
+        kind = REQUEST_TYPES[request.type].number if request.type else OF_EXPRESSIONS
         lines.append(f"{number:>10}{kind:>5}{request.i or 0:>10}{request.j or 0:>10}{len(comment):>5}")
         lines.append(comment)
     values = [result.request(number)[:, KEPT] for number in requests]

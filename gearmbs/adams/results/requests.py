@@ -11,6 +11,7 @@ from gearmbs._jit import njit
 from gearmbs.adams.builders.data_calls import translated
 from gearmbs.adams.builders.model import AdamsModel, markers_of
 from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.statements_data import REQUEST_TYPES
 from gearmbs.dae.analyses.equilibrium_solution import EquilibriumSolution
 from gearmbs.dae.equations import layout as tables
 from gearmbs.dae.equations.counted_angles import AXES as ANGLE_NAMES
@@ -25,14 +26,6 @@ from gearmbs.mechanism.expression_compiler import compile_expression
 from gearmbs.mechanism.expression_series import evaluate_series
 from gearmbs.mechanism.expression_syntax import Scope
 from gearmbs.mechanism.user_functions import raised_errors
-
-COLUMNS = {
-    "DISPLACEMENT": ("DM", "DX", "DY", "DZ", "", "PSI", "THETA", "PHI"),
-    "VELOCITY": ("VM", "VX", "VY", "VZ", "WM", "WX", "WY", "WZ"),
-    "ACCELERATION": ("ACCM", "ACCX", "ACCY", "ACCZ", "WDTM", "WDTX", "WDTY", "WDTZ"),
-    "FORCE": ("FM", "FX", "FY", "FZ", "TM", "TX", "TY", "TZ"),
-}
-"""Functions behind the eight columns of the standard requests."""
 
 NAMES = ("F1", "F2", "F3", "F4", "F5", "F6", "F7", "F8")
 
@@ -65,7 +58,7 @@ def request_texts(request: st.Request, ypr: bool = False) -> tuple[str | None, .
         return request.functions()
     i, j, k = request.i or 0, request.j or 0, request.rm or 0
     texts: list[str | None] = []
-    for name in COLUMNS[request.type]:
+    for name in REQUEST_TYPES[request.type].functions:
         if not name:
             texts.append(None)
         elif name in ("PSI", "THETA", "PHI", "DM", "VM", "ACCM", "WM", "WDTM", "FM", "TM"):
@@ -77,7 +70,7 @@ def request_texts(request: st.Request, ypr: bool = False) -> tuple[str | None, .
 
 def column_names(request: st.Request, ypr: bool = False) -> tuple[str, ...]:
     """Return the names of a request's columns: CNAMES, TITLE, or the functions'."""
-    standard: tuple[str, ...] = COLUMNS[request.type] if request.type else NAMES
+    standard: tuple[str, ...] = REQUEST_TYPES[request.type].functions if request.type else NAMES
     if ypr:
         standard = tuple(CARDAN.get(name, name) for name in standard)
     given = request.cnames or request.title
