@@ -146,12 +146,13 @@ def test_turns_are_counted_in_steps_of_many_turns(integrator, speed):
         assert solution.stats.steps < 100
 
 
-@pytest.mark.parametrize("formulation", ["SI2", "SI1", "I3"])
-@pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF", "IDA"])
+@pytest.mark.parametrize(
+    ("integrator", "formulation"),
+    # IDA does not take index 3
+    [(i, f) for i in ("WSTIFF", "GSTIFF", "IDA") for f in ("SI2", "SI1", "I3") if (i, f) != ("IDA", "I3")],
+)
 def test_fast_shaft_in_a_bearing_takes_long_steps(integrator, formulation):
     """A Newton matrix of another orientation would let deviations grow, and fail the run or hold its steps short."""
-    if (integrator, formulation) == ("IDA", "I3"):
-        pytest.skip("IDA does not take index 3")
     m = Mechanism("shaft")
     shaft = m.body("shaft", 1.0, (1, 1, 2.0), angular_velocity=(0, 0, 60.0))
     m.revolute("bearing", shaft, m.ground, at=(0, 0, 0))
