@@ -129,7 +129,7 @@ class Equilibrium:
     Parameters
     ----------
     force : callable
-        ``force(place)`` returns load (5,), stiffness (5, 5) by displacement and turns, and the sum of the forces' sizes.
+        ``force(place)``: load (5,), stiffness (5, 5) by displacement and turns, and the sum of all normal forces.
     axis : ndarray, shape (3,)
         Of the inner ring, in the ring.
     wanted : ndarray, shape (3,) or (5,)
@@ -138,9 +138,7 @@ class Equilibrium:
         Length that turns are multiplied by, and typical distance of groove centres, m.
     """
 
-    def __init__(
-        self, force: Callable, axis: np.ndarray, wanted: np.ndarray, radius: float, reach: float
-    ) -> None:
+    def __init__(self, force: Callable, axis: np.ndarray, wanted: np.ndarray, radius: float, reach: float) -> None:
         self.force, self.axis, self.wanted, self.n = force, axis, wanted, wanted.size
         self.size = np.array([1.0, 1.0, 1.0, radius, radius])[: self.n]
         self.reach = reach
