@@ -299,9 +299,10 @@ class Shaft(Written):
         Parameters
         ----------
         modes : int, optional
-            How many modes are kept, the slowest; default: all that the reduction has up to ``max_frequency``.
+            How many shapes with held seats, the slowest, are kept beside the static ones; default 20, or all below
+            ``max_frequency``. See :func:`reduce_model`.
         max_frequency : float or str, optional
-            Modes above are left out, Hz.
+            Shapes with held seats above are left out, Hz.
         seats : sequence of str, optional
             Which seats are interfaces; default: all.
         spin : str or float, optional
