@@ -146,16 +146,23 @@ class UnbalanceResponse:
         Along the shaft, m.
     displacements : ndarray, shape (s, stations, 6)
         Complex amplitudes of exp(i speed t): the real part is the motion.
+    shaft : Shaft
     """
 
     speeds: np.ndarray
     positions: np.ndarray
     displacements: np.ndarray
+    shaft: Shaft
 
-    def major_axis(self, at: float) -> np.ndarray:
-        """Return the largest radial displacement of the station nearest to ``at`` over the speeds, m."""
-        k = int(np.argmin(np.abs(self.positions - at)))
-        x, y = self.displacements[:, k, 0], self.displacements[:, k, 1]
+    def at(self, position: Quantity) -> np.ndarray:
+        """Return the complex displacements and rotations of the section at a place, m, over the speeds: (s, 6)."""
+        places, moved, turned = self.shaft.section_motion(quantity(position, "length", "position"))
+        ends = self.displacements.reshape(len(self.speeds), -1)[:, places]
+        return np.asarray(ends @ np.vstack([moved, turned]).T)
+
+    def major_axis(self, at: Quantity) -> np.ndarray:
+        """Return the largest radial displacement at a place along the shaft over the speeds, m."""
+        x, y = self.at(at)[:, :2].T
         return 0.5 * (np.abs(x - 1j * y) + np.abs(x + 1j * y))
 
 
@@ -258,7 +265,9 @@ class Rotor:
         both = np.sort(1.0 / np.sqrt(real[real > 1e-12 * real.max()]))
         return both[:count]
 
-    def unbalance_response(self, speeds: Sequence[Quantity], unbalance: Mapping[float, complex]) -> UnbalanceResponse:
+    def unbalance_response(
+        self, speeds: Sequence[Quantity], unbalance: Mapping[Quantity, complex]
+    ) -> UnbalanceResponse:
         """Return the steady response to unbalanced masses.
 
         Parameters
@@ -267,19 +276,22 @@ class Rotor:
             rad/s or text.
         unbalance : mapping of float to complex
             Mass times eccentricity, kg m, by position along the shaft, m; a complex number has its angle at time 0.
+            Between stations its force is shared by the functions of the element, the same that its mass matrix has.
+
+        Raises
+        ------
+        FlexibleError
+            For a place off the shaft.
         """
         values = np.array([quantity(s, "angular speed", "speeds") for s in speeds])
         m, c, g, k, rows, z = self._matrices
         load = np.zeros(DOFS * z.size, dtype=complex)
         for at, size in unbalance.items():
-            if not -1e-9 <= at <= self.shaft.length * (1 + 1e-9):
-                raise FlexibleError(f"unbalance at {at} m: the shaft reaches from 0 to {self.shaft.length:g} m")
-            node = int(np.argmin(np.abs(z - at)))
-            load[DOFS * node] += size
-            load[DOFS * node + 1] += -1j * size
+            places, moved, _ = self.shaft.section_motion(quantity(at, "length", "unbalance"), "unbalance")
+            load[places] += size * (moved[0] - 1j * moved[1])
         load = load[rows]
         found = [np.linalg.solve(k + 1j * w * (c + w * g) - w**2 * m, w**2 * load) for w in values]
-        return UnbalanceResponse(values, z, self._at_stations(np.array(found)))
+        return UnbalanceResponse(values, z, self._at_stations(np.array(found)), self.shaft)
 
     def _at_stations(self, vectors: np.ndarray) -> np.ndarray:
         """Return vectors of the degrees of freedom in use by station and direction."""
