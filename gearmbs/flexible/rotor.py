@@ -255,15 +255,20 @@ class Rotor:
         )
 
     def critical_speeds(self, count: int = 6, order: float = 1.0) -> np.ndarray:
-        """Return the speeds at which a natural frequency is ``order`` times the speed, rad/s, without damping.
+        """Return the speeds at which a natural frequency is ``order`` times the speed, rad/s.
 
-        With q exp(i order W t) they are eigenvalues: K q = W^2 (order^2 M - i order G) q.
+        With q exp(i order W t) they are eigenvalues: K q = W^2 (order^2 M - i order G) q. Damping does not shift them,
+        but motions that it lets not oscillate are left out: those whose damping ratio q* C q / (2 order W q* M q) is 1
+        or more.
         """
-        m, _, g, k, _, _ = self._matrices
-        values = scipy.linalg.eigvals(np.linalg.solve(k, order**2 * m - 1j * order * g))
-        real = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values)) & (values.real > 0.0)]
-        both = np.sort(1.0 / np.sqrt(real[real > 1e-12 * real.max()]))
-        return both[:count]
+        m, c, g, k, _, _ = self._matrices
+        values, vectors = scipy.linalg.eig(np.linalg.solve(k, order**2 * m - 1j * order * g))
+        whirls = (np.abs(values.imag) < 1e-6 * np.abs(values)) & (values.real > 0.0)
+        real, shapes = values.real[whirls], vectors[:, whirls]
+        there = real > 1e-12 * real.max(initial=0.0)
+        speeds, shapes = 1.0 / np.sqrt(real[there]), shapes[:, there]
+        lost, held = (np.einsum("ia,ij,ja->a", shapes.conj(), matrix, shapes).real for matrix in (c, m))
+        return np.sort(speeds[lost < 2.0 * order * speeds * held])[:count]
 
     def unbalance_response(
         self, speeds: Sequence[Quantity], unbalance: Mapping[Quantity, complex]
