@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gearmbs.bearings import layout as B
+from gearmbs.bearings.equilibrium import Equilibrium, free_direction
 from gearmbs.bearings.errors import BearingError, require, require_fields
 from gearmbs.bearings.geometry import Bearing
 from gearmbs.bearings.settings import BearingSettings
@@ -21,8 +22,6 @@ from gearmbs.bearings.tables import BearingTables, pack
 from gearmbs.units import Quantity, to_si
 
 AXES = ("x", "y", "z", "tilt x", "tilt y")
-ITERATIONS = 200
-HALVINGS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,17 +128,20 @@ class BearingStatics:
         start : sequence of float, optional
             Displacement to begin with.
 
+        Where a load leaves a direction open, such as the axis of cylindrical rollers, it stays as in ``start``.
+
         Raises
         ------
         BearingError
-            If the bearing cannot carry the load.
+            If the bearing cannot carry the load: there is a direction in which it moves the ring without end, see
+            `gearmbs.bearings.equilibrium`.
         """
         wanted = np.asarray(load, dtype=float)
         require(
             wanted.shape in ((3,), (5,)) and bool(np.all(np.isfinite(wanted))), f"load is {load!r}; give 3 or 5 numbers"
         )
         place = self._first(wanted) if start is None else self._five(start, "start")
-        place = self._newton(place, wanted, cage_angle)
+        place = self._carried(place, wanted, cage_angle)
         found, stiffness = self._load(place, cage_angle)
         return self._state(place, found, stiffness, cage_angle)
 
@@ -196,38 +198,26 @@ class BearingStatics:
             {"load": ("load", sizes, {"units": "N"}), "axis": list(AXES)},
         )
 
-    # --- the iteration -----------------------------------------------------------------------------
+    def _carried(self, place: np.ndarray, wanted: np.ndarray, cage_angle: float | None) -> np.ndarray:
+        """Return the displacement under a load, or refuse a load that nothing balances."""
+        reals, radius = self.tables.reals, 0.5 * self.bearing.pitch_diameter
+        angle = self.settings.cage_angle if cage_angle is None else cage_angle
+        free = free_direction(self.tables, angle, wanted, radius)
+        if free is not None:
+            way = ", ".join(f"{part:+.3g} {name}" for part, name in zip(free, AXES) if abs(part) > 1e-3)
+            raise BearingError(
+                f"no equilibrium under {wanted.tolist()} N: the bearing does not carry it in this direction; nothing "
+                f"stops the inner ring along ({way}), tilts times half the pitch diameter (an axial load needs a "
+                "contact angle or ball grooves, and the right sense; tapered rollers need one under a radial load)"
+            )
 
-    def _newton(self, place: np.ndarray, wanted: np.ndarray, cage_angle: float | None) -> np.ndarray:
-        n = wanted.size
-        size = np.array([1.0, 1.0, 1.0, 0.5 * self.bearing.pitch_diameter, 0.5 * self.bearing.pitch_diameter])[:n]
-        scale = max(float(np.abs(wanted / size).max()), 1e-9)
-        load, stiffness = self._load(place, cage_angle)
-        miss = (wanted - load[:n]) / size
-        for _ in range(ITERATIONS):
-            if float(np.abs(miss).max()) <= 1e-11 * scale:
-                return place
-            matrix = stiffness[:n, :n] / np.outer(size, size)
-            step = np.linalg.lstsq(matrix, miss, rcond=1e-13)[0] / size
-            step *= min(1.0, 0.02 * self.bearing.element_diameter / max(float(np.abs(step * size).max()), 1e-300))
-            part, before = 1.0, float(miss @ miss)
-            for _ in range(HALVINGS):
-                there = place.copy()
-                there[:n] += part * step
-                load, stiffness = self._load(there, cage_angle)
-                miss = (wanted - load[:n]) / size
-                if float(miss @ miss) < before:
-                    break
-                part *= 0.5
-            else:
-                if np.sqrt(before) <= 1e-8 * scale:
-                    return place
-                break
-            place = there
-        raise BearingError(
-            f"no equilibrium under {wanted.tolist()} N found: the bearing does not carry it in this direction (an "
-            "axial load needs a contact angle or ball grooves, and the right sense)"
-        )
+        def force(there: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+            return self._pressed(there, cage_angle)
+
+        # X and Y are about as long as the groove centres are apart, those of rollers about as the gap
+        reach = self.bearing.groove_distance if not self.bearing.rollers else 1e-2 * self.bearing.element_diameter
+        axis = reals[B.INNER_AXIS : B.INNER_AXIS + 3].copy()
+        return Equilibrium(force, axis, wanted, radius, reach).solve(place)
 
     def _first(self, wanted: np.ndarray) -> np.ndarray:
         """Return a displacement in the direction of the load that closes the clearance."""
@@ -257,6 +247,12 @@ class BearingStatics:
         self, place: np.ndarray, cage_angle: float | None, tables: BearingTables | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the load on the inner ring and its derivatives by the displacement."""
+        return self._pressed(place, cage_angle, tables)[:2]
+
+    def _pressed(
+        self, place: np.ndarray, cage_angle: float | None, tables: BearingTables | None = None
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Return the load on the inner ring, its derivatives by the displacement, and the sum of all normal forces."""
         from gearmbs.bearings.kernel import bearing_force
         from gearmbs.dae.equations.force_elements import DERIVATIVES
 
@@ -271,7 +267,7 @@ class BearingStatics:
             tables.integers, tables.reals, 0.0, frames, states, np.zeros(0), DERIVATIVES, work, wrench, rates, jac,
             np.zeros(7),
         )  # fmt: skip
-        return -wrench[0, :5], -jac[:5, :5]
+        return -wrench[0, :5], -jac[:5, :5], float(work[B.S_SUMS])
 
     def _state(
         self, place: np.ndarray, load: np.ndarray, stiffness: np.ndarray, cage_angle: float | None

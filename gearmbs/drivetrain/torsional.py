@@ -108,6 +108,14 @@ class TorsionalModel:
         shapes[free] = vectors / np.abs(vectors).max(axis=0)
         return np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi), shapes
 
+    def damping_ratios(self) -> np.ndarray:
+        """Return phi.C phi / (2 w phi.M phi) of each of `modes`: from 1 on it does not oscillate; zero of rigid ones."""
+        m, c, _ = self.matrices()
+        frequencies, shapes = self.modes()
+        lost, held = (np.einsum("ia,ij,ja->a", shapes, matrix, shapes) for matrix in (c, m))
+        rates = 4.0 * np.pi * frequencies * held
+        return np.divide(lost, rates, out=np.zeros(rates.size), where=rates > 0.0)
+
     def response(self, frequency: np.ndarray, force: dict[str, complex]) -> np.ndarray:
         """Return the complex amplitudes of the angles under harmonic torques, or motions of prescribed shafts.
 
@@ -209,8 +217,12 @@ class TorsionalModel:
         return speeds.get(shaft, 0.0)
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{f:.5g}" for f in self.frequencies())
-        return f"TorsionalModel({len(self.names)} inertias, {len(self.springs)} springs: {shown} Hz)"
+        frequencies, over = self.frequencies(), self.damping_ratios() >= 1.0
+        shown = ", ".join(f"{f:.5g}" for f in frequencies[(frequencies > 0.0) & ~over]) or "no"
+        rigid = int(np.sum(frequencies == 0.0))
+        apart = f", {rigid} rigid" if rigid else ""
+        apart += f", {int(over.sum())} over-damped" if over.any() else ""
+        return f"TorsionalModel({len(self.names)} inertias, {len(self.springs)} springs: {shown} Hz{apart})"
 
 
 def torsional_model(train: Drivetrain) -> TorsionalModel:

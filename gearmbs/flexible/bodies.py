@@ -48,7 +48,7 @@ def thin_rimmed_wheel(
     width, web : float or str
         Of hub and rim, and the thickness of the web in their middle, m.
     modes : int, optional
-        Shapes that are kept; default: all of the reduction, for the slowest twist a wheel less than its web does.
+        Shapes with held seats that are kept beside the static ones, see `reduce_model`; default 20.
     around : int
         Elements round about.
     material : ElasticMaterial
@@ -100,7 +100,7 @@ def planet_carrier(
     pin_circle, pin : float or str
         Diameters of the circle of the pins and of a pin, m.
     modes : int, optional
-        Shapes that are kept; default: all of the reduction, for the slowest do not twist the disc under its pins.
+        Shapes with held seats that are kept beside the static ones, see `reduce_model`; default 20.
     material : ElasticMaterial
     name : str
 
@@ -138,7 +138,7 @@ def box_housing(
     bearing: Quantity,
     *,
     divisions: tuple[int, int, int] = (6, 4, 4),
-    modes: int | None = 40,
+    modes: int | None = 10,
     material: ElasticMaterial = STEEL,
     name: str = "housing",
 ) -> ModalModel:
@@ -160,7 +160,7 @@ def box_housing(
     divisions : tuple of 3 ints
         Elements between the walls.
     modes : int, optional
-        Shapes that are kept; all of the reduction if None.
+        Shapes with held seats that are kept beside the static ones, see `reduce_model`; 20 if None.
     material : ElasticMaterial
     name : str
 

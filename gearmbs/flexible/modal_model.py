@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -22,6 +23,9 @@ from gearmbs.mechanism.modal import COUPLING, ShapedMarker
 
 LEVELS = (*COUPLING, "rigid")
 """Levels of coupling between deformation and motion, from all terms to none."""
+
+PAIR = 1e-7
+"""Relative distance below which squared frequencies count as a pair."""
 
 SLENDER = 0.2
 """A body whose least moment of inertia is a smaller share of the next has a long axis."""
@@ -153,6 +157,35 @@ class ModalModel:
         return replace(
             self, frequencies=self.frequencies[k], integrals=integrals, moved=self.moved[k], turned=turned, seats=seats
         )
+
+    def slowest(self, count: int) -> ModalModel:
+        """Return the body with its slowest modes only, for a cheap run: static shapes of the seats go with the others.
+
+        More modes are then not always better at the seats: see `check_reduction`, which tells what flexibility is lost.
+
+        Parameters
+        ----------
+        count : int
+            Of a shaft one less where the last would be one half of a bending pair, for the shaft would get an axis of
+            preference; a warning says so.
+
+        Raises
+        ------
+        FlexibleError
+            If it is not one of 1 to `modes`.
+        """
+        if not 1 <= count <= self.modes:
+            raise FlexibleError(f"{self.name}: the slowest {count} modes of {self.modes}; give 1 to {self.modes}")
+        squares, kept = self.frequencies**2, count
+        while self.line and 0 < kept < self.modes and squares[kept] - squares[kept - 1] < PAIR * squares[kept]:
+            kept -= 1
+        kept = kept or count
+        if kept < count:
+            warnings.warn(
+                f"{self.name}: {kept} modes are kept instead of {count}, whose last is one half of a bending pair",
+                stacklevel=2,
+            )
+        return self.selected(np.arange(kept))
 
     def participation(self, *, torques: bool = False) -> np.ndarray:
         """Return the share of each mode in the static compliance of the seats, shape (n,).

@@ -23,7 +23,7 @@ from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
 from gearmbs.flexible.integrals import lumps, shape_integrals
 from gearmbs.flexible.interfaces import Interface, Resolved, resolve
-from gearmbs.flexible.modal_model import ModalModel
+from gearmbs.flexible.modal_model import PAIR, ModalModel
 from gearmbs.flexible.seats import Seat
 from gearmbs.mechanism.quantities import quantity
 from gearmbs.progress import waiting
@@ -32,8 +32,8 @@ from gearmbs.units import Quantity
 DENSE = 900
 """Below so many degrees of freedom matrices are treated as dense."""
 
-PAIR = 1e-7
-"""Relative distance below which squared frequencies count as a pair."""
+USUAL = 20
+"""Vibration shapes where nothing else is said: a shaft's first four bends are then right to 0.03 %."""
 
 MULTIPLE = 8
 """Most equal modes: two planes of bending times equal spans between seats."""
@@ -61,7 +61,6 @@ def reduce_model(
     *,
     modes: int | None = None,
     max_frequency: Quantity = None,
-    internal: int | None = None,
     method: str = "craig-bampton",
     name: str | None = None,
     preload: Any = None,
@@ -77,13 +76,12 @@ def reduce_model(
     interfaces : iterable of str or Interface, optional
         Where the body is joined and loaded; default: its seats.
     modes : int, optional
-        How many shapes are kept, the slowest; default: all of the reduction below ``max_frequency``. Of a shaft one
-        less where the last would be one half of a bending pair, for the shaft would get an axis of preference; a
-        warning says so.
+        How many vibration shapes, the slowest, are kept beside the static ones, which always are: modes with held
+        interfaces, or of the free body; default 20, or all below ``max_frequency``. The body has up to 6 (seats - 1)
+        modes more. Of a shaft one more where the last would be one half of a bending pair, for the shaft would get
+        an axis of preference.
     max_frequency : float or str, optional
-        Shapes above are left out, Hz.
-    internal : int, optional
-        How many modes with held interfaces (or of the free body) the reduction starts from; default: ``modes``, or 20.
+        Vibration shapes above are left out, Hz: take 1.5 to 2 times the highest frequency that matters.
     method : {"craig-bampton", "free"}
     name : str, optional
         Default: that of the model.
@@ -112,18 +110,24 @@ def reduce_model(
         warnings.warn(f"{model.name}: {'; '.join(doubts)}", stacklevel=3)
     k = sp.csc_array(parts.expand.T @ model.stiffness @ parts.expand)
     m = sp.csc_array(parts.expand.T @ model.mass @ parts.expand)
-    count = internal if internal is not None else modes if modes is not None else 20
     rigid = _rigid_of(model, parts)
+    found_values, vibrating = _vibrations(k, m, rigid, parts, method, modes, limit)
+    if modes is not None and found_values.size < modes and limit is None:
+        raise FlexibleError(
+            f"{model.name}: modes = {modes}, but beside its static shapes the model has {found_values.size}; "
+            "ask for no more"
+        )
     static = None
     if method == "free":
-        basis = np.hstack([free_modes(k, m, rigid, count)[1], attachment_modes(k, m, rigid, parts.constraints)])
+        basis = np.hstack([vibrating, attachment_modes(k, m, rigid, parts.constraints)])
     else:
-        held_values, held = held_modes(k, m, parts.constraints, count + MULTIPLE)
-        while count < held_values.size and _same(held_values, count):
-            count += 1
-        held = held[:, :count]
         static = constraint_modes(k, parts.constraints)
-        basis = np.hstack([static, held])
+        basis = np.hstack([static, vibrating])
+    if basis.shape[1] == 0:
+        raise FlexibleError(
+            f"{model.name}: without interfaces there are no static shapes, and no mode of the free body is below "
+            f"max_frequency = {limit} Hz; raise it"
+        )
     values, shapes = orthonormal(k, m, basis, rigid)
     if preload is not None:
         full = parts.expand @ shapes
@@ -134,36 +138,12 @@ def reduce_model(
     if model.slices is not None:
         shapes = _in_planes(model, parts, values, shapes)
     shapes = _signed(parts, shapes)
-    keep = np.arange(values.size)
-    if limit is not None:
-        keep = keep[np.sqrt(values) <= 2 * np.pi * limit]
-    if modes is not None:
-        if keep.size < modes and limit is None:
-            raise FlexibleError(
-                f"{model.name}: modes = {modes}, but the reduction has {keep.size}; ask for more internal modes"
-            )
-        whole = _whole(values, modes) if model.slices is not None else modes
-        if whole < modes <= keep.size:
-            warnings.warn(
-                f"{model.name}: {whole} modes are kept instead of {modes}, whose last is one half of a bending pair",
-                stacklevel=3,
-            )
-        keep = keep[:whole]
     exact = {} if preload is not None else static_flexibility(k, m, rigid, parts, static)
-    if keep.size == 0:
-        raise FlexibleError(
-            f"{model.name}: no mode is below max_frequency = {limit} Hz; "
-            f"the first has {np.sqrt(values[0]) / 2 / np.pi:.6g} Hz"
-        )
-    frequencies = np.sqrt(values[keep]) / (2 * np.pi)
-    found = as_modal_model(model, parts, properties, frequencies, shapes[:, keep], name or model.name)
+    frequencies = np.sqrt(values) / (2 * np.pi)
+    found = as_modal_model(model, parts, properties, frequencies, shapes, name or model.name)
     seats = {key: replace(seat, flexibility=exact.get(key)) for key, seat in found.seats.items()}
     found = replace(found, seats=seats)
-    return (
-        found
-        if spin_stiffness is None
-        else _stiffened(found, parts.expand @ shapes[:, keep], spin_stiffness, long_axis)
-    )
+    return found if spin_stiffness is None else _stiffened(found, parts.expand @ shapes, spin_stiffness, long_axis)
 
 
 def _stiffened(found: ModalModel, full: np.ndarray, spin_stiffness: Any, axis: int) -> ModalModel:
@@ -185,12 +165,31 @@ def _signed(parts: Resolved, shapes: np.ndarray) -> np.ndarray:
     return shapes * np.sign(full[largest, np.arange(full.shape[1])])
 
 
-def _whole(values: np.ndarray, count: int) -> int:
-    """Return how many values, ``count`` at most, can be kept without parting equal ones."""
-    kept = min(count, values.size)
-    while 0 < kept < values.size and _same(values, kept):
-        kept -= 1
-    return kept or count
+def _vibrations(
+    k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, parts: Resolved, method: str, modes: int | None,
+    limit: float | None,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return squared circular frequencies and shapes with held interfaces, or of the free body: see `reduce_model`.
+
+    The spaces of more modes hold those of fewer, so that by Rayleigh's quotient no frequency of the body gets worse
+    with their number.
+    """
+    count = modes if modes is not None else USUAL
+    while True:
+        if method == "free":
+            values, shapes = free_modes(k, m, rigid, count + MULTIPLE)
+        else:
+            values, shapes = held_modes(k, m, parts.constraints, count + MULTIPLE)
+        complete = values.size < count + MULTIPLE
+        below = values.size if limit is None else int(np.sum(np.sqrt(values) <= 2 * np.pi * limit))
+        if modes is not None or limit is None or below < values.size or complete:
+            break
+        count *= 2
+    if limit is None or modes is not None:
+        below = min(below, count)
+    while 0 < below < values.size and _same(values, below):
+        below += 1
+    return values[:below], shapes[:, :below]
 
 
 def _same(values: np.ndarray, k: int) -> bool:

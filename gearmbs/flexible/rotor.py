@@ -146,16 +146,23 @@ class UnbalanceResponse:
         Along the shaft, m.
     displacements : ndarray, shape (s, stations, 6)
         Complex amplitudes of exp(i speed t): the real part is the motion.
+    shaft : Shaft
     """
 
     speeds: np.ndarray
     positions: np.ndarray
     displacements: np.ndarray
+    shaft: Shaft
 
-    def major_axis(self, at: float) -> np.ndarray:
-        """Return the largest radial displacement of the station nearest to ``at`` over the speeds, m."""
-        k = int(np.argmin(np.abs(self.positions - at)))
-        x, y = self.displacements[:, k, 0], self.displacements[:, k, 1]
+    def at(self, position: Quantity) -> np.ndarray:
+        """Return the complex displacements and rotations of the section at a place, m, over the speeds: (s, 6)."""
+        places, moved, turned = self.shaft.section_motion(quantity(position, "length", "position"))
+        ends = self.displacements.reshape(len(self.speeds), -1)[:, places]
+        return np.asarray(ends @ np.vstack([moved, turned]).T)
+
+    def major_axis(self, at: Quantity) -> np.ndarray:
+        """Return the largest radial displacement at a place along the shaft over the speeds, m."""
+        x, y = self.at(at)[:, :2].T
         return 0.5 * (np.abs(x - 1j * y) + np.abs(x + 1j * y))
 
 
@@ -248,17 +255,24 @@ class Rotor:
         )
 
     def critical_speeds(self, count: int = 6, order: float = 1.0) -> np.ndarray:
-        """Return the speeds at which a natural frequency is ``order`` times the speed, rad/s, without damping.
+        """Return the speeds at which a natural frequency is ``order`` times the speed, rad/s.
 
-        With q exp(i order W t) they are eigenvalues: K q = W^2 (order^2 M - i order G) q.
+        With q exp(i order W t) they are eigenvalues: K q = W^2 (order^2 M - i order G) q. Damping does not shift them,
+        but motions that it lets not oscillate are left out: those whose damping ratio q* C q / (2 order W q* M q) is 1
+        or more.
         """
-        m, _, g, k, _, _ = self._matrices
-        values = scipy.linalg.eigvals(np.linalg.solve(k, order**2 * m - 1j * order * g))
-        real = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values)) & (values.real > 0.0)]
-        both = np.sort(1.0 / np.sqrt(real[real > 1e-12 * real.max()]))
-        return both[:count]
+        m, c, g, k, _, _ = self._matrices
+        values, vectors = scipy.linalg.eig(np.linalg.solve(k, order**2 * m - 1j * order * g))
+        whirls = (np.abs(values.imag) < 1e-6 * np.abs(values)) & (values.real > 0.0)
+        real, shapes = values.real[whirls], vectors[:, whirls]
+        there = real > 1e-12 * real.max(initial=0.0)
+        speeds, shapes = 1.0 / np.sqrt(real[there]), shapes[:, there]
+        lost, held = (np.einsum("ia,ij,ja->a", shapes.conj(), matrix, shapes).real for matrix in (c, m))
+        return np.sort(speeds[lost < 2.0 * order * speeds * held])[:count]
 
-    def unbalance_response(self, speeds: Sequence[Quantity], unbalance: Mapping[float, complex]) -> UnbalanceResponse:
+    def unbalance_response(
+        self, speeds: Sequence[Quantity], unbalance: Mapping[Quantity, complex]
+    ) -> UnbalanceResponse:
         """Return the steady response to unbalanced masses.
 
         Parameters
@@ -267,19 +281,22 @@ class Rotor:
             rad/s or text.
         unbalance : mapping of float to complex
             Mass times eccentricity, kg m, by position along the shaft, m; a complex number has its angle at time 0.
+            Between stations its force is shared by the functions of the element, the same that its mass matrix has.
+
+        Raises
+        ------
+        FlexibleError
+            For a place off the shaft.
         """
         values = np.array([quantity(s, "angular speed", "speeds") for s in speeds])
         m, c, g, k, rows, z = self._matrices
         load = np.zeros(DOFS * z.size, dtype=complex)
         for at, size in unbalance.items():
-            if not -1e-9 <= at <= self.shaft.length * (1 + 1e-9):
-                raise FlexibleError(f"unbalance at {at} m: the shaft reaches from 0 to {self.shaft.length:g} m")
-            node = int(np.argmin(np.abs(z - at)))
-            load[DOFS * node] += size
-            load[DOFS * node + 1] += -1j * size
+            places, moved, _ = self.shaft.section_motion(quantity(at, "length", "unbalance"), "unbalance")
+            load[places] += size * (moved[0] - 1j * moved[1])
         load = load[rows]
         found = [np.linalg.solve(k + 1j * w * (c + w * g) - w**2 * m, w**2 * load) for w in values]
-        return UnbalanceResponse(values, z, self._at_stations(np.array(found)))
+        return UnbalanceResponse(values, z, self._at_stations(np.array(found)), self.shaft)
 
     def _at_stations(self, vectors: np.ndarray) -> np.ndarray:
         """Return vectors of the degrees of freedom in use by station and direction."""

@@ -211,6 +211,39 @@ class Shaft(Written):
         outer, inner = _diameters(section, 0.5 * (a + b) - start)
         return BeamSection.ring(section.material or self.material, outer, inner, self.shear)
 
+    def section_motion(self, at: float, what: str = "section") -> tuple[slice, np.ndarray, np.ndarray]:
+        """Return which degrees of freedom move the section at a place, and how, by the element's own functions.
+
+        Parameters
+        ----------
+        at : float
+            m.
+        what : str
+            What is there, for messages.
+
+        Returns
+        -------
+        places : slice
+            Twelve of the degrees of freedom of `model`.
+        moved, turned : ndarray, shape (3, 12)
+            Displacement of its middle, and rotation.
+
+        Raises
+        ------
+        FlexibleError
+            Off the shaft.
+        """
+        if not -1e-9 * self.length <= at <= self.length * (1 + 1e-9):
+            raise FlexibleError(
+                f"shaft '{self.name}': {what} at {at} m is off the shaft, which reaches from 0 to {self.length:g} m"
+            )
+        z = self.stations()
+        k = int(np.clip(np.searchsorted(z, at) - 1, 0, z.size - 2))
+        length = z[k + 1] - z[k]
+        x = np.clip((at - z[k]) / length, 0.0, 1.0)
+        moved, turned = section_shapes(x, length, self.element_section(z[k], z[k + 1]))
+        return slice(DOFS * k, DOFS * (k + 2)), moved[0], turned[0]
+
     def outline(self) -> np.ndarray:
         """Return the outline with the discs, rows of z and radius, m; steps have two rows at one place."""
         ends = np.concatenate([[0.0], np.cumsum([s.length for s in self.sections])])
@@ -299,9 +332,10 @@ class Shaft(Written):
         Parameters
         ----------
         modes : int, optional
-            How many modes are kept, the slowest; default: all that the reduction has up to ``max_frequency``.
+            How many shapes with held seats, the slowest, are kept beside the static ones; default 20, or all below
+            ``max_frequency``. See :func:`reduce_model`.
         max_frequency : float or str, optional
-            Modes above are left out, Hz.
+            Shapes with held seats above are left out, Hz.
         seats : sequence of str, optional
             Which seats are interfaces; default: all.
         spin : str or float, optional

@@ -41,7 +41,7 @@ def campbell(
         those that do; a mechanism, whose modes are those of its initial position and speeds, or the result of
         `linear_modes`, or one for each speed; or a function of the speed in rad/s that returns any of them, as whirl
         needs. Modes are followed from speed
-        to speed in the order of their frequencies; rigid motions are left out.
+        to speed in the order of their frequencies. Rigid motions, and what is damped beyond the critical, are left out.
     speeds : sequence
         Increasing, rad/s or texts such as "1500 rpm"; two or more.
     orders : sequence of float, or mapping of name to float
@@ -79,7 +79,8 @@ def campbell(
     kept = kept if count is None else kept[:count]
     if not kept.size:
         raise SignalError(
-            "modes: no mode oscillates within the range; rigid motions have no place in a Campbell diagram"
+            "modes: no mode oscillates within the range; rigid motions, and what is damped beyond the critical, "
+            "have no place in a Campbell diagram"
         )
     frequency = frequency[:, kept]
     excitation = omega[:, None] * multiples[None, :] / TURN
@@ -153,12 +154,10 @@ def _frequencies(modes: Any, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray 
         modes = [modes] * omega.size
     rows = list(modes)
     if rows and all(hasattr(row, "frequencies") for row in rows):
-        order = [np.argsort(row.frequencies, kind="stable") for row in rows]
+        order = _followed([_natural(row) for row in rows])
         damped = all(hasattr(row, "damping_ratios") for row in rows)
-        frequency = _padded([np.asarray(row.frequencies, dtype=float)[k] for row, k in zip(rows, order)])
-        damping = (
-            _padded([np.asarray(r.damping_ratios, dtype=float)[k] for r, k in zip(rows, order)]) if damped else None
-        )
+        frequency = _picked([np.asarray(row.frequencies, dtype=float) for row in rows], order)
+        damping = _picked([np.asarray(r.damping_ratios, dtype=float) for r in rows], order) if damped else None
     else:
         try:
             frequency, damping = np.asarray(rows, dtype=float), None
@@ -201,9 +200,50 @@ def _modes_of(thing: Any) -> Any:
     return thing.linear_modes() if callable(getattr(thing, "linear_modes", None)) else thing
 
 
-def _padded(rows: list[np.ndarray]) -> np.ndarray:
-    width = max(row.size for row in rows)
-    return np.stack([np.pad(row, (0, width - row.size), constant_values=np.nan) for row in rows])
+def _natural(row: Any) -> np.ndarray:
+    """Return the frequencies of what oscillates, NaN elsewhere: what is damped beyond the critical has none."""
+    frequency = np.asarray(row.frequencies, dtype=float)
+    if hasattr(row, "damping_ratios"):
+        frequency = np.where(np.abs(np.asarray(row.damping_ratios, dtype=float)) < 1.0, frequency, np.nan)
+    return np.where(frequency > LOWEST, frequency, np.nan)
+
+
+def _followed(rows: list[np.ndarray]) -> list[np.ndarray]:
+    """Return, for each speed, which entry each mode is, -1 where it does not oscillate.
+
+    In the order of frequencies while there are as many; where a motion begins or ceases to oscillate, modes are those
+    whose frequencies changed least.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    places: list[np.ndarray] = []
+    last = np.zeros(0)
+    for row in rows:
+        here = np.argsort(row, kind="stable")[: int(np.isfinite(row).sum())]
+        alive = np.flatnonzero(np.isfinite(last))
+        found = np.full(last.size, -1)
+        if here.size == alive.size:
+            found[alive[np.argsort(last[alive], kind="stable")]] = here
+            new = here[:0]
+        else:
+            kept, taken = linear_sum_assignment(np.abs(np.log(last[alive])[:, None] - np.log(row[here])))
+            found[alive[kept]] = here[taken]
+            new = np.delete(here, taken)
+        found = np.concatenate([found, new]).astype(int)
+        last = np.where(found >= 0, row[found], np.nan) if found.size else last
+        places.append(found)
+    # by the frequency at the first speed where there is one
+    width = places[-1].size
+    whole = [np.pad(p, (0, width - p.size), constant_values=-1) for p in places]
+    first = [next(row[p[j]] for row, p in zip(rows, whole) if p[j] >= 0) for j in range(width)]
+    order = np.argsort(first, kind="stable")
+    return [p[order] for p in whole]
+
+
+def _picked(rows: list[np.ndarray], order: list[np.ndarray]) -> np.ndarray:
+    if not order[0].size:
+        return np.full((len(rows), 1), np.nan)
+    return np.stack([np.where(k >= 0, row[k], np.nan) if row.size else k * np.nan for row, k in zip(rows, order)])
 
 
 def _crossings(omega: np.ndarray, frequency: np.ndarray, multiples: np.ndarray, maximum: float | None) -> np.ndarray:

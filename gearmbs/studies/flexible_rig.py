@@ -21,7 +21,7 @@ def flexible_rig(
     shaft_radius: Quantity = 0.015,
     shaft_length: Quantity = 0.200,
     material: ElasticMaterial | None = None,
-    modes: int = 16,
+    modes: int = 4,
     damping: Damping = ((1000.0, 0.01), (5000.0, 0.05), (20000.0, 0.3), (float("inf"), 1.0)),
     coupling: str = "full",
 ) -> Mechanism:
@@ -38,7 +38,7 @@ def flexible_rig(
     material : ElasticMaterial, optional
         Of the shafts; default: steel.
     modes : int
-        Of each shaft.
+        Shapes of each shaft with held seats, beside the 12 static ones of its three seats.
     damping : float, sequence or bands
         See :func:`gearmbs.flexible.damping_ratios`.
     coupling : {"full", "partial", "constant", "rigid"}

@@ -70,7 +70,8 @@ class GearboxStudy:
             "| mode | Hz | damping ratio |",
             "|---|---|---|",
         ]
-        told = zip(self.modes.frequencies, self.modes.damping_ratios, strict=True)
+        modes = self.modes.oscillating
+        told = zip(self.modes.frequencies[modes], self.modes.damping_ratios[modes], strict=True)
         for k, (f, zeta) in enumerate((pair for pair in told if 0.1 < pair[0] < HIGHEST), 1):
             lines.append(f"| {k} | {f:.5g} | {zeta:.3g} |")
         lines += ["", "## Critical speeds of the motor, from half of the operating speed on", "",

@@ -40,7 +40,7 @@ def again(m, path):
 
 @pytest.mark.parametrize("coupling", ["full", "partial", "constant"])
 def test_a_body_of_a_neutral_file_moves_as_before(tmp_path, coupling):
-    write_mnf(tmp_path / "a.mnf", mnf_of(SHAFT.modal_model(6)))
+    write_mnf(tmp_path / "a.mnf", mnf_of(SHAFT.modal_model().slowest(6)))
     m, _ = running(read_mnf(tmp_path / "a.mnf").modal_model("shaft"), coupling)
     expected = m.simulate(END, t_eval=np.linspace(0, END, STEPS + 1), tol=1e-9)
     found = again(m, tmp_path / "deck.adm")
@@ -56,7 +56,7 @@ def test_markers_off_the_nodes_become_nodes_without_mass(tmp_path):
     errors = []
     for elements in (12, 24):
         shaft = Shaft([ShaftSection(0.6, 0.02)], seats={"A": 0.0, "B": 0.6}, elements=elements, name="shaft")
-        m, body = running(shaft.modal_model(6), "full")
+        m, body = running(shaft.modal_model().slowest(6), "full")
         edge = body.marker((0.01, 0.0, 0.26), name="edge")
         m.load("pull", edge, m.ground.marker((0.1, 0.2, 0.26)), rm=m.ground.marker(), fx="200*SIN(1000*TIME)")
         expected = m.simulate(END, t_eval=np.linspace(0, END, STEPS + 1), tol=1e-9)
@@ -73,7 +73,7 @@ def test_markers_off_the_nodes_become_nodes_without_mass(tmp_path):
 
 def test_a_body_without_markers_gets_one_in_the_deck_alone(tmp_path):
     m = Mechanism("free")
-    body = SHAFT.modal_model(6).add_to(m, "shaft", damping=0.01, angular_velocity=(0.0, 2.0, 0.0))
+    body = SHAFT.modal_model().slowest(6).add_to(m, "shaft", damping=0.01, angular_velocity=(0.0, 2.0, 0.0))
     spun = again(m, tmp_path / "deck.adm")
     assert not body.markers
     np.testing.assert_allclose(spun.angular_velocity(spun.system.body_names[0])[0], [0.0, 2.0, 0.0], atol=1e-12)
@@ -88,16 +88,18 @@ def test_damping_of_each_mode_is_an_expression():
 
 
 def test_what_no_neutral_file_holds_is_named(tmp_path):
-    m, body = running(SHAFT.modal_model(6), "full")
+    m, body = running(SHAFT.modal_model().slowest(6), "full")
     with pytest.raises(ModelError, match="stands beside the deck; give the deck's path"):
         write_deck(m)
-    m.load("back", m.ground.marker(), body.marker(SHAFT.modal_model(6).place("A")), rm=m.ground.marker(), fx="1")
+    m.load(
+        "back", m.ground.marker(), body.marker(SHAFT.modal_model().slowest(6).place("A")), rm=m.ground.marker(), fx="1"
+    )
     with pytest.raises(ModelError, match="body 'shaft': a force needs a floating marker on it, and it deforms"):
         write_deck(m, tmp_path / "deck.adm")
-    m, body = running(SHAFT.modal_model(6), "full")
+    m, body = running(SHAFT.modal_model().slowest(6), "full")
     add_modal_force(m, "wind", body, np.eye(12)[6], "1")
     with pytest.raises(ModelError, match="has shapes of its own, as those of modal forces"):
         write_deck(m, tmp_path / "deck.adm")
-    spun, _ = running(SHAFT.modal_model(6, spin="A"), "full")
+    spun, _ = running(SHAFT.modal_model(spin="A").slowest(6), "full")
     with pytest.raises(ModelError, match="no stiffening by spin"):
         write_deck(spun, tmp_path / "deck.adm")

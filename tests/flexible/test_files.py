@@ -39,7 +39,7 @@ def bar():
 
 def rotating_bar_file(folder: Path) -> Path:
     path = folder / "bar.mnf"
-    write_mnf(path, mnf_of(reduce_model(bar(), modes=8)))
+    write_mnf(path, mnf_of(reduce_model(bar()).slowest(8)))
     return path
 
 
@@ -47,7 +47,7 @@ def rotating_bar_file(folder: Path) -> Path:
 
 
 def test_a_written_file_is_read_as_it_was(tmp_path):
-    model = reduce_model(bar(), modes=8)
+    model = reduce_model(bar()).slowest(8)
     path = rotating_bar_file(tmp_path)
     found = read_mnf(path)
     assert list(found.interfaces) == [1, 5]
@@ -413,6 +413,6 @@ def test_public_rotor_of_abaqus():
     np.testing.assert_allclose(report.frequencies[6:], expected, atol=6e-4)
     z = model.positions[:, 2]
     faces = [Interface(f"end {k}", model.ids[np.abs(z - e) < 1e-6]) for k, e in enumerate((z.min(), z.max()))]
-    found = check_reduction(model, reduce_model(model, faces, internal=8), faces)
+    found = check_reduction(model, reduce_model(model, faces, modes=8), faces)
     np.testing.assert_allclose(found.exact[:4], [104.6626, 104.6626, 187.8241, 212.5661], atol=1e-4)
     np.testing.assert_allclose(found.errors[0], 0.0058, atol=5e-5)

@@ -225,7 +225,7 @@ def spun_modes(spin, coupling="full"):
     material = ElasticMaterial(2.8e7 / area, 0.0, 1.2 / area)
     shaft = Shaft([ShaftSection(10.0, diameter)], seats={"root": 0.0, "tip": 10.0}, material=material, elements=12)
     stiffening = None if spin is None else shaft.spin_stiffness(spin)
-    model = reduce_model(shaft.model(), internal=4, spin_stiffness=stiffening)
+    model = reduce_model(shaft.model(), modes=4, spin_stiffness=stiffening)
     m = Mechanism("spin-up")
     body = model.add_to(m, "b", orientation=[[0, 0, 1], [1, 0, 0], [0, 1, 0]], damping=0.05, coupling=coupling)
     root = body.marker(model.place("root"), [[0, 1, 0], [0, 0, 1], [1, 0, 0]], name="root")
@@ -268,7 +268,7 @@ def test_modes_and_beams_agree_in_small_motion():
         return supported(m, [("A", bar.first, 0.0), ("B", bar.last, length)])
 
     shaft = Shaft([ShaftSection(length, diameter)], seats={"A": 0.0, "B": length}, elements=48)
-    model = reduce_model(shaft.model(), internal=40)
+    model = reduce_model(shaft.model(), modes=40)
     m = Mechanism("modes")
     body = model.add_to(m, damping=0.0)
     modal = supported(m, [(key, body.marker(model.place(key)), z) for key, z in (("A", 0.0), ("B", length))])
@@ -286,14 +286,14 @@ def test_a_preload_raises_the_frequencies_as_a_string():
     for k in range(10):
         part = geometric_stiffness(z[k + 1] - z[k], shaft.element_section(z[k], z[k + 1]), GAUSS_X, tension * GAUSS_W)
         matrix[6 * k : 6 * k + 12, 6 * k : 6 * k + 12] += part
-    plain, pulled = (reduce_model(model, internal=8, preload=p) for p in (None, matrix))
+    plain, pulled = (reduce_model(model, modes=8, preload=p) for p in (None, matrix))
     bending = plain.moved[0]
     slope = np.gradient(np.linalg.norm(bending, axis=1) * np.sign(bending.sum(axis=1)), z)
     shift = tension * np.trapezoid(slope**2, z)
     change = (2 * np.pi) ** 2 * (pulled.frequencies[0] ** 2 - plain.frequencies[0] ** 2)
     np.testing.assert_allclose(change, shift, rtol=0.1)
     with pytest.raises(FlexibleError, match="buckle"):
-        reduce_model(model, internal=8, preload=-100 * matrix)
+        reduce_model(model, modes=8, preload=-100 * matrix)
 
 
 @pytest.mark.parametrize(
@@ -322,7 +322,7 @@ def falling_rod(stiffness, elements=0):
         tip = bar.last
     else:
         shaft = Shaft([ShaftSection(1.0, 0.008)], seats={"pin": 0.0, "tip": 1.0}, material=material, elements=16)
-        model = reduce_model(shaft.model(), modes=6, internal=12)
+        model = reduce_model(shaft.model(), modes=6)
         bands = [(200.0, 0.0), (2000.0, 0.05), (np.inf, 0.5)]
         body = model.add_to(m, "b", orientation=[[0, 0, 1], [1, 0, 0], [0, 1, 0]], damping=bands)
         root = body.marker(model.place("pin"), [[0, 1, 0], [0, 0, 1], [1, 0, 0]], name="root")

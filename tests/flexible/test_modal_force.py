@@ -10,7 +10,7 @@ from gearmbs.mechanism.forces.modal_force import frame_marker
 
 @pytest.fixture(scope="module")
 def bar():
-    return Shaft([ShaftSection(0.4, 0.01)], seats={"A": 0.0, "B": 0.4}).modal_model(4)
+    return Shaft([ShaftSection(0.4, 0.01)], seats={"A": 0.0, "B": 0.4}).modal_model().slowest(4)
 
 
 def test_a_constant_force_on_the_modes_of_a_free_body(bar):

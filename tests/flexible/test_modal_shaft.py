@@ -30,7 +30,7 @@ def shaft(elements: int = 12) -> Shaft:
 
 def test_reduction_is_that_of_a_free_body():
     model = shaft().model()
-    reduced = reduce_model(model, modes=10, internal=40)
+    reduced = reduce_model(model, modes=40).slowest(10)
     n = reduced.modes
     exact = np.sqrt(np.maximum(scipy.linalg.eigh(model.stiffness.toarray(), model.mass.toarray())[0], 0))[6 : 6 + n]
     np.testing.assert_allclose(reduced.frequencies, exact / (2 * np.pi), rtol=3e-5)
@@ -46,7 +46,7 @@ def test_bending_pairs_stay_whole():
     for count in range(4, 12):
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
-            frequencies = shaft().modal_model(count).frequencies
+            frequencies = shaft().modal_model().slowest(count).frequencies
         assert frequencies.size in (count, count - 1)
         assert len(said) == count - frequencies.size
         assert all("modes are kept instead of" in str(one.message) for one in said)
@@ -59,7 +59,7 @@ def test_equal_spans_do_not_part_pairs_either():
     """Held modes of two equal spans come in fours."""
     even = Shaft([ShaftSection(0.2, 0.03)], [Disc(0.1, outer=0.1, width=0.02)], {"A": 0.0, "W": 0.1, "B": 0.2})
     for count in (5, 6, 7, 8):
-        frequencies = even.modal_model(count).frequencies
+        frequencies = even.modal_model().slowest(count).frequencies
         single = [f for f in frequencies if np.sum(np.abs(frequencies / f - 1) < 1e-7) != 2]
         assert len(single) <= 2
 
@@ -69,7 +69,7 @@ def test_integrals_of_the_turning_frame_give_the_whirl_seen_from_rest(speed):
     """In a frame that turns with the shaft w -+ speed, by Coriolis and centrifugal terms of the integrals only."""
     rotor = Rotor(shaft(), [Support("A", 1e6), Support("B", 1e6)])
     expected = rotor.modes(speed, 5).frequencies
-    model = reduce_model(shaft().model(), internal=60)
+    model = reduce_model(shaft().model(), modes=60)
     p, i = model.properties, model.integrals
     own = i.about_centre_of_mass(p.mass)
     n, z = model.modes, np.array([0, 0, 1.0])
@@ -127,7 +127,7 @@ def test_wrong_damping_is_refused(damping):
 def test_markers_between_the_stations_and_off_the_axis_follow_the_section():
     """Cantilever held at the left end, loaded at the right: the line w = F (3 l z^2 - z^3) / 6 E I at any point."""
     slim = Shaft([ShaftSection(1.0, 0.01)], seats={"A": 0.0, "B": 1.0}, elements=10)
-    model = reduce_model(slim.model(), internal=6)
+    model = reduce_model(slim.model(), modes=6)
     m = Mechanism("cantilever")
     body = model.add_to(m, damping=0.0)
     m.fixed("clamp", body.marker(model.place("A")), m.ground.marker())
@@ -150,7 +150,7 @@ def test_markers_between_the_stations_and_off_the_axis_follow_the_section():
 def test_modes_of_the_mechanism_are_those_of_the_rotor():
     """At rest, on springs: linear modes of the modal body against all degrees of freedom."""
     rotor = Rotor(shaft(), [Support("A", 1e6), Support("B", 1e6)])
-    model = reduce_model(shaft().model(), internal=30)
+    model = reduce_model(shaft().model(), modes=30)
     m = Mechanism("rotor")
     body = model.add_to(m, damping=0.0)
     for seat in ("A", "B"):
@@ -163,7 +163,7 @@ def test_modes_of_the_mechanism_are_those_of_the_rotor():
 
 
 def test_coupling_levels_and_integrals():
-    i = shaft().modal_model(6).integrals
+    i = shaft().modal_model().slowest(6).integrals
     assert np.any(i.coupled("full").second)
     assert not np.any(i.coupled("partial").second)
     assert not np.any(i.coupled("constant").first)
@@ -174,7 +174,7 @@ def test_coupling_levels_and_integrals():
 
 
 def test_modes_are_selected_by_what_they_give_to_the_seats():
-    model = reduce_model(shaft().model(), internal=20)
+    model = reduce_model(shaft().model(), modes=20)
     share = model.participation()
     assert np.all((share >= 0) & (share <= 1))
     kept = model.by_participation(1e-3)
@@ -198,7 +198,7 @@ def test_steps_are_those_of_the_whole_matrix(torque, monkeypatch):
     """
     from gearmbs.dae.integrators import driver
 
-    bar = Shaft([ShaftSection(0.4, 0.01)], seats={"A": 0.0, "B": 0.4}).modal_model(4)
+    bar = Shaft([ShaftSection(0.4, 0.01)], seats={"A": 0.0, "B": 0.4}).modal_model().slowest(4)
 
     def steps(tol: float) -> int:
         m = Mechanism("free")
@@ -215,6 +215,6 @@ def test_steps_are_those_of_the_whole_matrix(torque, monkeypatch):
 
 
 def test_an_unknown_level_of_coupling_is_refused_with_all_that_there_are():
-    model = Shaft([ShaftSection(1.0, 0.05)], seats={"A": 0.0, "B": 1.0}).modal_model(4)
+    model = Shaft([ShaftSection(1.0, 0.05)], seats={"A": 0.0, "B": 1.0}).modal_model().slowest(4)
     with pytest.raises(FlexibleError, match=r"coupling = 'half'; choose one of full, partial, constant, rigid"):
         model.add_to(Mechanism("m"), coupling="half")

@@ -2,18 +2,24 @@
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from gearmbs.flexible import (
+    Disc,
     ElasticMaterial,
     FlexibleError,
     Interface,
     Shaft,
     ShaftSection,
+    block_mesh,
     check_reduction,
     from_matrices,
+    nodes_where,
     reduce_model,
+    solid_model,
 )
 from gearmbs.flexible.integrals import of_lumps, of_mass_matrix
+from gearmbs.flexible.interfaces import resolve
 from gearmbs.mechanism import Mechanism, ShapeIntegrals, static_equilibrium
 from tests.flexible.test_files import cube
 
@@ -44,7 +50,7 @@ def ends(kind):
 def test_reductions_converge_from_above_and_keep_static_flexibility(kind, method):
     model, errors = tower(), []
     for internal in (2, 10, 30):
-        report = check_reduction(model, reduce_model(model, ends(kind), internal=internal, method=method), ends(kind))
+        report = check_reduction(model, reduce_model(model, ends(kind), modes=internal, method=method), ends(kind))
         assert np.all(report.errors[:4] > -1e-8)
         assert all(-1e-9 < share < (1e-9 if method == "free" else 0.7) for share in report.flexibility.values())
         assert all(-1e-9 < share < (1e-9 if method == "free" else 0.7) for share in report.turning.values())
@@ -63,7 +69,8 @@ def test_slow_modes_lack_flexibility_under_torques():
     exact = 7850.0 * area * 9.81 / (320 * bending)
     sag = {}
     for modes in (8, None):
-        model = shaft.modal_model(modes)
+        model = shaft.modal_model()
+        model = model.slowest(modes) if modes else model
         m = Mechanism("bar", gravity=(0, -9.81, 0))
         body = model.add_to(m)
         m.spherical("pin", body.marker(model.place("pinned")), m.ground.marker())
@@ -87,7 +94,7 @@ def test_rigid_faces_stiffen_and_averages_do_not():
     model = tower()
     free = reduce_model(model, [], modes=4, method="free").frequencies
     rigid, average = (
-        check_reduction(model, reduce_model(model, ends(kind), internal=10), ends(kind)).exact[:4]
+        check_reduction(model, reduce_model(model, ends(kind), modes=10), ends(kind)).exact[:4]
         for kind in ("rigid", "average")
     )
     np.testing.assert_allclose(average, free, rtol=1e-9)
@@ -97,7 +104,7 @@ def test_rigid_faces_stiffen_and_averages_do_not():
 
 def test_average_follows_rigid_motion_and_shares_loads():
     model = tower()
-    reduced = reduce_model(model, ends("average"), internal=8)
+    reduced = reduce_model(model, ends("average"), modes=8)
     seat = reduced.seats["head"]
     nodes = [20, 21, 22, 23]
     np.testing.assert_allclose(seat.moved, reduced.moved[:, nodes].mean(axis=1), atol=1e-9)
@@ -122,8 +129,8 @@ def test_lumped_integrals_of_a_shaft_are_near_those_of_its_slices():
     shaft = Shaft([ShaftSection(1.0, 0.05)], seats={"A": 0.0, "B": 1.0}, elements=40).model()
     from dataclasses import replace
 
-    exact = reduce_model(shaft, internal=6)
-    lumped = reduce_model(replace(shaft, slices=None), internal=6)
+    exact = reduce_model(shaft, modes=6)
+    lumped = reduce_model(replace(shaft, slices=None), modes=6)
     np.testing.assert_allclose(lumped.frequencies, exact.frequencies, rtol=1e-9)
     for a, b in zip(exact.frequencies[:4], range(4)):
         del a
@@ -137,11 +144,11 @@ def test_sparse_and_dense_solvers_agree():
 
     model = tower(9)
     faces = [Interface("foot", [1, 2, 3, 4]), Interface("head", [33, 34, 35, 36], "average")]
-    dense = reduce_model(model, faces, internal=6).frequencies
+    dense = reduce_model(model, faces, modes=6).frequencies
     before = reduction.DENSE
     try:
         reduction.DENSE = 10
-        sparse = reduce_model(model, faces, internal=6).frequencies
+        sparse = reduce_model(model, faces, modes=6).frequencies
     finally:
         reduction.DENSE = before
     np.testing.assert_allclose(sparse, dense, rtol=1e-8)
@@ -161,9 +168,9 @@ def test_sparse_and_dense_solvers_agree():
         (lambda: reduce_model(tower(), []), "needs interfaces"),
         (lambda: reduce_model(tower(), ends("rigid"), modes=0), "needs one at least"),
         (lambda: reduce_model(tower(), ends("rigid"), method="guess"), "choose one of craig-bampton, free"),
-        (lambda: reduce_model(tower(), ends("rigid"), modes=500, internal=3), "ask for more internal modes"),
-        (lambda: reduce_model(tower(), ends("rigid"), internal=4).shapes(np.array([0.3, 0.3, 0.3])), "the nearest, "),
-        (lambda: reduce_model(tower(), ends("rigid"), internal=4).place("roof"), "there is no seat 'roof'"),
+        (lambda: reduce_model(tower(), ends("rigid"), modes=500), "beside its static shapes the model has"),
+        (lambda: reduce_model(tower(), ends("rigid"), modes=4).shapes(np.array([0.3, 0.3, 0.3])), "the nearest, "),
+        (lambda: reduce_model(tower(), ends("rigid"), modes=4).place("roof"), "there is no seat 'roof'"),
     ],
 )
 def test_wrong_interfaces_are_named(make, message):
@@ -177,3 +184,59 @@ def test_mass_differs_by_direction_where_degrees_of_freedom_are_missing():
     report = check_model(tower())
     np.testing.assert_allclose(report.directional_mass, 24.0)
     assert report.massless == 0
+
+
+def rotor_body():
+    """A stepped shaft with discs and three seats."""
+    discs = [Disc(0.5, outer=0.28, width=0.07, inner=0.05), Disc(1.1, outer=0.2, width=0.05, inner=0.06)]
+    sections = [ShaftSection(0.8, 0.05), ShaftSection(0.7, 0.06)]
+    return Shaft(sections, discs, {"A": 0.1, "W": 0.6, "B": 1.4}).model(), ["A", "W", "B"]
+
+
+def plate_body():
+    """A thin plate with an averaged seat and two edges held rigid."""
+    pytest.importorskip("skfem")
+    plate = solid_model(block_mesh((0.3, 0.2, 0.01), (5, 4, 1)), quadratic=False, name="plate")
+    feet = [nodes_where(plate, lambda x, y, z, x0=x0: abs(x - x0) < 1e-9) for x0 in (0.0, 0.3)]
+    seat = nodes_where(plate, lambda x, y, z: (abs(x - 0.15) < 0.07) & (abs(y - 0.1) < 0.07))
+    return plate, [Interface("left", feet[0]), Interface("right", feet[1]), Interface("seat", seat, "average")]
+
+
+def block_body():
+    """A block as thick as wide with seats at two faces."""
+    pytest.importorskip("skfem")
+    block = solid_model(block_mesh((0.2, 0.12, 0.1), (3, 2, 2)), quadratic=False, name="block")
+    low, top = (nodes_where(block, lambda x, y, z, x0=x0: abs(x - x0) < 1e-9) for x0 in (0.0, 0.2))
+    return block, [Interface("low", low), Interface("top", top, "average")]
+
+
+@pytest.mark.parametrize(
+    ("body", "method"),
+    [(rotor_body, "craig-bampton"), (rotor_body, "free"), (plate_body, "craig-bampton"), (block_body, "craig-bampton")],
+)
+def test_more_modes_are_never_worse(body, method):
+    """The first six frequencies against all of the finite elements, from above."""
+    model, seats = body()
+    parts = resolve(model, seats)
+    k, m = ((parts.expand.T @ matrix @ parts.expand).toarray() for matrix in (model.stiffness, model.mass))
+    exact = np.sqrt(scipy.linalg.eigh(k, m, eigvals_only=True)[6:12]) / (2 * np.pi)
+    found = [reduce_model(model, seats, modes=n, method=method) for n in (1, 2, 3, 4, 6, 8, 11, 14, 16, 20, 26, 32)]
+    worst = np.array([(body.frequencies[:6] / exact - 1).max() for body in found])
+    # below 1e-7 the frequencies of the whole model are rounding
+    assert np.all(worst[1:] <= 1.05 * worst[:-1] + 1e-7), worst
+    assert worst[-1] < 0.05 * worst[0]
+
+
+def test_what_modes_counts():
+    """Shapes with held seats beside the static ones; by frequency likewise; the slowest alone only if asked for."""
+    model, seats = rotor_body()
+    static = 6 * (len(seats) - 1)
+    # the first twists the shaft, then come two planes of bending, which stay together
+    assert [reduce_model(model, seats, modes=n).modes - static for n in (1, 2, 3, 4)] == [1, 3, 3, 5]
+    sizes = [reduce_model(model, seats, max_frequency=limit).modes for limit in (1.0, 500.0, 2000.0, 2e4)]
+    assert sizes[0] == static
+    assert sizes == sorted(set(sizes))
+    with pytest.warns(UserWarning, match="modes are kept instead of"):
+        reduce_model(model, seats, modes=4).slowest(1 + static)
+    with pytest.raises(FlexibleError, match="give 1 to 17"):
+        reduce_model(model, seats, modes=4).slowest(18)

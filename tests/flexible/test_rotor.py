@@ -1,9 +1,21 @@
 """Shafts by sections: published and closed-form frequencies, critical speeds, whirl, unbalance."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from gearmbs.flexible import Disc, ElasticMaterial, Rotor, Shaft, ShaftSection, Support, shear_coefficient
+from gearmbs.flexible import (
+    Disc,
+    ElasticMaterial,
+    FlexibleError,
+    Rotor,
+    Shaft,
+    ShaftSection,
+    Support,
+    shear_coefficient,
+)
+from tests.generators import cases, seed
 
 RPM = np.pi / 30
 PINNED = 1e15
@@ -153,3 +165,40 @@ def test_masses_of_sections_cones_and_discs():
 def test_wrong_settings_are_named(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_an_unbalance_between_stations_is_one_with_a_station_there():
+    """Anywhere on a stepped shaft, against the same shaft with a seat there; so is what is read off between."""
+    rng = np.random.default_rng(seed())
+    sections = [ShaftSection(0.5, 0.05), ShaftSection(0.4, 0.07, 0.02), ShaftSection(0.6, 0.05)]
+    disc = Disc(0.9, outer=0.25, width=0.05, inner=0.05)
+    supports = [Support("A", (1e7, 3e7), 500.0), Support("B", 2e7, 500.0)]
+
+    def rotor(**seats):
+        return Rotor(Shaft(sections, [disc], {"A": 0.1, "B": 1.45, **seats}, elements=20), supports)
+
+    speeds = [30.0, 150.0, 280.0, 420.0]
+    for at, read in rng.uniform(0.0, 1.5, (cases(6), 2)):
+        size = 1e-4 * np.exp(1j * rng.uniform(0.0, 6.0))
+        found = rotor().unbalance_response(speeds, {at: size})
+        exact = rotor(here=at, there=read).unbalance_response(speeds, {at: size})
+        for place in (read, 0.9):
+            np.testing.assert_allclose(found.at(place)[:, :2], exact.at(place)[:, :2],
+                                       atol=1e-4 * np.abs(exact.displacements).max())  # fmt: skip
+        assert found.major_axis(read) == pytest.approx(exact.major_axis(read), rel=2e-3)
+
+
+def test_unbalances_are_linear_in_their_place_for_a_stiff_shaft():
+    """A rigid rotor far above its criticals turns about its principal axis: -U/m and -U a/(I_t - I_p)."""
+    shaft = Shaft([ShaftSection(1.0, 0.1)], seats={"A": 0.0, "B": 1.0}, elements=3)
+    stiff = replace(shaft, material=ElasticMaterial(2.1e17, density=7850.0))
+    rotor = Rotor(stiff, [Support("A", 1e2), Support("B", 1e2)])
+    mass = stiff.model().mass_properties()
+    transverse, polar = mass.inertia[0, 0], mass.inertia[2, 2]
+    for at in (0.0, 0.21, 0.5, 0.83):
+        found = rotor.unbalance_response([3e3], {at: 1e-3}).at(0.5)[0]
+        assert found[0].real == pytest.approx(-1e-3 / mass.mass, rel=1e-4)
+        turned = -1e-3 * (at - 0.5) / (transverse - polar)
+        assert found[4].real == pytest.approx(turned, rel=1e-3, abs=1e-9)
+    with pytest.raises(FlexibleError, match="off the shaft"):
+        rotor.unbalance_response([1.0], {1.2: 1e-3})

@@ -89,7 +89,7 @@ def test_a_block_bends_as_a_beam():
         Interface("a", nodes_where(block, lambda x, y, z: x < 1e-9)),
         Interface("b", nodes_where(block, lambda x, y, z: x > 0.2 - 1e-9)),
     ]
-    model = reduce_model(block, faces, internal=4)
+    model = reduce_model(block, faces, modes=4)
     zero = (0.0, 0.0, 0.0)
     q = deflected(model, {"a": (zero, (0, 0, -moment)), "b": (zero, (0, 0, moment))})
     modes = model.stress_modes()
@@ -123,7 +123,7 @@ def test_von_mises_and_what_is_refused():
 
 
 def test_given_stresses_follow_the_modes():
-    model = BAR.modal_model(6)
+    model = BAR.modal_model().slowest(6)
     values = np.random.default_rng(3).normal(size=(6, 2, 6))
     own = model.with_stresses(StressModes([[0, 0, 0.1], [0, 0, 0.2]], values))
     np.testing.assert_allclose(own.stress_modes().values, values, atol=1e-9)
@@ -131,4 +131,4 @@ def test_given_stresses_follow_the_modes():
     with pytest.raises(FlexibleError, match="stresses of 5 modes for 6 modes"):
         model.with_stresses(StressModes([[0, 0, 0.1], [0, 0, 0.2]], values[:5]))
     with pytest.raises(FlexibleError, match="mode 7 is no combination of the 6 shapes"):
-        own.recovery(BAR.modal_model(8).moved, None)
+        own.recovery(BAR.modal_model().slowest(8).moved, None)

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from gearmbs.mechanism import Mechanism
-from gearmbs.signals import campbell
+from gearmbs.flexible import Rotor, Shaft, ShaftSection, Support
+from gearmbs.mechanism import Mechanism, linear_modes
+from gearmbs.signals import SignalError, campbell
 from gearmbs.view import campbell_plot
+from tests.generators import cases, seed
 from tests.view.looking import assert_readable
 
 
@@ -68,3 +70,64 @@ def test_one_mechanism_for_all_speeds_is_warned_of_where_it_may_whirl(recwarn):
     split = np.hypot(tilting, gyroscopic) + np.array([-1.0, 1.0]) * gyroscopic
     for frequency in split / (2.0 * np.pi):
         assert np.abs(diagram["frequency"].values[1] - frequency).min() < 1e-6 * frequency
+
+
+def bushed(*ratios: float) -> Mechanism:
+    """Bodies of 1 kg, each on a spring of its own along x, with damping by the critical one."""
+    m = Mechanism("bushed")
+    for k, ratio in enumerate(ratios):
+        body = m.body(f"b{k}", 1.0, (0.1,) * 3, position=(0, k, 0))
+        stiffness = 1e6 * (1 + k)
+        m.translational(f"slide{k}", body, m.ground, axis=(1, 0, 0))
+        m.bushing(f"bush{k}", body.marker(), m.ground.marker((0, k, 0)), stiffness=(stiffness, 0, 0),
+                  damping=(2.0 * ratio * np.sqrt(stiffness), 0, 0))  # fmt: skip
+    return m
+
+
+def test_what_is_over_damped_has_no_natural_frequency_and_no_critical_speed():
+    rng = np.random.default_rng(seed())
+    speeds = np.linspace(0.0, 3000.0, 7)
+    for ratio in (1.0, 1.0 + 1e-9, 1.01, 5.0, *rng.uniform(1.001, 50.0, cases(10))):
+        over = linear_modes(bushed(ratio))
+        assert over.kinds == ["real", "real"], ratio
+        assert np.all(np.isnan(over.frequencies))
+        with pytest.raises(SignalError, match="damped beyond the critical"):
+            campbell(bushed(ratio), speeds)
+        # beside one that oscillates it is left out
+        both = campbell(bushed(0.1, ratio), speeds)
+        assert both.sizes["mode"] == 1
+        assert both.critical_speed.values == pytest.approx([1000.0], rel=1e-9)
+    for ratio in (0.95, *rng.uniform(0.0, 0.999, cases(10))):
+        under = campbell(bushed(ratio), speeds)
+        assert under.critical_speed.values == pytest.approx([1000.0], rel=1e-9), ratio
+        assert under.damping.values == pytest.approx(ratio, abs=1e-9)
+
+
+def test_a_motion_that_ceases_to_oscillate_leaves_the_others_their_lines():
+    """Damping that grows with the speed: the line ends, and no crossing is made up between two modes."""
+
+    def at(speed):
+        return linear_modes(bushed(0.02 + speed / 1000.0, 0.05))
+
+    diagram = campbell(at, [0.0, 300.0, 600.0, 900.0, 1100.0, 1400.0, 1700.0])
+    lines = diagram.frequency.values * 2 * np.pi
+    np.testing.assert_allclose(lines[:4], [[1e3, np.sqrt(2e6)]] * 4, rtol=1e-9)
+    assert np.all(np.isnan(lines[4:, 0]))
+    np.testing.assert_allclose(lines[4:, 1], np.sqrt(2e6), rtol=1e-9)
+    assert diagram.critical_speed.values == pytest.approx([np.sqrt(2e6)], rel=1e-9)
+
+
+def test_rotors_on_supports_damped_beyond_the_critical_have_no_critical_speed():
+    shaft = Shaft([ShaftSection(0.1, 0.2)], seats={"A": 0.0, "B": 0.1}, elements=2)
+    mass = shaft.model().mass_properties().mass
+    critical = 2.0 * np.sqrt(1e5 * mass / 2)
+    plain = Rotor(shaft, [Support(s, 1e5) for s in "AB"])
+    first = np.sqrt(2e5 / mass)
+    for ratio, count in ((5.0, 0), (0.95, 2)):
+        rotor = Rotor(shaft, [Support(s, 1e5, ratio * critical) for s in "AB"])
+        found = rotor.critical_speeds()
+        assert np.sum(np.abs(found / first - 1.0) < 0.01) == count
+        # tilting has its own ratio; nothing is there that the undamped rotor has not
+        assert found.size <= plain.critical_speeds().size
+        slow = rotor.modes(0.0).frequencies
+        assert np.any(np.abs(slow / (first * np.sqrt(abs(1 - min(ratio, 0.999) ** 2))) - 1) < 0.01) == bool(count)

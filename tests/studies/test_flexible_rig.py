@@ -7,17 +7,18 @@ from gearmbs.gears import GearPair
 from gearmbs.studies import flexible_rig
 
 
-def run(coupling="full", stiffer=1.0, time=0.07):
+def run(coupling="full", stiffer=1.0, time=0.07, rate=2000):
     pair = GearPair.paper(backlash="0.1 mm")
     material = ElasticMaterial(2.1e11 * stiffer)
-    rig = flexible_rig(pair, speed="300 rpm", run_up=0.05, modes=6, coupling=coupling, material=material, damping=0.3)
-    solution = rig.simulate(time, rate=2000, tol=1e-6)
+    rig = flexible_rig(pair, speed="300 rpm", run_up=0.05, modes=1, coupling=coupling, material=material, damping=0.3)
+    solution = rig.simulate(time, rate=rate, tol=1e-6)
     assert solution.success, solution.message
     return solution
 
 
 def test_shafts_bend_and_twist_by_the_tooth_force():
-    solution = run()
+    # the energy balance sums powers over the outputs
+    solution = run(rate=8000)
     rig = solution.system
     balance = solution.energy_balance()
     assert balance.attrs["relative_imbalance"] < 1e-4

@@ -19,7 +19,7 @@ SHAFT = Shaft(
 @pytest.fixture(scope="module")
 def run():
     """Return model and solution of a struck shaft on two bushings."""
-    model = SHAFT.modal_model(8)
+    model = SHAFT.modal_model().slowest(8)
     m = Mechanism("rotor")
     body = model.add_to(m, "shaft", damping=0.02, angular_velocity=(0, 0, 50.0))
     for seat in ("left", "right"):
@@ -31,7 +31,7 @@ def run():
 
 
 def test_the_surface_of_a_shaft_is_closed_and_holds_its_volume():
-    surface = SHAFT.modal_model(4).surface()
+    surface = SHAFT.modal_model().slowest(4).surface()
     mesh = Mesh(surface.vertices, surface.triangles)
     assert mesh.watertight
     outline = SHAFT.outline()
@@ -108,7 +108,7 @@ def test_fewer_shapes_draw_nearly_the_same():
 
 
 def test_a_mechanism_shows_the_start():
-    model = SHAFT.modal_model(4)
+    model = SHAFT.modal_model().slowest(4)
     m = Mechanism("bent")
     model.add_to(m, "shaft", start=[1e-3, 0, 0, 0])
     scene = mechanism_scene(m)

@@ -11,7 +11,7 @@ SHAFT = Shaft([ShaftSection("1 m", "100 mm")], seats={"A": 0.0, "B": 1.0})
 
 
 def test_a_mode_is_drawn_and_moves(tmp_path):
-    model = SHAFT.modal_model(6)
+    model = SHAFT.modal_model().slowest(6)
     figure = deformed_plot(model, np.eye(model.modes)[0])
     axes = figure.axes[0]
     still, bent = (np.array(line.get_data_3d()) for line in axes.lines)
@@ -40,7 +40,7 @@ def test_faces_are_coloured_by_their_deflection():
 
 
 def test_energy_by_mode_and_film_of_a_solution():
-    model = SHAFT.modal_model(8)
+    model = SHAFT.modal_model().slowest(8)
     m = Mechanism("shaft")
     body = model.add_to(m, "shaft", damping=0.02)
     for seat in ("A", "B"):

@@ -65,7 +65,7 @@ def add_modal_force(
     --------
     >>> from gearmbs.flexible import Shaft, ShaftSection
     >>> from gearmbs.mechanism import Mechanism, add_modal_force
-    >>> bar = Shaft([ShaftSection(0.4, 0.01)], seats={"A": 0.0, "B": 0.4}).modal_model(4)
+    >>> bar = Shaft([ShaftSection(0.4, 0.01)], seats={"A": 0.0, "B": 0.4}).modal_model().slowest(4)
     >>> m = Mechanism("m")
     >>> body = bar.add_to(m)
     >>> load = bar.modal_load({"A": ((10.0, 0, 0), (0, 0, 0)), "B": ((-10.0, 0, 0), (0, 0, 0))})

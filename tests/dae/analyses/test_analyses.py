@@ -164,6 +164,10 @@ def test_overdamped_oscillator_has_two_real_modes():
     # s^2 + 50 s + 100 = 0
     assert sorted(found.eigenvalues.real) == pytest.approx(sorted(np.roots([1, 50, 100])), rel=1e-9)
     assert found.kinds == ["real", "real"]
+    assert not found.oscillating.size
+    assert np.all(np.isnan(found.frequencies))
+    assert "no modes: real eigenvalues" in found.table()
+    assert repr(found) == "Modes(2 without oscillation, stable)"
 
 
 def test_free_body_has_six_rigid_modes():
@@ -238,7 +242,7 @@ def test_rigid_motions_of_damped_and_joined_bodies():
     m.bushing("oil", a.marker(name="k"), m.ground.marker(name="l"), damping=(0, 0.3, 0))
     found = linear_modes(m)
     # stretching: omega^2 = k (1/m_a + 1/m_b) = 9e8; oil: c / m_a = 0.3; all other eleven motions are free
-    assert found.kinds == ["rigid"] * 11 + ["real", "oscillating"]
+    assert found.kinds == ["rigid"] * 11 + ["damped rigid", "oscillating"]
     assert found.eigenvalues[-2:] == pytest.approx([-0.3, 30000j], rel=1e-9)
 
 
