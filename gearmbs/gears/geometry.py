@@ -164,6 +164,12 @@ class PairGeometry(Written):
             f"{name}: the wheels do not reach each other: centre distance {a * MM:.4f} mm, tip radii sum up to "
             f"{reach * MM:.4f} mm; reduce centre_distance_error",
         )
+        path, remedy = self.path_of_contact, "reduce" if self.sign > 0 else "increase"
+        require(
+            path > 0,
+            f"{name}: the wheels do not mesh: at the centre distance {a * MM:.4f} mm the tips leave {path * MM:.4f} mm "
+            f"of a path of contact; {remedy} centre_distance_error or give longer teeth",
+        )
 
     def _check_ring_size(self) -> None:
         one, two = self.driver, self.driven
