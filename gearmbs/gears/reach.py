@@ -89,3 +89,37 @@ def corner_reach(geometry: PairGeometry, wheel: int, change: float = 0.0) -> Cor
     count = int(np.argmin(rising)) if not rising.all() else rising.size
     bound = (gap[1 : count + 1] / x[1 : count + 1] ** 2).min(initial=curve)
     return CornerReach(float(x_end), float(passing), curve, float(bound))
+
+
+TURNS = 400
+"""Places of the wheel while its corner goes through the mate's root: gaps between them are good to 1e-5 modules."""
+
+
+def fillet_clearance(geometry: PairGeometry, wheel: int) -> float:
+    """Least distance of the tip corner of a wheel, 0 or 1, from the mate's root arc while flanks at work just touch.
+
+    Infinite if the corner does not come over the arc; negative if it cuts into it. See `gearmbs.contact.root` for the
+    arc and where a corner is over it.
+
+    Parameters
+    ----------
+    geometry : PairGeometry
+    wheel : {0, 1}
+    """
+    own, mate = geometry.wheels if wheel == 0 else geometry.wheels[::-1]
+    rb, mate_rb = own.sign * own.base_radius, mate.sign * mate.base_radius
+    a, alpha = geometry.sign * geometry.centre_distance, geometry.working_pressure_angle
+    radius, arc = own.sign * own.corner_radius, mate.fillet_radius
+    centre, around = mate.sign * mate.fillet_centre_radius, mate.sign * mate.fillet_half_angle
+    # from where the corner is a whole root angle before the line of centres to the end of the path of contact
+    widest = math.pi / mate.teeth * abs(mate.base_radius / own.base_radius) + math.pi / own.teeth
+    corner = np.linspace(-2.0 * widest, 2.0 * widest, TURNS)
+    f = corner - own.sign * own.corner_half_angle
+    rolls = geometry.line_of_action - geometry.base_radius_sum * alpha - rb * (f + own.sign * own.base_half_angle)
+    f_mate = rolls / mate_rb - mate.sign * mate.base_half_angle
+    at = f_mate + around
+    dx = a - radius * np.cos(corner) - centre * np.cos(at)
+    dy = -radius * np.sin(corner) - centre * np.sin(at)
+    end = at - math.asin(arc / centre)
+    over = (dx * np.sin(at) - dy * np.cos(at) >= 0.0) & (dx * np.cos(end) + dy * np.sin(end) < 0.0)
+    return float((arc - own.tip_rounding - np.hypot(dx, dy)[over]).min(initial=math.inf))

@@ -24,6 +24,7 @@ from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
 from gearmbs.mechanism.seat_check import warn_of_stiff_seats
 from gearmbs.mechanism.spin_check import warn_of_spin
+from gearmbs.mechanism.start_check import refuse_overlaps
 from gearmbs.mechanism.stops import StopAt, stop_options, with_stops
 from gearmbs.mechanism.user_functions import raised_errors
 from gearmbs.progress import time_bar
@@ -130,7 +131,8 @@ def simulate(
     Raises
     ------
     ModelError
-        If the model or an option is wrong, or the mechanism cannot be assembled; if a function of the user fails, its
+        If the model or an option is wrong, or the mechanism cannot be assembled; if teeth start deeper in each other
+        than the loads press them; if a function of the user fails, its
         ``solution`` has what was computed until then.
     """
     if consumer is not None and not every_step:
@@ -140,6 +142,7 @@ def simulate(
     name = _checked(integrator, tol, options)
     asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
     with uncollected(), raised_errors(mechanism.functions.values()):
+        refuse_overlaps(mechanism, t_start)
         system, problem, members, lumping = _prepared(mechanism, t_start, lump, formulation, rate_scale)
     if stops:
         if name == "IDA" or lump:
