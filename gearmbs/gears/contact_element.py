@@ -107,8 +107,12 @@ class GearContact(ForceElement):
         depth = max(drive, coast)
         if depth <= DEEP * geometry.driver.module + jammed:
             return None
-        where = "on both flanks" if min(drive, coast) > 0.0 else f"on the {'drive' if drive > coast else 'coast'} flanks"
-        text = f"its teeth are {shown(depth, 'mm', '.4g')} deep in each other {where}, which makes {1e-3 * force:.4g} kN"
+        where = (
+            "on both flanks" if min(drive, coast) > 0.0 else f"on the {'drive' if drive > coast else 'coast'} flanks"
+        )
+        text = (
+            f"its teeth are {shown(depth, 'mm', '.4g')} deep in each other {where}, which makes {1e-3 * force:.4g} kN"
+        )
         # the driven wheel yields in its own sense where the drive flanks press
         turn = -geometry.sign * self.pair.operating_point.rotation * (drive - coast) / geometry.driven.base_radius
         remedy = (

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import difflib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -142,7 +143,7 @@ def simulate(
     name = _checked(integrator, tol, options)
     asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
     with uncollected(), raised_errors(mechanism.functions.values()):
-        refuse_overlaps(mechanism, t_start)
+        refuse_overlaps(mechanism.elements, lambda names: _without(mechanism, names).compile(t_start))
         system, problem, members, lumping = _prepared(mechanism, t_start, lump, formulation, rate_scale)
     if stops:
         if name == "IDA" or lump:
@@ -168,6 +169,13 @@ def simulate(
         return _closed(stream, solution, name)
     warn_of_spin(mechanism.bodies, solution)
     return solution
+
+
+def _without(mechanism: Mechanism, names: Collection[str]) -> Mechanism:
+    """Return the mechanism without some of its force elements."""
+    part = copy.copy(mechanism)
+    part.elements = {name: element for name, element in mechanism.elements.items() if name not in names}
+    return part
 
 
 def _closed(stream: Stream, solution: Solution, name: str) -> Solution:

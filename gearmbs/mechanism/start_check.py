@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Collection
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from gearmbs.dae.errors import ModelError
 from gearmbs.mechanism.elements import ForceElement
 
 if TYPE_CHECKING:
-    from gearmbs.mechanism.mechanism import Mechanism
+    from gearmbs.dae.model.system import System
     from gearmbs.mechanism.parts import Marker
 
 MOST_EXCESS = 2.0
@@ -23,29 +22,36 @@ SHOWN = 1e-3
 """Share of a force below which nothing is said to press against it."""
 
 
-def refuse_overlaps(mechanism: Mechanism, t0: float) -> None:
+def refuse_overlaps(elements: Mapping[str, Any], compiled: Callable[[Collection[str]], System]) -> None:
     """Refuse a mechanism of which parts start deep in each other, though nothing presses them together.
 
     With the accelerations A of a mechanism as it is, B without the contacts in question and a contact's wrench W on
     its two bodies, ``-W B`` is the rate at which the loads press the parts together, and ``W (A - B)`` that at which
     the contact drives them apart. A start under load has ``W A`` near zero.
 
+    Parameters
+    ----------
+    elements : mapping
+        Of the mechanism, by name.
+    compiled : callable
+        Returns the mechanism compiled without the elements named.
+
     Raises
     ------
     ModelError
         Naming the first of the elements whose parts the loads do not press together so much.
     """
-    elements = [e for e in mechanism.elements.values() if isinstance(e, ForceElement)]
-    deep = {e.name: found for e in elements if (found := e.start_overlap()) is not None}
+    forces = [e for e in elements.values() if isinstance(e, ForceElement)]
+    deep = {e.name: found for e in forces if (found := e.start_overlap()) is not None}
     if not deep:
         return
     try:
-        moving = _accelerations(mechanism, (), t0), _accelerations(mechanism, deep, t0)
+        moving = _accelerations(compiled(())), _accelerations(compiled(deep))
     except ModelError:
         # something else depends on the contact, or nothing else holds a body: there is no load to ask for
         moving = None
     for name, overlap in deep.items():
-        element = mechanism.elements[name]
+        element = elements[name]
         share = 0.0
         if moving is not None:
             apart, pressed = (_power(overlap.wrench, element.i, element.j, a) for a in moving)
@@ -58,15 +64,10 @@ def refuse_overlaps(mechanism: Mechanism, t0: float) -> None:
         )
 
 
-def _accelerations(mechanism: Mechanism, without: Collection[str], t0: float) -> dict[str, tuple[np.ndarray, ...]]:
+def _accelerations(system: System) -> dict[str, tuple[np.ndarray, ...]]:
     """Return place and acceleration of the centre of mass, and angular acceleration, of each body."""
-    part = mechanism
-    if without:
-        part = copy.copy(mechanism)
-        part.elements = {name: e for name, e in mechanism.elements.items() if name not in without}
-    system = part.compile(t0)
     system.initialise()
-    rows = system.accelerations(system.start, t0)[0]
+    rows = system.accelerations(system.start, system.t0)[0]
     return {n: (pose[:3], row[:3], row[3:]) for n, pose, row in zip(system.body_names, system.pose, rows)}
 
 
