@@ -228,10 +228,10 @@ class PairGeometry(Written):
         if overlap > JAM_ROUNDING:
             farther = overlap / (2 * math.sin(self.working_pressure_angle))
             warnings.warn(
-                f"{self._name}: negative backlash: at the centre distance {self.centre_distance * MM:.4f} mm the normal "
-                f"backlash is {-overlap * MM:.4g} mm, so that the teeth press on both flanks without load; give backlash "
-                f"{(self.backlash + overlap) * MM:.4g} mm or more, or {'increase' if self.sign > 0 else 'reduce'} "
-                f"centre_distance_error by {farther * MM:.4g} mm",
+                f"{self._name}: negative backlash: at the centre distance {self.centre_distance * MM:.4f} mm the "
+                f"normal backlash is {-overlap * MM:.4g} mm, so that the teeth press on both flanks without load; give "
+                f"backlash {(self.backlash + overlap) * MM:.4g} mm or more, or "
+                f"{'increase' if self.sign > 0 else 'reduce'} centre_distance_error by {farther * MM:.4g} mm",
                 stacklevel=self._calls,
             )
 
@@ -439,7 +439,11 @@ class PairGeometry(Written):
     @property
     def normal_backlash(self) -> float:
         """Backlash j_bn along the line of action at the working centre distance, parallel axes, m."""
-        alpha = self.working_pressure_angle
+        return self.normal_backlash_of(self.centre_distance)
+
+    def normal_backlash_of(self, centre_distance: float) -> float:
+        """Backlash along the line of action at another centre distance, m."""
+        alpha = math.acos(self.base_radius_sum / (self.sign * centre_distance))
         return 2 * (self.base_radius_sum * involute(alpha) - self.base_arc_sum) + self.driver.base_pitch
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -114,34 +115,34 @@ class GearPair(PairGeometry, Shown):
     def _remark_on_tips(self) -> None:
         """Warn of tips that reach the mate where the contact does not look for them, once the flanks yield to the load.
 
-        Along the line of action flanks yield by the penetration of one tooth pair, and tips come closer to the mate's
-        root arcs by up to that; those of an internal pair to the tips they pass.
+        At an end of the path of contact one pair more than the whole contact ratio carries, and where tips of an
+        internal pair pass each other as many as that.
         """
-        yielding = self.penetration()
         names = f"the driver ({self.driver.name})", f"the driven wheel ({self.driven.name})"
-        load = f"{shown(self.torque, 'N*m', '.4g')} press the flanks {yielding * 1e3:.3g} mm together"
+        whole = math.floor(self.contact_ratio)
         if not self.tips_may_bottom:
-            clearances = [fillet_clearance(self, k) for k in (0, 1)]
-            near = [
-                f"the tips of {names[k]} come within {clearance * 1e3:.3g} mm of the root arcs of {names[1 - k]}"
-                for k, clearance in enumerate(clearances)
-                if clearance < yielding
+            yielding = self.penetration(pairs=whole + 1)
+            fouls = [
+                f"the tips of {names[k]} foul the root arcs of {names[1 - k]} by {-clearance * 1e3:.3g} mm"
+                for k in (0, 1)
+                if (clearance := fillet_clearance(self, k, yielding)) < 0.0
             ]
-            if near:
+            if fouls:
                 counted = "" if self.driver.helix_angle else ", or give root_contact=True, which counts the force there"
                 warnings.warn(
-                    f"GearPair: {' and '.join(near)}, and {load}: they may foul there under load, unseen; reduce "
-                    f"fillet_radius there or the addendum{counted}",
+                    f"GearPair: under {shown(self.torque, 'N*m', '.4g')} the flanks yield {yielding * 1e3:.3g} mm, and "
+                    f"{', '.join(fouls)}, unseen; reduce fillet_radius there or the addendum{counted}",
                     stacklevel=self._calls - 1,
                 )
         if self.sign < 0:
             needed, free = self.fouling_angles
             passing = (free - needed) * self.driven.base_radius
+            yielding = self.penetration(pairs=max(whole, 1))
             if passing < yielding:
                 warnings.warn(
-                    f"GearPair: where the tips of {names[0]} and {names[1]} leave each other, {passing * 1e3:.3g} mm "
-                    f"are free, and {load}: they touch there under load; use lower addenda or a greater difference of "
-                    "teeth",
+                    f"GearPair: the tips of {names[0]} and {names[1]} pass each other {passing * 1e3:.3g} mm apart, "
+                    f"and under {shown(self.torque, 'N*m', '.4g')} the flanks yield {yielding * 1e3:.3g} mm: they "
+                    "touch there; use lower addenda or a greater difference of teeth",
                     stacklevel=self._calls - 1,
                 )
 

@@ -96,8 +96,8 @@ TURNS = 80
 distance is good to 1e-5 modules."""
 
 
-def fillet_clearance(geometry: PairGeometry, wheel: int) -> float:
-    """Least distance of the tip corner of a wheel, 0 or 1, from the mate's root arc while flanks at work just touch.
+def fillet_clearance(geometry: PairGeometry, wheel: int, depth: float = 0.0) -> float:
+    """Least distance of the tip corner of a wheel, 0 or 1, from the mate's root arc while flanks at work touch.
 
     Infinite if the corner does not come over the arc; negative if it cuts into it. See `gearmbs.contact.root` for the
     arc and where a corner is over it.
@@ -106,19 +106,23 @@ def fillet_clearance(geometry: PairGeometry, wheel: int) -> float:
     ----------
     geometry : PairGeometry
     wheel : {0, 1}
+    depth : float
+        How deep the flanks are pressed into each other, m.
     """
     own, mate = geometry.wheels if wheel == 0 else geometry.wheels[::-1]
     rb, mate_rb = own.sign * own.base_radius, mate.sign * mate.base_radius
     a, alpha = geometry.sign * geometry.centre_distance, geometry.working_pressure_angle
     radius, arc = own.sign * own.corner_radius, mate.fillet_radius
     centre, around = mate.sign * mate.fillet_centre_radius, mate.sign * mate.fillet_half_angle
+    together = geometry.line_of_action - geometry.base_radius_sum * alpha + depth
     middle, width = 0.0, 4.0 * math.pi / own.teeth
     least = math.inf
     for _ in range(2):
         corner = middle + width * np.linspace(-1.0, 1.0, TURNS)
         f = corner - own.sign * own.corner_half_angle
-        rolls = geometry.line_of_action - geometry.base_radius_sum * alpha - rb * (f + own.sign * own.base_half_angle)
-        at = rolls / mate_rb - mate.sign * mate.base_half_angle + around
+        at = (
+            (together - rb * (f + own.sign * own.base_half_angle)) / mate_rb - mate.sign * mate.base_half_angle + around
+        )
         dx = a - radius * np.cos(corner) - centre * np.cos(at)
         dy = -radius * np.sin(corner) - centre * np.sin(at)
         end = at - math.asin(arc / centre)
@@ -126,5 +130,5 @@ def fillet_clearance(geometry: PairGeometry, wheel: int) -> float:
         clearance = np.where(over, arc - own.tip_rounding - np.hypot(dx, dy), math.inf)
         best = int(clearance.argmin())
         least = min(least, float(clearance[best]))
-        middle, width = corner[best], 4.0 * width / TURNS
+        middle, width = float(corner[best]), 4.0 * width / TURNS
     return least

@@ -77,6 +77,7 @@ def simulate(
     consumer: Callable[[Solution], None] | None = None,
     lump: bool | None = None,
     stops: Sequence[StopAt] = (),
+    continued: bool = False,
     **options,
 ) -> Solution:
     """Integrate a mechanism and return its motion and forces.
@@ -121,6 +122,9 @@ def simulate(
     stops : sequence of StopAt
         The run ends where a state of the mechanism passes a value; times are in the result's ``t_events``, one array a
         stop. Not with IDA, and not with ``lump``.
+    continued : bool
+        Whether the start is a state in which an earlier run ended: teeth may then be deep in an impact, which else is
+        refused.
     **options
         Handed to the integrator.
 
@@ -143,7 +147,8 @@ def simulate(
     name = _checked(integrator, tol, options)
     asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
     with uncollected(), raised_errors(mechanism.functions.values()):
-        refuse_overlaps(mechanism.elements, lambda names: _without(mechanism, names).compile(t_start))
+        if not continued:
+            refuse_overlaps(mechanism.elements, lambda names: _without(mechanism, names).compile(t_start))
         system, problem, members, lumping = _prepared(mechanism, t_start, lump, formulation, rate_scale)
     if stops:
         if name == "IDA" or lump:
@@ -285,4 +290,5 @@ SETTINGS = (
     "consumer",
     "lump",
     "stops",
+    "continued",
 )

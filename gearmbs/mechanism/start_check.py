@@ -59,9 +59,8 @@ def refuse_overlaps(elements: Mapping[str, Any], compiled: Callable[[Collection[
                 continue
             share = max(0.0, -pressed / (apart - pressed)) if apart > pressed else 0.0
         pressing = f"{100 * share:.2g} % of that" if share > SHOWN else "nothing"
-        raise ModelError(
-            f"{element.kind} '{name}': at the start {overlap.text}; the loads there explain {pressing}. {overlap.remedy}"
-        )
+        label = f"{element.kind} '{name}'"
+        raise ModelError(f"{label}: at the start {overlap.text}; the loads there explain {pressing}. {overlap.remedy}")
 
 
 def _accelerations(system: System) -> dict[str, tuple[np.ndarray, ...]]:

@@ -118,8 +118,7 @@ def first_touch(pair, driver_angle):
     """Driven angle at which sampled flanks first meet, the driver turning counter-clockwise, and how close, m.
 
     Knows nothing of tooth pairs, corners or paths of contact. Each point of the driver's flanks is compared with the
-    mate's flank at the same distance from the mate's axis, the mate's tips are points of its flank among them: where the
-    mate has no flank, nothing is met.
+    mate's flank at the same distance from the mate's axis, its tip included: where it has no flank, nothing is met.
     """
     one, two = pair.wheels
     ideal = StaticMesh(pair).ideal_angle(driver_angle)

@@ -41,22 +41,26 @@ def test_negative_backlash_is_remarked_on_with_its_value(kind, wheels, sign):
     assert quiet(lambda: kind(**wheels, centre_distance_error=error)).normal_backlash >= 0
 
 
-def test_tips_close_to_roots_are_remarked_on_under_a_load_that_closes_the_gap():
-    wheels = {"driver": GearSpec(62, "2 mm"), "driven": GearSpec(62, "2 mm", fillet_radius="0.5 mm")}
-    clearances = [fillet_clearance(GearPair(**wheels, torque=1.0), k) for k in (0, 1)]
-    assert 5e-6 < clearances[1] < 15e-6 < clearances[0]
+def test_tips_that_foul_roots_under_the_load_are_remarked_on():
+    wheels = {"driver": GearSpec(62, "2 mm", fillet_radius="0.5 mm"), "driven": GearSpec(62, "2 mm")}
+    plain = GearPair(**wheels, torque=1.0)
+    # the driven wheel's default root arc is within reach of the driver's tips
+    assert 5e-6 < fillet_clearance(plain, 0) < 15e-6 < fillet_clearance(plain, 1)
+    yielding = plain.penetration(100.0, 2)
+    fouls = -fillet_clearance(plain, 0, yielding)
+    assert 0 < fouls < yielding
     quiet(lambda: GearPair(**wheels, torque=20.0))
-    with pytest.warns(
-        UserWarning, match=r"tips of the driven wheel \(gear\) come within 0.00\d+ mm .* root_contact=True"
-    ):
+    expected = rf"tips of the driver \(gear\) foul the root arcs of the driven wheel \(gear\) by {1e3 * fouls:.3g} mm"
+    with pytest.warns(UserWarning, match=expected) as said:
         GearPair(**wheels, torque=100.0)
+    assert [w.filename for w in said] == [__file__]
     quiet(lambda: GearPair(**wheels, torque=100.0, root_contact=True))
 
 
-def test_tips_close_to_each_other_are_remarked_on():
+def test_tips_that_meet_tips_under_the_load_are_remarked_on():
     wheels = {"driver": GearSpec(60, "2 mm"), "driven": GearSpec.ring(70, "2 mm", addendum="1.6 mm")}
     quiet(lambda: GearPair(**wheels))
-    with pytest.warns(UserWarning, match=r"leave each other, 0\.2\d+ mm are free, and 8000 N\*m press"):
+    with pytest.warns(UserWarning, match=r"pass each other 0\.2\d+ mm apart, and under 8000 N\*m the flanks yield"):
         GearPair(**wheels, torque=8000.0)
 
 

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from gearmbs.dae.errors import ModelError
-from gearmbs.gears import ContactLaw, GearPair, GearSpec
+from gearmbs.gears import ContactLaw, GearPair, GearSpec, planetary
+from gearmbs.gears.planetary_rig import planetary_mechanism
 from gearmbs.mechanism import Mechanism
+from tests.drivetrain.support import rotation, stage
 from tests.generators import cases, seed
 
 PAPER = GearPair.paper(backlash="0.1 mm")
@@ -73,7 +75,7 @@ def test_soft_teeth_start_as_deep_as_they_yield():
 
 def test_wheels_both_held_are_refused_where_they_are_deep():
     two_wheels(PAPER, 30e-6, held=True).simulate(1e-4)
-    with pytest.raises(ModelError, match="its teeth are 0.2 mm deep"):
+    with pytest.raises(ModelError, match=r"its teeth are 0\.2 mm deep"):
         two_wheels(PAPER, 0.2e-3, held=True).simulate(1e-4)
 
 
@@ -100,3 +102,33 @@ def test_any_pair_starts_where_it_is_placed_and_not_deep():
         overlap = two_wheels(pair, deep).elements["mesh"].start_overlap()
         assert overlap is not None
         assert "on the drive flanks" in overlap.text
+
+
+def turned(mechanism, body, depth, radius):
+    """The mechanism with one of its bodies turned about its z axis until its teeth are so deep in their mates."""
+    one = mechanism.bodies[body]
+    one.orientation = rotation(one.orientation[:, 2] * depth / radius) @ one.orientation
+    return mechanism
+
+
+@pytest.mark.parametrize("depth", [0.3e-3, -0.5e-3])
+def test_a_wheel_of_a_drivetrain(depth):
+    train = stage()
+    radius = train.wheels[1].gear.base_radius
+    with pytest.raises(ModelError, match="gear contact 'mesh': at the start its teeth are"):
+        turned(train.build(), "out", depth, radius).simulate(1e-4)
+    turned(train.build(), "out", math.copysign(30e-6, depth), radius).simulate(1e-4)
+
+
+def test_a_planet_of_a_set():
+    gears = planetary((24, 30, 84), "1.5 mm", backlash_sun="0.05 mm", backlash_ring="0.05 mm")
+    settings = {"speeds": {"sun": "300 rpm"}, "torques": {"carrier": "-60 N m"}, "run_up": "0.01 s"}
+    planetary_mechanism(gears, **settings).simulate(1e-5)
+    for sign in (1, -1):
+        deep = turned(planetary_mechanism(gears, **settings), "planet 2", sign * 0.3e-3, gears.planet.base_radius)
+        with pytest.raises(ModelError, match=r"gear contact '(sun-planet 2|planet 2-ring)': at the start its teeth"):
+            deep.simulate(1e-5)
+
+
+def test_a_run_that_goes_on_from_an_impact():
+    two_wheels(PAPER, 0.15e-3).simulate(1e-6, continued=True)
