@@ -132,14 +132,16 @@ def _pack(pair: Mesh, slices: int | None) -> tuple[np.ndarray, np.ndarray, int]:
 def _pack_reach(geometry: PairGeometry, reals: np.void) -> None:
     """Fill how far tip corners reach; see `gearmbs.contact.search.teeth_in_reach`."""
     module = geometry.driver.module
+    # to the side on which the path of contact becomes shorter: on the other tips may come to the line of action's end
     step = min(MOVED * module, 0.5 * (geometry.centre_distance - abs(geometry.base_radius_sum)))
-    here, nearer, apart = ([corner_reach(geometry, k, change) for k in (0, 1)] for change in (0.0, -step, step))
-    slopes = [abs(n.passing_gap - a.passing_gap) / (2.0 * step) for n, a in zip(nearer, apart)]
+    here, moved = ([corner_reach(geometry, k, change) for k in (0, 1)] for change in (0.0, geometry.sign * step))
+    slopes = [abs(m.passing_gap - h.passing_gap) / step for h, m in zip(here, moved)]
+    longer = max(abs(m.length - h.length) for h, m in zip(here, moved))
     reals["centre_distance"] = geometry.sign * geometry.centre_distance
     share = min(r.bound for r in here) / min(r.curve for r in here)
     reals["corner_share"] = min(MOST_OF_PARABOLA, SHARE_KEPT * share)
     # other poses lengthen the reach a little; a pitch more costs nothing, since gaps decide
-    reals["corner_reach"] = max(r.length for r in (*nearer, *here, *apart)) + geometry.driver.base_pitch
+    reals["corner_reach"] = max(r.length for r in here) + longer + geometry.driver.base_pitch
     reals["passing_gap"] = min(r.passing_gap for r in here)
     reals["passing_slope"] = 2.0 * max(slopes)
     reals["edge"] = EDGE * module
