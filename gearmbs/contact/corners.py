@@ -6,6 +6,7 @@ import numpy as np
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.corner_sections import corner_normals, corner_sections, corner_starts
+from gearmbs.contact.deviations import roll_under_corner
 from gearmbs.contact.helical_sections import edge_normals, edge_sections
 from gearmbs.contact.jit import kernel
 from gearmbs.contact.level import level, level_corner
@@ -40,13 +41,14 @@ def copy_corner(corner, source, target):
     corner.roll[target] = corner.roll[source]
     corner.sin[target] = corner.sin[source]
     corner.cos[target] = corner.cos[source]
+    corner.mate_tip[target] = corner.mate_tip[source]
 
 
 @kernel
-def corner_gaps(side, wheels, corner, strip, n, kind, f_mate, normal, want):
+def corner_gaps(side, wheels, corner, strip, n, kind, f_mate, normal, lookup, want):
     """Fill the gaps of the corners at work on the mate's flank.
 
-    Close to its base circle and inside it the mate's flank goes on as its tangent plane.
+    Close to its base circle and inside it the mate's flank goes on as its tangent plane. Behind its tip it falls away.
 
     Parameters
     ----------
@@ -62,12 +64,15 @@ def corner_gaps(side, wheels, corner, strip, n, kind, f_mate, normal, want):
         Angle of the mate's tooth from the line of centres.
     normal : record
         Strip whose first section has a solved normal.
+    lookup : record
+        Scratch for a place on the mate's profile.
     want : int
         Nonzero to fill second derivatives.
     """
     rb = side.base_2 if kind == 1 else side.base_1
     start = f_mate + (wheels.wheel_2.half_angle if kind == 1 else wheels.wheel_1.half_angle)
     if level(side, strip, n, want) and level_corner(side, corner, strip, kind, start):
+        fall_behind_tip(side, wheels, corner, strip, n, kind, lookup, want)
         return
     corner_starts(side, corner, strip, n, rb, normal)
     if side.twist_1 != 0.0:
@@ -83,6 +88,37 @@ def corner_gaps(side, wheels, corner, strip, n, kind, f_mate, normal, want):
             corner_near_base(side, corner, strip, j, kind, start, rb, want)
     if mended:
         normal_turns(side, strip, n)
+    fall_behind_tip(side, wheels, corner, strip, n, kind, lookup, want)
+
+
+@kernel
+def fall_behind_tip(side, wheels, corner, strip, n, kind, lookup, want):
+    """Add to the gaps of the corners at work what the mate's flank falls away behind its tip.
+
+    A corner whose foot is at the length of roll s on the mate, beyond its tip at s_t, has no involute beneath it: the
+    flank goes on as a rounded edge of radius R, ``(s - s_t)^2 / (2 R)`` below the endless involute. Gap and slope are
+    continuous, and so is the force of a corner that leaves under load.
+
+    Parameters
+    ----------
+    side, wheels, corner, strip, n, kind, lookup, want
+        As in `corner_gaps`.
+    """
+    mate = wheels.wheel_2 if kind == 1 else wheels.wheel_1
+    for j in range(n):
+        foot = strip.roll_2[j] if kind == 1 else strip.roll_1[j]
+        if foot + 0.5 * strip.gap[j] <= corner.mate_tip[j]:
+            continue
+        roll_under_corner(side, corner, strip, j, lookup, kind % 2, want)
+        over = max(lookup.roll - corner.mate_tip[j], 0.0)
+        inverse = 1.0 / (wheels.edge + corner.rounding[j] + mate.tip_rounding)
+        strip.gap[j] += 0.5 * over * over * inverse
+        for i in range(6):
+            strip.grad[i, j] += over * inverse * lookup.grad[i]
+            if want != 0 and over > 0.0:
+                for k in range(i, 6):
+                    bend = lookup.grad[i] * lookup.grad[k] + over * lookup.hess[i, k]
+                    strip.hess[i, k, j] += bend * inverse
 
 
 @kernel

@@ -116,6 +116,13 @@ PAIR = record(
     "compliance_start",  # first place of the pair's compliance curve on wheel 1's length of roll, m
     "compliance_spacing",
     "secant",  # of the base helix angle: normal force over its part in the transverse section
+    # reach of tip corners beyond the path of contact, see `search.teeth_in_reach`
+    "centre_distance",  # that of the drawing, m; the next four are for it
+    "corner_share",  # of the flatter parabola of a corner's gap at the path's ends that bounds the gap from below
+    "corner_reach",  # how far beyond the path a corner has a foot on the mate's involute, m
+    "passing_gap",  # least gap with which a corner leaves the mate's tip, m
+    "passing_slope",  # how much that falls at most with a change of the centre distance
+    "edge",  # radius by which the mate's flank falls away behind its tip, m
 )
 SLICES, FRICTION, LAW = place(OPTIONS, "slices"), place(OPTIONS, "friction"), place(OPTIONS, "law")
 
@@ -203,7 +210,7 @@ SIDE = record(
     "step",  # width of a slice, m
     "slices",  # along the face
     "overhang",  # how far the common face may reach beyond the slices, m
-    "curve",  # lower bound of the corner gap's growth beyond the path of contact, 1/m
+    "curve",  # lower bound of the corner gap's growth beyond the path of contact, 1/m; 0: none
     "sign",  # +1 or -1, for the tables that name flanks
     ("lines", LINES),
 )
@@ -236,8 +243,9 @@ SUMS = record(
 )
 LOOKUP = record("roll", ("grad", 6), ("hess", 6, 6))
 """Where the contact stands on a profile."""
-CORNER = lanes("roll", "radius", "rounding", "sin", "cos")
-"""The tip corner of a wheel at work: length of roll, radius, rounding, sine and cosine of its polar angle."""
+CORNER = lanes("roll", "radius", "rounding", "sin", "cos", "mate_tip")
+"""The tip corner of a wheel at work: length of roll, radius, rounding, sine and cosine of its polar angle; and the
+length of roll at which its mate's flank ends."""
 LOADS = lanes(
     "kind",  # of contact in the tooth pair at work
     # of the slice from this node to the next

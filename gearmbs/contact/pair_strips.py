@@ -106,10 +106,12 @@ def pair_kinds(options, wheels, scratch, flanks, n, low, high):
             if over_1 > 0.0:
                 loads.kind[j] = 1.0
                 scratch.corner_1.roll[j] = tip_1
+                scratch.corner_1.mate_tip[j] = tip_2
                 corners_1 += 1
         elif over_2 > 0.0:
             loads.kind[j] = 2.0
             scratch.corner_2.roll[j] = tip_2
+            scratch.corner_2.mate_tip[j] = tip_1
             corners_2 += 1
     return corners_1, corners_2
 
@@ -144,7 +146,9 @@ def pair_corners(wheels, scratch, flanks, own, n, kind, whole, want):
             continue
         roll = corner.roll[j]
         if reference >= 0 and roll == corner.roll[reference]:
+            own_mate = corner.mate_tip[j]
             copy_corner(corner, reference, j)
+            corner.mate_tip[j] = own_mate
         else:
             set_corner(wheel, corner, j, f, roll)
             reference = j
@@ -155,7 +159,7 @@ def pair_corners(wheels, scratch, flanks, own, n, kind, whole, want):
         strip.zeta[j] = flanks.zeta[source]
     if helical:
         set_edges(scratch.side, corner, strip, n, first)
-    corner_gaps(scratch.side, wheels, corner, strip, n, kind, f_mate, scratch.middle, want)
+    corner_gaps(scratch.side, wheels, corner, strip, n, kind, f_mate, scratch.middle, scratch.lookup_1, want)
     if whole:
         return
     a, b = rows_of(strip), rows_of(own)

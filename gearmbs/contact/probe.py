@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from gearmbs.contact import layout as L
 from gearmbs.contact.corners import corner_gaps, set_corner
-from gearmbs.contact.deviations import add_deviations, pair_softness, tip_roll
+from gearmbs.contact.deviations import add_deviations, pair_softness, roll_under_corner, tip_roll
 from gearmbs.contact.face import end_roll, limit_value, roll_difference
 from gearmbs.contact.helical_friction import helical_points
 from gearmbs.contact.helical_sections import helical_flanks, helical_normals, set_edges
@@ -35,7 +37,7 @@ SIDE, TOOTH_1, TOOTH_2, SECTION, GAP, KIND, ROLL_1, ROLL_2, NORMAL, TANGENT, ALP
 
 @kernel
 def pair_gaps(gi, gr, R1, A1, R2, A2, sections, rows, work):
-    """Gap of every tooth pair within one pitch of the path of contact, both sides, in sections across the face.
+    """Gap of every tooth pair on the path of contact or in reach of a tip corner, both sides, in sections of the face.
 
     Parameters
     ----------
@@ -49,7 +51,7 @@ def pair_gaps(gi, gr, R1, A1, R2, A2, sections, rows, work):
         Out, columns as in ``COLUMNS``: side (+1, -1), tooth numbers, section, gap m, kind (0 flank on flank, 1 or 2
         the wheel whose corner bears), lengths of roll on both wheels m, contact point from the centre of wheel 1 along
         normal and tangent m, operating angle of the normal rad (mirrored for side -1), stiffness factor
-        of the pair.
+        of the pair. The gap is infinite in sections where a corner has no foot on the mate's flank.
 
     Returns
     -------
@@ -68,8 +70,8 @@ def pair_gaps(gi, gr, R1, A1, R2, A2, sections, rows, work):
         if not open_side(wheels, side):
             return 0
         facing_teeth(options, wheels, side)
-        first, last = teeth_in_reach(wheels, side, 0.0, 0.0)
-        for i in range(first - 1, last + 2):
+        first, last = teeth_in_reach(wheels, side, np.inf, 0.0)
+        for i in range(first, last + 1):
             set_pair(options, scratch, sign, i)
             count = pair_rows(options, wheels, scratch, sign, i, sections, rows, count)
     return count
@@ -132,6 +134,14 @@ def pair_rows(options, wheels, scratch, sign, i, sections, rows, count):
 
 
 @kernel
+def beyond_tip(side, scratch, strip, kind):
+    """How far the foot of the corner in the first section is beyond its mate's tip, m."""
+    corner = scratch.corner_1 if kind == L.CORNER_1 else scratch.corner_2
+    roll_under_corner(side, corner, strip, 0, scratch.lookup_1, kind % 2, 0)
+    return scratch.lookup_1.roll - corner.mate_tip[0]
+
+
+@kernel
 def section_of_pair(options, wheels, scratch, zeta):
     """Fill the first section of ``scratch.middle`` with the gap of the pair at work, its deviations included."""
     side, pair = scratch.side, scratch.pair
@@ -163,11 +173,16 @@ def section_of_pair(options, wheels, scratch, zeta):
         set_corner(wheels.wheel_1, scratch.corner_1, 0, pair.f_1, tip_1)
         if side.twist_1 != 0.0:
             set_edges(side, scratch.corner_1, strip, 1, True)
-        corner_gaps(side, wheels, scratch.corner_1, strip, 1, kind, pair.f_2, strip, 0)
+        scratch.corner_1.mate_tip[0] = tip_2
+        corner_gaps(side, wheels, scratch.corner_1, strip, 1, kind, pair.f_2, strip, scratch.lookup_1, 0)
     elif kind == L.CORNER_2:
         set_corner(wheels.wheel_2, scratch.corner_2, 0, pair.f_2, tip_2)
         if side.twist_1 != 0.0:
             set_edges(side, scratch.corner_2, strip, 1, False)
-        corner_gaps(side, wheels, scratch.corner_2, strip, 1, kind, pair.f_1, strip, 0)
+        scratch.corner_2.mate_tip[0] = tip_1
+        corner_gaps(side, wheels, scratch.corner_2, strip, 1, kind, pair.f_1, strip, scratch.lookup_1, 0)
+    if kind != L.FLANKS and beyond_tip(side, scratch, strip, kind) > wheels.edge:
+        strip.gap[0] = np.inf
+        return
     if teeth:
         add_deviations(options, wheels, scratch, strip, 0, 0)

@@ -12,7 +12,6 @@ from gearmbs.contact.records import strip_at
 from gearmbs.contact.sections import flank_normals, flank_sections, gap_rates, set_sections
 from gearmbs.contact.support import GENTLE
 
-CORNER_SLACK = 0.45  # share of the corner gap's parabola taken as its lower bound
 STEEPEST = 3.0  # how much steeper the corner gap may grow than that bound
 BENDING = 4.0  # bound of the gap's bending along the face of an internal pair, as a multiple of the tilt squared
 SAME_PITCH = 1e-13  # tilt times the tangent of the base helix below which all pairs of helical flanks have one gap
@@ -215,14 +214,19 @@ def corner_growth(length, tip, rb):
 def teeth_in_reach(wheels, side, depth, wander):
     """First and last tooth of wheel 1 that may bear, counted from tooth 0.
 
-    A corner may bear beyond the path of contact as far as the parabola of its gap stays below ``depth``; ``wander`` is
-    how far the contact moves along the profile over the face.
+    A corner bears beyond the path of contact while it has a foot on the mate's involute and its gap is below ``depth``.
+    The gap grows at first, from a parabola on, and is never less than the one with which the corner passes the mate's
+    tip: up to that depth the parabola bounds the reach, beyond it the foot does. ``wander`` is how far the contact
+    moves along the profile over the face. The least depth reaches nothing beyond the path, an infinite one all feet.
     """
     tip_1, tip_2, length = wheels.wheel_1.tip_roll, wheels.wheel_2.tip_roll, side.length
     rb1, rb2, pitch = side.base_1, side.base_2, wheels.pitch
-    curve = CORNER_SLACK * min(corner_growth(length, tip_1, rb1), corner_growth(length, tip_2, rb2))
+    curve = 0.0
+    beyond = wheels.corner_reach
+    if depth < wheels.passing_gap - wheels.passing_slope * abs(side.x[L.A] - wheels.centre_distance):
+        curve = wheels.corner_share * min(corner_growth(length, tip_1, rb1), corner_growth(length, tip_2, rb2))
+        beyond = min(beyond, np.sqrt(max(depth, 0.0) / curve) + wander)
     side.curve = curve
-    beyond = min(pitch, np.sqrt(max(depth, 0.0) / curve) + wander)
     # a helix moves the contact along the profile from one end of the face to the other
     beyond += abs(side.twist_1) * (wheels.face_high - wheels.face_low + abs(side.x[L.H]))
     at = rb1 * side.start_1 + rb1 * side.alpha_0

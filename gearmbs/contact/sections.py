@@ -22,7 +22,9 @@ from gearmbs.contact.support import (
 NEWTON_STEPS = 20
 NEWTON_END = 1e-6  # a further step would change alpha by about the square of it
 LARGEST_TURN = 0.1  # rad, for the series of sine and cosine
-NEAR_BASE = 0.01  # length of roll over base radius below which an involute is too curved to bear on
+NEAR_BASE = 0.003
+"""Length of roll over base radius below which an involute is too curved to bear on, and goes on as a plane: the two are
+a sixth of its cube of the base radius apart, 5e-10 m at 0.1 m."""
 
 
 class GapCurvatures(NamedTuple):

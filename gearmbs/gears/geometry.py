@@ -7,9 +7,10 @@ one negative, and with them centre distance and line of action of the pair. One 
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, overload
+from typing import ClassVar, Literal, overload
 
 import numpy as np
 
@@ -95,6 +96,9 @@ class PairGeometry(Written):
     axial_shift: Quantity = 0.0
     backlash: Quantity = 0.0
 
+    _calls: ClassVar[int] = 4
+    """Calls from `_remark` up to the line that makes the pair."""
+
     def __post_init__(self) -> None:
         lengths = ("centre_distance_error", "pivot", "axial_shift", "backlash")
         convert_fields(self, {name: "length" for name in lengths} | {"misalignment": "angle"}, self._name)
@@ -104,6 +108,7 @@ class PairGeometry(Written):
         self._check_settings()
         self._check_distance()
         self._check_engagement()
+        self._remark()
 
     @property
     def _name(self) -> str:
@@ -164,6 +169,12 @@ class PairGeometry(Written):
             f"{name}: the wheels do not reach each other: centre distance {a * MM:.4f} mm, tip radii sum up to "
             f"{reach * MM:.4f} mm; reduce centre_distance_error",
         )
+        path, remedy = self.path_of_contact, "reduce" if self.sign > 0 else "increase"
+        require(
+            path > 0,
+            f"{name}: the wheels do not mesh: at the centre distance {a * MM:.4f} mm the tips leave {path * MM:.4f} mm "
+            f"of a path of contact; {remedy} centre_distance_error or give longer teeth",
+        )
 
     def _check_ring_size(self) -> None:
         one, two = self.driver, self.driven
@@ -209,6 +220,19 @@ class PairGeometry(Written):
                 free >= needed,
                 f"{name}: the tips of {self.driver.name} and {self.driven.name} foul where they leave each other "
                 f"(angle {free:.5f} rad, {needed:.5f} needed); use a greater difference of teeth or lower addenda",
+            )
+
+    def _remark(self) -> None:
+        """Warn of what is no mistake by itself and rarely meant."""
+        overlap = -self.normal_backlash
+        if overlap > JAM_ROUNDING:
+            farther = overlap / (2 * math.sin(self.working_pressure_angle))
+            warnings.warn(
+                f"{self._name}: negative backlash: at the centre distance {self.centre_distance * MM:.4f} mm the "
+                f"normal backlash is {-overlap * MM:.4g} mm, so that the teeth press on both flanks without load; give "
+                f"backlash {(self.backlash + overlap) * MM:.4g} mm or more, or "
+                f"{'increase' if self.sign > 0 else 'reduce'} centre_distance_error by {farther * MM:.4g} mm",
+                stacklevel=self._calls,
             )
 
     # --- signed sums --------------------------------------------------------------------------------
@@ -415,7 +439,11 @@ class PairGeometry(Written):
     @property
     def normal_backlash(self) -> float:
         """Backlash j_bn along the line of action at the working centre distance, parallel axes, m."""
-        alpha = self.working_pressure_angle
+        return self.normal_backlash_of(self.centre_distance)
+
+    def normal_backlash_of(self, centre_distance: float) -> float:
+        """Backlash along the line of action at another centre distance, m."""
+        alpha = math.acos(self.base_radius_sum / (self.sign * centre_distance))
         return 2 * (self.base_radius_sum * involute(alpha) - self.base_arc_sum) + self.driver.base_pitch
 
     @property

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from gearmbs.gears.fault import Fault
 from gearmbs.gears.geometry import PairGeometry, Placement
 from gearmbs.gears.laws import ContactLaw, FlankFriction
 from gearmbs.gears.operating_point import OperatingPoint
+from gearmbs.gears.reach import fillet_clearance
 from gearmbs.gears.show import pair_html, pair_table
 from gearmbs.gears.spec import GearSpec, require
 from gearmbs.gears.stiffness import compliance_roll_lengths, iso_mesh_stiffness, iso_single_stiffness, pair_stiffness
@@ -89,6 +92,8 @@ class GearPair(PairGeometry, Shown):
     stiffness_curve: Literal["constant", "potential-energy"] = "constant"
     faults: tuple[Fault, ...] = ()
 
+    _calls: ClassVar[int] = 5
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "faults", tuple(self.faults))
         # both check what they are made of
@@ -105,11 +110,50 @@ class GearPair(PairGeometry, Shown):
         )
         if not self.root_contact:
             self._check_clearance(0.0)
+        self._remark_on_tips()
+
+    def _remark_on_tips(self) -> None:
+        """Warn of tips that reach the mate where the contact does not look for them, once the flanks yield to the load.
+
+        At an end of the path of contact one pair more than the whole contact ratio carries, and where tips of an
+        internal pair pass each other as many as that.
+        """
+        names = f"the driver ({self.driver.name})", f"the driven wheel ({self.driven.name})"
+        whole = math.floor(self.contact_ratio)
+        if not self.tips_may_bottom:
+            yielding = self.penetration(pairs=whole + 1)
+            fouls = [
+                f"the tips of {names[k]} foul the root arcs of {names[1 - k]} by {-clearance * 1e3:.3g} mm"
+                for k in (0, 1)
+                if (clearance := fillet_clearance(self, k, yielding)) < 0.0
+            ]
+            if fouls:
+                counted = "" if self.driver.helix_angle else ", or give root_contact=True, which counts the force there"
+                warnings.warn(
+                    f"GearPair: under {shown(self.torque, 'N*m', '.4g')} the flanks yield {yielding * 1e3:.3g} mm, and "
+                    f"{', '.join(fouls)}, unseen; reduce fillet_radius there or the addendum{counted}",
+                    stacklevel=self._calls - 1,
+                )
+        if self.sign < 0:
+            needed, free = self.fouling_angles
+            passing = (free - needed) * self.driven.base_radius
+            yielding = self.penetration(pairs=max(whole, 1))
+            if passing < yielding:
+                warnings.warn(
+                    f"GearPair: the tips of {names[0]} and {names[1]} pass each other {passing * 1e3:.3g} mm apart, "
+                    f"and under {shown(self.torque, 'N*m', '.4g')} the flanks yield {yielding * 1e3:.3g} mm: they "
+                    "touch there; use lower addenda or a greater difference of teeth",
+                    stacklevel=self._calls - 1,
+                )
 
     @cached_property
     def geometry(self) -> PairGeometry:
         """The wheels and their places alone."""
-        return PairGeometry(**{item.name: getattr(self, item.name) for item in fields(PairGeometry)})
+        # as checked already, and remarked on
+        geometry = object.__new__(PairGeometry)
+        for item in fields(PairGeometry):
+            object.__setattr__(geometry, item.name, getattr(self, item.name))
+        return geometry
 
     @cached_property
     def contact_model(self) -> ContactModel:

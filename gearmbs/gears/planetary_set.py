@@ -245,7 +245,7 @@ class PlanetarySet(Written):
     def _pairs(self, one: GearSpec, two: GearSpec, thin: str, backlash: float, mesh: str) -> tuple[GearPair, ...]:
         plain = PairGeometry(one, two)
         error = self.carrier_radius - plain.nominal_centre_distance
-        own = PairGeometry(one, two, centre_distance_error=error).normal_backlash
+        own = plain.normal_backlash_of(self.carrier_radius)
         cut = max(0.0, backlash - own) / math.cos(one.transverse_pressure_angle)
         if cut > 0 and thin == "one":
             one = replace(one, thinning=one.thinning + cut)

@@ -9,7 +9,9 @@ import numpy as np
 
 from gearmbs.contact import layout as L
 from gearmbs.gears.contact_model import ContactModel
+from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
+from gearmbs.gears.reach import corner_reach
 from gearmbs.gears.spec import GearSpec
 from gearmbs.gears.stiffness import compliance_roll_lengths, pair_stiffness
 from gearmbs.gears.tooth_deviations import COMPLIANCE_POINTS, PROFILE_POINTS, ToothDeviations
@@ -23,6 +25,19 @@ LAWS = {
 FRICTIONS = {"none": L.FRICTION_NONE, "adams": L.FRICTION_ADAMS, "smooth": L.FRICTION_SMOOTH}
 END_BLEND = 1e-6
 """Length over which the ends of two faces are blended where they tie, m."""
+
+EDGE = 0.1
+"""Radius, in modules, of the edge by which a flank ends behind a tip drawn sharp: that of a usual chamfer. A corner
+that leaves its mate's tip 60 um deep gives its force up over 0.15 mm of a 2 mm module."""
+
+MOST_OF_PARABOLA = 0.45
+"""Share of a corner's parabola that bounds its gap at poses near the drawing's, where gaps grow no slower than it."""
+
+SHARE_KEPT = 0.6
+"""Of the share found for the drawing, what is counted on at other poses."""
+
+MOVED = 0.05
+"""Change of the centre distance, in modules, over which the passing gap's slope is taken."""
 
 
 def _pack_wheel(gear: GearSpec, table: np.void) -> None:
@@ -99,6 +114,7 @@ def _pack(pair: Mesh, slices: int | None) -> tuple[np.ndarray, np.ndarray, int]:
     integers["root"] = int(model.tips_may_bottom(geometry))
     _pack_wheel(first, reals["wheel_1"])
     _pack_wheel(second, reals["wheel_2"])
+    _pack_reach(geometry, reals)
     reals["pitch"] = first.base_pitch
     reals["width"] = geometry.common_face_width
     _pack_laws(model, geometry.common_face_width, math.cos(first.base_helix_angle), reals)
@@ -111,6 +127,24 @@ def _pack(pair: Mesh, slices: int | None) -> tuple[np.ndarray, np.ndarray, int]:
     gi = np.concatenate([options.view(np.int64), more_integers])
     gr = np.concatenate([table.view(np.float64), more_reals])
     return gi, gr, L.work_size(slices)
+
+
+def _pack_reach(geometry: PairGeometry, reals: np.void) -> None:
+    """Fill how far tip corners reach; see `gearmbs.contact.search.teeth_in_reach`."""
+    module = geometry.driver.module
+    # to the side on which the path of contact becomes shorter: on the other tips may come to the line of action's end
+    step = min(MOVED * module, 0.5 * (geometry.centre_distance - abs(geometry.base_radius_sum)))
+    here, moved = ([corner_reach(geometry, k, change) for k in (0, 1)] for change in (0.0, geometry.sign * step))
+    slopes = [abs(m.passing_gap - h.passing_gap) / step for h, m in zip(here, moved)]
+    longer = max(abs(m.length - h.length) for h, m in zip(here, moved))
+    reals["centre_distance"] = geometry.sign * geometry.centre_distance
+    share = min(r.bound for r in here) / min(r.curve for r in here)
+    reals["corner_share"] = min(MOST_OF_PARABOLA, SHARE_KEPT * share)
+    # other poses lengthen the reach a little; a pitch more costs nothing, since gaps decide
+    reals["corner_reach"] = max(r.length for r in here) + longer + geometry.driver.base_pitch
+    reals["passing_gap"] = min(r.passing_gap for r in here)
+    reals["passing_slope"] = 2.0 * max(slopes)
+    reals["edge"] = EDGE * module
 
 
 def _pack_laws(model: ContactModel, width: float, cosine: float, reals: np.void) -> None:

@@ -142,17 +142,32 @@ class StaticMesh:
         return math.pi + turned - driver_angle / geometry.ratio
 
     def touching_angle(self, driver_angle: float) -> float:
-        """Driven angle at which the drive flanks just touch."""
+        """Driven angle at which the drive flanks just touch.
+
+        Raises
+        ------
+        ValueError
+            If no tooth finds a mate's flank to bear on: the wheels lose each other between one pair and the next.
+        """
         side = self.rotation
         rb = self.geometry.driven.base_radius
         angle = self.ideal_angle(driver_angle)
+        gap = math.inf
         for _ in range(PHASE_STEPS):
             rows = self.gaps(driver_angle, angle)
-            gap = rows[rows[:, SIDE] == side, GAP].min()
+            gap = rows[rows[:, SIDE] == side, GAP].min(initial=math.inf)
+            if not math.isfinite(gap):
+                break
             angle += self.turning * gap / rb
             if abs(gap) < TOUCH_TOLERANCE:
-                break
-        return angle
+                return angle
+        if abs(gap) < SEARCHED_FROM:
+            return angle
+        raise ValueError(
+            f"at the driver angle {driver_angle:.6g} rad no tooth bears on its mate's flank: with a contact ratio of "
+            f"{self.geometry.contact_ratio:.3f} the wheels lose each other between two teeth; change the centre "
+            "distance or give longer teeth"
+        )
 
     def loaded_angle(self, driver_angle: float, torque: float, start: float) -> float:
         """Driven angle at which the contact carries ``torque``, by Newton's method kept inside a bracket."""

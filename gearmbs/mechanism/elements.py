@@ -48,6 +48,24 @@ class Compiled:
     scratch: int = 0
 
 
+@dataclass(frozen=True)
+class StartOverlap:
+    """A force element whose parts stand deep in each other at the start.
+
+    Attributes
+    ----------
+    text : str
+        What stands where and how deep.
+    remedy : str
+    wrench : ndarray, shape (6,)
+        Force, N, and torque about I's origin, N m, on I's body, global components; J's body takes the reaction.
+    """
+
+    text: str
+    remedy: str
+    wrench: np.ndarray
+
+
 @dataclass(eq=False)
 class ForceElement(ABC):
     """A force element with a kernel of its own. A subclass says how it is compiled.
@@ -87,6 +105,10 @@ class ForceElement(ABC):
     def states(self) -> tuple[State, ...]:
         """The element's own states."""
         return ()
+
+    def start_overlap(self) -> StartOverlap | None:
+        """Return how parts stand in each other at the start, if that is deeper than a small share of their size."""
+        return None
 
     @abstractmethod
     def compiled(self) -> Compiled:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import difflib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.quantities import quantity
 from gearmbs.mechanism.seat_check import warn_of_stiff_seats
 from gearmbs.mechanism.spin_check import warn_of_spin
+from gearmbs.mechanism.start_check import refuse_overlaps
 from gearmbs.mechanism.stops import StopAt, stop_options, with_stops
 from gearmbs.mechanism.user_functions import raised_errors
 from gearmbs.progress import time_bar
@@ -75,6 +77,7 @@ def simulate(
     consumer: Callable[[Solution], None] | None = None,
     lump: bool | None = None,
     stops: Sequence[StopAt] = (),
+    continued: bool = False,
     **options,
 ) -> Solution:
     """Integrate a mechanism and return its motion and forces.
@@ -119,6 +122,9 @@ def simulate(
     stops : sequence of StopAt
         The run ends where a state of the mechanism passes a value; times are in the result's ``t_events``, one array a
         stop. Not with IDA, and not with ``lump``.
+    continued : bool
+        Whether the start is a state in which an earlier run ended: teeth may then be deep in an impact, which else is
+        refused.
     **options
         Handed to the integrator.
 
@@ -130,7 +136,8 @@ def simulate(
     Raises
     ------
     ModelError
-        If the model or an option is wrong, or the mechanism cannot be assembled; if a function of the user fails, its
+        If the model or an option is wrong, or the mechanism cannot be assembled; if teeth start deeper in each other
+        than the loads press them; if a function of the user fails, its
         ``solution`` has what was computed until then.
     """
     if consumer is not None and not every_step:
@@ -140,6 +147,8 @@ def simulate(
     name = _checked(integrator, tol, options)
     asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
     with uncollected(), raised_errors(mechanism.functions.values()):
+        if not continued:
+            refuse_overlaps(mechanism.elements, lambda names: _without(mechanism, names).compile(t_start))
         system, problem, members, lumping = _prepared(mechanism, t_start, lump, formulation, rate_scale)
     if stops:
         if name == "IDA" or lump:
@@ -165,6 +174,13 @@ def simulate(
         return _closed(stream, solution, name)
     warn_of_spin(mechanism.bodies, solution)
     return solution
+
+
+def _without(mechanism: Mechanism, names: Collection[str]) -> Mechanism:
+    """Return the mechanism without some of its force elements."""
+    part = copy.copy(mechanism)
+    part.elements = {name: element for name, element in mechanism.elements.items() if name not in names}
+    return part
 
 
 def _closed(stream: Stream, solution: Solution, name: str) -> Solution:
@@ -274,4 +290,5 @@ SETTINGS = (
     "consumer",
     "lump",
     "stops",
+    "continued",
 )

@@ -140,6 +140,18 @@ def test_a_gear_pair_is_the_very_pair_again(name, tmp_path):
     np.testing.assert_allclose(b.load("mesh")[0], a.load("mesh")[0], atol=1e-4 * force)
 
 
+def test_gears_of_a_deck_that_start_deep_in_each_other_are_refused(tmp_path):
+    m = rig(PAIRS["plain"])
+    wheel = m.bodies["wheel 2"]
+    turn = 0.4e-3 / PAIRS["plain"].driven.base_radius
+    wheel.orientation = wheel.orientation @ np.array(
+        [[np.cos(turn), -np.sin(turn), 0.0], [np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]]
+    )
+    write_deck(m, tmp_path / "g.adm", gears="solids")
+    with pytest.raises(ModelError, match=r"gear contact 'mesh': at the start its teeth are 0\.4"):
+        read_deck(tmp_path / "g.adm").to_mechanism().simulate(1e-4)
+
+
 def test_the_meshes_touch_where_the_teeth_do(tmp_path):
     """Without the comments the deck is what other programs have: two meshes that press each other apart."""
     m = rig(PAIRS["plain"])

@@ -301,7 +301,7 @@ CORNERS = {
     "ring": GearPair(
         GearSpec(23, "3 mm"),
         GearSpec.ring(70, "3 mm", addendum="2 mm"),
-        centre_distance_error="-3.5 mm",
+        centre_distance_error="-3 mm",
         backlash="0.2 mm",
         contact=LINEAR,
     ),

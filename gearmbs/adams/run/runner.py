@@ -453,7 +453,13 @@ def _solve(
     options.setdefault("first_step", FIRST_STEP * output_step)
     options.setdefault("max_step", output_step)
     solution = model.mechanism.simulate(
-        float(times[-1]), t_start=session.time * scale, t_eval=times, progress=progress, stops=stops, **options
+        float(times[-1]),
+        t_start=session.time * scale,
+        t_eval=times,
+        progress=progress,
+        stops=stops,
+        continued=session.time > 0.0,
+        **options,
     )
     return solution, None
 
