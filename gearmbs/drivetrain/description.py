@@ -18,7 +18,8 @@ Each kind of part is a table of named tables::
     driver = "z1"
     driven = "z2"
     backlash = "0.1 mm"
-    contact = { kind = "impact", stiffness = "2.9852e5 N/mm^1.3" }
+    stiffness = "iso"
+    damping_ratio = 0.05
 
     [[meshes."stage 1".faults]]
     kind = "broken tooth"
@@ -255,7 +256,7 @@ def _wheel(where: str, name: str, given: dict[str, Any]) -> Wheel:
 
 def _mesh(where: str, name: str, given: dict[str, Any], fault: FaultReader | None) -> GearMesh:
     own: dict[str, Any] = {key: given.pop(key) for key in ("driver", "driven", "direction", "phase") if key in given}
-    _check_keys(where, given, ["driver", "driven", "direction", "phase", *PAIR_KEYS, "stiffness"])
+    _check_keys(where, given, ["driver", "driven", "direction", "phase", *PAIR_KEYS, "stiffness", "damping_ratio"])
     if "faults" in given:
         require(fault is not None, f"{where}: faults cannot be read here; run the file with gearmbs run")
         assert fault is not None

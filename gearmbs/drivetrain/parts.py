@@ -11,6 +11,7 @@ import numpy as np
 
 from gearmbs.drivetrain.errors import require, told_of
 from gearmbs.drivetrain.part import Part
+from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.laws import ContactLaw, FlankFriction
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec
@@ -152,9 +153,18 @@ class GearMesh(Part):
         angle. Two meshes whose phases differ by a half have their first mesh harmonics in opposition.
     settings : mapping
         Keywords of `gearmbs.gears.GearPair`: backlash, contact, friction, misalignment, centre_distance_error, faults,
-        slices, ...; ``contact`` may be a table with ``kind``, and ``stiffness`` "iso" or "potential-energy".
+        slices, ...; ``contact`` may be a table with ``kind``. Without ``contact`` the teeth have the stiffness of their
+        own wheels and a damping ratio: ``stiffness`` ("iso", "iso single", "potential-energy" or N/m of a tooth pair)
+        and ``damping_ratio``, see `gearmbs.gears.GearPair.with_own_stiffness`. The torque is that of the drivetrain.
     pair : type, optional
         What is made of the two wheels, ``pair(driver, driven, **settings)``; default `GearPair`.
+        `gearmbs.gears.IdealMesh`: one spring along the line of action, ``stiffness`` then of the whole mesh (default
+        c_gamma), ``error`` and ``stiffness_curve`` its own, and ``ideal_backlash`` whether teeth can part.
+
+    Raises
+    ------
+    DrivetrainError
+        For ``contact`` beside ``stiffness`` or ``damping_ratio``, and for ``torque``, which follows from the loads.
     """
 
     title: ClassVar[str] = "mesh"
@@ -171,21 +181,43 @@ class GearMesh(Part):
         """Return the pair of the two wheels for a sense of the driver and a torque on the driven wheel (N m)."""
         with told_of(self.label):
             given = dict(self.settings)
+            for name in ("torque", "input_torque", "rotation"):
+                require(name not in given, f"{self.label}: {name} follows from the drives and loads; leave it out")
             if "contact" in given:
                 given["contact"] = contact_law(given["contact"])
             if "friction" in given:
                 given["friction"] = flank_friction(given["friction"])
-            stiffness = given.pop("stiffness", None)
-            pair = (self.pair or GearPair)(driver, driven, rotation=rotation, torque=abs(torque), **given)
-            if stiffness == "iso":
-                return pair.with_iso_stiffness(damping=given.get("damping", 0.0))
-            if stiffness == "potential-energy":
-                return pair.with_potential_energy_stiffness()
-            require(
-                stiffness is None, f"{self.label}: stiffness is {stiffness!r}; choose 'iso' or 'potential-energy', "
-                "or give contact"
-            )  # fmt: skip
-            return pair
+            own = {key: given.pop(key) for key in ("stiffness", "damping_ratio") if given.get(key) is not None}
+            for key in own:
+                require(
+                    "contact" not in given,
+                    f"{self.label}: {key} is {own[key]!r} beside contact, which has its own; leave one of them out",
+                )
+            operation = {"rotation": rotation, "torque": abs(torque)}
+            kind = self.pair or GearPair
+            if isinstance(kind, type) and issubclass(kind, IdealMesh):
+                return _ideal(kind, driver, driven, {**given, **operation}, own)
+            if not (isinstance(kind, type) and issubclass(kind, GearPair)):
+                return kind(driver, driven, **operation, **given, **own)
+            pair = kind(driver, driven, **operation, **given)
+            if "contact" in given:
+                return pair
+            varies = given.get("stiffness_curve") == "potential-energy"
+            return pair.with_own_stiffness(
+                own.get("stiffness", "potential-energy" if varies else "iso"), own.get("damping_ratio")
+            )
+
+
+def _ideal(kind: Any, driver: GearSpec, driven: GearSpec, given: dict[str, Any], own: dict[str, Any]) -> IdealMesh:
+    """Return the ideal mesh of two wheels: its stiffness and damping are those of the whole mesh, along the normal."""
+    parting = bool(given.pop("ideal_backlash", False))
+    curves = {key: given.pop(key) for key in ("stiffness_curve", "error") if key in given}
+    pair = GearPair(driver, driven, **given)
+    stiffness, ratio = own.get("stiffness", "iso"), own.get("damping_ratio")
+    if stiffness not in ("iso", "iso single", "potential-energy"):
+        return kind.with_damping_ratio(pair, stiffness, ratio, backlash=parting, **curves)
+    law = pair.with_own_stiffness(stiffness)
+    return kind.with_damping_ratio(pair, law.mean_mesh_stiffness, ratio, backlash=parting, **curves)
 
 
 def contact_law(value: Any) -> ContactLaw:
