@@ -164,9 +164,9 @@ def read_description(path: str | Path, fault: FaultReader | None = None) -> Desc
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise DrivetrainError(f"{path}: cannot be read ({error.strerror or error})") from error
+        raise DrivetrainError(f"{path}: cannot be read ({error.strerror or error})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DrivetrainError(f"{path}: not a valid TOML file ({error})") from error
+        raise DrivetrainError(f"{path}: not a valid TOML file ({error})") from None
     data.setdefault("name", path.stem)
     return make_description(data, str(path), fault)
 
@@ -178,7 +178,7 @@ def make_description(
     try:
         return _made(data, fault)
     except ValueError as error:
-        raise DrivetrainError(f"{source}: {error}") from error
+        raise DrivetrainError(f"{source}: {error}") from None
 
 
 def _made(data: Mapping[str, Any], fault: FaultReader | None) -> Description:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -17,6 +17,9 @@ from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec
 from gearmbs.units import Quantity
 
+DIAMETER = 0.030
+"""Of a shaft that gives none, m: the usual one of a gearbox of this size, as in the bench of Fig. 2."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Shaft(Part):
@@ -26,10 +29,15 @@ class Shaft(Part):
 
     Parameters
     ----------
-    length, radius : float or str
-        m. A solid cylinder.
-    sections : sequence of (length, radius), optional
-        Instead: cylinders from left to right, m.
+    length : float or str
+        m.
+    diameter : float or str, optional
+        Of a solid cylinder, m; default 30 mm.
+    radius : float or str, optional
+        Instead of ``diameter``, m.
+    sections : sequence, optional
+        Instead: cylinders from left to right, as tables ``{"length": ..., "diameter": ...}`` (or ``radius``), as
+        `gearmbs.flexible.ShaftSection` without bore, or as pairs (length, radius), m.
     density : float or str
         kg/m^3.
     mass, inertia : float or str, optional
@@ -47,31 +55,32 @@ class Shaft(Part):
 
     title: ClassVar[str] = "shaft"
     units: ClassVar[Mapping[str, str]] = {
-        "length": "length", "radius": "length", "density": "density", "mass": "mass", "inertia": "inertia",
+        "length": "length", "radius": "length", "diameter": "length", "density": "density", "mass": "mass", "inertia": "inertia",
         "angle": "angle", "position": "length",
     }  # fmt: skip
-    positive: ClassVar[tuple[str, ...]] = ("length", "radius", "density", "mass", "inertia")
+    positive: ClassVar[tuple[str, ...]] = ("length", "radius", "diameter", "density", "mass", "inertia")
 
     length: Quantity = None
-    radius: Quantity = 0.015
-    sections: tuple[tuple[Quantity, Quantity], ...] | None = None
+    radius: Quantity = None
+    sections: Sequence[Any] | None = None
     density: Quantity = 7850.0
     mass: Quantity = None
     inertia: Quantity = None
     position: tuple[Quantity, Quantity, Quantity] | None = None
     angle: Quantity = 0.0
+    diameter: Quantity = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require(
+            self.radius is None or self.diameter is None,
+            f"{self.label}: radius is {self.radius} m and diameter {self.diameter} m; give one of them",
+        )
         if self.sections is not None:
-            require(self.length is None, f"{self.label}: give length or sections, not both")
-            require(len(self.sections) > 0, f"{self.label}: sections is empty; give pairs of length and radius")
-            cut = tuple(self._in_si("sections", pair, "length") for pair in self.sections)
-            for pair in cut:
-                require(
-                    len(pair) == 2 and min(pair) > 0.0,
-                    f"{self.label}: sections has {pair}; give pairs of a positive length and radius",
-                )
+            for name in ("length", "radius", "diameter"):
+                require(getattr(self, name) is None, f"{self.label}: give {name} or sections, not both")
+            require(len(self.sections) > 0, f"{self.label}: sections is empty; give lengths and diameters")
+            cut = tuple(self._section(one) for one in self.sections)
             object.__setattr__(self, "sections", cut)
             object.__setattr__(self, "length", math.fsum(pair[0] for pair in cut))
         elif self.length is None:
@@ -79,10 +88,35 @@ class Shaft(Part):
         if self.position is not None:
             require(len(self.position) == 3, f"{self.label}: position is {self.position}; give three lengths")
 
+    def _section(self, given: Any) -> tuple[float, float]:
+        """Return length and radius of a section, m."""
+        if hasattr(given, "outer"):
+            plain = given.outer == given.outer_end and given.inner == given.inner_end == 0.0
+            require(plain, f"{self.label}: sections has {given!r}; a rigid shaft has solid cylinders without bore or cone")
+            given = {"length": given.length, "diameter": given.outer}
+        if isinstance(given, Mapping):
+            known = set(given) in ({"length", "diameter"}, {"length", "radius"})
+            require(known, f"{self.label}: sections has {dict(given)}; give length and diameter, or length and radius")
+            measured = {key: self._in_si(f"sections.{key}", value, "length") for key, value in given.items()}
+            found = measured["length"], measured.get("radius", 0.5 * measured.get("diameter", 0.0))
+        else:
+            found = self._in_si("sections", tuple(given), "length")
+        require(
+            len(found) == 2 and min(found) > 0.0,
+            f"{self.label}: sections has {found}; give pairs of a positive length and radius, or tables of length and "
+            "diameter",
+        )
+        return found
+
     @property
     def cylinders(self) -> tuple[tuple[float, float], ...]:
         """Lengths and radii from left to right, m."""
-        return self.sections if self.sections is not None else ((self.length, self.radius),)
+        if self.sections is not None:
+            return tuple(self.sections)
+        radius = self.radius
+        if radius is None:
+            radius = DIAMETER / 2 if self.diameter is None else 0.5 * self.diameter
+        return ((self.length, radius),)
 
     def body(self) -> tuple[float, float, float, float]:
         """Return mass (kg), place of the centre of mass along the axis (m), moments along and across the axis."""

@@ -302,6 +302,13 @@ class PlanetarySet(Written):
         stiffness = self.ideal[0 if which == "sun" else 1]
         return tuple(IdealMesh(p, stiffness, self.ideal_damping, self.ideal_backlash) for p in pairs)
 
+    def law(self, which: str) -> str:
+        """Law, stiffness and damping of the meshes with the "sun" or the "ring", in words."""
+        mesh = self.meshes(which)[0]
+        if isinstance(mesh, IdealMesh):
+            return f"ideal, {1e-3 * mesh.stiffness:.5g} N/mm a mesh, damping {1e-3 * mesh.damping:.4g} N s/mm"
+        return str(mesh.contact)
+
     # --- assembly and phases --------------------------------------------------------------------------
 
     @property
