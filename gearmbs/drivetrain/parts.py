@@ -55,7 +55,8 @@ class Shaft(Part):
 
     title: ClassVar[str] = "shaft"
     units: ClassVar[Mapping[str, str]] = {
-        "length": "length", "radius": "length", "diameter": "length", "density": "density", "mass": "mass", "inertia": "inertia",
+        "length": "length", "radius": "length", "diameter": "length", "density": "density", "mass": "mass",
+        "inertia": "inertia",
         "angle": "angle", "position": "length",
     }  # fmt: skip
     positive: ClassVar[tuple[str, ...]] = ("length", "radius", "diameter", "density", "mass", "inertia")
@@ -92,7 +93,9 @@ class Shaft(Part):
         """Return length and radius of a section, m."""
         if hasattr(given, "outer"):
             plain = given.outer == given.outer_end and given.inner == given.inner_end == 0.0
-            require(plain, f"{self.label}: sections has {given!r}; a rigid shaft has solid cylinders without bore or cone")
+            require(
+                plain, f"{self.label}: sections has {given!r}; a rigid shaft has solid cylinders without bore or cone"
+            )
             given = {"length": given.length, "diameter": given.outer}
         if isinstance(given, Mapping):
             known = set(given) in ({"length", "diameter"}, {"length", "radius"})

@@ -257,8 +257,8 @@ class MeshDynamics(NamedTuple):
     stiffness, damping : float
         Means over a mesh cycle, in the transverse plane along the line of action, N/m and N s/m.
     mass : float
-        Of both shafts with their wheels there, 1 / (r_b1^2 / J_1 + r_b2^2 / J_2), kg; a shaft of prescribed speed counts
-        as held.
+        Of both shafts with their wheels there, 1 / (r_b1^2 / J_1 + r_b2^2 / J_2), kg; a shaft of prescribed speed
+        counts as held.
     """
 
     law: str
@@ -288,7 +288,9 @@ def mesh_dynamics(train: Drivetrain) -> dict[str, MeshDynamics]:
         spring = _mesh_spring(train, mesh.name, names)
         softness = [arm**2 / inertias[k] for k, arm in zip(spring.shafts, spring.levers) if names[k] not in held]
         mass = 1.0 / sum(softness) if softness else 0.0
-        law = str(train.pairs[mesh.name].contact_model.law)
+        pair = train.pairs[mesh.name]
+        # an ideal mesh has words of its own
+        law = str(getattr(pair, "law", None) or pair.contact_model.law)
         out[mesh.name] = MeshDynamics(law, float(spring.stiffness), float(spring.damping), float(mass))
     return out
 
@@ -304,9 +306,9 @@ def warn_of_overdamped_meshes(train: Drivetrain, stacklevel: int = 3) -> None:
     for name, found in train.mesh_dynamics.items():
         if found.damping_ratio > 1.0:
             warnings.warn(
-                f"mesh '{name}' is damped {found.damping_ratio:.3g} times critically by its law ({found.law}): its mode at "
-                f"{found.frequency:.4g} Hz does not oscillate, and is missing in modes and Campbell diagrams; leave contact "
-                "out for the stiffness of the wheels and a damping ratio, or give less damping",
+                f"mesh '{name}' is damped {found.damping_ratio:.3g} times critically by its law ({found.law}): its mode "
+                f"at {found.frequency:.4g} Hz does not oscillate, and is missing in modes and Campbell diagrams; leave "
+                "contact out for the stiffness of the wheels and a damping ratio, or give less damping",
                 stacklevel=stacklevel,
             )
 

@@ -144,6 +144,13 @@ class IdealMesh(Written):
         return cls(pair, stiffness, 2.0 * zeta * math.sqrt(along * pair.reduced_mass) / cosine, **others)
 
     @property
+    def law(self) -> str:
+        """Stiffness and damping in words, in the units of a drawing."""
+        damping = f"damping {1e-3 * self.damping:.4g} N s/mm" if self.damping else "no damping"
+        parting = "" if self.backlash else ", teeth do not part"
+        return f"ideal, {1e-3 * self.stiffness:.5g} N/mm the mesh, {damping}{parting}"
+
+    @property
     def contact_model(self) -> ContactModel:
         """The mesh as that of `contact_ratio` tooth pairs: what analyses of mean stiffness and damping take."""
         share = max(1.0, self.geometry.contact_ratio)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import InitVar, dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -19,7 +19,7 @@ from gearmbs.gears.show import pair_html, pair_table
 from gearmbs.gears.spec import GearSpec, require
 from gearmbs.gears.stiffness import compliance_roll_lengths, iso_mesh_stiffness, iso_single_stiffness, pair_stiffness
 from gearmbs.gears.tables import pack
-from gearmbs.units import Quantity, shown
+from gearmbs.units import Quantity, shown, to_si
 
 if TYPE_CHECKING:
     from gearmbs.gears.contact_element import GearContact
@@ -53,8 +53,11 @@ class GearPair(PairGeometry, Shown):
     friction : FlankFriction
     rotation : {1, -1}
         Sense in which the driver turns about +z.
-    torque : float or str
-        Load torque on the driven wheel, N m, of the static analyses and, if it is given none, of the test stand.
+    torque : float or str, optional
+        Load torque on the **driven** wheel, N m, of the static analyses and, if it is given none, of the test stand;
+        default 100 N m.
+    input_torque : float or str, optional
+        Instead, the torque on the driver, N m: ``torque`` is then z_2 / z_1 of it, as without losses.
     slices : int, optional
         Slices along the face; default by `ContactModel.face_slices`: 1 for parallel axes without axial shift, 11 for
         others, 41 when faults vary along the face.
@@ -83,14 +86,26 @@ class GearPair(PairGeometry, Shown):
     contact: ContactLaw = field(default_factory=ContactLaw.impact)
     friction: FlankFriction = field(default_factory=FlankFriction)
     rotation: Literal[1, -1] = 1
-    torque: Quantity = 100.0
+    torque: Quantity = None
     slices: int | None = None
     load: Literal["slices", "adams"] = "slices"
     root_contact: bool | None = None
     stiffness_curve: Literal["constant", "potential-energy"] = "constant"
     faults: tuple[Fault, ...] = ()
+    input_torque: InitVar[Quantity] = None
 
-    def __post_init__(self) -> None:
+    # mypy may lose InitVar among modules that import each other for types
+    def __post_init__(self, input_torque: Quantity) -> None:  # type: ignore[override]
+        if input_torque is not None:
+            require(
+                self.torque is None,
+                f"GearPair.torque is {self.torque!r}, on the driven wheel, and input_torque {input_torque!r}, on the "
+                "driver; give one of them",
+            )
+            given = to_si(input_torque, "torque", "GearPair.input_torque")
+            object.__setattr__(self, "torque", given * self.driven.teeth / self.driver.teeth)
+        elif self.torque is None:
+            object.__setattr__(self, "torque", OperatingPoint.torque)
         object.__setattr__(self, "faults", tuple(self.faults))
         # both check what they are made of
         point, _ = self.operating_point, self.contact_model
@@ -144,7 +159,9 @@ class GearPair(PairGeometry, Shown):
         return cls(**changes)
 
     def with_changes(self, **changes: Any) -> GearPair:
-        """A copy with some fields changed."""
+        """A copy with some fields changed, or with another ``input_torque``."""
+        if changes.get("input_torque") is not None:
+            changes.setdefault("torque", None)
         return replace(self, **changes)
 
     def with_faults(self, *faults: Fault) -> GearPair:
@@ -237,9 +254,7 @@ class GearPair(PairGeometry, Shown):
             depth = RATIO_DEPTH if depth is None else depth
         return replace(self, contact=ContactLaw.linear(stiffness, damping, depth), stiffness_curve="constant")
 
-    def with_own_stiffness(
-        self, stiffness: Quantity = "iso", damping_ratio: float | None = None
-    ) -> GearPair:
+    def with_own_stiffness(self, stiffness: Quantity = "iso", damping_ratio: float | None = None) -> GearPair:
         """A copy with the stiffness of its own wheels and a damping ratio: the default of drivetrains.
 
         Parameters
@@ -269,14 +284,14 @@ class GearPair(PairGeometry, Shown):
         is_number = not isinstance(stiffness, str) or stiffness.strip()[:1].isdigit()
         require(
             is_number,
-            f"stiffness is {stiffness!r}; choose 'iso', 'iso single' or 'potential-energy', give a stiffness of a tooth "
-            "pair in N/m, or give contact",
+            f"stiffness is {stiffness!r}; choose 'iso', 'iso single' or 'potential-energy', give that of a tooth pair "
+            "in N/m, or give contact",
         )
         return self.with_linear_stiffness(stiffness, damping_ratio=ratio)
 
     @property
     def _pairs_in_mesh(self) -> float:
-        """Mean number of tooth pairs, in the stiffness of the mesh in the transverse plane: epsilon_alpha cos beta_b."""
+        """Stiffness of the mesh in the transverse plane over that of a tooth pair: epsilon_alpha cos beta_b."""
         return max(1.0, self.contact_ratio) * math.cos(self.driver.base_helix_angle)
 
     @property
@@ -375,9 +390,13 @@ class GearPair(PairGeometry, Shown):
             f"module {shown(one.module, 'mm', '.4g')}",
             f"centre distance {1e3 * self.centre_distance:.4f} mm",
             f"backlash {self._backlash_shown()}",
+            f"{shown(self.torque, 'N m', '.6g')} on the driven wheel",
         ]
         if self.misalignment:
             parts.append(f"{self.plane} {shown(self.misalignment, 'deg', '.4g')}")
+        parts += [str(self.contact)]
+        if self.stiffness_curve != "constant":
+            parts.append(f"stiffness by {self.stiffness_curve} along the path")
         parts += [fault.label for fault in self.faults]
         return f"GearPair({', '.join(parts)})"
 

@@ -305,9 +305,7 @@ class PlanetarySet(Written):
     def law(self, which: str) -> str:
         """Law, stiffness and damping of the meshes with the "sun" or the "ring", in words."""
         mesh = self.meshes(which)[0]
-        if isinstance(mesh, IdealMesh):
-            return f"ideal, {1e-3 * mesh.stiffness:.5g} N/mm a mesh, damping {1e-3 * mesh.damping:.4g} N s/mm"
-        return str(mesh.contact)
+        return mesh.law if isinstance(mesh, IdealMesh) else str(mesh.contact)
 
     # --- assembly and phases --------------------------------------------------------------------------
 
