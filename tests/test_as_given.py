@@ -91,7 +91,7 @@ def test_wheels_and_pairs_show_the_units_they_were_given_in():
     for text in ("30 arcmin skew", "100 um", "0.2 kN m", "<td>1 mm</td>", "3.0645 mm"):
         assert text in page
     # what other settings have changed is not as it was given
-    assert "100 um" not in repr(GearPair.paper(backlash="100 um", centre_distance_error="3 mm"))
+    assert "backlash 100 um" not in repr(GearPair.paper(backlash="100 um", centre_distance_error="3 mm"))
 
 
 def test_a_mechanism_shows_the_units_it_was_given():

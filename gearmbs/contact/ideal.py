@@ -102,8 +102,11 @@ def side_spring(options, wheels, own, scratch, diagnostics, sign, want):
     diagnostics[ENERGY] += energy * share
     diagnostics[POWER] += (force - elastic) * rate
     diagnostics[FORCE] += force
-    if linear or depth > abs(diagnostics[DEFLECTION]):
+    if linear:
         diagnostics[DEFLECTION] = depth
+    elif depth > abs(diagnostics[DEFLECTION]):
+        # negative on the coast flank
+        diagnostics[DEFLECTION] = sign * depth
     add_spring(sums, strip, lookup, (cosine, per), (error_u, error_uu), (force, by_depth, by_rate), want)
     add_parametric(own, sums, strip, lookup, (cosine, per), (error_u, share_u, share_uu), depth, want)
     if want != 0:

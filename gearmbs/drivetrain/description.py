@@ -18,7 +18,8 @@ Each kind of part is a table of named tables::
     driver = "z1"
     driven = "z2"
     backlash = "0.1 mm"
-    contact = { kind = "impact", stiffness = "2.9852e5 N/mm^1.3" }
+    stiffness = "iso"
+    damping_ratio = 0.05
 
     [[meshes."stage 1".faults]]
     kind = "broken tooth"
@@ -163,9 +164,9 @@ def read_description(path: str | Path, fault: FaultReader | None = None) -> Desc
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise DrivetrainError(f"{path}: cannot be read ({error.strerror or error})") from error
+        raise DrivetrainError(f"{path}: cannot be read ({error.strerror or error})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DrivetrainError(f"{path}: not a valid TOML file ({error})") from error
+        raise DrivetrainError(f"{path}: not a valid TOML file ({error})") from None
     data.setdefault("name", path.stem)
     return make_description(data, str(path), fault)
 
@@ -177,7 +178,7 @@ def make_description(
     try:
         return _made(data, fault)
     except ValueError as error:
-        raise DrivetrainError(f"{source}: {error}") from error
+        raise DrivetrainError(f"{source}: {error}") from None
 
 
 def _made(data: Mapping[str, Any], fault: FaultReader | None) -> Description:
@@ -255,7 +256,7 @@ def _wheel(where: str, name: str, given: dict[str, Any]) -> Wheel:
 
 def _mesh(where: str, name: str, given: dict[str, Any], fault: FaultReader | None) -> GearMesh:
     own: dict[str, Any] = {key: given.pop(key) for key in ("driver", "driven", "direction", "phase") if key in given}
-    _check_keys(where, given, ["driver", "driven", "direction", "phase", *PAIR_KEYS, "stiffness"])
+    _check_keys(where, given, ["driver", "driven", "direction", "phase", *PAIR_KEYS, "stiffness", "damping_ratio"])
     if "faults" in given:
         require(fault is not None, f"{where}: faults cannot be read here; run the file with gearmbs run")
         assert fault is not None

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from gearmbs.drivetrain.kinematics import KinematicTable
     from gearmbs.drivetrain.placement import Layout
     from gearmbs.drivetrain.power import PowerFlow
-    from gearmbs.drivetrain.torsional import TorsionalModel
+    from gearmbs.drivetrain.torsional import MeshDynamics, TorsionalModel
     from gearmbs.gears.spec import GearSpec
     from gearmbs.mechanism.mechanism import Mechanism
 
@@ -216,10 +216,24 @@ class Drivetrain:
         return KinematicTable(self)
 
     def torsional(self) -> TorsionalModel:
-        """Return the chain of inertias and torsional springs of this drivetrain: rigid bodies that only turn."""
-        from gearmbs.drivetrain.torsional import torsional_model
+        """Return the chain of inertias and torsional springs of this drivetrain: rigid bodies that only turn.
 
+        Warns
+        -----
+        UserWarning
+            Of meshes that are damped above critical.
+        """
+        from gearmbs.drivetrain.torsional import torsional_model, warn_of_overdamped_meshes
+
+        warn_of_overdamped_meshes(self)
         return torsional_model(self)
+
+    @cached_property
+    def mesh_dynamics(self) -> dict[str, MeshDynamics]:
+        """Contact law, mean stiffness and damping, reduced mass, frequency and damping ratio of each mesh, by name."""
+        from gearmbs.drivetrain.torsional import mesh_dynamics
+
+        return mesh_dynamics(self)
 
     def build(self) -> Mechanism:
         """Return the drivetrain as an ordinary mechanism, to which anything may be added.
@@ -262,11 +276,17 @@ class Drivetrain:
 
     def _repr_html_(self) -> str:
         parts = (part for group in GROUPS for part in getattr(self, group))
-        return parts_html(self.name, parts) + self.kinematics.to_html()
+        laws = {name: found.law for name, found in self.mesh_dynamics.items()}
+        return parts_html(self.name, parts, laws) + self.kinematics.to_html()
 
     def __repr__(self) -> str:
-        counts = ", ".join(f"{len(getattr(self, g))} {g}" for g in GROUPS if getattr(self, g))
-        return f"Drivetrain({self.name!r}: {counts})"
+        counts = [(len(getattr(self, g)), g) for g in GROUPS if getattr(self, g)]
+        said = [f"{n} {KINDS[g].title if n == 1 else g}" for n, g in counts]
+        by_law: dict[str, list[str]] = {}
+        for name, found in self.mesh_dynamics.items():
+            by_law.setdefault(found.law, []).append(name)
+        said += [f"{', '.join(names)}: {law}" for law, names in by_law.items()]
+        return f"Drivetrain({self.name!r}: {'; '.join([', '.join(said[: len(counts)]), *said[len(counts) :]])})"
 
 
 KINDS: dict[str, type[Part]] = {

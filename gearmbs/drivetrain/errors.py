@@ -19,7 +19,7 @@ def told_of(part: str) -> Iterator[None]:
         raise
     except (TypeError, ValueError) as error:
         text = str(error).replace("\n", " ")
-        raise DrivetrainError(text if text.startswith(part) else f"{part}: {text}") from error
+        raise DrivetrainError(text if text.startswith(part) else f"{part}: {text}") from None
 
 
 def require(condition: bool, message: str) -> None:

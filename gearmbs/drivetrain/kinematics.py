@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from gearmbs.drivetrain.errors import DrivetrainError
 from gearmbs.drivetrain.parts import GearMesh
+from gearmbs.units import Quantity, to_si
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -120,9 +121,40 @@ class KinematicTable:
         table["multiple"] = table.frequency / reference if reference else float("nan")
         return table
 
-    def nearest(self, frequency: float, harmonics: int = 3, order: int = 2) -> tuple[str, float]:
-        """Return what a line of a spectrum comes from: its name, and how far it is from there, Hz."""
-        known = self.known_lines(harmonics, order)
+    def nearest(self, frequency: Quantity, harmonics: int | None = None, order: int = 2) -> tuple[str, float]:
+        """Return what a line of a spectrum comes from: its name, and how far it is from there, Hz.
+
+        Parameters
+        ----------
+        frequency : float or str
+            Hz.
+        harmonics : int, optional
+            Highest harmonic of all lines; default: of meshes, bearings and pumps as many as reach the frequency, of
+            shafts and hunting teeth, whose harmonics lie close everywhere, three.
+        order : int
+            Sidebands on either side of each mesh harmonic.
+
+        Raises
+        ------
+        DrivetrainError
+            For a frequency that is not finite, and where nothing turns.
+        """
+        frequency = to_si(frequency, "frequency", "nearest: frequency")
+        if not math.isfinite(frequency):
+            raise DrivetrainError(f"nearest: frequency is {frequency} Hz; give a finite one")
+        known = self.known_lines(harmonics or 3, order) if len(self.lines) else {}
+        if harmonics is None:
+            for row in self.lines.itertuples():
+                line = float(row.frequency)  # type: ignore[arg-type]
+                if row.kind == "shaft" or row.name == "hunting tooth" or line <= 0.0:
+                    continue
+                # the harmonics on either side; sidebands reach as far as their order
+                for h in {max(1, math.floor(frequency / line)), max(1, math.ceil(frequency / line))}:
+                    known[f"{h} x {row.name} of {row.of}"] = h * line
+                    if row.name == "GMF":
+                        known |= self._sidebands(str(row.of), h, order)
+        if not any(known.values()):
+            raise DrivetrainError(f"drivetrain '{self.train.name}': nothing turns, so that it has no lines")
         name = min(known, key=lambda one: abs(known[one] - frequency))
         return name, frequency - known[name]
 
@@ -140,10 +172,19 @@ class KinematicTable:
                 known.setdefault(part, {})[name] = h * float(row.frequency)  # type: ignore[arg-type]
             if row.name == "GMF":
                 sidebands = known.setdefault(f"sidebands of {row.of}", {})
-                for side in self.sidebands(str(row.of), harmonics, order).itertuples():
-                    name = f"{side.harmonic} x GMF of {row.of} {side.order:+d} x {side.shaft}"
-                    sidebands[name] = float(side.frequency)  # type: ignore[arg-type]
+                for h in range(1, harmonics + 1):
+                    sidebands |= self._sidebands(str(row.of), h, order)
         return known
+
+    def _sidebands(self, mesh: str, harmonic: int, order: int) -> dict[str, float]:
+        """Return the sidebands of one mesh harmonic, Hz, by name."""
+        gmf = harmonic * self.mesh_frequency(mesh)
+        return {
+            f"{harmonic} x GMF of {mesh} {k:+d} x {wheel.shaft}": gmf + k * self.shaft_frequency(wheel.shaft)
+            for wheel in self.train.wheels_of(mesh)
+            for k in range(-order, order + 1)
+            if k
+        }
 
     def for_analysis(self, mesh: str | GearMesh) -> dict[str, object]:
         """Return ``speed`` (rad/s) and ``teeth`` of a mesh, as `gearmbs.signals.make_signal` takes them."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -11,10 +11,14 @@ import numpy as np
 
 from gearmbs.drivetrain.errors import require, told_of
 from gearmbs.drivetrain.part import Part
+from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.laws import ContactLaw, FlankFriction
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec
 from gearmbs.units import Quantity
+
+DIAMETER = 0.030
+"""Of a shaft that gives none, m: the usual one of a gearbox of this size, as in the bench of Fig. 2."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,10 +29,15 @@ class Shaft(Part):
 
     Parameters
     ----------
-    length, radius : float or str
-        m. A solid cylinder.
-    sections : sequence of (length, radius), optional
-        Instead: cylinders from left to right, m.
+    length : float or str
+        m.
+    diameter : float or str, optional
+        Of a solid cylinder, m; default 30 mm.
+    radius : float or str, optional
+        Instead of ``diameter``, m.
+    sections : sequence, optional
+        Instead: cylinders from left to right, as tables ``{"length": ..., "diameter": ...}`` (or ``radius``), as
+        `gearmbs.flexible.ShaftSection` without bore, or as pairs (length, radius), m.
     density : float or str
         kg/m^3.
     mass, inertia : float or str, optional
@@ -46,31 +55,33 @@ class Shaft(Part):
 
     title: ClassVar[str] = "shaft"
     units: ClassVar[Mapping[str, str]] = {
-        "length": "length", "radius": "length", "density": "density", "mass": "mass", "inertia": "inertia",
+        "length": "length", "radius": "length", "diameter": "length", "density": "density", "mass": "mass",
+        "inertia": "inertia",
         "angle": "angle", "position": "length",
     }  # fmt: skip
-    positive: ClassVar[tuple[str, ...]] = ("length", "radius", "density", "mass", "inertia")
+    positive: ClassVar[tuple[str, ...]] = ("length", "radius", "diameter", "density", "mass", "inertia")
 
     length: Quantity = None
-    radius: Quantity = 0.015
-    sections: tuple[tuple[Quantity, Quantity], ...] | None = None
+    radius: Quantity = None
+    sections: Sequence[Any] | None = None
     density: Quantity = 7850.0
     mass: Quantity = None
     inertia: Quantity = None
     position: tuple[Quantity, Quantity, Quantity] | None = None
     angle: Quantity = 0.0
+    diameter: Quantity = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require(
+            self.radius is None or self.diameter is None,
+            f"{self.label}: radius is {self.radius} m and diameter {self.diameter} m; give one of them",
+        )
         if self.sections is not None:
-            require(self.length is None, f"{self.label}: give length or sections, not both")
-            require(len(self.sections) > 0, f"{self.label}: sections is empty; give pairs of length and radius")
-            cut = tuple(self._in_si("sections", pair, "length") for pair in self.sections)
-            for pair in cut:
-                require(
-                    len(pair) == 2 and min(pair) > 0.0,
-                    f"{self.label}: sections has {pair}; give pairs of a positive length and radius",
-                )
+            for name in ("length", "radius", "diameter"):
+                require(getattr(self, name) is None, f"{self.label}: give {name} or sections, not both")
+            require(len(self.sections) > 0, f"{self.label}: sections is empty; give lengths and diameters")
+            cut = tuple(self._section(one) for one in self.sections)
             object.__setattr__(self, "sections", cut)
             object.__setattr__(self, "length", math.fsum(pair[0] for pair in cut))
         elif self.length is None:
@@ -78,10 +89,37 @@ class Shaft(Part):
         if self.position is not None:
             require(len(self.position) == 3, f"{self.label}: position is {self.position}; give three lengths")
 
+    def _section(self, given: Any) -> tuple[float, float]:
+        """Return length and radius of a section, m."""
+        if hasattr(given, "outer"):
+            plain = given.outer == given.outer_end and given.inner == given.inner_end == 0.0
+            require(
+                plain, f"{self.label}: sections has {given!r}; a rigid shaft has solid cylinders without bore or cone"
+            )
+            given = {"length": given.length, "diameter": given.outer}
+        if isinstance(given, Mapping):
+            known = set(given) in ({"length", "diameter"}, {"length", "radius"})
+            require(known, f"{self.label}: sections has {dict(given)}; give length and diameter, or length and radius")
+            measured = {key: self._in_si(f"sections.{key}", value, "length") for key, value in given.items()}
+            found = measured["length"], measured.get("radius", 0.5 * measured.get("diameter", 0.0))
+        else:
+            found = self._in_si("sections", tuple(given), "length")
+        require(
+            len(found) == 2 and min(found) > 0.0,
+            f"{self.label}: sections has {found}; give pairs of a positive length and radius, or tables of length and "
+            "diameter",
+        )
+        return found
+
     @property
     def cylinders(self) -> tuple[tuple[float, float], ...]:
         """Lengths and radii from left to right, m."""
-        return self.sections if self.sections is not None else ((self.length, self.radius),)
+        if self.sections is not None:
+            return tuple(self.sections)
+        radius = self.radius
+        if radius is None:
+            radius = DIAMETER / 2 if self.diameter is None else 0.5 * self.diameter
+        return ((self.length, radius),)
 
     def body(self) -> tuple[float, float, float, float]:
         """Return mass (kg), place of the centre of mass along the axis (m), moments along and across the axis."""
@@ -152,9 +190,18 @@ class GearMesh(Part):
         angle. Two meshes whose phases differ by a half have their first mesh harmonics in opposition.
     settings : mapping
         Keywords of `gearmbs.gears.GearPair`: backlash, contact, friction, misalignment, centre_distance_error, faults,
-        slices, ...; ``contact`` may be a table with ``kind``, and ``stiffness`` "iso" or "potential-energy".
+        slices, ...; ``contact`` may be a table with ``kind``. Without ``contact`` the teeth have the stiffness of their
+        own wheels and a damping ratio: ``stiffness`` ("iso", "iso single", "potential-energy" or N/m of a tooth pair)
+        and ``damping_ratio``, see `gearmbs.gears.GearPair.with_own_stiffness`. The torque is that of the drivetrain.
     pair : type, optional
         What is made of the two wheels, ``pair(driver, driven, **settings)``; default `GearPair`.
+        `gearmbs.gears.IdealMesh`: one spring along the line of action, ``stiffness`` then of the whole mesh (default
+        c_gamma), ``error`` and ``stiffness_curve`` its own, and ``ideal_backlash`` whether teeth can part.
+
+    Raises
+    ------
+    DrivetrainError
+        For ``contact`` beside ``stiffness`` or ``damping_ratio``, and for ``torque``, which follows from the loads.
     """
 
     title: ClassVar[str] = "mesh"
@@ -171,21 +218,43 @@ class GearMesh(Part):
         """Return the pair of the two wheels for a sense of the driver and a torque on the driven wheel (N m)."""
         with told_of(self.label):
             given = dict(self.settings)
+            for name in ("torque", "input_torque", "rotation"):
+                require(name not in given, f"{self.label}: {name} follows from the drives and loads; leave it out")
             if "contact" in given:
                 given["contact"] = contact_law(given["contact"])
             if "friction" in given:
                 given["friction"] = flank_friction(given["friction"])
-            stiffness = given.pop("stiffness", None)
-            pair = (self.pair or GearPair)(driver, driven, rotation=rotation, torque=abs(torque), **given)
-            if stiffness == "iso":
-                return pair.with_iso_stiffness(damping=given.get("damping", 0.0))
-            if stiffness == "potential-energy":
-                return pair.with_potential_energy_stiffness()
-            require(
-                stiffness is None, f"{self.label}: stiffness is {stiffness!r}; choose 'iso' or 'potential-energy', "
-                "or give contact"
-            )  # fmt: skip
-            return pair
+            own = {key: given.pop(key) for key in ("stiffness", "damping_ratio") if given.get(key) is not None}
+            for key in own:
+                require(
+                    "contact" not in given,
+                    f"{self.label}: {key} is {own[key]!r} beside contact, which has its own; leave one of them out",
+                )
+            operation = {"rotation": rotation, "torque": abs(torque)}
+            kind = self.pair or GearPair
+            if isinstance(kind, type) and issubclass(kind, IdealMesh):
+                return _ideal(kind, driver, driven, {**given, **operation}, own)
+            if not (isinstance(kind, type) and issubclass(kind, GearPair)):
+                return kind(driver, driven, **operation, **given, **own)
+            pair = kind(driver, driven, **operation, **given)
+            if "contact" in given:
+                return pair
+            varies = given.get("stiffness_curve") == "potential-energy"
+            return pair.with_own_stiffness(
+                own.get("stiffness", "potential-energy" if varies else "iso"), own.get("damping_ratio")
+            )
+
+
+def _ideal(kind: Any, driver: GearSpec, driven: GearSpec, given: dict[str, Any], own: dict[str, Any]) -> IdealMesh:
+    """Return the ideal mesh of two wheels: its stiffness and damping are those of the whole mesh, along the normal."""
+    parting = bool(given.pop("ideal_backlash", False))
+    curves = {key: given.pop(key) for key in ("stiffness_curve", "error") if key in given}
+    pair = GearPair(driver, driven, **given)
+    stiffness, ratio = own.get("stiffness", "iso"), own.get("damping_ratio")
+    if stiffness not in ("iso", "iso single", "potential-energy"):
+        return kind.with_damping_ratio(pair, stiffness, ratio, backlash=parting, **curves)
+    law = pair.with_own_stiffness(stiffness)
+    return kind.with_damping_ratio(pair, law.mean_mesh_stiffness, ratio, backlash=parting, **curves)
 
 
 def contact_law(value: Any) -> ContactLaw:

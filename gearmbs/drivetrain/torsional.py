@@ -8,8 +8,9 @@ angles of its shafts, where s is 1 for external and -1 for internal pairs.
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -17,10 +18,14 @@ import scipy.linalg
 from gearmbs.dae.equations.time_functions import smooth_step
 from gearmbs.drivetrain.drives import SpeedDrive
 from gearmbs.drivetrain.errors import require
+from gearmbs.gears.stiffness import pair_stiffness
 
 if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain
     from gearmbs.gears.contact_model import ContactModel
+
+CURVE_POINTS = 200
+"""Along the path of contact, for the mean of a stiffness that varies."""
 
 
 @dataclass(frozen=True)
@@ -232,9 +237,7 @@ def torsional_model(train: Drivetrain) -> TorsionalModel:
     times the contact ratio.
     """
     names = tuple(shaft.name for shaft in train.shafts)
-    inertias = np.array([shaft.body()[2] for shaft in train.shafts])
-    for wheel in train.wheels:
-        inertias[names.index(wheel.shaft)] += wheel.gear.inertia[2]
+    inertias = _inertias(train, names)
     springs = []
     for coupling in train.couplings:
         shafts = names.index(coupling.first), names.index(coupling.second)
@@ -256,6 +259,80 @@ def torsional_model(train: Drivetrain) -> TorsionalModel:
     return TorsionalModel(names, inertias, tuple(springs), ground, held)
 
 
+class MeshDynamics(NamedTuple):
+    """How a mesh of a drivetrain springs and damps at the operating point.
+
+    Attributes
+    ----------
+    law : str
+        The contact law of a tooth pair.
+    stiffness, damping : float
+        Means over a mesh cycle, in the transverse plane along the line of action, N/m and N s/m.
+    mass : float
+        Of both shafts with their wheels there, 1 / (r_b1^2 / J_1 + r_b2^2 / J_2), kg; a shaft of prescribed speed
+        counts as held.
+    """
+
+    law: str
+    stiffness: float
+    damping: float
+    mass: float
+
+    @property
+    def frequency(self) -> float:
+        """Natural frequency of both shafts on this mesh alone, without damping, Hz."""
+        return math.sqrt(self.stiffness / self.mass) / (2.0 * math.pi) if self.mass > 0.0 else math.nan
+
+    @property
+    def damping_ratio(self) -> float:
+        """Of that motion: c / (2 sqrt(k m)); above 1 it does not oscillate."""
+        size = 2.0 * math.sqrt(self.stiffness * self.mass)
+        return self.damping / size if size > 0.0 else math.nan
+
+
+def mesh_dynamics(train: Drivetrain) -> dict[str, MeshDynamics]:
+    """Return law, stiffness, damping and reduced mass of each mesh, by name."""
+    names = tuple(shaft.name for shaft in train.shafts)
+    inertias = _inertias(train, names)
+    held = {drive.shaft for drive in train.drives if isinstance(drive, SpeedDrive)}
+    out = {}
+    for mesh in train.meshes:
+        spring = _mesh_spring(train, mesh.name, names)
+        softness = [arm**2 / inertias[k] for k, arm in zip(spring.shafts, spring.levers) if names[k] not in held]
+        mass = 1.0 / sum(softness) if softness else 0.0
+        pair = train.pairs[mesh.name]
+        # an ideal mesh has words of its own
+        law = str(getattr(pair, "law", None) or pair.contact_model.law)
+        out[mesh.name] = MeshDynamics(law, float(spring.stiffness), float(spring.damping), float(mass))
+    return out
+
+
+def warn_of_overdamped_meshes(train: Drivetrain, stacklevel: int = 3) -> None:
+    """Warn of meshes whose damping is above critical.
+
+    Warns
+    -----
+    UserWarning
+        With the mesh, its law and the remedy.
+    """
+    for name, found in train.mesh_dynamics.items():
+        if found.damping_ratio > 1.0:
+            warnings.warn(
+                f"mesh '{name}' is damped {found.damping_ratio:.3g} times critically by its law ({found.law}): its mode "
+                f"at {found.frequency:.4g} Hz does not oscillate, and is missing in modes and Campbell diagrams; leave "
+                "contact out for the stiffness of the wheels and a damping ratio, or give less damping",
+                stacklevel=stacklevel,
+            )
+
+
+def _inertias(train: Drivetrain, names: tuple[str, ...]) -> np.ndarray:
+    """Return the moments of inertia of all shafts with their wheels about their axes, kg m^2."""
+    inertias = np.array([shaft.body()[2] for shaft in train.shafts])
+    for wheel in train.wheels:
+        inertias[names.index(wheel.shaft)] += wheel.gear.inertia[2]
+    return inertias
+
+
 def _mesh_spring(train: Drivetrain, mesh: str, names: tuple[str, ...]) -> TorsionalSpring:
     driver, driven = train.wheels_of(mesh)
     pair = train.pairs[mesh]
@@ -268,6 +345,11 @@ def _mesh_spring(train: Drivetrain, mesh: str, names: tuple[str, ...]) -> Torsio
     one = law.tangent_stiffness(force / share, 1) if force > 0.0 else law.law.stiffness
     if law.law.exponent == 1.0:
         one = law.law.stiffness
+    if law.stiffness_curve == "potential-energy":
+        # the law's stiffness is the largest along the path
+        path = np.linspace(geometry.first_roll_lengths[0], geometry.driver.tip_roll_length, CURVE_POINTS)
+        curve = pair_stiffness(geometry, path)
+        one *= float(curve.mean() / curve.max())
     return TorsionalSpring(
         mesh,
         (names.index(driver.shaft), names.index(driven.shaft)),

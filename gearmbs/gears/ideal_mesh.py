@@ -11,12 +11,16 @@ import numpy as np
 
 from gearmbs._shown import Written
 from gearmbs.dae.equations.force_elements import DISSIPATED, STORED, Diagnostic
+from gearmbs.gears.contact_model import ContactModel
+from gearmbs.gears.fault import Fault
 from gearmbs.gears.geometry import PairGeometry, Placement
+from gearmbs.gears.laws import DAMPING_RATIO, ContactLaw, FlankFriction
+from gearmbs.gears.operating_point import OperatingPoint
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import convert_fields, require
 from gearmbs.gears.tables import pack
 from gearmbs.mechanism.elements import Compiled, ForceElement
-from gearmbs.units import Quantity
+from gearmbs.units import Quantity, to_si
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.parts import Marker
@@ -113,6 +117,68 @@ class IdealMesh(Written):
         mean = float(along.mean())
         error = loaded.error - loaded.load / pair.driven.base_radius / loaded.stiffness
         return cls(pair, mean, stiffness_curve=(along / mean).tolist(), error=error.tolist(), **others)
+
+    @classmethod
+    def with_damping_ratio(
+        cls, pair: GearPair, stiffness: Quantity, ratio: float | None = None, **others: Any
+    ) -> IdealMesh:
+        """Mesh whose damping is a ratio of the critical one of the bare wheels on it.
+
+        In the transverse plane stiffness and damping are cos^2(beta_b) of those along the normal: with the reduced mass
+        m of the pair ``c = 2 zeta sqrt(k m) / cos(beta_b)``.
+
+        Parameters
+        ----------
+        pair : GearPair
+        stiffness : float or str
+            Along the normal, N/m.
+        ratio : float, optional
+            zeta; default `gearmbs.gears.laws.DAMPING_RATIO`, 0.07.
+        **others
+            Further fields of `IdealMesh`.
+        """
+        along = to_si(stiffness, "N/m", "IdealMesh.stiffness")
+        zeta = DAMPING_RATIO if ratio is None else ratio
+        require(zeta >= 0, f"damping_ratio is {zeta!r}; give a number that is not negative")
+        cosine = math.cos(pair.driver.base_helix_angle)
+        return cls(pair, stiffness, 2.0 * zeta * math.sqrt(along * pair.reduced_mass) / cosine, **others)
+
+    @property
+    def law(self) -> str:
+        """Stiffness and damping in words, in the units of a drawing."""
+        damping = f"damping {1e-3 * self.damping:.4g} N s/mm" if self.damping else "no damping"
+        parting = "" if self.backlash else ", teeth do not part"
+        return f"ideal, {1e-3 * self.stiffness:.5g} N/mm the mesh, {damping}{parting}"
+
+    @property
+    def contact_model(self) -> ContactModel:
+        """The mesh as that of `contact_ratio` tooth pairs: what analyses of mean stiffness and damping take."""
+        share = max(1.0, self.geometry.contact_ratio)
+        # a tooth pair's flank is longer by 1 / cos beta_b
+        cosine = math.cos(self.geometry.driver.base_helix_angle)
+        law = ContactLaw.linear(
+            self.stiffness * cosine / share, self.damping * cosine / share, self.depth if self.backlash else 1e-12
+        )
+        return ContactModel(law, FlankFriction.none())
+
+    @property
+    def operating_point(self) -> OperatingPoint:
+        """Load and sense of rotation of the pair."""
+        return self.pair.operating_point
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """None: an ideal mesh knows errors only as ``error``."""
+        return ()
+
+    @property
+    def rotation(self) -> int:
+        """Sense in which the driver turns about +z."""
+        return self.pair.rotation
+
+    def driven_angle(self, driver_angle: float = 0.0) -> float:
+        """Angle of the driven wheel at which the drive flanks just touch, rad."""
+        return self.pair.driven_angle(driver_angle)
 
     @property
     def geometry(self) -> PairGeometry:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import InitVar, dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -14,14 +14,14 @@ from gearmbs._shown import Shown
 from gearmbs.gears.contact_model import ContactModel
 from gearmbs.gears.fault import Fault
 from gearmbs.gears.geometry import PairGeometry, Placement
-from gearmbs.gears.laws import ContactLaw, FlankFriction
+from gearmbs.gears.laws import DAMPING_RATIO, RATIO_DEPTH, ContactLaw, FlankFriction
 from gearmbs.gears.operating_point import OperatingPoint
 from gearmbs.gears.reach import fillet_clearance
 from gearmbs.gears.show import pair_html, pair_table
 from gearmbs.gears.spec import GearSpec, require
 from gearmbs.gears.stiffness import compliance_roll_lengths, iso_mesh_stiffness, iso_single_stiffness, pair_stiffness
 from gearmbs.gears.tables import pack
-from gearmbs.units import Quantity, shown
+from gearmbs.units import Quantity, shown, to_si
 
 if TYPE_CHECKING:
     from gearmbs.gears.contact_element import GearContact
@@ -55,8 +55,11 @@ class GearPair(PairGeometry, Shown):
     friction : FlankFriction
     rotation : {1, -1}
         Sense in which the driver turns about +z.
-    torque : float or str
-        Load torque on the driven wheel, N m, of the static analyses and, if it is given none, of the test stand.
+    torque : float or str, optional
+        Load torque on the **driven** wheel, N m, of the static analyses and, if it is given none, of the test stand;
+        default 100 N m.
+    input_torque : float or str, optional
+        Instead, the torque on the driver, N m: ``torque`` is then z_2 / z_1 of it, as without losses.
     slices : int, optional
         Slices along the face; default by `ContactModel.face_slices`: 1 for parallel axes without axial shift, 11 for
         others, 41 when faults vary along the face.
@@ -85,16 +88,28 @@ class GearPair(PairGeometry, Shown):
     contact: ContactLaw = field(default_factory=ContactLaw.impact)
     friction: FlankFriction = field(default_factory=FlankFriction)
     rotation: Literal[1, -1] = 1
-    torque: Quantity = 100.0
+    torque: Quantity = None
     slices: int | None = None
     load: Literal["slices", "adams"] = "slices"
     root_contact: bool | None = None
     stiffness_curve: Literal["constant", "potential-energy"] = "constant"
     faults: tuple[Fault, ...] = ()
+    input_torque: InitVar[Quantity] = None
 
     _calls: ClassVar[int] = 5
 
-    def __post_init__(self) -> None:
+    # mypy may lose InitVar among modules that import each other for types
+    def __post_init__(self, input_torque: Quantity) -> None:  # type: ignore[override]
+        if input_torque is not None:
+            require(
+                self.torque is None,
+                f"GearPair.torque is {self.torque!r}, on the driven wheel, and input_torque {input_torque!r}, on the "
+                "driver; give one of them",
+            )
+            given = to_si(input_torque, "torque", "GearPair.input_torque")
+            object.__setattr__(self, "torque", given * self.driven.teeth / self.driver.teeth)
+        elif self.torque is None:
+            object.__setattr__(self, "torque", OperatingPoint.torque)
         object.__setattr__(self, "faults", tuple(self.faults))
         # both check what they are made of
         point, _ = self.operating_point, self.contact_model
@@ -187,38 +202,47 @@ class GearPair(PairGeometry, Shown):
         return cls(**changes)
 
     def with_changes(self, **changes: Any) -> GearPair:
-        """A copy with some fields changed."""
+        """A copy with some fields changed, or with another ``input_torque``."""
+        if changes.get("input_torque") is not None:
+            changes.setdefault("torque", None)
         return replace(self, **changes)
 
     def with_faults(self, *faults: Fault) -> GearPair:
         """A copy with these faults added to those it has."""
         return replace(self, faults=self.faults + faults)
 
-    def with_potential_energy_stiffness(self, damping: Quantity = 0.0, depth: Quantity = "0.1 mm") -> GearPair:
+    def with_potential_energy_stiffness(
+        self, damping: Quantity = None, depth: Quantity = None, *, damping_ratio: float | None = None
+    ) -> GearPair:
         """A copy with linear tooth pairs whose stiffness varies along the path by the potential-energy method.
+
+        The contact flattens as under 300 N/mm, see `gearmbs.gears.stiffness.pair_stiffness`.
 
         Parameters
         ----------
-        damping, depth : float or str
-            See `ContactLaw.linear`.
+        damping, depth, damping_ratio
+            See `with_linear_stiffness`.
         """
         geometry = self.geometry
         largest = float(pair_stiffness(geometry, compliance_roll_lengths(geometry)).max())
-        law = ContactLaw.linear(largest, damping, depth)
-        return replace(self, contact=law, stiffness_curve="potential-energy")
+        made = self.with_linear_stiffness(largest, damping, depth, damping_ratio=damping_ratio)
+        return replace(made, stiffness_curve="potential-energy")
 
     def with_iso_stiffness(
-        self, kind: Literal["single", "mesh"] = "single", damping: Quantity = 0.0, depth: Quantity = "0.1 mm"
-    ) -> GearPair:
+        self, kind: Literal["single", "mesh"] = "single", damping: Quantity = None, depth: Quantity = None, *,
+        damping_ratio: float | None = None,
+    ) -> GearPair:  # fmt: skip
         """A copy with linear tooth pairs of ISO 6336-1's stiffness, constant along the path.
 
         Parameters
         ----------
         kind : {"single", "mesh"}
-            ``single``: each pair has c' times the common face width. ``mesh``: each has c_gamma times that width over
-            the contact ratio, so that the mean over a mesh cycle is c_gamma.
-        damping, depth : float or str
-            See `ContactLaw.linear`.
+            ``single``: each pair has c' times the common face width. ``mesh``: the mean over a mesh cycle, in the
+            transverse plane along the line of action, is c_gamma times that width: each pair has
+            c_gamma b / (epsilon_alpha cos beta_b), since the line of contact is longer by 1 / cos beta_b and the normal
+            out of the plane, in gap and in force.
+        damping, depth, damping_ratio
+            See `with_linear_stiffness`.
 
         Examples
         --------
@@ -226,13 +250,103 @@ class GearPair(PairGeometry, Shown):
         >>> round(pair.contact.stiffness / 1e6, 1)
         254.9
         """
-        choices = {
-            "single": iso_single_stiffness(self.geometry),
-            "mesh": iso_mesh_stiffness(self.geometry) / self.contact_ratio,
-        }
-        require(kind in choices, f"kind is {kind!r}; choose 'single' or 'mesh'")
-        law = ContactLaw.linear(choices[kind] * self.common_face_width, damping, depth)
-        return replace(self, contact=law, stiffness_curve="constant")
+        require(kind in ("single", "mesh"), f"kind is {kind!r}; choose 'single' or 'mesh'")
+        if kind == "single":
+            stiffness = iso_single_stiffness(self.geometry)
+        else:
+            stiffness = iso_mesh_stiffness(self.geometry) / self._pairs_in_mesh
+        return self.with_linear_stiffness(
+            stiffness * self.common_face_width, damping, depth, damping_ratio=damping_ratio
+        )
+
+    def with_linear_stiffness(
+        self, stiffness: Quantity, damping: Quantity = None, depth: Quantity = None, *,
+        damping_ratio: float | None = None,
+    ) -> GearPair:  # fmt: skip
+        """A copy with linear tooth pairs.
+
+        Parameters
+        ----------
+        stiffness : float or str
+            Of a tooth pair over its whole face, N/m.
+        damping : float or str, optional
+            Of a tooth pair, N s/m; default none.
+        depth : float or str, optional
+            Penetration at which the damping is fully on; default 0.1 mm, and 2 um with a ratio.
+        damping_ratio : float, optional
+            Instead of ``damping``: zeta of the bare wheels on their mesh. With the mean stiffness
+            k = epsilon_alpha cos(beta_b) K of the mesh and `reduced_mass`, its damping is 2 zeta sqrt(k m), a tooth
+            pair's that over epsilon_alpha cos(beta_b).
+
+        Raises
+        ------
+        ValueError
+            If damping and ratio are both given, or the ratio is negative.
+        """
+        law = ContactLaw.linear(stiffness)
+        if damping_ratio is None:
+            damping, depth = 0.0 if damping is None else damping, "0.1 mm" if depth is None else depth
+        else:
+            require(damping is None, f"damping is {damping!r} and damping_ratio {damping_ratio!r}; give one of them")
+            require(
+                isinstance(damping_ratio, (int, float)) and 0.0 <= damping_ratio < math.inf,
+                f"damping_ratio is {damping_ratio!r}; give a number that is not negative",
+            )
+            share = self._pairs_in_mesh
+            damping = 2.0 * damping_ratio * math.sqrt(law.stiffness * self.reduced_mass / share)
+            depth = RATIO_DEPTH if depth is None else depth
+        return replace(self, contact=ContactLaw.linear(stiffness, damping, depth), stiffness_curve="constant")
+
+    def with_own_stiffness(self, stiffness: Quantity = "iso", damping_ratio: float | None = None) -> GearPair:
+        """A copy with the stiffness of its own wheels and a damping ratio: the default of drivetrains.
+
+        Parameters
+        ----------
+        stiffness : {"iso", "iso single", "potential-energy"} or float or str
+            ``iso``: the mean over a mesh cycle is ISO 6336-1's c_gamma. ``iso single``: each tooth pair has c'.
+            ``potential-energy``: it varies along the path. Or a number: of a tooth pair, N/m.
+        damping_ratio : float, optional
+            See `with_linear_stiffness`; default `gearmbs.gears.laws.DAMPING_RATIO`, 0.07.
+
+        Raises
+        ------
+        ValueError
+            For another word.
+
+        Examples
+        --------
+        >>> pair = GearPair.paper().with_own_stiffness()
+        >>> print(pair.contact)
+        linear, 2.2994e+05 N/mm a tooth pair, damping 0.8689 N s/mm, fully on at 2 um
+        """
+        ratio = DAMPING_RATIO if damping_ratio is None else damping_ratio
+        if stiffness in ("iso", "iso single"):
+            return self.with_iso_stiffness("mesh" if stiffness == "iso" else "single", damping_ratio=ratio)
+        if stiffness == "potential-energy":
+            return self.with_potential_energy_stiffness(damping_ratio=ratio)
+        is_number = not isinstance(stiffness, str) or stiffness.strip()[:1].isdigit()
+        require(
+            is_number,
+            f"stiffness is {stiffness!r}; choose 'iso', 'iso single' or 'potential-energy', give that of a tooth pair "
+            "in N/m, or give contact",
+        )
+        return self.with_linear_stiffness(stiffness, damping_ratio=ratio)
+
+    @property
+    def _pairs_in_mesh(self) -> float:
+        """Stiffness of the mesh in the transverse plane over that of a tooth pair: epsilon_alpha cos beta_b."""
+        return max(1.0, self.contact_ratio) * math.cos(self.driver.base_helix_angle)
+
+    @property
+    def mean_mesh_stiffness(self) -> float:
+        """Mean over a mesh cycle of linear tooth pairs, along the normal, N/m: epsilon_alpha K / cos(beta_b)."""
+        along = math.cos(self.driver.base_helix_angle)
+        return float(self.contact.stiffness) * self._pairs_in_mesh / along**2
+
+    @property
+    def reduced_mass(self) -> float:
+        """Mass of the bare wheels along the line of action, 1 / (r_b1^2 / J_1 + r_b2^2 / J_2), kg."""
+        return 1.0 / sum(wheel.base_radius**2 / wheel.inertia[2] for wheel in self.wheels)
 
     # --- contact and load ---------------------------------------------------------------------------
 
@@ -319,9 +433,13 @@ class GearPair(PairGeometry, Shown):
             f"module {shown(one.module, 'mm', '.4g')}",
             f"centre distance {1e3 * self.centre_distance:.4f} mm",
             f"backlash {self._backlash_shown()}",
+            f"{shown(self.torque, 'N m', '.6g')} on the driven wheel",
         ]
         if self.misalignment:
             parts.append(f"{self.plane} {shown(self.misalignment, 'deg', '.4g')}")
+        parts += [str(self.contact)]
+        if self.stiffness_curve != "constant":
+            parts.append(f"stiffness by {self.stiffness_curve} along the path")
         parts += [fault.label for fault in self.faults]
         return f"GearPair({', '.join(parts)})"
 

@@ -49,7 +49,8 @@ class PlanetarySet(Written):
         fits.
     backlash_sun, backlash_ring : float or str
         Normal backlash of the meshes, m, made by thinning the teeth of sun and ring.
-    contact : ContactLaw
+    contact : ContactLaw, optional
+        Of all tooth pairs; default: each mesh has the stiffness of its own wheels and a damping ratio.
     friction : FlankFriction
     slices : int, optional
         As of `GearPair`.
@@ -67,6 +68,8 @@ class PlanetarySet(Written):
         Of ideal meshes, N s/m.
     ideal_backlash : bool
         Whether teeth of ideal meshes can part.
+    stiffness, damping_ratio
+        Of the meshes without ``contact``, see `GearPair.with_own_stiffness`.
     name : str
 
     Raises
@@ -93,7 +96,7 @@ class PlanetarySet(Written):
     planet_at_ring: GearSpec | None = None
     backlash_sun: Quantity = 0.0
     backlash_ring: Quantity = 0.0
-    contact: ContactLaw = field(default_factory=ContactLaw.impact)
+    contact: ContactLaw | None = None
     friction: FlankFriction = field(default_factory=FlankFriction)
     slices: int | None = None
     pin_errors: Mapping[int, tuple[float, float]] = field(default_factory=dict)
@@ -102,6 +105,8 @@ class PlanetarySet(Written):
     ideal: tuple[float, float] | None = None
     ideal_damping: float = 0.0
     ideal_backlash: bool = False
+    stiffness: Quantity = None
+    damping_ratio: float | None = None
     name: str = "planetary set"
 
     def __post_init__(self) -> None:
@@ -134,6 +139,12 @@ class PlanetarySet(Written):
             )
         for where, fault in self.faults:
             self._holder(where, fault)
+        for name in ("stiffness", "damping_ratio"):
+            require(
+                getattr(self, name) is None or (self.contact is None and self.ideal is None),
+                f"PlanetarySet.{name} is {getattr(self, name)!r} beside contact or ideal, which have their own; leave "
+                "one of them out",
+            )
         _ = self.pairs_sun
         self._meshing_with_ring()
 
@@ -256,16 +267,19 @@ class PlanetarySet(Written):
         for k in range(self.planets):
             faults = self._faults_of(k, mesh)
             if faults not in made:
-                made[faults] = GearPair(
+                pair = GearPair(
                     one,
                     two,
                     centre_distance_error=error,
-                    contact=self.contact,
                     friction=self.friction,
                     slices=self.slices,
                     rotation=self.rotation if mesh == "sun" else -self.rotation,  # type: ignore[arg-type]
                     faults=faults,
                 )
+                if self.contact is None:
+                    made[faults] = pair.with_own_stiffness(self.stiffness or "iso", self.damping_ratio)
+                else:
+                    made[faults] = pair.with_changes(contact=self.contact)
             pairs.append(made[faults])
         return tuple(pairs)
 
@@ -287,6 +301,11 @@ class PlanetarySet(Written):
             return pairs
         stiffness = self.ideal[0 if which == "sun" else 1]
         return tuple(IdealMesh(p, stiffness, self.ideal_damping, self.ideal_backlash) for p in pairs)
+
+    def law(self, which: str) -> str:
+        """Law, stiffness and damping of the meshes with the "sun" or the "ring", in words."""
+        mesh = self.meshes(which)[0]
+        return mesh.law if isinstance(mesh, IdealMesh) else str(mesh.contact)
 
     # --- assembly and phases --------------------------------------------------------------------------
 

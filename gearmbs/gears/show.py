@@ -70,8 +70,9 @@ def pair_table(pair: Mesh) -> Table:
         ("normal backlash", shown(geometry.normal_backlash, "mm", ".4f")),
         *((f"{name.replace('_', ' ')}", shown(getattr(geometry, name), unit)) for name, unit in _given(geometry)),
         ("misalignment", f"{shown(geometry.misalignment, 'deg', '.3f')} {tilt}".strip()),
-        ("load torque", shown(point.torque, "N m", ".1f")),
+        ("load torque, driven wheel", shown(point.torque, "N m", ".1f")),
         ("normal force", shown(force, "N", ".1f")),
+        ("contact law", str(pair.contact_model.law)),
         ("penetration, one pair", shown(pair.contact_model.penetration(force), "um", ".2f")),
     ):
         table.add_row(label, value, "")

@@ -51,6 +51,8 @@ def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any
     for name, rate in (("signal_rate", case.signal_rate), ("output_rate", case.output_rate)):
         out[f"solver_{name}"], out[f"solver_{name}_units"] = rate, "Hz"
     pair = case.pair()
+    out["operation_torque_of"] = "driven wheel"
+    out["contact_law"] = str(pair.contact)
     out["contact_ratio"] = pair.contact_ratio
     out["face_slices"] = pair.face_slices
     out["remarks"] = "; ".join(remarks(case)) or "none"

@@ -29,7 +29,7 @@ from gearmbs.drivetrain import (
     TorsionalShaft,
     Wheel,
 )
-from gearmbs.gears import GearSpec
+from gearmbs.gears import ContactLaw, GearSpec
 from gearmbs.units import Quantity, to_si
 
 PRESSURES = {"low": 1e6, "high": 5e6}
@@ -128,7 +128,8 @@ def bench_train(
         raise ValueError(f"bearings is {s.bearings!r}; choose 'elastic' or 'ideal'")
     speed = to_si(s.speed, "angular speed", "speed")
     rigid = s.bearings == "ideal"
-    pair = {"backlash": s.backlash}
+    # the paper's law, whatever the wheels are
+    pair = {"backlash": s.backlash, "contact": ContactLaw.impact()}
     motor: Any = SpeedDrive(name="drive", shaft="motor", speed=speed)
     if s.motor == "induction":
         # 22 kW on an inverter that holds 1.026 of the speed as synchronous speed
@@ -253,6 +254,7 @@ def bench_choices(settings: BenchSettings | None = None) -> list[BenchChoice]:
         ("second pair", f"as the first, phase {s.phase:g} pitches", "only one pair is published; equal teeth lock both "
          "meshes in phase, so that their lines add or cancel with the assembly angle"),
         ("faults", "on the first pair; everything behind it is placed by it", "the paper does not say which pair"),
+        ("teeth", f"{ContactLaw.impact()}", "the paper's law, eq. (10)-(11); it over-damps the meshes at this depth"),
         ("bearings", f"{s.bearings}" + (f", {s.bearing_stiffness:.3g} N/m radially" if s.bearings == "elastic" else ""),
          "a laser on the shaft sees nothing move in rigid bearings"),
         ("housing", f"{s.housing_mass:g} kg on four mounts of {s.mount_stiffness:.3g} N/m, 5 % damping",

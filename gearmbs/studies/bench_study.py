@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -185,7 +186,10 @@ def run_bench(
             train = bench_train(pressure, state, settings)
             name = f"bench, {state}, {load} load"
             told = told_of_span(progress, name, train.run_up + run.settling + run.duration)
-            records[load, state] = run_train(train, run, progress=told)
+            with warnings.catch_warnings():
+                # the paper's law over-damps the meshes; the choices and the report say so
+                warnings.filterwarnings("ignore", r"mesh '.*' is damped .* times critically")
+                records[load, state] = run_train(train, run, progress=told)
     rows = [[[levels(records[load, state], sensor) for state in STATES] for load in PRESSURES] for sensor in SENSORS]
     table = xr.DataArray(
         np.array(rows), dims=("sensor", "load", "state", "harmonic"),

@@ -135,8 +135,14 @@ class Shafts(Section):
     density: q.Density = 7850.0
 
 
+INPUT_TORQUE = "torque is that of the driven wheel: give the driver's times z_2 / z_1 there"
+"""What is said to somebody who has the other torque."""
+
+
 class Operation(Section):
     """Speed of the driver, load torque on the driven wheel, run-up and recording.
+
+    ``torque`` is that of the **driven** wheel, z_2/z_1 times the driver's.
 
     ``speed`` and ``torque`` are numbers, or curves for run-ups and coast-downs: lists of points (time, value), the time
     from the beginning of the record, ``[["0 s", "0 rpm"], ["2 s", "3000 rpm"]]``. Between the points runs a monotone
@@ -145,6 +151,7 @@ class Operation(Section):
     """
 
     section: ClassVar[str] = "operation"
+    elsewhere: ClassVar[dict[str, str]] = dict.fromkeys(("input_torque", "driver_torque", "torque_in"), INPUT_TORQUE)
 
     speed: q.AngularSpeed = 104.71975511965977
     torque: q.TorqueValue = 100.0

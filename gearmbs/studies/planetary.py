@@ -273,6 +273,7 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
         attrs={
             "title": gears.name,
             "sampling_rate": run.rate,
+            **{f"law_{mesh}": gears.law(mesh) for mesh in ("sun", "ring")},
             "teeth": [gears.sun.teeth, gears.planet.teeth, gears.ring.teeth],
             **({"planet_angles": [float(a) for a in gears.angles or ()]} if plain else {}),
             **{f"frequency_{name}": value for name, value in rates.items()},

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.drivetrain import Drivetrain, SpeedDrive, TorqueLoad
+from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
 from gearmbs.mechanism import linear_modes, static_equilibrium
 from gearmbs.mechanism.functions import constant
 
@@ -54,7 +55,13 @@ def train_modes(train: Drivetrain) -> Modes:
     ------
     ModelError
         If no position of rest is found.
+
+    Warns
+    -----
+    UserWarning
+        Of meshes that are damped above critical: their modes do not oscillate.
     """
+    warn_of_overdamped_meshes(train)
     still = resting(train)
     m = still.build()
     after = 2.0 * still.run_up

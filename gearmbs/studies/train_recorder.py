@@ -52,6 +52,16 @@ def counted_turns(t: np.ndarray, turned: np.ndarray, speed: np.ndarray) -> np.nd
     return np.concatenate([turned[:1], turned[:1] + np.cumsum(step, axis=0)])
 
 
+def _of_an_ideal_mesh(told: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return the quantities of `CONTACT` of one spring: it is a single pair, on the flank that is pressed."""
+    pressed = told["normal_force"] > 0.0
+    drive, back = pressed & (told["deflection"] > 0.0), pressed & (told["deflection"] < 0.0)
+    size = np.abs(told["deflection"])
+    return {"normal_force": told["normal_force"], "penetration_drive": np.where(drive, size, 0.0),
+            "penetration_back": np.where(back, size, 0.0), "pairs_drive": drive.astype(float),
+            "pairs_back": back.astype(float)}  # fmt: skip
+
+
 class TrainRecorder:
     """Collects the columns of a drivetrain's record from the parts of a solution, as a consumer of `simulate`.
 
@@ -90,6 +100,8 @@ class TrainRecorder:
         contact = np.empty((m, len(train.meshes), len(CONTACT)))
         for k, mesh in enumerate(train.meshes):
             told = part.contact(mesh.name)
+            if "deflection" in told:
+                told = _of_an_ideal_mesh(told)
             contact[:, k] = np.stack([told[name] for name in CONTACT], axis=1)
         force = np.empty((m, len(train.bearings), 3))
         for k, bearing in enumerate(train.bearings):

@@ -48,6 +48,19 @@ def _meshes(train: Drivetrain, record: xr.Dataset) -> list[str]:
             f"| {100 * np.mean(drive & back):.3g} | {100 * np.mean(~drive & ~back):.3g} "
             f"| {1e6 * np.ptp(one['transmission_error'].values):.4g} |"
         )
+    return [*lines, "", *_laws(train)]
+
+
+def _laws(train: Drivetrain) -> list[str]:
+    """Return the contact laws, and what they make of both shafts of each mesh."""
+    lines = ["| mesh | contact law | mean stiffness of the mesh, N/um | damping, N s/mm | natural frequency, Hz | of "
+             "critical damping |", _rule(5)]  # fmt: skip
+    for name, m in train.mesh_dynamics.items():
+        over = ", **over-damped**" if m.damping_ratio > 1.0 else ""
+        lines.append(
+            f"| {name} | {m.law} | {1e-6 * m.stiffness:.4g} | {1e-3 * m.damping:.4g} | {m.frequency:.5g} "
+            f"| {m.damping_ratio:.3g}{over} |"
+        )
     return lines
 
 

@@ -16,6 +16,7 @@ from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.drivetrain import Drivetrain, DrivetrainError, RunSettings
 from gearmbs.drivetrain.description import Description, read_description
+from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.simulate import simulate
 from gearmbs.signals import even_signal, make_signal
@@ -78,8 +79,14 @@ def run_train(
         If the record is too short for its harmonics.
     SimulationFailed
         If the integrator stops early; the exception carries the solution so far.
+
+    Warns
+    -----
+    UserWarning
+        Of meshes that are damped above critical by their contact law.
     """
     run = run or RunSettings()
+    warn_of_overdamped_meshes(train)
     rate = run.output_rate(train)
     check_record(train, run)
     begin = train.run_up + run.settling
@@ -306,6 +313,11 @@ def attributes(train: Drivetrain, run: RunSettings | None, solution: Solution) -
         "gearmbs_version": gearmbs.__version__,
     }
     if train.meshes:
+        out["mesh_laws"] = json.dumps({
+            name: {"law": m.law, "stiffness": m.stiffness, "damping": m.damping, "damping_ratio": m.damping_ratio,
+                   "frequency": m.frequency}
+            for name, m in train.mesh_dynamics.items()
+        })  # fmt: skip
         out["known_lines"] = json.dumps(train.kinematics.known_lines())
         given = train.kinematics.for_analysis(train.meshes[0])
         out |= {"mesh_speed": given["speed"], "mesh_speed_units": "rad/s", "mesh_teeth": list(given["teeth"])}  # type: ignore[call-overload]

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gearmbs.gears import ElasticRim, GearSpec, PlanetarySet, RimModes, planetary_mechanism
+from gearmbs.gears import ContactLaw, ElasticRim, GearSpec, PlanetarySet, RimModes, planetary_mechanism
 
 GEARS = PlanetarySet(
     GearSpec(28, "2 mm", face_width="20 mm"),
     GearSpec(36, "2 mm", face_width="20 mm"),
     GearSpec.ring(100, "2 mm", face_width="20 mm", rim_thickness="6 mm"),
     planets=4,
+    contact=ContactLaw.impact(),
 )
 BOLTED = ElasticRim(waves=5, bolts=np.arange(6) * np.pi / 3, bolt_stiffness=(3e7, 3e7))
 SUN = 1800 * np.pi / 30
@@ -42,7 +43,7 @@ def test_derivatives_of_the_element(planets):
     from gearmbs.contact.elastic_ring_kernel import ring_meshes as kernel
     from gearmbs.dae.compiled.pointers import address
 
-    gears = PlanetarySet(GEARS.sun, GEARS.planet, GEARS.ring, planets=planets)
+    gears = PlanetarySet(GEARS.sun, GEARS.planet, GEARS.ring, planets=planets, contact=GEARS.contact)
     element = planetary_mechanism(gears, torques={"carrier": -200.0}, rim=BOLTED).elements["ring meshes"]
     made, n, m = element.compiled(), planets, element.modes.mass.size
     ints = np.concatenate([[address(*made.functions[0])], made.integers]).astype(np.int64)

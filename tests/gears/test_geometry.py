@@ -180,6 +180,7 @@ def test_pairs_of_any_size(z1, z2, module, error, thinning):
 def test_pair_shows_itself():
     pair = GearPair.paper(misalignment="1 deg", backlash="0.1 mm")
     assert repr(pair) == (
-        "GearPair(29/29 teeth, module 3.065 mm, centre distance 88.8710 mm, backlash 0.1 mm, skew 1 deg)"
+        "GearPair(29/29 teeth, module 3.065 mm, centre distance 88.8710 mm, backlash 0.1 mm, 100 N m on the driven "
+        "wheel, skew 1 deg, impact, 2.9852e+05 N/mm^1.3 a tooth pair, damping 298.5 N s/mm, fully on at 100 um)"
     )
     assert "<td>contact ratio</td><td>1.6" in pair._repr_html_()

@@ -52,7 +52,7 @@ def test_curve_of_ross():
     ratio = gear.fillet_radius / gear.module
     angle = (math.pi / 2 + 2 * math.tan(ALPHA) * (1 - ratio) + 2 * ratio / math.cos(ALPHA)) / 62
     assert angle == pytest.approx(0.0456584787349235, rel=1e-12)
-    tooth = tooth_compliance(gear, root_angle=angle)
+    tooth = tooth_compliance(gear, root_angle=angle, sainsot=True)
     half, height = rack_root(gear)
     low = math.acos(gear.base_radius / math.hypot(half[-1], height[-1]))
     high = math.acos(gear.base_radius / gear.tip_radius)
@@ -64,8 +64,8 @@ def test_curve_of_ross():
 
     meshing = (high - low) / pair.contact_ratio
     assert single(0.0) + single(meshing) == pytest.approx(396622921.3581085, rel=3e-6)
-    assert mesh_stiffness(pair).maximum == pytest.approx(4.0966e8, rel=0.02)
-    assert mesh_stiffness(pair, root_angles=(angle, angle)).maximum == pytest.approx(4.0966e8, rel=0.011)
+    assert mesh_stiffness(pair, sainsot=True).maximum == pytest.approx(4.0966e8, rel=0.02)
+    assert mesh_stiffness(pair, root_angles=(angle, angle), sainsot=True).maximum == pytest.approx(4.0966e8, rel=0.011)
 
 
 # one tooth's compliances from ROSS 2.3.0, m/N, by pressure angle at the contact: bending, shear, axial, foundation
@@ -81,7 +81,7 @@ def test_components_of_ross(angle):
     gear = ross_pair().driver
     ratio = gear.fillet_radius / gear.module
     root = (math.pi / 2 + 2 * math.tan(ALPHA) * (1 - ratio) + 2 * ratio / math.cos(ALPHA)) / 62
-    tooth, plain = tooth_compliance(gear, root_angle=root), tooth_compliance(gear)
+    tooth, plain = tooth_compliance(gear, root_angle=root, sainsot=True), tooth_compliance(gear, sainsot=True)
     roll_length = gear.base_radius * math.tan(angle)
     parts = [
         np.interp(roll_length, tooth.roll_length, p)
@@ -219,3 +219,81 @@ def test_a_short_internal_tooth_is_a_beam_of_its_outline():
     density = moment**2 / (ring.material.youngs_modulus * (2 * x) ** 3 * ring.face_width / 12)
     energy = float((0.5 * (density[1:] + density[:-1]) * -np.diff(y)).sum())
     assert tooth.bending[0] == pytest.approx(energy, rel=1e-4)
+
+
+def test_a_solid_wheel_is_no_ring_on_a_thin_bore():
+    # the smaller the bore the more the disc turns against it, which is no compliance of a tooth
+    solid, *held = (
+        mesh_stiffness(GearPair(*(GearSpec(30, "3 mm", bore_radius=bore),) * 2), 20).mean
+        for bore in (0.0, 0.02, 0.01, 0.005)
+    )
+    assert solid > held[0] > held[1] > held[2]
+    wheel = GearSpec(30, "3 mm", bore_radius="10 mm")
+    apart = tooth_compliance(wheel).total - tooth_compliance(GearSpec(30, "3 mm")).total
+    # r_b^2 / (4 pi G b) (1 / r_bore^2 - 1 / r_f^2)
+    shear = wheel.material.youngs_modulus / (2 * (1 + wheel.material.poisson_ratio))
+    turn = (1 / 0.01**2 - 1 / wheel.root_radius**2) / (4 * math.pi * shear * wheel.face_width)
+    assert apart == pytest.approx(np.full(apart.size, wheel.base_radius**2 * turn), rel=1e-9)
+    with pytest.raises(ValueError, match="bore_radius is 0"):
+        tooth_compliance(GearSpec(30, "3 mm"), sainsot=True)
+
+
+def test_flattening_by_quadrature():
+    """Against the integral of Flamant's strain along the normal under the pressure of Hertz, in plane strain."""
+    from gearmbs.gears.stiffness import contact_half_width, flattening
+
+    wheel, depth, a = GearSpec(30, "3 mm"), 2e-3, 1e-4
+    young, nu = wheel.material.youngs_modulus, wheel.material.poisson_ratio
+    ratio = nu / (1 - nu)
+
+    def displacement(z):
+        # half plane under a line load at x = a sin t, relative to the depth of reference: Timoshenko and Goodier, 36
+        t = (np.arange(4000) + 0.5) / 4000 * math.pi - 0.5 * math.pi
+        x, weight = a * np.sin(t), 2 / math.pi * np.cos(t) ** 2 * math.pi / 4000
+        r2 = x**2 + z**2
+        return float(np.sum(weight * (-np.log(r2) + z**2 / r2 * (1 + ratio))) * (1 - nu**2) / (math.pi * young))
+
+    apart = displacement(0.0) - displacement(depth)
+    assert float(flattening(wheel, depth, a)) * wheel.face_width == pytest.approx(apart, rel=2e-3)
+    pair = GearPair(wheel, GearSpec.ring(80, "3 mm"), backlash="0.1 mm").geometry
+    convex = GearPair(wheel, GearSpec(80, "3 mm")).geometry
+    roll = np.array([wheel.base_radius * math.tan(ALPHA)])
+    # the flank of a ring is hollow: a wider contact
+    assert contact_half_width(pair, roll, 1e5) > contact_half_width(convex, roll, 1e5)
+    soft = 2 * (1 - nu**2) / young
+    curvature = 1 / roll[0] + 1 / convex.mate_roll_length(0, roll)[0]
+    wanted = math.sqrt(4 * 1e5 * soft / math.pi / curvature)
+    assert contact_half_width(convex, roll, 1e5)[0] == pytest.approx(wanted, rel=1e-12)
+
+
+@pytest.mark.slow
+def test_finite_elements_of_a_pair():
+    """Repeat a row of each table of ``docs/data/tooth_stiffness.md``."""
+    pytest.importorskip("skfem")
+    from pathlib import Path
+
+    from benchmarks.tooth_stiffness import EXAMPLES, bore_row, mean_row, pair_row
+
+    text = (Path(__file__).parents[2] / "docs" / "data" / "tooth_stiffness.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in line.strip("|\n ").split("|")] for line in text.splitlines()]
+
+    def stored(*begin):
+        return [float(cell) for row in rows if row[: len(begin)] == list(begin) for cell in row[len(begin) :]]
+
+    one = EXAMPLES[1]
+    # three digits are kept
+    found = pair_row(one, 2e5)
+    assert found == pytest.approx(stored(one.name, "200"), rel=5e-3)
+    fine, flattened, _, energies, _, iso, theoretical = found
+    assert fine == pytest.approx(flattened, rel=0.03)
+    assert energies == pytest.approx(fine, rel=0.07)
+    assert iso == pytest.approx(fine, rel=0.1)
+    assert theoretical > 1.2 * fine
+    assert bore_row(EXAMPLES[0].pair.driver, 0.5) == pytest.approx(stored("0.5"), rel=5e-3)
+    means = mean_row(one)
+    assert means == pytest.approx(
+        next([float(c) for c in r[1:]] for r in rows if r[0] == one.name and len(r) == 8), rel=5e-3
+    )
+    _, together, alone, mesh = means[:4]
+    assert mesh == pytest.approx(together, rel=0.1)
+    assert alone > 1.1 * together

@@ -27,6 +27,16 @@ def test_coast_flanks_are_hit_from_the_threshold_on(model):
     assert above.coast_hits >= 1.0
 
 
+@pytest.mark.parametrize("speed", [0.0, 5.0, 50.0])
+def test_nothing_hits_where_nothing_fluctuates(speed):
+    """The start is the state that runs: no shock of loads or speeds that come on, whatever is counted from when."""
+    found = rattle("multibody", RattleSettings(level=0.0, frequency=100.0, speed=speed), cycles=4, settling=0)
+    assert (found.drive_hits, found.coast_hits) == (0.0, 0.0)
+    # the twin that fluctuates above the threshold does rattle
+    loud = rattle("multibody", RattleSettings(level=3.0, frequency=100.0, speed=speed), cycles=4, settling=0)
+    assert loud.drive_hits > 0.0
+
+
 def test_models_agree_below_the_threshold():
     table = rattle_table(RattleSettings(frequency=20.0), [0.5], MODELS)
     np.testing.assert_allclose(table.amplitude.values, 1.0, rtol=1e-2)
@@ -40,7 +50,7 @@ def test_models_agree_below_the_threshold():
 
 
 def test_map_begins_at_one():
-    found = rattle_map(RattleSettings(backlash=1e-4, stiffness=1e7), [0.8, 3.0], [5.0, 10.0], cycles=5)
+    found = rattle_map(RattleSettings(backlash=1e-4, stiffness=1e7, damping=1e3), [0.8, 3.0], [5.0, 10.0], cycles=5)
     assert np.all(found.sel(level=0.8) == 0.0)
     assert np.all(found.sel(level=3.0) > 0.0)
 

@@ -1,0 +1,274 @@
+"""What meshes of drivetrains and planetary sets are made of: stiffness of their wheels, damping ratio, and names."""
+
+import json
+import math
+import traceback
+import warnings
+
+import numpy as np
+import pytest
+
+import gearmbs as gm
+from gearmbs.drivetrain import Drivetrain, DrivetrainError, GearMesh, IdealBearing, RunSettings, Shaft
+from gearmbs.flexible import ShaftSection
+from gearmbs.gears import (
+    ContactLaw,
+    FlankFriction,
+    GearPair,
+    GearSpec,
+    IdealMesh,
+    loaded_transmission_error,
+    planetary,
+)
+from gearmbs.gears.laws import DAMPING_RATIO
+from gearmbs.gears.stiffness import iso_mesh_stiffness, iso_single_stiffness
+from gearmbs.studies import run_train, train_campbell, train_modes, train_report
+from tests.drivetrain.support import stage
+from tests.generators import cases, seed
+
+LIGHT = 1.0
+"""N m: deflections so small that tips do not bear beyond the path of contact."""
+
+
+def meshed(**settings):
+    return stage(
+        meshes=[GearMesh(name="mesh", driver="pinion", driven="gear", settings={"backlash": "0.1 mm", **settings})]
+    )
+
+
+def random_pair(rng):
+    """Return two wheels that mesh: spur or helical, external or internal."""
+    while True:
+        try:
+            return any_pair(rng)
+        except ValueError:
+            # tips and roots that foul each other: draw again
+            continue
+
+
+def any_pair(rng):
+    """Return two wheels, or raise ValueError where they do not mesh."""
+    module = float(rng.choice([1.5, 2.0, 3.0, 5.0])) * 1e-3
+    width = float(rng.uniform(6, 12)) * module
+    helix = math.radians(float(rng.choice([0.0, 0.0, 10.0, 20.0, 28.0])))
+    one = GearSpec(int(rng.integers(18, 35)), module, face_width=width, helix_angle=helix)
+    teeth = int(rng.integers(40, 90))
+    if rng.random() < 0.3:
+        two = GearSpec.ring(one.teeth + teeth, module, face_width=width, helix_angle=helix)
+    else:
+        two = GearSpec(teeth, module, face_width=width, helix_angle=helix, hand="left")
+    return GearPair(one, two, backlash=0.1 * module, torque=LIGHT, friction=FlankFriction.none())
+
+
+def test_own_stiffness_is_that_of_the_standard_in_the_mean():
+    """The kernel's quasi-static mesh stiffness against c_gamma b, and the damping ratio of the bare wheels on it."""
+    rng = np.random.default_rng(seed())
+    for _ in range(cases(8)):
+        pair = random_pair(rng).with_own_stiffness()
+        wanted = iso_mesh_stiffness(pair.geometry) * pair.common_face_width
+        found = float(loaded_transmission_error(pair, points=100).stiffness.mean())
+        # 100 angles of the driver say where pairs come and go to a hundredth of the cycle, light loads a little later
+        assert found == pytest.approx(wanted, rel=0.03), repr(pair)
+        one, two = pair.wheels
+        mass = 1 / (one.base_radius**2 / one.inertia[2] + two.base_radius**2 / two.inertia[2])
+        mean = pair.contact.damping / pair.contact.stiffness * wanted
+        assert mean / (2 * math.sqrt(wanted * mass)) == pytest.approx(DAMPING_RATIO, rel=1e-9)
+
+
+def test_default_of_a_drivetrain():
+    train = meshed()
+    law = train.pairs["mesh"].contact
+    assert (law.kind, law.exponent) == ("linear", 1.0)
+    wheels = GearPair(*train.pairs["mesh"].wheels)
+    assert law == wheels.with_own_stiffness("iso", DAMPING_RATIO).contact
+    single = meshed(stiffness="iso single", damping_ratio=0.02).pairs["mesh"]
+    assert single.contact.stiffness == pytest.approx(iso_single_stiffness(wheels.geometry) * wheels.common_face_width)
+    varied = meshed(stiffness_curve="potential-energy").pairs["mesh"]
+    assert varied.stiffness_curve == "potential-energy"
+    assert varied.contact == meshed(stiffness="potential-energy").pairs["mesh"].contact
+    assert meshed(stiffness="3e8 N/m").pairs["mesh"].contact.stiffness == 3e8
+    # the paper's law is there for whoever names it
+    assert meshed(contact={"kind": "impact"}).pairs["mesh"].contact == ContactLaw.impact()
+
+
+def test_default_of_a_planetary_set():
+    gears = planetary((24, 30, 84), "1.5 mm")
+    for pairs in (gears.pairs_sun, gears.pairs_ring):
+        assert pairs[0].contact == pairs[0].with_own_stiffness().contact
+    assert "linear" in gears.law("ring")
+    told = planetary((24, 30, 84), "1.5 mm", stiffness="iso single", damping_ratio=0.1).pairs_sun[0]
+    assert told.contact == told.with_own_stiffness("iso single", 0.1).contact
+    paper = planetary((24, 30, 84), "1.5 mm", contact=ContactLaw.impact())
+    assert paper.pairs_ring[0].contact == ContactLaw.impact()
+    with pytest.raises(ValueError, match=r"PlanetarySet.damping_ratio is 0.1 beside contact"):
+        planetary((24, 30, 84), "1.5 mm", contact=ContactLaw.impact(), damping_ratio=0.1)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (
+            {"stiffness": "iso", "contact": {"kind": "linear", "stiffness": "3e8 N/m"}},
+            "stiffness is 'iso' beside contact",
+        ),
+        ({"damping_ratio": 0.05, "contact": ContactLaw.impact()}, "damping_ratio is 0.05 beside contact"),
+        ({"stiffness": "din"}, "stiffness is 'din'; choose 'iso', 'iso single' or 'potential-energy'"),
+        ({"damping_ratio": -0.1}, "damping_ratio is -0.1; give a number that is not negative"),
+        ({"torque": "300 N m"}, "torque follows from the drives and loads"),
+        ({"input_torque": "300 N m"}, "input_torque follows from the drives and loads"),
+    ],
+)
+def test_settings_that_contradict(settings, message):
+    with pytest.raises(DrivetrainError, match=message):
+        meshed(**settings)
+
+
+def test_mesh_mode_of_the_default_oscillates():
+    """Rigid shafts in joints, the input held: the one mode is the output on its mesh; by hand it has k r^2 / J."""
+    train = meshed()
+    found = train.mesh_dynamics["mesh"]
+    inertia = train.torsional().inertias[1]
+    assert found.mass == pytest.approx(inertia / train.pairs["mesh"].driven.base_radius ** 2)
+    assert 0.02 < found.damping_ratio < 0.2
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        modes = train_modes(train)
+    assert "oscillating" in modes.kinds
+    # at rest one or two pairs touch: c_gamma / epsilon or twice that, in the mean c_gamma
+    ratio = train.pairs["mesh"].contact_ratio
+    possible = [found.frequency * math.sqrt(n / ratio) for n in (1, 2)]
+    assert min(abs(modes.frequencies[-1] / f - 1) for f in possible) < 0.01
+
+
+def test_overdamped_meshes_are_warned_of():
+    hard = ContactLaw.linear("3e8 N/m", "1e5 N*s/m", "2 um")
+    for contact in (ContactLaw.impact(depth="0.01 mm"), ContactLaw.impact(), hard):
+        train = meshed(contact=contact)
+        assert train.mesh_dynamics["mesh"].damping_ratio > 1
+        for analysis in (train_modes, train_campbell, Drivetrain.torsional):
+            with pytest.warns(UserWarning, match=r"mesh 'mesh' is damped .* times critically by its law"):
+                analysis(train)
+    # a twin below critical damping
+    train = meshed(contact=ContactLaw.linear("3e8 N/m", "2e3 N*s/m", "2 um"))
+    assert train.mesh_dynamics["mesh"].damping_ratio < 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        train.torsional()
+
+
+def test_records_and_reports_name_the_law():
+    train = meshed()
+    record = run_train(train, RunSettings(settling=0.0, duration=0.03))
+    law = str(train.pairs["mesh"].contact)
+    told = json.loads(record.attrs["mesh_laws"])["mesh"]
+    assert told["law"] == law
+    assert told["stiffness"] == pytest.approx(iso_mesh_stiffness(train.pairs["mesh"].geometry) * 0.02, rel=1e-6)
+    assert law in train_report(train, record)
+    assert law in repr(train)
+    assert law in train._repr_html_()
+    assert law in repr(train.pairs["mesh"])
+    assert law in train.pairs["mesh"]._repr_html_()
+    assert "1 drive, 1 load" in repr(train)
+
+
+def ideal(*wheels, **others):
+    """Return an ideal mesh as somebody makes it by himself."""
+    return IdealMesh(GearPair(*wheels, **others), "4e8 N/m", "500 N*s/m")
+
+
+@pytest.mark.parametrize("kind", [IdealMesh, ideal])
+def test_ideal_mesh_in_a_drivetrain(kind):
+    train = stage(
+        meshes=[GearMesh(name="mesh", driver="pinion", driven="gear", settings={"backlash": "0.1 mm"}, pair=kind)]
+    )
+    mesh = train.pairs["mesh"]
+    assert isinstance(mesh, IdealMesh)
+    found = train.mesh_dynamics["mesh"]
+    assert found.stiffness == pytest.approx(mesh.stiffness)
+    assert found.damping == pytest.approx(mesh.damping)
+    modes = train_modes(train)
+    assert modes.frequencies[-1] == pytest.approx(found.frequency, rel=1e-3)
+    record = run_train(train, RunSettings(settling=0.02, duration=0.03))
+    radius = train.pairs["mesh"].geometry.driven.base_radius
+    assert float(record.normal_force.mean()) == pytest.approx(300.0 / radius, rel=1e-3)
+    assert float(record.transmission_error.mean()) == pytest.approx(300.0 / radius / mesh.stiffness, rel=1e-2)
+    assert "ideal" in train_report(train, record)
+
+
+def test_ideal_mesh_of_the_wheels():
+    train = stage(meshes=[GearMesh(name="mesh", driver="pinion", driven="gear", pair=IdealMesh,
+                                   settings={"stiffness": "4e8 N/m", "damping_ratio": 0.1, "ideal_backlash": True,
+                                             "backlash": "0.1 mm"})])  # fmt: skip
+    mesh = train.pairs["mesh"]
+    assert (mesh.stiffness, mesh.backlash) == (4e8, True)
+    assert mesh.damping == pytest.approx(0.2 * math.sqrt(4e8 * mesh.pair.reduced_mass))
+
+
+def test_the_torque_of_either_shaft():
+    one, two = GearSpec(20, "3 mm"), GearSpec(60, "3 mm")
+    by_output, by_input = GearPair(one, two, torque="300 N m"), GearPair(one, two, input_torque="100 N m")
+    assert by_input == by_output
+    assert by_input.normal_force == pytest.approx(100.0 / one.base_radius)
+    assert by_output.with_changes(input_torque=50.0).torque == pytest.approx(150.0)
+    assert "300 N m on the driven wheel" in repr(by_output)
+    assert GearPair(one, two).torque == 100.0
+    with pytest.raises(
+        ValueError, match=r"torque is 300.0, on the driven wheel, and input_torque 100.0, on the driver"
+    ):
+        GearPair(one, two, torque=300.0, input_torque=100.0)
+    with pytest.raises(gm.CaseError, match="torque is that of the driven wheel"):
+        gm.Case(operation={"input_torque": "100 N m"})
+
+
+def test_diameters_and_radii():
+    by_radius, by_diameter = Shaft(name="a", radius="15 mm"), Shaft(name="a", diameter="30 mm")
+    assert by_radius.body() == by_diameter.body() == Shaft(name="a").body()
+    pairs = [("100 mm", "15 mm"), ("50 mm", "20 mm")]
+    tables = [{"length": "100 mm", "diameter": "30 mm"}, {"radius": "20 mm", "length": "50 mm"}]
+    flexible = [ShaftSection("100 mm", "30 mm"), ShaftSection("50 mm", "40 mm")]
+    made = [Shaft(name="a", sections=sections) for sections in (pairs, tables, flexible)]
+    for one in made:
+        assert np.array(one.cylinders) == pytest.approx(np.array([(0.1, 0.015), (0.05, 0.02)]))
+    with pytest.raises(DrivetrainError, match=r"radius is 0.015 m and diameter 0.03 m; give one of them"):
+        Shaft(name="a", radius="15 mm", diameter="30 mm")
+    with pytest.raises(DrivetrainError, match="give diameter or sections, not both"):
+        Shaft(name="a", diameter="30 mm", sections=pairs)
+    with pytest.raises(DrivetrainError, match="without bore or cone"):
+        Shaft(name="a", sections=[ShaftSection("100 mm", "30 mm", inner="10 mm")])
+    with pytest.raises(DrivetrainError, match="give length and diameter"):
+        Shaft(name="a", sections=[{"length": 0.1, "width": 0.2}])
+
+
+def test_lines_of_any_harmonic():
+    """Every harmonic of the mesh, and every sideband, is found by its name."""
+    train = stage()
+    gmf, turns = 500.0, 25.0
+    rng = np.random.default_rng(seed())
+    for _ in range(cases(25)):
+        h, k = int(rng.integers(1, 60)), int(rng.integers(-2, 3))
+        name, off = train.kinematics.nearest(h * gmf + k * turns)
+        assert abs(off) < 1e-9 * gmf
+        if k == 0:
+            assert name == f"{h} x GMF of mesh"
+        elif abs(h * gmf + k * turns) > 3 * turns:
+            assert name == f"{h} x GMF of mesh {k:+d} x in"
+    assert train.kinematics.nearest("2 kHz")[0] == "4 x GMF of mesh"
+    # an upper bound is kept where one is given
+    assert train.kinematics.nearest(2000.0, harmonics=3)[1] != 0.0
+    still = stage(
+        drives=[],
+        loads=[],
+        meshes=[],
+        wheels=[],
+        shafts=[Shaft(name="in")],
+        bearings=[IdealBearing(name="a", shaft="in")],
+    )
+    with pytest.raises(DrivetrainError, match="nothing turns"):
+        still.kinematics.nearest(100.0)
+
+
+def test_errors_are_one_traceback():
+    with pytest.raises(DrivetrainError) as caught:
+        meshed(misalignment="1 apple")
+    told = "".join(traceback.format_exception(caught.value))
+    assert told.count("Traceback") == 1
