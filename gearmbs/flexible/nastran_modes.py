@@ -210,7 +210,7 @@ def _shapes(file: Path, table: GridTable, count: int) -> np.ndarray:
     out = np.zeros((count, len(table.ids), 6))
     if len(records) % 2 or any(len(head) != IDENTIFICATION * int(integer[-1]) for head in records[::2]):
         raise FlexibleError(f"{file.name}: {name} has no identification before each of its records")
-    modes = []
+    modes: list[int] = []
     kind = np.dtype([("grid", integer, (2,)), ("value", real, (6,))])
     for head, data in zip(records[::2], records[1::2]):
         approach, mode, form, width = (int(k) for k in np.frombuffer(head, integer)[[0, 4, 8, 9]])
