@@ -3,7 +3,7 @@ import pytest
 import xarray as xr
 
 from gearmbs import signals
-from gearmbs.gears import GearPair, loaded_transmission_error
+from gearmbs.gears import GearPair, GearSpec, loaded_transmission_error
 from gearmbs.gears.pattern import contact_pattern
 from gearmbs.view import (
     average_plot,
@@ -17,6 +17,7 @@ from gearmbs.view import (
     time_plot,
     transmission_error_plot,
 )
+from gearmbs.view.curves import path_ends
 from gearmbs.view.signals import thinned
 from tests.generators import cases, seed
 from tests.view.looking import assert_readable
@@ -110,6 +111,33 @@ def test_the_axis_of_an_average_has_the_numbers_of_the_teeth(case):
     assert average_plot(average, teeth=count + 1).axes[0].get_xlabel().startswith("pitches from")
     other = signals.time_synchronous_average(part, signals.phase_from_speed(part, 1.31 * 2 * np.pi * turn))
     assert "tooth_numbers" not in other.attrs or abs(1.31 / (teeth[0] / teeth[1]) - 1) < 0.01
+
+
+@pytest.mark.parametrize("case", range(cases(4)))
+def test_the_path_in_a_pattern_leans_with_the_helix(case):
+    """Helix, hand, sense, ring or not, either flank: what bears without load to speak of lies between the lines."""
+    rng = np.random.default_rng((seed(), case))
+    hand, rotation, ring = str(rng.choice(["right", "left"])), int(rng.choice([-1, 1])), bool(rng.random() < 0.3)
+    side, settings = str(rng.choice(["drive", "coast"])), {"helix_angle": rng.uniform(0.05, 0.4), "face_width": "20 mm"}
+    one = GearSpec(int(rng.integers(20, 30)), "2 mm", hand=hand, **settings)
+    if ring:
+        two = GearSpec.ring(int(rng.integers(80, 95)), "2 mm", hand=hand, addendum="1.4 mm", **settings)
+    else:
+        two = GearSpec(int(rng.integers(20, 50)), "2 mm", hand={"right": "left", "left": "right"}[hand], **settings)
+    # a tilt as small as jams the coast flanks: they bear only then
+    jam = {"misalignment": "0.3 deg", "backlash": "0.01 mm"} if side == "coast" else {"backlash": "0.1 mm"}
+    pair = GearPair(one, two, rotation=rotation, **jam)
+    pattern = contact_pattern(pair, 0.05, points=61, sections=9, side=side)
+    ends, loaded = path_ends(pattern, pair), pattern.pressure > 0.0
+    # lines lean by the transverse lead: z tan(beta) / r on the pitch circle
+    lean = np.diff(ends, axis=1) / np.diff(pattern.section)
+    expected = np.tan(one.helix_angle) / one.pitch_radius
+    np.testing.assert_allclose(np.abs(lean), expected, rtol=1e-9)
+    if side == "coast":
+        return
+    step, roll = np.diff(pattern.roll_angle)[0], pattern.roll_angle[:, None]
+    assert not np.any(loaded & ((roll < ends[0] - 2 * step) | (roll > ends[1] + 2 * step)))
+    assert np.all(loaded[(roll > ends[0] + 2 * step) & (roll < ends[1] - 2 * step)])
 
 
 def test_thinning_keeps_the_extremes():
