@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
@@ -14,7 +15,10 @@ from gearmbs.drivetrain.part import Part
 from gearmbs.gears.laws import ContactLaw, FlankFriction
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec
-from gearmbs.units import Quantity
+from gearmbs.units import Quantity, doubt_of_density
+
+LONG = 30.0
+"""Lengths of a shaft from here on, m, look like millimetres: no gearbox has such; a ship has several."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +81,12 @@ class Shaft(Part):
             object.__setattr__(self, "length", 0.2)
         if self.position is not None:
             require(len(self.position) == 3, f"{self.label}: position is {self.position}; give three lengths")
+        doubt = doubt_of_density(self.density)
+        largest = max(max(pair) for pair in self.cylinders)
+        if largest >= LONG:
+            doubt = f"a length or radius of {largest:g} m; are millimetres meant ('{largest:g} mm')?"
+        if doubt:
+            warnings.warn(f"{self.label}: {doubt}", stacklevel=3)
 
     @property
     def cylinders(self) -> tuple[tuple[float, float], ...]:
