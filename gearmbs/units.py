@@ -306,3 +306,52 @@ def _turns(quantity: Any, registry: Any, text: str, target: str, field: str) -> 
     if "hertz" in names or "minute" in names:
         return float(quantity.to("1/s").magnitude) * math.tau
     raise ValueError(f"{field}: {text!r} may be turns or radians; write 'rpm', 'Hz' or 'rad/s'")
+
+
+SLOWEST_WAVE, FASTEST_WAVE = 20.0, 2e4
+"""Speed of waves along a bar of any solid, sqrt(E / rho), m/s: soft rubber has 30, steel 5200, diamond 17 500."""
+METAL_DENSITY, METAL_WAVE = 5000.0, 800.0
+"""Density above which a solid is a metal, kg/m^3, and the speed of waves in any metal at least: lead has 1200."""
+LIGHTEST, HEAVIEST = 25.0, 3e4
+"""Densities of solids, kg/m^3: light foams have 30, osmium 22 600; in g/cm^3 all solids are below the first."""
+
+
+def doubt_of_material(youngs_modulus: float, density: float) -> str | None:
+    """Return why no solid has this modulus (Pa) and density (kg/m^3), with what may be meant; None if some has.
+
+    Units that are wrong by a thousand or a million show in the density, or in the speed of waves along a bar. A
+    density of zero, that of parts whose mass is elsewhere, is not doubted.
+
+    Examples
+    --------
+    >>> doubt_of_material(2.1e11, 7850.0)
+    >>> doubt_of_material(210.0, 7850.0)
+    "E = 210 Pa with 7850 kg/m^3: waves would run at 0.164 m/s, in steel at 5200; is 2.1e+11 Pa meant ('210 GPa')?"
+    """
+    doubt = doubt_of_density(density)
+    if doubt or density == 0.0:
+        return doubt
+    wave = math.sqrt(youngs_modulus / density)
+    least = METAL_WAVE if density > METAL_DENSITY else SLOWEST_WAVE
+    if least <= wave <= FASTEST_WAVE:
+        return None
+    units = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1e-3, "mPa"), (1e-6, "uPa"))
+    meant = [
+        f"; is {youngs_modulus * f:.4g} Pa meant ('{youngs_modulus:.4g} {u}')?"
+        for f, u in units
+        if 1e3 <= math.sqrt(youngs_modulus * f / density) <= FASTEST_WAVE
+    ]
+    said = f"E = {youngs_modulus:.4g} Pa with {density:.4g} kg/m^3: waves would run at {wave:.3g} m/s, in steel at 5200"
+    return said + "".join(meant[:1])
+
+
+def doubt_of_density(density: float) -> str | None:
+    """Return why no solid has this density (kg/m^3), with what may be meant; None if some has, and of zero."""
+    if density == 0.0:
+        return None
+    if not LIGHTEST <= density <= HEAVIEST:
+        factor = next((f for f in (1e3, 1e12, 1e9, 1e6, 1e-3, 1e-6) if 500.0 <= density * f <= HEAVIEST), None)
+        meant = "" if factor is None else f"; is {density * factor:.4g} kg/m^3 meant"
+        text = {1e3: " ('g/cm^3')", 1e12: " ('t/mm^3')", 1e9: " ('kg/mm^3')"}.get(factor or 0.0, "")
+        return f"{density:.4g} kg/m^3 is the density of no solid{meant}{text}{'?' if meant else ''}"
+    return None

@@ -131,7 +131,10 @@ class ElasticBearing(Bearing):
     def __post_init__(self) -> None:
         super().__post_init__()
         k = self._matrix("stiffness", self.stiffness, "stiffness")
-        k[3, 3], k[4, 4] = k[3, 3] + float(self.tilting[0]), k[4, 4] + float(self.tilting[1])
+        require(np.shape(self.tilting) == (2,), f"{self.label}: tilting is {self.tilting!r}; give two numbers")
+        tilting = self._in_si("tilting", tuple(self.tilting), "N*m/rad")
+        require(min(tilting) >= 0.0, f"{self.label}: tilting is {tilting} N m/rad; none may be negative")
+        k[3, 3], k[4, 4] = k[3, 3] + tilting[0], k[4, 4] + tilting[1]
         require(not np.any(k[5]) and not np.any(k[:, 5]), f"{self.label}: stiffness resists rotation; leave it zero")
         require(bool(np.any(k)), f"{self.label}: all stiffnesses are zero; give stiffness")
         c = self.damping_time * k if self.damping is None else self._matrix("damping", self.damping, "damping")
@@ -139,9 +142,17 @@ class ElasticBearing(Bearing):
 
     def _matrix(self, field: str, value: Any, unit: str) -> np.ndarray:
         if np.shape(value) == (6, 6):
-            return np.array(value, dtype=float)
+            whole = np.array(value, dtype=float)
+            require(bool(np.all(np.isfinite(whole))), f"{self.label}: {field} has entries that are not finite")
+            require(
+                bool(np.all(np.diag(whole) >= 0.0)),
+                f"{self.label}: {field} has {np.diag(whole)} on its diagonal; none may be negative",
+            )
+            return whole
         require(np.shape(value) == (3,), f"{self.label}: {field} has shape {np.shape(value)}; give 3 numbers or 6 x 6")
-        return np.diag([*self._in_si(field, tuple(value), unit), 0.0, 0.0, 0.0])
+        along = self._in_si(field, tuple(value), unit)
+        require(min(along) >= 0.0, f"{self.label}: {field} is {along}; none may be negative")
+        return np.diag([*along, 0.0, 0.0, 0.0])
 
     def holds(self, count: int) -> np.ndarray:
         return self.matrices[0][:5, :5]

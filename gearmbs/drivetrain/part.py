@@ -54,6 +54,7 @@ class Part(Written):
 
     def _in_si(self, field: str, value: Any, unit: str) -> Any:
         if isinstance(value, list | tuple):
+            require(len(value) > 0, f"{self.label}: {field} is empty; give a number in SI, or a text with a unit")
             return tuple(self._in_si(field, item, unit) for item in value)
         try:
             number = to_si(value, unit, f"{self.label}: {field}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
@@ -15,7 +16,10 @@ from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.laws import ContactLaw, FlankFriction
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec
-from gearmbs.units import Quantity
+from gearmbs.units import Quantity, doubt_of_density
+
+LONG = 30.0
+"""Lengths of a shaft from here on, m, look like millimetres: no gearbox has such; a ship has several."""
 
 DIAMETER = 0.030
 """Of a shaft that gives none, m: the usual one of a gearbox of this size, as in the bench of Fig. 2."""
@@ -88,6 +92,12 @@ class Shaft(Part):
             object.__setattr__(self, "length", 0.2)
         if self.position is not None:
             require(len(self.position) == 3, f"{self.label}: position is {self.position}; give three lengths")
+        doubt = doubt_of_density(self.density)
+        largest = max(max(pair) for pair in self.cylinders)
+        if largest >= LONG:
+            doubt = f"a length or radius of {largest:g} m; are millimetres meant ('{largest:g} mm')?"
+        if doubt:
+            warnings.warn(f"{self.label}: {doubt}", stacklevel=3)
 
     def _section(self, given: Any) -> tuple[float, float]:
         """Return length and radius of a section, m."""

@@ -118,6 +118,11 @@ def planet_carrier(
         raise FlexibleError(
             f"planet_carrier: {pins} pins of {p} m on a circle of {circle} m do not fit between {a} and {d} m"
         )
+    if pins > 1 and circle * np.sin(np.pi / pins) <= p:
+        raise FlexibleError(
+            f"planet_carrier: {pins} pins of {p} m on a circle of {circle} m overlap; they are "
+            f"{circle * np.sin(np.pi / pins):.4g} m apart"
+        )
     around = pins * int(np.ceil(24 / pins))
     radii = np.unique(np.array([a, circle - p, circle, circle + p, d]) / 2)
     model = solid_model(revolved_mesh(radii, np.array([-w, w]) / 2, around), material, name=name)
@@ -178,6 +183,14 @@ def box_housing(
     for u, v in axes:
         if not (t + reach <= u <= x - t - reach and t + reach <= v <= y - reach):
             raise FlexibleError(f"box_housing: a bearing of {2 * reach} m at ({u}, {v}) m is not inside the end walls")
+    for k, (u, v) in enumerate(axes):
+        apart = np.hypot(*(axes[:k] - (u, v)).T)
+        if apart.size and apart.min() < 2 * reach:
+            other = axes[int(np.argmin(apart))]
+            raise FlexibleError(
+                f"box_housing: bearings of {2 * reach} m at ({u}, {v}) m and ({other[0]}, {other[1]}) m overlap; they "
+                f"are {apart.min():.4g} m apart"
+            )
     places = [
         np.concatenate([[0.0], np.linspace(t, x - t, divisions[0] + 1), [x]]),
         np.concatenate([[0.0], np.linspace(t, y, divisions[1] + 1)]),

@@ -20,6 +20,10 @@ FAST = 4e4
 """Wave speed of a body, m/s, above which units are doubted: diamond has 34 000, steel 14 000 and its bars 5200."""
 SLOW = 500.0
 """Wave speed, m/s, below which the units of a body are doubted that is heavier than any metal."""
+SYMMETRIC = 1e-6
+"""Difference of mirrored entries against the root of those of the diagonal: files with 4 bytes or 6 digits round so."""
+ROUNDED = 1e-12
+"""Entries below this share of the largest are rounding of what was turned or reduced."""
 HEAVY = 3e4
 """Density, kg/m^3, above which a body is heavier than any metal: osmium has 22 600."""
 
@@ -116,17 +120,47 @@ class FiniteElementModel:
                 raise FlexibleError(f"{self.name}: {label} has shape {matrix.shape}; there are {d} degrees of freedom")
             if not np.all(np.isfinite(matrix.data)):
                 raise FlexibleError(f"{self.name}: {label} has entries that are not finite")
-            size = np.abs(matrix.data).max(initial=0.0)
-            wrong = abs(matrix - matrix.T)
-            if wrong.data.max(initial=0.0) > 1e-6 * max(size, 1e-300):
-                raise FlexibleError(
-                    f"{self.name}: {label} is not symmetric; if the file holds one triangle, read it with symmetry"
-                )
+            self._check_entries(label, matrix)
             object.__setattr__(self, label, sp.csc_array(0.5 * (matrix + matrix.T)))
         if self.positions.shape != (len(self.ids), 3):
             raise FlexibleError(f"{self.name}: positions have shape {self.positions.shape} for {len(self.ids)} nodes")
         if d and (self.dofs[:, 0].max() >= len(self.ids) or self.dofs[:, 1].max() > 5 or self.dofs.min() < -1):
             raise FlexibleError(f"{self.name}: degrees of freedom name nodes or directions that do not exist")
+
+    def _check_entries(self, label: str, matrix: sp.csc_array) -> None:
+        """Refuse a matrix that is not symmetric, or has an entry without room between those of the diagonal.
+
+        Of a positive semidefinite matrix a_ij^2 <= a_ii a_jj. Masses are; a stiffness may have lost it under a preload,
+        and then keeps that a row whose diagonal is zero is empty.
+        """
+        size = np.abs(matrix.data).max(initial=0.0)
+        root = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
+        coo = matrix.tocoo()
+        room = root[coo.row] * root[coo.col]
+        skew = (matrix - matrix.T).tocoo()
+        far = np.abs(skew.data) - SYMMETRIC * root[skew.row] * root[skew.col] > ROUNDED * size
+        if far.any():
+            k = int(np.argmax(far))
+            raise FlexibleError(
+                f"{self.name}: {label} is not symmetric ({self._dof(skew.row[k])} with {self._dof(skew.col[k])}); if "
+                "the file holds one triangle, read it with symmetry, else it is damaged"
+            )
+        over = np.abs(coo.data) - (1.0 + SYMMETRIC) * room > ROUNDED * size
+        if label == "stiffness":
+            over &= room == 0.0
+        if over.any():
+            k = int(np.argmax(over))
+            raise FlexibleError(
+                f"{self.name}: {label} of {self._dof(coo.row[k])} with {self._dof(coo.col[k])} is {coo.data[k]:.6g}, "
+                f"between diagonal entries of {matrix.diagonal()[coo.row[k]]:.6g} and "
+                f"{matrix.diagonal()[coo.col[k]]:.6g}: no body has such; the file is damaged, or "
+                "a row is no displacement"
+            )
+
+    def _dof(self, row: int) -> str:
+        """Return the name of a degree of freedom for messages."""
+        node, direction = self.dofs[row]
+        return f"direction {direction + 1} of node {self.ids[node]}" if 0 <= node < len(self.ids) else f"row {row + 1}"
 
     @property
     def has_rotations(self) -> bool:

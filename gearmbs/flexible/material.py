@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,10 @@ import numpy as np
 from gearmbs._shown import Written
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.mechanism.quantities import quantity
-from gearmbs.units import Quantity
+from gearmbs.units import Quantity, doubt_of_material
+
+MOST_SHEAR = 0.52
+"""Shear modulus over Young's: 1/2 at a Poisson's ratio of zero, and what sources round."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,11 @@ class ElasticMaterial(Written):
     ------
     FlexibleError
         For values that no material has.
+
+    Warns
+    -----
+    UserWarning
+        For a modulus or density that no solid has: other units are meant (`gearmbs.units.doubt_of_material`).
     """
 
     youngs_modulus: Quantity = 2.1e11
@@ -45,13 +54,23 @@ class ElasticMaterial(Written):
             raise FlexibleError(f"ElasticMaterial.youngs_modulus is {e} Pa; it must be positive")
         if not (np.isfinite(rho) and rho >= 0.0):
             raise FlexibleError(f"ElasticMaterial.density is {rho} kg/m^3; it must not be negative")
-        if not 0.0 <= self.poisson_ratio < 0.5:
-            raise FlexibleError(f"ElasticMaterial.poisson_ratio is {self.poisson_ratio}; give 0 up to 0.5")
+        ratio = quantity(self.poisson_ratio, "dimensionless", "ElasticMaterial.poisson_ratio")
+        if not 0.0 <= ratio < 0.5:
+            raise FlexibleError(f"ElasticMaterial.poisson_ratio is {ratio}; give 0 up to 0.5")
+        doubt = doubt_of_material(e, rho)
+        if doubt:
+            warnings.warn(f"ElasticMaterial '{self.name}': {doubt}", stacklevel=3)
         g = self.shear_modulus
         g = e / (2.0 * (1.0 + self.poisson_ratio)) if g is None else quantity(g, "Pa", "ElasticMaterial.shear_modulus")
         if not (np.isfinite(g) and g > 0.0):
             raise FlexibleError(f"ElasticMaterial.shear_modulus is {g} Pa; it must be positive")
-        for field, value in (("youngs_modulus", e), ("density", rho), ("shear_modulus", g)):
+        if g > MOST_SHEAR * e:
+            warnings.warn(
+                f"ElasticMaterial '{self.name}': shear_modulus is {g:.4g} Pa beside E = {e:.4g} Pa; of an isotropic "
+                "material it is at most E / 2",
+                stacklevel=3,
+            )
+        for field, value in (("youngs_modulus", e), ("poisson_ratio", ratio), ("density", rho), ("shear_modulus", g)):
             object.__setattr__(self, field, value)
 
 

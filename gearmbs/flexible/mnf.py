@@ -2,12 +2,17 @@
 
 A file of version 6 holds big-endian (XDR) numbers: integers of 4 bytes, floats of 8, text one character to 4 bytes. A
 header of fixed size ends with flags that tell which blocks follow: nodes, mass properties, eigenvalues, shapes, nodal
-masses, nodal inertias, units, faces, transformation of the shapes, interface nodes. What comes after these is kept as
-it is. The nine invariants that ADAMS computes from them follow from nodal masses, inertias and shapes.
+masses, nodal inertias, units, faces, transformation of the shapes, interface nodes, stresses at nodes, statistics of
+the modes. The last two are followed to the end of the file, so that one that is cut is known, and kept as they are; the
+statistics repeat the greatest length of each shape, which is compared. The format has no checksum: files of this
+package carry the SHA-256 of their content in the comments of the header. The nine invariants that ADAMS computes follow
+from nodal masses, inertias and shapes.
 """
 
 from __future__ import annotations
 
+import hashlib
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,7 +34,14 @@ HEADER = 0xA14
 FLAGS = HEADER - 400
 """First of the flags of content; block b of ADAMS's numbering is number b - 4 up to the nodal inertias."""
 F_TOPOLOGY, F_INERTIAS, F_UNITS, F_STIFFNESS, F_MASS = 1, 6, 8, 9, 10
-F_FACES, F_DAMPING, F_TRANSFORM, F_INTERFACE = 12, 13, 14, 15
+F_FACES, F_DAMPING, F_TRANSFORM, F_INTERFACE, F_STRESS, F_STATISTICS = 12, 13, 14, 15, 16, 28
+BLOCK = 2
+"""ADAMS's number of a block from the faces on, less the place of its flag."""
+COMMENTS = 0x504
+"""Byte of the comments in the header; the flags end them."""
+MARK = text_bytes("gearmbs SHA-256 ", 16)
+SAME_LENGTH = 1e-6
+"""Relative difference of a shape's greatest length from that of the statistics, whose programs round to 4 bytes."""
 NEEDED = {0: "nodes", 2: "global properties", 3: "eigenvalues", 4: "mode shapes", 5: "nodal masses", F_UNITS: "units"}
 UNKNOWN = {
     F_TOPOLOGY: "element topology", 7: "block 7", F_STIFFNESS: "generalised stiffness", 11: "block 11",
@@ -68,6 +80,9 @@ def read_mnf(path: str | Path) -> ModalNeutralFile:
     r = Reader(data, label)
     r.at = FLAGS
     flags = r.ints(100, "content summary")
+    for place, flag in enumerate(flags):
+        if flag not in (0, 1):
+            r.wrong("content summary", f"flag {place} is {flag}, where 0 and 1 are no and yes", 4 * (100 - place))
     for place, what in NEEDED.items():
         if not flags[place]:
             raise FlexibleError(f"{label}: the file has no {what}; write it with all standard blocks")
@@ -105,12 +120,21 @@ def read_mnf(path: str | Path) -> ModalNeutralFile:
         if rows.min() < 0 or rows.max() >= count:
             r.wrong("interface nodes", f"row {rows.max()} of {count} nodes", 4 * rows.size)
         interfaces = ids[rows]
+    first = r.at
+    statistics = _follow_to_end(r, flags, ids, n)
     found = ModalNeutralFile(
         ids, nodes["x"].astype(float), float(overall[0]), overall[1:4].copy(), overall[4:].reshape(3, 3).copy(),
         eigen["id"].astype(int), eigen["v"].astype(float), shapes, masses, inertias, units, faces,  # type: ignore[arg-type]
-        transformation, interfaces, data[:HEADER], unit_bytes, data[r.at :],
+        transformation, interfaces, data[:HEADER], unit_bytes, data[first:],
     )  # fmt: skip
     check_numbers(found, label)
+    if statistics is not None:
+        _check_lengths(found, statistics, label)
+    if _marked(data) and _stamped(data) != data:
+        raise FlexibleError(
+            f"{label}: its content is not what was written (SHA-256 in the comments of its header): it is damaged; "
+            "write it anew. If another program changed it on purpose, clear those comments"
+        )
     return found
 
 
@@ -151,7 +175,7 @@ def write_mnf(path: str | Path, mnf: ModalNeutralFile) -> None:
         parts += [ints_bytes(mnf.interfaces.size, *(place[int(k)] for k in mnf.interfaces))]
     whole = bytes(header) + b"".join(parts) + mnf.tail
     part = path.with_name(path.name + ".part")
-    part.write_bytes(whole)
+    part.write_bytes(_stamped(whole) if _marked(whole) else whole)
     part.replace(path)
 
 
@@ -266,8 +290,65 @@ def _header(mnf: ModalNeutralFile, title: str = "") -> bytes:
         flags[place] = int(there)
     text = text_bytes(title[:60], 60)
     out[4 : 4 + len(text)] = text
+    out[COMMENTS : COMMENTS + len(MARK)] = MARK
     out[FLAGS:HEADER] = flags.tobytes()
     return bytes(out)
+
+
+def _marked(data: bytes) -> bool:
+    """Return whether the comments of a file announce the SHA-256 of its content."""
+    return data[COMMENTS : COMMENTS + len(MARK)] == MARK
+
+
+def _stamped(data: bytes) -> bytes:
+    """Return a file with the SHA-256 of all its other bytes in the comments, 64 characters of 4 bytes."""
+    first = COMMENTS + len(MARK)
+    head, rest = data[:first], data[first + 4 * 64 :]
+    return head + text_bytes(hashlib.sha256(head + rest).hexdigest(), 64) + rest
+
+
+def _follow_to_end(r: Reader, flags: tuple[int, ...], ids: np.ndarray, n: int) -> np.ndarray | None:
+    """Follow what comes after the interface nodes to the end of the file, and return the statistics of the modes."""
+    if flags[F_STRESS]:
+        shapes, nodes = r.ints(2, "nodal stresses")
+        _same_nodes(r, np.array(r.ints(r.count(nodes, "nodal stresses"), "nodal stresses")), ids, "nodal stresses")
+        r.records([("id", ">i4"), ("v", ">f8", (nodes, 6))], r.count(shapes, "nodal stresses", True), "nodal stresses")
+    others = [str(k + BLOCK) for k in range(F_STRESS + 1, len(flags)) if flags[k] and k != F_STATISTICS]
+    if others:
+        if r.at == len(r.data):
+            r.wrong(f"number {others[0]}", "the file ends here, and its summary names this block; it is cut off")
+        warnings.warn(
+            f"{r.label}: of its blocks {', '.join(others)} the length is not known: whether the file is whole after "
+            f"byte {r.at} cannot be told. What is read stands before it",
+            stacklevel=5,
+        )
+        return None
+    statistics = None
+    if flags[F_STATISTICS]:
+        found = r.ints(1, "modal statistics")[0]
+        if found != n:
+            r.wrong("modal statistics", f"they are of {found} modes, the file has {n}", 4)
+        statistics = r.records([("k", ">i4", (13,)), ("v", ">f8", (13,))], n, "modal statistics")["v"].astype(float)
+    if r.at != len(r.data):
+        warnings.warn(
+            f"{r.label}: {len(r.data) - r.at} bytes from byte {r.at} on are of no block that its summary names; they "
+            "are not looked at",
+            stacklevel=5,
+        )
+    return statistics
+
+
+def _check_lengths(found: ModalNeutralFile, statistics: np.ndarray, label: str) -> None:
+    """Refuse shapes whose greatest displacement or rotation is not that of the statistics."""
+    for column, part, what in ((0, found.shapes[:, :, :3], "displacement"), (1, found.shapes[:, :, 3:], "rotation")):
+        own = np.linalg.norm(part, axis=2).max(axis=1)
+        wrong = np.abs(own - statistics[:, column]) > SAME_LENGTH * np.maximum(own, statistics[:, column])
+        if wrong.any():
+            k = int(np.argmax(wrong))
+            raise FlexibleError(
+                f"{label}: mode {found.mode_ids[k]}: its greatest {what} is {own[k]:.6g}, its statistics say "
+                f"{statistics[k, column]:.6g}; the shapes are damaged"
+            )
 
 
 def _read_shapes(r: Reader, n: int, ids: np.ndarray) -> np.ndarray:

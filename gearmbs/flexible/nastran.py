@@ -110,7 +110,7 @@ def read_op2(
     """
     file = Path(path)
     found = op2_tables(file, [stiffness.upper(), mass.upper()])
-    table = GridTable.of(found["uset"])
+    table = found["grids"]
     matrices = [_named(found, wanted, file) for wanted in (stiffness, mass)]
     if dofs is not None:
         table = GridTable(table.ids, table.positions, table.axes, np.asarray(dofs, dtype=int))

@@ -15,7 +15,7 @@ from gearmbs.flexible.integrals import nodal_lumps
 from gearmbs.flexible.matrices import FileUnits
 from gearmbs.flexible.matrix_text import Path_
 from gearmbs.flexible.mnf_content import SI, ModalNeutralFile
-from gearmbs.flexible.nastran_files import GridTable, op2_tables, pyyeti_module
+from gearmbs.flexible.nastran_files import GridTable, block_records, op2_tables, pyyeti_module, word_kinds
 from gearmbs.flexible.nastran_stress import grid_stresses
 from gearmbs.units import Quantity
 
@@ -23,6 +23,15 @@ MODES = ("OUGV1", "OUGV1PAT", "OUG1")
 """Data blocks of mode shapes, in displacement coordinate systems."""
 BASIC_MODES = ("BOUGV1",)
 """The same in the basic coordinate system."""
+IDENTIFICATION, GRID_POINT = 146, 1
+"""Words before the shapes of a mode, and the kind of point that has six displacements; scalar points are 2."""
+REAL_MODES = 2
+ANALYSES = {
+    1: "statics", 5: "frequency responses", 6: "a transient", 7: "prebuckling", 8: "buckling", 9: "complex modes",
+    10: "nonlinear statics",
+}  # fmt: skip
+"""Approach code, tenths of the first word of an identification (DMAP guide)."""
+OTHER_EIGENVALUES = (("CLAMA", "complex modes"), ("BLAMA", "buckling"))
 ORTHOGONAL = 1e-3
 """How far modes may be from orthogonal in the mass matrix, whose numbers have 4 bytes."""
 LUMPED = 2.0
@@ -74,10 +83,13 @@ def read_op2_modes(
     length, _, mass_unit = FileUnits.of(length, 1.0, mass_unit)
     file = Path(path)
     blocks = op2_tables(file, ["MGG"] if masses is None else [])
-    table = GridTable.of(blocks["uset"])
+    table = blocks["grids"]
     lama = blocks.get("lama")
     if lama is None or not len(lama):
-        raise FlexibleError(f"{file.name}: it has no table of eigenvalues (LAMA); run SOL 103 with PARAM,POST,-1")
+        other = next((f"; its {name} is of {what}" for name, what in OTHER_EIGENVALUES if name in blocks["names"]), "")
+        raise FlexibleError(
+            f"{file.name}: it has no table of eigenvalues (LAMA){other}; run SOL 103 with PARAM,POST,-1"
+        )
     shapes = _shapes(file, table, len(lama))
     if masses is None:
         if "mgg" not in blocks:
@@ -186,37 +198,53 @@ def _shapes(file: Path, table: GridTable, count: int) -> np.ndarray:
     """Return the shapes of an op2 file in basic coordinates, shape (n, N, 6)."""
     op2 = pyyeti_module("op2", "op2")
     with op2.OP2(str(file)) as opened:
-        names = [name for name in (*MODES, *BASIC_MODES) if name in opened.dbnames]
-        try:
-            frame = opened.rdop2oug(names[0]) if names else None
-        except Exception as error:
+        name = next((name for name in (*MODES, *BASIC_MODES) if name in opened.dbnames), None)
+        if name is None:
             raise FlexibleError(
-                f"{file.name}: {names[0]} cannot be read ({type(error).__name__}); shapes are read of "
-                "little-endian files with words of 4 bytes"
-            ) from None
-    if frame is None:
-        raise FlexibleError(
-            f"{file.name}: it has no real mode shapes ({', '.join(MODES)}); ask for DISPLACEMENT(PLOT)=ALL"
-        )
-    values = frame.to_numpy(dtype=float)
-    if values.shape[1] != count:
-        raise FlexibleError(f"{file.name}: {names[0]} holds {values.shape[1]} shapes, LAMA {count} eigenvalues")
+                f"{file.name}: it has no real mode shapes ({', '.join(MODES)}); ask for DISPLACEMENT(PLOT)=ALL"
+            )
+        if len(opened.dbnames[name]) > 1:
+            raise FlexibleError(f"{file.name}: {name} is there more than once; write one subcase")
+        records, (integer, real) = block_records(opened, name), word_kinds(opened)
     row = {int(number): k for k, number in enumerate(table.ids)}
     out = np.zeros((count, len(table.ids), 6))
-    seen = np.zeros((len(table.ids), 6), dtype=bool)
-    for k, (number, direction) in enumerate(frame.index):
-        if int(direction) == 0:
-            continue
-        if int(number) not in row:
-            raise FlexibleError(f"{file.name}: {names[0]} names grid point {number}, which GEOM1 does not have")
-        out[:, row[int(number)], int(direction) - 1] = values[k]
-        seen[row[int(number)], int(direction) - 1] = True
-    if not seen.all():
-        number = table.ids[int(np.argmin(seen.all(axis=1)))]
-        raise FlexibleError(f"{file.name}: {names[0]} has no shapes of grid point {number}; ask for all points")
+    if len(records) % 2 or any(len(head) != IDENTIFICATION * int(integer[-1]) for head in records[::2]):
+        raise FlexibleError(f"{file.name}: {name} has no identification before each of its records")
+    modes: list[int] = []
+    kind = np.dtype([("grid", integer, (2,)), ("value", real, (6,))])
+    for head, data in zip(records[::2], records[1::2]):
+        approach, mode, form, width = (int(k) for k in np.frombuffer(head, integer)[[0, 4, 8, 9]])
+        if approach // 10 != REAL_MODES or form not in (0, 1) or width != 8:
+            what = ANALYSES.get(approach // 10, f"analysis {approach // 10}")
+            raise FlexibleError(
+                f"{file.name}: {name} holds {what} in {width} words a point and no real modes; run SOL 103 with "
+                "DISPLACEMENT(PLOT,SORT1,REAL)=ALL"
+            )
+        if len(data) % kind.itemsize:
+            raise FlexibleError(f"{file.name}: {name}: {len(data)} bytes are no points of 8 words")
+        if len(modes) == count or mode in modes:
+            raise FlexibleError(f"{file.name}: {name} holds {len(records) // 2} shapes, LAMA {count} eigenvalues")
+        points = np.frombuffer(data, kind)
+        points = points[points["grid"][:, 1] == GRID_POINT]
+        numbers = points["grid"][:, 0] // 10
+        places = [row.get(int(number), -1) for number in numbers]
+        if -1 in places:
+            raise FlexibleError(
+                f"{file.name}: {name} names grid point {numbers[places.index(-1)]}, which GEOM1 does not have"
+            )
+        absent = np.setdiff1d(np.arange(len(table.ids)), places)
+        if absent.size or len(places) > len(table.ids):
+            which = f"no shapes of grid point {table.ids[absent[0]]}" if absent.size else "grid points twice"
+            raise FlexibleError(f"{file.name}: {name} has {which}; ask for all points")
+        out[len(modes), places] = points["value"]
+        modes.append(mode)
+    if not modes:
+        raise FlexibleError(f"{file.name}: {name} is empty; ask for DISPLACEMENT(PLOT)=ALL in SOL 103")
+    if len(modes) != count:
+        raise FlexibleError(f"{file.name}: {name} holds {len(modes)} shapes, LAMA {count} eigenvalues")
     if not np.all(np.isfinite(out)):
-        raise FlexibleError(f"{file.name}: {names[0]} has numbers that are not finite")
-    if names[0] in MODES:
+        raise FlexibleError(f"{file.name}: {name} has numbers that are not finite")
+    if name in MODES:
         for base in (0, 3):
             out[:, :, base : base + 3] = np.einsum("pij,npj->npi", table.axes, out[:, :, base : base + 3])
     return out

@@ -56,7 +56,7 @@ def read_op2_stresses(path: Path_, *, length: Quantity = 1.0, force: Quantity = 
     """
     file = Path(path)
     length, force, _ = FileUnits.of(length, force)
-    return grid_stresses(file, GridTable.of(op2_tables(file, [])["uset"]), length, force)
+    return grid_stresses(file, op2_tables(file, [])["grids"], length, force)
 
 
 def grid_stresses(file: Path, table: GridTable, length: float, force: float) -> StressModes:

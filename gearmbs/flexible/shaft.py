@@ -31,8 +31,18 @@ from gearmbs.units import Quantity
 if TYPE_CHECKING:
     from gearmbs.flexible.modal_model import ModalModel
 
+THINNEST = 1e-3
+"""Excess of a polar moment over twice the diametral one that digits of a catalogue leave."""
 ELEMENTS = 24
 """Least number of elements of a shaft unless told otherwise."""
+
+
+MOST_SHEAR = 1e6
+"""Shear coefficients are below one; great ones make a beam without shear of Euler and Bernoulli."""
+
+
+def _is_count(value: Any) -> bool:
+    return not isinstance(value, bool) and isinstance(value, int | np.integer) and value >= 1
 
 
 @dataclass(frozen=True)
@@ -67,7 +77,7 @@ class ShaftSection(Written):
         if not (np.isfinite(self.length) and self.length > 0.0):
             raise FlexibleError(f"ShaftSection.length is {self.length} m; it must be positive")
         for outer, inner in ((self.outer, self.inner), (self.outer_end, self.inner_end)):
-            if not 0.0 <= inner < outer:
+            if not 0.0 <= inner < outer < np.inf:
                 raise FlexibleError(f"ShaftSection: bore {inner} m in {outer} m; give diameters 0 <= inner < outer")
 
 
@@ -111,8 +121,25 @@ class Disc(Written):
         if by_size == by_mass:
             raise FlexibleError(f"{label}: give outer and width, or mass, polar and diametral")
         numbers = (self.outer, self.width) if by_size else (self.mass, self.polar, self.diametral)
-        if not all(np.isfinite(value) and value >= 0.0 for value in numbers) or (by_size and self.inner >= self.outer):
-            raise FlexibleError(f"{label}: sizes {numbers} must not be negative, nor the bore wider than the disc")
+        for name in ("at", "inner"):
+            value = getattr(self, name)
+            if value is None or not 0.0 <= value < np.inf:
+                raise FlexibleError(f"{label}: {name} is {value} m; give a finite length, not negative")
+        if not all(np.isfinite(value) and value >= 0.0 for value in numbers):
+            raise FlexibleError(f"{label}: sizes {numbers} must be finite and not negative")
+        if by_size and not (self.inner < self.outer and self.width > 0.0):
+            raise FlexibleError(
+                f"{label}: a bore of {self.inner} m in {self.outer} m, {self.width} m wide; give diameters "
+                "0 <= inner < outer and a positive width"
+            )
+        # each moment of a body is at most the sum of the others; a thin disc has just polar = 2 diametral
+        if not by_size and self.polar > 2.0 * self.diametral * (1.0 + THINNEST):
+            raise FlexibleError(
+                f"{label}: polar = {self.polar:g} kg m^2 exceeds twice diametral = {self.diametral:g} kg m^2, which no "
+                "body has; a thin disc has polar = 2 diametral"
+            )
+        if not by_size and self.mass == 0.0 and self.polar > 0.0:
+            raise FlexibleError(f"{label}: it has moments of inertia and no mass; give its mass")
 
     def properties(self, material: ElasticMaterial) -> tuple[float, float, float]:
         """Return mass, polar and diametral moment of inertia."""
@@ -188,8 +215,11 @@ class Shaft(Written):
         for what, at in places.items():
             if not -1e-9 * self.length <= at <= self.length * (1 + 1e-9):
                 raise FlexibleError(f"{label}: {what} is at {at} m; the shaft reaches from 0 to {self.length:g} m")
-        if self.elements < 1:
-            raise FlexibleError(f"{label}: elements = {self.elements}; it needs one at least")
+        if not _is_count(self.elements):
+            raise FlexibleError(f"{label}: elements = {self.elements!r}; give a whole number, one at least")
+        shear = self.shear
+        if shear is not None and not (0.0 < quantity(shear, "dimensionless", f"{label}: shear") <= MOST_SHEAR):
+            raise FlexibleError(f"{label}: shear = {shear!r}; give a coefficient above 0 to {MOST_SHEAR:g}")
 
     @property
     def length(self) -> float:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 from gearmbs._shown import Shown, Written
-from gearmbs.units import Given, Quantity, to_si
+from gearmbs.units import Given, Quantity, doubt_of_material, to_si
 
 UNDERCUT_TOLERANCE = 0.8  # share of the cutter height that must clear the base circle's normal (14 teeth at 20 deg)
 
@@ -62,6 +63,9 @@ class Material(Written):
         require(self.youngs_modulus > 0, f"Material.youngs_modulus is {self.youngs_modulus} Pa; it must be positive")
         require(self.density > 0, f"Material.density is {self.density} kg/m^3; it must be positive")
         require(0 <= self.poisson_ratio < 0.5, f"Material.poisson_ratio is {self.poisson_ratio}; give 0 up to 0.5")
+        doubt = doubt_of_material(self.youngs_modulus, self.density)
+        if doubt:
+            warnings.warn(f"Material '{self.name}': {doubt}", stacklevel=3)
 
 
 @dataclass(frozen=True)

@@ -234,7 +234,7 @@ def _report(signal: xr.DataArray, counts: tuple[int, ...], options: AnalysisOpti
     tell("averaging")
     own, phase = counts[options.wheel - 1], shaft.phase
     if options.wheel > 1:
-        phase = phase * (counts[0] / own)
+        phase = (phase * (counts[0] / own)).assign_attrs(**phase.attrs, wheel=options.wheel)
         notes.append(f"Averages, indicators and sidebands follow wheel {options.wheel} with {own} teeth.")
     average = _average(signal, phase, own, harmonics, shaft.speed * counts[0] / own, notes, tell)
     if average is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy.fft
@@ -88,7 +88,10 @@ def time_synchronous_average(
     Returns
     -------
     xarray.DataArray
-        Dimensions (angle, channel), angle in revolutions from 0; attributes `averages` and `samples_per_rev`.
+        Dimensions (angle, channel), angle in revolutions from 0; attributes `averages`, `samples_per_rev` and
+        `angle_origin`, from where the angle counts. Where the signal says which teeth are in mesh (``teeth_in_mesh``,
+        as simulated ones do) and the phase is that of one of its two wheels, ``tooth_numbers`` are that wheel's teeth,
+        the number in mesh at angle 0, its step a pitch, and the wheel.
 
     Raises
     ------
@@ -117,8 +120,56 @@ def time_synchronous_average(
     # Angles keep their origin: the first sample of the average is the same angle of the shaft in every record.
     shift = clock.first % length
     average = np.roll(total / count, shift, axis=0)
-    extra = {"averages": count, "mean_speed": clock.mean_speed}
+    extra = {"averages": count, "mean_speed": clock.mean_speed, "angle_origin": _origin(phase)}
+    extra |= _tooth_numbers(signal, phase, clock.mean_speed)
     return _angular(signal, average, np.arange(length) / clock.per_rev, clock.per_rev, extra)
+
+
+ORIGINS = {
+    "constant speed": "the record's first sample", "speed curve": "the record's first sample",
+    "tacho": "the tacho's pulse", "line": "where the mesh line turns positive",
+}  # fmt: skip
+"""From where an angle counts, by how the phase was found."""
+SAME_SPEED = 1e-2
+"""Relative difference of a phase's mean speed from a wheel's: speeds of wheels with other teeth differ by more."""
+
+
+def _origin(phase: xr.DataArray) -> str:
+    """Return from where the angles of a phase count, in words."""
+    return ORIGINS.get(str(phase.attrs.get("origin")), "zero of the angle that was given")
+
+
+def _tooth_numbers(signal: xr.DataArray, phase: xr.DataArray, mean_speed: float) -> dict[str, Any]:
+    """Return the teeth of the wheel that a phase belongs to, the number in mesh at its angle zero, and the step.
+
+    ``teeth_in_mesh`` holds a time, and of driver and driven wheel the number at that time and its step for each pitch.
+    The driver's angle since then is the signal's coordinate ``angle``, or its speed times the time.
+    """
+    known, teeth = signal.attrs.get("teeth_in_mesh"), signal.attrs.get("teeth")
+    if known is None or teeth is None or len(teeth) != 2:
+        return {}
+    since, own = phase["time"].values[0], signal.coords.get("angle")
+    at = np.asarray(signal["time"].values, dtype=float)
+    if own is not None and own.dims == ("time",):
+        driver = float(np.interp(since, at, own.values))
+        speed = abs(float(own.values[-1] - own.values[0])) / (at[-1] - at[0])
+    elif signal.attrs.get("speed") is not None:
+        speed = float(signal.attrs["speed"])
+        driver = speed * (float(since) - known[0])
+    else:
+        return {}
+    ratios = (1.0, teeth[0] / teeth[1])
+    wheel = phase.attrs.get("wheel")
+    if wheel is None:
+        wheel = next(
+            (k + 1 for k, r in enumerate(ratios) if abs(mean_speed - r * speed) < SAME_SPEED * r * speed), None
+        )
+    if wheel is None:
+        return {}
+    count, number, step = teeth[wheel - 1], known[2 * wheel - 1], known[2 * wheel]
+    turned = (ratios[wheel - 1] * driver - float(phase.values[0])) / TURN
+    name = ("driver", "driven wheel")[wheel - 1]
+    return {"tooth_numbers": (int(count), float((number + step * count * turned) % count), int(step), name)}
 
 
 def order_spectrum(
@@ -252,7 +303,7 @@ def _halvings(positions: np.ndarray) -> np.ndarray:
 
 
 def _angular(
-    signal: xr.DataArray, values: np.ndarray, angle: np.ndarray, per_rev: int, extra: dict[str, float]
+    signal: xr.DataArray, values: np.ndarray, angle: np.ndarray, per_rev: int, extra: dict[str, Any]
 ) -> xr.DataArray:
     kept = {k: v for k, v in signal.attrs.items() if k not in ("sampling_rate", "units")}
     return xr.DataArray(

@@ -349,15 +349,25 @@ def check_rate(rate: Any) -> float:
     """`rate` as a positive finite float, or an error that names it."""
     if rate is None:
         raise MissingMetadataError("rate", "a signal", REMEDIES["rate"])
-    value = float(rate)
+    value = _number("rate", rate)
     if not (math.isfinite(value) and value > 0.0):
         raise SignalError(f"rate: must be a positive number of Hz, got {rate!r}")
     return value
 
 
+def _number(field: str, value: Any) -> float:
+    """`value` as a float, or an error that names its field."""
+    try:
+        if isinstance(value, bool | np.bool_):
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError):
+        raise SignalError(f"{field}: give a number, got {value!r}") from None
+
+
 def check_speed(speed: Any) -> float:
     """`speed` as a positive finite float (rad/s), or an error that names it."""
-    value = float(speed)
+    value = _number("speed", speed)
     if not (math.isfinite(value) and value > 0.0):
         raise SignalError(f"speed: must be a positive number of rad/s, got {speed!r}")
     return value
@@ -368,7 +378,12 @@ def check_teeth(teeth: Any) -> tuple[int, ...]:
     counts: Iterable[Any] = np.atleast_1d(teeth).ravel()
     result = []
     for count in counts:
-        if float(count) != int(count) or int(count) < 1:
+        if (
+            isinstance(count, bool | np.bool_)
+            or not math.isfinite(float(count))
+            or float(count) % 1
+            or float(count) < 1
+        ):
             raise SignalError(f"teeth: must be positive whole numbers, got {teeth!r}")
         result.append(int(count))
     if not result:

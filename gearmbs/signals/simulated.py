@@ -53,8 +53,9 @@ def record_signal(record: xr.Dataset, component: str | None = None) -> xr.DataAr
     Returns
     -------
     DataArray
-        Dimensions (time, channel), m/s^2, with sampling rate, speed and teeth. Of a run-up the coordinates ``speed``
-        (rad/s) and ``angle`` (rad) over time, and no single speed.
+        Dimensions (time, channel), m/s^2, with sampling rate, speed and teeth: the force on the driven gear over its
+        mass, with its mean, no reading of an accelerometer (attribute ``quantity``). Of a run-up the coordinates
+        ``speed`` (rad/s) and ``angle`` (rad) over time, and no single speed.
 
     Raises
     ------
@@ -77,9 +78,19 @@ def record_signal(record: xr.Dataset, component: str | None = None) -> xr.DataAr
         t0=float(record.signal_time.values[0]),
         speed=None if turning else float(attributes["operation_speed"]),
         teeth=tuple(int(z) for z in attributes["gears_teeth"]),
-        attrs={"source": str(attributes.get("case", "simulation"))},
+        attrs={
+            "source": str(attributes.get("case", "simulation")),
+            "quantity": "force over mass",
+            **_numbering(record),
+        },
     )
     return signal.assign_coords({name: ("time", record[name].values, record[name].attrs) for name in turning})
+
+
+def _numbering(record: xr.Dataset) -> dict[str, tuple[float, ...]]:
+    """Return the teeth in mesh at the start of a record, where it says them; see `time_synchronous_average`."""
+    found = record["acceleration"].attrs.get("teeth_in_mesh")
+    return {} if found is None else {"teeth_in_mesh": tuple(float(x) for x in np.ravel(found))}
 
 
 def held_speed(record: xr.Dataset) -> float:

@@ -75,7 +75,9 @@ def evaluate(case: Case, known: Measured, *, even: bool, variables: Collection[s
     plain = acceleration.drop_vars(["channel_units", "units"], errors="ignore")
     dataset["acceleration"] = plain.rename(time="signal_time", channel="component")
     dataset["acceleration"].attrs.update(
-        units="m/s^2", long_name="force on the driven gear over its mass (Newton's second law)"
+        units="m/s^2",
+        long_name="force on the driven gear over its mass (Newton's second law)",
+        teeth_in_mesh=teeth_in_mesh(case, start),
     )
     if case.operation.speed_curve is not None:
         dataset = dataset.assign_coords(_turning(case, dataset["signal_time"].values))
@@ -207,6 +209,27 @@ def _tracked_levels(case: Case, acceleration: xr.DataArray, dataset: xr.Dataset)
     found = found.assign_coords(harmonic=np.arange(1, HARMONICS + 1))
     found.attrs = {"units": "m/s^2", "long_name": "RMS of the mesh orders along the run-up"}
     return found
+
+
+def teeth_in_mesh(case: Case, time: float) -> list[float]:
+    """Return which teeth are on the line of centres at a time: ``[time, number, step, number, step]``, driver first.
+
+    A wheel turned by psi from where its tooth 0 points along x has tooth z (mu - psi) / (2 pi) in the direction mu of
+    the mesh: pi from the driven wheel, and from a driver inside a ring, else 0. A step is what the number changes by
+    for each pitch that passes, 1 or -1; wheels turn against each other unless one is a ring.
+    """
+    operation, pair = case.operation, case.pair()
+    sense = pair.operating_point.rotation
+    driver = drive_angle(operation.speed, operation.run_up, operation.run_up + operation.settling, sense)(time)
+    teeth, external = case.gears.teeth, pair.geometry.sign > 0
+    driven = pair.driven_angle(0.0) - (1 if external else -1) * driver * teeth[0] / teeth[1]
+    out = [float(time)]
+    for count, mesh, angle, step in (
+        (teeth[0], pair.geometry.mesh_angle, driver, -sense),
+        (teeth[1], np.pi, driven, sense if external else -sense),
+    ):
+        out += [float((mesh - angle) * count / (2.0 * np.pi) % count), float(step)]
+    return out
 
 
 def _turning(case: Case, t: np.ndarray) -> dict[str, Any]:

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from gearmbs.view.scene import Scene
 
 RPM = 30.0 / np.pi
+ROUNDEST = 4000.0
+"""Radius of the largest wheel over the distance of a chord from its curve: a quarter of a pixel in 1000."""
 
 
 def train_report(train: Drivetrain, record: xr.Dataset) -> str:
@@ -142,11 +144,15 @@ def _cost(train: Drivetrain, record: xr.Dataset) -> list[str]:
 def train_shapes(train: Drivetrain) -> dict[str, Mesh]:
     """Return the meshes of all shafts with their wheels, in the bodies' frames, for scenes."""
     from gearmbs.view.mesh import cylinder, joined
+    from gearmbs.view.scenes import TOLERANCE
     from gearmbs.view.solid import pair_solids
 
     wheels: dict[str, Mesh] = {}
+    # a wheel among many fills a part of the picture; its outline is as round as that of the largest alone
+    largest = max((wheel.gear.outer_radius for wheel in train.wheels), default=0.0)
+    tolerance = max(TOLERANCE, largest / ROUNDEST)
     for mesh in train.meshes:
-        for name, solid in zip((mesh.driver, mesh.driven), pair_solids(train.pairs[mesh.name]), strict=True):
+        for name, solid in zip((mesh.driver, mesh.driven), pair_solids(train.pairs[mesh.name], tolerance), strict=True):
             wheels.setdefault(name, solid)
     out = {}
     for shaft in train.shafts:
@@ -163,7 +169,11 @@ def train_shapes(train: Drivetrain) -> dict[str, Mesh]:
 
 
 def train_scene(train: Drivetrain) -> Scene:
-    """Return the 3-D view of a drivetrain at its start: shafts with their wheels, housings as boxes, joints."""
+    """Return the 3-D view of a drivetrain at its start: shafts with their wheels, housings as boxes, joints.
+
+    Housings are seen through.
+    """
     from gearmbs.view import mechanism_scene
 
-    return mechanism_scene(train.build(), shapes=train_shapes(train), title=train.name)
+    housings = [housing.name for housing in train.housings]
+    return mechanism_scene(train.build(), shapes=train_shapes(train), through=housings, title=train.name)

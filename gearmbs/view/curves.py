@@ -87,7 +87,8 @@ def contact_pattern_plot(
     pattern : ContactPattern
         From `gearmbs.gears.pattern.contact_pattern`.
     pair : GearPair, optional
-        Marks the ends of the path of contact of parallel wheels.
+        Marks where the flank begins and ceases to bear, section by section: the ends of the path of contact, which a
+        helix turns by z tan(beta_b) / r_b, so that its zone of contact is a parallelogram.
     title : str, optional
     ax : matplotlib axes, optional
     """
@@ -100,7 +101,7 @@ def contact_pattern_plot(
         ax.set_facecolor("#ECEDEF")
         ax.grid(visible=False)
         if pair is not None:
-            _path_ends(ax, pair)
+            _path_ends(ax, pattern, pair)
         if not pressure.count():
             ax.text(0.5, 0.5, "no load on this flank", transform=ax.transAxes, ha="center", color=VERMILLION)
         ax.set_xlabel("along the face, mm")
@@ -112,23 +113,46 @@ def contact_pattern_plot(
     return figure
 
 
-def _path_ends(ax: Axes, pair: GearPair) -> None:
-    """Mark where the tooth enters and leaves the path of contact of parallel wheels."""
-    first, second = pair.wheels
-    middle = first.base_radius * np.tan(pair.working_pressure_angle)
-    begin = pair.line_of_action - second.tip_roll_length - middle
-    for way, text, where in (
-        (begin, "start of path", "top"),
-        (first.tip_roll_length - middle, "end of path", "bottom"),
-    ):
-        angle = np.rad2deg(way / first.base_radius)
-        ax.axhline(angle, color=VERMILLION, linewidth=0.9, linestyle=(0, (5, 3)))
-        shift = -3 if where == "top" else 3
+def path_ends(pattern: ContactPattern, pair: GearPair) -> np.ndarray | None:
+    """Return the driver angles at which each section enters and leaves the path of contact, rad, shape (2, m).
+
+    A flank touches at length of roll s = a + d (r_b phi + rho h z tan(beta_b)): phi the angle, z the section, rho the
+    sense of rotation, h 1 for a right-hand driver and -1 for a left-hand one, d 1 for drive flanks and -1 for coast
+    flanks, whose contact runs the other way. Of drive flanks a is r_b tan(alpha'); of coast flanks, which the backlash
+    moves, it is what the pattern has. The wheels are taken as parallel. None where nothing bears.
+    """
+    driver, section = pair.driver, np.asarray(pattern.section)
+    loaded = np.isfinite(pattern.roll_length)
+    turned = driver.base_radius * pattern.roll_angle[:, None] + _lead(pair) * section
+    middle = driver.base_radius * np.tan(pair.working_pressure_angle)
+    if not loaded.any():
+        return None
+    away = [np.median(np.abs(pattern.roll_length - middle - turned)[loaded]), np.inf]
+    coast = np.median((pattern.roll_length + turned)[loaded])
+    away[1] = np.median(np.abs(pattern.roll_length - coast + turned)[loaded])
+    start, way = (middle, 1.0) if away[0] <= away[1] else (coast, -1.0)
+    ends = np.array([pair.geometry.first_roll_lengths[0], driver.tip_roll_length])
+    return (way * (ends[:, None] - start) - _lead(pair) * section) / driver.base_radius
+
+
+def _lead(pair: GearPair) -> float:
+    """Return how far contact moves along the path for each metre of face: rho h tan(beta_b)."""
+    return pair.operating_point.rotation * pair.driver.twist_tangent
+
+
+def _path_ends(ax: Axes, pattern: ContactPattern, pair: GearPair) -> None:
+    """Mark where each section enters and leaves the path of contact."""
+    ends = path_ends(pattern, pair)
+    if ends is None:
+        return
+    across = np.asarray(pattern.section) * 1e3
+    for angles, text, where in zip(np.rad2deg(ends), ("start of path", "end of path"), ("top", "bottom")):
+        ax.plot(across, angles, color=VERMILLION, linewidth=0.9, linestyle=(0, (5, 3)))
+        right = int(np.argmax(across))
         ax.annotate(
             text,
-            (1.0, angle),
-            xycoords=("axes fraction", "data"),
-            xytext=(-4, shift),
+            (across[right], angles[right]),
+            xytext=(-4, -3 if where == "top" else 3),
             textcoords="offset points",
             ha="right",
             va=where,

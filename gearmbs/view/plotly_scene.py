@@ -66,6 +66,7 @@ def _moving(go: Any, scene: SceneData, instant: int) -> list:
         x, y, z = mesh.vertices.T
         i, j, k = mesh.triangles.T
         shape = {"x": x, "y": y, "z": z, "i": i, "j": j, "k": k, "flatshading": True, "lighting": LIGHT}
+        shape["opacity"] = part.opacity
         traces.append(go.Mesh3d(**shape, color=part.colour, name=part.name, showlegend=True, hoverinfo="name"))
         traces.append(_line(go, part.name, "#222222", feature_edges(mesh), legend=False))
     if scene.forces:

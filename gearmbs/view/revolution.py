@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import xarray as xr
@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from gearmbs.view.bars import state_colour
 from gearmbs.view.figure_style import GREY, drawn_on, label, look, new_figure
-from gearmbs.view.signals import KINDS
+from gearmbs.view.signals import quantity
 
 MOST_TICKS = 60
 """More teeth than this are not marked one by one."""
@@ -35,7 +35,10 @@ def average_plot(
         Dimension angle (revolutions), optionally channel of length one, as
         `gearmbs.signals.time_synchronous_average` makes them and an `AnalysisReport` holds them.
     teeth : int, optional
-        Teeth of the wheel on that shaft: the axis counts them. Default: revolutions.
+        Teeth of the wheel on that shaft: the axis counts them. Default: revolutions. Of averages that know the numbers
+        of the teeth (``tooth_numbers``, those of simulated pairs) it is the tooth on the line of centres, and runs
+        from the highest to the lowest number where they pass in this order; of others pitches from where the angle
+        begins, which the label says.
     title : str, optional
     ax : matplotlib axes, optional
         For a single average.
@@ -58,9 +61,14 @@ def average_plot(
         else:
             figure = new_figure(7.2, 1.0 + 1.7 * len(curves))
             panels = list(figure.subplots(len(curves), 1, sharex=True, sharey=True, squeeze=False)[:, 0])
+        numbers = _numbers(named.values(), teeth)
         for k, (panel, (name, (angle, values, unit))) in enumerate(zip(panels, curves.items())):
-            panel.plot(angle * (teeth or 1), values, color=state_colour(name, k), linewidth=0.9)
-            panel.set_ylabel(label(KINDS.get(unit, "average"), unit))
+            x = angle * (teeth or 1)
+            if numbers is not None:
+                x = (numbers[k][1] + numbers[k][2] * x) % numbers[k][0]
+                x, values = (column[np.argsort(x)] for column in (x, values))
+            panel.plot(x, values, color=state_colour(name, k), linewidth=0.9)
+            panel.set_ylabel(label(quantity(list(named.values())[k], unit, "average"), unit))
             if name:
                 panel.set_title(name, fontsize=10)
             panel.margins(x=0)
@@ -69,12 +77,33 @@ def average_plot(
             if teeth is not None and teeth * angle[-1] <= MOST_TICKS:
                 panel.set_xticks(np.arange(0, round(teeth * angle[-1]) + 1), minor=True)
                 panel.grid(visible=True, axis="x", which="minor", color=GREY, alpha=0.25, linewidth=0.5)
-        panels[-1].set_xlabel("revolution" if teeth is None else f"tooth of the wheel, {teeth} a revolution")
+        panels[-1].set_xlabel(_axis(named.values(), teeth, numbers))
+        if numbers is not None and numbers[0][2] < 0:
+            panels[-1].invert_xaxis()
         if title and len(panels) == 1:
             panels[0].set_title(title, wrap=True)
         elif title:
             figure.suptitle(title)
     return figure
+
+
+def _numbers(averages: Iterable[xr.DataArray], teeth: int | None) -> list[tuple[int, float, int, str]] | None:
+    """Return tooth count, number at angle 0 and step of each average, if all know them of this wheel, alike."""
+    found = [average.attrs.get("tooth_numbers") for average in averages]
+    single = all(float(average["angle"].values[-1]) < 1.0 for average in averages)
+    known = single and all(one is not None and one[0] == teeth for one in found)
+    return found if known and len({one[2:] for one in found}) == 1 else None  # type: ignore[return-value, index]
+
+
+def _axis(
+    averages: Iterable[xr.DataArray], teeth: int | None, numbers: list[tuple[int, float, int, str]] | None
+) -> str:
+    """Return the label of the axis: what it counts, and from where."""
+    if numbers is not None:
+        return f"tooth of the {numbers[0][3]} in mesh, 0 to {numbers[0][0] - 1}"
+    origins = sorted({str(average.attrs.get("angle_origin", "angle 0")) for average in averages})
+    where = f"from {origins[0]}" if len(origins) == 1 else "each from its own start"
+    return f"revolution, {where}" if teeth is None else f"pitches {where}, {teeth} teeth"
 
 
 def _curve(name: str, average: xr.DataArray) -> tuple[np.ndarray, np.ndarray, str]:

@@ -15,6 +15,7 @@ from gearmbs.progress import waiting
 from gearmbs.view.figure_style import DPI, VERMILLION, look, new_figure, png_bytes
 from gearmbs.view.files import whole_file
 from gearmbs.view.film import ENDINGS, write_film
+from gearmbs.view.mesh import Mesh
 from gearmbs.view.page import Page
 from gearmbs.view.plotly_scene import plotly_figure
 from gearmbs.view.render import Camera, render
@@ -79,14 +80,7 @@ class Scene(SceneData):
         columns, rows = round(width * dpi), round((height - BORDER) * dpi)
         camera.frame(points, columns, rows)
         solids = [part.placed(instant) for part in self.parts]
-        image = render(
-            [m.corners for m in solids],
-            [corner_normals(m) for m in solids],
-            [to_rgb(p.colour) for p in self.parts],
-            camera,
-            columns,
-            rows,
-        )
+        image = self._picture(solids, camera, columns, rows)
         with look():
             figure = new_figure(width, height)
             ax = figure.subplots()
@@ -106,10 +100,32 @@ class Scene(SceneData):
                 heading += f", {self.label} {self.value[instant]:.5g} {self.unit}"
             figure.suptitle(heading, x=0.01, ha="left", fontsize=11)
             for part in self.parts:
-                ax.plot([], [], color=part.colour, linewidth=7, label=part.name)
+                ax.plot([], [], color=part.colour, alpha=part.opacity, linewidth=7, label=part.name)
             count = len(self.parts) + len(self.lines)
             figure.legend(loc="outside lower center", ncols=min(count, 4), handlelength=1.4)
         return figure
+
+    def _picture(self, solids: list[Mesh], camera: Camera, columns: int, rows: int) -> np.ndarray:
+        """Return the picture: the parts that hide what is behind them, and over it each that is seen through.
+
+        What stands before a part that is seen through is the same in the pictures with it and without it.
+        """
+
+        def drawn(chosen: list[int]) -> np.ndarray:
+            return render(
+                [solids[k].corners for k in chosen], [corner_normals(solids[k]) for k in chosen],
+                [to_rgb(self.parts[k].colour) for k in chosen], camera, columns, rows,
+            )  # fmt: skip
+
+        hiding = [k for k, part in enumerate(self.parts) if part.opacity == 1.0]
+        image = drawn(hiding)
+        for k, part in enumerate(self.parts):
+            if part.opacity < 1.0:
+                both, opacity = drawn([*hiding, k]), part.opacity
+                opaque = opacity * both[..., 3:] + (1.0 - opacity) * image[..., 3:]
+                colour = opacity * both[..., 3:] * both[..., :3] + (1.0 - opacity) * image[..., 3:] * image[..., :3]
+                image = np.concatenate([colour / np.maximum(opaque, 1e-9), opaque], axis=2)
+        return image
 
     def save(self, path: str | Path, **options: Any) -> Path:
         """Write the scene: ``.html`` to turn and play, ``.png`` of one instant, ``.gif``, ``.mp4`` (by ffmpeg) of all.

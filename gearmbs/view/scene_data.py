@@ -57,6 +57,8 @@ class Part:
         Frame at each instant, global, m.
     deflection : Deflection, optional
         Of a solid that bends.
+    opacity : float
+        Above 0 to 1; a housing is seen through.
     """
 
     name: str
@@ -65,6 +67,11 @@ class Part:
     origins: np.ndarray
     axes: np.ndarray
     deflection: Deflection | None = None
+    opacity: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.opacity <= 1.0:
+            raise ValueError(f"opacity of part {self.name!r} is {self.opacity}; give above 0 to 1")
 
     def placed(self, instant: int) -> Mesh:
         """Return the mesh where it is at an instant, global, m."""

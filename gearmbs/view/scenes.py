@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +32,8 @@ TOLERANCE = 8e-6
 SHAFT = "#A9B0BA"
 GEARS = (BLUE, ORANGE)
 OTHERS = tuple(c for c in COLOURS if c not in GEARS)
+SEEN_THROUGH = 0.22
+"""Opacity of a body that is seen through: its faces behind each other still let the wheels stand out."""
 ROD = 0.012
 """Radius of rods between markers, as a part of the mechanism's size."""
 
@@ -130,6 +133,7 @@ def mechanism_scene(
     shapes: Mapping[str, Mesh] | None = None,
     joints: bool = True,
     factor: float | None = None,
+    through: Collection[str] = (),
     title: str | None = None,
 ) -> Scene:
     """Return a mechanism at its initial position.
@@ -147,8 +151,18 @@ def mechanism_scene(
         Mark joints with small balls.
     factor : float, optional
         Bodies are drawn bent that many times as far as they are; default such that it can be seen.
+    through : collection of body names
+        Bodies that are seen through, as housings.
     title : str, optional
+
+    Raises
+    ------
+    ValueError
+        For names of bodies that there are not.
     """
+    strange = [name for name in through if name not in mechanism.bodies]
+    if strange:
+        raise ValueError(f"through: no body {strange[0]!r}; the bodies are {', '.join(mechanism.bodies)}")
     poses, bent = {}, {}
     for name, body in mechanism.bodies.items():
         turned = body.orientation
@@ -158,6 +172,7 @@ def mechanism_scene(
     balls = _joint_parts(mechanism, None, np.zeros(1, dtype=int)) if joints else []
     bending = bodies_bent(mechanism, bent, factor)
     parts = [*_body_parts(mechanism, poses, shapes or {}, bending), *balls]
+    parts = [replace(part, opacity=SEEN_THROUGH) if part.name in through else part for part in parts]
     scene = Scene(parts, title or mechanism.name + bending.remark, up=_up(mechanism))
     scene.lines = _lines(mechanism, scene.size)
     return scene

@@ -51,7 +51,7 @@ def time_plot(
         figure, panels = _panels(len(columns), ax, 1.9)
         for panel, (name, unit, values) in zip(panels, columns):
             panel.plot(*thinned(t[inside], values[inside]), color=BLUE, linewidth=0.9)
-            panel.set_ylabel(label(KINDS.get(unit, "value"), unit))
+            panel.set_ylabel(label(quantity(signal, unit), unit))
             _name(panel, name, len(columns))
             panel.margins(x=0)
         panels[-1].set_xlabel("time, s")
@@ -125,6 +125,12 @@ def order_plot(
     return _lines(
         spectrum, "order", "order of the shaft's speed", mesh, "mesh", harmonics, sideband, maximum, log, title, ax
     )
+
+
+def quantity(signal: xr.DataArray, unit: str, default: str = "value") -> str:
+    """Return what a signal is in words: what it says itself (attribute ``quantity``), or what its unit means."""
+    own = signal.attrs.get("quantity") if unit == "m/s^2" else None
+    return str(own) if own else KINDS.get(unit, default)
 
 
 def thinned(x: np.ndarray, y: np.ndarray, points: int = MAX_POINTS) -> tuple[np.ndarray, np.ndarray]:

@@ -84,6 +84,7 @@ def _part(part: Part) -> dict:
     return {
         "name": part.name,
         "colour": [round(c, 4) for c in to_rgb(part.colour)],
+        "opacity": part.opacity,
         "points": packed(part.mesh.vertices[rows[:, 0]]),
         "normals": packed(padded, "i1"),
         "index": packed(index.reshape(-1), "<u4"),

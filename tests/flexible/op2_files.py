@@ -50,7 +50,11 @@ class Op2Writer:
             self.key(-4 - k, 1, 1 if k + 1 < columns else 0)
         self.key(0)
 
-    def grids(self, ids, positions, systems=None):
+    def reals(self, values, wide):
+        """Numbers of 8 bytes, or 4."""
+        return np.asarray(values, self.order + ("f8" if wide else "f4")).tobytes()
+
+    def grids(self, ids, positions, systems=None, without=()):
         """GEOM1, BGPDT and EQEXIN; systems: (id, kind, origin, point on z, point on xz), and the points that use it."""
         used = np.zeros(len(ids), dtype=int)
         geometry = []
@@ -63,11 +67,16 @@ class Op2Writer:
             self.ints(i, 0) + self.floats(x) + self.ints(int(c), 0, 0) for i, x, c in zip(ids, positions, used)
         )
         geometry.append(self.ints(4501, 45, 1) + rows)
-        self.table("GEOM1", [*geometry, self.ints(65535, 65535, 65535)])
-        self.table("BGPDT", [b"".join(self.ints(int(c)) + self.floats(x) for x, c in zip(positions, used))])
+        tables = {
+            "GEOM1": [*geometry, self.ints(65535, 65535, 65535)],
+            "BGPDT": [b"".join(self.ints(int(c)) + self.floats(x) for x, c in zip(positions, used))],
+        }
         pairs = [(i, k + 1) for k, i in enumerate(ids)]
         sils = [(i, 10 * (6 * k + 1) + 1) for k, i in enumerate(ids)]
-        self.table("EQEXIN", [self.ints(*np.ravel(pairs)), self.ints(*np.ravel(sils))])
+        tables["EQEXIN"] = [self.ints(*np.ravel(pairs)), self.ints(*np.ravel(sils))]
+        for name, records in tables.items():
+            if name not in without:
+                self.table(name, records)
 
     def modes(self, ids, shapes, eigenvalues, general):
         """LAMA and OUGV1 of shapes (n, N, 6)."""

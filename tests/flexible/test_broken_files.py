@@ -1,6 +1,7 @@
 """Files cut off or with a wrong byte: each reader names what is wrong, and returns the whole or nothing."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,13 +21,18 @@ from gearmbs.flexible import (
     reduce_model,
     write_mnf,
 )
+from gearmbs.flexible.mnf import COMMENTS, FLAGS, MARK
+from gearmbs.flexible.mnf_bytes import ints_bytes, record_bytes
 from tests.flexible import test_nastran as nastran
 from tests.flexible.test_files import cube, write_nodes, write_triplets
+from tests.generators import cases, seed
 
 with np.printoptions():
     op4 = pytest.importorskip("pyyeti.nastran.op4")
 
 CUTS, FLIPS = 120, 80
+CHECKED = ("b.mnf",)
+"""Kinds that carry a checksum of all they hold; the others repeat only part of it, so that a wrong digit may pass."""
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +82,9 @@ def arrays(found):
     if hasattr(found, "stiffness"):
         return found.stiffness.toarray(), found.mass.toarray(), found.positions, found.ids, found.dofs
     if hasattr(found, "eigenvalues"):
-        return found.ids, found.positions, found.eigenvalues, found.shapes, found.nodal_masses
+        inner = (found.mass, found.centre, found.inertia, found.inertias(), found.interfaces, found.transformation)
+        own = () if found.transformation is None else tuple(np.asarray(a) for a in inner)
+        return found.ids, found.positions, found.eigenvalues, found.shapes, found.nodal_masses, *own
     return found.positions, found.values
 
 
@@ -91,11 +99,13 @@ def test_a_broken_file_is_refused_or_read_whole(files, kind):
     path, read = files[kind]
     data = path.read_bytes()
     whole = arrays(read(path))
-    random = np.random.default_rng(7)
+    random = np.random.default_rng(seed(7))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            for size in np.unique(np.linspace(0, len(data) - 1, CUTS).astype(int)):
+            for size in np.unique(
+                np.append(np.linspace(0, len(data) - 1, CUTS).astype(int), random.integers(0, len(data), CUTS // 4))
+            ):
                 path.write_bytes(data[:size])
                 try:
                     found = arrays(read(path))
@@ -103,7 +113,7 @@ def test_a_broken_file_is_refused_or_read_whole(files, kind):
                     continue
                 # what is missing says nothing: the mark of the end, the last end of a line, what is not looked at
                 assert all(np.array_equal(a, b) for a, b in zip(found, whole, strict=True)), f"{kind} cut at {size}"
-            for at in random.integers(0, len(data), FLIPS):
+            for at in random.integers(0, len(data), cases(FLIPS)):
                 broken = bytearray(data)
                 broken[at] ^= 1 << int(random.integers(8))
                 path.write_bytes(bytes(broken))
@@ -112,6 +122,8 @@ def test_a_broken_file_is_refused_or_read_whole(files, kind):
                 except FlexibleError:
                     continue
                 assert [a.shape for a in found] == [a.shape for a in whole], f"{kind} with another byte {at}"
+                if kind in CHECKED:
+                    assert all(np.array_equal(a, b) for a, b in zip(found, whole, strict=True)), f"{kind}: byte {at}"
         finally:
             path.write_bytes(data)
 
@@ -119,3 +131,88 @@ def test_a_broken_file_is_refused_or_read_whole(files, kind):
 def test_a_modal_neutral_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(FlexibleError, match=r"path = '.*absent.mnf': there is no such file; give a modal neutral file"):
         read_mnf(tmp_path / "absent.mnf")
+
+
+STRESS, STATISTICS = 16, 28
+
+
+def with_tail(path, stresses=True, statistics=True, other=0, extra=b""):
+    """A neutral file as other programs write it: stresses at nodes, statistics of the modes, without a checksum."""
+    bar = Shaft([ShaftSection(0.4, 0.03)], seats={"A": 0.0, "B": 0.4}, elements=4, name="bar").model()
+    found = mnf_of(reduce_model(bar, modes=3))
+    header = bytearray(found.header)
+    header[COMMENTS : COMMENTS + len(MARK)] = bytes(len(MARK))
+    n, count = len(found.mode_ids), len(found.ids)
+    tail = b""
+    for place, there in ((STRESS, stresses), (STATISTICS, statistics), (other, other)):
+        if there:
+            header[FLAGS + 4 * place : FLAGS + 4 * place + 4] = ints_bytes(1)
+    if stresses:
+        kind = [("id", ">i4"), ("v", ">f8", (count, 6))]
+        values = np.random.default_rng(1).normal(size=(n, count, 6))
+        tail += ints_bytes(n, count, *found.ids) + record_bytes(kind, (found.mode_ids, values))
+    if statistics:
+        lengths = [np.linalg.norm(found.shapes[:, :, part], axis=2) for part in (slice(0, 3), slice(3, 6))]
+        rows = np.zeros(n, [("k", ">i4", (13,)), ("v", ">f8", (13,))])
+        for column, length in enumerate(lengths):
+            rows["k"][:, column] = found.ids[length.argmax(axis=1)]
+            rows["v"][:, column] = length.max(axis=1)
+        tail += ints_bytes(n) + rows.tobytes()
+    write_mnf(path, replace(found, header=bytes(header), tail=tail + extra))
+    return path, found
+
+
+@pytest.mark.parametrize(("stresses", "statistics"), [(True, True), (False, True), (True, False)])
+def test_the_end_of_a_neutral_file_of_another_program_is_followed(tmp_path, stresses, statistics):
+    """Cut anywhere it is refused; whole it is read and written as it was."""
+    path, own = with_tail(tmp_path / "a.mnf", stresses, statistics)
+    data = path.read_bytes()
+    found = read_mnf(path)
+    np.testing.assert_array_equal(found.shapes, own.shapes)
+    write_mnf(tmp_path / "b.mnf", found)
+    assert (tmp_path / "b.mnf").read_bytes() == data
+    random = np.random.default_rng(seed())
+    for size in [*random.integers(0, len(data), cases(60)), *random.integers(len(data) - 400, len(data), 20)]:
+        path.write_bytes(data[:size])
+        with pytest.raises(FlexibleError, match=r"a\.mnf: byte \d+"):
+            read_mnf(path)
+
+
+def test_shapes_are_held_against_the_statistics_of_the_modes(tmp_path):
+    path, own = with_tail(tmp_path / "a.mnf")
+    row = int(np.linalg.norm(own.shapes[7, :, :3], axis=1).argmax())
+    at = path.read_bytes().index(own.shapes[7, row].astype(">f8").tobytes())
+    data = bytearray(path.read_bytes())
+    column = int(np.abs(own.shapes[7, row, :3]).argmax())
+    # the greatest component by a ten-thousandth: no other block tells
+    changed = np.array(own.shapes[7, row, column] * 1.0001).astype(">f8").tobytes()
+    data[at + 8 * column : at + 8 * column + 8] = changed
+    path.write_bytes(bytes(data))
+    with pytest.raises(FlexibleError, match=r"mode 8: its greatest displacement is .*, its statistics say .* damaged"):
+        read_mnf(path)
+
+
+def test_what_follows_without_a_length_is_said(tmp_path):
+    path, own = with_tail(tmp_path / "a.mnf", other=19, extra=bytes(40))
+    with pytest.warns(UserWarning, match=r"of its blocks 21 the length is not known: whether the file is whole after"):
+        np.testing.assert_array_equal(read_mnf(path).shapes, own.shapes)
+    path, own = with_tail(tmp_path / "b.mnf", extra=bytes(12))
+    with pytest.warns(UserWarning, match=r"12 bytes from byte \d+ on are of no block that its summary names"):
+        np.testing.assert_array_equal(read_mnf(path).shapes, own.shapes)
+
+
+def test_a_neutral_file_that_was_changed_says_so(tmp_path):
+    """One digit of a shape in a file of this package; without the comments it is one of another program."""
+    path = tmp_path / "a.mnf"
+    bar = Shaft([ShaftSection(0.4, 0.03)], seats={"A": 0.0, "B": 0.4}, elements=4, name="bar").model()
+    own = mnf_of(reduce_model(bar, modes=3))
+    write_mnf(path, own)
+    data = bytearray(path.read_bytes())
+    at = bytes(data).index(own.shapes[7, 2].astype(">f8").tobytes())
+    data[at + 7] ^= 1
+    path.write_bytes(bytes(data))
+    with pytest.raises(FlexibleError, match=r"a\.mnf: its content is not what was written \(SHA-256 in the comments"):
+        read_mnf(path)
+    data[COMMENTS : COMMENTS + 320] = bytes(320)
+    path.write_bytes(bytes(data))
+    assert read_mnf(path).shapes.shape == own.shapes.shape

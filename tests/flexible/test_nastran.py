@@ -20,7 +20,9 @@ from gearmbs.flexible import (
     read_op4,
     reduce_model,
 )
+from gearmbs.flexible.nastran_files import op2_tables
 from tests.flexible.op2_files import Op2Writer
+from tests.generators import cases, seed
 
 with np.printoptions():
     op4 = pytest.importorskip("pyyeti.nastran.op4")
@@ -74,13 +76,13 @@ def test_matrices_of_op2_are_turned_into_the_basic_system(tmp_path, bar, order):
     np.testing.assert_allclose(slow, reduce_model(found, [], modes=1, method="free").frequencies, rtol=1e-6)
 
 
-def modes_file(path, bar, model, weight=None, drop=None, mgg=True):
+def modes_file(path, bar, model, weight=None, drop=None, mgg=True, without=(), order="<"):
     """An op2 file with the modes of the free bar and its mass matrix."""
     mnf = mnf_of(model)
     kept = mnf.elastic
-    writer = Op2Writer()
+    writer = Op2Writer(order)
     ids = bar.ids if drop is None else bar.ids[:drop]
-    writer.grids(bar.ids, bar.positions)
+    writer.grids(bar.ids, bar.positions, without=without)
     writer.weight(model.properties.mass if weight is None else weight)
     shapes = mnf.shapes[kept][:, : len(ids)]
     writer.modes(ids, shapes, (2 * np.pi * model.frequencies) ** 2, mnf.eigenvalues[kept, 3])
@@ -89,9 +91,10 @@ def modes_file(path, bar, model, weight=None, drop=None, mgg=True):
     return writer.write(path)
 
 
-def test_modes_of_op2_are_those_of_the_body(tmp_path, bar):
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_modes_of_op2_are_those_of_the_body(tmp_path, bar, order):
     model = reduce_model(bar, modes=6)
-    found = read_op2_modes(modes_file(tmp_path / "bar.op2", bar, model))
+    found = read_op2_modes(modes_file(tmp_path / "bar.op2", bar, model, order=order))
     again = found.modal_model("bar")
     np.testing.assert_allclose(again.frequencies, model.frequencies, rtol=1e-6)
     np.testing.assert_allclose(again.moved, model.moved, atol=1e-6 * np.abs(model.moved).max())
@@ -101,6 +104,108 @@ def test_modes_of_op2_are_those_of_the_body(tmp_path, bar):
     np.testing.assert_allclose(again.properties.inertia, own.properties.inertia, rtol=1e-6, atol=1e-12)
     np.testing.assert_allclose(again.integrals.second, own.integrals.second, rtol=1e-4, atol=1e-4)
     assert found.units == ("KILOGRAM", "METER", "SECOND", "NEWTON")
+
+
+def places(kind, x):
+    """Coordinates of a place in a system at the origin: rectangular, cylindrical, spherical (degrees)."""
+    if kind == 1:
+        return x
+    around = np.rad2deg(np.arctan2(x[1], x[0]))
+    if kind == 2:
+        return np.array([np.hypot(x[0], x[1]), around, x[2]])
+    return np.array([np.linalg.norm(x), np.rad2deg(np.arctan2(np.hypot(x[0], x[1]), x[2])), around])
+
+
+def axes_there(kind, x):
+    """Unit vectors of the coordinates at a place, as columns, by differences of the place itself."""
+    if kind == 1:
+        return np.eye(3)
+    r, (c, s) = np.hypot(x[0], x[1]), np.array(x[:2]) / np.hypot(x[0], x[1])
+    if kind == 2:
+        return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    rho = np.linalg.norm(x)
+    out = np.array([x / rho, [c * x[2] / rho, s * x[2] / rho, -r / rho], [-s, c, 0]])
+    return out.T
+
+
+@pytest.mark.parametrize("case", range(cases(12)))
+def test_grid_points_of_bulk_data_are_where_the_basic_system_has_them(tmp_path, case):
+    """GEOM1 alone: systems in systems, by points and by grid points, words of both orders, wide numbers or not."""
+    rng = np.random.default_rng((seed(), case))
+    order, wide = "<>"[case % 2], bool(case // 2 % 2)
+    writer = Op2Writer(order)
+    systems = {0: (1, np.zeros(3), np.eye(3))}
+    count = 9
+    ids = np.sort(rng.choice(10_000, count, replace=False) + 1)
+    points = rng.normal(size=(count, 3)) + [3.0, 0.0, 0.0]
+    given, shown = np.zeros(count, dtype=int), np.zeros(count, dtype=int)
+
+    def seen_from(number, x):
+        kind, origin, axes = systems[number]
+        return places(kind, axes.T @ (x - origin))
+
+    records = {}
+    # three grid points in the basic system carry the first system, the others lean on those before
+    for number in rng.permutation(np.arange(11, 16)):
+        kind, inner = int(rng.integers(1, 4)), int(rng.choice(list(systems)))
+        by_grids = len(systems) == 1
+        three = points[:3] if by_grids else rng.normal(size=(3, 3)) + [5.0, 0.0, 0.0]
+        z = three[1] - three[0]
+        z /= np.linalg.norm(z)
+        y = np.cross(z, three[2] - three[0])
+        y /= np.linalg.norm(y)
+        if by_grids:
+            key = {1: (1801, 18, 5), 2: (1701, 17, 6), 3: (1901, 19, 7)}[kind]
+            data = writer.ints(number, kind, 1, *ids[:3])
+        else:
+            key = {1: (2101, 21, 8), 2: (2001, 20, 9), 3: (2201, 22, 10)}[kind]
+            data = writer.ints(number, kind, 2, inner) + writer.reals([seen_from(inner, x) for x in three], wide)
+        records.setdefault(key, []).append(data)
+        systems[int(number)] = (kind, three[0], np.column_stack([np.cross(y, z), y, z]))
+    given[3:] = rng.choice(list(systems), count - 3)
+    for k, c in enumerate(rng.choice(list(systems), count)):
+        _, origin, axes = systems[int(c)]
+        # on the axis of a system the direction around it is none
+        shown[k] = c if np.hypot(*(axes.T @ (points[k] - origin))[:2]) > 0.3 else 0
+    rows = [
+        writer.ints(i, g) + writer.reals(seen_from(int(g), x), wide) + writer.ints(int(c), 0, 0)
+        for i, g, x, c in zip(ids, given, points, shown)
+    ]
+    order_of_rows = rng.permutation(count)
+    geometry = [writer.ints(*key) + b"".join(data) for key, data in records.items()]
+    geometry.append(writer.ints(4501, 45, 1120001 if wide else 1) + b"".join(rows[k] for k in order_of_rows))
+    writer.table("GEOM1", [*geometry, writer.ints(65535, 65535, 65535)])
+    writer.matrix("KGG", np.eye(6 * count))
+    found = op2_tables(writer.write(tmp_path / "x.op2"), ["KGG"])["grids"]
+    assert list(found.ids) == list(ids)
+    np.testing.assert_allclose(found.positions, points, atol=1e-12 if wide else 2e-4)
+    for k, c in enumerate(shown):
+        kind, origin, axes = systems[int(c)]
+        expected = axes @ axes_there(kind, axes.T @ (points[k] - origin))
+        np.testing.assert_allclose(found.axes[k], expected, atol=1e-9 if wide else 5e-3)
+
+
+def test_grid_points_of_geom1_alone_make_the_same_body(tmp_path, bar):
+    model = reduce_model(bar, modes=6)
+    whole = read_op2_modes(modes_file(tmp_path / "a.op2", bar, model)).modal_model("bar")
+    for drop in (("BGPDT",), ("EQEXIN",), ("BGPDT", "EQEXIN")):
+        found = read_op2_modes(modes_file(tmp_path / "b.op2", bar, model, without=drop)).modal_model("bar")
+        np.testing.assert_array_equal(found.positions, whole.positions)
+        np.testing.assert_allclose(found.moved, whole.moved, rtol=1e-12, atol=1e-15)
+        np.testing.assert_allclose(found.properties.inertia, whole.properties.inertia, rtol=1e-12, atol=1e-15)
+    with pytest.raises(FlexibleError, match=r"no grid points \(GEOM1 is missing; GEOM1 alone would do\)"):
+        read_op2_modes(modes_file(tmp_path / "c.op2", bar, model, without=("GEOM1",)))
+
+
+@pytest.mark.parametrize(("analysis", "what"), [(5, "frequency responses"), (9, "complex modes"), (6, "a transient")])
+def test_shapes_that_are_no_modes_are_named(tmp_path, bar, analysis, what):
+    model = reduce_model(bar, modes=2)
+    file = modes_file(tmp_path / "a.op2", bar, model)
+    data = file.read_bytes()
+    at = data.index(np.array([22, 7, 0, 1, 1], "<i4").tobytes())
+    file.write_bytes(data[:at] + np.array([10 * analysis + 2], "<i4").tobytes() + data[at + 4 :])
+    with pytest.raises(FlexibleError, match=f"OUGV1 holds {what} in 8 words a point and no real modes; run SOL 103"):
+        read_op2_modes(file)
 
 
 def test_modes_and_masses_must_fit(tmp_path, bar):
@@ -149,7 +254,7 @@ def test_op2_files_that_lie_are_named(tmp_path, bar):
         read_op2(file, dofs=[(1, 1), (1, 2)])
     bare = Op2Writer()
     bare.matrix("KGG", bar.stiffness.toarray())
-    with pytest.raises(FlexibleError, match=r"no grid points \(GEOM1, BGPDT, EQEXIN are missing\).*Data blocks: KGG"):
+    with pytest.raises(FlexibleError, match=r"no grid points \(GEOM1, BGPDT, EQEXIN are missing;.*Data blocks: KGG"):
         read_op2(bare.write(tmp_path / "bare.op2"))
     held = Op2Writer()
     held.grids(bar.ids, 1e3 * bar.positions)

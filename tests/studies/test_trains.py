@@ -1,6 +1,7 @@
 """Records of drivetrains: what they hold, what they are checked against, the command line, the report and the view."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -130,6 +131,17 @@ def test_report_and_view(train, record):
         assert words in text
     scene = train_scene(train)
     assert {"in", "out", "box"} <= {part.name for part in scene.parts}
+    # the housing is seen through, whatever stands inside is in the picture, and the page is small
+    assert {part.name for part in scene.parts if part.opacity < 1.0} == {"box"}
+    assert len(scene.page().to_html()) < 1e6
+    inside = next(part for part in scene.parts if part.name == "out")
+    pictures = [np.asarray(one.still(dpi=60).axes[0].images[0].get_array()) for one in (
+        scene, replace(scene, parts=[replace(part, opacity=1.0) for part in scene.parts]),
+        replace(scene, parts=[part for part in scene.parts if part is not inside]),
+    )]  # fmt: skip
+    through, hidden = (np.abs(pictures[k][..., :3] - pictures[2][..., :3]).max(axis=2) > 0.05 for k in (0, 1))
+    assert through.sum() > 1000
+    assert through.sum() > 2 * hidden.sum()
 
 
 def test_figure_names_lines_by_the_kinematic_table(train, record):

@@ -3,7 +3,7 @@ import pytest
 import xarray as xr
 
 from gearmbs import signals
-from gearmbs.gears import GearPair, loaded_transmission_error
+from gearmbs.gears import GearPair, GearSpec, loaded_transmission_error
 from gearmbs.gears.pattern import contact_pattern
 from gearmbs.view import (
     average_plot,
@@ -17,7 +17,9 @@ from gearmbs.view import (
     time_plot,
     transmission_error_plot,
 )
+from gearmbs.view.curves import path_ends
 from gearmbs.view.signals import thinned
+from tests.generators import cases, seed
 from tests.view.looking import assert_readable
 
 GMF = 483.3333
@@ -69,12 +71,73 @@ def test_averages_share_their_axes_and_count_teeth(signal):
     one, two = figure.axes
     assert one.get_ylim() == two.get_ylim()
     assert one.get_ylabel() == "acceleration, m/s²"
-    assert two.get_xlabel() == "tooth of the wheel, 29 a revolution"
+    assert two.get_xlabel() == "pitches from the record's first sample, 29 teeth"
     # the last sample lies one step before the full turn
     assert two.lines[0].get_xdata()[-1] == pytest.approx(29 * (1 - 1 / average.sizes["angle"]))
     assert abs(two.lines[0].get_ydata().mean()) < 1e-12
     assert_readable(figure)
-    assert average_plot(average).axes[0].get_xlabel() == "revolution"
+    assert average_plot(average).axes[0].get_xlabel() == "revolution, from the record's first sample"
+
+
+@pytest.mark.parametrize("case", range(cases(12)))
+def test_the_axis_of_an_average_has_the_numbers_of_the_teeth(case):
+    """A click whenever one tooth is on the line of centres: wherever the phase begins, the axis shows the tooth."""
+    rng = np.random.default_rng((seed(), case))
+    teeth = tuple(int(z) for z in rng.choice(np.arange(12, 70), 2, replace=False))
+    wheel = int(rng.integers(2))
+    tooth, count = int(rng.integers(teeth[wheel])), teeth[wheel]
+    turn, t_ref, numbers = rng.uniform(5.0, 30.0), rng.uniform(0.0, 1.0), rng.uniform(0.0, 12.0, 2)
+    steps = rng.choice([-1.0, 1.0], 2)
+    rate = 200.0 * count * turn * teeth[0] / count
+    own_turn = turn * teeth[0] / count
+    t = t_ref + np.arange(int(6.5 / own_turn * rate)) / rate
+    at = (numbers[wheel] + steps[wheel] * count * own_turn * (t - t_ref) - tooth + count / 2) % count - count / 2
+    made = signals.make_signal(
+        np.exp(-((at / 0.2) ** 2)), rate, units="m/s^2", t0=t_ref, speed=2 * np.pi * turn, teeth=teeth,
+        attrs={"teeth_in_mesh": (t_ref, numbers[0], steps[0], numbers[1], steps[1])},
+    )  # fmt: skip
+    # cut anywhere; angles by the speed, or that of a tacho, which begins later and anywhere
+    part = made[int(rng.integers(0, made.sizes["time"] // 8)) :]
+    phase = signals.phase_from_speed(part, 2 * np.pi * own_turn)
+    if rng.random() < 0.5:
+        phase = (phase + rng.uniform(0.0, 6.0))[int(rng.integers(0, rate / own_turn)) :]
+    average = signals.time_synchronous_average(part, phase)
+    panel = average_plot(average, teeth=count).axes[0]
+    assert panel.get_xlabel() == f"tooth of the {('driver', 'driven wheel')[wheel]} in mesh, 0 to {count - 1}"
+    x, y = panel.lines[0].get_data()
+    assert abs((x[np.argmax(y)] - tooth + count / 2) % count - count / 2) < 0.1
+    assert panel.xaxis_inverted() == (steps[wheel] < 0)
+    # of a wheel with other teeth, or of one whose speed is none of the pair's, nothing is known
+    assert average_plot(average, teeth=count + 1).axes[0].get_xlabel().startswith("pitches from")
+    other = signals.time_synchronous_average(part, signals.phase_from_speed(part, 1.31 * 2 * np.pi * turn))
+    assert "tooth_numbers" not in other.attrs or abs(1.31 / (teeth[0] / teeth[1]) - 1) < 0.01
+
+
+@pytest.mark.parametrize("case", range(cases(4)))
+def test_the_path_in_a_pattern_leans_with_the_helix(case):
+    """Helix, hand, sense, ring or not, either flank: what bears without load to speak of lies between the lines."""
+    rng = np.random.default_rng((seed(), case))
+    hand, rotation, ring = str(rng.choice(["right", "left"])), int(rng.choice([-1, 1])), bool(rng.random() < 0.3)
+    side, settings = str(rng.choice(["drive", "coast"])), {"helix_angle": rng.uniform(0.05, 0.4), "face_width": "20 mm"}
+    one = GearSpec(int(rng.integers(20, 30)), "2 mm", hand=hand, **settings)
+    if ring:
+        two = GearSpec.ring(int(rng.integers(80, 95)), "2 mm", hand=hand, addendum="1.4 mm", **settings)
+    else:
+        two = GearSpec(int(rng.integers(20, 50)), "2 mm", hand={"right": "left", "left": "right"}[hand], **settings)
+    # a tilt as small as jams the coast flanks: they bear only then
+    jam = {"misalignment": "0.3 deg", "backlash": "0.01 mm"} if side == "coast" else {"backlash": "0.1 mm"}
+    pair = GearPair(one, two, rotation=rotation, **jam)
+    pattern = contact_pattern(pair, 0.05, points=61, sections=9, side=side)
+    ends, loaded = path_ends(pattern, pair), pattern.pressure > 0.0
+    # lines lean by the transverse lead: z tan(beta) / r on the pitch circle
+    lean = np.diff(ends, axis=1) / np.diff(pattern.section)
+    expected = np.tan(one.helix_angle) / one.pitch_radius
+    np.testing.assert_allclose(np.abs(lean), expected, rtol=1e-9)
+    if side == "coast":
+        return
+    step, roll = np.diff(pattern.roll_angle)[0], pattern.roll_angle[:, None]
+    assert not np.any(loaded & ((roll < ends[0] - 2 * step) | (roll > ends[1] + 2 * step)))
+    assert np.all(loaded[(roll > ends[0] + 2 * step) & (roll < ends[1] - 2 * step)])
 
 
 def test_thinning_keeps_the_extremes():

@@ -4,7 +4,7 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const canvas = document.getElementById("view");
   const parts = data.parts.map((p) => ({
-    name: p.name, colour: p.colour, visible: true,
+    name: p.name, colour: p.colour, opacity: p.opacity, visible: true,
     points: decode(p.points, Float32Array), normals: decode(p.normals, Int8Array),
     index: decode(p.index, Uint32Array), edges: decode(p.edges, Float32Array), poses: decode(p.poses, Float32Array),
     bend: p.shapes && {
@@ -127,11 +127,11 @@
   const VERTEX = `attribute vec3 point; attribute vec3 normal; uniform mat4 place; uniform mat3 turn; uniform float lift;
     varying vec3 facing; void main() { facing = turn * normal; gl_Position = place * vec4(point, 1.0);
     gl_Position.z -= lift; }`;
-  const FRAGMENT = `precision mediump float; varying vec3 facing; uniform vec3 colour; uniform float lit;
+  const FRAGMENT = `precision mediump float; varying vec3 facing; uniform vec3 colour; uniform float lit; uniform float opacity;
     void main() { vec3 n = normalize(facing);
     float bright = 0.5 + 0.5 * max(dot(n, vec3(-0.45, 0.65, 0.61)), 0.0) + 0.2 * max(dot(n, vec3(0.7, 0.1, 0.7)), 0.0)
       + 0.18 * pow(max(dot(n, vec3(-0.25, 0.36, 0.9)), 0.0), 24.0);
-    gl_FragColor = vec4(min(colour * mix(1.0, bright, lit), 1.0), 1.0); }`;
+    gl_FragColor = vec4(min(colour * mix(1.0, bright, lit), 1.0), opacity); }`;
 
   function makeWebGL() {
     const gl = canvas.getContext("webgl", { antialias: true, preserveDrawingBuffer: true });
@@ -147,7 +147,7 @@
     gl.linkProgram(program);
     gl.useProgram(program);
     const at = {};
-    for (const name of ["place", "turn", "colour", "lit", "lift"]) at[name] = gl.getUniformLocation(program, name);
+    for (const name of ["place", "turn", "colour", "lit", "lift", "opacity"]) at[name] = gl.getUniformLocation(program, name);
     const point = gl.getAttribLocation(program, "point"), normal = gl.getAttribLocation(program, "normal");
     const buffer = (kind, values) => {
       const b = gl.createBuffer();
@@ -183,7 +183,8 @@
       gl.clearColor(1, 1, 1, 1);
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
       const view = viewing();
-      for (const p of parts) {
+      // what is seen through comes last, over what it does not hide
+      for (const p of [...parts].sort((one, two) => two.opacity - one.opacity)) {
         if (!p.visible) continue;
         if (deflect(p, frame)) {
           refill(p.gl.points, p.points);
@@ -202,8 +203,13 @@
         gl.uniform3fv(at.colour, p.colour);
         gl.uniform1f(at.lit, 1);
         gl.uniform1f(at.lift, 0);
+        gl.uniform1f(at.opacity, p.opacity);
+        if (p.opacity < 1) { gl.enable(gl.BLEND); gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA); gl.depthMask(false); }
         gl.drawElements(gl.TRIANGLES, p.index.length, gl.UNSIGNED_INT, 0);
+        gl.uniform1f(at.opacity, 1);
+        gl.disable(gl.BLEND);
         strokes(p.gl.edges, p.edges.length / 3, p.colour.map((v) => 0.3 * v), 0.0004);
+        gl.depthMask(true);
       }
       gl.uniformMatrix4fv(at.place, false, matrix(view, still));
       for (const l of lines) strokes(l.buffer, l.ends.length / 3, l.colour, 0);
@@ -248,7 +254,7 @@
           const f = [0, 1, 2].map((r) => turn[r] * v[0] + turn[3 + r] * v[1] + turn[6 + r] * v[2]);
           const bright = 0.5 + 0.5 * Math.max(-0.45 * f[0] + 0.65 * f[1] + 0.61 * f[2], 0) + 0.2 * Math.max(0.7 * f[0] + 0.1 * f[1] + 0.7 * f[2], 0);
           faces.push([seen[a + 2] + seen[b + 2] + seen[c + 2], seen, a, b, c,
-            "rgb(" + p.colour.map((x) => Math.min(255, Math.round(255 * x * bright))).join(",") + ")"]);
+            "rgba(" + p.colour.map((x) => Math.min(255, Math.round(255 * x * bright))).join(",") + "," + p.opacity + ")"]);
         }
       }
       faces.sort((one, two) => two[0] - one[0]);
