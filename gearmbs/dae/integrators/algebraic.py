@@ -59,6 +59,10 @@ SHORTEST = 1e-6
 SPAN_OF_CONSTRAINTS = 1e-2
 """Spacing s of the differences along the solution in units of the step, for constraints. Over four of them the error is
 s^4/30 of the fifth derivative in units of the step, 3e-10 of what a step can tell apart; rounding is divided by s h."""
+WIDER = 30.0
+WIDENINGS = 3
+"""Times 30 the span is tried where rounding of the differences exceeds the tolerance, twice: steps at a start, which
+shrink with the tolerance, are far shorter than what changes in the constraints."""
 SPAN_OF_SLOPES = 2e-3
 """The same for the slopes of algebraic unknowns, which may vary much faster than the step tells: by radians over it."""
 RATE_OF_MATRIX = 1e8
@@ -226,11 +230,11 @@ def _slopes(functions, part, t, y, yp, s, f, idata, rdata, work):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _rows_at(functions, part, t, y, yp, h, idata, rdata, work):
+def _rows_at(functions, part, t, y, yp, wide, idata, rdata, work):
     """Write what the equations are off by at an instant to ``part.f``."""
     f = part.f
     if part.any_lifted:
-        _slopes(functions, part, t, y, yp, SPAN_OF_CONSTRAINTS * h, f, idata, rdata, work)
+        _slopes(functions, part, t, y, yp, SPAN_OF_CONSTRAINTS * wide, f, idata, rdata, work)
     functions.residual(t, y, yp, part.res, idata, rdata, work)
     for k in range(part.count):
         if part.lifted[k] == 0:
@@ -253,15 +257,15 @@ def _take(part, y, yp, x):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _iterate(functions, part, t, y, yp, h, fresh, idata, rdata, work):
+def _iterate(functions, part, t, y, yp, h, wide, fresh, idata, rdata, work):
     """Correct the unknowns with the present matrix; return whether they converge as from a guess near their root.
 
-    With a ``fresh`` matrix an iteration that gets no further within the tolerance is at the level of rounding.
+    Constraints are differenced over a part of ``wide``. With a ``fresh`` matrix an iteration that gets no further within the tolerance is at the level of rounding.
     """
     f, cols = part.f, part.cols
     previous = np.inf
     for _ in range(ITERATIONS):
-        _rows_at(functions, part, t, y, yp, h, idata, rdata, work)
+        _rows_at(functions, part, t, y, yp, wide, idata, rdata, work)
         _solve(part, f)
         norm = 0.0
         for k in range(part.count):
@@ -342,11 +346,15 @@ def settle(functions, part, t, y, yp, h, idata, rdata, work):
     for i in range(yp.shape[0]):
         kept[i] = yp[i]
     _take(part, y, yp, part.guess)
-    found = part.factored and _iterate(functions, part, t, y, yp, h, False, idata, rdata, work)
-    if not found:
+    found = part.factored and _iterate(functions, part, t, y, yp, h, h, False, idata, rdata, work)
+    wide = h
+    for _ in range(WIDENINGS if part.any_lifted else 1):
+        if found:
+            break
         _put(part, part.guess, y, yp)
         found = _evaluate_matrix(functions, part, t, y, yp, h, idata, rdata, work)
-        found = found and _iterate(functions, part, t, y, yp, h, True, idata, rdata, work)
+        found = found and _iterate(functions, part, t, y, yp, h, wide, True, idata, rdata, work)
+        wide *= WIDER
     if not found:
         part.factored = False
         _put(part, part.guess, y, yp)
