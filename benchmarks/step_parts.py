@@ -103,7 +103,7 @@ def warm(problem: DAEProblem, options: Options, t_end: float) -> Run:
         raise RuntimeError(failure[1])
     code = run_state.RUNNING
     while run.state.t < 0.5 * t_end and code >= 0:
-        code = step.advance(run.functions, run.state, run.plan, run.factors, 1)
+        code = step.advance(run.functions, run.state, run.algebraic.part, run.plan, run.factors, 1)
         if code == run_state.REPIVOT:
             run.repivot()
         elif code == run_state.BUFFER_FULL:

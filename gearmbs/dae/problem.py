@@ -69,6 +69,9 @@ class DAEProblem:
     small_entries : bool
         Whether many entries of the Jacobian are small beside others, as second derivatives by modal coordinates beside
         the stiffness of the modes, so that a corrector converges without them.
+    solved_at_outputs : ndarray of bool, optional
+        Algebraic unknowns that are solved for at outputs, where the rest of the algebraic ones is evaluated elsewhere;
+        default all, as far as they are not under error control. See `gearmbs.dae.integrators.algebraic`.
     advice : mapping of Status to str
         What to try after a failure, in the words of whoever states the problem; default: in those of `solve_dae`.
     """
@@ -96,4 +99,5 @@ class DAEProblem:
     restart_rates: Callable | None = None
     jacobian_residuals: int = 0
     small_entries: bool = False
+    solved_at_outputs: np.ndarray | None = None
     advice: Mapping[Any, str] = field(default_factory=dict)

@@ -50,3 +50,14 @@ def _bind(residual, jacobian, hook, events):
 def bind(residual, jacobian, hook, events):
     """Return the four compiled functions bound together, the same object for the same functions."""
     return _bind(residual, jacobian, hook, events)
+
+
+@njit(HOOK_SIG, cache=True, nogil=True, error_model="numpy")
+def no_hook(t, hist, npast, idata, rdata, work):
+    """Stand in for a problem without a hook."""
+    return 0
+
+
+@njit(EVENTS_SIG, cache=True, nogil=True, error_model="numpy")
+def no_events(t, y, yp, out, idata, rdata, work):
+    """Stand in for a problem without events."""

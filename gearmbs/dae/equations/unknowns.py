@@ -213,6 +213,16 @@ def error_mask(at: dict[str, int], formulation: int, states: np.ndarray) -> np.n
     return mask
 
 
+def plain_states(at: dict[str, int], controlled: np.ndarray) -> np.ndarray:
+    """Return which unknowns are states outside error control, ``controlled`` saying it of the user-defined ones.
+
+    Outputs hold these as they stand; multipliers and loads are evaluated anew there.
+    """
+    mask = np.zeros(at["n"], dtype=bool)
+    mask[at["z"] : at["mu"]] = ~controlled
+    return mask
+
+
 def velocities(at: dict[str, int]) -> np.ndarray:
     """Return the indices of u, eps and v_f, in the order of the coordinates R, theta and q_f."""
     return np.concatenate([np.arange(at["u"], at["p"]), np.arange(at["eps"], at["R"])])

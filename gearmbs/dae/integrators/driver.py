@@ -12,11 +12,11 @@ import time
 
 import numpy as np
 
-from gearmbs._jit import njit
-from gearmbs.dae.compiled.bound_functions import bind
+from gearmbs.dae.compiled.bound_functions import bind, no_events, no_hook
 from gearmbs.dae.compiled.direct_calls import direct
 from gearmbs.dae.integrators import messages, start
 from gearmbs.dae.integrators import run_state as s
+from gearmbs.dae.integrators.algebraic import AlgebraicOutputs
 from gearmbs.dae.integrators.initial_state import initial_state
 from gearmbs.dae.integrators.options import Options, output_times
 from gearmbs.dae.integrators.records import Records
@@ -34,7 +34,7 @@ from gearmbs.dae.linalg.counted_entries import (
 )
 from gearmbs.dae.linalg.lu_plan import LUPlan
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, LUFactors, factor, new_factors, solve
-from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, DAEProblem
+from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 
 FIRST_CHUNK = 16
@@ -45,17 +45,6 @@ DROP_ROUNDS_ALLOWED = 3
 UNSATISFIED = 1e-3
 """Part of its terms by which an equation set aside may be off at the end of a run."""
 DROP_TOLERANCES = (0.0, 1e-9, 1e-7, 1e-5)
-
-
-@njit(HOOK_SIG, cache=True, nogil=True, error_model="numpy")
-def no_hook(t, hist, npast, idata, rdata, work):
-    """Stand in for a problem without a hook."""
-    return 0
-
-
-@njit(EVENTS_SIG, cache=True, nogil=True, error_model="numpy")
-def no_events(t, y, yp, out, idata, rdata, work):
-    """Stand in for a problem without events."""
 
 
 class Run:
@@ -85,8 +74,9 @@ class Run:
         self.steps_given = options.first_step is not None, options.min_step is not None
         outputs, end = output_times(t_eval, float(problem.t0), t_end)
         every_step = t_eval is None
+        self.algebraic = AlgebraicOutputs(problem, problem.atol_scale * options.tol, options.rtol)
         self.state = initial_state(problem, options, outputs, end, every_step or options.dense_output)
-        self.records = Records(problem, self.state, options, every_step)
+        self.records = Records(problem, self.state, options, every_step, self.algebraic)
         start.choose_steps(self)
         self.stall = StallWatch(self.state.steps, self.state.t)
         self.indptr = np.asarray(problem.indptr, dtype=np.int64)
@@ -223,7 +213,7 @@ class Run:
         chunk = FIRST_CHUNK
         while True:
             tic = time.perf_counter()
-            code = direct(advance)(self.functions, self.state, self.plan, self.factors, chunk)
+            code = direct(advance)(self.functions, self.state, self.algebraic.part, self.plan, self.factors, chunk)
             ending = self.user_failure() if self.user_exception() is not None else self._heed(code)
             if ending is not None:
                 return ending

@@ -1,11 +1,14 @@
-"""Output at given times and event location, both on the polynomial of the last step."""
+"""Output at given times and event location, both on the polynomial of the last step.
+
+Algebraic unknowns outside error control are solved for there, see `gearmbs.dae.integrators.algebraic`.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from gearmbs._jit import njit
-from gearmbs.dae.dense_output import combine, lagrange_weights
+from gearmbs.dae.integrators.algebraic import settle, settle_between
 from gearmbs.dae.integrators.history import copy, rows_from, times_from
 
 SECANTS = 20
@@ -14,43 +17,50 @@ ROOT_ITERATIONS = 80
 """Tries in all; the last 60 halve what is left, to rounding whatever the function does: a jump has no root."""
 ROOT_EPS = 4e-16
 
+SAMPLES = 64
+"""Parts of a step, at most, in each of which an event function may change sign once."""
+COARSEST = 16
+"""Samples from one to the next at first: a quarter of the step."""
+STRAIGHT = 0.2
+"""Part of its range over the step by which an event function may leave its chords where no more samples are taken: a
+parabola between two chords of a quarter of its arc leaves them by a sixteenth, a full wave by all."""
+
 RECORD = 0
 STOP = 1
 RESTART = 2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def interpolate(st, t, y, yp):
+def interpolate(functions, st, part, t, y, yp):
     """Write y and y' at ``t`` from the polynomial of the last step, of its order through the newest points."""
-    count = st.order + 1
-    lagrange_weights(t, times_from(st, 0), count, st.value, st.slope)
-    combine(st.value, st.slope, count, rows_from(st, 0), 0, y, yp)
+    settle_between(
+        functions, part, t, st.t_old, rows_from(st, 1)[0], st.step, times_from(st, 0), rows_from(st, 0), 0,
+        st.order + 1, y, yp, st.idata, st.rdata, st.work,
+    )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def write_outputs(t, st):
+def write_outputs(functions, st, part, t):
     """Write all outputs up to ``t``, which lies in the last step; at its very end the corrector's values."""
     while st.next_output < st.outputs.shape[0] and st.outputs[st.next_output] <= t:
         row = st.next_output
         if st.outputs[row] == st.t_new:
             copy(st.y, st.y_out[row])
             copy(st.yp, st.yp_out[row])
+            if part.count > 0:
+                settle(functions, part, st.t_new, st.y_out[row], st.yp_out[row], st.step, st.idata, st.rdata, st.work)
         else:
-            interpolate(st, st.outputs[row], st.y_out[row], st.yp_out[row])
+            interpolate(functions, st, part, st.outputs[row], st.y_out[row], st.yp_out[row])
         st.next_output = row + 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _root(functions, st, which):
-    """Return where in the last step event ``which`` changes sign: Illinois method on the polynomial, then bisection.
+def _root(functions, st, part, which, a, fa, b, fb):
+    """Return where event ``which`` changes sign between a and b: Illinois method on the polynomial, then bisection.
 
-    ``st.g_new`` comes in with the event functions at the end of the step, and is overwritten.
+    ``fa`` and ``fb`` are its values there. ``st.g_new`` is overwritten.
     """
     y, yp, g = st.y_between, st.yp_between, st.g_new
-    a = st.t_old
-    b = st.t_new
-    fa = st.g_old[which]
-    fb = g[which]
     side = 0
     for k in range(ROOT_ITERATIONS):
         if fb == 0.0 or abs(b - a) <= ROOT_EPS * max(abs(a), abs(b)):
@@ -60,7 +70,7 @@ def _root(functions, st, which):
             t = 0.5 * (a + b)
             if t == a or t == b:
                 break
-        interpolate(st, t, y, yp)
+        interpolate(functions, st, part, t, y, yp)
         functions.events(t, y, yp, g, st.idata, st.rdata, st.work)
         f = g[which]
         if f == 0.0:
@@ -81,6 +91,49 @@ def _root(functions, st, which):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _sample_time(st, i):
+    """Return the time of sample i of the last step."""
+    return st.t_new if i == SAMPLES else st.t_old + (st.t_new - st.t_old) * (i / SAMPLES)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sample(functions, st, part):
+    """Sample the event functions over the last step into ``st.g_between``; return the samples from one to the next.
+
+    Functions of differential unknowns are as smooth as the error test has made these: the ends of the step tell. What
+    algebraic unknowns do between is unknown to it, so that samples are halved until the functions follow their chords.
+    """
+    g = st.g_between
+    for e in range(st.n_events):
+        g[0, e] = st.g_old[e]
+        g[SAMPLES, e] = st.g_new[e]
+    if part.count == 0:
+        return SAMPLES
+    stride = SAMPLES
+    while stride > 1:
+        half = stride // 2
+        straight = True
+        for i in range(half, SAMPLES, stride):
+            t = _sample_time(st, i)
+            interpolate(functions, st, part, t, st.y_between, st.yp_between)
+            functions.events(t, st.y_between, st.yp_between, g[i], st.idata, st.rdata, st.work)
+        for e in range(st.n_events):
+            low = np.inf
+            high = -np.inf
+            off = 0.0
+            for i in range(0, SAMPLES + 1, half):
+                low = min(low, g[i, e])
+                high = max(high, g[i, e])
+            for i in range(half, SAMPLES, stride):
+                off = max(off, abs(g[i, e] - 0.5 * (g[i - half, e] + g[i + half, e])))
+            straight &= off <= STRAIGHT * (high - low)
+        stride = half
+        if straight and stride <= COARSEST:
+            break
+    return stride
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _store_crossing(st, first, root, which):
     """Insert a crossing among those of the step, from place ``first`` on, in order of time."""
     p = st.n_crossings
@@ -94,7 +147,7 @@ def _store_crossing(st, first, root, which):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def locate_events(functions, st):
+def locate_events(functions, st, part):
     """Find and store the crossings of the last step; leave the event functions at its end in ``st.g_new``.
 
     Returns
@@ -108,24 +161,30 @@ def locate_events(functions, st):
     first = st.n_crossings
     cut = t
     action = RECORD
+    functions.events(t, st.y, st.yp, st.g_new, st.idata, st.rdata, st.work)
+    stride = _sample(functions, st, part)
+    g = st.g_between
     for e in range(st.n_events):
-        functions.events(t, st.y, st.yp, st.g_new, st.idata, st.rdata, st.work)
-        rising = st.g_old[e] < 0.0 and st.g_new[e] >= 0.0
-        falling = st.g_old[e] > 0.0 and st.g_new[e] <= 0.0
-        if not ((rising and st.event_direction[e] >= 0) or (falling and st.event_direction[e] <= 0)):
-            continue
-        root = _root(functions, st, e)
-        does = st.event_action[e]
-        acts = does == RESTART or (does == STOP and st.event_left[e] <= 1)
-        if acts and (action == RECORD or root < cut):
-            cut = root
-            action = does
-        _store_crossing(st, first, root, e)
+        left = st.event_left[e]
+        for i in range(stride, SAMPLES + 1, stride):
+            before, after = g[i - stride, e], g[i, e]
+            rising = before < 0.0 and after >= 0.0
+            falling = before > 0.0 and after <= 0.0
+            if not ((rising and st.event_direction[e] >= 0) or (falling and st.event_direction[e] <= 0)):
+                continue
+            root = _root(functions, st, part, e, _sample_time(st, i - stride), before, _sample_time(st, i), after)
+            does = st.event_action[e]
+            acts = does == RESTART or (does == STOP and left <= 1)
+            left -= 1
+            if acts and (action == RECORD or root < cut):
+                cut = root
+                action = does
+            _store_crossing(st, first, root, e)
     while st.n_crossings > first and st.crossing_t[st.n_crossings - 1] > cut:
         st.n_crossings -= 1
     for p in range(first, st.n_crossings):
         st.event_left[st.crossing_event[p]] -= 1
-        interpolate(st, st.crossing_t[p], st.y_between, st.yp_between)
+        interpolate(functions, st, part, st.crossing_t[p], st.y_between, st.yp_between)
         copy(st.y_between, st.crossing_y[p])
     functions.events(t, st.y, st.yp, st.g_new, st.idata, st.rdata, st.work)
     return cut, action
@@ -143,9 +202,9 @@ def end_of_step(st):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def cut_step(functions, st, cut):
+def cut_step(functions, st, part, cut):
     """Let the last step end at a crossing: replace its end by the polynomial's value there."""
-    interpolate(st, cut, st.y_between, st.yp_between)
+    interpolate(functions, st, part, cut, st.y_between, st.yp_between)
     copy(st.y_between, st.y)
     copy(st.yp_between, st.yp)
     copy(st.y_between, rows_from(st, 0)[0])

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
+from gearmbs.dae.integrators.algebraic import AlgebraicOutputs
 from gearmbs.dae.integrators.messages import advice, unknown_name
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.problem import DAEProblem
@@ -109,6 +110,7 @@ class _Callbacks:
         self.columns = np.repeat(np.arange(problem.n), np.diff(problem.indptr))
         self.vals = np.zeros(problem.indices.size)
         self.last_t = np.nan
+        self.last_step = 0.0
         self.steps = self.residuals = self.jacobians = 0
         self.bad_count, self.bad_t, self.bad_row = 0, -np.inf, 0
 
@@ -118,6 +120,7 @@ class _Callbacks:
         self.problem.residual(t, self.y, self.yp, out, self.idata, self.rdata, self.work)
         if t != self.last_t:
             self.steps += 1
+            self.last_step = abs(t - self.last_t)
             self.last_t = t
         self.residuals += 1
         finite = np.isfinite(out)
@@ -218,6 +221,8 @@ class _Run:
         self.calls = _Callbacks(problem, self.idata, self.rdata)
         self.atol = np.where(problem.error_mask, options.tol * problem.atol_scale, UNCONTROLLED)
         self.rows = _Rows(times, problem, every_step)
+        self.algebraic = AlgebraicOutputs(problem, problem.atol_scale * options.tol, max(options.rtol, SMALLEST_RTOL))
+        """What is solved for at outputs, which IDA interpolates."""
         self.epochs = [(0, self.idata.copy())]
         self.t, self.end = float(times[0]), float(times[-1])
 
@@ -238,13 +243,13 @@ class _Run:
             factorizations=self.calls.jacobians,
             wall_time=time.perf_counter() - start,
         )
-        rows = self.rows
+        rows, remark = self.rows, "" if self.every_step else self.algebraic.remark()
         return DAEResult(
             t=rows.t[: rows.done],
             y=rows.y[: rows.done],
             yp=rows.yp[: rows.done],
             status=status,
-            message=message,
+            message=f"{message} {remark}" if remark else message,
             stats=stats,
             epochs=self.epochs,
             t_last=self.t,
@@ -263,13 +268,29 @@ class _Run:
             if not answer.success:
                 return self._failure(float(answer.t), messages.text or answer.message)
             self.t, y, yp = float(answer.t) if self.every_step else target, answer.y, answer.yp
-            if rows.take(self.t, y, yp) and self.options.progress is not None:
+            told = rows.take(self.t, y, yp)
+            self._settle()
+            if told and self.options.progress is not None:
                 self.options.progress(self.t)
             changed = self._call_hook(y, yp)
             if changed is not None:
                 y, yp = changed
                 solver = self._start(y, yp)
         return Status.SUCCESS, Status.SUCCESS.sentence
+
+    def _settle(self) -> None:
+        """Solve for algebraic unknowns at the output just taken, and after the first step at the start."""
+        rows, settler = self.rows, self.algebraic
+        if self.every_step or not settler.is_needed or rows.t[rows.done - 1] != self.t:
+            return
+        h = self.calls.last_step
+        for k in (0, 1) if rows.done == 2 else (rows.done - 1,):
+            before = max(k - 1, 0)
+            span = float(rows.t[max(k, 1)] - rows.t[max(k, 1) - 1])
+            step = h if np.isfinite(h) and h > 0.0 else span
+            settler.settle_after(
+                float(rows.t[k]), rows.y[k], rows.yp[k], step, float(rows.t[before]), rows.y[before].copy(), self.idata
+            )
 
     def _start(self, y: np.ndarray, yp: np.ndarray) -> IDA:
         """Return IDA, set up at the time reached."""

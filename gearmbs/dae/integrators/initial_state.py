@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.dae.integrators.bdf import HISTORY
+from gearmbs.dae.integrators.events import SAMPLES
 from gearmbs.dae.integrators.history import newest_point
 from gearmbs.dae.integrators.newton_matrix import SLOPE_MAX_AGE
 from gearmbs.dae.integrators.options import Options, event_rules
@@ -65,6 +66,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.max_iterations = MAX_ITERATIONS if options.max_iterations is None else options.max_iterations
     st.max_steps = options.max_steps or 0
     st.n_events = n_events
+    st.most_crossings = SAMPLES * n_events
     st.fixed_leading = options.method == "GSTIFF"
     st.interpolate = options.interpolate
     st.has_hook = problem.hook is not None
@@ -105,7 +107,8 @@ def _empty_state(
         work=problem.work_size,
         stops=len(stops),
         events=n_events,
-        crossings=EVENT_BUFFER + n_events,
+        samples=SAMPLES + 1 if n_events else 1,
+        crossings=EVENT_BUFFER + SAMPLES * n_events,
         records=records,
     )
     return state_layout(sizes).new(

@@ -48,7 +48,8 @@ def unknown_name(problem: DAEProblem, index: int) -> str:
     return f"y[{index}]"
 
 
-def _list_names(problem: DAEProblem, indices: np.ndarray) -> str:
+def list_names(problem: DAEProblem, indices: np.ndarray) -> str:
+    """Return the names of the first few unknowns, and how many there are besides."""
     names = [unknown_name(problem, int(i)) for i in indices[:NAMES_SHOWN]]
     more = len(indices) - len(names)
     return ", ".join(names) + (f" and {more} more" if more > 0 else "")
@@ -57,7 +58,7 @@ def _list_names(problem: DAEProblem, indices: np.ndarray) -> str:
 def singular(problem: DAEProblem, t: float, rows: np.ndarray, cols: np.ndarray) -> str:
     """Explain a singular Newton matrix by the unknowns that no equation determines."""
     return (
-        f"{Status.SINGULAR_JACOBIAN.sentence} At t = {t:.9g} nothing determines {_list_names(problem, cols)} "
+        f"{Status.SINGULAR_JACOBIAN.sentence} At t = {t:.9g} nothing determines {list_names(problem, cols)} "
         f"(left-over equations: {_list_indices(rows)}). Check for redundant or conflicting constraints, for a part "
         "without mass or inertia that is free to move, and for an unknown that appears in no equation."
     )
@@ -97,7 +98,7 @@ def replaced_start(problem: DAEProblem, unknowns: np.ndarray) -> str:
     if not len(unknowns):
         return ""
     return (
-        f" Initial values of algebraic unknowns did not satisfy the equations: {_list_names(problem, unknowns)}. The "
+        f" Initial values of algebraic unknowns did not satisfy the equations: {list_names(problem, unknowns)}. The "
         "run replaced them in its first step; the output at the start holds them as they were given."
     )
 

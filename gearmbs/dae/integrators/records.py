@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 
+from gearmbs.dae.integrators.algebraic import AlgebraicOutputs
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.run_state import RunState
 from gearmbs.dae.problem import DAEProblem
@@ -23,9 +24,14 @@ class Records:
     options : Options
     every_step : bool
         Whether outputs are wanted at every step.
+    algebraic : AlgebraicOutputs
+        What is solved for at outputs.
     """
 
-    def __init__(self, problem: DAEProblem, st: RunState, options: Options, every_step: bool) -> None:
+    def __init__(
+        self, problem: DAEProblem, st: RunState, options: Options, every_step: bool, algebraic: AlgebraicOutputs
+    ) -> None:
+        self.algebraic = algebraic
         self.problem = problem
         self.state = st
         self.options = options
@@ -35,6 +41,7 @@ class Records:
         self.row_blocks: list[np.ndarray] = []
         self.crossings: list[tuple[float, int, np.ndarray]] = []
         self.epochs: list[tuple[int, np.ndarray]] = [(0, st.idata.copy())]
+        self.tables: list[tuple[float, np.ndarray]] = [(st.t, self.epochs[0][1])]
 
     def drain(self) -> None:
         """Take records and crossings out of the buffers of the compiled loop."""
@@ -74,6 +81,7 @@ class Records:
             # what was stored so far belongs to the old table
             self.drain()
         self.epochs.append((1 + st.steps if self.every_step else st.next_output, st.idata.copy()))
+        self.tables.append((st.t, self.epochs[-1][1]))
 
     def result(self, status: Status, message: str, stats: SolverStats) -> DAEResult:
         """Return everything computed so far; histories of steps are put into ``stats``."""
@@ -85,7 +93,10 @@ class Records:
         stats.t_steps, stats.h_steps, stats.orders = t[taken], h[taken], order[taken]
         rows = np.concatenate(self.row_blocks) if self.row_blocks else None
         consumed = self.options.consumer is not None
-        sol = DenseOutput(t, rows, order) if rows is not None and not consumed else None
+        sol = None
+        if rows is not None and not consumed:
+            between = Between(self.algebraic, self.tables, self.options) if self.algebraic.is_needed else None
+            sol = DenseOutput(t, rows, order, between)
         outputs: tuple[np.ndarray, np.ndarray, np.ndarray]
         if consumed and rows is not None:
             outputs = t[np.append(0, np.flatnonzero(is_step))[-1:]], rows, np.empty((0, n))
@@ -95,18 +106,20 @@ class Records:
             outputs = self._at_steps(t, is_step, rows, sol)
         else:
             m = st.next_output
+            self._settle_start()
             outputs = st.outputs[:m], st.y_out[:m], st.yp_out[:m]
             if status is not Status.SUCCESS:
                 # the run may go on, or the arrays are mostly empty; those of a finished run are handed over as they are
                 outputs = outputs[0].copy(), outputs[1].copy(), outputs[2].copy()
         t_out, y_out, yp_out = outputs
         by_event = [[hit for hit in self.crossings if hit[1] == e] for e in range(st.n_events)]
+        remark = "" if self.every_step and not self.options.dense_output else self.algebraic.remark()
         return DAEResult(
             t=t_out,
             y=y_out,
             yp=yp_out,
             status=status,
-            message=message,
+            message=f"{message} {remark}" if remark else message,
             stats=stats,
             sol=sol if self.options.dense_output else None,
             t_events=[np.array([hit[0] for hit in hits]) for hits in by_event],
@@ -114,6 +127,13 @@ class Records:
             epochs=[(0 if consumed else first, table.copy()) for first, table in self.epochs[-1 if consumed else 0 :]],
             t_last=st.t,
         )
+
+    def _settle_start(self) -> None:
+        """Settle the output at the start, whose algebraic unknowns the caller may have guessed."""
+        st = self.state
+        if self.algebraic.is_needed and st.next_output and st.outputs[0] == self.problem.t0 and st.steps:
+            first = float(self.steps[0][1][self.steps[0][2] > 0][:1].sum()) or st.step
+            self.algebraic.settle_row(st.outputs[0], st.y_out[0], st.yp_out[0], first, self.tables[0][1])
 
     def _at_steps(
         self, t: np.ndarray, is_step: np.ndarray, rows: np.ndarray, sol: DenseOutput
@@ -128,3 +148,43 @@ class Records:
         yp_out = sol.derivative(t_out)
         yp_out[0] = self.problem.yp0
         return t_out, y_out, yp_out
+
+
+class Between:
+    """Solves for algebraic unknowns at any time of a run, for its dense output.
+
+    Parameters
+    ----------
+    algebraic : AlgebraicOutputs
+    tables : list of (float, ndarray)
+        Times, and the integer tables that are valid from there on.
+    options : Options
+        With tolerances, and what tells that a function of the user has failed.
+    """
+
+    def __init__(self, algebraic: AlgebraicOutputs, tables: list[tuple[float, np.ndarray]], options: Options) -> None:
+        self.algebraic = algebraic
+        self.tables = list(tables)
+        self.error_probe = options.error_probe
+        part = algebraic.part
+        self.unknowns = np.unique(part.cols[part.rates == 0])
+        self.atol, self.rtol = part.atol[self.unknowns], part.rtol
+
+    def __call__(self, times, ends, orders, nodes, rows, y, yp) -> None:
+        """Write y and y' at times between steps; arguments are those of `dense_output.evaluate_many`.
+
+        Raises
+        ------
+        Exception
+            What a function of the user has raised.
+        """
+        valid = np.searchsorted([t for t, _ in self.tables], times, side="left") - 1
+        for k, (_, idata) in enumerate(self.tables):
+            mine = np.flatnonzero(np.maximum(valid, 0) == k)
+            if mine.size:
+                part, slopes = y[mine], yp[mine]
+                self.algebraic.settle_on_steps(times[mine], ends[mine], orders, nodes, rows, part, slopes, idata)
+                y[mine], yp[mine] = part, slopes
+        error = self.error_probe() if self.error_probe is not None else None
+        if error is not None:
+            raise error

@@ -81,6 +81,8 @@ class RunState(Struct):
         End, size, order and result of accepted steps since the last call; rows of order 0 are history alone.
     g_old, g_new : ndarray
         Event functions at the last accepted point and at the new one.
+    g_between : ndarray, shape (samples, n_events)
+        Event functions over the last step.
     event_direction, event_action, event_left : ndarray of int64, shape (n_events,)
         Crossings that count, what they do, and how many are left until a stop.
     crossing_t, crossing_event, crossing_y : ndarray
@@ -97,6 +99,7 @@ class RunState(Struct):
     max_iterations: int
     max_steps: int  # 0: no limit
     n_events: int
+    most_crossings: int  # that one step may have
     fixed_leading: bool  # GSTIFF
     interpolate: bool  # outputs by interpolation, or by steps that land on them
     has_hook: bool
@@ -208,6 +211,7 @@ class RunState(Struct):
     record_y: Matrix
     g_old: Vector
     g_new: Vector
+    g_between: Matrix
     event_direction: IntVector
     event_action: IntVector
     event_left: IntVector
@@ -239,8 +243,9 @@ class Sizes(NamedTuple):
         Tables and scratch of the problem.
     stops : int
         Times to land on.
-    events, crossings, records : int
-        Event functions; places for crossings, and for accepted steps, between two calls of the compiled loop.
+    events, samples, crossings, records : int
+        Event functions, and their samples over a step; places for crossings, and for accepted steps, between two calls
+        of the compiled loop.
     """
 
     n: int
@@ -250,6 +255,7 @@ class Sizes(NamedTuple):
     work: int
     stops: int
     events: int
+    samples: int
     crossings: int
     records: int
 
@@ -272,6 +278,7 @@ def state_layout(sizes: Sizes) -> BlockLayout[RunState]:
             "work": max(1, sizes.work),
             "stops": sizes.stops,
             **dict.fromkeys(PER_EVENT, max(1, sizes.events)),
+            "g_between": (sizes.samples, max(1, sizes.events)),
             **dict.fromkeys(("crossing_t", "crossing_event"), crossings),
             "crossing_y": (crossings if sizes.events else 1, n),
             **dict.fromkeys(("record_t", "record_h", "record_order"), records),

@@ -16,6 +16,7 @@ from gearmbs.dae.compiled.bound_functions import FUNCTIONS_TYPE
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 from gearmbs.dae.integrators import bdf
 from gearmbs.dae.integrators import run_state as s
+from gearmbs.dae.integrators.algebraic import PART_TYPE
 from gearmbs.dae.integrators.controller import after_error_failure, after_success
 from gearmbs.dae.integrators.corrector import CONVERGED, NOT_FINITE, SLOW, correct, first_not_finite
 from gearmbs.dae.integrators.events import RECORD, STOP, cut_step, end_of_step, locate_events, write_outputs
@@ -60,7 +61,8 @@ def open_step(st):
         return s.RUNNING
     if st.max_steps > 0 and st.steps >= st.max_steps:
         return s.FAIL_TOO_MANY_STEPS
-    if st.n_records + 2 * bdf.HISTORY > st.record_t.shape[0] or st.n_crossings + st.n_events > st.crossing_t.shape[0]:
+    full = st.n_crossings + st.most_crossings > st.crossing_t.shape[0]
+    if full or st.n_records + 2 * bdf.HISTORY > st.record_t.shape[0]:
         return s.BUFFER_FULL
     open_row(st)
     st.open = True
@@ -294,7 +296,7 @@ def accept(st):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def deliver(functions, st):
+def deliver(functions, st, part):
     """Deliver crossings, outputs and the record of the accepted step, and prepare the next one.
 
     Returns
@@ -305,12 +307,12 @@ def deliver(functions, st):
     cut = st.t_new
     action = RECORD
     if st.n_events > 0:
-        cut, action = locate_events(functions, st)
+        cut, action = locate_events(functions, st, part)
         if not end_of_step(st):
             return s.FAIL_NOT_FINITE
-    write_outputs(cut, st)
+    write_outputs(functions, st, part, cut)
     if action != RECORD and cut < st.t_new:
-        cut_step(functions, st, cut)
+        cut_step(functions, st, part, cut)
     record_step(st)
     if action == STOP:
         return s.TERMINAL
@@ -388,12 +390,12 @@ def close_step(functions, st, afresh):
 
 
 @njit(
-    int64(FUNCTIONS_TYPE, STATE_TYPE, PLAN_TYPE, FACTORS_TYPE, int64),
+    int64(FUNCTIONS_TYPE, STATE_TYPE, PART_TYPE, PLAN_TYPE, FACTORS_TYPE, int64),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def advance(functions, st, plan, factors, max_accepted):
+def advance(functions, st, part, plan, factors, max_accepted):
     """Take at most ``max_accepted`` accepted steps.
 
     Parameters
@@ -402,6 +404,8 @@ def advance(functions, st, plan, factors, max_accepted):
         Residual, Jacobian, hook and events.
     st : RunState
         State, read and written.
+    part : AlgebraicPart
+        What is solved for at outputs and crossings.
     plan, factors : LUPlan, LUFactors
         Plan and numbers of the sparse factorisation.
     max_accepted : int
@@ -432,7 +436,7 @@ def advance(functions, st, plan, factors, max_accepted):
         else:
             accept(st)
             accepted += 1
-            code = deliver(functions, st)
+            code = deliver(functions, st, part)
             if code != s.RUNNING:
                 return code
     return s.RUNNING

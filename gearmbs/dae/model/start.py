@@ -200,6 +200,7 @@ def make_problem(system: PosedModel, formulation: str, rate_scale: float) -> DAE
         restart_rates=restart_rates,
         jacobian_residuals=round(RESIDUALS_AN_ENTRY * len(indices) / at["n"]) if flexible else 0,
         small_entries=flexible,
+        solved_at_outputs=unknowns.plain_states(at, model.controlled_states),
     )
 
 

@@ -24,7 +24,7 @@ def started(problem: DAEProblem, t_eval: np.ndarray | None = None, t_end: float 
 def take_step(run: Run) -> int:
     """Take one accepted step, with the help of Python where it is needed; return the code of the loop."""
     while True:
-        code = advance(run.functions, run.state, run.plan, run.factors, 1)
+        code = advance(run.functions, run.state, run.algebraic.part, run.plan, run.factors, 1)
         if code == s.REPIVOT:
             assert run.repivot() is None
         elif code == s.BUFFER_FULL:

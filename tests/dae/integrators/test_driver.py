@@ -166,7 +166,9 @@ def test_outputs_at_every_step_and_dense_output_agree():
     assert every.t[-1] == 2.0
     at = np.linspace(0.0, 2.0, 33)
     sampled = solve_wstiff(pendulum(), at, tol=1e-7)
-    np.testing.assert_allclose(every.sol(at[:-1]), sampled.y[:-1], atol=1e-12)
+    # the polynomials are the same; multipliers are solved for, to far below their tolerances of 30 and 4 times 1e-7
+    np.testing.assert_allclose(every.sol(at[:-1])[:, :4], sampled.y[:-1, :4], atol=1e-12)
+    np.testing.assert_allclose(every.sol(at[:-1])[:, 4:], sampled.y[:-1, 4:], atol=1e-10)
     np.testing.assert_allclose(every.sol.derivative(every.t)[1:], every.yp[1:], atol=1e-8)
 
 

@@ -228,7 +228,7 @@ def test_an_accepted_step_is_the_newest_point():
     assert st.t == st.t_new == times_from(st, 0)[0]
     assert st.n_past == min(past + 1, bdf.HISTORY)
     assert not st.open
-    assert step.deliver(run.functions, st) == RUNNING
+    assert step.deliver(run.functions, st, run.algebraic.part) == RUNNING
     assert st.record_t[st.n_records - 1] == st.t
     forget(st)
     assert (st.n_past, st.order) == (1, 1)

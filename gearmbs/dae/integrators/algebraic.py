@@ -1,0 +1,700 @@
+"""Algebraic unknowns at an instant: solved for from the differential ones, where outputs lie between the steps.
+
+The polynomial of a step interpolates differential unknowns within the tolerance, for the error test looks at them. It
+says nothing of an algebraic unknown outside error control, which may do anything between two steps. Such unknowns z
+are solved for where they are asked for. With t and the differential unknowns x given, the unknowns are z and, as far
+as their equations hold them, the rates x'. In the graph of equations and these unknowns
+
+* an equation that holds some of them stands for itself, G_i(t, x, x', z) = 0;
+* one that holds none, g(t, x) = 0, is a constraint. Its derivative g_t + g_x x' = 0 takes its place: it determines
+  the multipliers of a system of index two;
+* a largest matching tells what the equations determine: all that no path alternating between matched and other edges
+  connects with an unmatched unknown (Dulmage and Mendelsohn).
+
+Of these the equations that the wanted unknowns need are solved by Newton's method with a frozen matrix. Then z', the
+slope along x', solves G_x x' + G_z z' + G_t = 0 with the same matrix.
+
+References
+----------
+.. [1] A. L. Dulmage, N. S. Mendelsohn, "Coverings of bipartite graphs", Canad. J. Math. 10 (1958) 517-534.
+.. [2] C. C. Pantelides, "The consistent initialization of differential-algebraic systems", SIAM J. Sci. Stat. Comput.
+       9 (1988) 213-231.
+.. [3] M. Abramowitz, I. A. Stegun (eds.), "Handbook of Mathematical Functions", NBS (1964), 25.3.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import float64, int64, types
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import maximum_bipartite_matching
+
+from gearmbs._jit import njit
+from gearmbs.dae.compiled.bound_functions import FUNCTIONS_TYPE, bind, no_events, no_hook
+from gearmbs.dae.compiled.structs import IntVector, Matrix, Struct, Vector
+from gearmbs.dae.dense_output import combine, lagrange_weights
+from gearmbs.dae.integrators.messages import list_names
+from gearmbs.dae.problem import RESIDUAL_SIG, DAEProblem
+
+EPS = 2.220446049250313e-16
+SETTLED = 1e-6
+"""Part of its tolerance by which an unknown may be off after the iteration: so little that an output does not depend on
+which others are asked for. A matrix that fits takes two iterations to it, as to any other part."""
+ROUNDED = 64.0 * EPS
+"""Part of an unknown below which a correction is rounding of the few terms of its equation."""
+STAGNANT = 1.0
+"""Tolerances within which an iteration that gets no further counts as at its end: rounding of ill-conditioned rows."""
+ITERATIONS = 10
+CONTRACTION = 0.25
+"""Ratio of successive corrections with a matrix evaluated at the guess up to which the root is that of the guess's
+neighbourhood: the simplified Newton method has a unique root there (Kantorovich: 2 h <= 1 with h = 1/4)."""
+SINGULAR = 1e-13
+"""Ratio of pivots of the scaled matrix below which it counts as singular."""
+FOLLOWED = 200
+"""Parts of a step in which a branch is followed, at most."""
+SHORTEST = 1e-6
+"""Smallest of these parts: a branch that turns within it ends or jumps."""
+SPAN_OF_CONSTRAINTS = 1e-2
+"""Spacing s of the differences along the solution in units of the step, for constraints. Over four of them the error is
+s^4/30 of the fifth derivative in units of the step, 3e-10 of what a step can tell apart; rounding is divided by s h."""
+WIDER = 30.0
+WIDENINGS = 3
+"""Times 30 the span is tried where rounding of the differences exceeds the tolerance, twice: steps at a start, which
+shrink with the tolerance, are far shorter than what changes in the constraints."""
+SPAN_OF_SLOPES = 2e-3
+"""The same for the slopes of algebraic unknowns, which may vary much faster than the step tells: by radians over it."""
+RATE_OF_MATRIX = 1e8
+"""Leading coefficient in units of the reciprocal step from which dG/dy' is read off: the rest is 1e-8 of it."""
+MAX_POINTS = 8
+"""Points of a polynomial of the highest order, and one to spare."""
+PROBE = 1e-6
+PROBE_OF_RATE = 1e-3
+
+
+class AlgebraicPart(Struct):
+    """Equations and unknowns that are solved at an instant, and scratch for it.
+
+    Attributes
+    ----------
+    rows : ndarray of int64, shape (m,)
+        Equation of the problem.
+    lifted : ndarray of int64, shape (m,)
+        1 where its derivative by time takes its place.
+    cols : ndarray of int64, shape (m,)
+        Unknown of the problem.
+    rates : ndarray of int64, shape (m,)
+        1 where its rate is solved for.
+    entry_row, entry_col, entry_at, entry_kind : ndarray of int64
+        Entries of the matrix: place in it, place among the CSC values, and 1 for a derivative by a rate.
+    atol : ndarray, shape (n,)
+        Absolute tolerances.
+    lu, scale, pivots : ndarray, shapes (m, m), (m,) and (m,)
+        Factors of the matrix, scales of its rows, interchanges.
+    f, guess, last, known : ndarray, shape (m,)
+        What the equations are off by, or corrections; values to return to: of a guess, of slopes, along a branch.
+    """
+
+    count: int
+    any_lifted: bool
+    any_rates: bool
+    factored: bool
+    rtol: float
+    failures: int  # instants at which the iteration did not converge
+    first_failure: float
+    rows: IntVector
+    lifted: IntVector
+    cols: IntVector
+    rates: IntVector
+    entry_row: IntVector
+    entry_col: IntVector
+    entry_at: IntVector
+    entry_kind: IntVector
+    atol: Vector
+    vals: Vector
+    vals_of_rates: Vector
+    lu: Matrix
+    scale: Vector
+    pivots: IntVector
+    f: Vector
+    guess: Vector
+    last: Vector
+    known: Vector
+    res: Vector
+    y_moved: Vector
+    yp_kept: Vector
+    value: Vector
+    slope: Vector
+
+
+PART_TYPE = AlgebraicPart.numba_type
+_VEC = float64[::1]
+_MAT = float64[:, ::1]
+_IVEC = int64[::1]
+_BOOLS = types.boolean[:, ::1]
+
+
+# --- the iteration ---------------------------------------------------------------------------------------
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _factor(part):
+    """Factor ``part.lu`` with rows scaled to one, by Gauss's elimination with row interchanges; False if singular."""
+    a, scale, pivots = part.lu, part.scale, part.pivots
+    m = part.count
+    for i in range(m):
+        top = 0.0
+        for j in range(m):
+            top = max(top, abs(a[i, j]))
+        if not (top > 0.0 and top < np.inf):
+            return False
+        scale[i] = 1.0 / top
+        for j in range(m):
+            a[i, j] *= scale[i]
+    largest = 0.0
+    for k in range(m):
+        p = k
+        for i in range(k + 1, m):
+            if abs(a[i, k]) > abs(a[p, k]):
+                p = i
+        pivots[k] = p
+        column = 0.0
+        for i in range(m):
+            column = max(column, abs(a[i, k]))
+        if not abs(a[p, k]) > SINGULAR * column:
+            return False
+        largest = max(largest, column)
+        if p != k:
+            for j in range(m):
+                a[k, j], a[p, j] = a[p, j], a[k, j]
+        for i in range(k + 1, m):
+            q = a[i, k] / a[k, k]
+            a[i, k] = q
+            if q != 0.0:
+                for j in range(k + 1, m):
+                    a[i, j] -= q * a[k, j]
+    return np.isfinite(largest)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _solve(part, x):
+    """Solve with the factors of `_factor`; ``x`` is right-hand side and solution."""
+    a, m = part.lu, part.count
+    for k in range(m):
+        x[k] *= part.scale[k]
+    for k in range(m):
+        p = part.pivots[k]
+        x[k], x[p] = x[p], x[k]
+    for k in range(m):
+        for i in range(k + 1, m):
+            x[i] -= a[i, k] * x[k]
+    for k in range(m - 1, -1, -1):
+        x[k] /= a[k, k]
+        for i in range(k):
+            x[i] -= a[i, k] * x[k]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _evaluate_matrix(functions, part, t, y, yp, h, idata, rdata, work):
+    """Evaluate and factor the matrix at an instant; return whether it is regular."""
+    functions.jacobian(t, y, yp, 0.0, part.vals, idata, rdata, work)
+    cj = RATE_OF_MATRIX / h
+    if part.any_rates:
+        functions.jacobian(t, y, yp, cj, part.vals_of_rates, idata, rdata, work)
+    part.lu[:] = 0.0
+    for q in range(part.entry_at.shape[0]):
+        p = part.entry_at[q]
+        v = part.vals_of_rates[p] / cj if part.entry_kind[q] == 1 else part.vals[p]
+        part.lu[part.entry_row[q], part.entry_col[q]] = v
+    part.factored = _factor(part)
+    return part.factored
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _slopes(functions, part, t, y, yp, s, f, idata, rdata, work):
+    """Write the derivatives by time of all rows along y', where y' itself is kept: (8 (1) - (2))/(12 s) [3]_.
+
+    (1) and (2) are the differences between the rows s and 2 s later and earlier.
+    """
+    moved, res = part.y_moved, part.res
+    f[: part.count] = 0.0
+    for j in range(4):
+        d = (1.0, -1.0, 2.0, -2.0)[j] * s
+        weight = (8.0, -8.0, -1.0, 1.0)[j] / (12.0 * s)
+        for i in range(y.shape[0]):
+            moved[i] = y[i] + d * yp[i]
+        functions.residual(t + d, moved, yp, res, idata, rdata, work)
+        for k in range(part.count):
+            f[k] += weight * res[part.rows[k]]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _rows_at(functions, part, t, y, yp, wide, idata, rdata, work):
+    """Write what the equations are off by at an instant to ``part.f``."""
+    f = part.f
+    if part.any_lifted:
+        _slopes(functions, part, t, y, yp, SPAN_OF_CONSTRAINTS * wide, f, idata, rdata, work)
+    functions.residual(t, y, yp, part.res, idata, rdata, work)
+    for k in range(part.count):
+        if part.lifted[k] == 0:
+            f[k] = part.res[part.rows[k]]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _put(part, x, y, yp):
+    for k in range(part.count):
+        if part.rates[k] == 1:
+            yp[part.cols[k]] = x[k]
+        else:
+            y[part.cols[k]] = x[k]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _take(part, y, yp, x):
+    for k in range(part.count):
+        x[k] = yp[part.cols[k]] if part.rates[k] == 1 else y[part.cols[k]]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _iterate(functions, part, t, y, yp, h, wide, fresh, idata, rdata, work):
+    """Correct the unknowns with the present matrix; return whether they converge as from a guess near their root.
+
+    Constraints are differenced over a part of ``wide``. With a ``fresh`` matrix an iteration that gets no further within the tolerance is at the level of rounding.
+    """
+    f, cols = part.f, part.cols
+    previous = np.inf
+    for _ in range(ITERATIONS):
+        _rows_at(functions, part, t, y, yp, wide, idata, rdata, work)
+        _solve(part, f)
+        norm = 0.0
+        for k in range(part.count):
+            j = cols[k]
+            unit = h if part.rates[k] == 1 else 1.0
+            size = abs(yp[j] * h) if part.rates[k] == 1 else abs(y[j])
+            allowed = max(SETTLED * (part.atol[j] + part.rtol * abs(y[j])), ROUNDED * size)
+            move = abs(f[k]) * unit / allowed
+            if not move <= norm:
+                norm = move
+            if part.rates[k] == 1:
+                yp[j] -= f[k]
+            else:
+                y[j] -= f[k]
+        if not np.isfinite(norm):
+            return False
+        rate = norm / previous
+        # a first correction tells nothing of what a frozen matrix leaves
+        known = previous < np.inf
+        if norm == 0.0 or (known and (norm <= 1.0 or norm * rate <= 1.0 - rate)):
+            return True
+        if rate > CONTRACTION:
+            return fresh and norm <= STAGNANT / SETTLED
+        previous = norm
+    return False
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _slopes_of_unknowns(functions, part, t, y, yp, h, idata, rdata, work):
+    """Replace the rates of algebraic unknowns by those that keep their equations satisfied along the solution."""
+    f, last = part.f, part.last
+    for k in range(part.count):
+        last[k] = yp[part.cols[k]]
+    previous = np.inf
+    for _ in range(ITERATIONS):
+        _slopes(functions, part, t, y, yp, SPAN_OF_SLOPES * h, f, idata, rdata, work)
+        _solve(part, f)
+        norm = 0.0
+        for k in range(part.count):
+            j = part.cols[k]
+            move = h * abs(f[k]) / (part.atol[j] + part.rtol * abs(y[j]))
+            if not move <= norm:
+                norm = move
+        if not norm < previous:
+            break
+        for k in range(part.count):
+            yp[part.cols[k]] -= f[k]
+        if norm <= 1.0:
+            return
+        previous = norm
+    if not previous < np.inf:
+        for k in range(part.count):
+            yp[part.cols[k]] = last[k]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def settle(functions, part, t, y, yp, h, idata, rdata, work):
+    """Solve for the algebraic unknowns at an instant, from a guess near them.
+
+    Parameters
+    ----------
+    functions : Functions
+    part : AlgebraicPart
+    t : float
+    y, yp : ndarray, shape (n,)
+        Unknowns and rates there; of the unknowns solved for the guess, replaced by the solution. Rates of differential
+        unknowns are left as they are. Without success all are.
+    h : float
+        Size of the step around ``t``.
+    idata, rdata, work : ndarray
+        Tables and scratch of the problem.
+
+    Returns
+    -------
+    found : bool
+    """
+    kept = part.yp_kept
+    for i in range(yp.shape[0]):
+        kept[i] = yp[i]
+    _take(part, y, yp, part.guess)
+    found = part.factored and _iterate(functions, part, t, y, yp, h, h, False, idata, rdata, work)
+    wide = h
+    for _ in range(WIDENINGS if part.any_lifted else 1):
+        if found:
+            break
+        _put(part, part.guess, y, yp)
+        found = _evaluate_matrix(functions, part, t, y, yp, h, idata, rdata, work)
+        found = found and _iterate(functions, part, t, y, yp, h, wide, True, idata, rdata, work)
+        wide *= WIDER
+    if not found:
+        part.factored = False
+        _put(part, part.guess, y, yp)
+    for i in range(yp.shape[0]):
+        yp[i] = kept[i]
+    if found and not part.any_rates:
+        _slopes_of_unknowns(functions, part, t, y, yp, h, idata, rdata, work)
+    return found
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def settle_between(functions, part, t, t_old, y_old, h, nodes, rows, first, count, y, yp, idata, rdata, work):
+    """Write y and y' at ``t`` from the polynomial of a step, and solve for the algebraic unknowns there.
+
+    Where the iteration does not converge from the polynomial's values, or not to a root near them, the branch is
+    followed from the old end of the step in parts, each from the solution before. What cannot be solved for keeps the
+    polynomial's value, and is counted.
+
+    Parameters
+    ----------
+    functions : Functions
+    part : AlgebraicPart
+    t, t_old : float
+        Instant, and old end of the step.
+    y_old : ndarray, shape (n,)
+        Unknowns at the old end.
+    h : float
+        Size of the step.
+    nodes, rows, first, count : ndarray, ndarray, int, int
+        Times of the points of the polynomial; their values from row ``first`` on; their number.
+    y, yp : ndarray, shape (n,)
+        Written.
+    idata, rdata, work : ndarray
+        Tables and scratch of the problem.
+    """
+    value, slope = part.value, part.slope
+    lagrange_weights(t, nodes, count, value, slope)
+    combine(value, slope, count, rows, first, y, yp)
+    if part.count == 0 or settle(functions, part, t, y, yp, h, idata, rdata, work):
+        return
+    at = t_old
+    step = 0.5 * (t - t_old)
+    z = part.known
+    for k in range(part.count):
+        z[k] = y_old[part.cols[k]]
+    for _ in range(FOLLOWED):
+        s = min(at + step, t)
+        if t - s < SHORTEST * h:
+            s = t
+        lagrange_weights(s, nodes, count, value, slope)
+        combine(value, slope, count, rows, first, y, yp)
+        for k in range(part.count):
+            if part.rates[k] == 0:
+                y[part.cols[k]] = z[k]
+        if settle(functions, part, s, y, yp, h, idata, rdata, work):
+            if s == t:
+                return
+            for k in range(part.count):
+                z[k] = y[part.cols[k]]
+            at = s
+            step *= 2.0
+        else:
+            step *= 0.25
+            if step < SHORTEST * h:
+                break
+    lagrange_weights(t, nodes, count, value, slope)
+    combine(value, slope, count, rows, first, y, yp)
+    note_failure(part, t)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def note_failure(part, t):
+    """Count an instant at which the algebraic unknowns could not be solved for."""
+    if part.failures == 0:
+        part.first_failure = t
+    part.failures += 1
+
+
+_SETTLE_ROWS = types.void(FUNCTIONS_TYPE, PART_TYPE, _VEC, _IVEC, _IVEC, _VEC, _MAT, _MAT, _MAT, _IVEC, _VEC, _VEC)
+
+
+@njit(_SETTLE_ROWS, cache=True, nogil=True, error_model="numpy")
+def settle_on_steps(functions, part, times, ends, orders, nodes, rows, y, yp, idata, rdata, work):
+    """Write y and y' at ``times``, each on the polynomial of the step that ends in row ``ends[i]``, and settle them.
+
+    Parameters
+    ----------
+    functions, part
+        As of `settle`.
+    times, ends, orders, nodes, rows, y, yp
+        As of `gearmbs.dae.dense_output.evaluate_many`.
+    idata, rdata, work : ndarray
+        Tables and scratch of the problem.
+    """
+    for i in range(times.shape[0]):
+        e = ends[i]
+        k = orders[e]
+        h = nodes[e] - nodes[e - 1]
+        settle_between(
+            functions, part, times[i], nodes[e - 1], rows[e - 1], h, nodes[e - k : e + 1], rows, e - k, k + 1,
+            y[i], yp[i], idata, rdata, work,
+        )  # fmt: skip
+
+
+@njit(
+    types.void(FUNCTIONS_TYPE, PART_TYPE, float64, _VEC, _VEC, float64, float64, _VEC, _IVEC, _VEC, _VEC),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def settle_output(functions, part, t, y, yp, h, t_old, y_old, idata, rdata, work):
+    """Settle an output of an integrator that tells nothing between outputs.
+
+    Where the iteration does not converge, the branch is followed on the chord from the output before, ``y_old`` at
+    ``t_old``. Other parameters are those of `settle`.
+    """
+    if settle(functions, part, t, y, yp, h, idata, rdata, work):
+        return
+    n = y.shape[0]
+    if t > t_old:
+        chord, nodes, z, zp = np.empty((2, n)), np.empty(2), np.empty(n), np.empty(n)
+        nodes[0], nodes[1] = t_old, t
+        for i in range(n):
+            chord[0, i] = y_old[i]
+            chord[1, i] = y[i]
+        failures = part.failures
+        settle_between(functions, part, t, t_old, y_old, t - t_old, nodes, chord, 0, 2, z, zp, idata, rdata, work)
+        if part.failures == failures:
+            for k in range(part.count):
+                if part.rates[k] == 0:
+                    y[part.cols[k]] = z[part.cols[k]]
+            if settle(functions, part, t, y, yp, h, idata, rdata, work):
+                return
+        part.failures = failures
+    note_failure(part, t)
+
+
+# --- which unknowns, which equations ---------------------------------------------------------------------
+
+
+@njit(
+    types.void(types.FunctionType(RESIDUAL_SIG), float64, _VEC, _VEC, _VEC, _BOOLS, _BOOLS, _IVEC, _VEC, _VEC),
+    cache=True,
+)
+def _probe(residual, t, y, yp, sizes, by_y, by_rate, idata, rdata, work):
+    """Mark which rows each unknown and each rate changes at one point."""
+    n = y.shape[0]
+    base, moved = np.empty(n), np.empty(n)
+    residual(t, y, yp, base, idata, rdata, work)
+    y_moved, yp_moved = y.copy(), yp.copy()
+    for j in range(n):
+        y_moved[j] = y[j] + PROBE * max(abs(y[j]), sizes[j])
+        residual(t, y_moved, yp, moved, idata, rdata, work)
+        y_moved[j] = y[j]
+        for i in range(n):
+            by_y[i, j] |= moved[i] != base[i]
+        yp_moved[j] = yp[j] + PROBE_OF_RATE * max(1.0, abs(yp[j]))
+        residual(t, y, yp_moved, moved, idata, rdata, work)
+        yp_moved[j] = yp[j]
+        for i in range(n):
+            by_rate[i, j] |= moved[i] != base[i]
+
+
+def _dependences(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
+    """Return which rows depend on which unknowns, and on which rates, two tables of shape (n, n).
+
+    They are tried at the start, and where all that is zero there is not: products of zeros hide a dependence.
+    """
+    n = problem.n
+    by_y, by_rate = np.zeros((n, n), dtype=bool), np.zeros((n, n), dtype=bool)
+    idata, rdata, work = problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
+    sizes = np.minimum(np.abs(problem.scale), problem.atol_scale / PROBE)
+    generic = 1.0 + np.arange(n) / (2.0 * n)
+    y = np.where(problem.y0 == 0.0, PROBE * sizes * generic, problem.y0)
+    yp = np.where(problem.yp0 == 0.0, PROBE_OF_RATE * generic, problem.yp0)
+    for place in ((problem.y0.astype(float), problem.yp0.astype(float)), (y, yp)):
+        _probe(problem.residual, float(problem.t0), *place, sizes, by_y, by_rate, idata, rdata, work)
+    return by_y, by_rate
+
+
+def _determined(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return for each column its matched row, -1 without one, and whether the rows determine it.
+
+    Parameters
+    ----------
+    edges : ndarray of bool, shape (rows, columns)
+    """
+    match = np.full(edges.shape[1], -1)
+    if edges.any():
+        match = maximum_bipartite_matching(csr_array(edges.astype(np.int8)), perm_type="row")
+    column_of = {int(row): c for c, row in enumerate(match) if row >= 0}
+    open_ones = [int(c) for c in np.flatnonzero(match < 0)]
+    free = set(open_ones)
+    while open_ones:
+        for row in np.flatnonzero(edges[:, open_ones.pop()]):
+            c = column_of.get(int(row))
+            if c is not None and c not in free:
+                free.add(c)
+                open_ones.append(c)
+    determined = np.ones(edges.shape[1], dtype=bool)
+    determined[list(free)] = False
+    return match, determined
+
+
+def _needed(edges: np.ndarray, match: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Return the columns that the matched rows of ``wanted`` hold, those that theirs hold, and so on."""
+    found, open_ones = set(wanted.tolist()), wanted.tolist()
+    while open_ones:
+        for c in np.flatnonzero(edges[match[open_ones.pop()]]).tolist():
+            if c not in found:
+                found.add(c)
+                open_ones.append(c)
+    return np.array(sorted(found), dtype=np.int64)
+
+
+def _chosen(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
+    """Return which unknowns are wanted at outputs, and which are solved for if an equation needs them."""
+    algebraic = ~np.asarray(problem.differential, dtype=bool)
+    if problem.solved_at_outputs is not None:
+        wanted = algebraic & problem.solved_at_outputs
+        return wanted, wanted
+    wanted = algebraic & ~np.asarray(problem.error_mask, dtype=bool)
+    return wanted, algebraic
+
+
+class AlgebraicOutputs:
+    """What is solved for at outputs of a problem, and what is not.
+
+    Attributes
+    ----------
+    part : AlgebraicPart
+    left : ndarray of int
+        Algebraic unknowns outside error control that the equations do not determine at an instant.
+    """
+
+    def __init__(self, problem: DAEProblem, atol: np.ndarray, rtol: float) -> None:
+        self.problem = problem
+        wanted, solved = _chosen(problem)
+        self.left = np.empty(0, dtype=np.int64)
+        rows = cols = np.empty(0, dtype=np.int64)
+        lifted = rates = by_y = by_rate = np.zeros((0, 0), dtype=bool)
+        n = problem.n
+        if wanted.any():
+            by_y, by_rate = _dependences(problem)
+            unknown = np.concatenate((solved & by_y.any(axis=0), by_rate.any(axis=0) & problem.differential))
+            edges = np.concatenate((by_y, by_rate), axis=1) & unknown
+            constraints = ~edges.any(axis=1) & ~by_y[:, ~problem.differential].any(axis=1)
+            edges[constraints, n:] = by_y[constraints] & unknown[n:]
+            match, determined = _determined(edges)
+            determined &= unknown
+            asked = np.flatnonzero(wanted)
+            self.left = asked[~determined[asked]]
+            found = _needed(edges, match, asked[determined[asked]])
+            rows, cols = match[found].astype(np.int64), found % n
+            rates, lifted = found >= n, constraints[rows]
+        self.part = self._made(rows, cols, lifted, rates, atol, rtol, (by_y, by_rate))
+
+    def _made(self, rows, cols, lifted, rates, atol, rtol, by) -> AlgebraicPart:
+        """Return the compiled loop's part of it."""
+        problem, m = self.problem, len(rows)
+        place = {int(row): k for k, row in enumerate(rows)}
+        entries: list[tuple[int, int, int, int]] = []
+        for c, (j, is_rate) in enumerate(zip(cols, rates)):
+            for p in range(int(problem.indptr[j]), int(problem.indptr[j + 1])):
+                k = place.get(int(problem.indices[p]))
+                if k is None:
+                    continue
+                table = by[1] if is_rate and not lifted[k] else by[0]
+                if table[rows[k], j]:
+                    entries.append((k, c, p, int(is_rate and not lifted[k])))
+        lists = np.array(entries, dtype=np.int64).reshape(-1, 4).T
+        n, nnz = (problem.n, len(problem.indices)) if m else (0, 0)
+        return AlgebraicPart(
+            count=m,
+            any_lifted=bool(np.any(lifted)),
+            any_rates=bool(np.any(rates)),
+            rtol=rtol,
+            rows=rows,
+            cols=cols,
+            lifted=np.asarray(lifted, dtype=np.int64).ravel(),
+            rates=np.asarray(rates, dtype=np.int64).ravel(),
+            **dict(zip(("entry_row", "entry_col", "entry_at", "entry_kind"), map(np.ascontiguousarray, lists))),
+            atol=np.array(atol, dtype=float),
+            vals=np.zeros(nnz),
+            vals_of_rates=np.zeros(nnz),
+            lu=np.zeros((m, m)),
+            pivots=np.zeros(m, dtype=np.int64),
+            **{name: np.zeros(m) for name in ("scale", "f", "guess", "last", "known")},
+            **{name: np.zeros(n) for name in ("res", "y_moved", "yp_kept")},
+            value=np.zeros(MAX_POINTS),
+            slope=np.zeros(MAX_POINTS),
+        )
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether there is anything to solve for."""
+        return self.part.count > 0
+
+    @property
+    def functions(self) -> Any:
+        """The functions of the problem, bound together for compiled code."""
+        return bind(self.problem.residual, self.problem.jacobian, no_hook, no_events)
+
+    def settle_row(self, t: float, y: np.ndarray, yp: np.ndarray, h: float, idata: np.ndarray) -> None:
+        """Settle one output in place, which lies in a step of about ``h``."""
+        self.settle_after(t, y, yp, h, t, y, idata)
+
+    def settle_after(
+        self, t: float, y: np.ndarray, yp: np.ndarray, h: float, t_old: float, y_old: np.ndarray, idata: np.ndarray
+    ) -> None:
+        """Settle one output in place; see `settle_output`."""
+        problem = self.problem
+        settle_output(
+            self.functions, self.part, t, y, yp, h, t_old, y_old, idata, problem.rdata.copy(),
+            np.zeros(problem.work_size),
+        )  # fmt: skip
+
+    def settle_on_steps(self, times, ends, orders, nodes, rows, y, yp, idata: np.ndarray) -> None:
+        """Write y and y' at times between steps, settled; see the function of this name."""
+        problem = self.problem
+        settle_on_steps(
+            self.functions, self.part, times, ends, orders, nodes, rows, y, yp, idata, problem.rdata.copy(),
+            np.zeros(problem.work_size),
+        )  # fmt: skip
+
+    def remark(self) -> str:
+        """Say which unknowns are known at the steps alone, and where they could not be solved for."""
+        problem, part = self.problem, self.part
+        parts = []
+        if len(self.left):
+            parts.append(
+                f"Between the steps {list_names(problem, self.left)} {'are' if len(self.left) > 1 else 'is'} "
+                "interpolated without control of the error: no equation and no derivative of one determines "
+                f"{'them' if len(self.left) > 1 else 'it'} at an instant. State a problem of index one or two, or put "
+                "error_mask on what is asked for."
+            )
+        if part.failures:
+            algebraic = np.unique(part.cols[part.rates == 0])
+            parts.append(
+                f"At {part.failures} instants, the first t = {part.first_failure:.9g}, "
+                f"{list_names(problem, algebraic)} could not be solved for, and the interpolated values stand there."
+            )
+        return " ".join(parts)
