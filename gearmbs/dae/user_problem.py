@@ -21,6 +21,11 @@ RATES_STEP = 1e-12
 RATES_SWEEPS = 3
 RATES_RATIO = 100.0
 RATES_ROUNDS = 12
+LARGEST_BLOCK = 600
+"""Algebraic unknowns up to which those of index one are looked for, by a dense decomposition: 0.2 s."""
+NULL = 1e-5
+"""Part of the largest singular value below which one, or a component of a vector, counts as zero in a block of
+differences, whose entries are right to 1e-8 where the tolerance allows an increment of some 1e-8, else to 1e-5."""
 
 
 def _takes(function: Callable, fewest: int, what: str) -> bool:
@@ -193,6 +198,36 @@ def _factors_at_start(problem: DAEProblem, gamma: float, tables: tuple) -> tuple
     return plan, factors
 
 
+def _index_one(problem: DAEProblem) -> np.ndarray:
+    """Return which algebraic unknowns the equations without derivatives determine at the start, shape (n,).
+
+    Those that no null vector of B moves, B the derivatives of these equations by all algebraic unknowns.
+    """
+    found = np.zeros(problem.n, dtype=bool)
+    columns = np.flatnonzero(~problem.differential)
+    if not 0 < len(columns) <= LARGEST_BLOCK:
+        return found
+    tables = (problem.idata, problem.rdata, np.zeros(problem.work_size))
+    base, moved, vals = np.empty(problem.n), np.empty(problem.n), np.empty(len(problem.indices))
+    problem.residual(problem.t0, problem.y0, problem.yp0, base, *tables)
+    # no two rates by the same, which an equation might balance
+    rates = problem.yp0 + (1.0 + np.abs(problem.yp0)) * np.random.default_rng(0).uniform(0.5, 1.0, problem.n)
+    problem.residual(problem.t0, problem.y0, rates, moved, *tables)
+    problem.jacobian(problem.t0, problem.y0, problem.yp0, 0.0, vals, *tables)
+    if not (np.isfinite(base).all() and np.isfinite(moved).all() and np.isfinite(vals).all()):
+        return found
+    matrix = csc_array((vals, problem.indices, problem.indptr), shape=(problem.n, problem.n)).tocsr()
+    block = matrix[np.flatnonzero(moved == base)][:, columns].toarray() * problem.scale[columns]
+    block = block[np.abs(block).max(axis=1) > 0.0] if len(block) else block
+    if not len(block):
+        return found
+    block /= np.abs(block).max(axis=1, keepdims=True)
+    _, values, right = np.linalg.svd(block)
+    null = right[int((values > NULL * values[0]).sum()) :]
+    found[columns] = (np.abs(null) <= NULL).all(axis=0)
+    return found
+
+
 def _compiled(
     functions: _UserFunctions, fun: Callable, jac: Callable | None, jac_sparsity: Any, events: Sequence[Callable]
 ) -> dict[str, Any]:
@@ -306,4 +341,5 @@ def as_problem(
         raise ValueError("error_mask leaves no unknown under error control")
     if yp0 is None:
         _find_rates(problem, span)
+    problem.index_one = _index_one(problem)
     return problem, functions.probe

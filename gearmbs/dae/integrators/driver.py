@@ -127,6 +127,12 @@ class Run:
             )  # fmt: skip
             st.gamma_planned = st.gamma
         except SingularMatrixError as error:
+            if st.drop_failed and st.singular_fails < SINGULAR_RETRIES:
+                self._retry_smaller()
+                st.matrix_wanted = True
+                # whatever pivots there are belong to another attempt
+                st.growth_limit = -1.0
+                return None
             if st.steps > 0 and st.drop_rounds < DROP_ROUNDS_ALLOWED:
                 st.drop_rounds += 1
                 st.drop_level = 1
@@ -223,24 +229,40 @@ class Run:
         chunk = FIRST_CHUNK
         while True:
             tic = time.perf_counter()
-            code = direct(advance)(self.functions, self.state, self.plan, self.factors, chunk)
+            few = 1 if self.stall.looking else chunk
+            code = direct(advance)(self.functions, self.state, self.plan, self.factors, few)
             ending = self.user_failure() if self.user_exception() is not None else self._heed(code)
             if ending is not None:
                 return ending
             if interrupt.raised:
                 return Status.INTERRUPTED, self._interrupted_message()
-            needed = self.stall.steps_needed(self.state.steps, self.state.t, self.state.t_end)
-            if needed:
-                return Status.STALLED, messages.stalled(
-                    self.problem, self.state.t, self.stall.progress, needed, self.state.worst_error
-                )
+            ending = self._stalled()
+            if ending is not None:
+                return ending
             if code == s.RUNNING:
                 self._report()
+                if few < chunk:
+                    continue
                 elapsed = time.perf_counter() - tic
                 if elapsed < 0.5 * CHUNK_SECONDS:
                     chunk *= 8 if elapsed < CHUNK_SECONDS / 16 else 2
                 elif elapsed > 2.0 * CHUNK_SECONDS and chunk > 1:
                     chunk //= 2
+
+    def _stalled(self) -> tuple[Status, str] | None:
+        """Return how the run has ended if it gets nowhere."""
+        st, watch = self.state, self.stall
+        needed = watch.steps_needed(st.steps, st.t, st.t_end)
+        if needed:
+            told = messages.stalled(self.problem, st.t, watch.progress, needed, st.worst_error)
+            return Status.STALLED, told
+        if watch.looking:
+            chatter = watch.look(st.t, st.y, st.yp, st.w_error)
+            if chatter is not None:
+                return Status.STALLED, messages.chatters(self.problem, st.t, chatter)
+        checked = st.error_rejections + st.newton_rejections + st.restarts
+        watch.watch_refused(st.steps, checked, st.t, st.t_end)
+        return None
 
     def _heed(self, code: int) -> tuple[Status, str] | None:
         """Do what the compiled loop has returned for; return how the run has ended, or None if it goes on."""
@@ -282,11 +304,26 @@ class Run:
             worst = st.worst_error
             told = messages.step_too_small(problem, t, h, worst, st.error, self._noise())
             return status, told
+        if status in (Status.NEWTON_FAILURE, Status.TOO_MANY_REJECTIONS) and st.newton_fails > 0:
+            undetermined = self._undetermined()
+            if undetermined is not None:
+                return undetermined
         if status is Status.NEWTON_FAILURE:
             return status, messages.newton(problem, t, h, worst, self._noise())
         if status is Status.TOO_MANY_STEPS:
             return status, messages.too_many_steps(problem, t, st.steps)
         return status, messages.too_many_rejections(problem, t, h, worst, self._noise())
+
+    def _undetermined(self) -> tuple[Status, str] | None:
+        """Return the failure if the matrix of the last attempt, beyond the time reached, is singular."""
+        st = self.state
+        if not np.isfinite(st.matrix).all():
+            return None
+        try:
+            analyse(self.indptr, self.indices, st.matrix, self.scale)
+        except SingularMatrixError as error:
+            return Status.SINGULAR_JACOBIAN, messages.singular(self.problem, st.t, error.rows, error.cols)
+        return None
 
     def _noise(self) -> float:
         """Return how far rounding alone moves the solution where the run stopped, in units of the tolerance."""

@@ -72,6 +72,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.step_in_weights = bool((st.tested > st.coupled).any())
     st.t = t0
     st.order = 1
+    st.worst_row = -1
     st.since_refused = KINK_MEMORY
     st.n_past = 1
     st.gamma_factored = 1.0
@@ -120,6 +121,8 @@ def _set_tables(st: RunState, problem: DAEProblem) -> None:
     """Copy the tables, which hooks and events may change, and the initial values."""
     st.idata[:] = problem.idata
     st.rdata[:] = problem.rdata
+    st.entry_row[:] = problem.indices
+    st.entry_col[:] = np.repeat(np.arange(problem.n), np.diff(problem.indptr))
     st.y[:] = problem.y0
     st.yp[:] = st.yp_start[:] = problem.yp0
 
@@ -130,9 +133,10 @@ def _set_tolerances(st: RunState, problem: DAEProblem, options: Options) -> None
     if not st.atol.min(initial=np.inf) > 0.0:
         raise ValueError(f"atol_scale must be positive, is {problem.atol_scale[int(np.argmin(st.atol))]:g} somewhere")
     st.controlled[:] = problem.error_mask
-    st.tested[:] = st.controlled if options.corrector == "modified" else 1.0
+    own = np.zeros(problem.n) if problem.index_one is None else problem.index_one
+    st.tested[:] = np.maximum(st.controlled, own) if options.corrector == "modified" else 1.0
     st.differential[:] = problem.differential
-    np.maximum(st.controlled, st.differential, out=st.coupled)
+    st.coupled[:] = np.maximum(np.maximum(st.controlled, st.differential), own)
 
 
 def _set_event_rules(st: RunState, n_events: int, options: Options) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.dae.integrators.stall import WINDOW
+from gearmbs.dae.integrators.stall import WINDOW, Chatter
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import Status
 
@@ -168,6 +168,17 @@ def stalled(problem: DAEProblem, t: float, progress: float, needed: float, worst
         f"{Status.STALLED.sentence} Near t = {t:.9g} {WINDOW} steps went {progress:.3g}, mostly because of "
         f"{unknown_name(problem, worst)}; at that rate the end is {needed:.1g} steps away. "
         f"{advice(problem, Status.STALLED)}"
+    )
+
+
+def chatters(problem: DAEProblem, t: float, chatter: Chatter) -> str:
+    """Explain a solution that stays where a rate jumps, and how such equations are posed."""
+    name = unknown_name(problem, chatter.unknown)
+    return (
+        f"{Status.STALLED.sentence} Near t = {t:.9g} the equations jump at {name} = {chatter.place:.3g}: the rate of "
+        f"{name} changes between {chatter.low:.3g} and {chatter.high:.3g} from step to step, and the solution stays "
+        "there (it slides on the jump, or chatters). Let the jump take a width, say tanh(y/width) for sign(y) with a "
+        "width of a hundred tolerances or more, or pose the sliding as an equation of its own."
     )
 
 

@@ -61,7 +61,7 @@ class RunState(Struct):
         Absolute tolerances.
     controlled, tested, differential, coupled : ndarray, shape (n,)
         1 for unknowns under error control, for those the corrector test looks at, for those whose derivative appears,
-        and for those that are controlled or differential; else 0.
+        and for those that it judges by their tolerance whatever the step: controlled, differential, or of index one.
     value, slope, nodes, respacing : ndarray, shape (MAX_NODES,), and (HISTORY, MAX_NODES) for the last
         Coefficients: of interpolation for values and slopes, times of points, weights of re-interpolation.
     jac, jac_slope, matrix : ndarray
@@ -69,6 +69,8 @@ class RunState(Struct):
         matrix carried over to the current leading coefficient, which is the one that is factored.
     carried : ndarray
         Entries with a derivative by the leading coefficient, of which ``n_carried`` are taken.
+    entry_row, entry_col : ndarray
+        Equation and unknown of each entry.
     idata, rdata, work : ndarray
         Tables and scratch of the problem.
     stops : ndarray
@@ -128,6 +130,8 @@ class RunState(Struct):
     singular_fails: int
     worst: int  # unknown, or equation, behind the last failure; -1 - e for event e
     worst_error: int  # unknown behind the last failure of the error test
+    worst_row: int  # equation furthest from holding where the corrector got no further, -1 for none
+    violation: float  # its residual, in units of what tolerances and rounding explain
     # the Newton matrix
     matrix_wanted: bool  # to be evaluated at the next prediction
     matrix_fresh: bool  # evaluated in this step
@@ -143,6 +147,7 @@ class RunState(Struct):
     rate_allowed: float  # beyond which the matrix is evaluated anew for the next step
     drop_level: int  # how large pivots may be to be left out near a singular position
     drop_age: int
+    drop_failed: bool  # whether setting pivots aside has not helped in this step
     drop_rounds: int
     left_out: bool  # whether entries larger than rounding may be left out of the matrix
     doubts: int  # failures of the corrector for which the entries left out of the matrix were suspected
@@ -162,6 +167,7 @@ class RunState(Struct):
     steps: int
     error_rejections: int
     newton_rejections: int
+    restarts: int
     residuals: int
     jacobians: int
     factorizations: int
@@ -195,6 +201,8 @@ class RunState(Struct):
     jac_slope: Vector
     matrix: Vector
     carried: IndexVector
+    entry_row: IndexVector
+    entry_col: IndexVector
     idata: IntVector
     rdata: Vector
     work: Vector
@@ -223,7 +231,7 @@ PER_UNKNOWN = (
     "y", "yp", "y_pred", "yp_pred", "res", "delta", "y_between", "yp_between", "yp_start", "w_error", "w_newton",
     "weight", "atol", "controlled", "tested", "differential", "coupled",
 )  # fmt: skip
-PER_ENTRY = ("jac", "jac_slope", "matrix", "carried")
+PER_ENTRY = ("jac", "jac_slope", "matrix", "carried", "entry_row", "entry_col")
 COEFFICIENTS = ("value", "slope", "nodes")
 PER_EVENT = ("g_old", "g_new", "event_direction", "event_action", "event_left")
 

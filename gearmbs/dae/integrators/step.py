@@ -17,7 +17,7 @@ from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 from gearmbs.dae.integrators import bdf
 from gearmbs.dae.integrators import run_state as s
 from gearmbs.dae.integrators.controller import after_error_failure, after_success
-from gearmbs.dae.integrators.corrector import CONVERGED, NOT_FINITE, SLOW, correct, first_not_finite
+from gearmbs.dae.integrators.corrector import CONVERGED, NOT_FINITE, SLOW, correct, equations_hold, first_not_finite
 from gearmbs.dae.integrators.events import RECORD, STOP, cut_step, end_of_step, locate_events, write_outputs
 from gearmbs.dae.integrators.history import copy, forget, open_row, record_history, respace, rows_from, times_from
 from gearmbs.dae.integrators.newton_matrix import SLOPE_MAX_AGE, form_matrix, renew_matrix
@@ -68,6 +68,9 @@ def open_step(st):
     st.newton_fails = 0
     st.nan_fails = 0
     st.singular_fails = 0
+    st.drop_failed = False
+    st.worst_row = -1
+    st.violation = 0.0
     st.h = max(st.h, st.h_min, ROUNDED_STEP * abs(st.t))
     st.h_first = st.h
     st.h_refused = np.inf
@@ -170,8 +173,11 @@ def solve_step(functions, st, plan, factors):
         sound = renew_matrix(functions, st, plan, factors)
         if sound:
             code = correct(functions, st, plan, factors)
+    if code == CONVERGED and st.drop_level > 0 and not equations_hold(functions, st):
+        # the corrections say nothing of the equations that were set aside
+        code = SLOW
     remember_noise(st)
-    if code == SLOW and sound and accept_noise(st, plan, factors, False):
+    if code == SLOW and sound and accept_noise(st, plan, factors, False) and equations_hold(functions, st):
         code = CONVERGED
     return code
 
@@ -202,11 +208,17 @@ def refuse_by_newton(st, code):
     st.caution = 2
     if st.newton_fails > DROP_AFTER:
         st.order = 1
-        if st.drop_level < DROP_LEVELS:
+        if st.drop_level < DROP_LEVELS and not st.drop_failed:
             # perhaps a singular position: go through it with the step it began with, some pivots dropped
             st.drop_level += 1
             st.drop_age = 0
             st.h = st.h_first
+            return s.REPIVOT
+        if not st.drop_failed:
+            # it is none, or not to be passed: smaller steps come nearer to where the equations end
+            st.drop_failed = True
+            st.drop_level = 0
+            st.h = NEWTON_SHRINK ** (DROP_AFTER + 1) * st.h_first
             return s.REPIVOT
     if st.left_out and st.doubts < DOUBTS:
         st.doubts += 1
@@ -319,6 +331,7 @@ def deliver(functions, st):
         st.next_stop += 1
     afresh = at_stop or action != RECORD
     if afresh:
+        st.restarts += 1
         copy(st.yp, st.yp_start)
         st.h = RESTART_SHRINK * st.step
         forget(st)
