@@ -126,6 +126,7 @@ class Run:
                 with_tail=problem.small_entries,
             )  # fmt: skip
             st.gamma_planned = st.gamma
+            st.plan_sign = _parity(self.plan.row_from) * _parity(self.plan.col_to)
         except SingularMatrixError as error:
             if st.drop_failed and st.singular_fails < SINGULAR_RETRIES:
                 self._retry_smaller()
@@ -271,7 +272,7 @@ class Run:
             return self._failure(code)
         if code == s.DONE:
             self._report()
-            failure = self._unsatisfied() if st.drop_level else None
+            failure = self._unsatisfied() if st.drop_level else self._another_index()
             return failure or (Status.SUCCESS, f"{Status.SUCCESS.sentence}{self.start_note}")
         if code == s.TERMINAL:
             return Status.TERMINAL_EVENT, f"{Status.TERMINAL_EVENT.sentence} t = {st.t:.9g}.{self.start_note}"
@@ -305,14 +306,30 @@ class Run:
             told = messages.step_too_small(problem, t, h, worst, st.error, self._noise())
             return status, told
         if status in (Status.NEWTON_FAILURE, Status.TOO_MANY_REJECTIONS) and st.newton_fails > 0:
+            if st.index_changes:
+                return Status.SINGULAR_JACOBIAN, messages.index_changes(t, t)
             undetermined = self._undetermined()
             if undetermined is not None:
                 return undetermined
         if status is Status.NEWTON_FAILURE:
-            return status, messages.newton(problem, t, h, worst, self._noise())
+            return status, messages.newton(problem, t, h, worst, self._noise(), self._end())
         if status is Status.TOO_MANY_STEPS:
             return status, messages.too_many_steps(problem, t, st.steps)
-        return status, messages.too_many_rejections(problem, t, h, worst, self._noise())
+        return status, messages.too_many_rejections(problem, t, h, worst, self._noise(), self._end())
+
+    def _another_index(self) -> tuple[Status, str] | None:
+        """Return a failure if the run has passed a singular pencil that no step had to take notice of."""
+        st = self.state
+        if not st.index_changes:
+            return None
+        return Status.SINGULAR_JACOBIAN, messages.index_changes(st.t_pencil, st.t)
+
+    def _end(self) -> str:
+        """Say how the solution ends where the last attempts found none on its branch."""
+        st = self.state
+        if st.jumped >= 0:
+            return messages.branch_ends(self.problem, st.jumped, st.jump_from, st.jump_to)
+        return messages.solution_ends(self.problem, st.worst_row, st.violation)
 
     def _undetermined(self) -> tuple[Status, str] | None:
         """Return the failure if the matrix of the last attempt, beyond the time reached, is singular."""
@@ -347,6 +364,19 @@ class Run:
             noise_limited=st.noise_limited,
             wall_time=self.wall_time,
         )
+
+
+def _parity(order: np.ndarray) -> float:
+    """Return 1 for an even permutation and -1 for an odd one."""
+    seen, sign = np.zeros(len(order), dtype=bool), 1.0
+    for first in range(len(order)):
+        at, length = first, 0
+        while not seen[at]:
+            seen[at] = True
+            at, length = int(order[at]), length + 1
+        if length and length % 2 == 0:
+            sign = -sign
+    return sign
 
 
 class InterruptFlag:

@@ -62,6 +62,8 @@ class RunState(Struct):
     controlled, tested, differential, coupled : ndarray, shape (n,)
         1 for unknowns under error control, for those the corrector test looks at, for those whose derivative appears,
         and for those that it judges by their tolerance whatever the step: controlled, differential, or of index one.
+    index_one : ndarray, shape (n,)
+        1 for algebraic unknowns that equations without derivatives determine, else 0.
     value, slope, nodes, respacing : ndarray, shape (MAX_NODES,), and (HISTORY, MAX_NODES) for the last
         Coefficients: of interpolation for values and slopes, times of points, weights of re-interpolation.
     jac, jac_slope, matrix : ndarray
@@ -102,6 +104,8 @@ class RunState(Struct):
     fixed_leading: bool  # GSTIFF
     interpolate: bool  # outputs by interpolation, or by steps that land on them
     has_hook: bool
+    has_index_one: bool
+    watches_pencil: bool  # whether the sign of the determinant is watched, see `branches.keeps_its_index`
     keep_rows: bool  # whether y of every step is recorded
     step_in_weights: bool  # whether the size of the step enters the weights of the corrector test
     # where the run stands
@@ -131,6 +135,10 @@ class RunState(Struct):
     worst: int  # unknown, or equation, behind the last failure; -1 - e for event e
     worst_error: int  # unknown behind the last failure of the error test
     worst_row: int  # equation furthest from holding where the corrector got no further, -1 for none
+    index_changes: bool  # the last attempt met a singular pencil
+    jumped: int  # unknown of index one that left its branch, -1 for none
+    jump_from: float
+    jump_to: float
     violation: float  # its residual, in units of what tolerances and rounding explain
     # the Newton matrix
     matrix_wanted: bool  # to be evaluated at the next prediction
@@ -143,6 +151,11 @@ class RunState(Struct):
     gamma_factored: float
     growth_limit: float  # growth of its factors beyond which pivots are chosen anew
     gamma_planned: float  # leading coefficient at which pivots, and entries to leave out, were chosen
+    plan_sign: float  # sign of the permutations of its pivots
+    sign_last: float  # of the determinant of the factored matrix at the last accepted step, 0 if it is not known
+    sign_pencil: float  # of the determinant of dG/dy + gamma dG/dy' for large gamma, 0 likewise
+    t_pencil: float  # where that was seen
+    gamma_large: float  # the least of these gamma
     rate: float  # of convergence of the corrector, as last seen
     rate_allowed: float  # beyond which the matrix is evaluated anew for the next step
     drop_level: int  # how large pivots may be to be left out near a singular position
@@ -193,6 +206,7 @@ class RunState(Struct):
     tested: Vector
     differential: Vector
     coupled: Vector
+    index_one: Vector
     value: Vector
     slope: Vector
     nodes: Vector
@@ -229,7 +243,7 @@ STATE_TYPE = RunState.numba_type
 
 PER_UNKNOWN = (
     "y", "yp", "y_pred", "yp_pred", "res", "delta", "y_between", "yp_between", "yp_start", "w_error", "w_newton",
-    "weight", "atol", "controlled", "tested", "differential", "coupled",
+    "weight", "atol", "controlled", "tested", "differential", "coupled", "index_one",
 )  # fmt: skip
 PER_ENTRY = ("jac", "jac_slope", "matrix", "carried", "entry_row", "entry_col")
 COEFFICIENTS = ("value", "slope", "nodes")

@@ -16,6 +16,7 @@ from gearmbs.dae.compiled.bound_functions import FUNCTIONS_TYPE
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 from gearmbs.dae.integrators import bdf
 from gearmbs.dae.integrators import run_state as s
+from gearmbs.dae.integrators.branches import keeps_its_index, kept_its_index, stays_on_branch
 from gearmbs.dae.integrators.controller import after_error_failure, after_success
 from gearmbs.dae.integrators.corrector import CONVERGED, NOT_FINITE, SLOW, correct, equations_hold, first_not_finite
 from gearmbs.dae.integrators.events import RECORD, STOP, cut_step, end_of_step, locate_events, write_outputs
@@ -40,6 +41,8 @@ DROP_LEVELS = 3
 DOUBTS = 3
 """Failures of the corrector after which entries left out are looked at; if harmless so often, they are."""
 RENEWALS = 3
+RENEWALS_AT_JUMPS = 20
+"""The same where shorter steps have not helped: an algebraic unknown may jump, and Newton's method has a long way."""
 SAME_ERROR = 0.1
 JUMP_LIMIT = 50.0
 """Error, in tolerances, up to which a run passes a jump that does not shrink with the step."""
@@ -70,6 +73,8 @@ def open_step(st):
     st.singular_fails = 0
     st.drop_failed = False
     st.worst_row = -1
+    st.jumped = -1
+    st.index_changes = False
     st.violation = 0.0
     st.h = max(st.h, st.h_min, ROUNDED_STEP * abs(st.t))
     st.h_first = st.h
@@ -167,12 +172,17 @@ def solve_step(functions, st, plan, factors):
     code = correct(functions, st, plan, factors)
     renewals = 0
     sound = True
-    while code == SLOW and st.matrix_fresh and sound and renewals < RENEWALS:
+    most = RENEWALS if st.newton_fails <= DROP_AFTER else RENEWALS_AT_JUMPS
+    while code == SLOW and st.matrix_fresh and sound and renewals < most:
         # contacts or multipliers are not as predicted: the matrix at the iterate knows them
         renewals += 1
         sound = renew_matrix(functions, st, plan, factors)
         if sound:
             code = correct(functions, st, plan, factors)
+    if code == CONVERGED and st.has_index_one and not stays_on_branch(functions, st, plan, factors):
+        code = SLOW
+    if code == CONVERGED and st.watches_pencil and not keeps_its_index(functions, st, plan, factors):
+        code = SLOW
     if code == CONVERGED and st.drop_level > 0 and not equations_hold(functions, st):
         # the corrections say nothing of the equations that were set aside
         code = SLOW
@@ -332,6 +342,8 @@ def deliver(functions, st):
     afresh = at_stop or action != RECORD
     if afresh:
         st.restarts += 1
+        st.sign_last = 0.0
+        st.sign_pencil = 0.0
         copy(st.yp, st.yp_start)
         st.h = RESTART_SHRINK * st.step
         forget(st)
@@ -384,6 +396,7 @@ def close_step(functions, st, afresh):
         RUNNING, DONE, or PAUSED after a change of coordinates.
     """
     if st.t >= st.t_end:
+        st.index_changes = st.watches_pencil and not kept_its_index(functions, st)
         return s.DONE
     if st.has_hook:
         rows = rows_from(st, 0)
@@ -392,6 +405,8 @@ def close_step(functions, st, afresh):
             st.matrix_wanted = True
         if answer == HISTORY_CHANGED:
             st.slope_age = SLOPE_MAX_AGE
+            st.sign_last = 0.0
+            st.sign_pencil = 0.0
             copy(rows[0], st.y)
             record_history(st, 0)
             return s.PAUSED
