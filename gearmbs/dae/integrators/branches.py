@@ -6,7 +6,7 @@ import numpy as np
 
 from gearmbs._jit import njit
 from gearmbs.dae.integrators.history import copy, rows_from
-from gearmbs.dae.integrators.newton_matrix import renew_matrix
+from gearmbs.dae.integrators.newton_matrix import carry_over, renew_matrix
 from gearmbs.dae.linalg.sparse_lu import solve
 
 UNFORESEEN = 100.0
@@ -92,16 +92,16 @@ def _determinant_sign(st, plan, factors):
 def _pencil_sign(functions, st):
     """Return the sign of det(dG/dy + gamma dG/dy') at the iterate for large gamma; 0 if it cannot be told.
 
-    Gaussian elimination with rows of unit size and pivots by columns: those of the step need not fit. The matrix of the
-    step is lost, its factors are not.
+    Gaussian elimination with rows of unit size and pivots by columns: those of the step need not fit.
     """
     n, gamma = st.y.shape[0], max(st.gamma_large, LARGER_GAMMA * st.gamma)
     functions.jacobian(st.t_new, st.y, st.yp, gamma, st.matrix, st.idata, st.rdata, st.work)
     st.jacobians += 1
-    st.matrix_wanted = True
     a = np.zeros((n, n))
     for p in range(st.matrix.shape[0]):
         a[st.entry_row[p], st.entry_col[p]] = st.matrix[p]
+    copy(st.jac, st.matrix)
+    carry_over(st)
     for i in range(n):
         size = np.abs(a[i]).max()
         if not (size > 0.0 and np.isfinite(size)):

@@ -116,6 +116,10 @@ class RunState(Struct):
     n_past: int  # points accepted and not forgotten, at most HISTORY
     since_change: int  # steps since order or size last changed
     caution: int  # steps without growth still to come after a failure
+    starting: bool  # whether order and size still grow after a start, see `controller.after_start`
+    passing: bool  # whether the open step is the first beyond a stop or an event
+    start_tries: int  # attempts of a first step that the error test has refused
+    h_tried: float  # size of the last of them
     since_refused: int  # steps since the error test refused one
     # the open step
     open: bool  # its row is taken
