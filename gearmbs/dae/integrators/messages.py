@@ -174,6 +174,15 @@ def solution_ends(problem: DAEProblem, row: int, violation: float) -> str:
     )
 
 
+def no_solution(problem: DAEProblem, row: int) -> str:
+    """Explain Newton's method that finds nothing beyond a time, though what it leaves is small."""
+    return (
+        f"Beyond that time Newton's method finds no solution, however short the step, because of "
+        f"{equation_name(problem, row)}: the solution seems to end there, as at a fold, where two branches meet; end the "
+        "run before, or see whether the equation is the one that is meant."
+    )
+
+
 def branch_ends(problem: DAEProblem, unknown: int, before: float, after: float) -> str:
     """Explain an unknown that would have to jump though its equation does not."""
     return (
