@@ -12,6 +12,7 @@ from scipy.sparse import csc_array, issparse
 
 from gearmbs.dae.compiled.python_callback import PythonCallback
 from gearmbs.dae.integrators import differences
+from gearmbs.dae.integrators.messages import unknown_name
 from gearmbs.dae.linalg.analyse import SingularMatrixError, analyse
 from gearmbs.dae.linalg.lu_plan import LUPlan
 from gearmbs.dae.linalg.sparse_lu import LUFactors, factor, new_factors, solve
@@ -23,6 +24,8 @@ RATES_RATIO = 100.0
 RATES_ROUNDS = 12
 LARGEST_BLOCK = 600
 """Algebraic unknowns up to which those of index one are looked for, by a dense decomposition: 0.2 s."""
+NEARBY = 1e-3
+"""Part of the span, and of the unknowns, by which the start is left to see whether more derivatives appear."""
 NULL = 1e-5
 """Part of the largest singular value below which one, or a component of a vector, counts as zero in a block of
 differences, whose entries are right to 1e-8 where the tolerance allows an increment of some 1e-8, else to 1e-5."""
@@ -244,6 +247,41 @@ def _compiled(
     }
 
 
+def _check_derivatives(problem: DAEProblem, functions: _UserFunctions, span: float) -> None:
+    """Refuse equations whose derivatives stand in G, but not at the start, or nowhere.
+
+    Raises
+    ------
+    ValueError
+    """
+    found = np.zeros(problem.n, dtype=np.bool_)
+    tables = problem.idata, problem.rdata, np.zeros(problem.work_size)
+    known = len(functions.errors)
+    # two ways off the start: one of them may lead out of where the equations are defined
+    for side in (1.0, -1.0):
+        t, y = problem.t0 + NEARBY * span, problem.y0 + side * NEARBY * (1.0 + np.abs(problem.y0))
+        near, out = np.zeros(problem.n, dtype=np.bool_), np.empty(problem.n)
+        problem.residual(t, y, problem.yp0, out, *tables)
+        if np.isfinite(out).all() and len(functions.errors) == known:
+            differences.find_differential(problem.residual, t, y, problem.yp0, near, *tables)
+            found |= near & (len(functions.errors) == known)
+        del functions.errors[known:]
+    lost = np.flatnonzero(found & ~problem.differential)
+    if len(lost):
+        named = ", ".join(unknown_name(problem, int(i)) for i in lost)
+        raise ValueError(
+            f"dG/dy' vanishes at the start for {named}: the derivative stands in G, but its factor is zero at "
+            f"t0 = {problem.t0:g}, y0 = {np.array2string(problem.y0, threshold=6)}, so that the equations do not say how "
+            "the solution leaves this point (it may be infinitely fast, or one of many). Start a little later on the "
+            "solution, or give differential= and yp0= if you know how it goes on"
+        )
+    if not problem.differential.any():
+        raise ValueError(
+            "no derivative appears in G, so that nothing is under error control: find the roots of algebraic equations "
+            "otherwise, or put unknowns under error control with error_mask="
+        )
+
+
 def _start(
     y0: np.ndarray, atol: float | np.ndarray, scale: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -337,8 +375,12 @@ def as_problem(
         names=list(names),
         jacobian_residuals=1 + int(idata[differences.N_COLOURS]) if jac is None else 0,
     )
+    if differential is None and error_mask is None:
+        _check_derivatives(problem, functions, span)
     if not problem.error_mask.any():
-        raise ValueError("error_mask leaves no unknown under error control")
+        raise ValueError(
+            "error_mask leaves no unknown under error control: set it for the unknowns whose derivatives appear, at least"
+        )
     if yp0 is None:
         _find_rates(problem, span)
     problem.index_one = _index_one(problem)

@@ -42,6 +42,12 @@ FIRST_CHUNK = 16
 CHUNK_SECONDS = 0.05
 SINGULAR_RETRIES = 8
 DROP_ROUNDS_ALLOWED = 3
+EPS = 2.220446049250313e-16
+LEAST_DIGITS = 16.0
+"""Units of the last digit that a tolerance has to be: differences of order k + 1, by which errors are told, amplify
+rounding by 2^k. At 27 oscillators take ten times the steps of a hundredfold tolerance, at 9 some do not end."""
+HOPELESS_DIGITS = 4.0
+"""The same in the course of a run, where an unknown may have grown."""
 UNSATISFIED = 1e-3
 """Part of its terms by which an equation set aside may be off at the end of a run."""
 DROP_TOLERANCES = (0.0, 1e-9, 1e-7, 1e-5)
@@ -224,6 +230,7 @@ class Run:
             failure = start.begin(self)
             if self.user_exception() is not None:
                 return self.user_failure()
+            failure = failure or self._below_rounding(LEAST_DIGITS)
             if failure is not None:
                 return failure
             self.started = True
@@ -253,6 +260,9 @@ class Run:
     def _stalled(self) -> tuple[Status, str] | None:
         """Return how the run has ended if it gets nowhere."""
         st, watch = self.state, self.stall
+        hopeless = self._below_rounding(HOPELESS_DIGITS)
+        if hopeless is not None:
+            return hopeless
         needed = watch.steps_needed(st.steps, st.t, st.t_end)
         if needed:
             told = messages.stalled(self.problem, st.t, watch.progress, needed, st.worst_error)
@@ -264,6 +274,18 @@ class Run:
         checked = st.error_rejections + st.newton_rejections + st.restarts
         watch.watch_refused(st.steps, checked, st.t, st.t_end)
         return None
+
+    def _below_rounding(self, digits: float) -> tuple[Status, str] | None:
+        """Return a failure if some tolerance is less than so many units of the last digit of its unknown."""
+        st = self.state
+        level = EPS * np.abs(st.y) * st.w_error
+        worst = int(np.argmax(level))
+        if not digits * level[worst] > 1.0:
+            return None
+        value, weight = float(st.y[worst]), float(st.w_error[worst])
+        least = LEAST_DIGITS * EPS * abs(value)
+        told = messages.below_rounding(self.problem, st.t, worst, value, 1.0 / weight, least)
+        return Status.BELOW_ROUNDING, told
 
     def _heed(self, code: int) -> tuple[Status, str] | None:
         """Do what the compiled loop has returned for; return how the run has ended, or None if it goes on."""

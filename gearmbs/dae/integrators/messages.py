@@ -9,6 +9,7 @@ from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import Status
 
 NAMES_SHOWN = 6
+EPS = 2.220446049250313e-16
 NOISE_WORTH_TELLING = 0.1
 """Movement by rounding, in units of the tolerance, from which on rounding is named as a cause."""
 
@@ -207,6 +208,16 @@ def too_many_steps(problem: DAEProblem, t: float, steps: int) -> str:
     return (
         f"{Status.TOO_MANY_STEPS.sentence} {steps} steps took the run to t = {t:.9g}. "
         f"{advice(problem, Status.TOO_MANY_STEPS)}"
+    )
+
+
+def below_rounding(problem: DAEProblem, t: float, unknown: int, value: float, tolerance: float, least: float) -> str:
+    """Explain a tolerance that no step can satisfy, and name the least that one could."""
+    return (
+        f"{Status.BELOW_ROUNDING.sentence} At t = {t:.9g} {unknown_name(problem, unknown)} is {value:.6g} and may be off "
+        f"by {tolerance:.2g} a step, {tolerance / abs(value) / EPS:.2g} units of its last digit; the least that can be "
+        f"asked for is {least:.2g}, or rtol = {least / abs(value):.1g}. Loosen the tolerance, or count the unknown from "
+        "another origin if it is large and changes little."
     )
 
 
