@@ -55,8 +55,12 @@ class DAEProblem:
         Typical magnitude of each unknown, for scaling the Newton matrix.
     differential : ndarray of bool, shape (n,)
         Unknowns whose derivative appears in G.
+    index_one : ndarray of bool, shape (n,), optional
+        Algebraic unknowns that equations without derivatives determine: the corrector satisfies them to their
+        tolerance at every step. What others, multipliers of index two and more, do to the rest shrinks with the step,
+        and so does what it asks of them. Default: none.
     names : list of str
-        Names of the unknowns, for messages.
+        Names of the unknowns, for messages; equation i goes by that of unknown i.
     n_events : int
         Number of event functions.
     hook_interval : callable, optional
@@ -91,6 +95,7 @@ class DAEProblem:
     scale: np.ndarray
     differential: np.ndarray
     t0: float = 0.0
+    index_one: np.ndarray | None = None
     names: list[str] = field(default_factory=list)
     hook: Callable | None = None
     events: Callable | None = None

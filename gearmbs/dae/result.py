@@ -40,6 +40,7 @@ class Status(enum.IntEnum):
     SOLVER_FAILURE = -10, "The external integrator gave up."
     CONFLICTING_CONSTRAINTS = -11, "A constraint removed as redundant was violated by the motion."
     STALLED = -12, "The steps have become so small that the run would never end."
+    BELOW_ROUNDING = -13, "The tolerance is below the rounding of double precision."
 
 
 @dataclass

@@ -12,6 +12,7 @@ from scipy.sparse import csc_array, issparse
 
 from gearmbs.dae.compiled.python_callback import PythonCallback
 from gearmbs.dae.integrators import differences
+from gearmbs.dae.integrators.messages import unknown_name
 from gearmbs.dae.linalg.analyse import SingularMatrixError, analyse
 from gearmbs.dae.linalg.lu_plan import LUPlan
 from gearmbs.dae.linalg.sparse_lu import LUFactors, factor, new_factors, solve
@@ -21,6 +22,13 @@ RATES_STEP = 1e-12
 RATES_SWEEPS = 3
 RATES_RATIO = 100.0
 RATES_ROUNDS = 12
+LARGEST_BLOCK = 600
+"""Algebraic unknowns up to which those of index one are looked for, by a dense decomposition: 0.2 s."""
+NEARBY = 1e-3
+"""Part of the span, and of the unknowns, by which the start is left to see whether more derivatives appear."""
+NULL = 1e-5
+"""Part of the largest singular value below which one, or a component of a vector, counts as zero in a block of
+differences, whose entries are right to 1e-8 where the tolerance allows an increment of some 1e-8, else to 1e-5."""
 
 
 def _takes(function: Callable, fewest: int, what: str) -> bool:
@@ -193,6 +201,36 @@ def _factors_at_start(problem: DAEProblem, gamma: float, tables: tuple) -> tuple
     return plan, factors
 
 
+def _index_one(problem: DAEProblem) -> np.ndarray:
+    """Return which algebraic unknowns the equations without derivatives determine at the start, shape (n,).
+
+    Those that no null vector of B moves, B the derivatives of these equations by all algebraic unknowns.
+    """
+    found = np.zeros(problem.n, dtype=bool)
+    columns = np.flatnonzero(~problem.differential)
+    if not 0 < len(columns) <= LARGEST_BLOCK:
+        return found
+    tables = (problem.idata, problem.rdata, np.zeros(problem.work_size))
+    base, moved, vals = np.empty(problem.n), np.empty(problem.n), np.empty(len(problem.indices))
+    problem.residual(problem.t0, problem.y0, problem.yp0, base, *tables)
+    # no two rates by the same, which an equation might balance
+    rates = problem.yp0 + (1.0 + np.abs(problem.yp0)) * np.random.default_rng(0).uniform(0.5, 1.0, problem.n)
+    problem.residual(problem.t0, problem.y0, rates, moved, *tables)
+    problem.jacobian(problem.t0, problem.y0, problem.yp0, 0.0, vals, *tables)
+    if not (np.isfinite(base).all() and np.isfinite(moved).all() and np.isfinite(vals).all()):
+        return found
+    matrix = csc_array((vals, problem.indices, problem.indptr), shape=(problem.n, problem.n)).tocsr()
+    block = matrix[np.flatnonzero(moved == base)][:, columns].toarray() * problem.scale[columns]
+    block = block[np.abs(block).max(axis=1) > 0.0] if len(block) else block
+    if not len(block):
+        return found
+    block /= np.abs(block).max(axis=1, keepdims=True)
+    _, values, right = np.linalg.svd(block)
+    null = right[int((values > NULL * values[0]).sum()) :]
+    found[columns] = (np.abs(null) <= NULL).all(axis=0)
+    return found
+
+
 def _compiled(
     functions: _UserFunctions, fun: Callable, jac: Callable | None, jac_sparsity: Any, events: Sequence[Callable]
 ) -> dict[str, Any]:
@@ -207,6 +245,41 @@ def _compiled(
         "indptr": indptr,
         "indices": indices,
     }
+
+
+def _check_derivatives(problem: DAEProblem, functions: _UserFunctions, span: float) -> None:
+    """Refuse equations whose derivatives stand in G, but not at the start, or nowhere.
+
+    Raises
+    ------
+    ValueError
+    """
+    found = np.zeros(problem.n, dtype=np.bool_)
+    tables = problem.idata, problem.rdata, np.zeros(problem.work_size)
+    known = len(functions.errors)
+    # two ways off the start: one of them may lead out of where the equations are defined
+    for side in (1.0, -1.0):
+        t, y = problem.t0 + NEARBY * span, problem.y0 + side * NEARBY * (1.0 + np.abs(problem.y0))
+        near, out = np.zeros(problem.n, dtype=np.bool_), np.empty(problem.n)
+        problem.residual(t, y, problem.yp0, out, *tables)
+        if np.isfinite(out).all() and len(functions.errors) == known:
+            differences.find_differential(problem.residual, t, y, problem.yp0, near, *tables)
+            found |= near & (len(functions.errors) == known)
+        del functions.errors[known:]
+    lost = np.flatnonzero(found & ~problem.differential)
+    if len(lost):
+        named = ", ".join(unknown_name(problem, int(i)) for i in lost)
+        raise ValueError(
+            f"dG/dy' vanishes at the start for {named}: the derivative stands in G, but its factor is zero at "
+            f"t0 = {problem.t0:g}, y0 = {np.array2string(problem.y0, threshold=6)}, so that the equations do not say how "
+            "the solution leaves this point (it may be infinitely fast, or one of many). Start a little later on the "
+            "solution, or give differential= and yp0= if you know how it goes on"
+        )
+    if not problem.differential.any():
+        raise ValueError(
+            "no derivative appears in G, so that nothing is under error control: find the roots of algebraic equations "
+            "otherwise, or put unknowns under error control with error_mask="
+        )
 
 
 def _start(
@@ -302,8 +375,13 @@ def as_problem(
         names=list(names),
         jacobian_residuals=1 + int(idata[differences.N_COLOURS]) if jac is None else 0,
     )
+    if differential is None and error_mask is None:
+        _check_derivatives(problem, functions, span)
     if not problem.error_mask.any():
-        raise ValueError("error_mask leaves no unknown under error control")
+        raise ValueError(
+            "error_mask leaves no unknown under error control: set it for the unknowns whose derivatives appear, at least"
+        )
     if yp0 is None:
         _find_rates(problem, span)
+    problem.index_one = _index_one(problem)
     return problem, functions.probe

@@ -11,6 +11,8 @@ TARGET = 0.2
 RAISE_GAIN = 1.15
 GROW_FROM = 1.2
 GROW_AT_MOST = 2.0
+START_GROWTH = 8.0
+"""The same in the first steps, which are shorter than those that follow by as much as the tolerance is small."""
 SHRINK_FROM = 0.9
 SHRINK_AT_MOST = 0.5
 FAIL_SHRINK = (0.1, 0.8)
@@ -70,6 +72,37 @@ def step_below(st, k, h, nodes):
     """
     below = step_at_order(st, k - 1, h, nodes)
     return min(below, step_at_order(st, k - 2, h, nodes)) if k > 2 else below
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def after_start(st):
+    """Set order and step size after an accepted step of a new start within a run, until an order is found that a lower one equals.
+
+    Steps grow at order one up to the size that the error test allows, then the order is raised with every step, as far
+    as there are points and the step grows by it. Ratios of steps so large are not stable for ever, but for the few steps
+    of a start they are, and the points, dense where they are old, stand for the derivatives at the start.
+    """
+    k, h, n_past = st.order, st.h, st.n_past
+    nodes = times_from(st, 0)
+    if n_past < 3:
+        # of a single step the distance from its prediction is all that is known
+        ratio = START_GROWTH if st.error <= 0.0 else min((TARGET / st.error) ** 0.5, START_GROWTH)
+        st.h = h * max(ratio, SHRINK_AT_MOST)
+        return
+    if n_past < k + 2:
+        return
+    h_best = step_at_order(st, k, h, nodes)
+    if k > 1 and step_reaching(st, k - 1, h_best, h, nodes) >= h_best:
+        st.starting = False
+        after_success(st)
+        return
+    st.h = min(max(h_best, SHRINK_AT_MOST * h), START_GROWTH * h)
+    st.since_change = 0
+    if h_best < START_GROWTH * h:
+        if k == st.max_order:
+            st.starting = False
+        else:
+            st.order = k + 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

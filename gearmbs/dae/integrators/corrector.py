@@ -23,7 +23,12 @@ RATE_UNKNOWN = 0.1
 ROUNDING_LEVEL = 0.1
 ROUNDING_LEVEL_FRESH = 0.5
 LOOSEST = 0.03
+ROUNDED_TERMS = 16.0
+"""Roundings of the terms of an equation: each is a product of a few factors, summed in some order."""
+EPS = 2.220446049250313e-16
 LOOSEST_AT_KINKS = 0.1
+LOOSEST_AT_START = 1e-3
+"""8^2/2 times less than `LOOSEST`: what a prediction eight steps ahead makes of it at order two."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -58,17 +63,49 @@ def apply_correction(delta, gamma, weight, y, yp):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _verdict(st, rate):
-    """Return CONVERGED where a corrector that gets no further is harmless to the unknowns under error control.
+def equations_hold(functions, st):
+    """Return whether the residual at the iterate is no more than tolerances and rounding explain, equation by equation.
+
+    An equation holds where small changes of its unknowns satisfy it, each within its tolerance or within what rounding
+    moves the terms of the equation by:
+
+        |G_i| <= sum_j |J_ij| (atol_j + rtol |y_j| + ROUNDED_TERMS eps |y_j|),   J = dG/dy + gamma dG/dy'
+
+    Neither the scale of an equation nor that of an unknown matters. ``st.worst_row`` and ``st.violation`` say which
+    equation is the furthest from that, and by which factor. ``st.res`` and ``st.y_between`` are overwritten.
+    """
+    functions.residual(st.t_new, st.y, st.yp, st.res, st.idata, st.rdata, st.work)
+    st.residuals += 1
+    y, res, weight, matrix, allowed = st.y, st.res, st.weight, st.matrix, st.y_between
+    row, col = st.entry_row, st.entry_col
+    allowed[:] = 0.0
+    for p in range(matrix.shape[0]):
+        j = col[p]
+        allowed[row[p]] += abs(matrix[p]) * (1.0 / weight[j] + ROUNDED_TERMS * EPS * abs(y[j]))
+    st.violation = 0.0
+    for i in range(res.shape[0]):
+        ratio = abs(res[i]) / allowed[i] if res[i] != 0.0 else 0.0
+        if not ratio <= st.violation:
+            st.violation = ratio
+            st.worst_row = i
+    return st.violation <= 1.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _verdict(functions, st, rate):
+    """Return CONVERGED where a corrector that gets no further is harmless: all equations hold, and it is at its end.
 
     Then it is rounding, or multipliers that nothing determines near a singular position. What a contracting iteration
     leaves is judged by its rate; a stagnating one leaves about its last correction. A stale matrix is suspected first.
+    Unknowns under error control may rest while an equation of the others has no solution: the residual tells.
     """
     fresh = st.matrix_fresh
     left = weighted_max(st.delta, st.w_error)
     if rate > RATE_LIMIT:
-        return CONVERGED if left <= (ROUNDING_LEVEL_FRESH if fresh else ROUNDING_LEVEL) else SLOW
-    return CONVERGED if fresh and left * rate <= ROUNDING_LEVEL_FRESH * (1.0 - rate) else SLOW
+        harmless = left <= (ROUNDING_LEVEL_FRESH if fresh else ROUNDING_LEVEL)
+    else:
+        harmless = fresh and left * rate <= ROUNDING_LEVEL_FRESH * (1.0 - rate)
+    return CONVERGED if harmless and equations_hold(functions, st) else SLOW
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -115,7 +152,7 @@ def correct(functions, st, plan, factors):
             rate = norm / previous if previous > 0.0 else 0.0
             if rate > RATE_LIMIT:
                 st.rate = 1.0
-                return _verdict(st, rate)
+                return _verdict(functions, st, rate)
             st.rate = max(rate, RATE_MEMORY * st.rate)
         trust = max(st.rate, RATE_FLOOR)
         if trust < 1.0 and norm * trust <= limit * (1.0 - trust):
@@ -127,6 +164,6 @@ def correct(functions, st, plan, factors):
             # would the iterations left suffice at this rate?
             rest = norm * trust / (1.0 - trust) if trust < 1.0 else norm
             if rest * trust ** (iterations - 1 - m) > limit:
-                return _verdict(st, trust)
+                return _verdict(functions, st, trust)
         previous = norm
-    return _verdict(st, st.rate) if iterations > 1 else SLOW
+    return _verdict(functions, st, st.rate) if iterations > 1 else SLOW

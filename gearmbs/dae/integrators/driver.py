@@ -42,6 +42,12 @@ FIRST_CHUNK = 16
 CHUNK_SECONDS = 0.05
 SINGULAR_RETRIES = 8
 DROP_ROUNDS_ALLOWED = 3
+EPS = 2.220446049250313e-16
+LEAST_DIGITS = 16.0
+"""Units of the last digit that a tolerance has to be: differences of order k + 1, by which errors are told, amplify
+rounding by 2^k. At 27 oscillators take ten times the steps of a hundredfold tolerance, at 9 some do not end."""
+HOPELESS_DIGITS = 4.0
+"""The same in the course of a run, where an unknown may have grown."""
 UNSATISFIED = 1e-3
 """Part of its terms by which an equation set aside may be off at the end of a run."""
 DROP_TOLERANCES = (0.0, 1e-9, 1e-7, 1e-5)
@@ -116,7 +122,14 @@ class Run:
                 with_tail=problem.small_entries,
             )  # fmt: skip
             st.gamma_planned = st.gamma
+            st.plan_sign = _parity(self.plan.row_from) * _parity(self.plan.col_to)
         except SingularMatrixError as error:
+            if st.drop_failed and st.singular_fails < SINGULAR_RETRIES:
+                self._retry_smaller()
+                st.matrix_wanted = True
+                # whatever pivots there are belong to another attempt
+                st.growth_limit = -1.0
+                return None
             if st.steps > 0 and st.drop_rounds < DROP_ROUNDS_ALLOWED:
                 st.drop_rounds += 1
                 st.drop_level = 1
@@ -207,30 +220,62 @@ class Run:
             failure = start.begin(self)
             if self.user_exception() is not None:
                 return self.user_failure()
+            failure = failure or self._below_rounding(LEAST_DIGITS)
             if failure is not None:
                 return failure
             self.started = True
         chunk = FIRST_CHUNK
         while True:
             tic = time.perf_counter()
-            code = direct(advance)(self.functions, self.state, self.algebraic.part, self.plan, self.factors, chunk)
+            few = 1 if self.stall.looking else chunk
+            code = direct(advance)(self.functions, self.state, self.algebraic.part, self.plan, self.factors, few)
             ending = self.user_failure() if self.user_exception() is not None else self._heed(code)
             if ending is not None:
                 return ending
             if interrupt.raised:
                 return Status.INTERRUPTED, self._interrupted_message()
-            needed = self.stall.steps_needed(self.state.steps, self.state.t, self.state.t_end)
-            if needed:
-                return Status.STALLED, messages.stalled(
-                    self.problem, self.state.t, self.stall.progress, needed, self.state.worst_error
-                )
+            ending = self._stalled()
+            if ending is not None:
+                return ending
             if code == s.RUNNING:
                 self._report()
+                if few < chunk:
+                    continue
                 elapsed = time.perf_counter() - tic
                 if elapsed < 0.5 * CHUNK_SECONDS:
                     chunk *= 8 if elapsed < CHUNK_SECONDS / 16 else 2
                 elif elapsed > 2.0 * CHUNK_SECONDS and chunk > 1:
                     chunk //= 2
+
+    def _stalled(self) -> tuple[Status, str] | None:
+        """Return how the run has ended if it gets nowhere."""
+        st, watch = self.state, self.stall
+        hopeless = self._below_rounding(HOPELESS_DIGITS)
+        if hopeless is not None:
+            return hopeless
+        needed = watch.steps_needed(st.steps, st.t, st.t_end)
+        if needed:
+            told = messages.stalled(self.problem, st.t, watch.progress, needed, st.worst_error)
+            return Status.STALLED, told
+        if watch.looking:
+            chatter = watch.look(st.t, st.y, st.yp, st.w_error)
+            if chatter is not None:
+                return Status.STALLED, messages.chatters(self.problem, st.t, chatter)
+        checked = st.error_rejections + st.newton_rejections + st.restarts
+        watch.watch_refused(st.steps, checked, st.t, st.t_end)
+        return None
+
+    def _below_rounding(self, digits: float) -> tuple[Status, str] | None:
+        """Return a failure if some tolerance is less than so many units of the last digit of its unknown."""
+        st = self.state
+        level = EPS * np.abs(st.y) * st.w_error
+        worst = int(np.argmax(level))
+        if not digits * level[worst] > 1.0:
+            return None
+        value, weight = float(st.y[worst]), float(st.w_error[worst])
+        least = LEAST_DIGITS * EPS * abs(value)
+        told = messages.below_rounding(self.problem, st.t, worst, value, 1.0 / weight, least)
+        return Status.BELOW_ROUNDING, told
 
     def _heed(self, code: int) -> tuple[Status, str] | None:
         """Do what the compiled loop has returned for; return how the run has ended, or None if it goes on."""
@@ -239,7 +284,7 @@ class Run:
             return self._failure(code)
         if code == s.DONE:
             self._report()
-            failure = self._unsatisfied() if st.drop_level else None
+            failure = self._unsatisfied() if st.drop_level else self._another_index()
             return failure or (Status.SUCCESS, f"{Status.SUCCESS.sentence}{self.start_note}")
         if code == s.TERMINAL:
             return Status.TERMINAL_EVENT, f"{Status.TERMINAL_EVENT.sentence} t = {st.t:.9g}.{self.start_note}"
@@ -272,11 +317,42 @@ class Run:
             worst = st.worst_error
             told = messages.step_too_small(problem, t, h, worst, st.error, self._noise())
             return status, told
+        if status in (Status.NEWTON_FAILURE, Status.TOO_MANY_REJECTIONS) and st.newton_fails > 0:
+            if st.index_changes:
+                return Status.SINGULAR_JACOBIAN, messages.index_changes(t, t)
+            undetermined = self._undetermined()
+            if undetermined is not None:
+                return undetermined
         if status is Status.NEWTON_FAILURE:
-            return status, messages.newton(problem, t, h, worst, self._noise())
+            return status, messages.newton(problem, t, h, worst, self._noise(), self._end())
         if status is Status.TOO_MANY_STEPS:
             return status, messages.too_many_steps(problem, t, st.steps)
-        return status, messages.too_many_rejections(problem, t, h, worst, self._noise())
+        return status, messages.too_many_rejections(problem, t, h, worst, self._noise(), self._end())
+
+    def _another_index(self) -> tuple[Status, str] | None:
+        """Return a failure if the run has passed a singular pencil that no step had to take notice of."""
+        st = self.state
+        if not st.index_changes:
+            return None
+        return Status.SINGULAR_JACOBIAN, messages.index_changes(st.t_pencil, st.t)
+
+    def _end(self) -> str:
+        """Say how the solution ends where the last attempts found none on its branch."""
+        st = self.state
+        if st.jumped >= 0:
+            return messages.branch_ends(self.problem, st.jumped, st.jump_from, st.jump_to)
+        return messages.solution_ends(self.problem, st.worst_row, st.violation)
+
+    def _undetermined(self) -> tuple[Status, str] | None:
+        """Return the failure if the matrix of the last attempt, beyond the time reached, is singular."""
+        st = self.state
+        if not np.isfinite(st.matrix).all():
+            return None
+        try:
+            analyse(self.indptr, self.indices, st.matrix, self.scale)
+        except SingularMatrixError as error:
+            return Status.SINGULAR_JACOBIAN, messages.singular(self.problem, st.t, error.rows, error.cols)
+        return None
 
     def _noise(self) -> float:
         """Return how far rounding alone moves the solution where the run stopped, in units of the tolerance."""
@@ -300,6 +376,19 @@ class Run:
             noise_limited=st.noise_limited,
             wall_time=self.wall_time,
         )
+
+
+def _parity(order: np.ndarray) -> float:
+    """Return 1 for an even permutation and -1 for an odd one."""
+    seen, sign = np.zeros(len(order), dtype=bool), 1.0
+    for first in range(len(order)):
+        at, length = first, 0
+        while not seen[at]:
+            seen[at] = True
+            at, length = int(order[at]), length + 1
+        if length and length % 2 == 0:
+            sign = -sign
+    return sign
 
 
 class InterruptFlag:

@@ -118,6 +118,8 @@ def forget(st):
     """Forget the history but its newest point and go on at order one."""
     st.n_past = 1
     st.order = 1
+    st.starting = True
+    st.start_tries = 0
     st.since_change = 0
     st.caution = 0
     st.matrix_wanted = True

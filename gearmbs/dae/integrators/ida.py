@@ -19,9 +19,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
+import scipy.sparse.linalg
 
 from gearmbs.dae.integrators.algebraic import AlgebraicOutputs
-from gearmbs.dae.integrators.messages import advice, unknown_name
+from gearmbs.dae.integrators.branches import SAME_EQUATION, UNFORESEEN
+from gearmbs.dae.integrators.corrector import EPS, ROUNDED_TERMS
+from gearmbs.dae.integrators.initial_state import LARGE_GAMMA, LARGEST_PENCIL
+from gearmbs.dae.integrators.messages import (
+    advice,
+    branch_ends,
+    index_changes,
+    no_solution,
+    solution_ends,
+    unknown_name,
+)
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
@@ -36,6 +47,18 @@ DENSE_LIMIT = 150
 MAX_ITERATIONS = 4
 MAX_STEPS = 100_000
 """Steps allowed between two outputs: 15 s of a vibration of 500 Hz at a dozen steps a period."""
+
+OF_JUMPS = ("error test failed", "convergence failed", "nonlinear solver failed", "linear solver")
+"""What SUNDIALS says where it stops at a jump of an algebraic unknown, or where a solution ends."""
+ROUNDED_STEP = 4.0 * EPS
+"""Least step in units of the time: below it IDA counts steps that do not move the time, up to their limit."""
+SHORTEST = 1e-12
+"""Part of the span that the step across such a place takes."""
+STANDSTILL = 1e-6
+"""Part of the span within which stops count as at one place."""
+TRIES_AT_A_JUMP = 3
+JUMP_ITERATIONS = 50
+"""From one solution of z^p = a to one a thousandfold larger, Newton's method takes p ln 1000 of them, and some."""
 
 NOT_FINITE_LIMIT = 100
 """Evaluations without a finite result, at times it never gets past, after which a run is given up."""
@@ -219,7 +242,9 @@ class _Run:
         self.options = options
         self.idata, self.rdata = problem.idata.copy(), problem.rdata.copy()
         self.calls = _Callbacks(problem, self.idata, self.rdata)
-        self.atol = np.where(problem.error_mask, options.tol * problem.atol_scale, UNCONTROLLED)
+        own = np.zeros(problem.n, dtype=bool) if problem.index_one is None else problem.index_one
+        self.atol = np.where(problem.error_mask | own, options.tol * problem.atol_scale, UNCONTROLLED)
+        self.branch = IdaBranch(problem, self.calls, self.idata, self.rdata, self.atol, options.rtol, float(times[0]))
         self.rows = _Rows(times, problem, every_step)
         self.algebraic = AlgebraicOutputs(problem, problem.atol_scale * options.tol, max(options.rtol, SMALLEST_RTOL))
         """What is solved for at outputs, which IDA interpolates."""
@@ -260,13 +285,24 @@ class _Run:
         problem, rows = self.problem, self.rows
         y, yp = problem.y0, problem.yp0
         solver = self._start(y, yp)
+        self.branch.know(self.t, y, yp, self.end)
         while self.t < self.end:
             target = rows.next_time
             if problem.hook_interval is not None and not self.every_step:
                 target = min(target, self.t + problem.hook_interval(self.t, y, yp))
             answer = solver.step(target, method="onestep" if self.every_step else "normal", tstop=self.end)
             if not answer.success:
-                return self._failure(float(answer.t), messages.text or answer.message)
+                beyond = self._beyond(answer, messages.text or answer.message)
+                if isinstance(beyond, str):
+                    self.t = max(self.t, float(answer.t))
+                    return self._failure(float(answer.t), messages.text or answer.message, beyond)
+                while rows.next_time <= beyond[0] < self.end and not self.every_step:
+                    # outputs within the shortest step belong to the near side of the jump
+                    rows.take(rows.next_time, np.array(answer.y), np.array(answer.yp))
+                self.t, y, yp = beyond
+                messages.text = ""
+                solver = self._start(y, yp)
+                continue
             self.t, y, yp = float(answer.t) if self.every_step else target, answer.y, answer.yp
             told = rows.take(self.t, y, yp)
             self._settle()
@@ -276,6 +312,9 @@ class _Run:
             if changed is not None:
                 y, yp = changed
                 solver = self._start(y, yp)
+        if self.branch.index_changed(self.t, y, yp):
+            told = index_changes(self.branch.t_known, self.t)
+            return Status.SINGULAR_JACOBIAN, told
         return Status.SUCCESS, Status.SUCCESS.sentence
 
     def _settle(self) -> None:
@@ -292,14 +331,27 @@ class _Run:
                 float(rows.t[k]), rows.y[k], rows.yp[k], step, float(rows.t[before]), rows.y[before].copy(), self.idata
             )
 
+    def _beyond(self, answer, why: str) -> tuple[float, np.ndarray, np.ndarray] | str:
+        """Return where to go on behind a jump of algebraic unknowns that stopped IDA, or why the solution ends there."""
+        if not any(text in why for text in OF_JUMPS) or self.branch.own is None:
+            return ""
+        t = float(answer.t)
+        if not (self.t <= t < self.end):
+            return ""
+        if self.rows.next_time < t:
+            # IDA is a step ahead of its outputs, which belong to this side
+            return ""
+        return self.branch.pass_jump(t, np.array(answer.y), np.array(answer.yp), self.end)
+
     def _start(self, y: np.ndarray, yp: np.ndarray) -> IDA:
         """Return IDA, set up at the time reached."""
         o = self.options
         settings = {
             "max_order": o.highest_order if o.max_order is None else o.max_order,
-            "max_step": 0.0 if o.max_step is None or np.isinf(o.max_step) else o.max_step,
+            # the binding refuses its own default, zero for none, beside a least step
+            "max_step": o.max_step if o.max_step and np.isfinite(o.max_step) else self.end - float(self.problem.t0),
             "first_step": o.first_step or 0.0,
-            "min_step": o.min_step or 0.0,
+            "min_step": ROUNDED_STEP * max(abs(self.t), abs(self.end)) if o.min_step is None else o.min_step,
             "max_nonlin_iters": MAX_ITERATIONS if o.max_iterations is None else o.max_iterations,
             "max_num_steps": MAX_STEPS if o.max_steps is None else o.max_steps,
         }
@@ -319,7 +371,7 @@ class _Run:
             yp = problem.restart_rates(self.t, y, yp, self.idata, self.rdata)
         return y, yp
 
-    def _failure(self, t: float, why: str) -> tuple[Status, str]:
+    def _failure(self, t: float, why: str, ends: str = "") -> tuple[Status, str]:
         """Say when the run failed, which unknown is the least satisfied, and what to try."""
         problem, calls = self.problem, self.calls
         if calls.bad_count:
@@ -331,8 +383,118 @@ class _Run:
         worst = int(np.argmax(moving))
         return Status.SOLVER_FAILURE, (
             f"IDA stopped at t = {t:.6g} s ({why.rstrip('.')}). The unknown that changes fastest for its tolerance is "
-            f"{unknown_name(problem, worst)}. {advice(problem, Status.SOLVER_FAILURE)}"
+            f"{unknown_name(problem, worst)}. {ends or advice(problem, Status.SOLVER_FAILURE)}"
         )
+
+
+class IdaBranch:
+    """Whether the equations have a solution beyond a time at which IDA stops, on the branch that it followed.
+
+    Parameters
+    ----------
+    problem : DAEProblem
+    calls : _Callbacks
+    idata, rdata : ndarray
+        Tables of the run.
+    atol, rtol : ndarray, float
+        Tolerances.
+    start : float
+        Start of the run.
+    """
+
+    def __init__(self, problem: DAEProblem, calls: _Callbacks, idata, rdata, atol, rtol: float, start: float) -> None:
+        self.problem, self.work = problem, calls.work
+        self.idata, self.rdata, self.atol, self.rtol = idata, rdata, atol, max(rtol, SMALLEST_RTOL)
+        self.columns = calls.columns
+        self.own = problem.index_one
+        self.start = self.t_known = self.passed = start
+        self.tries = 0
+        self.sign = 0.0
+
+    def _residual(self, t: float, y: np.ndarray, yp: np.ndarray) -> np.ndarray:
+        out = np.empty(self.problem.n)
+        self.problem.residual(t, y, yp, out, self.idata, self.rdata, self.work)
+        return out
+
+    def _matrix(self, t: float, y: np.ndarray, yp: np.ndarray, gamma: float) -> scipy.sparse.csc_array:
+        problem = self.problem
+        vals = np.empty(problem.indices.size)
+        problem.jacobian(t, y, yp, gamma, vals, self.idata, self.rdata, self.work)
+        return scipy.sparse.csc_array((vals, problem.indices, problem.indptr), shape=(problem.n,) * 2)
+
+    def _pencil(self, t: float, y: np.ndarray, yp: np.ndarray, gamma: float) -> float:
+        """Return the sign of det(dG/dy + gamma dG/dy'), 0 for large or singular matrices."""
+        if self.problem.n > LARGEST_PENCIL or self.own is None:
+            return 0.0
+        matrix = self._matrix(t, y, yp, gamma).toarray()
+        size = np.abs(matrix).max(axis=1)
+        if not (np.isfinite(size).all() and (size > 0.0).all()):
+            return 0.0
+        return float(np.linalg.slogdet(matrix / size[:, None])[0])
+
+    def know(self, t: float, y: np.ndarray, yp: np.ndarray, end: float) -> None:
+        """Note the sign of the pencil's determinant early in the run."""
+        self.gamma = LARGE_GAMMA / (end - self.start)
+        self.sign, self.t_known = self._pencil(t, np.array(y), np.array(yp), self.gamma), t
+
+    def index_changed(self, t: float, y: np.ndarray, yp: np.ndarray) -> bool:
+        """Return whether a singular pencil lies between the start of the run and ``t``, see `branches`."""
+        if self.sign == 0.0:
+            return False
+        sign = self._pencil(t, np.array(y), np.array(yp), self.gamma)
+        return sign not in (0.0, self.sign)
+
+    def pass_jump(
+        self, t: float, y: np.ndarray, yp: np.ndarray, end: float
+    ) -> tuple[float, np.ndarray, np.ndarray] | str:
+        """Take the shortest step of implicit Euler; return where it leads, or why it leads nowhere.
+
+        Newton's method with a matrix of its own for each iterate. Unknowns of index one may jump, if their equations
+        do: see `gearmbs.dae.integrators.branches.stays_on_branch`.
+        """
+        problem, own = self.problem, self.own
+        self.tries = self.tries + 1 if t - self.passed <= STANDSTILL * (end - self.start) else 0
+        self.passed = t
+        if self.tries >= TRIES_AT_A_JUMP:
+            return ""
+        h = max(SHORTEST * (end - self.start), 64.0 * EPS * abs(t))
+        gamma, after = 1.0 / h, t + h
+        moving = problem.differential
+        new = y + np.where(moving, h * yp, 0.0)
+        weight = 1.0 / (self.atol + self.rtol * np.abs(y))
+        rates = np.where(moving, gamma * (new - y), 0.0)
+        held, row, violation = False, -1, 0.0
+        with np.errstate(all="ignore"):
+            for _ in range(JUMP_ITERATIONS):
+                res = self._residual(after, new, rates)
+                matrix = self._matrix(after, new, rates, gamma)
+                allowed = abs(matrix) @ (1.0 / weight + ROUNDED_TERMS * EPS * np.abs(new))
+                ratio = np.where(res == 0.0, 0.0, np.abs(res) / allowed)
+                row = int(np.argmax(np.where(np.isnan(ratio), np.inf, ratio)))
+                violation = float(ratio[row])
+                if not (np.isfinite(res).all() and np.isfinite(matrix.data).all()):
+                    return ""
+                try:
+                    step = scipy.sparse.linalg.splu(matrix).solve(res)
+                except RuntimeError:
+                    break
+                held = violation <= 1.0 and float(np.max(np.abs(step) * weight)) <= 1.0
+                if held or not np.isfinite(step).all():
+                    break
+                new = new - step
+                rates = np.where(moving, gamma * (new - y), 0.0)
+        if not held:
+            return solution_ends(problem, row, violation) or no_solution(problem, row)
+        d = np.where(own, y - new, 0.0)
+        if float(np.max(np.abs(d) * weight)) > UNFORESEEN:
+            secant = scipy.sparse.linalg.splu(matrix).solve(self._residual(after, np.where(own, y, new), rates))
+            size = 1.0 / (np.abs(y) + np.abs(new) + 1.0 / weight)
+            if not (secant * size) @ (d * size) >= SAME_EQUATION * float((d * size) @ (d * size)):
+                worst = int(np.argmax(np.abs(d) * weight))
+                return branch_ends(problem, worst, float(y[worst]), float(new[worst]))
+        if self.index_changed(after, new, rates):
+            return index_changes(t, t)
+        return after, new, rates
 
 
 class _Rows:

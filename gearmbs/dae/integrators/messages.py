@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.dae.integrators.stall import WINDOW
+from gearmbs.dae.integrators.stall import WINDOW, Chatter
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import Status
 
 NAMES_SHOWN = 6
+EPS = 2.220446049250313e-16
 NOISE_WORTH_TELLING = 0.1
 """Movement by rounding, in units of the tolerance, from which on rounding is named as a cause."""
 
@@ -139,19 +140,65 @@ def step_too_small(problem: DAEProblem, t: float, h: float, worst: int, error: f
     )
 
 
-def newton(problem: DAEProblem, t: float, h: float, worst: int, noise: float = 0.0) -> str:
+def newton(problem: DAEProblem, t: float, h: float, worst: int, noise: float = 0.0, ends: str = "") -> str:
     """Explain a corrector that fails at the smallest step."""
     return (
         f"{Status.NEWTON_FAILURE.sentence} At t = {t:.9g} with h = {h:.3g}; the largest correction is in "
-        f"{unknown_name(problem, worst)}.{_rounding(noise)} {advice(problem, Status.NEWTON_FAILURE)}"
+        f"{unknown_name(problem, worst)}.{_rounding(noise)} {ends or advice(problem, Status.NEWTON_FAILURE)}"
     )
 
 
-def too_many_rejections(problem: DAEProblem, t: float, h: float, worst: int, noise: float = 0.0) -> str:
+def too_many_rejections(problem: DAEProblem, t: float, h: float, worst: int, noise: float = 0.0, ends: str = "") -> str:
     """Explain a step that was refused again and again."""
     return (
         f"{Status.TOO_MANY_REJECTIONS.sentence} At t = {t:.9g} with h = {h:.3g}, mostly because of "
-        f"{unknown_name(problem, worst)}.{_rounding(noise)} {advice(problem, Status.TOO_MANY_REJECTIONS)}"
+        f"{unknown_name(problem, worst)}.{_rounding(noise)} {ends or advice(problem, Status.TOO_MANY_REJECTIONS)}"
+    )
+
+
+def equation_name(problem: DAEProblem, row: int) -> str:
+    """Return what equation ``row`` goes by: its index, and the name of the unknown that stands for it."""
+    return f"equation {row}" + (f" ({problem.names[row]})" if 0 <= row < len(problem.names) else "")
+
+
+def solution_ends(problem: DAEProblem, row: int, violation: float) -> str:
+    """Explain an equation that cannot be satisfied any more, or nothing if all hold."""
+    if row < 0 or not violation > 1.0:
+        return ""
+    times = f"{violation:.2g} times what tolerances and rounding explain" if np.isfinite(violation) else "left as it is"
+    name = equation_name(problem, row)
+    return (
+        f"{name[0].upper()}{name[1:]} is not satisfied beyond that time, however short the step: its residual is "
+        f"{times}. The solution seems to end there, as at a fold, where two branches meet; end the run before, or see "
+        "whether the equation is the one that is meant."
+    )
+
+
+def no_solution(problem: DAEProblem, row: int) -> str:
+    """Explain Newton's method that finds nothing beyond a time, though what it leaves is small."""
+    return (
+        f"Beyond that time Newton's method finds no solution, however short the step, because of "
+        f"{equation_name(problem, row)}: the solution seems to end there, as at a fold, where two branches meet; end the "
+        "run before, or see whether the equation is the one that is meant."
+    )
+
+
+def branch_ends(problem: DAEProblem, unknown: int, before: float, after: float) -> str:
+    """Explain an unknown that would have to jump though its equation does not."""
+    return (
+        f"{unknown_name(problem, unknown)} would jump from {before:.6g} to {after:.6g}, another solution of an equation "
+        "that does not jump: the one it was on seems to end there, at a fold. End the run before, or see whether the "
+        "equations are those that are meant."
+    )
+
+
+def index_changes(after: float, before: float) -> str:
+    """Explain a matrix pencil that becomes singular just beyond ``after``, or until ``before``."""
+    where = f"just beyond t = {after:.9g}" if after == before else f"between t = {after:.9g} and {before:.9g}"
+    return (
+        f"{Status.SINGULAR_JACOBIAN.sentence} The determinant of dG/dy + gamma dG/dy' changes its sign {where}: the "
+        "factor of a derivative passes through zero, an algebraic unknown has a pole, or two branches meet. The "
+        "equations do not say how the solution goes on; end the run before, or start another one beyond."
     )
 
 
@@ -163,12 +210,33 @@ def too_many_steps(problem: DAEProblem, t: float, steps: int) -> str:
     )
 
 
+def below_rounding(problem: DAEProblem, t: float, unknown: int, value: float, tolerance: float, least: float) -> str:
+    """Explain a tolerance that no step can satisfy, and name the least that one could."""
+    return (
+        f"{Status.BELOW_ROUNDING.sentence} At t = {t:.9g} {unknown_name(problem, unknown)} is {value:.6g} and may be off "
+        f"by {tolerance:.2g} a step, {tolerance / abs(value) / EPS:.2g} units of its last digit; the least that can be "
+        f"asked for is {least:.2g}, or rtol = {least / abs(value):.1g}. Loosen the tolerance, or count the unknown from "
+        "another origin if it is large and changes little."
+    )
+
+
 def stalled(problem: DAEProblem, t: float, progress: float, needed: float, worst: int) -> str:
     """Explain a run that goes on without getting anywhere."""
     return (
         f"{Status.STALLED.sentence} Near t = {t:.9g} {WINDOW} steps went {progress:.3g}, mostly because of "
         f"{unknown_name(problem, worst)}; at that rate the end is {needed:.1g} steps away. "
         f"{advice(problem, Status.STALLED)}"
+    )
+
+
+def chatters(problem: DAEProblem, t: float, chatter: Chatter) -> str:
+    """Explain a solution that stays where a rate jumps, and how such equations are posed."""
+    name = unknown_name(problem, chatter.unknown)
+    return (
+        f"{Status.STALLED.sentence} Near t = {t:.9g} the equations jump at {name} = {chatter.place:.3g}: the rate of "
+        f"{name} changes between {chatter.low:.3g} and {chatter.high:.3g} from step to step, and the solution stays "
+        "there (it slides on the jump, or chatters). Let the jump take a width, say tanh(y/width) for sign(y) with a "
+        "width of a hundred tolerances or more, or pose the sliding as an equation of its own."
     )
 
 

@@ -61,7 +61,9 @@ class RunState(Struct):
         Absolute tolerances.
     controlled, tested, differential, coupled : ndarray, shape (n,)
         1 for unknowns under error control, for those the corrector test looks at, for those whose derivative appears,
-        and for those that are controlled or differential; else 0.
+        and for those that it judges by their tolerance whatever the step: controlled, differential, or of index one.
+    index_one : ndarray, shape (n,)
+        1 for algebraic unknowns that equations without derivatives determine, else 0.
     value, slope, nodes, respacing : ndarray, shape (MAX_NODES,), and (HISTORY, MAX_NODES) for the last
         Coefficients: of interpolation for values and slopes, times of points, weights of re-interpolation.
     jac, jac_slope, matrix : ndarray
@@ -69,6 +71,8 @@ class RunState(Struct):
         matrix carried over to the current leading coefficient, which is the one that is factored.
     carried : ndarray
         Entries with a derivative by the leading coefficient, of which ``n_carried`` are taken.
+    entry_row, entry_col : ndarray
+        Equation and unknown of each entry.
     idata, rdata, work : ndarray
         Tables and scratch of the problem.
     stops : ndarray
@@ -103,6 +107,8 @@ class RunState(Struct):
     fixed_leading: bool  # GSTIFF
     interpolate: bool  # outputs by interpolation, or by steps that land on them
     has_hook: bool
+    has_index_one: bool
+    watches_pencil: bool  # whether the sign of the determinant is watched, see `branches.keeps_its_index`
     keep_rows: bool  # whether y of every step is recorded
     step_in_weights: bool  # whether the size of the step enters the weights of the corrector test
     # where the run stands
@@ -113,6 +119,10 @@ class RunState(Struct):
     n_past: int  # points accepted and not forgotten, at most HISTORY
     since_change: int  # steps since order or size last changed
     caution: int  # steps without growth still to come after a failure
+    starting: bool  # whether order and size still grow after a start, see `controller.after_start`
+    passing: bool  # whether the open step is the first beyond a stop or an event
+    start_tries: int  # attempts of a first step that the error test has refused
+    h_tried: float  # size of the last of them
     since_refused: int  # steps since the error test refused one
     # the open step
     open: bool  # its row is taken
@@ -131,6 +141,12 @@ class RunState(Struct):
     singular_fails: int
     worst: int  # unknown, or equation, behind the last failure; -1 - e for event e
     worst_error: int  # unknown behind the last failure of the error test
+    worst_row: int  # equation furthest from holding where the corrector got no further, -1 for none
+    index_changes: bool  # the last attempt met a singular pencil
+    jumped: int  # unknown of index one that left its branch, -1 for none
+    jump_from: float
+    jump_to: float
+    violation: float  # its residual, in units of what tolerances and rounding explain
     # the Newton matrix
     matrix_wanted: bool  # to be evaluated at the next prediction
     matrix_fresh: bool  # evaluated in this step
@@ -142,10 +158,16 @@ class RunState(Struct):
     gamma_factored: float
     growth_limit: float  # growth of its factors beyond which pivots are chosen anew
     gamma_planned: float  # leading coefficient at which pivots, and entries to leave out, were chosen
+    plan_sign: float  # sign of the permutations of its pivots
+    sign_last: float  # of the determinant of the factored matrix at the last accepted step, 0 if it is not known
+    sign_pencil: float  # of the determinant of dG/dy + gamma dG/dy' for large gamma, 0 likewise
+    t_pencil: float  # where that was seen
+    gamma_large: float  # the least of these gamma
     rate: float  # of convergence of the corrector, as last seen
     rate_allowed: float  # beyond which the matrix is evaluated anew for the next step
     drop_level: int  # how large pivots may be to be left out near a singular position
     drop_age: int
+    drop_failed: bool  # whether setting pivots aside has not helped in this step
     drop_rounds: int
     left_out: bool  # whether entries larger than rounding may be left out of the matrix
     doubts: int  # failures of the corrector for which the entries left out of the matrix were suspected
@@ -165,6 +187,7 @@ class RunState(Struct):
     steps: int
     error_rejections: int
     newton_rejections: int
+    restarts: int
     residuals: int
     jacobians: int
     factorizations: int
@@ -190,6 +213,7 @@ class RunState(Struct):
     tested: Vector
     differential: Vector
     coupled: Vector
+    index_one: Vector
     value: Vector
     slope: Vector
     nodes: Vector
@@ -198,6 +222,8 @@ class RunState(Struct):
     jac_slope: Vector
     matrix: Vector
     carried: IndexVector
+    entry_row: IndexVector
+    entry_col: IndexVector
     idata: IntVector
     rdata: Vector
     work: Vector
@@ -225,9 +251,9 @@ STATE_TYPE = RunState.numba_type
 
 PER_UNKNOWN = (
     "y", "yp", "y_pred", "yp_pred", "res", "delta", "y_between", "yp_between", "yp_start", "w_error", "w_newton",
-    "weight", "atol", "controlled", "tested", "differential", "coupled",
+    "weight", "atol", "controlled", "tested", "differential", "coupled", "index_one",
 )  # fmt: skip
-PER_ENTRY = ("jac", "jac_slope", "matrix", "carried")
+PER_ENTRY = ("jac", "jac_slope", "matrix", "carried", "entry_row", "entry_col")
 COEFFICIENTS = ("value", "slope", "nodes")
 PER_EVENT = ("g_old", "g_new", "event_direction", "event_action", "event_left")
 

@@ -17,8 +17,9 @@ from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
 from gearmbs.dae.integrators import bdf
 from gearmbs.dae.integrators import run_state as s
 from gearmbs.dae.integrators.algebraic import PART_TYPE
-from gearmbs.dae.integrators.controller import after_error_failure, after_success
-from gearmbs.dae.integrators.corrector import CONVERGED, NOT_FINITE, SLOW, correct, first_not_finite
+from gearmbs.dae.integrators.branches import keeps_its_index, kept_its_index, stays_on_branch
+from gearmbs.dae.integrators.controller import after_error_failure, after_start, after_success
+from gearmbs.dae.integrators.corrector import CONVERGED, NOT_FINITE, SLOW, correct, equations_hold, first_not_finite
 from gearmbs.dae.integrators.events import RECORD, STOP, cut_step, end_of_step, locate_events, write_outputs
 from gearmbs.dae.integrators.history import copy, forget, open_row, record_history, respace, rows_from, times_from
 from gearmbs.dae.integrators.newton_matrix import SLOPE_MAX_AGE, form_matrix, renew_matrix
@@ -41,9 +42,15 @@ DROP_LEVELS = 3
 DOUBTS = 3
 """Failures of the corrector after which entries left out are looked at; if harmless so often, they are."""
 RENEWALS = 3
+RENEWALS_AT_JUMPS = 20
+"""The same where shorter steps have not helped: an algebraic unknown may jump, and Newton's method has a long way."""
 SAME_ERROR = 0.1
 JUMP_LIMIT = 50.0
 """Error, in tolerances, up to which a run passes a jump that does not shrink with the step."""
+FIRST_TARGET = 0.1
+"""Error of the first step after refused attempts, in tolerances: half of what later ones are meant to have."""
+FIRST_SHRINK = (1e-3, 0.5)
+"""Between which the size of a first step changes after a refusal: its error is known to fall with the square, or less."""
 LANDED = 0.999
 """Fraction of the size wanted below which a step counts as shortened to land on a stop."""
 
@@ -70,6 +77,12 @@ def open_step(st):
     st.newton_fails = 0
     st.nan_fails = 0
     st.singular_fails = 0
+    st.drop_failed = False
+    st.start_tries = 0
+    st.worst_row = -1
+    st.jumped = -1
+    st.index_changes = False
+    st.violation = 0.0
     st.h = max(st.h, st.h_min, ROUNDED_STEP * abs(st.t))
     st.h_first = st.h
     st.h_refused = np.inf
@@ -166,15 +179,24 @@ def solve_step(functions, st, plan, factors):
     code = correct(functions, st, plan, factors)
     renewals = 0
     sound = True
-    while code == SLOW and st.matrix_fresh and sound and renewals < RENEWALS:
+    most = RENEWALS if st.newton_fails <= DROP_AFTER else RENEWALS_AT_JUMPS
+    while code == SLOW and st.matrix_fresh and sound and renewals < most:
         # contacts or multipliers are not as predicted: the matrix at the iterate knows them
         renewals += 1
         sound = renew_matrix(functions, st, plan, factors)
         if sound:
             code = correct(functions, st, plan, factors)
+    if code == CONVERGED and st.has_index_one and not stays_on_branch(functions, st, plan, factors):
+        code = SLOW
+    if code == CONVERGED and st.watches_pencil and not keeps_its_index(functions, st, plan, factors):
+        code = SLOW
+    if code == CONVERGED and st.drop_level > 0 and not equations_hold(functions, st):
+        # the corrections say nothing of the equations that were set aside
+        code = SLOW
     remember_noise(st)
     if code == SLOW and sound and accept_noise(st, plan, factors, False):
-        code = CONVERGED
+        # multipliers may be off by what rounding makes of them, unknowns that equations of their own determine not
+        code = SLOW if st.has_index_one and not equations_hold(functions, st) else CONVERGED
     return code
 
 
@@ -192,6 +214,8 @@ def refuse_by_newton(st, code):
         st.h = st.h_wanted
         return s.RUNNING
     st.newton_rejections += 1
+    if start_afresh(st):
+        return s.RUNNING
     st.h = NEWTON_SHRINK * st.step
     if code == NOT_FINITE:
         bad = first_not_finite(st.res)
@@ -204,11 +228,17 @@ def refuse_by_newton(st, code):
     st.caution = 2
     if st.newton_fails > DROP_AFTER:
         st.order = 1
-        if st.drop_level < DROP_LEVELS:
+        if st.drop_level < DROP_LEVELS and not st.drop_failed:
             # perhaps a singular position: go through it with the step it began with, some pivots dropped
             st.drop_level += 1
             st.drop_age = 0
             st.h = st.h_first
+            return s.REPIVOT
+        if not st.drop_failed:
+            # it is none, or not to be passed: smaller steps come nearer to where the equations end
+            st.drop_failed = True
+            st.drop_level = 0
+            st.h = NEWTON_SHRINK ** (DROP_AFTER + 1) * st.h_first
             return s.REPIVOT
     if st.left_out and st.doubts < DOUBTS:
         st.doubts += 1
@@ -257,6 +287,55 @@ def passes_error_test(st, plan, factors):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def start_afresh(st):
+    """Forget the past after all, where a step beyond a possible discontinuity was refused; return whether it was that.
+
+    A stop or an event may be no discontinuity, or one of a derivative that the tolerance does not see: the past then
+    foretells the step beyond it as any other, and the run goes on as if nothing had been.
+    """
+    if not st.passing or st.n_past == 1:
+        return False
+    st.passing = False
+    forget(st)
+    st.h = RESTART_SHRINK * st.step
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def shorten_first_step(st):
+    """Choose the size of the next attempt of a first step, and from two attempts the rates it starts with.
+
+    Where the equations jump, as at a restart, the rates before the jump are not those after it, and leave an error that
+    falls with h and not with h^2. Implicit Euler gives r(h) = (y - y_0)/h = y'_0 + h y''/2 + ..., of whatever y'_0 it is
+    predicted with: two attempts give both,
+
+        y'' = 2 (r_1 - r_2)/(h_1 - h_2),   y'_0 = r_2 - h_2 (r_1 - r_2)/(h_1 - h_2),
+
+    and the first step with an error h^2 y''/2 of `FIRST_TARGET` tolerances.
+    """
+    h, rate, start = st.step, st.yp_between, rows_from(st, 1)[0]
+    st.start_tries += 1
+    ratio = np.sqrt(FIRST_TARGET / st.error)
+    if st.start_tries > 1:
+        apart = st.h_tried - h
+        bend = 0.0
+        for i in range(st.y.shape[0]):
+            if st.differential[i] != 0.0:
+                new = (st.y[i] - start[i]) / h
+                slope = (rate[i] - new) / apart
+                rate[i] = new
+                st.yp_start[i] = new - h * slope
+                bend = max(bend, abs(slope) * st.w_error[i])
+        if bend > 0.0:
+            ratio = min(FIRST_SHRINK[1], np.sqrt(FIRST_TARGET / bend) / h)
+    else:
+        for i in range(st.y.shape[0]):
+            rate[i] = (st.y[i] - start[i]) / h
+    st.h_tried = h
+    st.h = h * min(max(ratio, FIRST_SHRINK[0]), FIRST_SHRINK[1])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def refuse_by_error(st):
     """Choose order and size of the next attempt after the error test failed."""
     forget_noise(st)
@@ -265,6 +344,12 @@ def refuse_by_error(st):
     st.error_fails += 1
     st.worst = weighted_argmax(st.delta, st.w_error)
     st.worst_error = st.worst
+    if start_afresh(st):
+        return
+    if st.n_past == 1:
+        shorten_first_step(st)
+        return
+    st.starting = False
     after_error_failure(st, st.error, st.error_fails)
     if st.error_fails == RESTART_AFTER and st.n_past > 1:
         # a jump, most likely: the past says nothing about what comes
@@ -284,6 +369,7 @@ def accept(st):
                 start[i] = st.y[i]
     st.steps += 1
     st.since_refused += 1
+    st.passing = False
     st.open = False
     st.matrix_fresh = False
     st.matrix_age += 1
@@ -321,12 +407,14 @@ def deliver(functions, st, part):
         st.next_stop += 1
     afresh = at_stop or action != RECORD
     if afresh:
+        st.restarts += 1
+        st.sign_last = 0.0
+        st.sign_pencil = 0.0
         copy(st.yp, st.yp_start)
-        st.h = RESTART_SHRINK * st.step
-        forget(st)
-    else:
-        choose_next(st)
-    return close_step(functions, st, afresh)
+        st.matrix_wanted = True
+        st.passing = True
+    choose_next(st)
+    return close_step(functions, st)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -350,22 +438,18 @@ def choose_next(st):
         if landed:
             st.h = h_wanted
         return
-    after_success(st)
+    if st.starting:
+        after_start(st)
+    else:
+        after_success(st)
     if landed and st.h >= h:
         # shortened only to land: go on with the size the error test had asked for
         st.h = min(h_wanted, 2.0 * st.h) if st.interpolate else h_wanted
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def close_step(functions, st, afresh):
+def close_step(functions, st):
     """End the run at its end time; let the hook look at the new point, and heed what it says.
-
-    Parameters
-    ----------
-    functions : Functions
-    st : RunState
-    afresh : bool
-        Whether the history has been forgotten.
 
     Returns
     -------
@@ -373,6 +457,7 @@ def close_step(functions, st, afresh):
         RUNNING, DONE, or PAUSED after a change of coordinates.
     """
     if st.t >= st.t_end:
+        st.index_changes = st.watches_pencil and not kept_its_index(functions, st)
         return s.DONE
     if st.has_hook:
         rows = rows_from(st, 0)
@@ -381,11 +466,11 @@ def close_step(functions, st, afresh):
             st.matrix_wanted = True
         if answer == HISTORY_CHANGED:
             st.slope_age = SLOPE_MAX_AGE
+            st.sign_last = 0.0
+            st.sign_pencil = 0.0
             copy(rows[0], st.y)
             record_history(st, 0)
             return s.PAUSED
-    if afresh:
-        record_history(st, 0)
     return s.RUNNING
 
 

@@ -178,6 +178,8 @@ def make_problem(system: PosedModel, formulation: str, rate_scale: float) -> DAE
     allowed = scale.copy()
     allowed[unknowns.velocities(at)] *= rate_scale
     flexible = sum(model.modes) > 0
+    index_one = np.zeros(at["n"], dtype=bool)
+    index_one[at["z"] : at["mu"]] = ~differential
     return DAEProblem(
         n=at["n"],
         residual=residual.residual,
@@ -194,6 +196,7 @@ def make_problem(system: PosedModel, formulation: str, rate_scale: float) -> DAE
         scale=scale,
         differential=unknowns.differential_mask(at, form, differential),
         t0=system.t0,
+        index_one=index_one if index_one.any() else None,
         names=[unknown.name for unknown in model.unknowns(formulation)],
         hook=hook,
         hook_interval=_hook_interval(model, at),

@@ -1,0 +1,142 @@
+"""Solutions that end: no run comes to an end beyond, and one that ends just before succeeds to its tolerance.
+
+Folds of algebraic equations, blow-ups, and changes of the index, with random parameters and solutions in closed form.
+Units of unknowns, of equations and of time are random too: what holds must not depend on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from gearmbs.dae.result import Status
+from gearmbs.dae.solve import solve_dae
+from tests.generators import cases, seed
+
+METHODS = ("WSTIFF", "GSTIFF", "IDA")
+
+
+@dataclass(frozen=True)
+class Ending:
+    """A problem whose solution ends.
+
+    Attributes
+    ----------
+    name : str
+    residual : callable
+        As `solve_dae` takes it.
+    end : float
+        Where the solution ends.
+    exact : callable
+        Solution at a time, all unknowns.
+    """
+
+    name: str
+    residual: Callable
+    end: float
+    exact: Callable[[float], np.ndarray]
+
+
+def _clock(name: str, end: float, equation: Callable, solution: Callable, unit: float, row: float) -> Ending:
+    """Return x' = 1 beside 0 = equation(x/end, z/unit), of which z = unit solution(t/end) is the solution."""
+
+    def residual(t, y, yp, out):
+        out[0] = (yp[0] - 1.0) / row
+        out[1] = row * equation(y[0] / end, y[1] / unit)
+
+    return Ending(name, residual, end, lambda t: np.array([t, unit * solution(t / end)]))
+
+
+def _rate(name: str, end: float, rate: Callable, solution: Callable, unit: float) -> Ending:
+    """Return y' = unit/end rate(y/unit), of which y = unit solution(t/end) is the solution."""
+
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - unit / end * rate(y[0] / unit)
+
+    return Ending(name, residual, end, lambda t: np.array([unit * solution(t / end)]))
+
+
+def endings(rng: np.random.Generator) -> list[Ending]:
+    """Return one problem of each family."""
+    end, unit, row = 10.0 ** rng.uniform(-1.0, 1.0), 10.0 ** rng.uniform(-3.0, 3.0), 10.0 ** rng.uniform(-4.0, 4.0)
+    p, q, m = int(rng.integers(1, 4)), rng.uniform(0.5, 2.0), rng.uniform(0.3, 0.8)
+    top, turn = rng.uniform(0.9, 1.6), 2.0 / 27.0**0.5
+
+    def upper(x: float) -> float:
+        """Return the largest root of z^3 - z = -turn + (1 - x)(top^3 - top + turn)."""
+        roots = np.roots([1.0, 0.0, -1.0, turn - (1.0 - x) * (top**3 - top + turn)])
+        return float(roots.real[np.abs(roots.imag) < 1e-6].max())
+
+    def singular(t, y, yp, out):
+        out[0] = (1.0 - t / end) * yp[0] * row + row * m * y[0] / end
+
+    def hidden(t, y, yp, out):
+        out[0] = yp[0] - y[1]
+        out[1] = row * ((t / end - 1.0) * y[1] - m * y[0] / end)
+
+    def faded(t: float) -> np.ndarray:
+        return np.array([unit * (1.0 - t / end) ** m])
+
+    def faded_rate(t: float) -> np.ndarray:
+        return np.array([unit * (1.0 - t / end) ** m, -unit * m / end * (1.0 - t / end) ** (m - 1.0)])
+
+    return [
+        _clock("fold", end, lambda x, z: z ** (2 * p) + x - 1.0, lambda x: (1.0 - x) ** (0.5 / p), unit, row),
+        _clock("fold of a sine", end, lambda x, z: np.sin(z) - x, np.arcsin, unit, row),
+        _clock("fold beside another branch", end,
+               lambda x, z: z**3 - z + turn - (1.0 - x) * (top**3 - top + turn), upper, unit, row),
+        _clock("logarithm", end, lambda x, z: np.exp(z) + x - 1.0, lambda x: np.log(1.0 - x), unit, row),
+        _clock("pole of an algebraic unknown", end, lambda x, z: (1.0 - x) * z - 1.0, lambda x: 1.0 / (1.0 - x),
+               unit, row),
+        _rate("blow-up by a power", end, lambda z: abs(z) ** (1.0 + q) / q, lambda x: (1.0 - x) ** (-1.0 / q), unit),
+        _rate("blow-up of a tangent", end, lambda z: 0.5 * np.pi * (1.0 + z * z), lambda x: np.tan(0.5 * np.pi * x),
+              unit),
+        _rate("quenching", end, lambda z: -0.5 / z if z != 0.0 else np.nan, lambda x: (1.0 - x) ** 0.5, unit),
+        Ending("factor of a derivative", singular, end, faded),
+        Ending("change of the index", hidden, end, faded_rate),
+    ]  # fmt: skip
+
+
+def problems(count: int) -> list[tuple[Ending, float]]:
+    """Return so many problems, and a tolerance for each."""
+    rng = np.random.default_rng(seed())
+    found: list[tuple[Ending, float]] = []
+    while len(found) < count:
+        found += [(ending, 10.0 ** rng.uniform(-9.0, -4.0)) for ending in endings(rng)]
+    return found[:count]
+
+
+def solve(ending: Ending, tol: float, until: float, method: str):
+    start = ending.exact(0.0)
+    # of an algebraic unknown that starts at zero the solution over the first half tells the size
+    size = np.maximum(np.abs(start), np.abs(ending.exact(0.5 * ending.end)))
+    with np.errstate(all="ignore"):
+        return solve_dae(
+            ending.residual,
+            (0.0, until),
+            start,
+            rtol=tol,
+            atol=tol * size,
+            method=method,
+            scale=size,
+            max_steps=100_000,
+        )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_run_succeeds_beyond_the_end_and_its_twin_does(method):
+    for ending, tol in problems(cases(20)):
+        beyond = solve(ending, tol, 1.7 * ending.end, method)
+        told = f"{ending.name}, {method}, tol = {tol:.2g}, end = {ending.end:.6g}: {beyond.message}"
+        assert not beyond.success, told
+        assert beyond.status is not Status.TOO_MANY_STEPS, told
+        before = 0.98 * ending.end
+        twin = solve(ending, tol, before, method)
+        assert twin.success, f"{ending.name}, {method}, tol = {tol:.2g}: {twin.message}"
+        exact = ending.exact(before)
+        moved = np.abs(ending.exact(before * (1.0 + 1e-6)) - exact) / 1e-6
+        off = np.abs(twin.y[-1] - exact) / (np.abs(exact) + moved)
+        assert off.max() < 100.0 * tol, f"{ending.name}, {method}, tol = {tol:.2g}: off by {off / tol} tolerances"
