@@ -304,9 +304,9 @@ class _Run:
                 solver = self._start(y, yp)
                 continue
             self.t, y, yp = float(answer.t) if self.every_step else target, answer.y, answer.yp
-            told = rows.take(self.t, y, yp)
+            taken = rows.take(self.t, y, yp)
             self._settle()
-            if told and self.options.progress is not None:
+            if taken and self.options.progress is not None:
                 self.options.progress(self.t)
             changed = self._call_hook(y, yp)
             if changed is not None:
