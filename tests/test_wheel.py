@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import shutil
@@ -13,6 +14,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
+
+from gearmbs._kernel_cache import folders
 
 ROOT = Path(__file__).parent.parent
 
@@ -61,6 +64,17 @@ def sdist(source):
     return next((source.parent / "dist").glob("gearmbs-*.tar.gz"))
 
 
+def put_kernels(folder: Path) -> None:
+    """Copy the compiled kernels that are at hand: found by what they are made of, they serve there as well."""
+    place = folder / "gearmbs" / "__pycache__" / "kernels"
+    place.mkdir(parents=True)
+    for kept in folders("gearmbs"):
+        # another process may be at work there: files with these endings are whole, or removed
+        for file in [*kept.glob("*.entry"), *kept.glob("*.part")]:
+            with contextlib.suppress(FileNotFoundError):
+                shutil.copy(file, place)
+
+
 @pytest.fixture(scope="module")
 def environment(wheel, tmp_path_factory):
     """Install the wheel alone; what it depends on is taken from the environment of the tests."""
@@ -70,12 +84,7 @@ def environment(wheel, tmp_path_factory):
     run(sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", wheel, folder=folder)
     site = Path(run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", folder=folder).strip())
     (site / "dependencies.pth").write_text("".join(f"{p}\n" for p in sys.path if p.endswith("site-packages")))
-    # kernels are found by what they are made of, so that those of the checkout serve as well
-    compiled = Path(os.environ.get("NUMBA_CACHE_DIR", ROOT / "gearmbs" / "__pycache__" / "kernels"))
-    (folder / "kernels").mkdir()
-    if compiled.is_dir():
-        shutil.copytree(compiled, folder / "kernels", dirs_exist_ok=True)
-        shutil.copytree(compiled, site / "gearmbs" / "__pycache__" / "kernels")
+    put_kernels(site)
     assert run(python, "-c", "import gearmbs; print(gearmbs.__file__)", folder=folder).startswith(str(site))
     return folder
 
@@ -106,7 +115,7 @@ def test_the_sdist_passes_from_itself(sdist, environment, tmp_path):
         opened.extractall(tmp_path, filter="data")
     place = tmp_path / sdist.name.removesuffix(".tar.gz")
     python = environment / "venv" / "bin" / "python"
-    shutil.copytree(environment / "kernels", place / "gearmbs" / "__pycache__" / "kernels", dirs_exist_ok=True)
+    put_kernels(place)
     told = run(python, "-c", "import gearmbs; print(gearmbs.__file__)", folder=place)
     assert told.startswith(str(place))
     tests = [
