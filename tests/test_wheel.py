@@ -110,18 +110,15 @@ def test_the_sdist_holds_what_is_checked_in(source, sdist):
 
 
 def test_the_sdist_passes_from_itself(sdist, environment, tmp_path):
-    """Unpacked, with nothing of the checkout on the way: tests of the package, of its pages and of stored results."""
+    """Unpacked, with nothing of the checkout on the way: tests of imports, of pages and of stored results."""
     with tarfile.open(sdist) as opened:
         opened.extractall(tmp_path, filter="data")
     place = tmp_path / sdist.name.removesuffix(".tar.gz")
     python = environment / "venv" / "bin" / "python"
-    put_kernels(place)
     told = run(python, "-c", "import gearmbs; print(gearmbs.__file__)", folder=place)
     assert told.startswith(str(place))
-    tests = [
-        "tests/test_architecture.py", "tests/docs/test_pages.py", "tests/benchmarks/test_stored.py",
-        "tests/gears/test_units.py", "tests/signals/test_spectral.py", "tests/dae/compiled",
-    ]  # fmt: skip
+    # none that compiles kernels; .ci/matrix runs the quick subset so
+    tests = ("tests/test_architecture.py", "tests/docs/test_pages.py", "tests/benchmarks/test_stored.py")
     quick = ("-m", "not slow", "-k", "not examples", "-p", "no:cacheprovider")
     told = run(python, "-m", "pytest", *quick, *tests, folder=place)
     assert re.search(r"\d{3} passed", told)
