@@ -1,17 +1,21 @@
-"""The wheel that users install holds all it needs: built, installed into an empty environment, tried away from here."""
+"""What users install, and what is published beside it, holds all it needs: built and tried away from the checkout."""
 
 from __future__ import annotations
 
+import contextlib
 import os
+import re
 import shutil
 import subprocess
 import sys
-import sysconfig
+import tarfile
 import textwrap
 import zipfile
 from pathlib import Path
 
 import pytest
+
+from gearmbs._kernel_cache import folders
 
 ROOT = Path(__file__).parent.parent
 
@@ -29,25 +33,46 @@ def run(*command: str | Path, folder: Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
+def source(tmp_path_factory):
+    """Return a copy of what is checked in: of all that is here what .gitignore does not name."""
+    folder = tmp_path_factory.mktemp("source") / "checkout"
+    made = shutil.ignore_patterns(".*_cache", ".hypothesis", ".venv*", ".git", "__pycache__", "*.py[co]", "*.egg-info")
+    places = {Path(*name.split("/")) for name in ("build", "dist", "out", "docs/_build", "docs/_generated")}
+    places.add(Path("benchmarks", "results"))
+
+    def ignored(place: str, names: list[str]) -> set[str]:
+        inside = Path(place).relative_to(ROOT)
+        return {*made(place, names), *(name for name in names if inside / name in places)}
+
+    shutil.copytree(ROOT, folder, ignore=ignored)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def wheel(source):
     """Build the wheel from a copy of the sources."""
-    folder = tmp_path_factory.mktemp("source")
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, folder)
-    shutil.copytree(ROOT / "gearmbs", folder / "gearmbs", ignore=shutil.ignore_patterns("__pycache__"))
-    command = (
-        "-m",
-        "pip",
-        "wheel",
-        "--quiet",
-        "--no-deps",
-        "--no-build-isolation",
-        "--wheel-dir",
-        folder / "dist",
-        folder,
-    )
-    run(sys.executable, *command, folder=folder)
-    return next((folder / "dist").glob("gearmbs-*.whl"))
+    command = ("-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir")
+    run(sys.executable, *command, source.parent / "dist", source, folder=source)
+    return next((source.parent / "dist").glob("gearmbs-*.whl"))
+
+
+@pytest.fixture(scope="module")
+def sdist(source):
+    """Build the sdist from a copy of the sources."""
+    build = "from setuptools import build_meta; build_meta.build_sdist('../dist')"
+    run(sys.executable, "-c", build, folder=source)
+    return next((source.parent / "dist").glob("gearmbs-*.tar.gz"))
+
+
+def put_kernels(folder: Path) -> None:
+    """Copy the compiled kernels that are at hand: found by what they are made of, they serve there as well."""
+    place = folder / "gearmbs" / "__pycache__" / "kernels"
+    place.mkdir(parents=True)
+    for kept in folders("gearmbs"):
+        # another process may be at work there: files with these endings are whole, or removed
+        for file in [*kept.glob("*.entry"), *kept.glob("*.part")]:
+            with contextlib.suppress(FileNotFoundError):
+                shutil.copy(file, place)
 
 
 @pytest.fixture(scope="module")
@@ -58,11 +83,8 @@ def environment(wheel, tmp_path_factory):
     python = folder / "venv" / "bin" / "python"
     run(sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", wheel, folder=folder)
     site = Path(run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", folder=folder).strip())
-    (site / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
-    # kernels are found by what they are made of, so that those of the checkout serve as well
-    compiled = ROOT / "gearmbs" / "__pycache__" / "kernels"
-    if compiled.is_dir():
-        shutil.copytree(compiled, site / "gearmbs" / "__pycache__" / "kernels")
+    (site / "dependencies.pth").write_text("".join(f"{p}\n" for p in sys.path if p.endswith("site-packages")))
+    put_kernels(site)
     assert run(python, "-c", "import gearmbs; print(gearmbs.__file__)", folder=folder).startswith(str(site))
     return folder
 
@@ -74,6 +96,32 @@ def test_holds_every_file(wheel):
     assert wanted <= set(zipfile.ZipFile(wheel).namelist())
     assert any(f.endswith("viewer3d.js") for f in wanted)
     assert "gearmbs/py.typed" in wanted
+
+
+def test_the_sdist_holds_what_is_checked_in(source, sdist):
+    """Tests, documentation, benchmarks, changelog and Makefile beside the package; nothing that is made of them."""
+    held = {name.partition("/")[2] for name in tarfile.open(sdist).getnames()}
+    made = {"PKG-INFO", "setup.cfg"}
+    files = {p.relative_to(source).as_posix() for p in source.rglob("*") if p.is_file()}
+    checked_in = {f for f in files if ".egg-info" not in f and not f.startswith((".git", "build/"))}
+    assert {"CHANGELOG.md", "Makefile", "docs/conf.py", "tests/conftest.py", "benchmarks/__main__.py"} <= checked_in
+    assert checked_in <= held
+    assert {f for f in held - checked_in - made if "." in Path(f).name and ".egg-info" not in f} <= {".ci"}
+
+
+def test_the_sdist_passes_from_itself(sdist, environment, tmp_path):
+    """Unpacked, with nothing of the checkout on the way: tests of imports, of pages and of stored results."""
+    with tarfile.open(sdist) as opened:
+        opened.extractall(tmp_path, filter="data")
+    place = tmp_path / sdist.name.removesuffix(".tar.gz")
+    python = environment / "venv" / "bin" / "python"
+    told = run(python, "-c", "import gearmbs; print(gearmbs.__file__)", folder=place)
+    assert told.startswith(str(place))
+    # none that compiles kernels; .ci/matrix runs the quick subset so
+    tests = ("tests/test_architecture.py", "tests/docs/test_pages.py", "tests/benchmarks/test_stored.py")
+    quick = ("-m", "not slow", "-k", "not examples", "-p", "no:cacheprovider")
+    told = run(python, "-m", "pytest", *quick, *tests, folder=place)
+    assert re.search(r"\d{3} passed", told)
 
 
 def test_every_command(environment):

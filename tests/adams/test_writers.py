@@ -10,6 +10,8 @@ import xarray as xr
 
 from gearmbs.adams import parse_deck, run_deck
 from gearmbs.adams.builders.element_pairs import KINDS
+from gearmbs.adams.parse import statements as st
+from gearmbs.adams.parse.grammar import specs_of
 from gearmbs.adams.results.req import read_requests
 from gearmbs.adams.results.res import ENTITY_TYPES, NAMESPACE
 
@@ -72,3 +74,16 @@ def test_files_hold_every_kind_of_element(kind, tmp_path):
         assert np.all(np.isfinite(found))
     assert read_requests((tmp_path / "run.req").read_text())[1][1].shape == (3, 6)
     assert "End Simulation" in (tmp_path / "run.msg").read_text()
+
+
+@pytest.mark.parametrize("kind", [*specs_of(st.Request)["type"].choices, "F2 = TIME"])
+def test_every_type_of_request_is_evaluated_and_written(kind, tmp_path):
+    """What the grammar takes, the run evaluates and every file holds, with its units."""
+    text = model(PARTS.replace("REQUEST/1,FORCE", f"REQUEST/1,{kind}"))
+    result = run_deck(parse_deck(text), end=0.02, steps=2, out=tmp_path / "run")
+    assert result.success, result.messages
+    assert np.all(np.isfinite(result.request(1)))
+    assert len(result.request_units(1)) == 8
+    times, kept = read_requests((tmp_path / "run.req").read_text())
+    np.testing.assert_allclose(kept[1], result.request(1)[:, [1, 2, 3, 5, 6, 7]], rtol=1e-4, atol=1e-9)
+    assert times.size == 3
