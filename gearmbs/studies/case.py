@@ -141,7 +141,8 @@ class Operation(Section):
     ``speed`` and ``torque`` are numbers, or curves for run-ups and coast-downs: lists of points (time, value), the time
     from the beginning of the record, ``[["0 s", "0 rpm"], ["2 s", "3000 rpm"]]``. Between the points run straight
     lines whose corners are rounded, see `gearmbs.mechanism.polyline`; before the first the first value is held, which
-    ``run_up`` leads to from rest, and after the last the last. ``duration`` is up to the end of the curves unless it is given.
+    ``run_up`` leads to from rest, and after the last the last. ``duration`` is up to the end of the curves unless it is
+    given.
     """
 
     section: ClassVar[str] = "operation"
