@@ -155,10 +155,11 @@ class BearingStatics:
         state = self._state(place, found, stiffness, cage_angle)
         against = -self.settings.sense * float(found[2])
         if self.bearing.kind == "angular contact" and against > AGAINST * float(state.element_loads.sum()):
+            name = f" {self.bearing.designation}" if self.bearing.designation else ""
             warnings.warn(
-                f"angular contact bearing{self.bearing.designation and ' ' + self.bearing.designation}: {against:.4g} N "
-                f"along the axis press against its sense ({self.settings.sense:+d}) and are carried across the groove, on a shoulder that most such "
-                "bearings do not have; turn the load or the sense, or add a second bearing",
+                f"angular contact bearing{name}: {against:.4g} N along the axis press against its sense "
+                f"({self.settings.sense:+d}) and are carried across the groove, on a shoulder that most such bearings do "
+                "not have; turn the load or the sense, or add a second bearing",
                 stacklevel=2,
             )
         return state
