@@ -158,8 +158,8 @@ class BearingStatics:
             name = f" {self.bearing.designation}" if self.bearing.designation else ""
             warnings.warn(
                 f"angular contact bearing{name}: {against:.4g} N along the axis press against its sense "
-                f"({self.settings.sense:+d}) and are carried across the groove, on a shoulder that most such bearings do "
-                "not have; turn the load or the sense, or add a second bearing",
+                f"({self.settings.sense:+d}) and are carried across the groove, on a shoulder that most such bearings "
+                "do not have; turn the load or the sense, or add a second bearing",
                 stacklevel=2,
             )
         return state
