@@ -6,6 +6,7 @@ of the outer ring; loads are those that act on the inner ring from outside, with
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +23,9 @@ from gearmbs.bearings.tables import BearingTables, pack
 from gearmbs.units import Quantity, to_si
 
 AXES = ("x", "y", "z", "tilt x", "tilt y")
+
+AGAINST = 1e-6
+"""Axial load against the sense of an angular contact bearing, by the sum of its elements' forces, that is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +139,11 @@ class BearingStatics:
         BearingError
             If the bearing cannot carry the load: there is a direction in which it moves the ring without end, see
             `gearmbs.bearings.equilibrium`.
+
+        Warns
+        -----
+        UserWarning
+            If an angular contact bearing carries an axial load against its sense, on the other shoulder of its grooves.
         """
         wanted = np.asarray(load, dtype=float)
         require(
@@ -143,7 +152,17 @@ class BearingStatics:
         place = self._first(wanted) if start is None else self._five(start, "start")
         place = self._carried(place, wanted, cage_angle)
         found, stiffness = self._load(place, cage_angle)
-        return self._state(place, found, stiffness, cage_angle)
+        state = self._state(place, found, stiffness, cage_angle)
+        against = -self.settings.sense * float(found[2])
+        if self.bearing.kind == "angular contact" and against > AGAINST * float(state.element_loads.sum()):
+            name = f" {self.bearing.designation}" if self.bearing.designation else ""
+            warnings.warn(
+                f"angular contact bearing{name}: {against:.4g} N along the axis press against its sense "
+                f"({self.settings.sense:+d}) and are carried across the groove, on a shoulder that most such bearings "
+                "do not have; turn the load or the sense, or add a second bearing",
+                stacklevel=2,
+            )
+        return state
 
     def curve(self, loads: Iterable[npt.ArrayLike], *, cage_angle: float | None = None) -> list[BearingState]:
         """Return the bearing under loads that follow each other, each beginning where the last one ended."""

@@ -19,7 +19,7 @@ from gearmbs.drivetrain.errors import DrivetrainError, require
 from gearmbs.drivetrain.part import Part
 from gearmbs.drivetrain.torque_element import FROM_OWN, ShaftTorque
 from gearmbs.mechanism.elements import State
-from gearmbs.mechanism.functions import as_function, constant, curve_integral, ramp, step
+from gearmbs.mechanism.functions import as_function, constant, polyline_integral, ramp, step
 from gearmbs.mechanism.joints import Joint, Row, Term
 from gearmbs.units import Quantity
 
@@ -68,8 +68,9 @@ class SpeedDrive(Drive):
     function : TimeFunction or str, optional
         The rotation itself, rad, in place of the run-up and the speed.
     curve : sequence of (time, speed), optional
-        A run-up or coast-down: points from the end of the drivetrain's ``run_up`` on, joined by a monotone cubic; none
-        faster than ``speed``, all in its sense. Before the first point its speed is held, or reached from rest.
+        A run-up or coast-down: points from the end of the drivetrain's ``run_up`` on, joined by straight lines, see
+        `gearmbs.mechanism.polyline`; none faster than ``speed``, all in its sense. Before the first point its speed is
+        held, or reached from rest.
     """
 
     kind: ClassVar[str] = "speed"
@@ -107,7 +108,8 @@ class SpeedDrive(Drive):
             first = self.curve[0][1]
             later = [(at.run_up + t, w) for t, w in self.curve if t > 0.0]
             times = [0.0, at.run_up, *(t for t, _ in later)]
-            turned = curve_integral(times, [first if at.running else 0.0, first, *(w for _, w in later)])
+            speeds = [first if at.running else 0.0, first, *(w for _, w in later)]
+            turned = polyline_integral(times, speeds, soft_start=True)
         elif self.function is not None:
             turned = as_function(self.function, "rad", self.label)
         else:

@@ -114,7 +114,7 @@ class TorsionalModel:
         return np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi), shapes
 
     def damping_ratios(self) -> np.ndarray:
-        """Return phi.C phi / (2 w phi.M phi) of each of `modes`: from 1 on it does not oscillate; zero of rigid ones."""
+        """Return phi.C phi / (2 w phi.M phi) of each of `modes`: from 1 on it does not oscillate; 0 of rigid ones."""
         m, c, _ = self.matrices()
         frequencies, shapes = self.modes()
         lost, held = (np.einsum("ia,ij,ja->a", shapes, matrix, shapes) for matrix in (c, m))

@@ -76,6 +76,32 @@ class BeamChain:
         return self.markers[-1]
 
 
+def node_shares(elements: int) -> np.ndarray:
+    """Return the share of each node in the mass of a beam, in elements: weights of a rule of quadrature, all positive.
+
+    A load of inertia m u'' dx that varies smoothly is replaced by forces at the nodes. Half of each element at either
+    end (the trapezoidal rule) makes errors of h^2 at the ends of the beam: its moment of inertia is too large by the
+    share 2/n^2. Gregory's rule of third order (K. Atkinson, *An Introduction to Numerical Analysis*, 2nd ed., section
+    5.4) has them right up to h^4, as Newton's and Cotes's of few points; inside all weights are 1.
+
+    Parameters
+    ----------
+    elements : int
+        n.
+
+    Returns
+    -------
+    ndarray, shape (n + 1,)
+        Their sum is n; mass, centre and, from two elements on, moments of inertia of a straight beam are exact.
+    """
+    few = {1: (1 / 2,) * 2, 2: (1 / 3, 4 / 3, 1 / 3), 3: (3 / 8, 9 / 8, 9 / 8, 3 / 8),
+           4: (14 / 45, 64 / 45, 24 / 45, 64 / 45, 14 / 45)}  # fmt: skip
+    if elements in few:
+        return np.array(few[elements])
+    ends = np.array([9.0, 28.0, 23.0]) / 24.0
+    return np.concatenate([ends, np.ones(elements - 5), ends[::-1]])
+
+
 def add_beam(
     mechanism: Mechanism,
     name: str,
@@ -89,6 +115,9 @@ def add_beam(
     **motion: Any,
 ) -> BeamChain:
     """Add a straight beam that may bend, twist and turn as far as it likes.
+
+    Its nodes are rigid bodies with the mass and rotary inertia that `node_shares` gives them. Bending frequencies are
+    then wrong by terms of h^4; those of stretching and torsion fall short by (k h)^2/24 of a wave of number k.
 
     Parameters
     ----------
@@ -126,8 +155,7 @@ def add_beam(
         raise FlexibleError(f"beam '{name}': {', '.join(motion)} is no setting; velocity and angular_velocity are")
     step = length / elements
     bodies, markers, parts = [], [], []
-    for k in range(elements + 1):
-        share = step * (0.5 if k in (0, elements) else 1.0)
+    for k, share in enumerate(step * node_shares(elements)):
         place = a + (b - a) * k / elements
         body = mechanism.body(
             f"{name}.{k}", section.mass * share, tuple(share * j for j in section.inertia), position=place,

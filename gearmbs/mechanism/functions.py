@@ -14,13 +14,16 @@ from gearmbs.mechanism.quantities import any_quantity, expression_text, quantity
 RATES = ("angular speed", "speed", "rad/s^2", "acceleration", "dimensionless")
 """What the rate of a ramp may be."""
 
+ROUNDING = 0.02
+"""Share of a line that its corners take: no acceleration of an angle jumps, and a speed leaves the line by 0.6 %."""
+
 
 @dataclass(frozen=True)
 class TimeFunction:
     """A function of time in one of the closed forms of :mod:`gearmbs.dae.equations.time_functions`.
 
-    Make one with :func:`constant`, :func:`step`, :func:`ramp`, :func:`harmonic`, :func:`polynomial`, :func:`curve` or
-    :func:`curve_integral`.
+    Make one with :func:`constant`, :func:`step`, :func:`ramp`, :func:`harmonic`, :func:`polynomial`, :func:`curve`,
+    :func:`curve_integral`, :func:`polyline` or :func:`polyline_integral`.
     """
 
     kind: int
@@ -135,26 +138,126 @@ def curve_integral(times: Sequence[float], values: Sequence[float], start: float
         Value at the first of the times.
     """
     t, rate = _curve_pieces(times, values)
-    pieces = np.zeros((t.size + 1, 5))
-    pieces[:, 1:] = rate[:, :4] / np.arange(1, 5)
-    pieces[0, 0] = pieces[1, 0] = any_quantity(start, "curve_integral: start")
-    gain = np.diff(t) * np.polynomial.polynomial.polyval(np.diff(t), (rate[1:-1, :4] / np.arange(1, 5)).T, tensor=False)
-    pieces[2:, 0] = pieces[1, 0] + np.cumsum(gain)
+    pieces = _integral(t, rate, any_quantity(start, "curve_integral: start"))
     return _piecewise(t, pieces, f"integral of the curve of {t.size} points from {t[0]:g} to {t[-1]:g} s")
 
 
-def _curve_pieces(times: Sequence[float], values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points' times and the coefficients of all pieces, those before and after them included, (n + 1, 5)."""
+def polyline(
+    times: Sequence[float], values: Sequence[float], rounding: float = ROUNDING, soft_start: bool = False
+) -> TimeFunction:
+    """Return the straight lines through points, constant before the first and after the last of them.
+
+    At a corner the slope changes evenly while ``rounding`` of the shorter line passes before and after it, which leaves
+    the corner by a quarter of that time times the change of slope. Where a line begins or ends at rest it does so
+    within twice ``rounding`` of its own time, by x (2 u - u^2), u = x/L, and is at most 4/27 L of its slope late: with
+    the default 0.6 % of the change along the line. Everywhere else the function is exactly the line.
+
+    Parameters
+    ----------
+    times, values
+        As of :func:`curve`.
+    rounding : float
+        Share of a line, 0 to 0.25; 0 leaves the corners sharp.
+    soft_start : bool
+        Whether the first line is a STEP instead, as of a run-up from rest.
+
+    Raises
+    ------
+    ModelError
+        As of :func:`curve`, and for another rounding.
+    """
+    t, pieces, points = _line_pieces(times, values, rounding, soft_start)
+    return _piecewise(t, pieces, f"lines through {points.size} points from {points[0]:g} to {points[-1]:g} s")
+
+
+def polyline_integral(
+    times: Sequence[float], values: Sequence[float], start: float = 0.0, rounding: float = ROUNDING,
+    soft_start: bool = False,
+) -> TimeFunction:  # fmt: skip
+    """Return the angle or displacement whose rate is the `polyline` through points, in closed form.
+
+    Parameters
+    ----------
+    times, values, rounding, soft_start
+        As of :func:`polyline`; the values are rates.
+    start : float or str
+        Value at the first of the times.
+    """
+    t, rate, points = _line_pieces(times, values, rounding, soft_start)
+    text = f"integral of lines through {points.size} points from {points[0]:g} to {points[-1]:g} s"
+    return _piecewise(t, _integral(t, rate, any_quantity(start, "polyline_integral: start")), text)
+
+
+def _line_pieces(
+    times: Sequence[float], values: Sequence[float], rounding: float, soft_start: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return where pieces begin, their coefficients as of `_curve_pieces`, and the times of the points."""
+    if not 0.0 <= rounding <= 0.25:
+        raise ModelError(f"polyline: rounding is {rounding}; give a share of a line from 0 to 0.25")
+    points, f = _points(times, values)
+    width = np.diff(points)
+    slope = np.concatenate([[0.0], np.diff(f) / width, [0.0]])
+    width = np.concatenate([[np.inf], width, [np.inf]])
+    if soft_start:
+        # the first line leaves and comes with slope zero
+        slope[1] = 0.0
+    found: list[tuple[float, float, float, float, float]] = [(points[0], f[0], 0.0, 0.0, 0.0)]
+    for k in range(points.size):
+        before, after = slope[k], slope[k + 1]
+        t, value = float(points[k]), float(f[k])
+        if k == 0 and soft_start:
+            rise = f[1] - value
+            found.append((t, value, 0.0, 3.0 * rise / width[1] ** 2, -2.0 * rise / width[1] ** 3))
+            continue
+        r = rounding * min(width[k], width[k + 1])
+        if rounding == 0.0 or before == after:
+            found.append((t, value, after, 0.0, 0.0))
+        elif before == 0.0 or after == 0.0:
+            long = 2.0 * rounding * (width[k + 1] if before == 0.0 else width[k])
+            if before == 0.0:
+                found += [(t, value, 0.0, 2.0 * after / long, -after / long**2),
+                          (t + long, value + after * long, after, 0.0, 0.0)]  # fmt: skip
+            else:
+                # the same backwards: with y = long - x, value - before (2 y^2/long - y^3/long^2)
+                found += [(t - long, value - before * long, before, before / long, -before / long**2),
+                          (t, value, 0.0, 0.0, 0.0)]  # fmt: skip
+        else:
+            bend = (after - before) / (4.0 * r)
+            found += [(t - r, value - before * r, before, bend, 0.0), (t + r, value + after * r, after, 0.0, 0.0)]
+    table = np.array(found)
+    pieces = np.column_stack([table[:, 1:], np.zeros(len(table))])
+    return table[1:, 0], pieces, points
+
+
+def _integral(t: np.ndarray, rate: np.ndarray, start: float) -> np.ndarray:
+    """Return the coefficients of the integral of pieces, continuous, with a value at the first of the times."""
+    pieces = np.zeros((t.size + 1, 5))
+    pieces[:, 1:] = rate[:, :4] / np.arange(1, 5)
+    pieces[0, 0] = pieces[1, 0] = start
+    gain = np.diff(t) * np.polynomial.polynomial.polyval(np.diff(t), (rate[1:-1, :4] / np.arange(1, 5)).T, tensor=False)
+    pieces[2:, 0] = pieces[1, 0] + np.cumsum(gain)
+    return pieces
+
+
+def _points(times: Sequence[float], values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and values of points, refused where they do not make a curve."""
     t = np.array([quantity(time, "time", "curve: times") for time in times], dtype=float)
     f = np.array([any_quantity(value, "curve: values") for value in values], dtype=float)
     if t.size != f.size or t.size < 2:
         raise ModelError(f"curve: {t.size} times and {f.size} values; give two points or more, a value for each time")
     if not (np.all(np.isfinite(t)) and np.all(np.isfinite(f))):
         raise ModelError("curve: times and values must be finite")
-    width = np.diff(t)
-    if not np.all(width > 0.0):
-        late = int(np.argmin(width > 0.0))
+    grows = np.diff(t) > 0.0
+    if not np.all(grows):
+        late = int(np.argmin(grows))
         raise ModelError(f"curve: its times must increase; {t[late + 1]:g} s follows {t[late]:g} s")
+    return t, f
+
+
+def _curve_pieces(times: Sequence[float], values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points' times and the coefficients of all pieces, those before and after them included, (n + 1, 5)."""
+    t, f = _points(times, values)
+    width = np.diff(t)
     secant = np.diff(f) / width
     slope = np.zeros(t.size)
     left, right = secant[:-1], secant[1:]

@@ -145,9 +145,10 @@ class Operation(Section):
     ``torque`` is that of the **driven** wheel, z_2/z_1 times the driver's.
 
     ``speed`` and ``torque`` are numbers, or curves for run-ups and coast-downs: lists of points (time, value), the time
-    from the beginning of the record, ``[["0 s", "0 rpm"], ["2 s", "3000 rpm"]]``. Between the points runs a monotone
-    cubic, see `gearmbs.mechanism.curve`; before the first the first value is held, which ``run_up`` leads to from rest,
-    and after the last the last. ``duration`` is up to the end of the curves unless it is given.
+    from the beginning of the record, ``[["0 s", "0 rpm"], ["2 s", "3000 rpm"]]``. Between the points run straight
+    lines whose corners are rounded, see `gearmbs.mechanism.polyline`; before the first the first value is held, which
+    ``run_up`` leads to from rest, and after the last the last. ``duration`` is up to the end of the curves unless it is
+    given.
     """
 
     section: ClassVar[str] = "operation"

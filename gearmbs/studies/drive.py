@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.mechanism import TimeFunction, curve, curve_integral, ramp, step
+from gearmbs.mechanism import TimeFunction, polyline, polyline_integral, ramp, step
 from gearmbs.units import to_si
 
 
@@ -15,14 +15,14 @@ def drive_angle(speed: Any, run_up: float, start: float, sense: int = 1) -> Time
     """Return the driver's angle over time, rad; see `gearmbs.studies.rig.gear_rig`."""
     if not _is_curve(speed):
         return ramp(sense * to_si(speed, "angular speed", "speed"), over=run_up)
-    return curve_integral(*_after_run_up(speed, "angular speed", "speed", run_up, start, sense))
+    return polyline_integral(*_after_run_up(speed, "angular speed", "speed", run_up, start, sense), soft_start=True)
 
 
 def load_torque(torque: Any, run_up: float, start: float, sense: int = 1) -> TimeFunction:
     """Return the load torque over time, N m; see `gearmbs.studies.rig.gear_rig`."""
     if not _is_curve(torque):
         return step(0.0, 0.0, run_up, sense * to_si(torque, "torque", "torque"))
-    return curve(*_after_run_up(torque, "torque", "torque", run_up, start, sense))
+    return polyline(*_after_run_up(torque, "torque", "torque", run_up, start, sense), soft_start=True)
 
 
 def _is_curve(value: Any) -> bool:

@@ -26,6 +26,8 @@ HIGHEST = 2000.0
 """Modes up to this frequency are told, Hz."""
 SETTLING = 0.3
 """Time from the load's coming on to the record, s: the clutches' modes have then lost all but a thousandth."""
+HELD = 0.1
+"""Share of the run-up at whose end the speed is held, so that windows of order tracking fit into the steady part."""
 SLOWEST = 0.25
 """Speed at which the run-up begins, over the operating speed."""
 
@@ -137,7 +139,7 @@ def run_gearbox(
     duration : float
         Of the record at the operating speed, s.
     run_up : float
-        Time from a quarter of the operating speed to it, s.
+        Time from a quarter of the operating speed to it, of which the last tenth holds it, s.
     tolerance : float
     progress : callable, optional
         Called with "steady" or "run-up" and the part of it that is done.
@@ -154,7 +156,8 @@ def run_gearbox(
         raise ValueError("settings: a run-up is added here; leave curve out, and motor 'speed'")
     train = industrial_gearbox(s)
     speed = to_si(s.speed, "angular speed", "speed")
-    points = ((SETTLING, SLOWEST * speed), (SETTLING + run_up, speed))
+    reached = SETTLING + (1.0 - HELD) * run_up
+    points = ((SETTLING, SLOWEST * speed), (reached, speed), (SETTLING + run_up, speed))
     faster = industrial_gearbox(replace(s, curve=points))
     modes = train_modes(train)
     records = []

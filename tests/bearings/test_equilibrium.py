@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog, minimize
@@ -189,6 +191,7 @@ def lean(state) -> np.ndarray:
     return np.concatenate([state.displacement[:3], turn * (np.sin(angle) / angle if angle else 1.0)])
 
 
+@pytest.mark.filterwarnings("ignore:angular contact bearing.* against its sense")
 def test_places_are_those_of_an_independent_minimisation():
     """Of random bearings, loads of 1 N to 30 kN and clearances: verdict, deflection and element forces."""
     rng = np.random.default_rng(seed())
@@ -288,3 +291,17 @@ def test_mechanisms_rest_where_the_bearing_alone_does(size):
         np.testing.assert_allclose(
             static_equilibrium(m).com_position("ring"), state.displacement[:3], rtol=1e-6, atol=1e-12
         )
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_an_axial_load_on_the_shoulder_that_is_not_there_is_remarked(sense):
+    bearing = Bearing(kind="angular contact", elements=11, element_diameter=7.94e-3, pitch_diameter=38.5e-3,
+                      contact_angle="25 deg")  # fmt: skip
+    statics = BearingStatics(bearing, sense=sense)
+    with pytest.warns(UserWarning, match="against its sense"):
+        crossed = statics.under([100.0, 0.0, -400.0 * sense])
+    assert crossed.load[2] == pytest.approx(-400.0 * sense, rel=1e-8)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        statics.under([100.0, 0.0, 400.0 * sense])
+        statics.under([400.0, 0.0, 0.0])

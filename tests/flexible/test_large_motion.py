@@ -17,6 +17,7 @@ from gearmbs.flexible import (
     add_beam,
     reduce_model,
 )
+from gearmbs.flexible.large_beam import node_shares
 from gearmbs.mechanism import Mechanism, linear_modes, quasi_static
 
 SPEED, TIME = 6.0, 15.0
@@ -342,3 +343,33 @@ def test_a_flexible_pendulum_parts_from_beams_of_large_rotation_by_the_square_of
         gaps.append(np.abs(falling_rod(stiffness) - (fine + (fine - coarse) / 3)).max())
     assert gaps[0] < 1.2e-3
     assert 3.4 < gaps[0] / gaps[1] < 5.5
+
+
+@pytest.mark.parametrize("elements", range(1, 14))
+def test_shares_of_the_nodes_carry_mass_centre_and_inertia(elements):
+    shares, places = node_shares(elements), np.linspace(0.0, 1.0, elements + 1)
+    assert np.all(shares > 0.0)
+    for power in range(4 if elements > 1 else 2):
+        exact = elements / (power + 1)
+        # from five elements on the third moment, too, by symmetry about the middle
+        assert shares @ places**power == pytest.approx(exact, rel=1e-12), power
+
+
+def test_bending_frequencies_of_a_chain_converge_like_h_to_the_fourth():
+    """Clamped and free: against the roots of cosh x cos x = -+1 of a slender bar."""
+    section = BeamSection.ring(ElasticMaterial(), 0.004)
+    roots = {True: 1.8751040687119611, False: 4.730040744862704}
+    rate = np.sqrt(section.bending[0] / section.mass) / (2.0 * np.pi)
+    for clamped, root in roots.items():
+        errors = []
+        for elements in (4, 8, 16):
+            m = Mechanism("bar")
+            chain = add_beam(m, "b", section, (0, 0, 0), (0, 0, 1), elements)
+            if clamped:
+                m.fixed("clamp", chain.bodies[0], m.ground, at=(0, 0, 0))
+            found = linear_modes(m).frequencies
+            errors.append(abs(found[found > 0.1].min() / (root**2 * rate) - 1.0))
+        # what rotary inertia and shear take is 1e-5
+        assert errors[1] < (2e-4 if clamped else 1.5e-3)
+        assert errors[2] < 5e-5
+        assert errors[1] < errors[0] / 8.0

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.interpolate import PchipInterpolator
 
-from gearmbs.mechanism import Mechanism, ModelError, curve, curve_integral, step
+from gearmbs.mechanism import Mechanism, ModelError, curve, curve_integral, polyline, polyline_integral, step
+from tests.generators import cases, seed
 
 T = [0.0, 0.3, 0.5, 1.2, 1.5]
 F = [0.0, 40.0, 90.0, 90.0, 20.0]
@@ -87,3 +88,50 @@ def test_it_drives_a_joint_and_a_torque():
 def test_wrong_points(t, f, words):
     with pytest.raises(ModelError, match=words):
         curve(t, f)
+
+
+def test_lines_are_the_lines_but_for_their_corners():
+    """Of random points: exactly linear between the corners, near them at them, smooth, with a continuous integral."""
+    rng = np.random.default_rng(seed())
+    for _ in range(cases(20)):
+        n = int(rng.integers(2, 7))
+        t, f = np.cumsum(rng.uniform(0.2, 2.0, n)), rng.uniform(-300.0, 300.0, n)
+        if n > 3 and rng.random() < 0.5:
+            f[1] = f[2]
+        rounding = float(rng.choice([0.005, 0.02, 0.25]))
+        soft = bool(rng.random() < 0.5)
+        rate = polyline(t, f, rounding, soft)
+        angle = polyline_integral(t, f, 0.3, rounding, soft)
+        times = np.sort(np.concatenate([rng.uniform(t[0] - 0.2, t[-1] + 0.2, 2000), t]))
+        values = np.array([rate.derivatives(x) for x in times])
+        line = np.interp(times, t, f)
+        lines = np.flatnonzero(np.diff(t) > 0.0)
+        for k in lines[1:] if soft else lines:
+            width = t[k + 1] - t[k]
+            inside = (times > t[k] + 2 * rounding * width) & (times < t[k + 1] - 2 * rounding * width)
+            np.testing.assert_allclose(values[inside, 0], line[inside], atol=1e-9)
+            np.testing.assert_allclose(values[inside, 1], (f[k + 1] - f[k]) / width, atol=1e-8)
+            here = (times >= t[k]) & (times <= t[k + 1])
+            assert np.abs(values[here, 0] - line[here]).max() <= rounding * np.abs(np.diff(f)).max() + 1e-9
+        if soft:
+            first = step(t[0], f[0], t[1], f[1])
+            early = times < t[1]
+            np.testing.assert_allclose(values[early, 0], [first(x) for x in times[early]], atol=1e-9)
+        # neither the function nor its slope jumps
+        fine = np.linspace(t[0] - 0.1, t[-1] + 0.1, 20001)
+        slopes = np.array([rate.derivatives(x)[:2] for x in fine])
+        steepest = np.abs(slopes[:, 1]).max()
+        assert np.abs(np.diff(slopes[:, 0])).max() <= 1.01 * steepest * (fine[1] - fine[0]) + 1e-9
+        assert np.abs(np.diff(slopes[:, 1])).max() < 0.3 * steepest + 1e-9
+        np.testing.assert_allclose([angle.derivatives(x)[1] for x in times], values[:, 0], atol=1e-9)
+        summed = np.concatenate([[0.0], np.cumsum(0.5 * (slopes[1:, 0] + slopes[:-1, 0]) * np.diff(fine))])
+        turned = np.array([angle(x) for x in fine])
+        np.testing.assert_allclose(turned - turned[0], summed, atol=1e-4 * np.abs(f).max())
+        assert angle(t[0]) == pytest.approx(0.3, abs=1e-12)
+
+
+def test_sharp_corners_and_wrong_roundings():
+    assert polyline([0.0, 1.0, 3.0], [0.0, 2.0, 2.0], 0.0)(0.999) == pytest.approx(1.998, abs=1e-12)
+    assert polyline([0.0, 1.0], [5.0, 7.0])(1.0) == pytest.approx(7.0, abs=1e-12)
+    with pytest.raises(ModelError, match=r"rounding is 0\.3; give a share of a line from 0 to 0\.25"):
+        polyline([0.0, 1.0], [5.0, 7.0], 0.3)

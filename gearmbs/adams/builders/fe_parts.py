@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 ELEMENTS = 4
 """Elements between two nodes of a deck, whose own elements are of higher order; errors fall with their square."""
+EVEN = 1e-6
+"""Differences of the elements' lengths, by the longest, that are rounding of the deck's numbers."""
 STUBBY = 0.01
 """Share of shear in the deflection of a cantilever from which its coefficient, which a deck does not give, matters."""
 SHARE = re.compile(r"(?<![A-Za-z0-9_])S(?![A-Za-z0-9_(])", re.IGNORECASE)
@@ -69,7 +71,7 @@ class Beam:
 
 def add_fe_part(b: Builder, s: st.FePart) -> None:
     """FE_PART: nodes, and elements between them."""
-    from gearmbs.flexible.large_beam import LargeBeam
+    from gearmbs.flexible.large_beam import LargeBeam, node_shares
 
     kind = (s.type or "").upper()
     if kind not in NORMALS:
@@ -87,6 +89,11 @@ def add_fe_part(b: Builder, s: st.FePart) -> None:
     along = np.concatenate([[0.0], np.cumsum(steps)])
     of_element = [_mixed(sections[k // ELEMENTS], sections[k // ELEMENTS + 1], (k % ELEMENTS + 0.5) / ELEMENTS)
                   for k in range(len(steps))]  # fmt: skip
+    even = np.ptp(steps) <= EVEN * steps.max() and all(section == sections[0][0] for section, _ in sections)
+    halves = np.full(len(places), 1.0)
+    halves[[0, -1]] = 0.5
+    # the weights of an even chain, over the halves that are summed below
+    weights = node_shares(len(steps)) / halves if even else np.ones(len(places))
     bodies = []
     for k, (place, turn) in enumerate(zip(places, turns)):
         mass, inertia = 0.0, np.zeros((3, 3))
@@ -96,6 +103,7 @@ def add_fe_part(b: Builder, s: st.FePart) -> None:
                 half = 0.5 * steps[e]
                 mass += half * part.mass
                 inertia += half * turn @ own @ np.diag(part.inertia) @ own.T @ turn.T
+        mass, inertia = weights[k] * mass, weights[k] * inertia
         bodies.append(_node(b, s, name, k, (mass, inertia), (origin + axes @ place, axes)))
         if normal is not None:
             hold(b.mechanism, bodies[-1], "planar", normal)
