@@ -165,6 +165,19 @@ def _pack_laws(model: ContactModel, width: float, cosine: float, reals: np.void)
     reals["dynamic_speed"] = friction.dynamic_speed
 
 
+SPARE_PAIRS = 4
+"""Tooth pairs of a side by which other poses than the drawing's have more, at most: a pitch and more at either end."""
+
+
+def most_pairs(geometry: PairGeometry, gr: np.ndarray) -> int:
+    """Return how many tooth pairs of both sides `gearmbs.contact.pair_gaps` lists at most, from the pair's table."""
+    reals = gr[: L.PAIR.itemsize // gr.itemsize].view(L.PAIR)[0]
+    # a helix moves the contact along the path, over the face and as the wheels are shifted; other poses a little more
+    along = abs(reals["wheel_1"]["twist"]) * (reals["face_high"] - reals["face_low"] + abs(reals["axial_shift"]))
+    span = geometry.path_of_contact + 2.0 * (reals["corner_reach"] + along)
+    return 2 * (math.ceil(span / reals["pitch"]) + SPARE_PAIRS)
+
+
 def tooth_deviations(pair: Mesh) -> tuple[ToothDeviations, ToothDeviations]:
     """Deviations of all teeth of both wheels, with every fault applied."""
     geometry, rotation = pair.geometry, pair.operating_point.rotation

@@ -11,12 +11,11 @@ import numpy as np
 
 from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
 from gearmbs.gears.mesh import Mesh
-from gearmbs.gears.tables import pack
+from gearmbs.gears.tables import most_pairs, pack
 from gearmbs.progress import waiting
 
 SIDE, TOOTH_1, TOOTH_2, GAP = (GAP_COLUMNS.index(name) for name in ("side", "tooth_1", "tooth_2", "gap"))
 NORMAL_FORCE, PAIRS_DRIVE = layout.place(layout.TOTALS, "normal_force"), layout.place(layout.TOTALS, "pairs_drive")
-MAX_ROWS = 4000
 NEWTON_STEPS = 100
 PHASE_STEPS = 50
 TOUCH_TOLERANCE = 1e-15  # m
@@ -94,7 +93,8 @@ class StaticMesh:
         self.wrench = np.zeros(6)
         self.jac = np.zeros((6, 24))
         self.diag = np.zeros(8)
-        self.rows = np.zeros((MAX_ROWS, len(GAP_COLUMNS)))
+        self.pairs = most_pairs(pair.geometry, self.gr)
+        self.rows = np.zeros((0, len(GAP_COLUMNS)))
         self._zero = np.zeros(3)
         self.sections = np.zeros(1 if self.gi[layout.SLICES] == 1 else 0)
         if self.geometry.driver.helix_angle and self.gi[layout.SLICES] > 1:
@@ -125,6 +125,9 @@ class StaticMesh:
         place = self.geometry.frames(driver_angle, driven_angle)
         if sections is None:
             sections = self.sections
+        needed = self.pairs * max(2, sections.size)
+        if len(self.rows) < needed:
+            self.rows = np.zeros((needed, len(GAP_COLUMNS)))
         count = pair_gaps(
             self.gi, self.gr, place.origin_1, place.axes_1, place.origin_2, place.axes_2, sections, self.rows, self.work
         )

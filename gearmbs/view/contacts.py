@@ -10,12 +10,10 @@ from gearmbs.contact import GAP_COLUMNS, layout, pair_gaps
 from gearmbs.contact.laws import normal_law
 from gearmbs.gears import GearPair
 from gearmbs.gears.pair import Placement
+from gearmbs.gears.tables import most_pairs
 from gearmbs.view.motion import PairMotion
 
 COLUMN = {name: k for k, name in enumerate(GAP_COLUMNS)}
-MAX_PAIRS = 60
-"""More tooth pairs, of both sides, than are ever within reach."""
-
 SECTIONS = 21
 
 
@@ -79,7 +77,7 @@ class ContactProbe:
         count = 1 if single else (SECTIONS if sections is None else sections)
         self.width = pair.common_face_width / count if single else (high - low) / count
         self.sections = np.zeros(1) if single else low + (np.arange(count) + 0.5) * self.width
-        self.rows = np.zeros((MAX_PAIRS * max(2, count), len(GAP_COLUMNS)))
+        self.rows = np.zeros((most_pairs(pair.geometry, self.gr) * max(2, count), len(GAP_COLUMNS)))
 
     def at(
         self,

@@ -346,3 +346,20 @@ def test_friction_on_tip_corners(name):
         slack = 0.51 * depth * np.linalg.norm(state[3] - state[7])
         assert contact.diag[2] == pytest.approx(np.linalg.norm(load) * speed, abs=np.linalg.norm(load) * slack)
     assert kinds == {0, 1}
+
+
+@pytest.mark.parametrize(("helix", "slices"), [("0 deg", 1), ("0 deg", 5), ("15 deg", 9)])
+def test_derivatives_where_a_corner_leaves_the_tip_of_its_mate(helix, slices):
+    # tips pass 20 and 35 um apart, so that corners 60 um deep leave the ring's flank over its edge
+    one, ring = GearSpec(23, "3 mm", helix_angle=helix), GearSpec.ring(70, "3 mm", addendum="2 mm", helix_angle=helix)
+    pair = GearPair(one, ring, centre_distance_error="-3 mm", backlash="0.2 mm", slices=slices)
+    contact, rng, met = Contact(pair), np.random.default_rng(3), 0
+    depth, tip = 60e-6, -ring.tip_roll_length
+    for angle in np.linspace(0, 2 * math.pi / 23, 240, endpoint=False):
+        driven = contact.mesh.touching_angle(angle) + contact.mesh.turning * depth / pair.driven.base_radius
+        rows = contact.mesh.gaps(angle, driven, np.zeros(1))
+        leaving = (rows[:, 4] < 0) & (rows[:, 5] == 1) & (rows[:, 7] + 0.5 * rows[:, 4] > tip)
+        if leaving.any() and met < 4:
+            met += 1
+            assert column_errors(contact, shaken(contact.state(angle, depth, 50.0), rng)).max() < 1e-6
+    assert met >= 3

@@ -102,6 +102,20 @@ def test_corners_of_a_ring_leave_slowly():
     assert reach.passing_gap == pytest.approx((free - needed) * pair.driven.base_radius, rel=0.03)
 
 
+def test_wide_helical_wheels_have_room_for_all_their_rows():
+    # 40 mm of 0.66 mm teeth at 35 degrees: more than a hundred slices
+    kind = {"helix_angle": "35 deg", "pressure_angle": "20 deg", "face_width": "40 mm"}
+    pair = GearPair(
+        GearSpec(60, "0.66 mm", **kind), GearSpec.ring(94, "0.66 mm", addendum="0.5 mm", **kind), rotation=-1
+    )
+    assert pair.face_slices > 100
+    assert abs(kinematic_transmission_error(pair, 6).error).max() < 1e-9
+    mesh = StaticMesh(pair)
+    gaps = mesh.gaps(0.0, mesh.ideal_angle(0.0))
+    assert len(gaps) < len(mesh.rows)
+    assert np.unique(gaps[:, SIDE]).tolist() == [-1.0, 1.0]
+
+
 # --- against sampled profiles ----------------------------------------------------------------------------------------
 SAMPLES = 4000
 
