@@ -225,7 +225,7 @@ class GearMesh(Part):
                 given["contact"] = contact_law(given["contact"])
             if "friction" in given:
                 given["friction"] = flank_friction(given["friction"])
-            own = {key: given.pop(key) for key in ("stiffness", "damping_ratio") if key in given}
+            own: dict[str, Any] = {key: given.pop(key) for key in ("stiffness", "damping_ratio") if key in given}
             for key in own:
                 require(
                     "contact" not in given,
