@@ -1,6 +1,6 @@
 """Stiffness of a tooth pair by plane finite elements, against ISO 6336-1 and the potential-energy method.
 
-    python -m benchmarks.tooth_stiffness --write docs/data/tooth_stiffness.md
+    python -m benchmarks.tooth_stiffness --write docs/data/tooth_stiffness.txt
 
 A wheel is the whole ring from its bore, which is clamped, to the root circle, with four teeth: the loaded ones and
 their neighbours, with the root that a rack cuts. Quadratic quadrilaterals, per unit of face width.

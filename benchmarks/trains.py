@@ -27,14 +27,16 @@ STAGES = (1, 2, 5, 10)
 def stages_in_line(count: int) -> Any:
     """Return so many equal stages one after the other, with joints as bearings, as a drivetrain."""
     from gearmbs.drivetrain import Drivetrain, GearMesh, IdealBearing, Shaft, SpeedDrive, TorqueLoad, Wheel
-    from gearmbs.gears import GearSpec
+    from gearmbs.gears import ContactLaw, GearSpec
 
     wheels, meshes = [], []
     for k in range(count):
         for shaft, side in ((k, "a"), (k + 1, "b")):
             gear = GearSpec(29, 95e-3 / 31, face_width=0.02, name=f"{side}{k}")
             wheels.append(Wheel(name=f"{side}{k}", shaft=f"s{shaft}", station=0.05 + 0.1 * k, gear=gear))
-        meshes.append(GearMesh(name=f"m{k}", driver=f"a{k}", driven=f"b{k}", settings={"backlash": "0.1 mm"}))
+        # the law of the paper's pair, beside which they are timed
+        settings = {"backlash": "0.1 mm", "contact": ContactLaw.impact()}
+        meshes.append(GearMesh(name=f"m{k}", driver=f"a{k}", driven=f"b{k}", settings=settings))
     return Drivetrain(
         f"{count} stages",
         shafts=[Shaft(name=f"s{k}", length=0.1 * (count + 1)) for k in range(count + 1)],

@@ -227,14 +227,15 @@ class GearMesh(Part):
     def make(self, driver: GearSpec, driven: GearSpec, rotation: Any, torque: float) -> Any:
         """Return the pair of the two wheels for a sense of the driver and a torque on the driven wheel (N m)."""
         with told_of(self.label):
-            given = dict(self.settings)
+            # None takes a setting back, as in `Drivetrain.changed`, where settings are merged
+            given = {key: value for key, value in self.settings.items() if value is not None}
             for name in ("torque", "input_torque", "rotation"):
                 require(name not in given, f"{self.label}: {name} follows from the drives and loads; leave it out")
             if "contact" in given:
                 given["contact"] = contact_law(given["contact"])
             if "friction" in given:
                 given["friction"] = flank_friction(given["friction"])
-            own = {key: given.pop(key) for key in ("stiffness", "damping_ratio") if given.get(key) is not None}
+            own: dict[str, Any] = {key: given.pop(key) for key in ("stiffness", "damping_ratio") if key in given}
             for key in own:
                 require(
                     "contact" not in given,

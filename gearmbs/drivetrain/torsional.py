@@ -318,9 +318,9 @@ def warn_of_overdamped_meshes(train: Drivetrain, stacklevel: int = 3) -> None:
     for name, found in train.mesh_dynamics.items():
         if found.damping_ratio > 1.0:
             warnings.warn(
-                f"mesh '{name}' is damped {found.damping_ratio:.3g} times critically by its law ({found.law}): its mode "
-                f"at {found.frequency:.4g} Hz does not oscillate, and is missing in modes and Campbell diagrams; leave "
-                "contact out for the stiffness of the wheels and a damping ratio, or give less damping",
+                f"mesh '{name}' is damped {found.damping_ratio:.3g} times critically by its law ({found.law}): its "
+                f"mode at {found.frequency:.4g} Hz does not oscillate, and is missing in modes and Campbell diagrams; "
+                "leave contact out for the stiffness of the wheels and a damping ratio, or give less damping",
                 stacklevel=stacklevel,
             )
 

@@ -369,11 +369,11 @@ class GearPair(PairGeometry, Shown):
         return self.normal_force if torque is None else torque / self.driven.base_radius
 
     def penetration(self, torque: float | None = None, pairs: int = 1) -> float:
-        """Static penetration when ``pairs`` tooth pairs of parallel wheels share the load equally, m."""
+        """Static penetration when ``pairs`` tooth pairs share a torque on the driven wheel (N m) equally, m."""
         return self.contact_model.penetration(self._force(torque), pairs)
 
     def mesh_stiffness(self, torque: float | None = None, pairs: int = 1) -> float:
-        """Tangent stiffness along the line of action of that many pairs of parallel wheels, N/m."""
+        """Tangent stiffness of that many pairs along the line of action under a torque on the driven wheel, N/m."""
         return self.contact_model.tangent_stiffness(self._force(torque), pairs)
 
     def contact_tables(self, slices: int | None = None) -> tuple[np.ndarray, np.ndarray, int]:

@@ -109,7 +109,7 @@ def mesh_animation(
     frames : int
         At most so many instants; a simulation has no more than its outputs.
     torque : float, optional
-        Load of a pair at rest, N m; default the pair's.
+        Load on the driven wheel of a pair at rest, N m; default the pair's.
     width : float, optional
         Width of the detail, m; default seven modules.
     section : float

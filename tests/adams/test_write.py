@@ -231,7 +231,11 @@ def test_what_cannot_be_written_is_named():
     with pytest.raises(ModelError, match="tilted axes"):
         write_deck(rig(GearPair.paper(misalignment="1 deg", backlash="0.5 mm")))
     with pytest.raises(ModelError, match="has no form in ADAMS"):
-        write_deck(rig(GearPair.paper(contact=ContactLaw.linear(stiffness="1e8 N/m"))))
+        write_deck(rig(GearPair.paper(contact=ContactLaw.hunt_crossley())))
+    with pytest.raises(ModelError, match="stiffness varies along the path"):
+        write_deck(rig(GearPair.paper().with_potential_energy_stiffness()))
+    # a linear law is IMPACT with the exponent 1
+    assert ", 1.0, 0.0, 0.0001" in write_deck(rig(GearPair.paper(contact=ContactLaw.linear(stiffness="1e8 N/m"))))
     m = Mechanism("odd units")
     m.body("a", 1, (1, 1, 1))
     m.units = Units(length=0.123)

@@ -36,6 +36,8 @@ STAGE = {
 }
 SET = {
     "planetary": {"teeth": [24, 30, 84], "module": "1.5 mm", "planets": 3, "backlash_sun": "0.05 mm"},
+    # damped enough to settle within 5 ms
+    "contact": {"law": "impact"},
     "operation": {
         "speeds": {"sun": "600 rpm"},
         "torques": {"carrier": "20 N m"},

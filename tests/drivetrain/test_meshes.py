@@ -10,6 +10,7 @@ import pytest
 
 import gearmbs as gm
 from gearmbs.drivetrain import Drivetrain, DrivetrainError, GearMesh, IdealBearing, RunSettings, Shaft
+from gearmbs.drivetrain.description import make_description
 from gearmbs.flexible import ShaftSection
 from gearmbs.gears import (
     ContactLaw,
@@ -22,7 +23,7 @@ from gearmbs.gears import (
 )
 from gearmbs.gears.laws import DAMPING_RATIO
 from gearmbs.gears.stiffness import iso_mesh_stiffness, iso_single_stiffness
-from gearmbs.studies import run_train, train_campbell, train_modes, train_report
+from gearmbs.studies import bench_train, run_train, train_campbell, train_modes, train_report
 from tests.drivetrain.support import stage
 from tests.generators import cases, seed
 
@@ -87,8 +88,31 @@ def test_default_of_a_drivetrain():
     assert varied.stiffness_curve == "potential-energy"
     assert varied.contact == meshed(stiffness="potential-energy").pairs["mesh"].contact
     assert meshed(stiffness="3e8 N/m").pairs["mesh"].contact.stiffness == 3e8
+    # a law is taken back by None, as in the bench that names the paper's
+    bench = bench_train().changed("pair 1", settings={"contact": None, "damping_ratio": 0.05})
+    assert bench.pairs["pair 1"].contact == bench.pairs["pair 1"].with_own_stiffness(damping_ratio=0.05).contact
+    assert bench.pairs["pair 2"].contact == ContactLaw.impact()
     # the paper's law is there for whoever names it
     assert meshed(contact={"kind": "impact"}).pairs["mesh"].contact == ContactLaw.impact()
+
+
+def test_laws_in_files():
+    table = {
+        "shafts": {"a": {"diameter": "30 mm"}, "b": {}},
+        "wheels": {
+            "p": {"shaft": "a", "teeth": 20, "module": "3 mm"},
+            "g": {"shaft": "b", "teeth": 60, "module": "3 mm"},
+        },
+        "meshes": {"mesh": {"driver": "p", "driven": "g", "backlash": "0.1 mm"}},
+        "bearings": {"one": {"shaft": "a"}, "two": {"shaft": "b"}},
+        "drives": {"motor": {"shaft": "a", "speed": "1500 rpm"}},
+        "loads": {"brake": {"shaft": "b", "torque": "300 N m"}},
+    }
+    plain = make_description(table).train.pairs["mesh"]
+    assert plain.contact == plain.with_own_stiffness().contact
+    table["meshes"]["mesh"] |= {"stiffness": "iso single", "damping_ratio": 0.03}
+    told = make_description(table).train.pairs["mesh"]
+    assert told.contact == told.with_own_stiffness("iso single", 0.03).contact
 
 
 def test_default_of_a_planetary_set():

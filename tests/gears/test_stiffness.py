@@ -268,13 +268,13 @@ def test_flattening_by_quadrature():
 
 @pytest.mark.slow
 def test_finite_elements_of_a_pair():
-    """Repeat a row of each table of ``docs/data/tooth_stiffness.md``."""
+    """Repeat a row of each table of ``docs/data/tooth_stiffness.txt``."""
     pytest.importorskip("skfem")
     from pathlib import Path
 
     from benchmarks.tooth_stiffness import EXAMPLES, bore_row, mean_row, pair_row
 
-    text = (Path(__file__).parents[2] / "docs" / "data" / "tooth_stiffness.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "data" / "tooth_stiffness.txt").read_text(encoding="utf-8")
     rows = [[cell.strip() for cell in line.strip("|\n ").split("|")] for line in text.splitlines()]
 
     def stored(*begin):

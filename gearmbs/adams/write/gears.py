@@ -38,14 +38,18 @@ def gear_statements(writer: WriterContext, name: str, element: GearContact) -> N
     Raises
     ------
     ModelError
-        For tilted axes, internal gears or a contact law other than IMPACT.
+        For tilted axes, internal gears or a contact law that is no IMPACT: a linear law is one with the exponent 1.
     """
     pair: Any = element.pair
     if not all(hasattr(pair, a) for a in ("wheels", "contact", "line_of_action", "working_pressure_angle")):
         raise ModelError(f"gear contact '{name}': its pair does not tell its geometry; it cannot be written")
     law = pair.contact
-    if law.kind != "impact":
+    if law.kind == "hunt-crossley":
         raise ModelError(f"gear contact '{name}': the law {law.kind!r} has no form in ADAMS; use ContactLaw.impact")
+    if getattr(pair, "stiffness_curve", "constant") != "constant":
+        raise ModelError(
+            f"gear contact '{name}': its stiffness varies along the path, which IMPACT does not; take a constant one"
+        )
     frames = [(m.global_position(), m.global_orientation()) for m in (element.i, element.j)]
     axis = frames[0][1][:, 2]
     apart = frames[1][0] - frames[0][0]

@@ -31,7 +31,7 @@ MEANINGS = {
     "signal.line_of_action": "clean signal: force on the driven gear along the line of action over its mass, m/s^2",
     "error.peak_to_peak": "transmission error, m",
     "operation.speed": "speed of the driver, rad/s",
-    "operation.torque": "load torque, N m",
+    "operation.torque": "load torque on the driven wheel, N m",
 }
 
 
