@@ -311,7 +311,7 @@ def test_what_a_case_shows_is_what_differs_and_makes_it_again(case):
     rng = np.random.default_rng((seed(), case))
     pool = [
         ("operation", "speed", "1500 rpm"), ("operation", "torque", 73.0), ("fault", "backlash", "0.2 mm"),
-        ("fault", "misalignment", 0.002), ("gears", "teeth", (21, 33)), ("solver", "tolerance", 1e-5),
+        ("fault", "misalignment", 0.002), ("gears", "teeth", (21, 33)), ("solver", "tolerance", 1e-6),
         ("shafts", "radius", "12 mm"), ("contact", "damping", "300 N s/mm"), ("friction", "enabled", False),
         ("fault", "teeth", {"kind": "broken tooth", "tooth": 3}),
     ]  # fmt: skip
