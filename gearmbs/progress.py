@@ -116,6 +116,9 @@ class Bars:
         progress, tasks = self._picture
         for name, fraction in self.done.items():
             if fraction is not None:
+                # a clock runs from the first report on: what comes before, as compiling, is not the job's
+                if not progress.tasks[tasks[name]].started:
+                    progress.start_task(tasks[name])
                 progress.update(tasks[name], total=1.0, completed=fraction)
 
     def to_html(self, seconds: float) -> str:
@@ -160,7 +163,7 @@ def _terminal_bars(names: list[str]) -> tuple[Any, dict[str, Any]]:
     console = Console(stderr=True)
     progress = Progress(*columns, TimeElapsedColumn(), console=console, refresh_per_second=4, transient=True)
     progress.start()
-    return progress, {name: progress.add_task(name, total=None) for name in names}
+    return progress, {name: progress.add_task(name, start=False, total=None) for name in names}
 
 
 @contextmanager

@@ -235,3 +235,27 @@ def test_pruning(tmp_path, monkeypatch, capsys):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["c.entry", "d.entry", "notes.txt"]
     with pytest.raises(SystemExit, match=r"days = 0\.1"):
         compiling.main(["--prune", "0.1"])
+
+
+NEEDED = """
+import gearmbs._jit as jit
+from gearmbs import _kernel_calls as calls
+used, compile_ = set(), jit.Kernel.compile
+def noted(kernel, signature):
+    used.add(calls.address(kernel))
+    return compile_(kernel, signature)
+jit.Kernel.compile = noted
+from gearmbs.studies import bench_train
+assert bench_train().build().simulate(2e-4).success
+calls.import_all()
+entries = {calls.address(k) for k in calls.entries(calls.kernels(calls.kernel_modules()))}
+print(len(used), *sorted(used - entries))
+"""
+
+
+def test_what_a_run_of_the_bench_calls_is_compiled_ahead():
+    """Each kernel that Python calls in it is an entry of the compile command, which makes nothing else to be called."""
+    done = subprocess.run([sys.executable, "-c", NEEDED], capture_output=True, text=True, check=True, timeout=300)
+    count, *left_out = done.stdout.split()
+    assert int(count) > 15
+    assert left_out == []

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import float64, int64
 
+from gearmbs._jit import njit
 from gearmbs.contact import layout as L
 from gearmbs.contact.corners import corner_gaps, set_corner
 from gearmbs.contact.deviations import add_deviations, pair_softness, roll_under_corner, tip_roll
 from gearmbs.contact.face import end_roll, limit_value, roll_difference
 from gearmbs.contact.helical_friction import helical_points
 from gearmbs.contact.helical_sections import helical_flanks, helical_normals, set_edges
-from gearmbs.contact.jit import kernel
+from gearmbs.contact.jit import CONTRACT, kernel
 from gearmbs.contact.pair import set_pair
 from gearmbs.contact.points import contact_points
 from gearmbs.contact.pose import relative_pose
 from gearmbs.contact.records import options_at, pair_at, scratch_at
 from gearmbs.contact.search import face_pair, facing_teeth, open_side, set_twist, teeth_in_reach
 from gearmbs.contact.sections import flank_normals, flank_sections
+
+_VEC, _MATRIX = float64[::1], float64[:, ::1]
 
 COLUMNS: tuple[str, ...] = (
     "side",
@@ -35,7 +39,13 @@ COLUMNS: tuple[str, ...] = (
 SIDE, TOOTH_1, TOOTH_2, SECTION, GAP, KIND, ROLL_1, ROLL_2, NORMAL, TANGENT, ALPHA, STIFFNESS = range(len(COLUMNS))
 
 
-@kernel
+# a signature, for Python calls it: kernels without one are compiled at the first call only
+@njit(
+    int64(int64[::1], _VEC, _VEC, _MATRIX, _VEC, _MATRIX, _VEC, _MATRIX, _VEC),
+    cache=True,
+    error_model="numpy",
+    fastmath=CONTRACT,
+)
 def pair_gaps(gi, gr, R1, A1, R2, A2, sections, rows, work):
     """Gap of every tooth pair on the path of contact or in reach of a tip corner, both sides, in sections of the face.
 

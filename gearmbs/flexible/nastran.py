@@ -18,7 +18,8 @@ from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.fe_model import FiniteElementModel
 from gearmbs.flexible.matrices import FileUnits
 from gearmbs.flexible.matrix_text import Path_
-from gearmbs.flexible.nastran_files import GridTable, assembly_table, check_end, op2_tables, pyyeti_module
+from gearmbs.flexible.nastran_files import GridTable, assembly_table, check_end, pyyeti_module
+from gearmbs.flexible.nastran_grids import op2_tables
 from gearmbs.units import Quantity
 
 

@@ -12,10 +12,7 @@ import scipy.sparse as sp
 
 from gearmbs.flexible.errors import FlexibleError
 
-GRID_BLOCKS = ("GEOM1", "BGPDT", "EQEXIN")
 ORDERS: tuple[Literal["little", "big"], ...] = ("little", "big")
-SAME_PLACE = 1e-4
-"""Distance of a point's places in two blocks against the size of the model: words of 4 bytes, angles in degrees."""
 FIRST_RECORDS = {"OP4": (24, 48), "op2": (4, 8)}
 """Sizes in bytes that the first record of a binary file may have, by words of 4 and 8 bytes."""
 PRINTED = bytes(range(32, 127)) + b"\t\r\n"
@@ -91,75 +88,6 @@ def axes_at(rows: np.ndarray) -> np.ndarray:
     return axes @ cylinder @ sphere
 
 
-def op2_tables(file: Path, matrices: list[str]) -> dict[str, Any]:
-    """Return matrices, eigenvalues (``lama``), weights (``ogpwg``), grid points and names of blocks of an op2 file.
-
-    Grid points are those of EQEXIN, BGPDT and GEOM1; where one of these is missing or they do not fit each other, those
-    of GEOM1 alone (:func:`~gearmbs.flexible.nastran_grids.bulk_grids`).
-
-    Raises
-    ------
-    FlexibleError
-        If the records are not whole, or there are no grid points.
-    """
-    from gearmbs.flexible.nastran_grids import bulk_grids
-
-    op2 = pyyeti_module("op2", "op2")
-    check_end(file, "op2")
-    try:
-        with op2.OP2(str(file)) as opened:
-            names = [str(name) for name in opened.dbnames]
-            lacking = [block for block in GRID_BLOCKS if not any(name.startswith(block) for name in names)]
-            found = None
-            if not lacking:
-                try:
-                    found = opened.rdparampost(get_mats=matrices or False, get_dr_tables=False)
-                    found["grids"] = GridTable.of(found["uset"])
-                except (ValueError, KeyError, IndexError):
-                    # EQEXINS beside BGPDTS of another superelement, tables of other lengths
-                    found = None
-            if found is not None:
-                _check_places(file, found["grids"])
-                return found | {"names": names}
-            grids = bulk_grids(file)
-            if grids is None:
-                missing = f"{', '.join(lacking)} {'is' if len(lacking) == 1 else 'are'} missing"
-                raise FlexibleError(
-                    f"{file.name}: it has no grid points ({missing if lacking else 'GEOM1 is without'}; GEOM1 alone "
-                    "would do); write it with PARAM,POST,-1 and without PARAM,OGEOM,NO. Data blocks: "
-                    f"{', '.join(names) or 'none'}"
-                )
-            out = {"names": names, "grids": grids, "lama": _eigenvalues(opened, names), "ogpwg": opened.rdop2gpwg()}
-            return out | opened.rdop2mats(names=matrices, lower=True) if matrices else out
-    except FlexibleError:
-        raise
-    except Exception as error:
-        text = str(error).splitlines()[0] if str(error) else ""
-        raise FlexibleError(f"{file.name}: it cannot be read as op2 ({type(error).__name__}: {text})") from None
-
-
-def _check_places(file: Path, grids: GridTable) -> None:
-    """Refuse grid points whose places in BGPDT are not those of GEOM1, where both hold the same ones."""
-    from gearmbs.flexible.nastran_grids import bulk_grids
-
-    try:
-        own = bulk_grids(file)
-    except FlexibleError:
-        # superelements, resequenced points: EQEXIN and BGPDT say what GEOM1 does not
-        return
-    if own is None or not np.array_equal(np.sort(grids.ids), own.ids):
-        return
-    order = np.argsort(grids.ids)
-    apart = np.abs(grids.positions[order] - own.positions).max(axis=1)
-    size = np.abs(own.positions).max(initial=0.0)
-    if apart.max(initial=0.0) > SAME_PLACE * size:
-        k = int(np.argmax(apart))
-        raise FlexibleError(
-            f"{file.name}: grid point {own.ids[k]} is at {own.positions[k]} in GEOM1 and at "
-            f"{grids.positions[order][k]} in BGPDT; the file is damaged, or its blocks are of different models"
-        )
-
-
 def block_records(opened: Any, block: str) -> list[bytes]:
     """Return the records of the last block of a name, without its head."""
     opened.set_position(opened.dbnames[block][-1][0][0])
@@ -174,18 +102,6 @@ def word_kinds(opened: Any) -> tuple[str, str]:
     """Return the kinds of whole numbers and of numbers with a point in a file's words."""
     order, size = opened._endian, opened._ibytes
     return f"{order}i{size}", f"{order}f{size}"
-
-
-def _eigenvalues(opened: Any, names: list[str]) -> np.ndarray | None:
-    """Return the rows of LAMA: mode, order, eigenvalue, rad/s, Hz, generalised mass and stiffness."""
-    name = next((name for name in names if name.startswith("LAMA")), None)
-    if name is None:
-        return None
-    integer, real = word_kinds(opened)
-    data = b"".join(block_records(opened, name)[1:])
-    kind = np.dtype([("mode", integer, (2,)), ("value", real, (5,))])
-    rows = np.frombuffer(data, kind)
-    return np.column_stack([rows["mode"].astype(float), rows["value"].astype(float)])
 
 
 def assembly_table(path: Path) -> GridTable:

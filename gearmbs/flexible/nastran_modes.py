@@ -15,7 +15,8 @@ from gearmbs.flexible.integrals import nodal_lumps
 from gearmbs.flexible.matrices import FileUnits
 from gearmbs.flexible.matrix_text import Path_
 from gearmbs.flexible.mnf_content import SI, ModalNeutralFile
-from gearmbs.flexible.nastran_files import GridTable, block_records, op2_tables, pyyeti_module, word_kinds
+from gearmbs.flexible.nastran_files import GridTable, block_records, pyyeti_module, word_kinds
+from gearmbs.flexible.nastran_grids import op2_tables
 from gearmbs.flexible.nastran_stress import grid_stresses
 from gearmbs.units import Quantity
 

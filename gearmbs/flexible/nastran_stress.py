@@ -10,7 +10,8 @@ import numpy as np
 from gearmbs.flexible.errors import FlexibleError
 from gearmbs.flexible.matrices import FileUnits
 from gearmbs.flexible.matrix_text import Path_
-from gearmbs.flexible.nastran_files import GridTable, op2_tables, pyyeti_module
+from gearmbs.flexible.nastran_files import GridTable, pyyeti_module
+from gearmbs.flexible.nastran_grids import op2_tables
 from gearmbs.flexible.stress import COMPONENTS, StressModes
 from gearmbs.units import Quantity
 

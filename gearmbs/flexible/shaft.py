@@ -42,7 +42,7 @@ MOST_SHEAR = 1e6
 
 
 def _is_count(value: Any) -> bool:
-    return not isinstance(value, bool) and isinstance(value, int | np.integer) and value >= 1
+    return not isinstance(value, bool) and isinstance(value, int | np.integer) and bool(value >= 1)
 
 
 @dataclass(frozen=True)

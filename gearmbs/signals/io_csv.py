@@ -37,6 +37,8 @@ ROUNDED_TIMES = 0.01
 EXACT: dict[str, Any] = (
     {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
 )
+COUNT = "gearmbs_samples"
+"""Line of the header that says how many rows follow: a table cut at the end of a row looks whole."""
 GAPS = [cell for cell in GAP_CELLS if cell not in ("inf", "-inf")]
 
 
@@ -75,7 +77,35 @@ def read_csv(
             raise SignalFileError(path, "holds no rows of numbers")
         known = [clock for clock in clocks if clock is not None]
         clock = np.concatenate(known) if known else None
-        return _record(path, np.concatenate(blocks), clock, layout, rate)
+        found = _record(path, np.concatenate(blocks), clock, layout, rate)
+        said = _end_checked(path, packed, layout, len(found.values))
+        return replace(found, notes=[*found.notes, *said]) if said else found
+
+
+def _end_checked(path: Path, packed: bool, layout: CsvLayout, count: int) -> list[str]:
+    """Return what is to be said of a table's end: a last row without an end may be cut within its last number.
+
+    Raises
+    ------
+    SignalFileError
+        Of a file of this package whose rows are fewer or more than its header says, or whose last one has no end.
+    """
+    own = number_of(layout.meta.get(COUNT))
+    if own is not None and own[0] != count:
+        raise SignalFileError(path, f"holds {count} of the {own[0]:g} samples that its header names: it is cut off")
+    if packed or _ends_a_line(path):
+        return []
+    if own is not None:
+        raise SignalFileError(path, "its last line has no end: it is cut off within a number")
+    return ["The last line has no end: if the file is cut off, its last sample is wrong."]
+
+
+def _ends_a_line(path: Path) -> bool:
+    """Return whether the last character of a text, of one to four bytes, ends a line."""
+    with path.open("rb") as raw:
+        raw.seek(0, 2)
+        raw.seek(max(0, raw.tell() - 4))
+        return raw.read().rstrip(b"\0").endswith((b"\n", b"\r"))
 
 
 def csv_pieces(
@@ -106,6 +136,7 @@ def csv_pieces(
             if checked_gaps(gaps) == "interpolate":
                 record = replace(record, values=_filled(record.values))
             yield record, fraction
+        _end_checked(path, packed, layout, count)
 
 
 def _filled(values: np.ndarray) -> np.ndarray:
@@ -254,6 +285,7 @@ def write_csv(record: Record, path: Path, packed: bool, progress: Progress | Non
             for key, value in meta.items():
                 if value is not None:
                     text.write(f"# {key}: {json.dumps(value)}\n")
+            text.write(f"# {COUNT}: {len(record.values)}\n")
             if record.attrs:
                 text.write(f"# attrs: {json.dumps(plain(record.attrs))}\n")
             cells = [f"{name} [{unit}]" for name, unit in zip(record.names, record.units)]

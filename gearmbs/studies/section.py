@@ -125,10 +125,11 @@ class Section(BaseModel, metaclass=_OneError):
         return made
 
     def __repr_args__(self) -> Any:
-        """What was set, quantities as they were written; pydantic makes the text of it."""
-        for name in type(self).model_fields:
-            if name in self.model_fields_set:
-                yield name, self.written.get(name, getattr(self, name))
+        """What differs from the defaults, quantities as they were written; pydantic makes the text of it."""
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            if name in self.model_fields_set and value != field.get_default(call_default_factory=True):
+                yield name, self.written.get(name, value)
 
     @property
     def written(self) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from scipy.signal import find_peaks
 
 from gearmbs.progress import waiting
 from gearmbs.signals import order_map, order_track, spectrogram, waterfall
-from gearmbs.view.figure_style import COLOURS, drawn_on, label, legend_below, look
+from gearmbs.view.figure_style import COLOURS, drawn_on, label, legend_below, look, scaling_name
 from gearmbs.view.speed_maps import (
     RANGE_DB,
     RPM,
@@ -81,7 +81,7 @@ def spectrogram_plot(
             if "speed" not in table.coords:
                 raise ValueError("orders: the speed is not known; pass speed=...")
             mark_orders(panel, table["time"].values, table["speed"].values / math.tau, orders, table)
-        put_title(panel, title, data)
+        put_title(panel, title, data, table)
     return figure
 
 
@@ -128,7 +128,7 @@ def order_map_plot(
         panel.set_ylabel("time, s" if over == "time" else "speed, rpm")
         for order in marked:
             mark_top(panel, order, f"{order:g}×")
-        put_title(panel, title, data)
+        put_title(panel, title, data, table)
     return figure
 
 
@@ -191,7 +191,7 @@ def waterfall_plot(
                 tag(panel, float(x[shown][-1]), float(speeds[shown][-1]), f"{order:g}×", colour)
         panel.set_xlabel("frequency, Hz")
         panel.set_ylabel("speed, rpm")
-        put_title(panel, title, data)
+        put_title(panel, title, data, table)
     return figure
 
 
@@ -236,11 +236,9 @@ def order_track_plot(
             panel.set_ylim(bottom=0.0)
         panel.margins(x=0)
         panel.set_xlabel("time, s" if over == "time" else "speed, rpm")
-        panel.set_ylabel(
-            label(str(table.attrs.get("scaling", "amplitude")).replace("rms", "RMS"), table.attrs["units"])
-        )
+        panel.set_ylabel(label(scaling_name(table.attrs.get("scaling")), table.attrs["units"]))
         legend_below(panel, 5)
-        put_title(panel, title, data)
+        put_title(panel, title, data, table)
     return figure
 
 

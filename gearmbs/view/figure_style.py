@@ -99,6 +99,14 @@ def label(quantity: str, unit: object = "") -> str:
     return f"{quantity}, {text}" if text else quantity
 
 
+SCALINGS = {"amplitude": "peak amplitude", "rms": "RMS", "power": "mean square", "density": "power density"}
+
+
+def scaling_name(scaling: object) -> str:
+    """Return what the values of a spectrum are, by its attribute ``scaling``: of a sine its peak, its RMS and so on."""
+    return SCALINGS.get(str(scaling or "amplitude"), str(scaling))
+
+
 def legend_below(ax: Axes, columns: int = 3) -> None:
     """Put the legend under the axes where it hides no data."""
     handles, labels = ax.get_legend_handles_labels()

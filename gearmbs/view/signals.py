@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gearmbs.view.figure_style import BLUE, VERMILLION, drawn_on, label, look, new_figure
+from gearmbs.view.figure_style import BLUE, VERMILLION, drawn_on, label, look, new_figure, scaling_name
 
 MAX_POINTS = 20_000
 """More points than this in a line are drawn as the envelope of minima and maxima."""
@@ -153,13 +153,12 @@ def _lines(spectrum, dim, xlabel, mesh, mesh_name, harmonics, sideband, maximum,
     shown = x <= top
     if shown.sum() < 2:
         raise ValueError(f"maximum is {maximum}; the {dim} axis spans {x[0]:g} to {x[-1]:g}")
-    scaling = str(spectrum.attrs.get("scaling", "amplitude"))
-    names = {"rms": "RMS", "density": "power density"}
+    scaling = scaling_name(spectrum.attrs.get("scaling"))
     with look():
         figure, panels = _panels(len(columns), ax, 2.5)
         for panel, (name, unit, values) in zip(panels, columns):
             panel.plot(*thinned(x[shown], values[shown]), color=BLUE, linewidth=0.9)
-            panel.set_ylabel(label(names.get(scaling, scaling), unit))
+            panel.set_ylabel(label(scaling, unit))
             _name(panel, name, len(columns))
             panel.set_xlim(0.0, top)
             peak = float(np.nanmax(values[shown], initial=0.0))

@@ -13,7 +13,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from gearmbs.signals.any_data import in_si
-from gearmbs.view.figure_style import BLACK, COLOURS, VERMILLION, label
+from gearmbs.view.figure_style import BLACK, COLOURS, VERMILLION, label, scaling_name
 
 RPM = 30.0 / math.pi
 RANGE_DB = 60.0
@@ -54,7 +54,9 @@ def by_speed(table: xr.DataArray) -> xr.DataArray:
     order = np.argsort(speeds[good], kind="stable")
     unique, first = np.unique(speeds[good][order], return_index=True)
     rows = np.maximum.reduceat(values[good][order], first, axis=0)
-    return xr.DataArray(rows, dims=("speed", other), coords={"speed": unique, other: table[other]}, attrs=table.attrs)
+    kept = {"channel": table["channel"]} if "channel" in table.coords else {}
+    coords = {"speed": unique, other: table[other].values, **kept}
+    return xr.DataArray(rows, dims=("speed", other), coords=coords, attrs=table.attrs)
 
 
 def draw_map(figure: Figure, panel: Axes, table: xr.DataArray, x: str, y: str, decibels: float) -> None:
@@ -73,8 +75,10 @@ def draw_map(figure: Figure, panel: Axes, table: xr.DataArray, x: str, y: str, d
         across, upward, level, cmap=COLOUR_MAP, vmin=-decibels, vmax=0.0, shading="flat", rasterized=True
     )
     panel.grid(False)
-    unit = str(table.attrs.get("units", ""))
-    bar = figure.colorbar(mesh, ax=panel, pad=0.02, label=f"dB re {top:.3g} {label('', unit).lstrip(', ')}".rstrip())
+    unit, name = str(table.attrs.get("units", "")), scaling_name(table.attrs.get("scaling"))
+    bar = figure.colorbar(
+        mesh, ax=panel, pad=0.02, label=f"{name}, dB re {top:.3g} {label('', unit).lstrip(', ')}".rstrip()
+    )
     bar.outline.set_visible(False)  # type: ignore[operator]
     panel.set_xlim(across[0], across[-1])
     panel.set_ylim(upward[0], upward[-1])
@@ -115,8 +119,8 @@ def stack_lines(panel: Axes, table: xr.DataArray, decibels: float | None) -> Non
     else:
         rows, speeds = table.values, table["speed"].values * RPM
     x = table["frequency"].values
+    top, unit = float(rows.max()), str(table.attrs.get("units", ""))
     if decibels is not None:
-        top = float(rows.max())
         factor = 10.0 if table.attrs.get("scaling") in ("power", "density") else 20.0
         with np.errstate(divide="ignore"):
             rows = np.clip(factor * np.log10(rows / top), -decibels, 0.0) + decibels
@@ -129,6 +133,14 @@ def stack_lines(panel: Axes, table: xr.DataArray, decibels: float | None) -> Non
         line = LineCollection([np.column_stack([x, speed + row])], colors=[COLOURS[0]], linewidths=0.8)
         line.set_zorder(1.0 + 1e-3 * (zorder + 0.5))
         panel.add_collection(line)
+    # a bar as tall as the highest line says how high lines are
+    means = label(scaling_name(table.attrs.get("scaling")), f"{top:.3g} {label('', unit).lstrip(', ')}".strip())
+    low = float(speeds[-1]) + 0.02 * height
+    panel.plot([1.012] * 2, [low, low + height], transform=panel.get_yaxis_transform(), color=BLACK, linewidth=2.0,
+               clip_on=False, solid_capstyle="butt")  # fmt: skip
+    panel.annotate(f"{means}" + (f"; {decibels:g} dB" if decibels is not None else ""), (1.02, low + 0.5 * height),
+                   xycoords=panel.get_yaxis_transform(), rotation=90, va="top", fontsize=7.5,
+                   annotation_clip=False)  # fmt: skip
     panel.grid(axis="y", visible=False)
     panel.set_xlim(float(x[0]), float(x[-1]))
     panel.set_ylim(float(speeds[0]) - 0.02 * span, float(speeds[-1]) + 1.05 * height)
@@ -181,7 +193,11 @@ def tag(panel: Axes, x: float, y: float, text: str, colour: str, inside: bool = 
     )
 
 
-def put_title(panel: Axes, title: str | None, data: xr.DataArray) -> None:
+def put_title(panel: Axes, title: str | None, data: xr.DataArray, table: xr.DataArray) -> None:
+    """Put the title over a panel; of data with several channels it says which one is drawn."""
+    if data.sizes.get("channel", 1) > 1 and "channel" in table.coords:
+        name = str(table["channel"].values).replace("_", " ")
+        title = f"{title}: {name}" if title else name
     if title:
         panel.set_title(title, wrap=True, pad=14 if panel.texts else 6)
 

@@ -22,6 +22,7 @@ from gearmbs.signals import (
     units_of,
     write_signal,
 )
+from tests.generators import cases, seed
 
 NAMES = {
     "csv": "x.csv",
@@ -418,3 +419,46 @@ def test_rounded_times_are_no_uneven_clock_if_the_rate_is_known(tmp_path):
     # another rate than the mean of the times is a contradiction, not a rounding
     with pytest.raises(SignalFileError, match="strays"):
         read_signal(tmp_path / "x.csv", rate=10000.0)
+
+
+WHOLE = (".csv", ".txt", ".csv.gz", ".npz", ".mat", ".h5", ".wav", ".uff")
+
+
+@pytest.mark.parametrize("ending", WHOLE)
+def test_a_file_of_ours_cut_anywhere_is_refused(tmp_path, ending):
+    values = np.round(np.random.default_rng(0).normal(size=(300, 2)), 6)
+    path = tmp_path / f"a{ending}"
+    write_signal(make_signal(values, 1000.0, units="m/s^2", speed=100.0, teeth=20), path)
+    data = path.read_bytes()
+    rng = np.random.default_rng(seed())
+    sizes = [*rng.integers(0, len(data), cases(25)), *rng.integers(int(0.97 * len(data)), len(data), 10)]
+    rows = [k + 1 for k in range(len(data) - 400, len(data) - 1) if data[k : k + 1] == b"\n"]
+    for size in [*sizes, *(rows if ending in (".csv", ".txt") else [])]:
+        path.write_bytes(data[:size])
+        with pytest.raises(SignalError):
+            read_signal(path)
+    path.write_bytes(data)
+    np.testing.assert_allclose(read_signal(path).values, values, atol=1e-9 if ending != ".wav" else 1e-4)
+
+
+@pytest.mark.parametrize("columns", [1, 2, 3])
+def test_a_table_of_others_cut_within_a_number_says_so(tmp_path, columns):
+    """Refused, remarked on, or whole rows and nothing else: never another last number without a word."""
+    values = np.round(np.random.default_rng(columns).normal(size=(200, columns)), 6)
+    text = "".join(",".join(repr(float(x)) for x in row) + "\n" for row in values)
+    path = tmp_path / "a.csv"
+    rng = np.random.default_rng((seed(), columns))
+    for size in rng.integers(len(text) // 2, len(text), cases(60)):
+        path.write_text(text[:size])
+        try:
+            found = read_signal(path, rate=1000.0)
+        except SignalError:
+            continue
+        if "The last line has no end" in " ".join(found.attrs.get("notes", ())):
+            assert not text[:size].endswith("\n")
+            continue
+        np.testing.assert_array_equal(found.values, values[: found.sizes["time"]])
+    path.write_text(text)
+    assert "notes" not in read_signal(path, rate=1000.0).attrs
+    path.write_text(text.rstrip("\n"))
+    np.testing.assert_array_equal(read_signal(path, rate=1000.0).values, values)

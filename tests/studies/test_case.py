@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from gearmbs.studies import Case, CaseError, load_case, make_case, paper_cases
+from gearmbs.studies import case as case_module
 from gearmbs.studies.case import CaseWarning, Gears, Operation
+from tests.generators import cases, seed
 
 FILE = """
 name = "tilted"
@@ -301,3 +303,25 @@ def test_names_that_are_no_fields_are_refused_like_keys():
         setattr(case, "bogus", 3)  # noqa: B010
     with pytest.raises(CaseError, match=r"gears\.tooth: unknown key.*did you mean teeth"):
         setattr(case.gears, "tooth", 3)  # noqa: B010
+
+
+@pytest.mark.parametrize("case", range(cases(20)))
+def test_what_a_case_shows_is_what_differs_and_makes_it_again(case):
+    """Changed and changed back, with units or in SI: the text has no default and is a program for the same case."""
+    rng = np.random.default_rng((seed(), case))
+    pool = [
+        ("operation", "speed", "1500 rpm"), ("operation", "torque", 73.0), ("fault", "backlash", "0.2 mm"),
+        ("fault", "misalignment", 0.002), ("gears", "teeth", (21, 33)), ("solver", "tolerance", 1e-6),
+        ("shafts", "radius", "12 mm"), ("contact", "damping", "300 N s/mm"), ("friction", "enabled", False),
+        ("fault", "teeth", {"kind": "broken tooth", "tooth": 3}),
+    ]  # fmt: skip
+    changed, wanted = Case(name="one"), set()
+    for k in rng.choice(len(pool), int(rng.integers(1, 5)), replace=False):
+        section, field, value = pool[k]
+        changed = changed.changed(**{section: {field: value}})
+        wanted.add(field)
+    text = repr(changed)
+    assert eval(text, vars(case_module)) == changed
+    for name in ("exponent", "density", "settling", "lump", "youngs_modulus"):
+        assert name not in text
+    assert all(f"{field}=" in text for field in wanted)

@@ -1,5 +1,7 @@
 """Figures of records whose speed changes."""
 
+import io
+
 import numpy as np
 import pytest
 
@@ -26,15 +28,15 @@ def signal():
         (waterfall_plot, {"orders": [10], "steps": 10}, ("frequency, Hz", "speed, rpm")),
         (waterfall_plot, {"style": "map", "maximum": 800.0}, ("frequency, Hz", "speed, rpm")),
         (waterfall_plot, {"decibels": 40.0}, ("frequency, Hz", "speed, rpm")),
-        (order_track_plot, {"orders": [10]}, ("speed, rpm", "amplitude, m/s²")),
-        (order_track_plot, {"orders": [10], "over": "time", "log": True}, ("time, s", "amplitude, m/s²")),
+        (order_track_plot, {"orders": [10]}, ("speed, rpm", "peak amplitude, m/s²")),
+        (order_track_plot, {"orders": [10], "over": "time", "log": True}, ("time, s", "peak amplitude, m/s²")),
     ],
 )
 def test_a_signal_is_drawn_with_labels(signal, draw, settings, labels):
     figure = draw(signal, channel="b", title="run-up", **settings)
     panel = figure.axes[0]
     assert (panel.get_xlabel(), panel.get_ylabel()) == labels
-    assert panel.get_title(loc="left") == "run-up"
+    assert panel.get_title(loc="left") == "run-up: b"
     assert len(png_bytes(figure, 50)) > 5000
 
 
@@ -76,3 +78,15 @@ def test_campbell_diagram_over_a_measurement(signal):
 def test_wrong_calls_name_the_argument(signal, call, said):
     with pytest.raises(ValueError, match=said):
         call(signal)
+
+
+def test_a_waterfall_has_a_scale(signal):
+    """The bar beside the lines is as tall as the highest of them, and says how much that is, as a peak."""
+    figure = waterfall_plot(signal, channel="b")
+    panel = figure.axes[0]
+    bar = next(line for line in panel.lines if list(line.get_xdata()) == [1.012, 1.012])
+    tall = float(np.ptp(bar.get_ydata()))
+    heights = [np.ptp(lines.get_segments()[0][:, 1]) for lines in panel.collections if hasattr(lines, "get_segments")]
+    assert max(heights) == pytest.approx(tall, rel=0.05)
+    assert any(text.get_text().startswith("peak amplitude, ") for text in panel.texts)
+    figure.savefig(io.BytesIO(), format="png")

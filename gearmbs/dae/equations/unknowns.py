@@ -119,7 +119,7 @@ def offsets(counts: Counts, formulation: int) -> dict[str, int]:
         "F": 3 * counts.forces,
         "N": 3 * counts.torques,
         "z": counts.states,
-        "mu": counts.rows if has_rate_rows(formulation) else 0,
+        "mu": counts.rows if has_rate_rows.py_func(formulation) else 0,
     }
     at, next_free = {}, 0
     for block in BLOCKS:
@@ -208,7 +208,7 @@ def error_mask(at: dict[str, int], formulation: int, states: np.ndarray) -> np.n
     mask = np.zeros(at["n"], dtype=bool)
     mask[at["R"] : at["lambda"]] = True
     mask[at["z"] : at["mu"]] = states
-    if has_rate_rows(formulation):
+    if has_rate_rows.py_func(formulation):
         mask[velocities(at)] = True
     return mask
 
@@ -283,7 +283,7 @@ def named(
     owners = {"lambda": rows, "F": forces, "N": torques, "z": states, "mu": rows}
     out: list[Unknown] = []
     for block, (meaning, equation, unit) in BLOCKS.items():
-        if block == "mu" and not has_rate_rows(formulation):
+        if block == "mu" and not has_rate_rows.py_func(formulation):
             continue
         if block in MODAL:
             names = [f"{block}_{k + 1}({body})" for body, n in zip(bodies, counts.modes) for k in range(n)]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from numba import float64, int64
+from numba import float64, int64, void
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.ordered_bits import bits_of, double_of
+from gearmbs.dae.integrators.run_state import STATE_TYPE
 
 _VEC = float64[::1]
 
@@ -32,7 +33,7 @@ def weighted_argmax(v, weight):
     return where
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(void(STATE_TYPE, _VEC, float64), cache=True, nogil=True, error_model="numpy")
 def set_weights(st, y, h):
     """Set the weights of the error test and of the corrector test from the tolerances at ``y``.
 
