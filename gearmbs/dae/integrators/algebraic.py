@@ -69,6 +69,10 @@ RATE_OF_MATRIX = 1e8
 """Leading coefficient in units of the reciprocal step from which dG/dy' is read off: the rest is 1e-8 of it."""
 MAX_POINTS = 8
 """Points of a polynomial of the highest order, and one to spare."""
+MOST_RANKED = 200
+"""Unknowns up to which the rank of dG/dx' is looked at, in some milliseconds."""
+RANK = 1e-8
+"""Singular value of the equilibrated dG/dx' below which it counts as zero: rounding of differences over a thousandth."""
 PROBE = 1e-6
 PROBE_OF_RATE = 1e-3
 
@@ -580,6 +584,31 @@ def _chosen(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
     return wanted, algebraic
 
 
+def _has_hidden_constraints(problem: DAEProblem) -> bool:
+    """Return whether the rates of the differential unknowns depend on each other at the start: dG/dx' has a null space.
+
+    Sums of equations are free of rates then, as in circuits of capacities without a path to the ground.
+    """
+    y, yp = problem.y0.astype(float), problem.yp0.astype(float)
+    tables = problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
+    base, moved = np.empty(problem.n), np.empty(problem.n)
+    problem.residual(float(problem.t0), y, yp, base, *tables)
+    columns = []
+    for j in np.flatnonzero(problem.differential):
+        d = PROBE_OF_RATE * max(1.0, abs(yp[j]))
+        kept, yp[j] = yp[j], yp[j] + d
+        problem.residual(float(problem.t0), y, yp, moved, *tables)
+        yp[j] = kept
+        columns.append((moved - base) / d)
+    matrix = np.array(columns).T
+    if not np.isfinite(matrix).all():
+        return True
+    for axis in (1, 0):
+        largest = np.abs(matrix).max(axis=axis, keepdims=True)
+        matrix = matrix / np.where(largest > 0.0, largest, 1.0)
+    return bool(np.linalg.matrix_rank(matrix, RANK) < matrix.shape[1])
+
+
 class AlgebraicOutputs:
     """What is solved for at outputs of a problem, and what is not.
 
@@ -652,6 +681,16 @@ class AlgebraicOutputs:
     def is_needed(self) -> bool:
         """Whether there is anything to solve for."""
         return self.part.count > 0
+
+    @property
+    def is_constrained(self) -> bool:
+        """Whether there are unknowns of index two or more, or what stands for them without error control."""
+        problem = self.problem
+        of_mechanism = problem.solved_at_outputs is not None
+        integrated = bool((problem.differential & ~np.asarray(problem.error_mask, dtype=bool)).any())
+        if of_mechanism or integrated or bool(self.part.any_lifted) or len(self.left) > 0:
+            return True
+        return problem.n > MOST_RANKED or _has_hidden_constraints(problem)
 
     @property
     def functions(self) -> Any:

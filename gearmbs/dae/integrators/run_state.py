@@ -103,6 +103,7 @@ class RunState(Struct):
     fixed_leading: bool  # GSTIFF
     interpolate: bool  # outputs by interpolation, or by steps that land on them
     has_hook: bool
+    constrained: bool  # whether there are multipliers, or what is like them: unknowns of index two and more
     keep_rows: bool  # whether y of every step is recorded
     step_in_weights: bool  # whether the size of the step enters the weights of the corrector test
     # where the run stands
