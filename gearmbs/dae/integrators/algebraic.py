@@ -24,6 +24,7 @@ References
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -69,10 +70,12 @@ RATE_OF_MATRIX = 1e8
 """Leading coefficient in units of the reciprocal step from which dG/dy' is read off: the rest is 1e-8 of it."""
 MAX_POINTS = 8
 """Points of a polynomial of the highest order, and one to spare."""
+MOST_TOGETHER = 300
+"""Equations that are solved together at an instant: their full matrix is factored in some 10 ms."""
 MOST_RANKED = 200
 """Unknowns up to which the rank of dG/dx' is looked at, in some milliseconds."""
 RANK = 1e-8
-"""Singular value of the equilibrated dG/dx' below which it counts as zero: rounding of differences over a thousandth."""
+"""Singular value of the equilibrated dG/dx' below which it counts as zero, as rounding."""
 PROBE = 1e-6
 PROBE_OF_RATE = 1e-3
 
@@ -264,7 +267,8 @@ def _take(part, y, yp, x):
 def _iterate(functions, part, t, y, yp, h, wide, fresh, idata, rdata, work):
     """Correct the unknowns with the present matrix; return whether they converge as from a guess near their root.
 
-    Constraints are differenced over a part of ``wide``. With a ``fresh`` matrix an iteration that gets no further within the tolerance is at the level of rounding.
+    Constraints are differenced over a part of ``wide``.
+    With a ``fresh`` matrix an iteration that gets no further within the tolerance is at the level of rounding.
     """
     f, cols = part.f, part.cols
     previous = np.inf
@@ -563,15 +567,29 @@ def _determined(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return match, determined
 
 
-def _needed(edges: np.ndarray, match: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Return the columns that the matched rows of ``wanted`` hold, those that theirs hold, and so on."""
-    found, open_ones = set(wanted.tolist()), wanted.tolist()
-    while open_ones:
-        for c in np.flatnonzero(edges[match[open_ones.pop()]]).tolist():
-            if c not in found:
-                found.add(c)
-                open_ones.append(c)
-    return np.array(sorted(found), dtype=np.int64)
+def _needed(edges: np.ndarray, match: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the columns that the matched rows of ``wanted`` hold, those that theirs hold, and so on.
+
+    Returns
+    -------
+    needed : ndarray of int
+    coupled : ndarray of int
+        Those of ``wanted`` that would need more than `MOST_TOGETHER`, and are left.
+    """
+    needed: set[int] = set()
+    coupled: set[int] = set()
+    for first in wanted.tolist():
+        found, open_ones = {first}, [first]
+        while open_ones and len(found | needed) <= MOST_TOGETHER and not found & coupled:
+            for c in np.flatnonzero(edges[match[open_ones.pop()]]).tolist():
+                if c not in found and c not in needed:
+                    found.add(c)
+                    open_ones.append(c)
+        if open_ones:
+            coupled.add(first)
+        else:
+            needed |= found
+    return np.array(sorted(needed), dtype=np.int64), np.array(sorted(coupled), dtype=np.int64)
 
 
 def _chosen(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
@@ -609,6 +627,26 @@ def _has_hidden_constraints(problem: DAEProblem) -> bool:
     return bool(np.linalg.matrix_rank(matrix, RANK) < matrix.shape[1])
 
 
+def _new_part(m: int, n: int, nnz: int, entries: int) -> AlgebraicPart:
+    """Return room for m equations among those of n unknowns, with ``nnz`` entries, ``entries`` of them in these."""
+    return AlgebraicPart(
+        count=m,
+        **{name: np.zeros(m, dtype=np.int64) for name in ("rows", "lifted", "cols", "rates", "pivots")},
+        **{name: np.zeros(entries, dtype=np.int64) for name in ("entry_row", "entry_col", "entry_at", "entry_kind")},
+        **{name: np.zeros(m) for name in ("scale", "f", "guess", "last", "known")},
+        **{name: np.zeros(n) for name in ("atol", "res", "y_moved", "yp_kept")},
+        **{name: np.zeros(nnz) for name in ("vals", "vals_of_rates")},
+        **{name: np.zeros(MAX_POINTS) for name in ("value", "slope")},
+        lu=np.zeros((m, m)),
+    )
+
+
+@cache
+def _nothing() -> AlgebraicPart:
+    """Return the part of problems without anything to solve for: compiled code but looks at its count."""
+    return _new_part(0, 0, 0, 0)
+
+
 class AlgebraicOutputs:
     """What is solved for at outputs of a problem, and what is not.
 
@@ -617,33 +655,37 @@ class AlgebraicOutputs:
     part : AlgebraicPart
     left : ndarray of int
         Algebraic unknowns outside error control that the equations do not determine at an instant.
+    coupled : ndarray of int
+        Those that hang on too many others.
     """
 
     def __init__(self, problem: DAEProblem, atol: np.ndarray, rtol: float) -> None:
         self.problem = problem
         wanted, solved = _chosen(problem)
         self.left = np.empty(0, dtype=np.int64)
-        rows = cols = np.empty(0, dtype=np.int64)
-        lifted = rates = by_y = by_rate = np.zeros((0, 0), dtype=bool)
+        self.coupled = self.left
+        # scratch of polynomials is not shared between threads
+        self.part = _nothing().with_members(value=np.zeros(MAX_POINTS), slope=np.zeros(MAX_POINTS))
+        if not wanted.any():
+            return
         n = problem.n
-        if wanted.any():
-            by_y, by_rate = _dependences(problem)
-            unknown = np.concatenate((solved & by_y.any(axis=0), by_rate.any(axis=0) & problem.differential))
-            edges = np.concatenate((by_y, by_rate), axis=1) & unknown
-            constraints = ~edges.any(axis=1) & ~by_y[:, ~problem.differential].any(axis=1)
-            edges[constraints, n:] = by_y[constraints] & unknown[n:]
-            match, determined = _determined(edges)
-            determined &= unknown
-            asked = np.flatnonzero(wanted)
-            self.left = asked[~determined[asked]]
-            found = _needed(edges, match, asked[determined[asked]])
-            rows, cols = match[found].astype(np.int64), found % n
-            rates, lifted = found >= n, constraints[rows]
-        self.part = self._made(rows, cols, lifted, rates, atol, rtol, (by_y, by_rate))
+        by_y, by_rate = _dependences(problem)
+        unknown = np.concatenate((solved & by_y.any(axis=0), by_rate.any(axis=0) & problem.differential))
+        edges = np.concatenate((by_y, by_rate), axis=1) & unknown
+        constraints = ~edges.any(axis=1) & ~by_y[:, ~problem.differential].any(axis=1)
+        edges[constraints, n:] = by_y[constraints] & unknown[n:]
+        match, determined = _determined(edges)
+        determined &= unknown
+        asked = np.flatnonzero(wanted)
+        self.left = asked[~determined[asked]]
+        found, self.coupled = _needed(edges, match, asked[determined[asked]])
+        if found.size:
+            rows = match[found].astype(np.int64)
+            self.part = self._made(rows, found % n, constraints[rows], found >= n, atol, rtol, (by_y, by_rate))
 
     def _made(self, rows, cols, lifted, rates, atol, rtol, by) -> AlgebraicPart:
         """Return the compiled loop's part of it."""
-        problem, m = self.problem, len(rows)
+        problem = self.problem
         place = {int(row): k for k, row in enumerate(rows)}
         entries: list[tuple[int, int, int, int]] = []
         for c, (j, is_rate) in enumerate(zip(cols, rates)):
@@ -654,28 +696,14 @@ class AlgebraicOutputs:
                 table = by[1] if is_rate and not lifted[k] else by[0]
                 if table[rows[k], j]:
                     entries.append((k, c, p, int(is_rate and not lifted[k])))
-        lists = np.array(entries, dtype=np.int64).reshape(-1, 4).T
-        n, nnz = (problem.n, len(problem.indices)) if m else (0, 0)
-        return AlgebraicPart(
-            count=m,
-            any_lifted=bool(np.any(lifted)),
-            any_rates=bool(np.any(rates)),
-            rtol=rtol,
-            rows=rows,
-            cols=cols,
-            lifted=np.asarray(lifted, dtype=np.int64).ravel(),
-            rates=np.asarray(rates, dtype=np.int64).ravel(),
-            **dict(zip(("entry_row", "entry_col", "entry_at", "entry_kind"), map(np.ascontiguousarray, lists))),
-            atol=np.array(atol, dtype=float),
-            vals=np.zeros(nnz),
-            vals_of_rates=np.zeros(nnz),
-            lu=np.zeros((m, m)),
-            pivots=np.zeros(m, dtype=np.int64),
-            **{name: np.zeros(m) for name in ("scale", "f", "guess", "last", "known")},
-            **{name: np.zeros(n) for name in ("res", "y_moved", "yp_kept")},
-            value=np.zeros(MAX_POINTS),
-            slope=np.zeros(MAX_POINTS),
-        )
+        part = _new_part(len(rows), problem.n, len(problem.indices), len(entries))
+        part.rtol = rtol
+        part.any_lifted, part.any_rates = bool(lifted.any()), bool(rates.any())
+        part.rows[:], part.cols[:], part.lifted[:], part.rates[:] = rows, cols, lifted, rates
+        part.atol[:] = atol
+        lists = np.array(entries, dtype=np.int64).reshape(-1, 4)
+        part.entry_row[:], part.entry_col[:], part.entry_at[:], part.entry_kind[:] = lists.T
+        return part
 
     @property
     def is_needed(self) -> bool:
@@ -688,7 +716,7 @@ class AlgebraicOutputs:
         problem = self.problem
         of_mechanism = problem.solved_at_outputs is not None
         integrated = bool((problem.differential & ~np.asarray(problem.error_mask, dtype=bool)).any())
-        if of_mechanism or integrated or bool(self.part.any_lifted) or len(self.left) > 0:
+        if of_mechanism or integrated or bool(self.part.any_lifted) or len(self.left) or len(self.coupled):
             return True
         return problem.n > MOST_RANKED or _has_hidden_constraints(problem)
 
@@ -723,13 +751,15 @@ class AlgebraicOutputs:
         """Say which unknowns are known at the steps alone, and where they could not be solved for."""
         problem, part = self.problem, self.part
         parts = []
-        if len(self.left):
-            parts.append(
-                f"Between the steps {list_names(problem, self.left)} {'are' if len(self.left) > 1 else 'is'} "
-                "interpolated without control of the error: no equation and no derivative of one determines "
-                f"{'them' if len(self.left) > 1 else 'it'} at an instant. State a problem of index one or two, or put "
-                "error_mask on what is asked for."
-            )
+        of_mechanism = problem.solved_at_outputs is not None
+        remedy = "" if of_mechanism else " State a problem of index one or two, or put it under error_mask."
+        for unknowns, why in (
+            (self.left, f"no equation and no derivative of one determines it at an instant.{remedy}"),
+            (self.coupled, f"it hangs on more than {MOST_TOGETHER} others. Put it under error_mask."),
+        ):
+            if len(unknowns):
+                names = list_names(problem, unknowns)
+                parts.append(f"Between the steps {names} is interpolated without control of the error: {why}")
         if part.failures:
             algebraic = np.unique(part.cols[part.rates == 0])
             parts.append(
