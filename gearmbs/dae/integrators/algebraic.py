@@ -24,8 +24,8 @@ References
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
+from functools import cache, lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import float64, int64, types
@@ -61,15 +61,17 @@ SPAN_OF_CONSTRAINTS = 1e-2
 """Spacing s of the differences along the solution in units of the step, for constraints. Over four of them the error is
 s^4/30 of the fifth derivative in units of the step, 3e-10 of what a step can tell apart; rounding is divided by s h."""
 WIDER = 30.0
-WIDENINGS = 3
-"""Times 30 the span is tried where rounding of the differences exceeds the tolerance, twice: steps at a start, which
-shrink with the tolerance, are far shorter than what changes in the constraints."""
+WIDENINGS = 5
+"""Times 30 the span is tried where rounding of the differences exceeds the tolerance, up to four times: steps at starts
+shrink with the tolerance and are far shorter than what changes in the constraints."""
 SPAN_OF_SLOPES = 2e-3
 """The same for the slopes of algebraic unknowns, which may vary much faster than the step tells: by radians over it."""
 RATE_OF_MATRIX = 1e8
 """Leading coefficient in units of the reciprocal step from which dG/dy' is read off: the rest is 1e-8 of it."""
 MAX_POINTS = 8
 """Points of a polynomial of the highest order, and one to spare."""
+KNOWN = 64
+"""Structures kept."""
 MOST_TOGETHER = 300
 """Equations that are solved together at an instant: their full matrix is factored in some 10 ms."""
 MOST_RANKED = 200
@@ -592,6 +594,64 @@ def _needed(edges: np.ndarray, match: np.ndarray, wanted: np.ndarray) -> tuple[n
     return np.array(sorted(needed), dtype=np.int64), np.array(sorted(coupled), dtype=np.int64)
 
 
+class _Graph:
+    """Which unknowns and rates stand in which equations, and what is asked: all that a structure follows from.
+
+    Parameters
+    ----------
+    *lists : ndarray
+        Dependences on unknowns and on rates; wanted, solved for and differential unknowns; pattern of the matrix.
+    """
+
+    def __init__(self, *lists: np.ndarray) -> None:
+        self.lists = lists
+        self._content = tuple(items.tobytes() for items in lists)
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Graph) and self._content == other._content
+
+
+class _Structure(NamedTuple):
+    """Unknowns left, unknowns that hang on too many others; equations, unknowns and entries of an `AlgebraicPart`."""
+
+    left: np.ndarray
+    coupled: np.ndarray
+    rows: np.ndarray
+    cols: np.ndarray
+    lifted: np.ndarray
+    rates: np.ndarray
+    entries: np.ndarray
+
+
+@lru_cache(maxsize=KNOWN)
+def _structure(graph: _Graph) -> _Structure:
+    """Return what is solved for and by which equations; runs of alike problems find it once."""
+    by_y, by_rate, wanted, solved, differential, indptr, indices = graph.lists
+    n = len(wanted)
+    unknown = np.concatenate((solved & by_y.any(axis=0), by_rate.any(axis=0) & differential))
+    edges = np.concatenate((by_y, by_rate), axis=1) & unknown
+    constraints = ~edges.any(axis=1) & ~by_y[:, ~differential].any(axis=1)
+    edges[constraints, n:] = by_y[constraints] & unknown[n:]
+    match, determined = _determined(edges)
+    determined &= unknown
+    asked = np.flatnonzero(wanted)
+    found, coupled = _needed(edges, match, asked[determined[asked]])
+    rows, cols, rates = match[found].astype(np.int64), found % n, found >= n
+    lifted = constraints[rows]
+    place = {int(row): k for k, row in enumerate(rows)}
+    entries: list[tuple[int, int, int, int]] = []
+    for c, (j, is_rate) in enumerate(zip(cols, rates)):
+        for p in range(int(indptr[j]), int(indptr[j + 1])):
+            k = place.get(int(indices[p]))
+            if k is not None and (by_rate if is_rate and not lifted[k] else by_y)[rows[k], j]:
+                entries.append((k, c, p, int(is_rate and not lifted[k])))
+    table = np.array(entries, dtype=np.int64).reshape(-1, 4)
+    return _Structure(asked[~determined[asked]], coupled, rows, cols, lifted, rates, table)
+
+
 def _chosen(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
     """Return which unknowns are wanted at outputs, and which are solved for if an equation needs them."""
     algebraic = ~np.asarray(problem.differential, dtype=bool)
@@ -668,41 +728,23 @@ class AlgebraicOutputs:
         self.part = _nothing().with_members(value=np.zeros(MAX_POINTS), slope=np.zeros(MAX_POINTS))
         if not wanted.any():
             return
-        n = problem.n
         by_y, by_rate = _dependences(problem)
-        unknown = np.concatenate((solved & by_y.any(axis=0), by_rate.any(axis=0) & problem.differential))
-        edges = np.concatenate((by_y, by_rate), axis=1) & unknown
-        constraints = ~edges.any(axis=1) & ~by_y[:, ~problem.differential].any(axis=1)
-        edges[constraints, n:] = by_y[constraints] & unknown[n:]
-        match, determined = _determined(edges)
-        determined &= unknown
-        asked = np.flatnonzero(wanted)
-        self.left = asked[~determined[asked]]
-        found, self.coupled = _needed(edges, match, asked[determined[asked]])
-        if found.size:
-            rows = match[found].astype(np.int64)
-            self.part = self._made(rows, found % n, constraints[rows], found >= n, atol, rtol, (by_y, by_rate))
+        differential = np.asarray(problem.differential, dtype=bool)
+        found = _structure(
+            _Graph(by_y, by_rate, wanted, solved, differential, np.asarray(problem.indptr), np.asarray(problem.indices))
+        )
+        self.left, self.coupled = found.left, found.coupled
+        if len(found.rows):
+            self.part = self._made(found, atol, rtol)
 
-    def _made(self, rows, cols, lifted, rates, atol, rtol, by) -> AlgebraicPart:
+    def _made(self, found: _Structure, atol: np.ndarray, rtol: float) -> AlgebraicPart:
         """Return the compiled loop's part of it."""
-        problem = self.problem
-        place = {int(row): k for k, row in enumerate(rows)}
-        entries: list[tuple[int, int, int, int]] = []
-        for c, (j, is_rate) in enumerate(zip(cols, rates)):
-            for p in range(int(problem.indptr[j]), int(problem.indptr[j + 1])):
-                k = place.get(int(problem.indices[p]))
-                if k is None:
-                    continue
-                table = by[1] if is_rate and not lifted[k] else by[0]
-                if table[rows[k], j]:
-                    entries.append((k, c, p, int(is_rate and not lifted[k])))
-        part = _new_part(len(rows), problem.n, len(problem.indices), len(entries))
+        part = _new_part(len(found.rows), self.problem.n, len(self.problem.indices), len(found.entries))
         part.rtol = rtol
-        part.any_lifted, part.any_rates = bool(lifted.any()), bool(rates.any())
-        part.rows[:], part.cols[:], part.lifted[:], part.rates[:] = rows, cols, lifted, rates
+        part.any_lifted, part.any_rates = bool(found.lifted.any()), bool(found.rates.any())
+        part.rows[:], part.cols[:], part.lifted[:], part.rates[:] = found.rows, found.cols, found.lifted, found.rates
         part.atol[:] = atol
-        lists = np.array(entries, dtype=np.int64).reshape(-1, 4)
-        part.entry_row[:], part.entry_col[:], part.entry_at[:], part.entry_kind[:] = lists.T
+        part.entry_row[:], part.entry_col[:], part.entry_at[:], part.entry_kind[:] = found.entries.T
         return part
 
     @property
@@ -725,9 +767,11 @@ class AlgebraicOutputs:
         """The functions of the problem, bound together for compiled code."""
         return bind(self.problem.residual, self.problem.jacobian, no_hook, no_events)
 
-    def settle_row(self, t: float, y: np.ndarray, yp: np.ndarray, h: float, idata: np.ndarray) -> None:
-        """Settle one output in place, which lies in a step of about ``h``."""
+    def settle_start(self, t: float, y: np.ndarray, yp: np.ndarray, h: float, idata: np.ndarray) -> None:
+        """Settle the output at the start in place, in a step of about ``h``; what cannot be stays as it was given."""
+        failures = self.part.failures
         self.settle_after(t, y, yp, h, t, y, idata)
+        self.part.failures = failures
 
     def settle_after(
         self, t: float, y: np.ndarray, yp: np.ndarray, h: float, t_old: float, y_old: np.ndarray, idata: np.ndarray
