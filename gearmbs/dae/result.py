@@ -117,7 +117,8 @@ class DAEResult:
     t : ndarray, shape (m,)
         Output times reached. When the run fails these are the ones computed until then.
     y, yp : ndarray, shape (m, n)
-        Unknowns and their derivatives at ``t``, one row per time; ``yp`` is empty when it was not wanted.
+        Unknowns and their derivatives at ``t``, one row per time; ``yp`` is empty when it was not wanted. ``y`` is
+        within the tolerance; ``yp``, the slope of the interpolating polynomial, is one order less accurate.
     status : Status
         How the run ended.
     message : str

@@ -83,7 +83,8 @@ def solve_dae(
         stop there, a number to stop at that occurrence), ``restart`` (land there and start afresh, for
         discontinuities).
     t_eval : array_like, optional
-        Output times; default every step.
+        Output times; default every step. Algebraic unknowns outside error control are solved for there, see
+        `gearmbs.dae.integrators.algebraic`; where that is not possible the message says so.
     options : Options, optional
         Settings of the integrator in one object.
     **more

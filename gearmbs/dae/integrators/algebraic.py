@@ -24,7 +24,8 @@ References
 
 from __future__ import annotations
 
-from typing import Any
+from functools import cache, lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import float64, int64, types
@@ -60,15 +61,23 @@ SPAN_OF_CONSTRAINTS = 1e-2
 """Spacing s of the differences along the solution in units of the step, for constraints. Over four of them the error is
 s^4/30 of the fifth derivative in units of the step, 3e-10 of what a step can tell apart; rounding is divided by s h."""
 WIDER = 30.0
-WIDENINGS = 3
-"""Times 30 the span is tried where rounding of the differences exceeds the tolerance, twice: steps at a start, which
-shrink with the tolerance, are far shorter than what changes in the constraints."""
+WIDENINGS = 5
+"""Times 30 the span is tried where rounding of the differences exceeds the tolerance, up to four times: steps at starts
+shrink with the tolerance and are far shorter than what changes in the constraints."""
 SPAN_OF_SLOPES = 2e-3
 """The same for the slopes of algebraic unknowns, which may vary much faster than the step tells: by radians over it."""
 RATE_OF_MATRIX = 1e8
 """Leading coefficient in units of the reciprocal step from which dG/dy' is read off: the rest is 1e-8 of it."""
 MAX_POINTS = 8
 """Points of a polynomial of the highest order, and one to spare."""
+KNOWN = 64
+"""Structures kept."""
+MOST_TOGETHER = 300
+"""Equations that are solved together at an instant: their full matrix is factored in some 10 ms."""
+MOST_RANKED = 200
+"""Unknowns up to which the rank of dG/dx' is looked at, in some milliseconds."""
+RANK = 1e-8
+"""Singular value of the equilibrated dG/dx' below which it counts as zero, as rounding."""
 PROBE = 1e-6
 PROBE_OF_RATE = 1e-3
 
@@ -260,7 +269,8 @@ def _take(part, y, yp, x):
 def _iterate(functions, part, t, y, yp, h, wide, fresh, idata, rdata, work):
     """Correct the unknowns with the present matrix; return whether they converge as from a guess near their root.
 
-    Constraints are differenced over a part of ``wide``. With a ``fresh`` matrix an iteration that gets no further within the tolerance is at the level of rounding.
+    Constraints are differenced over a part of ``wide``.
+    With a ``fresh`` matrix an iteration that gets no further within the tolerance is at the level of rounding.
     """
     f, cols = part.f, part.cols
     previous = np.inf
@@ -559,15 +569,87 @@ def _determined(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return match, determined
 
 
-def _needed(edges: np.ndarray, match: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Return the columns that the matched rows of ``wanted`` hold, those that theirs hold, and so on."""
-    found, open_ones = set(wanted.tolist()), wanted.tolist()
-    while open_ones:
-        for c in np.flatnonzero(edges[match[open_ones.pop()]]).tolist():
-            if c not in found:
-                found.add(c)
-                open_ones.append(c)
-    return np.array(sorted(found), dtype=np.int64)
+def _needed(edges: np.ndarray, match: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the columns that the matched rows of ``wanted`` hold, those that theirs hold, and so on.
+
+    Returns
+    -------
+    needed : ndarray of int
+    coupled : ndarray of int
+        Those of ``wanted`` that would need more than `MOST_TOGETHER`, and are left.
+    """
+    needed: set[int] = set()
+    coupled: set[int] = set()
+    for first in wanted.tolist():
+        found, open_ones = {first}, [first]
+        while open_ones and len(found | needed) <= MOST_TOGETHER and not found & coupled:
+            for c in np.flatnonzero(edges[match[open_ones.pop()]]).tolist():
+                if c not in found and c not in needed:
+                    found.add(c)
+                    open_ones.append(c)
+        if open_ones:
+            coupled.add(first)
+        else:
+            needed |= found
+    return np.array(sorted(needed), dtype=np.int64), np.array(sorted(coupled), dtype=np.int64)
+
+
+class _Graph:
+    """Which unknowns and rates stand in which equations, and what is asked: all that a structure follows from.
+
+    Parameters
+    ----------
+    *lists : ndarray
+        Dependences on unknowns and on rates; wanted, solved for and differential unknowns; pattern of the matrix.
+    """
+
+    def __init__(self, *lists: np.ndarray) -> None:
+        self.lists = lists
+        self._content = tuple(items.tobytes() for items in lists)
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Graph) and self._content == other._content
+
+
+class _Structure(NamedTuple):
+    """Unknowns left, unknowns that hang on too many others; equations, unknowns and entries of an `AlgebraicPart`."""
+
+    left: np.ndarray
+    coupled: np.ndarray
+    rows: np.ndarray
+    cols: np.ndarray
+    lifted: np.ndarray
+    rates: np.ndarray
+    entries: np.ndarray
+
+
+@lru_cache(maxsize=KNOWN)
+def _structure(graph: _Graph) -> _Structure:
+    """Return what is solved for and by which equations; runs of alike problems find it once."""
+    by_y, by_rate, wanted, solved, differential, indptr, indices = graph.lists
+    n = len(wanted)
+    unknown = np.concatenate((solved & by_y.any(axis=0), by_rate.any(axis=0) & differential))
+    edges = np.concatenate((by_y, by_rate), axis=1) & unknown
+    constraints = ~edges.any(axis=1) & ~by_y[:, ~differential].any(axis=1)
+    edges[constraints, n:] = by_y[constraints] & unknown[n:]
+    match, determined = _determined(edges)
+    determined &= unknown
+    asked = np.flatnonzero(wanted)
+    found, coupled = _needed(edges, match, asked[determined[asked]])
+    rows, cols, rates = match[found].astype(np.int64), found % n, found >= n
+    lifted = constraints[rows]
+    place = {int(row): k for k, row in enumerate(rows)}
+    entries: list[tuple[int, int, int, int]] = []
+    for c, (j, is_rate) in enumerate(zip(cols, rates)):
+        for p in range(int(indptr[j]), int(indptr[j + 1])):
+            k = place.get(int(indices[p]))
+            if k is not None and (by_rate if is_rate and not lifted[k] else by_y)[rows[k], j]:
+                entries.append((k, c, p, int(is_rate and not lifted[k])))
+    table = np.array(entries, dtype=np.int64).reshape(-1, 4)
+    return _Structure(asked[~determined[asked]], coupled, rows, cols, lifted, rates, table)
 
 
 def _chosen(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
@@ -580,6 +662,51 @@ def _chosen(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
     return wanted, algebraic
 
 
+def _has_hidden_constraints(problem: DAEProblem) -> bool:
+    """Return whether the rates of the differential unknowns depend on each other at the start: dG/dx' has a null space.
+
+    Sums of equations are free of rates then, as in circuits of capacities without a path to the ground.
+    """
+    y, yp = problem.y0.astype(float), problem.yp0.astype(float)
+    tables = problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
+    base, moved = np.empty(problem.n), np.empty(problem.n)
+    problem.residual(float(problem.t0), y, yp, base, *tables)
+    columns = []
+    for j in np.flatnonzero(problem.differential):
+        d = PROBE_OF_RATE * max(1.0, abs(yp[j]))
+        kept, yp[j] = yp[j], yp[j] + d
+        problem.residual(float(problem.t0), y, yp, moved, *tables)
+        yp[j] = kept
+        columns.append((moved - base) / d)
+    matrix = np.array(columns).T
+    if not np.isfinite(matrix).all():
+        return True
+    for axis in (1, 0):
+        largest = np.abs(matrix).max(axis=axis, keepdims=True)
+        matrix = matrix / np.where(largest > 0.0, largest, 1.0)
+    return bool(np.linalg.matrix_rank(matrix, RANK) < matrix.shape[1])
+
+
+def _new_part(m: int, n: int, nnz: int, entries: int) -> AlgebraicPart:
+    """Return room for m equations among those of n unknowns, with ``nnz`` entries, ``entries`` of them in these."""
+    return AlgebraicPart(
+        count=m,
+        **{name: np.zeros(m, dtype=np.int64) for name in ("rows", "lifted", "cols", "rates", "pivots")},
+        **{name: np.zeros(entries, dtype=np.int64) for name in ("entry_row", "entry_col", "entry_at", "entry_kind")},
+        **{name: np.zeros(m) for name in ("scale", "f", "guess", "last", "known")},
+        **{name: np.zeros(n) for name in ("atol", "res", "y_moved", "yp_kept")},
+        **{name: np.zeros(nnz) for name in ("vals", "vals_of_rates")},
+        **{name: np.zeros(MAX_POINTS) for name in ("value", "slope")},
+        lu=np.zeros((m, m)),
+    )
+
+
+@cache
+def _nothing() -> AlgebraicPart:
+    """Return the part of problems without anything to solve for: compiled code but looks at its count."""
+    return _new_part(0, 0, 0, 0)
+
+
 class AlgebraicOutputs:
     """What is solved for at outputs of a problem, and what is not.
 
@@ -588,65 +715,37 @@ class AlgebraicOutputs:
     part : AlgebraicPart
     left : ndarray of int
         Algebraic unknowns outside error control that the equations do not determine at an instant.
+    coupled : ndarray of int
+        Those that hang on too many others.
     """
 
     def __init__(self, problem: DAEProblem, atol: np.ndarray, rtol: float) -> None:
         self.problem = problem
         wanted, solved = _chosen(problem)
         self.left = np.empty(0, dtype=np.int64)
-        rows = cols = np.empty(0, dtype=np.int64)
-        lifted = rates = by_y = by_rate = np.zeros((0, 0), dtype=bool)
-        n = problem.n
-        if wanted.any():
-            by_y, by_rate = _dependences(problem)
-            unknown = np.concatenate((solved & by_y.any(axis=0), by_rate.any(axis=0) & problem.differential))
-            edges = np.concatenate((by_y, by_rate), axis=1) & unknown
-            constraints = ~edges.any(axis=1) & ~by_y[:, ~problem.differential].any(axis=1)
-            edges[constraints, n:] = by_y[constraints] & unknown[n:]
-            match, determined = _determined(edges)
-            determined &= unknown
-            asked = np.flatnonzero(wanted)
-            self.left = asked[~determined[asked]]
-            found = _needed(edges, match, asked[determined[asked]])
-            rows, cols = match[found].astype(np.int64), found % n
-            rates, lifted = found >= n, constraints[rows]
-        self.part = self._made(rows, cols, lifted, rates, atol, rtol, (by_y, by_rate))
-
-    def _made(self, rows, cols, lifted, rates, atol, rtol, by) -> AlgebraicPart:
-        """Return the compiled loop's part of it."""
-        problem, m = self.problem, len(rows)
-        place = {int(row): k for k, row in enumerate(rows)}
-        entries: list[tuple[int, int, int, int]] = []
-        for c, (j, is_rate) in enumerate(zip(cols, rates)):
-            for p in range(int(problem.indptr[j]), int(problem.indptr[j + 1])):
-                k = place.get(int(problem.indices[p]))
-                if k is None:
-                    continue
-                table = by[1] if is_rate and not lifted[k] else by[0]
-                if table[rows[k], j]:
-                    entries.append((k, c, p, int(is_rate and not lifted[k])))
-        lists = np.array(entries, dtype=np.int64).reshape(-1, 4).T
-        n, nnz = (problem.n, len(problem.indices)) if m else (0, 0)
-        return AlgebraicPart(
-            count=m,
-            any_lifted=bool(np.any(lifted)),
-            any_rates=bool(np.any(rates)),
-            rtol=rtol,
-            rows=rows,
-            cols=cols,
-            lifted=np.asarray(lifted, dtype=np.int64).ravel(),
-            rates=np.asarray(rates, dtype=np.int64).ravel(),
-            **dict(zip(("entry_row", "entry_col", "entry_at", "entry_kind"), map(np.ascontiguousarray, lists))),
-            atol=np.array(atol, dtype=float),
-            vals=np.zeros(nnz),
-            vals_of_rates=np.zeros(nnz),
-            lu=np.zeros((m, m)),
-            pivots=np.zeros(m, dtype=np.int64),
-            **{name: np.zeros(m) for name in ("scale", "f", "guess", "last", "known")},
-            **{name: np.zeros(n) for name in ("res", "y_moved", "yp_kept")},
-            value=np.zeros(MAX_POINTS),
-            slope=np.zeros(MAX_POINTS),
+        self.coupled = self.left
+        # scratch of polynomials is not shared between threads
+        self.part = _nothing().with_members(value=np.zeros(MAX_POINTS), slope=np.zeros(MAX_POINTS))
+        if not wanted.any():
+            return
+        by_y, by_rate = _dependences(problem)
+        differential = np.asarray(problem.differential, dtype=bool)
+        found = _structure(
+            _Graph(by_y, by_rate, wanted, solved, differential, np.asarray(problem.indptr), np.asarray(problem.indices))
         )
+        self.left, self.coupled = found.left, found.coupled
+        if len(found.rows):
+            self.part = self._made(found, atol, rtol)
+
+    def _made(self, found: _Structure, atol: np.ndarray, rtol: float) -> AlgebraicPart:
+        """Return the compiled loop's part of it."""
+        part = _new_part(len(found.rows), self.problem.n, len(self.problem.indices), len(found.entries))
+        part.rtol = rtol
+        part.any_lifted, part.any_rates = bool(found.lifted.any()), bool(found.rates.any())
+        part.rows[:], part.cols[:], part.lifted[:], part.rates[:] = found.rows, found.cols, found.lifted, found.rates
+        part.atol[:] = atol
+        part.entry_row[:], part.entry_col[:], part.entry_at[:], part.entry_kind[:] = found.entries.T
+        return part
 
     @property
     def is_needed(self) -> bool:
@@ -654,13 +753,25 @@ class AlgebraicOutputs:
         return self.part.count > 0
 
     @property
+    def is_constrained(self) -> bool:
+        """Whether there are unknowns of index two or more, or what stands for them without error control."""
+        problem = self.problem
+        of_mechanism = problem.solved_at_outputs is not None
+        integrated = bool((problem.differential & ~np.asarray(problem.error_mask, dtype=bool)).any())
+        if of_mechanism or integrated or bool(self.part.any_lifted) or len(self.left) or len(self.coupled):
+            return True
+        return problem.n > MOST_RANKED or _has_hidden_constraints(problem)
+
+    @property
     def functions(self) -> Any:
         """The functions of the problem, bound together for compiled code."""
         return bind(self.problem.residual, self.problem.jacobian, no_hook, no_events)
 
-    def settle_row(self, t: float, y: np.ndarray, yp: np.ndarray, h: float, idata: np.ndarray) -> None:
-        """Settle one output in place, which lies in a step of about ``h``."""
+    def settle_start(self, t: float, y: np.ndarray, yp: np.ndarray, h: float, idata: np.ndarray) -> None:
+        """Settle the output at the start in place, in a step of about ``h``; what cannot be stays as it was given."""
+        failures = self.part.failures
         self.settle_after(t, y, yp, h, t, y, idata)
+        self.part.failures = failures
 
     def settle_after(
         self, t: float, y: np.ndarray, yp: np.ndarray, h: float, t_old: float, y_old: np.ndarray, idata: np.ndarray
@@ -684,13 +795,15 @@ class AlgebraicOutputs:
         """Say which unknowns are known at the steps alone, and where they could not be solved for."""
         problem, part = self.problem, self.part
         parts = []
-        if len(self.left):
-            parts.append(
-                f"Between the steps {list_names(problem, self.left)} {'are' if len(self.left) > 1 else 'is'} "
-                "interpolated without control of the error: no equation and no derivative of one determines "
-                f"{'them' if len(self.left) > 1 else 'it'} at an instant. State a problem of index one or two, or put "
-                "error_mask on what is asked for."
-            )
+        of_mechanism = problem.solved_at_outputs is not None
+        remedy = "" if of_mechanism else " State a problem of index one or two, or put it under error_mask."
+        for unknowns, why in (
+            (self.left, f"no equation and no derivative of one determines it at an instant.{remedy}"),
+            (self.coupled, f"it hangs on more than {MOST_TOGETHER} others. Put it under error_mask."),
+        ):
+            if len(unknowns):
+                names = list_names(problem, unknowns)
+                parts.append(f"Between the steps {names} is interpolated without control of the error: {why}")
         if part.failures:
             algebraic = np.unique(part.cols[part.rates == 0])
             parts.append(

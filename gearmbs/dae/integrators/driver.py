@@ -82,6 +82,7 @@ class Run:
         every_step = t_eval is None
         self.algebraic = AlgebraicOutputs(problem, problem.atol_scale * options.tol, options.rtol)
         self.state = initial_state(problem, options, outputs, end, every_step or options.dense_output)
+        self.state.constrained = self.algebraic.is_constrained
         self.records = Records(problem, self.state, options, every_step, self.algebraic)
         start.choose_steps(self)
         self.stall = StallWatch(self.state.steps, self.state.t)

@@ -324,12 +324,13 @@ class _Run:
             return
         h = self.calls.last_step
         for k in (0, 1) if rows.done == 2 else (rows.done - 1,):
-            before = max(k - 1, 0)
-            span = float(rows.t[max(k, 1)] - rows.t[max(k, 1) - 1])
-            step = h if np.isfinite(h) and h > 0.0 else span
-            settler.settle_after(
-                float(rows.t[k]), rows.y[k], rows.yp[k], step, float(rows.t[before]), rows.y[before].copy(), self.idata
-            )
+            last = max(k, 1)
+            step = h if np.isfinite(h) and h > 0.0 else float(rows.t[last] - rows.t[last - 1])
+            output = float(rows.t[k]), rows.y[k], rows.yp[k], step
+            if k == 0:
+                settler.settle_start(*output, self.idata)
+            else:
+                settler.settle_after(*output, float(rows.t[k - 1]), rows.y[k - 1], self.idata)
 
     def _beyond(self, answer, why: str) -> tuple[float, np.ndarray, np.ndarray] | str:
         """Return where to go on behind a jump of algebraic unknowns that stopped IDA, or why the solution ends there."""

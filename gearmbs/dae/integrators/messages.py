@@ -100,7 +100,8 @@ def replaced_start(problem: DAEProblem, unknowns: np.ndarray) -> str:
         return ""
     return (
         f" Initial values of algebraic unknowns did not satisfy the equations: {list_names(problem, unknowns)}. The "
-        "run replaced them in its first step; the output at the start holds them as they were given."
+        "run replaced them in its first step; an output at the start holds them as given unless they could be "
+        "solved for there."
     )
 
 

@@ -12,6 +12,9 @@ from gearmbs.dae.integrators.run_state import RunState
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, SolverStats, Status
 
+START_STEPS = 20
+"""Steps, the longest of which is taken for the size of steps at the start: after some ten they have grown to it."""
+
 
 class Records:
     """Steps and crossings of one run, from its start on.
@@ -132,8 +135,9 @@ class Records:
         """Settle the output at the start, whose algebraic unknowns the caller may have guessed."""
         st = self.state
         if self.algebraic.is_needed and st.next_output and st.outputs[0] == self.problem.t0 and st.steps:
-            first = float(self.steps[0][1][self.steps[0][2] > 0][:1].sum()) or st.step
-            self.algebraic.settle_row(st.outputs[0], st.y_out[0], st.yp_out[0], first, self.tables[0][1])
+            # the first steps are far shorter than what changes
+            first = float(self.steps[0][1][:START_STEPS].max()) or st.step
+            self.algebraic.settle_start(st.outputs[0], st.y_out[0], st.yp_out[0], first, self.tables[0][1])
 
     def _at_steps(
         self, t: np.ndarray, is_step: np.ndarray, rows: np.ndarray, sol: DenseOutput

@@ -109,6 +109,7 @@ class RunState(Struct):
     has_hook: bool
     has_index_one: bool
     watches_pencil: bool  # whether the sign of the determinant is watched, see `branches.keeps_its_index`
+    constrained: bool  # whether there are multipliers, or what is like them: unknowns of index two and more
     keep_rows: bool  # whether y of every step is recorded
     step_in_weights: bool  # whether the size of the step enters the weights of the corrector test
     # where the run stands
