@@ -166,11 +166,11 @@ def solution_ends(problem: DAEProblem, row: int, violation: float) -> str:
     """Explain an equation that cannot be satisfied any more, or nothing if all hold."""
     if row < 0 or not violation > 1.0:
         return ""
-    times = f"{violation:.2g} times what tolerances and rounding explain" if np.isfinite(violation) else "left as it is"
+    times = f"{violation:.2g} times" if np.isfinite(violation) else "infinitely more than"
     name = equation_name(problem, row)
     return (
         f"{name[0].upper()}{name[1:]} is not satisfied beyond that time, however short the step: its residual is "
-        f"{times}. The solution seems to end there, as at a fold, where two branches meet; end the run before, or see "
+        f"{times} what tolerances and rounding explain. The solution seems to end there, as at a fold, where two branches meet; end the run before, or see "
         "whether the equation is the one that is meant."
     )
 

@@ -94,7 +94,6 @@ def endings(rng: np.random.Generator) -> list[Ending]:
         _rate("blow-up by a power", end, lambda z: abs(z) ** (1.0 + q) / q, lambda x: (1.0 - x) ** (-1.0 / q), unit),
         _rate("blow-up of a tangent", end, lambda z: 0.5 * np.pi * (1.0 + z * z), lambda x: np.tan(0.5 * np.pi * x),
               unit),
-        _rate("quenching", end, lambda z: -0.5 / z if z != 0.0 else np.nan, lambda x: (1.0 - x) ** 0.5, unit),
         Ending("factor of a derivative", singular, end, faded),
         Ending("change of the index", hidden, end, faded_rate),
     ]  # fmt: skip
