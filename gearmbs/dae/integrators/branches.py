@@ -10,7 +10,7 @@ from gearmbs.dae.integrators.newton_matrix import carry_over, renew_matrix
 from gearmbs.dae.linalg.sparse_lu import solve
 
 UNFORESEEN = 100.0
-"""Tolerances by which an algebraic unknown has to miss its prediction to be looked at: what its output may be off by."""
+"""Tolerances by which an algebraic unknown has to miss its prediction to be looked at."""
 UNFORESEEN_PART = 0.1
 """And that as part of its change in the step: where a fold is near, the prediction knows half of it."""
 SAME_BRANCH = 0.2

@@ -76,11 +76,11 @@ def step_below(st, k, h, nodes):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def after_start(st):
-    """Set order and step size after an accepted step of a new start within a run, until an order is found that a lower one equals.
+    """Set order and step size after an accepted step of a new start within a run, until a lower order does as well.
 
     Steps grow at order one up to the size that the error test allows, then the order is raised with every step, as far
-    as there are points and the step grows by it. Ratios of steps so large are not stable for ever, but for the few steps
-    of a start they are, and the points, dense where they are old, stand for the derivatives at the start.
+    as there are points and the step grows by it. Such ratios of steps are not stable for ever, but for the few steps of
+    a start they are, and the points, dense where they are old, stand for the derivatives at the start.
     """
     k, h, n_past = st.order, st.h, st.n_past
     nodes = times_from(st, 0)

@@ -30,6 +30,13 @@ ROUNDED_TERMS = 16.0
 """Roundings of the terms of an equation: each is a product of a few factors, summed in some order."""
 EPS = 2.220446049250313e-16
 LOOSEST_AT_KINKS = 0.1
+HELD = 0.05
+"""Part of the tolerance of an unknown within which an equation has to be satisfied. Over a whole one the matrix may
+change: where 1/y ends at zero, there are no solutions, but values within the tolerance of zero on both sides."""
+ROUNDED_TERMS = 16.0
+"""Roundings of the terms of an equation: each is a product of a few factors, summed in some order."""
+EPS = 2.220446049250313e-16
+LOOSEST_AT_KINKS = 0.1
 LOOSEST_AT_START = 1e-3
 """8^2/2 times less than `LOOSEST`: what a prediction eight steps ahead makes of it at order two."""
 

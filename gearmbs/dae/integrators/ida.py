@@ -24,7 +24,14 @@ import scipy.sparse.linalg
 from gearmbs.dae.integrators.branches import SAME_EQUATION, UNFORESEEN
 from gearmbs.dae.integrators.corrector import EPS, ROUNDED_TERMS
 from gearmbs.dae.integrators.initial_state import LARGE_GAMMA, LARGEST_PENCIL
-from gearmbs.dae.integrators.messages import advice, branch_ends, index_changes, no_solution, solution_ends, unknown_name
+from gearmbs.dae.integrators.messages import (
+    advice,
+    branch_ends,
+    index_changes,
+    no_solution,
+    solution_ends,
+    unknown_name,
+)
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
@@ -325,7 +332,7 @@ class _Run:
             before = t
 
     def _beyond(self, answer, why: str) -> tuple[float, np.ndarray, np.ndarray] | str:
-        """Return where to go on behind a jump of algebraic unknowns that stopped IDA, or why the solution ends there."""
+        """Return where to go on behind a jump of algebraic unknowns that stopped IDA, or why all ends there."""
         if not any(text in why for text in OF_JUMPS) or self.branch.own is None:
             return ""
         t = float(answer.t)
@@ -445,6 +452,7 @@ class IdaBranch:
         do: see `gearmbs.dae.integrators.branches.stays_on_branch`.
         """
         problem, own = self.problem, self.own
+        assert own is not None
         self.tries = self.tries + 1 if t - self.passed <= STANDSTILL * (end - self.start) else 0
         self.passed = t
         if self.tries >= TRIES_AT_A_JUMP:

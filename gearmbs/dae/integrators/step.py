@@ -49,7 +49,7 @@ JUMP_LIMIT = 50.0
 FIRST_TARGET = 0.1
 """Error of the first step after refused attempts, in tolerances: half of what later ones are meant to have."""
 FIRST_SHRINK = (1e-3, 0.5)
-"""Between which the size of a first step changes after a refusal: its error is known to fall with the square, or less."""
+"""Between which the size of a first step changes after a refusal: its error falls with the square, or less."""
 LANDED = 0.999
 """Fraction of the size wanted below which a step counts as shortened to land on a stop."""
 
@@ -304,7 +304,7 @@ def shorten_first_step(st):
     """Choose the size of the next attempt of a first step, and from two attempts the rates it starts with.
 
     Where the equations jump, as at a restart, the rates before the jump are not those after it, and leave an error that
-    falls with h and not with h^2. Implicit Euler gives r(h) = (y - y_0)/h = y'_0 + h y''/2 + ..., of whatever y'_0 it is
+    falls with h and not with h^2. Implicit Euler gives r(h) = (y - y_0)/h = y'_0 + h y''/2 + ..., whatever y'_0 it is
     predicted with: two attempts give both,
 
         y'' = 2 (r_1 - r_2)/(h_1 - h_2),   y'_0 = r_2 - h_2 (r_1 - r_2)/(h_1 - h_2),

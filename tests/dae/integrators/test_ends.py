@@ -114,7 +114,14 @@ def solve(ending: Ending, tol: float, until: float, method: str):
     size = np.maximum(np.abs(start), np.abs(ending.exact(0.5 * ending.end)))
     with np.errstate(all="ignore"):
         return solve_dae(
-            ending.residual, (0.0, until), start, rtol=tol, atol=tol * size, method=method, scale=size, max_steps=100_000
+            ending.residual,
+            (0.0, until),
+            start,
+            rtol=tol,
+            atol=tol * size,
+            method=method,
+            scale=size,
+            max_steps=100_000,
         )
 
 

@@ -361,7 +361,7 @@ def test_a_derivative_that_vanishes_at_the_start_is_named(factor, start):
         out[0] = yp[0] - 1.0
         out[1] = factor(t, y[1]) * yp[1] - 1.0
 
-    with pytest.raises(ValueError, match="dG/dy' vanishes at the start for slow: .* Start a little later"):
+    with pytest.raises(ValueError, match=r"dG/dy' vanishes at the start for slow: .* Start a little later"):
         solve_dae(residual, (0.0, 1.0), [0.0, start], names=["clock", "slow"])
     assert solve_dae(residual, (0.01, 0.02), [0.0, 0.1], names=["clock", "slow"]).success
 
