@@ -272,8 +272,8 @@ def _check_derivatives(problem: DAEProblem, functions: _UserFunctions, span: flo
         raise ValueError(
             f"dG/dy' vanishes at the start for {named}: the derivative stands in G, but its factor is zero at "
             f"t0 = {problem.t0:g}, y0 = {np.array2string(problem.y0, threshold=6)}, so that the equations do not say "
-            "how the solution leaves this point (it may be infinitely fast, or one of many). Start a little later on the "
-            "solution, or give differential= and yp0= if you know how it goes on"
+            "how the solution leaves this point (it may be infinitely fast, or one of many). Start a little later on "
+            "the solution, or give differential= and yp0= if you know how it goes on"
         )
     if not problem.differential.any():
         raise ValueError(

@@ -23,22 +23,13 @@ RATE_UNKNOWN = 0.1
 ROUNDING_LEVEL = 0.1
 ROUNDING_LEVEL_FRESH = 0.5
 LOOSEST = 0.03
+LOOSEST_AT_KINKS = 0.1
 HELD = 0.05
-"""Part of the tolerance of an unknown within which an equation has to be satisfied. Over a whole one the matrix may
-change: where 1/y ends at zero, there are no solutions, but values within the tolerance of zero on both sides."""
+"""Part of the tolerance of an unknown within which an equation has to be satisfied: about what a corrector that
+converges leaves. Over a whole tolerance the matrix may change."""
 ROUNDED_TERMS = 16.0
 """Roundings of the terms of an equation: each is a product of a few factors, summed in some order."""
 EPS = 2.220446049250313e-16
-LOOSEST_AT_KINKS = 0.1
-HELD = 0.05
-"""Part of the tolerance of an unknown within which an equation has to be satisfied. Over a whole one the matrix may
-change: where 1/y ends at zero, there are no solutions, but values within the tolerance of zero on both sides."""
-ROUNDED_TERMS = 16.0
-"""Roundings of the terms of an equation: each is a product of a few factors, summed in some order."""
-EPS = 2.220446049250313e-16
-LOOSEST_AT_KINKS = 0.1
-LOOSEST_AT_START = 1e-3
-"""8^2/2 times less than `LOOSEST`: what a prediction eight steps ahead makes of it at order two."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -216,8 +216,8 @@ def below_rounding(problem: DAEProblem, t: float, unknown: int, value: float, to
     """Explain a tolerance that no step can satisfy, and name the least that one could."""
     return (
         f"{Status.BELOW_ROUNDING.sentence} At t = {t:.9g} {unknown_name(problem, unknown)} is {value:.6g} and may be "
-        f"off by {tolerance:.2g} a step, {tolerance / abs(value) / EPS:.2g} units of its last digit; the least that can be "
-        f"asked for is {least:.2g}, or rtol = {least / abs(value):.1g}. Loosen the tolerance, or count the unknown "
+        f"off by {tolerance:.2g} a step, {tolerance / abs(value) / EPS:.2g} units of its last digit; the least to "
+        f"ask for is {least:.2g}, or rtol = {least / abs(value):.1g}. Loosen the tolerance, or count the unknown "
         "from another origin if it is large and changes little."
     )
 

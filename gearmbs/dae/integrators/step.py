@@ -304,10 +304,10 @@ def shorten_first_step(st):
     """Choose the size of the next attempt of a first step, and from two attempts the rates it starts with.
 
     Where the equations jump, as at a restart, the rates before the jump are not those after it, and leave an error that
-    falls with h and not with h^2. Implicit Euler gives r(h) = (y - y_0)/h = y'_0 + h y''/2 + ..., whatever y'_0 it is
+    falls with h and not with h^2. Implicit Euler gives r(h) = (y - y_0)/h = y'_0 + h y'' + ..., whatever y'_0 it is
     predicted with: two attempts give both,
 
-        y'' = 2 (r_1 - r_2)/(h_1 - h_2),   y'_0 = r_2 - h_2 (r_1 - r_2)/(h_1 - h_2),
+        y'' = (r_1 - r_2)/(h_1 - h_2),   y'_0 = r_2 - h_2 (r_1 - r_2)/(h_1 - h_2),
 
     and the first step with an error h^2 y''/2 of `FIRST_TARGET` tolerances.
     """
