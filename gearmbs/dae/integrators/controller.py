@@ -11,6 +11,9 @@ TARGET = 0.2
 RAISE_GAIN = 1.15
 GROW_FROM = 1.2
 GROW_AT_MOST = 2.0
+START_TARGET = 0.02
+"""Local error of the first steps behind a jump, in tolerances: those of a start have the same sign, and at a fifth of a
+tolerance each twenty jumps add up to thirty."""
 START_GROWTH = 8.0
 """The same in the first steps, which are shorter than those that follow by as much as the tolerance is small."""
 SHRINK_FROM = 0.9
@@ -36,7 +39,7 @@ def difference_norm(st, k):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def step_at_order(st, k, h, nodes):
+def step_at_order(st, k, h, nodes, target=TARGET):
     """Return the step size at order k from ``nodes[0]``.
 
     Parameters
@@ -47,8 +50,10 @@ def step_at_order(st, k, h, nodes):
         Size from which the search starts.
     nodes : ndarray
         Times of the past points of the step, newest first.
+    target : float
+        Local error that the step is to have, in tolerances.
     """
-    return step_for_error(h, nodes, k, difference_norm(st, k), TARGET)
+    return step_for_error(h, nodes, k, difference_norm(st, k), target)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -86,17 +91,19 @@ def after_start(st):
     nodes = times_from(st, 0)
     if n_past < 3:
         # of a single step the distance from its prediction is all that is known
-        ratio = START_GROWTH if st.error <= 0.0 else min((TARGET / st.error) ** 0.5, START_GROWTH)
+        ratio = START_GROWTH if st.error <= 0.0 else min((START_TARGET / st.error) ** 0.5, START_GROWTH)
         st.h = h * max(ratio, SHRINK_AT_MOST)
         return
     if n_past < k + 2:
         return
-    h_best = step_at_order(st, k, h, nodes)
-    if k > 1 and step_reaching(st, k - 1, h_best, h, nodes) >= h_best:
+    h_best = step_at_order(st, k, h, nodes, START_TARGET)
+    if k > 2 and step_at_order(st, k - 1, h, nodes, START_TARGET) >= h_best:
         st.starting = False
         after_success(st)
         return
-    st.h = min(max(h_best, SHRINK_AT_MOST * h), START_GROWTH * h)
+    # a history much shorter than the step would be taken far beyond its ends
+    growth = GROW_AT_MOST if k > 1 else START_GROWTH
+    st.h = min(max(h_best, SHRINK_AT_MOST * h), growth * h)
     st.since_change = 0
     if h_best < START_GROWTH * h:
         if k == st.max_order:

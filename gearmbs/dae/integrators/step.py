@@ -46,8 +46,8 @@ RENEWALS_AT_JUMPS = 20
 SAME_ERROR = 0.1
 JUMP_LIMIT = 50.0
 """Error, in tolerances, up to which a run passes a jump that does not shrink with the step."""
-FIRST_TARGET = 0.1
-"""Error of the first step after refused attempts, in tolerances: half of what later ones are meant to have."""
+FIRST_TARGET = 0.01
+"""Error of the first step after refused attempts, in tolerances: half of what the next ones are meant to have."""
 FIRST_SHRINK = (1e-3, 0.5)
 """Between which the size of a first step changes after a refusal: its error falls with the square, or less."""
 LANDED = 0.999
