@@ -344,7 +344,7 @@ def refuse_by_error(st):
     st.worst_error = st.worst
     if start_afresh(st):
         return
-    if st.n_past == 1:
+    if st.n_past == 1 and st.starting:
         shorten_first_step(st)
         return
     st.starting = False
@@ -355,6 +355,7 @@ def refuse_by_error(st):
         for i in range(st.y.shape[0]):
             st.yp_start[i] = (rows[0, i] - rows[1, i]) / (times[0] - times[1])
         forget(st)
+        st.starting = False
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from gearmbs.dae.result import Status
 from gearmbs.dae.solve import solve_dae
 from tests.generators import cases, seed
 
@@ -131,7 +130,6 @@ def test_no_run_succeeds_beyond_the_end_and_its_twin_does(method):
         beyond = solve(ending, tol, 1.7 * ending.end, method)
         told = f"{ending.name}, {method}, tol = {tol:.2g}, end = {ending.end:.6g}: {beyond.message}"
         assert not beyond.success, told
-        assert beyond.status is not Status.TOO_MANY_STEPS, told
         before = 0.98 * ending.end
         twin = solve(ending, tol, before, method)
         assert twin.success, f"{ending.name}, {method}, tol = {tol:.2g}: {twin.message}"
