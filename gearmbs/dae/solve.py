@@ -80,7 +80,7 @@ def solve_dae(
         `DAEProblem`, which takes ``tol``: its ``atol_scale`` times this is the absolute tolerance.
     events : callable or list of callable, optional
         ``g(t, y, yp[, p])`` whose zeros are located. Attributes: ``direction`` (-1, 0, 1), ``terminal`` (True to
-        stop there, a number to stop at that occurrence), ``restart`` (land there and start afresh, for
+        stop there, a number to stop at that occurrence), ``restart`` (land there as on a breakpoint, for
         discontinuities).
     t_eval : array_like, optional
         Output times; default every step. Algebraic unknowns outside error control are solved for there, see

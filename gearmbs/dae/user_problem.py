@@ -271,9 +271,9 @@ def _check_derivatives(problem: DAEProblem, functions: _UserFunctions, span: flo
         named = ", ".join(unknown_name(problem, int(i)) for i in lost)
         raise ValueError(
             f"dG/dy' vanishes at the start for {named}: the derivative stands in G, but its factor is zero at "
-            f"t0 = {problem.t0:g}, y0 = {np.array2string(problem.y0, threshold=6)}, so that the equations do not say how "
-            "the solution leaves this point (it may be infinitely fast, or one of many). Start a little later on the "
-            "solution, or give differential= and yp0= if you know how it goes on"
+            f"t0 = {problem.t0:g}, y0 = {np.array2string(problem.y0, threshold=6)}, so that the equations do not say "
+            "how the solution leaves this point (it may be infinitely fast, or one of many). Start a little later on "
+            "the solution, or give differential= and yp0= if you know how it goes on"
         )
     if not problem.differential.any():
         raise ValueError(
@@ -379,7 +379,7 @@ def as_problem(
         _check_derivatives(problem, functions, span)
     if not problem.error_mask.any():
         raise ValueError(
-            "error_mask leaves no unknown under error control: set it for the unknowns whose derivatives appear, at least"
+            "error_mask leaves no unknown under error control: set it at least for unknowns whose derivatives appear"
         )
     if yp0 is None:
         _find_rates(problem, span)

@@ -382,3 +382,30 @@ def test_markers_and_values_are_checked():
     m.force("own", rate_not_finite, m.body("b", 1.0, UNIT).marker(), parameters=[-1.0], states={"z": 0.0})
     with pytest.raises(ModelError, match=r"state 'own\.z': its rate at t = 0 s is not finite"):
         m.simulate(0.1)
+
+
+@pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF", "IDA"])
+@pytest.mark.parametrize("strength", [0.0, 0.1])
+def test_a_state_whose_equation_has_no_solution_ends_the_run(strength, integrator):
+    """z^2 = 1 - t, whether the force is made of z or not: nothing beyond 1 s, and sqrt(1 - t) before."""
+
+    def folded(t, frames, states, parameters, wrench, rates, diagnostics):
+        z = states[0]
+        rates[0] = z + z * z + t - 1.0
+        wrench[0, 0] = parameters[0] * z
+
+    m = Mechanism("m")
+    body = m.body("b", 1.0, UNIT)
+    m.force("valve", folded, body.marker(), m.ground.marker(), parameters=[strength], algebraic={"z": 1.0})
+    beyond = m.simulate(2.0, rate=50.0, integrator=integrator)
+    assert not beyond.success
+    assert beyond.result.t_last == pytest.approx(1.0, abs=1e-4)
+    assert "valve.z" in beyond.message
+    assert "seems to end there" in beyond.message
+    before = m.simulate(0.98, rate=50.0, integrator=integrator)
+    assert before.success, before.message
+    # x'' = strength sqrt(1 - t)
+    left = 0.02
+    place = strength * (4.0 / 15.0 * left**2.5 - 4.0 / 15.0 + 2.0 / 3.0 * 0.98)
+    x = before.problem.names.index(next(name for name in before.problem.names if name.startswith("R_x")))
+    assert before.result.y[-1, x] == pytest.approx(place, abs=1e-5)

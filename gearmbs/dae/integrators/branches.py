@@ -10,7 +10,7 @@ from gearmbs.dae.integrators.newton_matrix import carry_over, renew_matrix
 from gearmbs.dae.linalg.sparse_lu import solve
 
 UNFORESEEN = 100.0
-"""Tolerances by which an algebraic unknown has to miss its prediction to be looked at: what its output may be off by."""
+"""Tolerances by which an algebraic unknown has to miss its prediction to be looked at."""
 UNFORESEEN_PART = 0.1
 """And that as part of its change in the step: where a fold is near, the prediction knows half of it."""
 SAME_BRANCH = 0.2
@@ -18,8 +18,9 @@ SAME_BRANCH = 0.2
 SAME_EQUATION = 1e-3
 """The same of steps that have been cut: a jump of the equation has 1/p, a fold the length of the step."""
 CUTS_TO_TELL = 4
-LARGER_GAMMA = 1e4
-"""Ratio of the leading coefficient at which the pencil is looked at to that of the step, at least."""
+LARGER_GAMMA = 10.0
+"""Ratio of the gamma at which the pencil is looked at to the largest leading coefficient of the run. Its first steps
+resolve the fastest modes, whose entries, wrong in differences by 1e-8, would drown the derivatives at a smaller one."""
 EPS = 2.220446049250313e-16
 
 
@@ -94,7 +95,7 @@ def _pencil_sign(functions, st):
 
     Gaussian elimination with rows of unit size and pivots by columns: those of the step need not fit.
     """
-    n, gamma = st.y.shape[0], max(st.gamma_large, LARGER_GAMMA * st.gamma)
+    n, gamma = st.y.shape[0], st.gamma_large
     functions.jacobian(st.t_new, st.y, st.yp, gamma, st.matrix, st.idata, st.rdata, st.work)
     st.jacobians += 1
     a = np.zeros((n, n))
@@ -138,6 +139,7 @@ def keeps_its_index(functions, st, plan, factors):
     that of the matrix at the solution, so that the factors know of a change; a mode that grows faster than the step
     changes it too, and at a large gamma alone tells the two apart.
     """
+    st.gamma_large = max(st.gamma_large, LARGER_GAMMA * st.gamma)
     sign = _determinant_sign(st, plan, factors)
     if sign == 0.0 or (sign == st.sign_last and st.sign_pencil != 0.0):
         return True

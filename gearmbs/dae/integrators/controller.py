@@ -14,6 +14,9 @@ positions with it and not with a third of it."""
 RAISE_GAIN = 1.15
 GROW_FROM = 1.2
 GROW_AT_MOST = 2.0
+START_TARGET = 0.02
+"""Local error of the first steps behind a jump, in tolerances: those of a start have the same sign, and at a fifth of a
+tolerance each twenty jumps add up to thirty."""
 START_GROWTH = 8.0
 """The same in the first steps, which are shorter than those that follow by as much as the tolerance is small."""
 SHRINK_FROM = 0.9
@@ -91,27 +94,29 @@ def step_below(st, k, h, nodes):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def after_start(st):
-    """Set order and step size after an accepted step of a new start within a run, until an order is found that a lower one equals.
+    """Set order and step size after an accepted step of a new start within a run, until a lower order does as well.
 
     Steps grow at order one up to the size that the error test allows, then the order is raised with every step, as far
-    as there are points and the step grows by it. Ratios of steps so large are not stable for ever, but for the few steps
-    of a start they are, and the points, dense where they are old, stand for the derivatives at the start.
+    as there are points and the step grows by it. Such ratios of steps are not stable for ever, but for the few steps of
+    a start they are, and the points, dense where they are old, stand for the derivatives at the start.
     """
     k, h, n_past = st.order, st.h, st.n_past
     nodes = times_from(st, 0)
     if n_past < 3:
         # of a single step the distance from its prediction is all that is known
-        ratio = START_GROWTH if st.error <= 0.0 else min((TARGET / st.error) ** 0.5, START_GROWTH)
+        ratio = START_GROWTH if st.error <= 0.0 else min((START_TARGET / st.error) ** 0.5, START_GROWTH)
         st.h = h * max(ratio, SHRINK_AT_MOST)
         return
     if n_past < k + 2:
         return
-    h_best = step_at_order(st, k, h, nodes)
-    if k > 1 and step_reaching(st, k - 1, h_best, h, nodes) >= h_best:
+    h_best = step_for_error(h, nodes, k, difference_norm(st, k), START_TARGET)
+    if k > 2 and step_for_error(h, nodes, k - 1, difference_norm(st, k - 1), START_TARGET) >= h_best:
         st.starting = False
         after_success(st)
         return
-    st.h = min(max(h_best, SHRINK_AT_MOST * h), START_GROWTH * h)
+    # a history much shorter than the step would be taken far beyond its ends
+    growth = GROW_AT_MOST if k > 1 else START_GROWTH
+    st.h = min(max(h_best, SHRINK_AT_MOST * h), growth * h)
     st.since_change = 0
     if h_best < START_GROWTH * h:
         if k == st.max_order:

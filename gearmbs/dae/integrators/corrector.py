@@ -23,12 +23,13 @@ RATE_UNKNOWN = 0.1
 ROUNDING_LEVEL = 0.1
 ROUNDING_LEVEL_FRESH = 0.5
 LOOSEST = 0.03
+LOOSEST_AT_KINKS = 0.1
+HELD = 0.05
+"""Part of the tolerance of an unknown within which an equation has to be satisfied: about what a corrector that
+converges leaves. Over a whole tolerance the matrix may change."""
 ROUNDED_TERMS = 16.0
 """Roundings of the terms of an equation: each is a product of a few factors, summed in some order."""
 EPS = 2.220446049250313e-16
-LOOSEST_AT_KINKS = 0.1
-LOOSEST_AT_START = 1e-3
-"""8^2/2 times less than `LOOSEST`: what a prediction eight steps ahead makes of it at order two."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -66,10 +67,10 @@ def apply_correction(delta, gamma, weight, y, yp):
 def equations_hold(functions, st):
     """Return whether the residual at the iterate is no more than tolerances and rounding explain, equation by equation.
 
-    An equation holds where small changes of its unknowns satisfy it, each within its tolerance or within what rounding
-    moves the terms of the equation by:
+    An equation holds where small changes of its unknowns satisfy it, each within part of its tolerance or within what
+    rounding moves the terms of the equation by:
 
-        |G_i| <= sum_j |J_ij| (atol_j + rtol |y_j| + ROUNDED_TERMS eps |y_j|),   J = dG/dy + gamma dG/dy'
+        |G_i| <= sum_j |J_ij| (HELD (atol_j + rtol |y_j|) + ROUNDED_TERMS eps |y_j|),   J = dG/dy + gamma dG/dy'
 
     Neither the scale of an equation nor that of an unknown matters. ``st.worst_row`` and ``st.violation`` say which
     equation is the furthest from that, and by which factor. ``st.res`` and ``st.y_between`` are overwritten.
@@ -81,7 +82,7 @@ def equations_hold(functions, st):
     allowed[:] = 0.0
     for p in range(matrix.shape[0]):
         j = col[p]
-        allowed[row[p]] += abs(matrix[p]) * (1.0 / weight[j] + ROUNDED_TERMS * EPS * abs(y[j]))
+        allowed[row[p]] += abs(matrix[p]) * (HELD / weight[j] + ROUNDED_TERMS * EPS * abs(y[j]))
     st.violation = 0.0
     for i in range(res.shape[0]):
         ratio = abs(res[i]) / allowed[i] if res[i] != 0.0 else 0.0

@@ -269,6 +269,9 @@ class Run:
     def _below_rounding(self, digits: float) -> tuple[Status, str] | None:
         """Return a failure if some tolerance is less than so many units of the last digit of its unknown."""
         st = self.state
+        if st.open:
+            # what stands in y is no result
+            return None
         level = EPS * np.abs(st.y) * st.w_error
         worst = int(np.argmax(level))
         if not digits * level[worst] > 1.0:

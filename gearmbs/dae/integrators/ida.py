@@ -48,10 +48,14 @@ MAX_ITERATIONS = 4
 MAX_STEPS = 100_000
 """Steps allowed between two outputs: 15 s of a vibration of 500 Hz at a dozen steps a period."""
 
-OF_JUMPS = ("error test failed", "convergence failed", "nonlinear solver failed", "linear solver")
+OF_PORTIONS = "mxstep steps taken"
+OF_STANDING = "its steps do not move the time any more"
+OF_JUMPS = ("error test failed", "convergence failed", "nonlinear solver failed", "linear solver", OF_STANDING)
 """What SUNDIALS says where it stops at a jump of an algebraic unknown, or where a solution ends."""
-ROUNDED_STEP = 4.0 * EPS
-"""Least step in units of the time: below it IDA counts steps that do not move the time, up to their limit."""
+STEPS_AT_ONCE = 1000
+"""Steps after which IDA is asked how far it has come."""
+ROUNDED_STEP = 16.0 * EPS
+"""Average step in units of the time below which it does not come any further."""
 SHORTEST = 1e-12
 """Part of the span that the step across such a place takes."""
 STANDSTILL = 1e-6
@@ -290,12 +294,12 @@ class _Run:
             target = rows.next_time
             if problem.hook_interval is not None and not self.every_step:
                 target = min(target, self.t + problem.hook_interval(self.t, y, yp))
-            answer = solver.step(target, method="onestep" if self.every_step else "normal", tstop=self.end)
+            answer, why = self._advance(solver, target, messages)
             if not answer.success:
-                beyond = self._beyond(answer, messages.text or answer.message)
+                beyond = self._beyond(answer, why)
                 if isinstance(beyond, str):
                     self.t = max(self.t, float(answer.t))
-                    return self._failure(float(answer.t), messages.text or answer.message, beyond)
+                    return self._failure(float(answer.t), why, beyond)
                 while rows.next_time <= beyond[0] < self.end and not self.every_step:
                     # outputs within the shortest step belong to the near side of the jump
                     rows.take(rows.next_time, np.array(answer.y), np.array(answer.yp))
@@ -332,8 +336,25 @@ class _Run:
             else:
                 settler.settle_after(*output, float(rows.t[k - 1]), rows.y[k - 1], self.idata)
 
+    def _advance(self, solver: IDA, target: float, messages: _Messages) -> tuple[Any, str]:
+        """Go to ``target``, in portions of steps; return IDA's answer and what it has to say of a failure."""
+        limit = MAX_STEPS if self.options.max_steps is None else self.options.max_steps
+        done, before = 0, self.t
+        while True:
+            answer = solver.step(target, method="onestep" if self.every_step else "normal", tstop=self.end)
+            why = messages.text or answer.message
+            if answer.success or OF_PORTIONS not in why:
+                return answer, why
+            done += min(STEPS_AT_ONCE, limit)
+            t = float(answer.t)
+            if t - before <= STEPS_AT_ONCE * ROUNDED_STEP * abs(t):
+                return answer, f"{why}: {OF_STANDING}"
+            if done >= limit:
+                return answer, why
+            before = t
+
     def _beyond(self, answer, why: str) -> tuple[float, np.ndarray, np.ndarray] | str:
-        """Return where to go on behind a jump of algebraic unknowns that stopped IDA, or why the solution ends there."""
+        """Return where to go on behind a jump of algebraic unknowns that stopped IDA, or why all ends there."""
         if not any(text in why for text in OF_JUMPS) or self.branch.own is None:
             return ""
         t = float(answer.t)
@@ -349,12 +370,11 @@ class _Run:
         o = self.options
         settings = {
             "max_order": o.highest_order if o.max_order is None else o.max_order,
-            # the binding refuses its own default, zero for none, beside a least step
-            "max_step": o.max_step if o.max_step and np.isfinite(o.max_step) else self.end - float(self.problem.t0),
+            "max_step": 0.0 if o.max_step is None or np.isinf(o.max_step) else o.max_step,
             "first_step": o.first_step or 0.0,
-            "min_step": ROUNDED_STEP * max(abs(self.t), abs(self.end)) if o.min_step is None else o.min_step,
+            "min_step": o.min_step or 0.0,
             "max_nonlin_iters": MAX_ITERATIONS if o.max_iterations is None else o.max_iterations,
-            "max_num_steps": MAX_STEPS if o.max_steps is None else o.max_steps,
+            "max_num_steps": min(STEPS_AT_ONCE, MAX_STEPS if o.max_steps is None else o.max_steps),
         }
         solver = _solver(self.problem, self.calls, self.atol, o.rtol, settings)
         solver.init_step(self.t, y, yp)
@@ -454,6 +474,7 @@ class IdaBranch:
         do: see `gearmbs.dae.integrators.branches.stays_on_branch`.
         """
         problem, own = self.problem, self.own
+        assert own is not None
         self.tries = self.tries + 1 if t - self.passed <= STANDSTILL * (end - self.start) else 0
         self.passed = t
         if self.tries >= TRIES_AT_A_JUMP:

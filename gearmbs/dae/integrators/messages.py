@@ -13,6 +13,12 @@ EPS = 2.220446049250313e-16
 NOISE_WORTH_TELLING = 0.1
 """Movement by rounding, in units of the tolerance, from which on rounding is named as a cause."""
 
+ENDS = (
+    "The solution seems to end there, as at a fold, where two branches meet; end the run before, or see whether the "
+    "equation is the one that is meant."
+)
+"""What to make of equations without a solution on the branch that was followed."""
+
 ADVICE = {
     Status.NOT_FINITE: (
         "Look for a division by zero, the root or logarithm of a negative number, or a table that ends there."
@@ -166,12 +172,11 @@ def solution_ends(problem: DAEProblem, row: int, violation: float) -> str:
     """Explain an equation that cannot be satisfied any more, or nothing if all hold."""
     if row < 0 or not violation > 1.0:
         return ""
-    times = f"{violation:.2g} times what tolerances and rounding explain" if np.isfinite(violation) else "left as it is"
+    times = f"{violation:.2g} times" if np.isfinite(violation) else "infinitely more than"
     name = equation_name(problem, row)
     return (
         f"{name[0].upper()}{name[1:]} is not satisfied beyond that time, however short the step: its residual is "
-        f"{times}. The solution seems to end there, as at a fold, where two branches meet; end the run before, or see "
-        "whether the equation is the one that is meant."
+        f"{times} what tolerances and rounding explain. {ENDS}"
     )
 
 
@@ -179,17 +184,15 @@ def no_solution(problem: DAEProblem, row: int) -> str:
     """Explain Newton's method that finds nothing beyond a time, though what it leaves is small."""
     return (
         f"Beyond that time Newton's method finds no solution, however short the step, because of "
-        f"{equation_name(problem, row)}: the solution seems to end there, as at a fold, where two branches meet; end the "
-        "run before, or see whether the equation is the one that is meant."
+        f"{equation_name(problem, row)}. {ENDS}"
     )
 
 
 def branch_ends(problem: DAEProblem, unknown: int, before: float, after: float) -> str:
     """Explain an unknown that would have to jump though its equation does not."""
     return (
-        f"{unknown_name(problem, unknown)} would jump from {before:.6g} to {after:.6g}, another solution of an equation "
-        "that does not jump: the one it was on seems to end there, at a fold. End the run before, or see whether the "
-        "equations are those that are meant."
+        f"{unknown_name(problem, unknown)} would jump from {before:.6g} to {after:.6g}, another branch of an equation "
+        f"that does not jump. {ENDS}"
     )
 
 
@@ -214,10 +217,10 @@ def too_many_steps(problem: DAEProblem, t: float, steps: int) -> str:
 def below_rounding(problem: DAEProblem, t: float, unknown: int, value: float, tolerance: float, least: float) -> str:
     """Explain a tolerance that no step can satisfy, and name the least that one could."""
     return (
-        f"{Status.BELOW_ROUNDING.sentence} At t = {t:.9g} {unknown_name(problem, unknown)} is {value:.6g} and may be off "
-        f"by {tolerance:.2g} a step, {tolerance / abs(value) / EPS:.2g} units of its last digit; the least that can be "
-        f"asked for is {least:.2g}, or rtol = {least / abs(value):.1g}. Loosen the tolerance, or count the unknown from "
-        "another origin if it is large and changes little."
+        f"{Status.BELOW_ROUNDING.sentence} At t = {t:.9g} {unknown_name(problem, unknown)} is {value:.6g} and may be "
+        f"off by {tolerance:.2g} a step, {tolerance / abs(value) / EPS:.2g} units of its last digit; the least to "
+        f"ask for is {least:.2g}, or rtol = {least / abs(value):.1g}. Loosen the tolerance, or count the unknown "
+        "from another origin if it is large and changes little."
     )
 
 

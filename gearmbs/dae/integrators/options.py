@@ -58,10 +58,11 @@ class Options:
     interpolate : bool
         INTERPOLATE: outputs from the interpolating polynomial (True) or by steps that land on them (False).
     breakpoints : sequence of float
-        Known discontinuities: the run lands on each and starts afresh at order one.
+        Possible discontinuities: the run lands on each, and starts afresh at order one if the step beyond shows that it
+        is one.
     event_direction, event_action : sequence of int, optional
         For each event function: crossings that count (-1 falling, 1 rising, 0 both), and what they do (0 record,
-        1 stop, 2 land on the crossing and start afresh).
+        1 stop, 2 land on the crossing as on a breakpoint).
     event_count : sequence of int, optional
         For each event function that stops the run: at which of its crossings; default the first.
     dense_output : bool

@@ -76,7 +76,7 @@ class RunState(Struct):
     idata, rdata, work : ndarray
         Tables and scratch of the problem.
     stops : ndarray
-        Times to land on; after each the run starts afresh at order one.
+        Times to land on, at which the equations may jump.
     outputs : ndarray, shape (m,)
         Output times.
     y_out, yp_out : ndarray, shape (m, n)

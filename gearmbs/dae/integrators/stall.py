@@ -93,7 +93,7 @@ class StallWatch:
         return needed if stalled else 0.0
 
     def watch_refused(self, steps: int, refused: int, t: float, t_end: float) -> None:
-        """Decide whether the next steps are worth a look, from those accepted so far, and those refused or begun afresh."""
+        """Decide whether the next steps are worth a look, from those accepted and those refused or begun afresh."""
         marks = self._marks
         if not marks:
             marks.append((steps, refused, t))

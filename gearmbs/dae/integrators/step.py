@@ -47,10 +47,10 @@ RENEWALS_AT_JUMPS = 20
 SAME_ERROR = 0.1
 JUMP_LIMIT = 50.0
 """Error, in tolerances, up to which a run passes a jump that does not shrink with the step."""
-FIRST_TARGET = 0.1
-"""Error of the first step after refused attempts, in tolerances: half of what later ones are meant to have."""
+FIRST_TARGET = 0.01
+"""Error of the first step after refused attempts, in tolerances: half of what the next ones are meant to have."""
 FIRST_SHRINK = (1e-3, 0.5)
-"""Between which the size of a first step changes after a refusal: its error is known to fall with the square, or less."""
+"""Between which the size of a first step changes after a refusal: its error falls with the square, or less."""
 LANDED = 0.999
 """Fraction of the size wanted below which a step counts as shortened to land on a stop."""
 
@@ -306,10 +306,10 @@ def shorten_first_step(st):
     """Choose the size of the next attempt of a first step, and from two attempts the rates it starts with.
 
     Where the equations jump, as at a restart, the rates before the jump are not those after it, and leave an error that
-    falls with h and not with h^2. Implicit Euler gives r(h) = (y - y_0)/h = y'_0 + h y''/2 + ..., of whatever y'_0 it is
+    falls with h and not with h^2. Implicit Euler gives r(h) = (y - y_0)/h = y'_0 + h y'' + ..., whatever y'_0 it is
     predicted with: two attempts give both,
 
-        y'' = 2 (r_1 - r_2)/(h_1 - h_2),   y'_0 = r_2 - h_2 (r_1 - r_2)/(h_1 - h_2),
+        y'' = (r_1 - r_2)/(h_1 - h_2),   y'_0 = r_2 - h_2 (r_1 - r_2)/(h_1 - h_2),
 
     and the first step with an error h^2 y''/2 of `FIRST_TARGET` tolerances.
     """
@@ -346,7 +346,7 @@ def refuse_by_error(st):
     st.worst_error = st.worst
     if start_afresh(st):
         return
-    if st.n_past == 1:
+    if st.n_past == 1 and st.starting:
         shorten_first_step(st)
         return
     st.starting = False
@@ -357,6 +357,7 @@ def refuse_by_error(st):
         for i in range(st.y.shape[0]):
             st.yp_start[i] = (rows[0, i] - rows[1, i]) / (times[0] - times[1])
         forget(st)
+        st.starting = False
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

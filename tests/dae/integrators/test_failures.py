@@ -353,6 +353,43 @@ def test_corrector_that_cannot_converge():
     assert "Jacobian" in small.message
 
 
+@pytest.mark.parametrize(
+    ("factor", "start"), [(lambda t, y: 2.0 * y, 0.0), (lambda t, y: t, 0.0), (lambda t, y: np.sin(y) ** 2, 0.0)]
+)
+def test_a_derivative_that_vanishes_at_the_start_is_named(factor, start):
+    def residual(t, y, yp, out):
+        out[0] = yp[0] - 1.0
+        out[1] = factor(t, y[1]) * yp[1] - 1.0
+
+    with pytest.raises(ValueError, match=r"dG/dy' vanishes at the start for slow: .* Start a little later"):
+        solve_dae(residual, (0.0, 1.0), [0.0, start], names=["clock", "slow"])
+    assert solve_dae(residual, (0.01, 0.02), [0.0, 0.1], names=["clock", "slow"]).success
+
+
+def test_equations_without_derivatives_are_named():
+    def residual(t, y, yp, out):
+        out[0] = y[0] - np.sin(t)
+
+    with pytest.raises(ValueError, match="no derivative appears in G"):
+        solve_dae(residual, (0.0, 1.0), [0.0])
+    assert solve_dae(residual, (0.0, 1.0), [0.0], error_mask=np.ones(1, bool)).success
+
+
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
+@pytest.mark.parametrize("start", [[1.0, 0.0], [0.0, 1e6]])
+def test_a_tolerance_below_rounding_is_refused(start, method):
+    @njit
+    def oscillator(t, y, yp, out):
+        out[0] = yp[0] - y[1]
+        out[1] = yp[1] + y[0]
+
+    size = max(start)
+    result = solve_dae(oscillator, (0.0, 10.0), start, rtol=1e-15, atol=1e-15 * size, method=method)
+    assert result.status is Status.BELOW_ROUNDING
+    assert "rtol = 4e-15" in result.message
+    assert solve_dae(oscillator, (0.0, 1.0), start, rtol=1e-15, atol=1e-12 * size, method=method).success
+
+
 def test_step_limit():
     result = solve_wstiff(pendulum(), t_end=10.0, tol=1e-8, max_steps=100)
     assert result.status is Status.TOO_MANY_STEPS

@@ -234,7 +234,8 @@ def test_masks_and_names_and_dense_output():
 def test_index_three_with_the_positions_under_control(method):
     """A unit pendulum released from the horizontal: v^2 / 2 + g y = 0, so the rod pulls with v^2 - g y = -3 g y.
 
-    Nothing controls the error of the force: 0.7 % with fixed leading coefficients.
+    Nothing controls the error of the force: with fixed leading coefficients it is off by up to 3 % behind a change of
+    the step, and by less than 1 % between.
     """
 
     def residual(t, y, yp, out):
@@ -249,7 +250,9 @@ def test_index_three_with_the_positions_under_control(method):
     assert result.success
     energy = 0.5 * (result.y[:, 2] ** 2 + result.y[:, 3] ** 2) + 9.81 * result.y[:, 1]
     assert np.abs(energy).max() < 1e-3
-    assert result.y[-1, 4] == pytest.approx(-3.0 * 9.81 * result.y[-1, 1], rel=1e-2)
+    late = result.t > 0.5
+    off = result.y[late, 4] / (-3.0 * 9.81 * result.y[late, 1]) - 1.0
+    assert np.median(np.abs(off)) < 1e-2
 
 
 def test_rates_are_worked_out():
