@@ -29,8 +29,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import float64, int64, types
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from gearmbs._jit import njit
 from gearmbs.dae.compiled.bound_functions import FUNCTIONS_TYPE, bind, no_events, no_hook
@@ -206,7 +204,10 @@ def _solve(part, x):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _evaluate_matrix(functions, part, t, y, yp, h, idata, rdata, work):
-    """Evaluate and factor the matrix at an instant; return whether it is regular."""
+    """Evaluate and factor the matrix at an instant; return whether it is regular.
+
+    The parameters are those of `settle`.
+    """
     functions.jacobian(t, y, yp, 0.0, part.vals, idata, rdata, work)
     cj = RATE_OF_MATRIX / h
     if part.any_rates:
@@ -224,7 +225,8 @@ def _evaluate_matrix(functions, part, t, y, yp, h, idata, rdata, work):
 def _slopes(functions, part, t, y, yp, s, f, idata, rdata, work):
     """Write the derivatives by time of all rows along y', where y' itself is kept: (8 (1) - (2))/(12 s) [3]_.
 
-    (1) and (2) are the differences between the rows s and 2 s later and earlier.
+    (1) and (2) are the differences between the rows s and 2 s later and earlier. The slopes are written to ``f``;
+    the other parameters are those of `settle`.
     """
     moved, res = part.y_moved, part.res
     f[: part.count] = 0.0
@@ -240,7 +242,10 @@ def _slopes(functions, part, t, y, yp, s, f, idata, rdata, work):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _rows_at(functions, part, t, y, yp, wide, idata, rdata, work):
-    """Write what the equations are off by at an instant to ``part.f``."""
+    """Write what the equations are off by at an instant to ``part.f``.
+
+    Constraints are differenced over a part of ``wide``; the other parameters are those of `settle`.
+    """
     f = part.f
     if part.any_lifted:
         _slopes(functions, part, t, y, yp, SPAN_OF_CONSTRAINTS * wide, f, idata, rdata, work)
@@ -269,8 +274,8 @@ def _take(part, y, yp, x):
 def _iterate(functions, part, t, y, yp, h, wide, fresh, idata, rdata, work):
     """Correct the unknowns with the present matrix; return whether they converge as from a guess near their root.
 
-    Constraints are differenced over a part of ``wide``.
-    With a ``fresh`` matrix an iteration that gets no further within the tolerance is at the level of rounding.
+    Constraints are differenced over a part of ``wide``. With a ``fresh`` matrix an iteration that gets no further
+    within the tolerance is at the level of rounding. The other parameters are those of `settle`.
     """
     f, cols = part.f, part.cols
     previous = np.inf
@@ -305,7 +310,10 @@ def _iterate(functions, part, t, y, yp, h, wide, fresh, idata, rdata, work):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _slopes_of_unknowns(functions, part, t, y, yp, h, idata, rdata, work):
-    """Replace the rates of algebraic unknowns by those that keep their equations satisfied along the solution."""
+    """Replace the rates of algebraic unknowns by those that keep their equations satisfied along the solution.
+
+    The parameters are those of `settle`.
+    """
     f, last = part.f, part.last
     for k in range(part.count):
         last[k] = yp[part.cols[k]]
@@ -479,7 +487,7 @@ def settle_output(functions, part, t, y, yp, h, t_old, y_old, idata, rdata, work
     """Settle an output of an integrator that tells nothing between outputs.
 
     Where the iteration does not converge, the branch is followed on the chord from the output before, ``y_old`` at
-    ``t_old``. Other parameters are those of `settle`.
+    ``t_old``. The other parameters are those of `settle`.
     """
     if settle(functions, part, t, y, yp, h, idata, rdata, work):
         return
@@ -510,7 +518,22 @@ def settle_output(functions, part, t, y, yp, h, t_old, y_old, idata, rdata, work
     cache=True,
 )
 def _probe(residual, t, y, yp, sizes, by_y, by_rate, idata, rdata, work):
-    """Mark which rows each unknown and each rate changes at one point."""
+    """Mark which rows each unknown and each rate changes at one point.
+
+    Parameters
+    ----------
+    residual : function
+        G(t, y, y').
+    t : float
+    y, yp : ndarray, shape (n,)
+        The point.
+    sizes : ndarray, shape (n,)
+        Least sizes that unknowns are changed by a part of.
+    by_y, by_rate : ndarray of bool, shape (n, n)
+        Marked where row i changes with unknown, or rate, j; marks that are there stay.
+    idata, rdata, work : ndarray
+        Tables and scratch of the problem.
+    """
     n = y.shape[0]
     base, moved = np.empty(n), np.empty(n)
     residual(t, y, yp, base, idata, rdata, work)
@@ -554,6 +577,10 @@ def _determined(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     match = np.full(edges.shape[1], -1)
     if edges.any():
+        # takes longer to load than many a run, which has no algebraic unknowns
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import maximum_bipartite_matching
+
         match = maximum_bipartite_matching(csr_array(edges.astype(np.int8)), perm_type="row")
     column_of = {int(row): c for c, row in enumerate(match) if row >= 0}
     open_ones = [int(c) for c in np.flatnonzero(match < 0)]
@@ -678,7 +705,9 @@ def _has_hidden_constraints(problem: DAEProblem) -> bool:
         problem.residual(float(problem.t0), y, yp, moved, *tables)
         yp[j] = kept
         columns.append((moved - base) / d)
-    matrix = np.array(columns).T
+    matrix = np.reshape(columns, (len(columns), problem.n)).T
+    if matrix.size == 0:
+        return False
     if not np.isfinite(matrix).all():
         return True
     for axis in (1, 0):

@@ -58,7 +58,18 @@ def write_outputs(functions, st, part, t):
 def _root(functions, st, part, which, a, fa, b, fb):
     """Return where event ``which`` changes sign between a and b: Illinois method on the polynomial, then bisection.
 
-    ``fa`` and ``fb`` are its values there. ``st.g_new`` is overwritten.
+    ``st.g_new`` is overwritten.
+
+    Parameters
+    ----------
+    functions, st, part
+        As everywhere in a run.
+    which : int
+        The event.
+    a, b : float
+        Times on both sides of the change, in any order.
+    fa, fb : float
+        Values of the event there.
     """
     y, yp, g = st.y_between, st.yp_between, st.g_new
     side = 0

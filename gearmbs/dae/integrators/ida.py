@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-import scipy.sparse.linalg
 
 from gearmbs.dae.integrators.algebraic import AlgebraicOutputs
 from gearmbs.dae.integrators.branches import SAME_EQUATION, UNFORESEEN
@@ -473,6 +472,9 @@ class IdaBranch:
         Newton's method with a matrix of its own for each iterate. Unknowns of index one may jump, if their equations
         do: see `gearmbs.dae.integrators.branches.stays_on_branch`.
         """
+        # takes longer to load than many a run, which does not need it
+        from scipy.sparse.linalg import splu
+
         problem, own = self.problem, self.own
         assert own is not None
         self.tries = self.tries + 1 if t - self.passed <= STANDSTILL * (end - self.start) else 0
@@ -497,7 +499,7 @@ class IdaBranch:
                 if not (np.isfinite(res).all() and np.isfinite(matrix.data).all()):
                     return ""
                 try:
-                    step = scipy.sparse.linalg.splu(matrix).solve(res)
+                    step = splu(matrix).solve(res)
                 except RuntimeError:
                     break
                 held = violation <= 1.0 and float(np.max(np.abs(step) * weight)) <= 1.0
@@ -509,7 +511,7 @@ class IdaBranch:
             return solution_ends(problem, row, violation) or no_solution(problem, row)
         d = np.where(own, y - new, 0.0)
         if float(np.max(np.abs(d) * weight)) > UNFORESEEN:
-            secant = scipy.sparse.linalg.splu(matrix).solve(self._residual(after, np.where(own, y, new), rates))
+            secant = splu(matrix).solve(self._residual(after, np.where(own, y, new), rates))
             size = 1.0 / (np.abs(y) + np.abs(new) + 1.0 / weight)
             if not (secant * size) @ (d * size) >= SAME_EQUATION * float((d * size) @ (d * size)):
                 worst = int(np.argmax(np.abs(d) * weight))
