@@ -319,7 +319,7 @@ class _Run:
         if self.branch.index_changed(self.t, y, yp):
             told = index_changes(self.branch.t_known, self.t)
             return Status.SINGULAR_JACOBIAN, told
-        return Status.SUCCESS, Status.SUCCESS.sentence
+        return Status.SUCCESS, f"{Status.SUCCESS.sentence}{problem.start_note}"
 
     def _settle(self) -> None:
         """Solve for algebraic unknowns at the output just taken, and after the first step at the start."""
