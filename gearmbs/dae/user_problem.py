@@ -195,6 +195,25 @@ def _find_rates(problem: DAEProblem, span: float) -> None:
         problem.yp0[moving] -= gamma * sweep(gamma, factored)
 
 
+def _find_steep(problem: DAEProblem, functions: _UserFunctions, span: float) -> None:
+    """Mark as differential also unknowns whose derivative changes G over rates of one or typical ones only.
+
+    Over a thousandth of them a fourth power is lost in the rounding of other terms.
+    """
+    tables = problem.idata, problem.rdata, np.zeros(problem.work_size)
+    known = len(functions.errors)
+    base, moved = np.empty(problem.n), np.empty(problem.n)
+    problem.residual(problem.t0, problem.y0, problem.yp0, base, *tables)
+    for j in np.flatnonzero(~problem.differential):
+        for size in (1.0 + abs(problem.yp0[j]), problem.scale[j] / span):
+            rates = problem.yp0.copy()
+            rates[j] += size
+            problem.residual(problem.t0, problem.y0, rates, moved, *tables)
+            if len(functions.errors) == known and np.isfinite(moved).all() and (moved != base).any():
+                problem.differential[j] = True
+            del functions.errors[known:]
+
+
 def _nonlinear_in_rates(problem: DAEProblem, functions: _UserFunctions, span: float) -> bool:
     """Return whether second differences of G by y' do not vanish, over rates of the order of the given ones or of one,
     and over typical ones. Where G is not defined there it is not linear either.
@@ -470,6 +489,10 @@ def as_problem(
         names=list(names),
         jacobian_residuals=1 + int(idata[differences.N_COLOURS]) if jac is None else 0,
     )
+    if differential is None:
+        _find_steep(problem, functions, span)
+        if error_mask is None:
+            problem.error_mask = problem.differential.copy()
     if differential is None and error_mask is None:
         _check_derivatives(problem, functions, span)
     if not problem.error_mask.any():

@@ -678,6 +678,8 @@ def _has_hidden_constraints(problem: DAEProblem) -> bool:
         problem.residual(float(problem.t0), y, yp, moved, *tables)
         yp[j] = kept
         columns.append((moved - base) / d)
+    if not columns:
+        return False
     matrix = np.array(columns).T
     if not np.isfinite(matrix).all():
         return True
