@@ -29,7 +29,7 @@ RATES_FOUND = 1e-8
 RATES_REMARKED = 1e-6
 """Part of a rate, or of a typical one, from which on a change of given rates is told."""
 RATES_HOLD = 1e-10
-"""Residual, in terms of what rates of the order of one do to it, that counts as zero: some roundings."""
+"""Residual, in terms of what typical rates do to it, that counts as zero: some roundings."""
 BENT = 1e-12
 """Second difference of G by y', in terms of G, beyond rounding."""
 LARGEST_BLOCK = 600
@@ -233,7 +233,7 @@ def _nonlinear_in_rates(problem: DAEProblem, functions: _UserFunctions, span: fl
         if not np.isfinite(values[0]).all():
             return False
         bend = np.abs(values[2] - 2.0 * values[1] + values[0])
-        if raised or not (bend <= BENT * np.abs(values).sum(axis=0)).all():
+        if raised or not np.isfinite(values).all() or (bend > BENT * np.abs(values).sum(axis=0)).any():
             return True
     return False
 
@@ -251,7 +251,7 @@ def _settle_rates(problem: DAEProblem, span: float, given: bool) -> str:
     """
     tables = problem.idata, problem.rdata, np.zeros(problem.work_size)
     moving, given_rates = problem.differential, problem.yp0.copy()
-    typical = problem.scale / span
+    typical = problem.rdata[2 * problem.n : 3 * problem.n]
     gamma, out, delta = 1.0 / (RATES_STEP * span), np.empty(problem.n), np.empty(problem.n)
     raises = 0
     for _ in range(RATES_ITERATIONS):
@@ -271,22 +271,21 @@ def _settle_rates(problem: DAEProblem, span: float, given: bool) -> str:
             continue
         move = gamma * delta[moving]
         problem.yp0[moving] -= move
-        if (np.abs(move) <= RATES_FOUND * np.maximum(np.abs(problem.yp0[moving]), RATES_FOUND * typical[moving])).all():
+        if (np.abs(move) <= RATES_FOUND * np.maximum(np.abs(problem.yp0), typical)[moving]).all():
             moved = np.abs(problem.yp0 - given_rates) > RATES_REMARKED * np.maximum(np.abs(problem.yp0), typical)
             return moved_rates(problem, np.flatnonzero(moved), given_rates) if given else ""
     problem.yp0[:] = given_rates
     problem.residual(problem.t0, problem.y0, given_rates, out, *tables)
-    rest = given_rates + np.where(moving, 1.0 + np.abs(given_rates), 0.0) * np.random.default_rng(0).uniform(
-        0.5, 1.0, problem.n
-    )
+    size = np.where(moving, np.maximum(np.abs(given_rates), typical), 0.0)
+    rest = given_rates + size * np.random.default_rng(0).uniform(0.5, 1.0, problem.n)
     moved_out = np.empty(problem.n)
     problem.residual(problem.t0, problem.y0, rest, moved_out, *tables)
     rows = moved_out != out
-    size = float(np.max(np.abs(out), initial=0.0))
-    if not np.isfinite(size) or np.max(np.abs(out[~rows]), initial=0.0) > RATES_HOLD * (1.0 + np.abs(problem.y0).max()):
+    off = float(np.max(np.abs(out), initial=0.0))
+    if not np.isfinite(off) or np.max(np.abs(out[~rows]), initial=0.0) > RATES_HOLD * (1.0 + np.abs(problem.y0).max()):
         # values off the constraints, or equations that are not defined: the check of the start says so
         return ""
-    if size <= RATES_HOLD * float(np.max(np.abs(moved_out - out)[rows], initial=0.0)):
+    if off <= RATES_HOLD * float(np.max(np.abs(moved_out - out)[rows], initial=0.0)):
         return ""
     row = int(np.argmax(np.where(rows, np.abs(out), 0.0)))
     raise ValueError(
