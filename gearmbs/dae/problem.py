@@ -59,6 +59,10 @@ class DAEProblem:
         Algebraic unknowns that equations without derivatives determine: the corrector satisfies them to their
         tolerance at every step. What others, multipliers of index two and more, do to the rest shrinks with the step,
         and so does what it asks of them. Default: none.
+    nonlinear_rates : bool
+        Whether G is not linear in y': the corrector then trusts no rate of convergence that it has not seen itself.
+    start_note : str
+        What to say of the initial values in the message of a run that succeeds.
     names : list of str
         Names of the unknowns, for messages; equation i goes by that of unknown i.
     n_events : int
@@ -96,6 +100,8 @@ class DAEProblem:
     differential: np.ndarray
     t0: float = 0.0
     index_one: np.ndarray | None = None
+    nonlinear_rates: bool = False
+    start_note: str = ""
     names: list[str] = field(default_factory=list)
     hook: Callable | None = None
     events: Callable | None = None

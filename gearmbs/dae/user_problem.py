@@ -12,7 +12,7 @@ from scipy.sparse import csc_array, issparse
 
 from gearmbs.dae.compiled.python_callback import PythonCallback
 from gearmbs.dae.integrators import differences
-from gearmbs.dae.integrators.messages import unknown_name
+from gearmbs.dae.integrators.messages import moved_rates, unknown_name
 from gearmbs.dae.linalg.analyse import SingularMatrixError, analyse
 from gearmbs.dae.linalg.lu_plan import LUPlan
 from gearmbs.dae.linalg.sparse_lu import LUFactors, factor, new_factors, solve
@@ -22,6 +22,16 @@ RATES_STEP = 1e-12
 RATES_SWEEPS = 3
 RATES_RATIO = 100.0
 RATES_ROUNDS = 12
+RATES_ITERATIONS = 100
+"""From rates a million times too large Newton's method takes ln 1e6/ln(p/(p - 1)) of them with a power p: 62 with 5."""
+RATES_FOUND = 1e-8
+"""Part of a rate within which Newton's method has found it: its next correction is the square of that."""
+RATES_REMARKED = 1e-6
+"""Part of a rate, or of a typical one, from which on a change of given rates is told."""
+RATES_HOLD = 1e-10
+"""Residual, in terms of what typical rates do to it, that counts as zero: some roundings."""
+BENT = 1e-12
+"""Second difference of G by y', in terms of G, beyond rounding."""
 LARGEST_BLOCK = 600
 """Algebraic unknowns up to which those of index one are looked for, by a dense decomposition: 0.2 s."""
 NEARBY = 1e-3
@@ -62,11 +72,11 @@ class _UserFunctions:
         self.addresses[slot] = callback.address
 
     def tables(
-        self, compiled: dict[str, Any], least: np.ndarray, scales: np.ndarray
+        self, compiled: dict[str, Any], least: np.ndarray, scales: np.ndarray, span: float
     ) -> tuple[np.ndarray, np.ndarray, int]:
         """Return the tables of the problem and the length of its work array, with the addresses of its callbacks."""
         idata, rdata, work_size = differences.pack_tables(
-            compiled["indptr"], compiled["indices"], least, scales, self.parameters
+            compiled["indptr"], compiled["indices"], least, scales, least / span, self.parameters
         )
         for slot, address in self.addresses.items():
             idata[slot] = address
@@ -183,6 +193,107 @@ def _find_rates(problem: DAEProblem, span: float) -> None:
     problem.yp0[moving] -= gamma * jump
     for _ in range(RATES_SWEEPS - 1):
         problem.yp0[moving] -= gamma * sweep(gamma, factored)
+
+
+def _find_steep(problem: DAEProblem, functions: _UserFunctions, span: float) -> None:
+    """Mark as differential also unknowns whose derivative changes G over rates of one or typical ones only.
+
+    Over a thousandth of them a fourth power is lost in the rounding of other terms.
+    """
+    tables = problem.idata, problem.rdata, np.zeros(problem.work_size)
+    known = len(functions.errors)
+    base, moved = np.empty(problem.n), np.empty(problem.n)
+    problem.residual(problem.t0, problem.y0, problem.yp0, base, *tables)
+    for j in np.flatnonzero(~problem.differential):
+        for size in (1.0 + abs(problem.yp0[j]), problem.scale[j] / span):
+            rates = problem.yp0.copy()
+            rates[j] += size
+            problem.residual(problem.t0, problem.y0, rates, moved, *tables)
+            if len(functions.errors) == known and np.isfinite(moved).all() and (moved != base).any():
+                problem.differential[j] = True
+            del functions.errors[known:]
+
+
+def _nonlinear_in_rates(problem: DAEProblem, functions: _UserFunctions, span: float) -> bool:
+    """Return whether second differences of G by y' do not vanish, over rates of the order of the given ones or of one,
+    and over typical ones. Where G is not defined there it is not linear either.
+    """
+    tables = problem.idata, problem.rdata, np.zeros(problem.work_size)
+    known = len(functions.errors)
+    moving = problem.differential
+    for size in (1.0 + np.abs(problem.yp0), problem.scale / span):
+        way = np.where(moving, size * np.random.default_rng(0).uniform(0.5, 1.0, problem.n), 0.0)
+        values = np.empty((3, problem.n))
+        for k in range(3):
+            problem.residual(problem.t0, problem.y0, problem.yp0 + k * way, values[k], *tables)
+        raised = len(functions.errors) > known
+        if known == 0 and raised and not np.isfinite(values[0]).all():
+            return False
+        del functions.errors[known:]
+        if not np.isfinite(values[0]).all():
+            return False
+        bend = np.abs(values[2] - 2.0 * values[1] + values[0])
+        if raised or not np.isfinite(values).all() or (bend > BENT * np.abs(values).sum(axis=0)).any():
+            return True
+    return False
+
+
+def _settle_rates(problem: DAEProblem, span: float, given: bool) -> str:
+    """Solve G = 0 for y' of differential unknowns where G is not linear in them; return what to say of it.
+
+    Newton's method, with y kept: steps of implicit Euler so short that y does not move in them, which take the change
+    of algebraic unknowns into account. Its path stays on the branch of the given rates, else of zero.
+
+    Raises
+    ------
+    ValueError
+        Where it does not converge though the constraints hold: the rates are then not determined by y alone.
+    """
+    tables = problem.idata, problem.rdata, np.zeros(problem.work_size)
+    moving, given_rates = problem.differential, problem.yp0.copy()
+    typical = problem.rdata[2 * problem.n : 3 * problem.n]
+    gamma, out, delta = 1.0 / (RATES_STEP * span), np.empty(problem.n), np.empty(problem.n)
+    raises = 0
+    for _ in range(RATES_ITERATIONS):
+        factored = _factors_at_start(problem, gamma, tables)
+        if factored is None:
+            break
+        problem.residual(problem.t0, problem.y0, problem.yp0, out, *tables)
+        solve(*factored, out, delta)
+        if not np.isfinite(delta).all():
+            break
+        if not (np.abs(delta[moving]) <= problem.atol_scale[moving]).all():
+            # the move of a rate shrinks with the step, a jump of y does not
+            raises += 1
+            if raises > RATES_ROUNDS:
+                break
+            gamma *= RATES_RATIO
+            continue
+        move = gamma * delta[moving]
+        problem.yp0[moving] -= move
+        if (np.abs(move) <= RATES_FOUND * np.maximum(np.abs(problem.yp0), typical)[moving]).all():
+            moved = np.abs(problem.yp0 - given_rates) > RATES_REMARKED * np.maximum(np.abs(problem.yp0), typical)
+            return moved_rates(problem, np.flatnonzero(moved), given_rates) if given else ""
+    problem.yp0[:] = given_rates
+    problem.residual(problem.t0, problem.y0, given_rates, out, *tables)
+    size = np.where(moving, np.maximum(np.abs(given_rates), typical), 0.0)
+    rest = given_rates + size * np.random.default_rng(0).uniform(0.5, 1.0, problem.n)
+    moved_out = np.empty(problem.n)
+    problem.residual(problem.t0, problem.y0, rest, moved_out, *tables)
+    rows = moved_out != out
+    off = float(np.max(np.abs(out), initial=0.0))
+    if not np.isfinite(off) or np.max(np.abs(out[~rows]), initial=0.0) > RATES_HOLD * (1.0 + np.abs(problem.y0).max()):
+        # values off the constraints, or equations that are not defined: the check of the start says so
+        return ""
+    if off <= RATES_HOLD * float(np.max(np.abs(moved_out - out)[rows], initial=0.0)):
+        return ""
+    row = int(np.argmax(np.where(rows, np.abs(out), 0.0)))
+    raise ValueError(
+        f"the rates at the start cannot be found: G is not linear in y', and from yp0 = "
+        f"{np.array2string(given_rates, threshold=6)} Newton's method does not come to rates that satisfy equation "
+        f"{row} (residual {out[row]:.3g}); dG/dy' vanishes on the way, or several rates are possible, or none. Give "
+        "yp0= near the rates that are meant"
+    )
 
 
 def _factors_at_start(problem: DAEProblem, gamma: float, tables: tuple) -> tuple[LUPlan, LUFactors] | None:
@@ -353,7 +464,9 @@ def as_problem(
     parameters = np.array([] if p is None else p, dtype=float).ravel()
     functions = _UserFunctions(n, parameters)
     compiled = _compiled(functions, fun, jac, jac_sparsity, events)
-    idata, rdata, work_size = functions.tables(compiled, np.minimum(scales, atols / differences.INCREMENT), scales)
+    idata, rdata, work_size = functions.tables(
+        compiled, np.minimum(scales, atols / differences.INCREMENT), scales, span
+    )
     rates = np.zeros(n) if yp0 is None else _vector(yp0, n, "yp0")
     tables = idata, rdata, np.zeros(work_size)
     mask = _mask(differential, n, "differential") if differential is not None else np.empty(n, dtype=np.bool_)
@@ -375,13 +488,21 @@ def as_problem(
         names=list(names),
         jacobian_residuals=1 + int(idata[differences.N_COLOURS]) if jac is None else 0,
     )
+    if differential is None:
+        _find_steep(problem, functions, span)
+        if error_mask is None:
+            problem.error_mask = problem.differential.copy()
     if differential is None and error_mask is None:
         _check_derivatives(problem, functions, span)
     if not problem.error_mask.any():
         raise ValueError(
             "error_mask leaves no unknown under error control: set it at least for unknowns whose derivatives appear"
         )
-    if yp0 is None:
+    problem.nonlinear_rates = _nonlinear_in_rates(problem, functions, span)
+    if problem.nonlinear_rates:
+        idata[differences.NONLINEAR_RATES] = 1
+        problem.start_note = _settle_rates(problem, span, yp0 is not None)
+    elif yp0 is None:
         _find_rates(problem, span)
     problem.index_one = _index_one(problem)
     return problem, functions.probe

@@ -705,9 +705,9 @@ def _has_hidden_constraints(problem: DAEProblem) -> bool:
         problem.residual(float(problem.t0), y, yp, moved, *tables)
         yp[j] = kept
         columns.append((moved - base) / d)
-    matrix = np.reshape(columns, (len(columns), problem.n)).T
-    if matrix.size == 0:
+    if not columns:
         return False
+    matrix = np.array(columns).T
     if not np.isfinite(matrix).all():
         return True
     for axis in (1, 0):

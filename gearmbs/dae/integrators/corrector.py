@@ -30,6 +30,9 @@ converges leaves. Over a whole tolerance the matrix may change."""
 ROUNDED_TERMS = 16.0
 """Roundings of the terms of an equation: each is a product of a few factors, summed in some order."""
 EPS = 2.220446049250313e-16
+SETTLED_RATE = 0.01
+"""Part of a rate by which its last correction may move it where G is not linear in y'. In a short step the tolerance of
+y allows any rate; a correction of that size leaves about its square."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -93,6 +96,24 @@ def equations_hold(functions, st):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def rates_settle(st):
+    """Return whether the last correction has left the rates as they were, up to a part of them and rounding.
+
+        gamma |delta_j| <= SETTLED_RATE (|y'_j| + |y'_pred,j|) + gamma ROUNDED_TERMS eps |y_j|
+
+    Only where G is not linear in y': elsewhere wrong rates are no obstacle to the convergence of y.
+    """
+    if not st.nonlinear_rates:
+        return True
+    y, yp, guess, gamma, delta = st.y, st.yp, st.yp_pred, st.gamma, st.delta
+    for j in range(y.shape[0]):
+        allowed = SETTLED_RATE * (abs(yp[j]) + abs(guess[j])) + gamma * ROUNDED_TERMS * EPS * abs(y[j])
+        if st.differential[j] != 0.0 and not gamma * abs(delta[j]) <= allowed:
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _verdict(functions, st, rate):
     """Return CONVERGED where a corrector that gets no further is harmless: all equations hold, and it is at its end.
 
@@ -106,7 +127,7 @@ def _verdict(functions, st, rate):
         harmless = left <= (ROUNDING_LEVEL_FRESH if fresh else ROUNDING_LEVEL)
     else:
         harmless = fresh and left * rate <= ROUNDING_LEVEL_FRESH * (1.0 - rate)
-    return CONVERGED if harmless and equations_hold(functions, st) else SLOW
+    return CONVERGED if harmless and rates_settle(st) and equations_hold(functions, st) else SLOW
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -156,7 +177,9 @@ def correct(functions, st, plan, factors):
                 return _verdict(functions, st, rate)
             st.rate = max(rate, RATE_MEMORY * st.rate)
         trust = max(st.rate, RATE_FLOOR)
-        if trust < 1.0 and norm * trust <= limit * (1.0 - trust):
+        # where G is not linear in y', what other steps have seen of the convergence holds nothing
+        seen = m > 0 or norm == 0.0 or iterations == 1 or not st.nonlinear_rates
+        if seen and trust < 1.0 and norm * trust <= limit * (1.0 - trust) and rates_settle(st):
             if m == 0:
                 # a rate that nothing has confirmed is worth less each time
                 st.rate = max(st.rate, min(RATE_AGEING * trust, RATE_UNKNOWN))

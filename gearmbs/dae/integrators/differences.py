@@ -4,12 +4,16 @@ A user's function is called with its own few arguments; what the integrator need
 increments, addresses of Python callbacks) stands in front of the user's parameters in the tables of the problem:
 
 * ``idata``: the header below, then colour pointers, columns by colour, ``indptr``, ``indices``
-* ``rdata``: least and typical magnitude of each unknown for the increments, then the user's parameters
+* ``rdata``: least and typical magnitude of each unknown for the increments, typical magnitude of its rate, then the
+  user's parameters
 
 An increment is a fixed part of the unknown or of what it changes by in a step, but no less than its tolerance, or the
 same part of its typical magnitude if that is smaller. A larger increment of an unknown that has become small, say a
 radical at 1e-13, would measure the slope at another place. Where the tolerance lies far below the typical magnitude a
 second difference, over that magnitude, supplies the entries that rounding hides in the first.
+
+y and y' are moved together, y' by cj times as much, which for small steps is far more than y' itself. That is exact
+where G is linear in y'. Where it is not, the two are differenced apart, y' to both sides by a part of its own size.
 """
 
 from __future__ import annotations
@@ -35,9 +39,13 @@ COLOUR_COLS = 6
 INDPTR = 7
 INDICES = 8
 PARAMETERS = 9
-N_HEADER = 10
+NONLINEAR_RATES = 10
+N_HEADER = 11
 
 INCREMENT = 1.4901161193847656e-08
+INCREMENT_OF_RATE = 6e-6
+"""Part of a rate by which it is moved to both sides: the cube root of the rounding, where its error is that of the
+third derivative, 1e-11."""
 FAR_BELOW = 1e-3
 """Part of the typical magnitude below which the least one counts as far below it."""
 VISIBLE = 100.0
@@ -91,7 +99,12 @@ def colour_columns(indptr, indices, colours):
 
 
 def pack_tables(
-    indptr: np.ndarray, indices: np.ndarray, least: np.ndarray, typical: np.ndarray, parameters: np.ndarray
+    indptr: np.ndarray,
+    indices: np.ndarray,
+    least: np.ndarray,
+    typical: np.ndarray,
+    rates: np.ndarray,
+    parameters: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Lay out ``idata``, ``rdata`` and the length of ``work`` for a user's problem.
 
@@ -101,6 +114,8 @@ def pack_tables(
         CSC pattern.
     least, typical : ndarray, shape (n,)
         Magnitudes of each unknown, for the increments.
+    rates : ndarray, shape (n,)
+        Typical magnitudes of the rates, for the same.
     parameters : ndarray
         The user's parameters.
 
@@ -121,9 +136,9 @@ def pack_tables(
     header[COLOUR_COLS] = header[COLOUR_PTR] + len(pointers)
     header[INDPTR] = header[COLOUR_COLS] + n
     header[INDICES] = header[INDPTR] + n + 1
-    header[PARAMETERS] = 2 * n
+    header[PARAMETERS] = 3 * n
     idata = np.concatenate((header, pointers, columns, indptr, indices)).astype(np.int64)
-    rdata = np.concatenate((least, typical, parameters)).astype(float)
+    rdata = np.concatenate((least, typical, rates, parameters)).astype(float)
     return idata, rdata, 5 * n
 
 
@@ -222,22 +237,52 @@ def _difference_colour(residual, t, y, yp, cj, vals, idata, rdata, work, c, wide
     nogil=True,
     error_model="numpy",
 )
-def difference_matrix(residual, t, y, yp, cj, vals, idata, rdata, work):
-    """Write dG/dy + cj dG/dy' by forward differences, one residual for each colour and one for the base.
+def _add_rates(residual, t, y, yp, cj, vals, idata, rdata, work):
+    """Add cj dG/dy' to ``vals`` by central differences over part of each rate, two residuals for each colour."""
+    n = idata[N]
+    behind, ahead, yp_moved = work[0:n], work[n : 2 * n], work[3 * n : 4 * n]
+    colour_ptr = idata[idata[COLOUR_PTR] :]
+    columns = idata[idata[COLOUR_COLS] :]
+    indptr = idata[idata[INDPTR] :]
+    indices = idata[idata[INDICES] :]
+    for i in range(n):
+        yp_moved[i] = yp[i]
+    for c in range(idata[N_COLOURS]):
+        first, last = colour_ptr[c], colour_ptr[c + 1]
+        for q in range(first, last):
+            j = columns[q]
+            yp_moved[j] = yp[j] - INCREMENT_OF_RATE * max(abs(yp[j]), rdata[2 * n + j])
+        residual(t, y, yp_moved, behind, idata, rdata, work)
+        for q in range(first, last):
+            j = columns[q]
+            yp_moved[j] = yp[j] + INCREMENT_OF_RATE * max(abs(yp[j]), rdata[2 * n + j])
+        residual(t, y, yp_moved, ahead, idata, rdata, work)
+        for q in range(first, last):
+            j = columns[q]
+            d = 2.0 * INCREMENT_OF_RATE * max(abs(yp[j]), rdata[2 * n + j])
+            for p in range(indptr[j], indptr[j + 1]):
+                vals[p] += cj * ((ahead[indices[p]] - behind[indices[p]]) / d)
+            yp_moved[j] = yp[j]
 
-    Columns with entries that rounding may hide cost their colour a second residual.
 
-    Parameters
-    ----------
-    residual : function
-        Of RESIDUAL_SIG.
-    t, y, yp, cj : float, ndarray, ndarray, float
-        Time, y, y' and the factor of dG/dy'.
-    vals : ndarray, shape (nnz,)
-        Written, in CSC order.
-    idata, rdata, work : ndarray
-        Tables laid out by `pack_tables`, handed to ``residual`` as they are; G is left in the first block of ``work``.
-    """
+@njit(
+    types.void(
+        types.FunctionType(RESIDUAL_SIG),
+        types.float64,
+        types.float64[::1],
+        types.float64[::1],
+        types.float64,
+        types.float64[::1],
+        _IVEC,
+        types.float64[::1],
+        types.float64[::1],
+    ),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def _difference_together(residual, t, y, yp, cj, vals, idata, rdata, work):
+    """Write dG/dy + cj dG/dy' by forward differences, y and y' moved together; see `difference_matrix`."""
     n = idata[N]
     base = work[0:n]
     residual(t, y, yp, base, idata, rdata, work)
@@ -258,6 +303,45 @@ def difference_matrix(residual, t, y, yp, cj, vals, idata, rdata, work):
             if _hidden(columns[q], y, yp, cj, rdata, n):
                 _difference_colour(residual, t, y, yp, cj, vals, idata, rdata, work, c, True)
                 break
+
+
+@njit(
+    types.void(
+        types.FunctionType(RESIDUAL_SIG),
+        types.float64,
+        types.float64[::1],
+        types.float64[::1],
+        types.float64,
+        types.float64[::1],
+        _IVEC,
+        types.float64[::1],
+        types.float64[::1],
+    ),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def difference_matrix(residual, t, y, yp, cj, vals, idata, rdata, work):
+    """Write dG/dy + cj dG/dy' by forward differences, one residual for each colour and one for the base.
+
+    Columns with entries that rounding may hide cost their colour a second residual, and where G is not linear in y'
+    each colour two more.
+
+    Parameters
+    ----------
+    residual : function
+        Of RESIDUAL_SIG.
+    t, y, yp, cj : float, ndarray, ndarray, float
+        Time, y, y' and the factor of dG/dy'.
+    vals : ndarray, shape (nnz,)
+        Written, in CSC order.
+    idata, rdata, work : ndarray
+        Tables laid out by `pack_tables`, handed to ``residual`` as they are; ``work`` is overwritten.
+    """
+    apart = idata[NONLINEAR_RATES] != 0 and cj != 0.0
+    _difference_together(residual, t, y, yp, 0.0 if apart else cj, vals, idata, rdata, work)
+    if apart:
+        _add_rates(residual, t, y, yp, cj, vals, idata, rdata, work)
 
 
 @njit(RESIDUAL_SIG, cache=True, nogil=True, error_model="numpy")

@@ -76,7 +76,7 @@ class Run:
         """First step that the present pivots were chosen for, zero for none."""
         self.counted = np.zeros(len(problem.indices), dtype=bool)
         self.started = False
-        self.start_note = ""
+        self.start_note = problem.start_note
         self.steps_given = options.first_step is not None, options.min_step is not None
         outputs, end = output_times(t_eval, float(problem.t0), t_end)
         every_step = t_eval is None

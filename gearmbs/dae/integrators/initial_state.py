@@ -145,6 +145,7 @@ def _set_tolerances(st: RunState, problem: DAEProblem, options: Options, span: f
     st.watches_pencil = problem.index_one is not None and problem.n <= LARGEST_PENCIL
     st.gamma_large = LARGE_GAMMA / span
     st.has_index_one = bool(st.index_one.any())
+    st.nonlinear_rates = problem.nonlinear_rates
     st.tested[:] = np.maximum(st.controlled, st.index_one) if options.corrector == "modified" else 1.0
     st.differential[:] = problem.differential
     st.coupled[:] = np.maximum(np.maximum(st.controlled, st.differential), st.index_one)

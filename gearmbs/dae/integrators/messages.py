@@ -100,6 +100,16 @@ def not_repaired(problem: DAEProblem, t: float, worst: int) -> str:
     )
 
 
+def moved_rates(problem: DAEProblem, unknowns: np.ndarray, given: np.ndarray) -> str:
+    """Say which given rates did not satisfy the equations and what took their place, or nothing if there are none."""
+    if not len(unknowns):
+        return ""
+    shown = unknowns[:NAMES_SHOWN]
+    listed = ", ".join(f"{unknown_name(problem, int(i))}' from {given[i]:.6g} to {problem.yp0[i]:.6g}" for i in shown)
+    more = len(unknowns) - len(shown)
+    return f" Initial rates were moved onto the equations: {listed}{f' and {more} more' if more > 0 else ''}."
+
+
 def replaced_start(problem: DAEProblem, unknowns: np.ndarray) -> str:
     """Say which algebraic unknowns did not start on their equations, or nothing if there are none."""
     if not len(unknowns):

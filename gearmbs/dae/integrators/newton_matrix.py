@@ -28,7 +28,7 @@ def evaluate_matrix(functions, st):
     jacobian(t, st.y, st.yp, gamma, jac, st.idata, st.rdata, st.work)
     st.jacobians += 1
     st.slope_age += 1
-    if st.slope_age >= SLOPE_MAX_AGE:
+    if st.slope_age >= SLOPE_MAX_AGE or st.nonlinear_rates:
         jacobian(t, st.y, st.yp, 2.0 * gamma, slope, st.idata, st.rdata, st.work)
         st.jacobians += 1
         st.slope_age = 0

@@ -186,7 +186,7 @@ def _check(run: Run, h: float) -> Failure | None:
         if not first_given:
             st.h = max(min(st.h, h * min(1.0, FIRST_MOVE / move)), st.h_min)
     if run.options.error_probe is not None and h < st.h:
-        run.start_note = _algebraic_note(run)
+        run.start_note += _algebraic_note(run)
     return None
 
 
@@ -260,7 +260,7 @@ def _repair(run: Run, h: float) -> Failure | None:
     off = float(np.max(np.abs(y - start) * st.w_error)) if np.isfinite(y).all() else np.inf
     if np.isfinite(off) and _correction(run) <= max(REPAIR_FROM, CHECK_RATIO * off):
         moved = np.flatnonzero(np.abs(y - start) * st.w_error > REPAIR_FROM)
-        run.start_note = messages.repaired_start(run.problem, moved, y - start)
+        run.start_note += messages.repaired_start(run.problem, moved, y - start)
         return None
     worst = int(np.argmax(np.abs(np.where(np.isfinite(y), st.delta, np.inf)) * st.w_error))
     return Status.INCONSISTENT_START, messages.not_repaired(run.problem, float(st.t), worst)
