@@ -234,8 +234,8 @@ def _check_suffix(designation: str, suffixes: str, changes: dict[str, Any]) -> N
     unknown = [word for word in words if word and SUFFIX.fullmatch(word) is None and APART.fullmatch(word) is None]
     if unknown and "clearance" not in changes:
         warnings.warn(
-            f"designation {designation!r}: what {', '.join(unknown)} means is not known, and is taken to say nothing of "
-            "the clearance; give clearance= (diametral) if it does",
+            f"designation {designation!r}: what {', '.join(unknown)} means is not known, and is taken to say nothing "
+            "of the clearance; give clearance= (diametral) if it does",
             stacklevel=4,
         )
 

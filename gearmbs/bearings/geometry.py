@@ -153,7 +153,8 @@ class Bearing(Written):
             Suffixes are understood, "6205-2RS/C3" and "6205ZZC3"; a class of clearance, CN or C2 to C5, sets the
             clearance to the middle of its range (C3H and C3L: of its upper and lower half), without one it is 0.
             Those known that say nothing of it: seals and shields (2RS, 2Z, ZZ, LLU, DDU, ...), cages (TVH, TN9, M,
-            J, ...), snap rings (N, NR), precision (P4 to P6), grease and heat treatment. Fields may stand behind it, with commas:
+            J, ...), snap rings (N, NR), precision (P4 to P6), grease and heat treatment.
+            Fields may stand behind it, with commas:
             "6305, elements=7, element_diameter=13.49 mm".
         **changes
             Fields that differ, or that the catalogue does not know.
