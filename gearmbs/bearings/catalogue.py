@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
@@ -74,8 +75,10 @@ ALIASES = {
     "LDKUER204": "XJTU", "CWRUDRIVEEND": "CWRU drive end", "CWRUFANEND": "CWRU fan end", "MFPT": "MFPT",
     "PHM09": "PHM09", "IMS": "IMS", "XJTU": "XJTU", "SPECTRAQUEST": "SpectraQuest", "REXNORDZA2115": "IMS",
 }  # fmt: skip
-CLASSES = re.compile(r"[/\s-](CN|C[2345])(?![0-9])")
-"""Class of radial clearance in a designation."""
+CLASSES = re.compile(r"C(?P<name>N|M|\d+)(?:(?P<half>[HL])(?![A-Z0-9]))?|P[456](?P<short>[0-9])(?![0-9])")
+"""Class of radial clearance among the suffixes: written apart or onto others, "/C3", "ZZC3", with its upper or lower
+half, "C3H", or in short with the class of precision, "P63" for P6 and C3."""
+TABULATED = ("C2", "CN", "C3", "C4", "C5")
 CLEARANCES = (
     (10, (0, 7), (2, 13), (8, 23), (14, 29), (20, 37)), (18, (0, 9), (3, 18), (11, 25), (18, 33), (25, 45)),
     (24, (0, 10), (5, 20), (13, 28), (20, 36), (28, 48)), (30, (1, 11), (5, 20), (13, 28), (23, 41), (30, 53)),
@@ -93,9 +96,12 @@ ROLLER_CLEARANCES = (
 """The same of cylindrical roller bearings with a cylindrical bore."""
 SUFFIX = re.compile(
     r"(?:N|E|ET|A|B|K|M|MA|J|T|TN9|ETN9|TVH|TVP2?|2?Z|ZZ|2?RS[1HLR]?|2?RSR|2?RZ|LL[BUH]|L[BUH]|DDU?|DU|VV|EE|NR|ZNR|2?ZNR"
-    r"|CM|CN|C[2345]|P[456])+"
+    r"|P[456])+"
 )
-"""Suffixes that makers write onto the digits: seals and shields, cages, snap rings, clearance, precision."""
+"""Suffixes that makers write onto the digits, which say nothing of the clearance: seals and shields, cages, snap rings,
+precision."""
+APART = re.compile(r"[CE]|2?HRS|MT\d+|GJN|WT|LHT\d+|V[LAT]\d+|TN|S[0-4]|X?\dK|[25]K|2AS|NS7S?|Q\d+|L\d+|P[456]|")
+"""The same of those written apart only: design, grease, heat treatment, quality."""
 MAKERS = re.compile(r"^(?:SKF|FAG|NSK|NTN|INA|KOYO)\s*")
 SMALL_BORES = {0: 10, 1: 12, 2: 15, 3: 17}
 
@@ -124,24 +130,27 @@ def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
     bare = MAKERS.sub("", designation.upper().strip())
     group = dimension_series(bare)
     if group is not None:
-        fixed = known_of(bare, _boundary("".join(group)))
+        fixed = known_of(bare, _boundary("".join(group[:2])))
         if fixed is not None:
-            return _asked(designation, fixed, changes)
+            return _asked(designation, fixed, changes, _named_class(designation, group[2], changes))
     digits = re.match(r"^(\d{4,5})", bare)
     series = digits[1] if digits else ""
-    if digits and plain not in ALIASES:
-        _check_suffix(designation, bare[digits.end() :])
+    named = None
+    if digits:
+        suffixes = bare[digits.end() :]
+        named = _named_class(designation, suffixes, changes)
+        _check_suffix(designation, suffixes, changes)
     if series in ELEMENTS:
         z, d, pitch = ELEMENTS[series]
         found = {"elements": z, "element_diameter": 1e-3 * d, "pitch_diameter": 1e-3 * pitch}
-        found |= _clearance(designation, _boundary(series))
+        found |= _clearance(named, _boundary(series))
         return Bearing(**{**found, **_boundary(series), "designation": designation.strip(), **changes})
     boundary = _boundary(series)
     if boundary:
         if {"elements", "element_diameter"} <= changes.keys():
             middle = 0.5 * (boundary["bore"] + boundary["outside_diameter"])
             own = {"pitch_diameter": middle, **boundary, "designation": designation.strip()}
-            own |= _clearance(designation, boundary)
+            own |= _clearance(named, boundary)
             return Bearing(**{**own, **changes})
         sizes = ", ".join(f"{key.replace('_', ' ')} {1e3 * value:g} mm" for key, value in boundary.items())
         raise BearingError(
@@ -149,6 +158,11 @@ def look_up(designation: str, changes: dict[str, Any]) -> Bearing:
             "makers; count them and give elements= and element_diameter= (and pitch_diameter= if it is not the mean)"
         )
     if {"elements", "element_diameter", "pitch_diameter"} <= changes.keys():
+        if named is not None and "clearance" not in changes:
+            raise BearingError(
+                f"designation {designation!r}: its bore is not in the catalogue, so that {named} says no clearance; "
+                "give clearance= (diametral)"
+            )
         return Bearing(**{"designation": designation.strip(), **changes})
     raise BearingError(
         f"designation {designation!r} is not in the catalogue ({', '.join(known())}); give elements=, element_diameter="
@@ -179,23 +193,59 @@ def _with_fields(text: str) -> tuple[str, dict[str, Any]]:
     return head, found
 
 
-def _check_suffix(designation: str, rest: str) -> None:
-    """Refuse letters written onto the digits that no maker uses: they are a slip, or mean another bearing."""
-    found = re.match(r"[A-Z0-9]*", rest)
-    letters = found[0] if found else ""
+def _named_class(designation: str, suffixes: str, changes: dict[str, Any]) -> str | None:
+    """Return the class of clearance among the suffixes, "C3" or its half "C3H", None without one.
+
+    Raises
+    ------
+    BearingError
+        For a class that is not tabulated, and for two, unless the clearance is given.
+    """
+    found = {f"C{one['name'] or one['short']}{one['half'] or ''}" for one in CLASSES.finditer(suffixes)}
+    if "clearance" in changes or not found:
+        return None
+    if len(found) > 1:
+        raise BearingError(f"designation {designation!r} names {' and '.join(sorted(found))}; give one class")
+    (named,) = found
+    if named.rstrip("HL") not in TABULATED:
+        raise BearingError(
+            f"designation {designation!r}: {named} is no class of clearance of the standard; choose "
+            f"{', '.join(TABULATED)}, or give clearance= (diametral)"
+        )
+    return named
+
+
+def _check_suffix(designation: str, suffixes: str, changes: dict[str, Any]) -> None:
+    """Refuse letters written onto the digits that no maker uses: they are a slip, or mean another bearing.
+
+    Warns
+    -----
+    UserWarning
+        Of suffixes written apart that are not known, unless the clearance is given.
+    """
+    onto, *apart = re.split(r"[^A-Z0-9]+", suffixes.rstrip())
+    letters = CLASSES.sub("", onto)
     if letters and SUFFIX.fullmatch(letters) is None:
         raise BearingError(
-            f"designation {designation!r}: {letters!r} right after the digits is no suffix that is known; leave it "
-            f"out, or write it apart, '{designation.strip()[: -len(rest.rstrip())]}-{letters}', if your maker uses it"
+            f"designation {designation!r}: {onto!r} right after the digits is no suffix that is known; leave it "
+            f"out, or write it apart, '{designation.strip()[: -len(suffixes.rstrip())]}-{onto}', if your maker uses it"
+        )
+    words = [CLASSES.sub("", word) for word in apart]
+    unknown = [word for word in words if word and SUFFIX.fullmatch(word) is None and APART.fullmatch(word) is None]
+    if unknown and "clearance" not in changes:
+        warnings.warn(
+            f"designation {designation!r}: what {', '.join(unknown)} means is not known, and is taken to say nothing "
+            "of the clearance; give clearance= (diametral) if it does",
+            stacklevel=4,
         )
 
 
-def _asked(designation: str, fixed: Known, changes: dict[str, Any]) -> Bearing:
+def _asked(designation: str, fixed: Known, changes: dict[str, Any], named: str | None) -> Bearing:
     """Return a bearing whose designation fixes some fields, the length of rollers by the rating if that is given."""
     from gearmbs.bearings.geometry import Bearing
     from gearmbs.bearings.ratings import roller_length_for
 
-    own = {**fixed.fields, **_class_of(designation, fixed, changes), "designation": designation.strip(), **changes}
+    own = {**fixed.fields, **_class_of(designation, fixed, named), "designation": designation.strip(), **changes}
     missing = [name for name in fixed.asked if own.get(name) is None]
     if missing == ["roller_length"] and own.get("dynamic_rating") is not None:
         return roller_length_for(Bearing(**{**own, "roller_length": own["element_diameter"]}))
@@ -217,33 +267,32 @@ def _asked(designation: str, fixed: Known, changes: dict[str, Any]) -> Bearing:
     )
 
 
-def _class_of(designation: str, fixed: Known, changes: dict[str, Any]) -> dict[str, float]:
+def _class_of(designation: str, fixed: Known, named: str | None) -> dict[str, float]:
     """Return the mean clearance of a class that is named; refuse it of bearings that have no radial classes."""
     kind = fixed.fields["kind"]
     if kind == "cylindrical roller":
-        return _clearance(designation, fixed.fields, ROLLER_CLEARANCES)
-    named = CLASSES.search(designation.upper())
-    if named is not None and "clearance" not in changes:
+        return _clearance(named, fixed.fields, ROLLER_CLEARANCES)
+    if named is not None:
         told = (
             "it is one of axial clearance" if kind == "four point" else "their clearance is set when they are mounted"
         )
         raise BearingError(
-            f"designation {designation!r}: {named[1]} says nothing of the radial clearance of {kind} bearings, {told}; "
+            f"designation {designation!r}: {named} says nothing of the radial clearance of {kind} bearings, {told}; "
             "give clearance= (diametral)"
         )
     return {}
 
 
-def _clearance(designation: str, boundary: dict[str, Any], classes: tuple = CLEARANCES) -> dict[str, float]:
-    """Return the mean clearance of the class that a designation names; empty without one."""
-    named = CLASSES.search(designation.upper())
+def _clearance(named: str | None, boundary: dict[str, Any], classes: tuple = CLEARANCES) -> dict[str, float]:
+    """Return the mean clearance of a class, or of its upper or lower half; empty without one."""
     if named is None or not boundary:
         return {}
     bore = 1e3 * boundary["bore"]
+    share = {"H": 0.75, "L": 0.25}.get(named[-1], 0.5)
     for top, *limits in classes:
         if bore <= top + 1e-6:
-            low, high = limits[("C2", "CN", "C3", "C4", "C5").index(named[1])]
-            return {"clearance": 0.5e-6 * (low + high)}
+            low, high = limits[TABULATED.index(named.rstrip("HL"))]
+            return {"clearance": 1e-6 * (low + share * (high - low))}
     return {}
 
 

@@ -150,8 +150,11 @@ class Bearing(Written):
         Parameters
         ----------
         designation : str
-            Suffixes are understood, "6205-2RS/C3"; a class of clearance, CN or C2 to C5, sets the clearance to the
-            middle of its range, without one it is 0. Fields may stand behind it, with commas:
+            Suffixes are understood, "6205-2RS/C3" and "6205ZZC3"; a class of clearance, CN or C2 to C5, sets the
+            clearance to the middle of its range (C3H and C3L: of its upper and lower half), without one it is 0.
+            Those known that say nothing of it: seals and shields (2RS, 2Z, ZZ, LLU, DDU, ...), cages (TVH, TN9, M,
+            J, ...), snap rings (N, NR), precision (P4 to P6), grease and heat treatment.
+            Fields may stand behind it, with commas:
             "6305, elements=7, element_diameter=13.49 mm".
         **changes
             Fields that differ, or that the catalogue does not know.
@@ -159,7 +162,13 @@ class Bearing(Written):
         Raises
         ------
         BearingError
-            If the designation is unknown or its elements are not certain; the message asks for what is missing.
+            If the designation is unknown or its elements are not certain; the message asks for what is missing. For
+            a class of clearance that is not the standard's.
+
+        Warns
+        -----
+        UserWarning
+            Of suffixes that are not known.
         """
         from gearmbs.bearings.catalogue import look_up
 

@@ -94,7 +94,7 @@ def load_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, 
     BearingError
         For cylindrical rollers under axial load, and contact angles outside the standard's table.
     """
-    axial = abs(axial)
+    radial, axial = abs(radial), abs(axial)
     if bearing.kind == "cylindrical roller":
         require(
             axial <= 1e-9 * max(radial, 1.0),
@@ -120,9 +120,18 @@ def load_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, 
 
 
 def equivalent_load(bearing: Bearing, radial: float, axial: float = 0.0) -> float:
-    """Return the dynamic equivalent radial load P = max(F_r, X F_r + Y F_a), N."""
+    """Return the dynamic equivalent radial load P = max(F_r, X F_r + Y F_a), N; signs of the loads do not count.
+
+    Raises
+    ------
+    BearingError
+        For loads that are not finite, and as `load_factors`.
+    """
+    for name, value in (("radial", radial), ("axial", axial)):
+        require(math.isfinite(value), f"{name} is {float(value)!r} N; give a finite load")
+    radial, axial = abs(radial), abs(axial)
     x, y = load_factors(bearing, radial, axial)
-    return max(radial, x * radial + y * abs(axial))
+    return max(radial, x * radial + y * axial)
 
 
 def rating_life(bearing: Bearing, load: float, *, reliability: float = 0.9, life_factor: float = 1.0) -> float:
@@ -136,8 +145,16 @@ def rating_life(bearing: Bearing, load: float, *, reliability: float = 0.9, life
         Share of bearings that reach it, 0.9 to 0.9995; a_1 is the standard's from 95 % up.
     life_factor : float
         a_ISO, for lubrication and cleanliness.
+
+    Raises
+    ------
+    BearingError
+        For a load or life factor that is not positive and finite, and another reliability.
     """
-    require(load > 0.0, f"load is {load!r} N; give a positive equivalent load")
+    require(0.0 < load < math.inf, f"load is {load!r} N; give a positive equivalent load")
+    require(
+        0.0 < life_factor < math.inf, f"life_factor is {life_factor!r}; give a positive a_ISO, 1 if it is not known"
+    )
     shares = (0.9, 0.95, 0.96, 0.97, 0.98, 0.99, 0.992, 0.994, 0.996, 0.998, 0.999, 0.9992, 0.9994, 0.9995)
     factors = (1.0, 0.64, 0.55, 0.47, 0.37, 0.25, 0.22, 0.19, 0.16, 0.12, 0.093, 0.087, 0.080, 0.077)
     require(shares[0] <= reliability <= shares[-1], f"reliability is {reliability!r}; give 0.9 up to 0.9995")
@@ -159,10 +176,22 @@ def mean_load(bearing: Bearing, radial: np.ndarray, axial: np.ndarray | None = N
         Loads at even instants, as a simulation gives them, N.
     speed : ndarray, shape (m,), optional
         Relative speed of the rings there; default constant.
+
+    Raises
+    ------
+    BearingError
+        For other lengths, none at all, values that are not finite, and speeds that are all zero.
     """
     radial = np.asarray(radial, dtype=float)
     axial = np.zeros_like(radial) if axial is None else np.asarray(axial, dtype=float)
     turns = np.ones_like(radial) if speed is None else np.abs(np.asarray(speed, dtype=float))
+    for name, value in (("radial", radial), ("axial", axial), ("speed", turns)):
+        require(
+            value.ndim == 1 and value.shape == radial.shape and value.size > 0,
+            f"{name} has the shape {value.shape} beside radial of {radial.shape}; give as many of each, from one up",
+        )
+        require(bool(np.isfinite(value).all()), f"{name} has values that are not finite; leave these instants out")
+    require(bool(turns.any()), "speed is 0 throughout: a bearing at rest has no life in revolutions; see static_rating")
     p = life_exponent(bearing)
     loads = np.array([equivalent_load(bearing, r, a) for r, a in zip(radial, axial)])
     return float((np.sum(turns * loads**p) / np.sum(turns)) ** (1.0 / p))

@@ -87,9 +87,9 @@ def known_of(designation: str, boundary: dict[str, float]) -> Known | None:
     return None
 
 
-def dimension_series(designation: str) -> tuple[str, str] | None:
-    """Return the dimension series, "62" or "63", and the bore code of a designation; None if it has none."""
+def dimension_series(designation: str) -> tuple[str, str, str] | None:
+    """Return dimension series, "62" or "63", bore code and suffixes of a designation; None if it has no series."""
     for pattern in (CYLINDRICAL, TAPERED, ANGULAR, FOUR_POINT):
         if found := pattern.match(designation):
-            return f"6{found[1]}", found[2]
+            return f"6{found[1]}", found[2], designation[found.end() :]
     return None

@@ -129,6 +129,7 @@ class TorqueDrive(Drive):
     """
 
     kind: ClassVar[str] = "torque"
+    functions: ClassVar[tuple[str, ...]] = ("torque",)
     torque: Any = 0.0
 
     def add(self, at: Attached) -> None:

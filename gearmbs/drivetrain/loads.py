@@ -62,6 +62,7 @@ class TorqueLoad(Load):
     """
 
     kind: ClassVar[str] = "torque"
+    functions: ClassVar[tuple[str, ...]] = ("torque",)
     torque: Any
 
     def nominal(self, speed: float) -> float:
@@ -138,6 +139,7 @@ class Pump(Load):
         **Load.units, "displacement": "m^3", "idle": "torque", "viscous": "N*m*s/rad", "lag": "time", "start": "angle"
     }  # fmt: skip
     positive: ClassVar[tuple[str, ...]] = ("displacement",)
+    functions: ClassVar[tuple[str, ...]] = ("pressure",)
     not_negative: ClassVar[tuple[str, ...]] = ("idle", "viscous", "lag")
 
     displacement: Quantity
@@ -155,6 +157,10 @@ class Pump(Load):
     def __post_init__(self) -> None:
         super().__post_init__()
         require(0.0 < self.efficiency <= 1.0, f"{self.label}: efficiency is {self.efficiency:g}; give above 0, up to 1")
+        require(
+            self.ripple is None or all(math.isfinite(share) for share in self.ripple),
+            f"{self.label}: ripple is {self.ripple}; give finite shares of the mean",
+        )
 
     @property
     def per_pressure(self) -> float:
@@ -211,6 +217,7 @@ class Brake(Load):
     units: ClassVar[Mapping[str, str]] = {**Load.units, "torque": "torque", "smoothing": "angular speed"}
     positive: ClassVar[tuple[str, ...]] = ("smoothing",)
     not_negative: ClassVar[tuple[str, ...]] = ("torque",)
+    functions: ClassVar[tuple[str, ...]] = ("share",)
 
     torque: Quantity
     share: Any = 1.0

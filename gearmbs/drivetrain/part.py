@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from numbers import Real
 from typing import Any, ClassVar
 
 from gearmbs._shown import Written
@@ -35,6 +36,9 @@ class Part(Written):
     """Fields that must be above zero."""
     not_negative: ClassVar[tuple[str, ...]] = ()
 
+    functions: ClassVar[tuple[str, ...]] = ()
+    """Fields that may be functions of time."""
+
     name: str
 
     def __post_init__(self) -> None:
@@ -43,6 +47,12 @@ class Part(Written):
             value = getattr(self, field)
             if value is not None:
                 object.__setattr__(self, field, self._in_si(field, value, unit))
+        for field in self.functions:
+            value = getattr(self, field)
+            require(
+                not isinstance(value, Real) or math.isfinite(value),
+                f"{self.label}: {field} is {value}; give a finite number, a quantity or an expression of time",
+            )
         for field in (*self.positive, *self.not_negative):
             value = getattr(self, field)
             if value is None:

@@ -28,7 +28,7 @@ class OperatingPoint(Written):
     Raises
     ------
     ValueError
-        For a torque that is not finite, or another sense of rotation.
+        For a torque that is not finite or negative, or another sense of rotation.
 
     Examples
     --------
@@ -44,6 +44,11 @@ class OperatingPoint(Written):
     def __post_init__(self, owner: str) -> None:  # type: ignore[override]
         object.__setattr__(self, "torque", to_si(self.torque, "torque", f"{owner}.torque"))
         require(math.isfinite(self.torque), f"{owner}.torque is {self.torque}; give a finite number")
+        require(
+            self.torque >= 0.0,
+            f"{owner}.torque is {self.torque:g} N m; give its size (0 up): it acts against the motion, whose sense is "
+            "that of rotation, 1 or -1",
+        )
         require(self.rotation in (1, -1), f"{owner}.rotation is {self.rotation!r}; give 1 or -1")
 
     def normal_force(self, geometry: PairGeometry) -> float:

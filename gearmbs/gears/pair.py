@@ -126,6 +126,23 @@ class GearPair(PairGeometry, Shown):
         if not self.root_contact:
             self._check_clearance(0.0)
         self._remark_on_tips()
+        self._remark_on_slices()
+
+    def _remark_on_slices(self) -> None:
+        """Warn of what varies along the face where the flanks are looked at in one section only."""
+        if self.slices != 1:
+            return
+        varying = [
+            *([f"the misalignment of {shown(self.misalignment, 'deg', '.4g')}"] if self.misalignment else []),
+            *(["the helix"] if self.driver.helix_angle else []),
+            *(fault.label for fault in self.faults if fault.along_face),
+        ]
+        if varying:
+            warnings.warn(
+                f"GearPair.slices is 1: the flanks are looked at in the middle of the face only, and how they vary "
+                f"along it is not seen ({', '.join(varying)}); leave slices out for as many as that needs",
+                stacklevel=self._calls - 1,
+            )
 
     def _remark_on_tips(self) -> None:
         """Warn of tips that reach the mate where the contact does not look for them, once the flanks yield to the load.

@@ -11,7 +11,8 @@ from gearmbs.contact import GAP_COLUMNS, layout
 from gearmbs.gears.fault import COAST_ALIASES
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
-from gearmbs.gears.transmission import StaticMesh, static_lag, warn_of_unseen
+from gearmbs.gears.transmission import StaticMesh, load_of, static_lag, warn_of_unseen
+from gearmbs.units import Quantity
 
 SIDE, SECTION, GAP, ROLL_LENGTH_1, SOFT = (
     GAP_COLUMNS.index(name) for name in ("side", "section", "gap", "roll_1", "stiffness")
@@ -61,7 +62,7 @@ class ContactPattern:
 
 def contact_pattern(
     pair: Mesh,
-    torque: float | None = None,
+    torque: Quantity = None,
     points: int = 81,
     sections: int = 41,
     side: str = "drive",
@@ -72,7 +73,7 @@ def contact_pattern(
     Parameters
     ----------
     pair : GearPair or Mesh
-    torque : float, optional
+    torque : float or str, optional
         On the driven wheel, N m; default that of the pair's operating point.
     points : int
         Positions over the engagement.
@@ -106,7 +107,7 @@ def contact_pattern(
         raise ValueError(f"side is {side!r}; choose 'drive' or 'coast'")
     if not 1 <= sections <= MAX_SECTIONS:
         raise ValueError(f"sections is {sections!r}; give 1 up to {MAX_SECTIONS}")
-    load = pair.operating_point.torque if torque is None else torque
+    load = load_of(pair, torque)
     mesh = StaticMesh(pair)
     geometry, rotation = mesh.geometry, mesh.rotation
     tooth %= geometry.driver.teeth

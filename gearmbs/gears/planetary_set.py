@@ -113,6 +113,15 @@ class PlanetarySet(Written):
         convert_fields(
             self, {"backlash_sun": "length", "backlash_ring": "length", "carrier_radius": "length"}, "PlanetarySet"
         )
+        for name in ("backlash_sun", "backlash_ring"):
+            value = getattr(self, name)
+            require(
+                0.0 <= value < math.inf,
+                f"PlanetarySet.{name} is {value * 1e3:.6g} mm: negative backlash; give 0 or more, or change "
+                "carrier_radius to mesh tighter"
+                if value < 0.0
+                else f"PlanetarySet.{name} is {value}; give a finite length",
+            )
         require(
             isinstance(self.planets, int) and self.planets >= 1,
             f"PlanetarySet.planets is {self.planets!r}; give a whole number from 1 up",

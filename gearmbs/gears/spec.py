@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, field, fields
+from numbers import Real
 from typing import Any, Literal
 
 from gearmbs._shown import Shown, Written
-from gearmbs.units import Given, Quantity, doubt_of_material, to_si
+from gearmbs.units import Given, Quantity, doubt_of_material, shown, to_si
 
 UNDERCUT_TOLERANCE = 0.8  # share of the cutter height that must clear the base circle's normal (14 teeth at 20 deg)
 
@@ -33,6 +34,12 @@ LARGEST_HELIX = math.radians(45)
 
 LARGEST_MODULE = 0.2
 """m; the largest gears made have a third of it, and a forgotten unit is far above."""
+
+
+WIDEST_FACE = 5.0
+"""m; the widest wheels, of rolling mills and ships, have half of it, and a forgotten unit is above."""
+MOST_MODULES = 300.0
+"""Face width or rim of a usual wheel, in modules, at most: pump wheels and long pinions have up to 100."""
 
 
 def require(condition: bool, message: str) -> None:
@@ -141,6 +148,21 @@ class GearSpec(Shown, Written):
         lengths = ("module", "face_width", "addendum", "dedendum", "fillet_radius", "thinning", "tip_rounding")
         units = {name: "length" for name in (*lengths, "bore_radius", "rim_thickness")}
         convert_fields(self, units | {"pressure_angle": "angle", "helix_angle": "angle"}, self.name)
+        require(
+            self.module is not None,
+            f"{self.name}.module is None; give a length such as '3 mm'",
+        )
+        shift = self.profile_shift
+        require(
+            isinstance(shift, Real) and not isinstance(shift, bool),
+            f"{self.name}.profile_shift is {shift!r}; give the coefficient x, a number: 0.5 for half a module",
+        )
+        object.__setattr__(self, "profile_shift", float(shift))
+        require(
+            isinstance(self.material, Material),
+            f"{self.name}.material is {self.material!r}; give a Material, such as Material('2.1e5 MPa', 0.3, "
+            "'7850 kg/m^3')",
+        )
         if isinstance(self.teeth, int) and self.teeth < 0:
             object.__setattr__(self, "teeth", -self.teeth)
             object.__setattr__(self, "internal", True)
@@ -153,6 +175,19 @@ class GearSpec(Shown, Written):
             self.module <= LARGEST_MODULE,
             f"{self.name}.module is {self.module:g} m; a plain number is in m, write '{self.module:g} mm'",
         )
+        for name in ("face_width", "rim_thickness"):
+            value = getattr(self, name) or 0.0
+            require(
+                value <= WIDEST_FACE,
+                f"{self.name}.{name} is {value:g} m, and no wheel has that; a plain number is in m, write "
+                f"'{value:g} mm'",
+            )
+            if value > MOST_MODULES * self.module:
+                warnings.warn(
+                    f"{self.name}.{name} is {shown(value, 'mm')}, {value / self.module:.4g} times the module of "
+                    f"{shown(self.module, 'mm')}; is another unit meant?",
+                    stacklevel=3,
+                )
         defaults = {
             "addendum": (1.0 + self.profile_shift) * self.module,
             "dedendum": (1.25 - self.profile_shift) * self.module,
@@ -242,6 +277,10 @@ class GearSpec(Shown, Written):
             require(
                 "profile_shift" not in others,
                 f"{name}: both profile_shift and outward_shift are given; give one (profile_shift = -outward_shift)",
+            )
+            require(
+                isinstance(outward_shift, Real) and not isinstance(outward_shift, bool),
+                f"{name}.outward_shift is {outward_shift!r}; give the coefficient, a number: half a module is 0.5",
             )
             others["profile_shift"] = -outward_shift
         return cls(abs(teeth), module, internal=True, name=name, **others)

@@ -13,6 +13,7 @@ from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.tables import most_pairs, pack
 from gearmbs.progress import waiting
+from gearmbs.units import Quantity, to_si
 
 SIDE, TOOTH_1, TOOTH_2, GAP = (GAP_COLUMNS.index(name) for name in ("side", "tooth_1", "tooth_2", "gap"))
 NORMAL_FORCE, PAIRS_DRIVE = layout.place(layout.TOTALS, "normal_force"), layout.place(layout.TOTALS, "pairs_drive")
@@ -21,6 +22,15 @@ PHASE_STEPS = 50
 TOUCH_TOLERANCE = 1e-15  # m
 SEARCHED_FROM = 1e-11  # m
 TOUCHING = 1e-9  # m
+UNBALANCED = 1e-6
+"""Share of the torque that may be missing where the search for its angle has ended: found are 1e-12 of it."""
+LAST_DIGITS = 1e-15
+"""Of an angle, as a share: a few units of the last place."""
+MOST_YIELDING = 0.2
+"""Deflection of teeth, in modules, beyond which no tooth is elastic. By Lewis' formula the root's stress is about
+2.5 F/(b m), and the deflection F/(b c') with c' = 14 kN/(mm mm) of steel (ISO 6336-1), in proportion to the modulus of
+others. At the largest stress that gear materials bear, 1.5 GPa of case-hardened steel and 60 MPa of a plastic of
+E = 3 GPa, these are 0.04 and 0.12 m."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +80,20 @@ class TransmissionError:
         """Amplitudes of the first mesh harmonics, m."""
         lines = 2 * np.abs(np.fft.rfft(self.error)) / self.error.size
         return lines[self.cycles : (count + 1) * self.cycles : self.cycles]
+
+
+def load_of(pair: Mesh, torque: Quantity) -> float:
+    """Return a load torque on the driven wheel, N m, by default that of the pair's operating point.
+
+    Raises
+    ------
+    ValueError
+        For a torque that is not positive or not finite.
+    """
+    load = to_si(pair.operating_point.torque if torque is None else torque, "torque", "torque")
+    if not 0.0 < load < math.inf:
+        raise ValueError(f"torque is {load} N m; give a positive load, or use kinematic_transmission_error for none")
+    return load
 
 
 def static_lag(pair: Mesh, torque: float) -> float:
@@ -173,7 +197,13 @@ class StaticMesh:
         )
 
     def loaded_angle(self, driver_angle: float, torque: float, start: float) -> float:
-        """Driven angle at which the contact carries ``torque``, by Newton's method kept inside a bracket."""
+        """Driven angle at which the contact carries ``torque``, by Newton's method kept inside a bracket.
+
+        Raises
+        ------
+        ValueError
+            If no angle is found at which it does, or if the teeth yield by more than `MOST_YIELDING` there.
+        """
         side = self.turning
         lag = side * start
         longest = static_lag(self.pair, torque)
@@ -194,7 +224,37 @@ class StaticMesh:
             if abs(trial - lag) <= 1e-16 or abs(miss) <= 1e-12 * torque:
                 break
             lag = trial
+        self._check_carried(driver_angle, torque, side * lag)
         return side * lag
+
+    def _check_carried(self, driver_angle: float, torque: float, driven_angle: float) -> None:
+        """Refuse an angle at which the torque is not carried, or only by teeth that no longer are any."""
+        carried = -self.turning * self.torque(driver_angle, driven_angle)[0]
+        module, radius = self.geometry.driver.module, self.geometry.driven.base_radius
+        most = MOST_YIELDING * module
+        behind = self.turning * (driven_angle - self.ideal_angle(driver_angle)) * radius
+        remedy = (
+            f"give a smaller torque (a plain number is in N m; is '{float(torque):g} N mm' meant?) or a stiffer contact"
+        )
+        if behind > most:
+            # faults may let the driven wheel lag before anything is carried
+            behind -= self.turning * (self.touching_angle(driver_angle) - self.ideal_angle(driver_angle)) * radius
+            if behind > most:
+                raise ValueError(
+                    f"torque is {float(torque):g} N m: at the driver angle {driver_angle:.6g} rad the teeth would "
+                    f"yield by {behind * 1e3:.4g} mm, more than {MOST_YIELDING:g} of their module of "
+                    f"{module * 1e3:.4g} mm, which no tooth survives; {remedy}"
+                )
+        # of a small torque a step of the angle's last digits is more than its share
+        step = self.turning * LAST_DIGITS * max(1.0, abs(driven_angle))
+        low, high = (-self.turning * self.torque(driver_angle, driven_angle + s)[0] for s in (-step, step))
+        allowed = UNBALANCED * torque + abs(high - low)
+        self.torque(driver_angle, driven_angle)
+        if not abs(carried - torque) <= allowed:
+            raise ValueError(
+                f"torque is {float(torque):g} N m: at the driver angle {driver_angle:.6g} rad no position of the "
+                f"driven wheel was found that carries it (the last carries {carried:.6g} N m); {remedy}"
+            )
 
 
 def touching_angle(pair: Mesh, driver_angle: float = 0.0) -> float:
@@ -225,7 +285,7 @@ def kinematic_transmission_error(
     Warns
     -----
     UserWarning
-        If faults sit on teeth that do not pass the mesh.
+        If faults sit on teeth that do not pass the mesh, or if the teeth jam.
     """
     phase = _phases(pair, points, start, cycles)
     mesh = StaticMesh(pair, slices)
@@ -245,7 +305,7 @@ def kinematic_transmission_error(
 
 def loaded_transmission_error(
     pair: Mesh,
-    torque: float | None = None,
+    torque: Quantity = None,
     points: int = 400,
     slices: int | None = None,
     *,
@@ -257,7 +317,7 @@ def loaded_transmission_error(
     Parameters
     ----------
     pair : GearPair or Mesh
-    torque : float, optional
+    torque : float or str, optional
         On the driven wheel, N m; default that of the pair's operating point.
     points, slices, start, cycles
         As for `kinematic_transmission_error`.
@@ -265,16 +325,15 @@ def loaded_transmission_error(
     Raises
     ------
     ValueError
-        For a torque that is not positive.
+        For a torque that is not positive, or that no tooth carries: where the teeth yield by more than
+        `MOST_YIELDING` modules, or no position of the wheels balances it.
 
     Warns
     -----
     UserWarning
-        If faults sit on teeth that do not pass the mesh.
+        If faults sit on teeth that do not pass the mesh, or if the teeth jam.
     """
-    load = pair.operating_point.torque if torque is None else torque
-    if not load > 0:
-        raise ValueError(f"torque is {load} N m; give a positive load, or use kinematic_transmission_error for none")
+    load = load_of(pair, torque)
     phase = _phases(pair, points, start, cycles)
     mesh = StaticMesh(pair, slices)
     side, rb = mesh.turning, mesh.geometry.driven.base_radius
@@ -305,6 +364,7 @@ def _over_phases(mesh: StaticMesh, phase: np.ndarray, at: Callable[[float], tupl
 def _phases(pair: Mesh, points: int, start: float, cycles: int) -> np.ndarray:
     if cycles < 1 or cycles != int(cycles):
         raise ValueError(f"cycles is {cycles!r}; give a whole number of mesh cycles from 1 up")
+    warn_of_jam(pair, 4)
     warn_of_unseen(pair, start, start + cycles, "give cycles={turn} for a whole turn, or another start", 4)
     return start + np.arange(points * int(cycles)) / points
 
@@ -328,6 +388,21 @@ def _extremes(
             found = min(found, float(best.fun))
         ends.append(sign * found)
     return ends[0], ends[1]
+
+
+def warn_of_jam(pair: Mesh, level: int = 3) -> None:
+    """Warn of a misalignment beyond the backlash: both flanks touch, and no position is free of load.
+
+    Parallel wheels without backlash have been remarked on when they were made.
+    """
+    geometry = pair.geometry
+    if geometry.misalignment and geometry.jams:
+        warnings.warn(
+            f"the teeth jam: under the misalignment of {math.degrees(geometry.misalignment):.4g} deg they need a "
+            f"normal backlash of {geometry.jam_backlash * 1e3:.4g} mm and have {geometry.normal_backlash * 1e3:.4g} "
+            "mm, so that the coast flanks are in each other where the drive flanks touch; give more backlash",
+            stacklevel=level,
+        )
 
 
 def warn_of_unseen(pair: Mesh, begin: float, end: float, remedy: str, level: int = 3) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 
 import numpy as np
 import pytest
@@ -235,3 +236,70 @@ def test_defects_may_be_tables():
     ):
         with pytest.raises(BearingError, match=told):
             RollingBearing("b", m.ground.marker(), m.ground.marker(), Bearing.from_designation("6205"), defects=wrong)
+
+
+@pytest.mark.parametrize(
+    ("text", "clearance"),
+    [
+        ("6205C3", 20.5e-6), ("6205ZZC3", 20.5e-6), ("6205-2RSC3", 20.5e-6), ("NTN 6205LLUC4/5K", 32e-6),
+        ("6205/P63", 20.5e-6), ("6205/C3H", 24.25e-6), ("6205-C3L", 16.75e-6), ("6205/P6", 0.0), ("6205CN", 12.5e-6),
+        ("6205DDU", 0.0), ("6205-C-2HRS", 0.0),
+    ],
+)  # fmt: skip
+def test_class_of_clearance_as_makers_write_it(text, clearance):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert Bearing.from_designation(text).clearance == pytest.approx(clearance, abs=1e-12)
+
+
+@pytest.mark.parametrize("text", ["6205/C9", "6205C9", "6205 C1", "6205ZZ/C33", "6205CM", "6205-2RSC6", "NU206/C9"])
+def test_classes_that_are_none_are_refused_by_name(text):
+    counted = {"elements": 13, "roller_length": 9e-3} if text.startswith("NU") else {}
+    with pytest.raises(BearingError, match=r"C(\d+|M) is no class of clearance .* choose C2, CN, C3, C4, C5"):
+        Bearing.from_designation(text, **counted)
+    assert Bearing.from_designation(text, clearance="30 um", **counted).clearance == pytest.approx(30e-6)
+
+
+def test_other_suffixes_never_stand_for_a_class_in_silence():
+    with pytest.raises(BearingError, match="C2 and C3; give one"):
+        Bearing.from_designation("6205C2/C3")
+    with pytest.warns(UserWarning, match="what XYZ means is not known"):
+        assert Bearing.from_designation("6205-XYZ/C3").clearance == pytest.approx(20.5e-6)
+    sizes = {"elements": 10, "element_diameter": 20e-3, "pitch_diameter": 130e-3}
+    with pytest.raises(BearingError, match="not in the catalogue, so that C3 says no clearance"):
+        Bearing.from_designation("6220/C3", **sizes)
+    assert Bearing.from_designation("6220", **sizes).clearance == 0.0
+
+
+def test_loads_count_by_their_size():
+    bearing = Bearing.from_designation("6205")
+    for radial, axial in ((1000.0, 500.0), (1000.0, 50.0), (0.0, 500.0)):
+        known = equivalent_load(bearing, radial, axial)
+        assert {equivalent_load(bearing, a * radial, b * axial) for a in (1, -1) for b in (1, -1)} == {known}
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda b: rating_life(b, 1400.0, life_factor=-1.0), "life_factor is -1.0"),
+        (lambda b: rating_life(b, 1400.0, life_factor=0.0), "life_factor is 0.0"),
+        (lambda b: rating_life(b, math.inf), "load is inf N"),
+        (lambda b: rating_life(b, math.nan), "load is nan N"),
+        (lambda b: equivalent_load(b, math.nan), "radial is nan N"),
+        (lambda b: equivalent_load(b, 1.0, math.inf), "axial is inf N"),
+        (lambda b: mean_load(b, np.array([1.0, math.nan])), "radial has values that are not finite"),
+        (lambda b: mean_load(b, np.ones(2), speed=np.zeros(2)), "speed is 0 throughout"),
+        (lambda b: mean_load(b, np.ones(2), speed=np.array([1.0, math.inf])), "speed has values"),
+        (lambda b: mean_load(b, np.ones(2), np.ones(3)), r"axial has the shape \(3,\)"),
+        (lambda b: mean_load(b, np.ones(0)), r"radial has the shape \(0,\)"),
+    ],
+)
+def test_loads_that_give_no_life_are_refused_by_name(call, told):
+    with pytest.raises(BearingError, match=told):
+        call(Bearing.from_designation("6205"))
+
+
+def test_a_bearing_at_rest_for_a_while_has_a_mean_load():
+    bearing = Bearing.from_designation("6205")
+    load = mean_load(bearing, np.array([1000.0, 2000.0]), speed=np.array([0.0, -3.0]))
+    assert rating_life(bearing, load, life_factor=0.5) == pytest.approx(0.5 * rating_life(bearing, 2000.0))

@@ -238,3 +238,20 @@ def test_wrong_numbers_are_named(make, words):
     with pytest.raises(DrivetrainError, match=words) as caught:
         make()
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), np.float64("nan")])
+@pytest.mark.parametrize(
+    ("kind", "field", "others"),
+    [
+        (TorqueLoad, "torque", {"shaft": "a"}),
+        (TorqueDrive, "torque", {"shaft": "a", "speed": 10.0}),
+        (Pump, "pressure", {"shaft": "a", "displacement": "10 cm^3"}),
+        (Brake, "share", {"shaft": "a", "torque": 1.0}),
+    ],
+)
+def test_a_load_that_is_no_number_is_refused_by_name(kind, field, others, value):
+    with pytest.raises(DrivetrainError, match=rf"'x': {field} is (nan|inf); give a finite number"):
+        kind(name="x", **{field: value}, **others)
+    for fine in (2.0, "2*SIN(TIME)"):
+        kind(name="x", **{field: fine}, **others)

@@ -340,3 +340,11 @@ def test_bad_sets_are_one_line(build, words):
     with pytest.raises(ValueError, match=words) as caught:
         build()
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["backlash_sun", "backlash_ring"])
+def test_negative_backlash_is_refused(name):
+    for value in ("-1 mm", -1e-9):
+        with pytest.raises(ValueError, match=rf"PlanetarySet.{name} is -.* mm: negative backlash; give 0 or more"):
+            planetary((24, 30, 84), "1.5 mm", **{name: value})
+    assert planetary((24, 30, 84), "1.5 mm", **{name: "0.05 mm"})

@@ -87,3 +87,57 @@ def test_fillet_clearance_is_that_of_the_outlines(pair):
         if 0 < nearest < around.size - 1:
             found = min(found, float(distance[nearest]))
     assert fillet_clearance(pair, 0) == pytest.approx(found, abs=3e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"misalignment": "0.5 deg", "backlash": "0.5 mm"}, "the misalignment of 0.5 deg"),
+        ({"driver": GearSpec(23, "3 mm", helix_angle="10 deg", hand="right"),
+          "driven": GearSpec(41, "3 mm", helix_angle="10 deg", hand="left")}, "the helix"),
+    ],
+)  # fmt: skip
+def test_one_section_of_flanks_that_vary_along_the_face_is_remarked_on(changes, told):
+    given = {"driver": GearSpec(23, "3 mm"), "driven": GearSpec(41, "3 mm"), "torque": 1.0, **changes}
+    with pytest.warns(UserWarning, match=rf"GearPair.slices is 1: .*{told}"):
+        GearPair(**given, slices=1)
+    quiet(lambda: GearPair(**given, slices=2))
+    quiet(lambda: GearPair(**given))
+
+
+def test_one_section_of_parallel_wheels_is_not_remarked_on():
+    quiet(lambda: GearPair(GearSpec(23, "3 mm"), GearSpec(41, "3 mm"), torque=1.0, slices=1))
+
+
+@pytest.mark.parametrize("name", ["face_width", "rim_thickness"])
+def test_lengths_in_a_wrong_unit(name):
+    def made(value):
+        wheel = {"internal": True} if name == "rim_thickness" else {}
+        return GearSpec(40, "3 mm", **{name: value}, **wheel)
+
+    with pytest.raises(ValueError, match=rf"gear.{name} is 20 m, .* write '20 mm'"):
+        made(20)
+    with pytest.warns(UserWarning, match=rf"gear.{name} is 1000 mm, 333.3 times the module of 3 mm"):
+        made(1.0)
+    quiet(lambda: made("200 mm"))
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"profile_shift": "0.5 mm"}, r"profile_shift is '0.5 mm'; give the coefficient"),
+        ({"profile_shift": None}, r"profile_shift is None"),
+        ({"material": "plastic"}, r"material is 'plastic'; give a Material"),
+        ({"module": None}, r"module is None; give a length"),
+    ],
+)
+def test_other_kinds_of_values_are_refused_by_name(changes, told):
+    with pytest.raises(ValueError, match=rf"gear.{told}"):
+        GearSpec(**{"teeth": 20, "module": "3 mm", **changes})
+    GearSpec(20, "3 mm", profile_shift=np.float64(0.5))
+
+
+def test_a_negative_torque_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"GearPair.torque is -100 N m; give its size"):
+        GearPair(GearSpec(23, "3 mm"), GearSpec(41, "3 mm"), torque=-100.0)
+    GearPair(GearSpec(23, "3 mm"), GearSpec(41, "3 mm"), torque=100.0, rotation=-1)

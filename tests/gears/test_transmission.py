@@ -1,11 +1,14 @@
 """Transmission error without dynamics, with the same kernel the dynamics use."""
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
 from gearmbs.gears import GearPair, GearSpec, kinematic_transmission_error, loaded_transmission_error
 from gearmbs.gears.faults import BrokenTooth, PitchError, Wear
+from gearmbs.gears.pattern import contact_pattern
 from gearmbs.gears.transmission import StaticMesh
 
 UM = 1e-6
@@ -114,3 +117,51 @@ def test_both_senses_of_rotation():
 def test_no_load_is_refused():
     with pytest.raises(ValueError, match="torque is 0"):
         loaded_transmission_error(GearPair.paper(), 0.0)
+
+
+PLAIN = {"driver": GearSpec(23, "3 mm"), "driven": GearSpec(41, "3 mm"), "backlash": "0.1 mm"}
+
+
+@pytest.mark.parametrize("law", ["own", "paper"])
+@pytest.mark.parametrize("torque", [1e5, 3e5, 1e9, "100 MN m"])
+def test_a_load_beyond_every_tooth_is_refused(law, torque):
+    pair = GearPair(**PLAIN)
+    pair = pair.with_own_stiffness() if law == "own" else pair
+    for analyse in (loaded_transmission_error, contact_pattern):
+        with pytest.raises(ValueError, match=r"torque is .* N m.*of their module of 3 mm"):
+            analyse(pair, torque=torque, points=4)
+    # as many N mm, or a thousandth, run
+    fewer = "100 N m" if isinstance(torque, str) else min(1e-3 * torque, 3e3)
+    te = loaded_transmission_error(pair, fewer, points=4)
+    assert te.pairs.min() >= 1
+    assert 0.0 < te.mean < 0.2 * 3e-3
+
+
+@pytest.mark.parametrize("torque", [1e-6, 1e-3, 1.0])
+def test_a_small_load_is_carried(torque):
+    pair = GearPair(**PLAIN).with_own_stiffness()
+    te = loaded_transmission_error(pair, torque, points=4)
+    assert te.forces == pytest.approx(torque / pair.driven.base_radius, rel=1e-3)
+
+
+@pytest.mark.parametrize("torque", [0.0, -100.0, np.inf, "100 mm"])
+def test_a_load_that_is_none_is_refused_by_name(torque):
+    for analyse in (loaded_transmission_error, contact_pattern):
+        with pytest.raises(ValueError, match=r"^torque"):
+            analyse(GearPair(**PLAIN), torque=torque)
+
+
+def test_a_load_may_be_text():
+    pair = GearPair(**PLAIN)
+    assert loaded_transmission_error(pair, "0.1 kN m", points=4).mean == loaded_transmission_error(pair, 100.0, 4).mean
+
+
+def test_jammed_teeth_are_remarked_on():
+    jammed = GearPair(**PLAIN, misalignment="1 deg")
+    free = jammed.with_changes(backlash=1.01 * jammed.jam_backlash)
+    for analyse in (kinematic_transmission_error, loaded_transmission_error):
+        with pytest.warns(UserWarning, match=r"teeth jam: .* need a normal backlash of 0\.3\d* mm and have 0\.1 mm"):
+            analyse(jammed, points=2)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            analyse(free, points=2)
