@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -17,7 +18,7 @@ from gearmbs.bearings.hertz import (
     in_series,
     line_contact,
 )
-from gearmbs.units import Quantity, to_si
+from gearmbs.units import Quantity, doubt_of_material, to_si
 
 BALLS = ("deep groove", "angular contact", "four point")
 ROLLERS = ("cylindrical roller", "tapered roller")
@@ -101,6 +102,9 @@ class Bearing(Written):
             if isinstance(value, float) and not math.isfinite(value):
                 raise BearingError(f"Bearing.{item.name} is {value}; give a finite number")
         self._check()
+        doubt = doubt_of_material(self.youngs_modulus, self.density)
+        if doubt:
+            warnings.warn(f"Bearing: {doubt}", stacklevel=3)
 
     def _check(self) -> None:
         z, d, pitch = self.elements, self.element_diameter, self.pitch_diameter

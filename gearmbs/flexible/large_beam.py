@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -142,12 +144,19 @@ def add_beam(
     Raises
     ------
     FlexibleError
-        For a beam without length or elements.
+        For a beam without length or elements, and a damping time that is negative.
     """
     a, b = vector(start, f"beam '{name}': start", "length"), vector(end, f"beam '{name}': end", "length")
     length = float(np.linalg.norm(b - a))
-    if not length > 0.0 or elements < 1:
-        raise FlexibleError(f"beam '{name}': length {length} m, {elements} elements; both must be positive")
+    whole = isinstance(elements, Integral) and not isinstance(elements, bool)
+    if not length > 0.0 or not whole or elements < 1:
+        raise FlexibleError(
+            f"beam '{name}': length {length} m, {elements!r} elements; both must be positive, and elements a whole "
+            "number"
+        )
+    tau = quantity(damping_time, "time", f"beam '{name}': damping_time")
+    if not 0.0 <= tau < math.inf:
+        raise FlexibleError(f"beam '{name}': damping_time is {tau} s; give a time from 0 up, negative damping drives")
     axes = frame_along(b - a, f"beam '{name}'", None if x_axis is None else x_axis)
     u = vector(motion.pop("velocity", (0, 0, 0)), f"beam '{name}': velocity", "speed")
     w = vector(motion.pop("angular_velocity", (0, 0, 0)), f"beam '{name}': angular_velocity", "angular speed")
@@ -163,7 +172,6 @@ def add_beam(
         )  # fmt: skip
         bodies.append(body)
         markers.append(body.marker(name=f"{name}.node{k}"))
-    tau = quantity(damping_time, "time", f"beam '{name}': damping_time")
     for k in range(elements):
         element = LargeBeam(f"{name}.beam{k + 1}", markers[k], markers[k + 1], step, section, tau)
         parts.append(mechanism.add(element))

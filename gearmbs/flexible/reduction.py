@@ -12,6 +12,7 @@ import contextlib
 import warnings
 from collections.abc import Iterable
 from dataclasses import replace
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -99,8 +100,9 @@ def reduce_model(
     """
     if method not in METHODS:
         raise FlexibleError(f"method = {method!r}; choose one of {', '.join(METHODS)}")
-    if modes is not None and modes < 1:
-        raise FlexibleError(f"modes = {modes}; a modal body needs one at least")
+    whole = isinstance(modes, Integral) and not isinstance(modes, bool)
+    if modes is not None and not (whole and modes >= 1):
+        raise FlexibleError(f"modes = {modes!r}; a modal body needs one at least, and a whole number")
     limit = None if max_frequency is None else quantity(max_frequency, "frequency", "max_frequency")
     parts = resolve(model, list(model.seats) if interfaces is None else interfaces)
     properties = model.mass_properties()

@@ -9,8 +9,10 @@ the modal body of the same shaft, which turns with its frame and needs no G.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Number
 
 import numpy as np
 import scipy.linalg
@@ -224,6 +226,11 @@ class Rotor:
         speed : float or str
             rad/s or text, ``"3000 rpm"``.
         count : int
+
+        Warns
+        -----
+        UserWarning
+            If one of the motions left out grows, as on supports of negative stiffness.
         """
         speed = quantity(speed, "angular speed", "speed")
         m, c, g, k, _, _ = self._matrices
@@ -232,7 +239,15 @@ class Rotor:
         a = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(m, k), -np.linalg.solve(m, damping)]])
         values, vectors = scipy.linalg.eig(a)
         floor = 1e-6 * np.sqrt(np.abs(k).max() / np.abs(m).max())
-        chosen = np.flatnonzero(values.imag > max(floor, 1e-3))
+        floor = max(floor, 1e-3)
+        growing = values.real[(np.abs(values.imag) <= floor) & (values.real > floor)]
+        if growing.size:
+            warnings.warn(
+                f"the rotor is unstable: {growing.size} motion(s) without a frequency, which are no modes, grow by up "
+                f"to exp({growing.max():.4g} t); give its supports a stiffness and damping that are not negative",
+                stacklevel=2,
+            )
+        chosen = np.flatnonzero(values.imag > floor)
         chosen = chosen[np.argsort(values[chosen].imag)][:count]
         values = values[chosen]
         shapes = self._at_stations(vectors[:n, chosen].T)
@@ -271,7 +286,7 @@ class Rotor:
         return np.sort(speeds[lost < 2.0 * order * speeds * held])[:count]
 
     def unbalance_response(
-        self, speeds: Sequence[Quantity], unbalance: Mapping[Quantity, complex]
+        self, speeds: Sequence[Quantity], unbalance: Mapping[Quantity, complex | str]
     ) -> UnbalanceResponse:
         """Return the steady response to unbalanced masses.
 
@@ -279,20 +294,25 @@ class Rotor:
         ----------
         speeds : sequence of float or str
             rad/s or text.
-        unbalance : mapping of float to complex
-            Mass times eccentricity, kg m, by position along the shaft, m; a complex number has its angle at time 0.
-            Between stations its force is shared by the functions of the element, the same that its mass matrix has.
+        unbalance : mapping of float or str to complex or str
+            Mass times eccentricity, kg m or text such as "100 g*mm", by position along the shaft, m; a complex number
+            has its angle at time 0. Between stations its force is shared by the functions of the element, the same that
+            its mass matrix has.
 
         Raises
         ------
         FlexibleError
-            For a place off the shaft.
+            For a place off the shaft, and an unbalance that is no finite number.
         """
         values = np.array([quantity(s, "angular speed", "speeds") for s in speeds])
         m, c, g, k, rows, z = self._matrices
         load = np.zeros(DOFS * z.size, dtype=complex)
         for at, size in unbalance.items():
             places, moved, _ = self.shaft.section_motion(quantity(at, "length", "unbalance"), "unbalance")
+            if isinstance(size, str):
+                size = quantity(size, "kg*m", f"unbalance at {at}")
+            if isinstance(size, bool) or not isinstance(size, Number) or not np.isfinite(complex(size)):  # type: ignore
+                raise FlexibleError(f"unbalance at {at} is {size!r}; give a finite mass times eccentricity, kg m")
             load[places] += size * (moved[0] - 1j * moved[1])
         load = load[rows]
         found = [np.linalg.solve(k + 1j * w * (c + w * g) - w**2 * m, w**2 * load) for w in values]

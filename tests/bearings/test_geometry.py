@@ -303,3 +303,11 @@ def test_a_bearing_at_rest_for_a_while_has_a_mean_load():
     bearing = Bearing.from_designation("6205")
     load = mean_load(bearing, np.array([1000.0, 2000.0]), speed=np.array([0.0, -3.0]))
     assert rating_life(bearing, load, life_factor=0.5) == pytest.approx(0.5 * rating_life(bearing, 2000.0))
+
+
+def test_a_modulus_in_a_wrong_unit_is_remarked_on():
+    with pytest.warns(UserWarning, match=r"Bearing: E = 207 Pa .*'207 GPa'"):
+        Bearing.from_designation("6205", youngs_modulus=207.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Bearing.from_designation("6205", youngs_modulus="310 GPa", density=3200.0)  # silicon nitride

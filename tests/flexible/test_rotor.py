@@ -1,5 +1,6 @@
 """Shafts by sections: published and closed-form frequencies, critical speeds, whirl, unbalance."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -202,3 +203,30 @@ def test_unbalances_are_linear_in_their_place_for_a_stiff_shaft():
         assert found[4].real == pytest.approx(turned, rel=1e-3, abs=1e-9)
     with pytest.raises(FlexibleError, match="off the shaft"):
         rotor.unbalance_response([1.0], {1.2: 1e-3})
+
+
+def test_unbalance_may_be_text_and_must_be_finite():
+    rotor = friswell(elements=12)
+    for size in (float("nan"), float("inf"), None, True, "3 mm"):
+        with pytest.raises(ValueError, match=r"unbalance at 0\.5"):
+            rotor.unbalance_response([50.0], {0.5: size})
+    text, number = (rotor.unbalance_response([50.0], u) for u in ({"500 mm": "100 g*mm"}, {0.5: 1e-4}))
+    assert text.displacements == pytest.approx(number.displacements, rel=1e-12)
+
+
+def test_motions_that_grow_without_a_frequency_are_warned_of():
+    shaft = Shaft([ShaftSection(1.0, 0.05)], seats={"A": 0.0, "B": 1.0}, elements=6)
+    with pytest.warns(UserWarning, match=r"the rotor is unstable: \d+ motion"):
+        Rotor(shaft, [Support("A", -1e9), Support("B", 1e9)]).modes()
+    for supports in ([Support("A", 1e9), Support("B", 1e9)], []):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            Rotor(shaft, supports).modes()
+
+
+@pytest.mark.parametrize("modes", [2.5, True, "8", 0])
+def test_a_number_of_modes_is_whole(modes):
+    shaft = Shaft([ShaftSection(1.0, 0.05)], seats={"A": 0.0, "B": 1.0}, elements=6)
+    with pytest.raises(FlexibleError, match=r"modes = .*; a modal body needs one at least, and a whole number"):
+        shaft.modal_model(modes)
+    assert shaft.modal_model(np.int64(2)).modes
