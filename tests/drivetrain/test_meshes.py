@@ -23,6 +23,7 @@ from gearmbs.gears import (
 )
 from gearmbs.gears.laws import DAMPING_RATIO
 from gearmbs.gears.stiffness import iso_mesh_stiffness, iso_single_stiffness
+from gearmbs.signals import SignalError
 from gearmbs.studies import bench_train, run_train, train_campbell, train_modes, train_report
 from tests.drivetrain.support import stage
 from tests.generators import cases, seed
@@ -169,9 +170,13 @@ def test_overdamped_meshes_are_warned_of():
     for contact in (ContactLaw.impact(depth="0.01 mm"), ContactLaw.impact(), hard):
         train = meshed(contact=contact)
         assert train.mesh_dynamics["mesh"].damping_ratio > 1
-        for analysis in (train_modes, train_campbell, Drivetrain.torsional):
-            with pytest.warns(UserWarning, match=r"mesh 'mesh' is damped .* times critically by its law"):
+        damped = r"mesh 'mesh' is damped .* times critically by its law"
+        for analysis in (train_modes, Drivetrain.torsional):
+            with pytest.warns(UserWarning, match=damped):
                 analysis(train)
+        # the only mode of the train does not oscillate then, and its diagram would be empty
+        with pytest.warns(UserWarning, match=damped), pytest.raises(SignalError, match="no mode oscillates"):
+            train_campbell(train)
     # a twin below critical damping
     train = meshed(contact=ContactLaw.linear("3e8 N/m", "2e3 N*s/m", "2 um"))
     assert train.mesh_dynamics["mesh"].damping_ratio < 1
