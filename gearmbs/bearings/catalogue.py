@@ -207,6 +207,13 @@ def _named_class(designation: str, suffixes: str, changes: dict[str, Any]) -> st
     if len(found) > 1:
         raise BearingError(f"designation {designation!r} names {' and '.join(sorted(found))}; give one class")
     (named,) = found
+    if named == "CM":
+        warnings.warn(
+            f"designation {designation!r}: CM is a maker's own class for electric motors, which is not "
+            "tabulated here; give clearance= (diametral), it is taken as not given",
+            stacklevel=4,
+        )
+        return None
     if named.rstrip("HL") not in TABULATED:
         raise BearingError(
             f"designation {designation!r}: {named} is no class of clearance of the standard; choose "

@@ -24,6 +24,9 @@ RATES_RATIO = 100.0
 RATES_ROUNDS = 12
 RATES_ITERATIONS = 100
 """From rates a million times too large Newton's method takes ln 1e6/ln(p/(p - 1)) of them with a power p: 62 with 5."""
+RATES_HALVINGS = 40
+"""Halvings of a correction of Newton's method until the next one, with the same matrix, is smaller: an exponential
+overshoots by any factor a double can hold."""
 RATES_FOUND = 1e-8
 """Part of a rate within which Newton's method has found it: its next correction is the square of that."""
 RATES_REMARKED = 1e-6
@@ -252,6 +255,7 @@ def _settle_rates(problem: DAEProblem, span: float, given: bool) -> str:
     tables = problem.idata, problem.rdata, np.zeros(problem.work_size)
     moving, given_rates = problem.differential, problem.yp0.copy()
     typical = problem.rdata[2 * problem.n : 3 * problem.n]
+    unit = np.maximum(np.abs(given_rates), typical)
     gamma, out, delta = 1.0 / (RATES_STEP * span), np.empty(problem.n), np.empty(problem.n)
     raises = 0
     for _ in range(RATES_ITERATIONS):
@@ -269,8 +273,14 @@ def _settle_rates(problem: DAEProblem, span: float, given: bool) -> str:
                 break
             gamma *= RATES_RATIO
             continue
-        move = gamma * delta[moving]
-        problem.yp0[moving] -= move
+        move, before, size = gamma * delta[moving], problem.yp0[moving], np.abs(delta[moving] / unit[moving]).max()
+        for halvings in range(RATES_HALVINGS):
+            problem.yp0[moving] = before - 0.5**halvings * move
+            problem.residual(problem.t0, problem.y0, problem.yp0, out, *tables)
+            if np.isfinite(out).all():
+                solve(*factored, out, delta)
+                if np.abs(delta[moving] / unit[moving]).max() <= (1.0 - 0.25 * 0.5**halvings) * size:
+                    break
         if (np.abs(move) <= RATES_FOUND * np.maximum(np.abs(problem.yp0), typical)[moving]).all():
             moved = np.abs(problem.yp0 - given_rates) > RATES_REMARKED * np.maximum(np.abs(problem.yp0), typical)
             return moved_rates(problem, np.flatnonzero(moved), given_rates) if given else ""

@@ -40,8 +40,9 @@ def campbell(
         Natural frequencies in Hz: of shape (modes,) for modes that do not depend on the speed, (speeds, modes) for
         those that do; a mechanism, whose modes are those of its initial position and speeds, or the result of
         `linear_modes`, or one for each speed; or a function of the speed in rad/s that returns any of them, as whirl
-        needs. Modes are followed from speed
-        to speed in the order of their frequencies. Rigid motions, and what is damped beyond the critical, are left out.
+        needs. Columns of an array are modes, whose lines may cross. Results of analyses, and rows that a function
+        returns, are followed from speed to speed in the order of their frequencies. Rigid motions, and what is damped
+        beyond the critical, are left out.
     speeds : sequence
         Increasing, rad/s or texts such as "1500 rpm"; two or more.
     orders : sequence of float, or mapping of name to float
@@ -141,7 +142,8 @@ def _orders(orders: Sequence[float] | Mapping[str, float]) -> tuple[list[str], n
 
 def _frequencies(modes: Any, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
     """Frequencies (Hz) and, where known, damping ratios, each of shape (speeds, modes); short rows end in NaN."""
-    if callable(modes):
+    evaluated = callable(modes)
+    if evaluated:
         found = []
         with waiting("modes at each speed") as tell:
             for i, speed in enumerate(omega):
@@ -167,8 +169,13 @@ def _frequencies(modes: Any, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray 
             ) from None
         if frequency.ndim == 1:
             frequency = np.tile(frequency, (omega.size, 1))
-        if frequency.ndim == 2:
+        if frequency.ndim == 2 and evaluated:
+            # rows of a function's own, which says nothing of which mode is which
             frequency = np.sort(frequency, axis=1)
+        elif frequency.ndim == 2 and frequency.size:
+            # columns are modes; the lowest at the first speed where they have a frequency come first
+            first = np.argmax(np.isfinite(frequency), axis=0)
+            frequency = frequency[:, np.argsort(frequency[first, np.arange(frequency.shape[1])], kind="stable")]
     if frequency.ndim != 2 or frequency.shape[0] != omega.size or not frequency.shape[1]:
         raise SignalError(f"modes: shape {frequency.shape} does not fit {omega.size} speeds; give (speeds, modes)")
     return frequency, damping

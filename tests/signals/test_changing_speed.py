@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 
+import gearmbs as gm
 from gearmbs.signals import (
     MissingMetadataError,
     SignalError,
@@ -238,3 +239,20 @@ def test_orders_of_what_becomes_a_signal():
     np.testing.assert_array_equal(tracks.sel(channel="a"), tracks.sel(channel="b"))
     np.testing.assert_allclose(tracks.sel(channel="b").median("time"), [1.0, 0.5], rtol=1e-2)
     assert order_map(table, RUN_UP)["channel"].values.tolist() == ["a", "b"]
+
+
+def test_columns_of_an_array_are_modes_that_may_cross():
+    """300 + 100 x and 350 - 40 x against 500 x Hz over 3000 rpm: crossings at x = 3/4 and 350/540, by hand."""
+    given = np.array([[300.0, 350.0], [400.0, 310.0]])
+    for columns in ([0, 1], [1, 0]):
+        found = gm.signals.critical_speeds(gm.campbell(given[:, columns], ["0 rpm", "3000 rpm"], {"mesh": 10}))
+        speeds = np.sort(found["speed_rpm"])
+        np.testing.assert_allclose(speeds, [3000.0 * 350.0 / 540.0, 2250.0], rtol=1e-12)
+        np.testing.assert_allclose(np.sort(found["frequency_hz"]), 10.0 * speeds / 60.0, rtol=1e-12)
+
+
+def test_rows_of_a_function_are_followed_by_their_frequencies():
+    """Eigenvalues come in any order: here the second speed's are turned round."""
+    rows = {0.0: [300.0, 350.0], 314.0: [420.0, 310.0]}
+    diagram = gm.campbell(lambda speed: np.array(rows[speed]), [0.0, 314.0], [1])
+    np.testing.assert_allclose(diagram["frequency"], [[300.0, 350.0], [310.0, 420.0]])

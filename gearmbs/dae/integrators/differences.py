@@ -238,7 +238,10 @@ def _difference_colour(residual, t, y, yp, cj, vals, idata, rdata, work, c, wide
     error_model="numpy",
 )
 def _add_rates(residual, t, y, yp, cj, vals, idata, rdata, work):
-    """Add cj dG/dy' to ``vals`` by central differences over part of each rate, two residuals for each colour."""
+    """Add cj dG/dy' to ``vals`` by central differences over part of each rate, two residuals for each colour.
+
+    The parameters are those of `difference_matrix`.
+    """
     n = idata[N]
     behind, ahead, yp_moved = work[0:n], work[n : 2 * n], work[3 * n : 4 * n]
     colour_ptr = idata[idata[COLOUR_PTR] :]
@@ -282,7 +285,10 @@ def _add_rates(residual, t, y, yp, cj, vals, idata, rdata, work):
     error_model="numpy",
 )
 def _difference_together(residual, t, y, yp, cj, vals, idata, rdata, work):
-    """Write dG/dy + cj dG/dy' by forward differences, y and y' moved together; see `difference_matrix`."""
+    """Write dG/dy + cj dG/dy' by forward differences, y and y' moved together.
+
+    The parameters are those of `difference_matrix`.
+    """
     n = idata[N]
     base = work[0:n]
     residual(t, y, yp, base, idata, rdata, work)
