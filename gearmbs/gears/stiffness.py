@@ -155,7 +155,7 @@ def tooth_compliance(
     rim_supports : int, optional
         Bolts that hold the rim of an internal wheel; default: it is held all around and does not bend.
     sainsot : bool
-        Whether the body of an external wheel is Sainsot's ring [2]_ instead of a half plane [5]_ and the torsion of
+        Whether the body of an external wheel is Sainsot's ring instead of Cornell's half plane and the torsion of
         the disc between bore and root circle. It is 0.2 to 0.5 softer; a solid wheel has none in it.
 
     Returns
@@ -227,7 +227,7 @@ def disc_torsion(gear: GearSpec) -> float:
 def _sainsot_foundation(
     gear: GearSpec, beta: np.ndarray, from_axis: np.ndarray, root_angle: float | None
 ) -> np.ndarray:
-    """Compliance of the body of an external wheel, a ring fixed at its bore [2]_, m/N."""
+    """Compliance of the body of an external wheel, a ring fixed at its bore (Sainsot), m/N."""
     theta = root_half_angle(gear) if root_angle is None else root_angle
     if gear.bore_radius == 0:
         raise ValueError(f"{gear.name}.bore_radius is 0: Sainsot's ring is held at its bore; give one")
@@ -264,7 +264,7 @@ def half_plane_foundation(gear: GearSpec, beta: np.ndarray, lever: np.ndarray, t
 
 
 def hertz_stiffness(pair: PairGeometry) -> float:
-    """Yang's and Lin's constant stiffness of the contact of two flanks [3]_, N/m.
+    """Yang's and Lin's constant stiffness of the contact of two flanks, N/m.
 
     pi E b / (4 (1 - nu^2)) for equal materials, 3 to 4 times that of `flattening`: it leaves out what two thick bodies
     give way below the strip that touches.
@@ -274,7 +274,7 @@ def hertz_stiffness(pair: PairGeometry) -> float:
 
 
 def flattening(gear: GearSpec, depth: np.ndarray, half_width: np.ndarray) -> np.ndarray:
-    """Compliance of one flank's contact against the tooth's middle line [6]_, m/N.
+    """Compliance of one flank's contact against the tooth's middle line (Weber and Banaschek), m/N.
 
     ``2 (1 - nu^2) / (pi E b) [ln(2 h / a) - nu / (2 (1 - nu))]``: what the surface of a half plane under Hertz's
     pressure of half width a moves against its depth h, in plane strain.
