@@ -242,7 +242,7 @@ def _sainsot_foundation(
 
 
 def half_plane_foundation(gear: GearSpec, beta: np.ndarray, lever: np.ndarray, thickness: float) -> np.ndarray:
-    """Compliance of the body under a tooth as that of an elastic half plane [5]_, m/N.
+    """Compliance of the body under a tooth as that of an elastic half plane (Cornell), m/N.
 
     ``cos^2 beta / (E b) [5.306 (l / h)^2 + 2 (1 - nu) l / h + 1.534 (1 + 0.4167 tan^2 beta / (1 + nu))]``: a wheel's
     body without its torsion, the rim of an internal one without its own bending.
