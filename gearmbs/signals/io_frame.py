@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,10 @@ from .errors import SignalError, SignalFileError
 from .labels import is_clock, name_and_unit, unique_names
 from .metadata import STEP_NAMES, chosen_rate, key_of, rate_candidates, speed_of
 from .record import Record, rate_from_times
-from .signal import UNKNOWN_UNITS
+from .signal import UNKNOWN_UNITS, check_teeth
 
+SPEED_WRITTEN = "speed [rad/s]"
+"""What a Parquet file calls the shaft's speed."""
 CLOCK_UNITS = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0}
 
 
@@ -87,7 +90,19 @@ def read_parquet(path: Path, kind: str, rate: float | None = None) -> Record:
         frame = pd.read_parquet(path) if kind == "parquet" else pd.read_feather(path)
     except Exception as exc:
         raise SignalFileError(path, f"cannot be read as {kind}: it is damaged or cut short ({exc})") from exc
-    return record_of_frame(frame, path, rate)
+    record = record_of_frame(frame, path, rate)
+    # as `write_parquet` writes them
+    speed, teeth, t0 = (frame.attrs.get(key) for key in (SPEED_WRITTEN, "teeth", "t0"))
+    if isinstance(speed, int | float):
+        record = replace(record, speed=float(speed))
+    if isinstance(t0, int | float):
+        record = replace(record, t0=float(t0))
+    if teeth is None:
+        return record
+    try:
+        return replace(record, teeth=check_teeth(teeth))
+    except (TypeError, ValueError) as exc:
+        raise SignalFileError(path, f"teeth: {exc}") from exc
 
 
 def write_parquet(record: Record, path: Path) -> None:
@@ -101,7 +116,9 @@ def write_parquet(record: Record, path: Path) -> None:
     frame = pd.DataFrame(
         {f"{n} [{u}]": record.values[:, i] for i, (n, u) in enumerate(zip(record.names, record.units))}
     )
-    frame.attrs = {"sampling_rate": record.rate}
+    known = {SPEED_WRITTEN: record.speed, "teeth": None if record.teeth is None else list(record.teeth)}
+    frame.attrs = {"sampling_rate": record.rate, "t0": record.t0}
+    frame.attrs |= {key: value for key, value in known.items() if value is not None}
     frame.to_parquet(path)
 
 

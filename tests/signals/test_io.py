@@ -462,3 +462,14 @@ def test_a_table_of_others_cut_within_a_number_says_so(tmp_path, columns):
     assert "notes" not in read_signal(path, rate=1000.0).attrs
     path.write_text(text.rstrip("\n"))
     np.testing.assert_array_equal(read_signal(path, rate=1000.0).values, values)
+
+
+def test_parquet_keeps_speed_and_teeth(tmp_path):
+    pytest.importorskip("pyarrow")
+    signal = make_signal(np.arange(20.0), 1000.0, speed=12.5, teeth=(23, 41))
+    write_signal(signal, tmp_path / "x.parquet")
+    found = read_signal(tmp_path / "x.parquet")
+    assert found.attrs["speed"] == signal.attrs["speed"]
+    assert tuple(found.attrs["teeth"]) == tuple(signal.attrs["teeth"])
+    write_signal(make_signal(np.arange(20.0), 1000.0), tmp_path / "y.parquet")
+    assert not {"speed", "teeth"} & set(read_signal(tmp_path / "y.parquet").attrs)
