@@ -107,7 +107,7 @@ PAIR = record(
     "dynamic_friction",
     "static_speed",
     "dynamic_speed",
-    "width",  # common face width the stiffness refers to, m
+    "width",  # face width that a single section stands for, m
     "end_blend",  # rounding of the face ends in the overlap, m
     "added_material",  # most material added to a flank pair by deviations, m
     "face_low",  # the slices' range along the mean axis, m

@@ -342,9 +342,10 @@ def _mesh_spring(train: Drivetrain, mesh: str, names: tuple[str, ...]) -> Torsio
     # a helical flank has its normal out of the transverse plane, in gap and in force, and a longer line of contact
     transverse = math.cos(driver.gear.base_helix_angle)
     # at no load laws with an exponent have no stiffness; a linear one has it always
-    one = law.tangent_stiffness(force / share, 1) if force > 0.0 else law.law.stiffness
+    face = law.face_share(geometry)
+    one = law.tangent_stiffness(force / share, 1, face) if force > 0.0 else face * law.law.stiffness
     if law.law.exponent == 1.0:
-        one = law.law.stiffness
+        one = face * law.law.stiffness
     if law.stiffness_curve == "potential-energy":
         # the law's stiffness is the largest along the path
         path = np.linspace(geometry.first_roll_lengths[0], geometry.driver.tip_roll_length, CURVE_POINTS)
@@ -355,17 +356,20 @@ def _mesh_spring(train: Drivetrain, mesh: str, names: tuple[str, ...]) -> Torsio
         (names.index(driver.shaft), names.index(driven.shaft)),
         (geometry.driver.base_radius, geometry.sign * geometry.driven.base_radius),
         transverse * one * geometry.contact_ratio,
-        transverse * _mesh_damping(law, force / share) * geometry.contact_ratio,
+        transverse * _mesh_damping(law, force / share, face) * geometry.contact_ratio,
         max(0.0, geometry.normal_backlash),
         force,
         int(pair.rotation),
     )
 
 
-def _mesh_damping(model: ContactModel, force: float) -> float:
-    """Return the damping of one tooth pair at its mean penetration, N s/m; without load that of half the depth."""
+def _mesh_damping(model: ContactModel, force: float, face: float) -> float:
+    """Return the damping of one tooth pair at its mean penetration, N s/m; without load that of half the depth.
+
+    ``face`` is the share of the face in mesh.
+    """
     law = model.law
     if law.kind == "hunt-crossley":
         return law.damping * force
-    depth = model.penetration(force) if force > 0.0 else 0.5 * law.depth
-    return law.damping * smooth_step(depth / law.depth, 0)[1]
+    depth = model.penetration(force, share=face) if force > 0.0 else 0.5 * law.depth
+    return face * law.damping * smooth_step(depth / law.depth, 0)[1]

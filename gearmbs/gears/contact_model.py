@@ -98,10 +98,23 @@ class ContactModel(Written):
         spur = geometry.driver.helix_angle == 0
         return spur and geometry.tip_clearance < BOTTOMING_CLEARANCE * geometry.driver.module
 
-    def penetration(self, force: float, pairs: int = 1) -> float:
-        """Static penetration when ``pairs`` tooth pairs of parallel wheels share a normal force (N) equally, m."""
-        return (force / (pairs * self.law.stiffness)) ** (1 / self.law.exponent)
+    def face_share(self, geometry: PairGeometry) -> float:
+        """Share of the law's stiffness and damping that the faces have as they stand, `PairGeometry.face_share`.
 
-    def tangent_stiffness(self, force: float, pairs: int = 1) -> float:
-        """Tangent stiffness along the line of action of that many tooth pairs under a normal force (N), N/m."""
-        return self.law.exponent * force / self.penetration(force, pairs)
+        The law is that of faces that stand opposite. With ``load="adams"`` one force carries, whatever the face width.
+        """
+        return 1.0 if self.load == "adams" else geometry.face_share
+
+    def penetration(self, force: float, pairs: int = 1, share: float = 1.0) -> float:
+        """Static penetration when ``pairs`` tooth pairs of parallel wheels share a normal force (N) equally, m.
+
+        ``share`` is that of the face in mesh, `face_share`.
+        """
+        return (force / (pairs * share * self.law.stiffness)) ** (1 / self.law.exponent)
+
+    def tangent_stiffness(self, force: float, pairs: int = 1, share: float = 1.0) -> float:
+        """Tangent stiffness along the line of action of that many tooth pairs under a normal force (N), N/m.
+
+        ``share`` is that of the face in mesh, `face_share`.
+        """
+        return self.law.exponent * force / self.penetration(force, pairs, share)

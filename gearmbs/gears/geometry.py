@@ -28,6 +28,10 @@ PRESSED_IN = 0.05
 """Overlap of a tip with the mate's root, in modules, that is a place wheels can be pressed into."""
 
 LARGEST_MISALIGNMENT = math.radians(10)
+
+SHORTEST_FACE = 1e-6
+"""Common face width, m, from which on wheels are side by side: the contact blends the ends of faces over as much."""
+
 MM = 1e3
 
 
@@ -199,9 +203,12 @@ class PairGeometry(Written):
         name = self._name
         for thinned in self.wheels:
             require(thinned.tip_thickness > 0, f"{name}.backlash is {self.backlash * MM:.4f} mm: teeth become pointed")
-        low, high = self.common_face
+        most = 0.5 * (self.driver.face_width + self.driven.face_width)
         require(
-            high > low, f"{name}.axial_shift is {self.axial_shift * MM:.4f} mm: the faces do not overlap; reduce it"
+            self.common_face_width > SHORTEST_FACE,
+            f"{name}.axial_shift is {self.axial_shift * MM:.4f} mm: the faces do not overlap, which are "
+            f"{self.driver.face_width * MM:.4g} and {self.driven.face_width * MM:.4g} mm wide; give less than "
+            f"{most * MM:.4g} mm to either side",
         )
         for near, far, start in zip((self.driver, self.driven), (self.driven, self.driver), self.first_roll_lengths):
             # the involute of an internal wheel ends outwards, at its root
@@ -490,13 +497,33 @@ class PairGeometry(Written):
         return self.normal_backlash < self.jam_backlash
 
     @property
-    def common_face_width(self) -> float:
-        """Face width both wheels share when aligned, m."""
+    def narrower_face_width(self) -> float:
+        """Face width of the narrower wheel, m, which is that of faces that stand opposite; contact laws refer to it."""
         return min(self.driver.face_width, self.driven.face_width)
 
     @property
+    def common_face_width(self) -> float:
+        """Length along the axis over which both faces stand opposite, m; see `common_face`.
+
+        That of the narrower wheel, until an axial shift is more than the wider one's excess on a side.
+        """
+        low, high = self.common_face
+        return high - low
+
+    @property
+    def face_share(self) -> float:
+        """Share of the narrower face that stands opposite the mate's: 1 without axial shift."""
+        return self.common_face_width / self.narrower_face_width
+
+    @property
     def common_face(self) -> tuple[float, float]:
-        """Range along the mean axis, from mid-way between the wheels, that both faces cover, m."""
+        """Range along the mean axis, from mid-way between the wheels, that both faces cover, m.
+
+        The overlap of both faces' intervals on the axis as they are drawn: ``axial_shift`` counts along it, and the
+        misalignment is left out. An angle gamma between the axes shortens the driven face by 1 - cos(gamma), 1.5 % at
+        the most, moves it by the pivot times that, and in the plane of the axes moves its ends at the mesh by
+        r_2 sin(gamma); the contact itself knows where they are.
+        """
         half = 0.5 * self.axial_shift
         low = max(-half - 0.5 * self.driver.face_width, half - 0.5 * self.driven.face_width)
         high = min(-half + 0.5 * self.driver.face_width, half + 0.5 * self.driven.face_width)

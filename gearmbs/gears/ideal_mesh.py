@@ -153,7 +153,8 @@ class IdealMesh(Written):
     @property
     def contact_model(self) -> ContactModel:
         """The mesh as that of `contact_ratio` tooth pairs: what analyses of mean stiffness and damping take."""
-        share = max(1.0, self.geometry.contact_ratio)
+        # its stiffness is of the wheels as they stand, that of a law is of faces that stand opposite
+        share = max(1.0, self.geometry.contact_ratio) * self.geometry.face_share
         # a tooth pair's flank is longer by 1 / cos beta_b
         cosine = math.cos(self.geometry.driver.base_helix_angle)
         law = ContactLaw.linear(

@@ -25,7 +25,8 @@ class ContactLaw(Written):
     """Normal force of one tooth pair over its face, against penetration and its rate.
 
     Use the class methods; each states its own formula. ``stiffness`` and ``damping`` refer to the whole face of a
-    pair of parallel wheels and are distributed evenly over it.
+    pair of parallel wheels whose faces stand opposite, that of the narrower one, and are distributed evenly over it:
+    what an axial shift takes out of mesh is missing.
 
     Attributes
     ----------

@@ -241,7 +241,7 @@ class GearPair(PairGeometry, Shown):
             See `with_linear_stiffness`.
         """
         geometry = self.geometry
-        largest = float(pair_stiffness(geometry, compliance_roll_lengths(geometry)).max())
+        largest = float(pair_stiffness(geometry, compliance_roll_lengths(geometry)).max()) / self._face_share
         made = self.with_linear_stiffness(largest, damping, depth, damping_ratio=damping_ratio)
         return replace(made, stiffness_curve="potential-energy")
 
@@ -257,7 +257,8 @@ class GearPair(PairGeometry, Shown):
             ``single``: each pair has c' times the common face width. ``mesh``: the mean over a mesh cycle, in the
             transverse plane along the line of action, is c_gamma times that width: each pair has
             c_gamma b / (epsilon_alpha cos beta_b), since the line of contact is longer by 1 / cos beta_b and the normal
-            out of the plane, in gap and in force.
+            out of the plane, in gap and in force. ``contact.stiffness`` is that of faces that stand opposite, of which
+            the contact counts the part in mesh.
         damping, depth, damping_ratio
             See `with_linear_stiffness`.
 
@@ -272,9 +273,8 @@ class GearPair(PairGeometry, Shown):
             stiffness = iso_single_stiffness(self.geometry)
         else:
             stiffness = iso_mesh_stiffness(self.geometry) / self._pairs_in_mesh
-        return self.with_linear_stiffness(
-            stiffness * self.common_face_width, damping, depth, damping_ratio=damping_ratio
-        )
+        width = self.common_face_width / self._face_share
+        return self.with_linear_stiffness(stiffness * width, damping, depth, damping_ratio=damping_ratio)
 
     def with_linear_stiffness(
         self, stiffness: Quantity, damping: Quantity = None, depth: Quantity = None, *,
@@ -287,13 +287,14 @@ class GearPair(PairGeometry, Shown):
         stiffness : float or str
             Of a tooth pair over its whole face, N/m.
         damping : float or str, optional
-            Of a tooth pair, N s/m; default none.
+            Of a tooth pair over its whole face, N s/m; default none.
         depth : float or str, optional
             Penetration at which the damping is fully on; default 0.1 mm, and 2 um with a ratio.
         damping_ratio : float, optional
             Instead of ``damping``: zeta of the bare wheels on their mesh. With the mean stiffness
             k = epsilon_alpha cos(beta_b) K of the mesh and `reduced_mass`, its damping is 2 zeta sqrt(k m), a tooth
-            pair's that over epsilon_alpha cos(beta_b).
+            pair's that over epsilon_alpha cos(beta_b). Of faces that stand opposite in part, K and the mesh's damping
+            are those of this part.
 
         Raises
         ------
@@ -309,7 +310,7 @@ class GearPair(PairGeometry, Shown):
                 isinstance(damping_ratio, (int, float)) and 0.0 <= damping_ratio < math.inf,
                 f"damping_ratio is {damping_ratio!r}; give a number that is not negative",
             )
-            share = self._pairs_in_mesh
+            share = self._pairs_in_mesh * self._face_share
             damping = 2.0 * damping_ratio * math.sqrt(law.stiffness * self.reduced_mass / share)
             depth = RATIO_DEPTH if depth is None else depth
         return replace(self, contact=ContactLaw.linear(stiffness, damping, depth), stiffness_curve="constant")
@@ -355,10 +356,18 @@ class GearPair(PairGeometry, Shown):
         return max(1.0, self.contact_ratio) * math.cos(self.driver.base_helix_angle)
 
     @property
+    def _face_share(self) -> float:
+        """Share of the law's stiffness that the faces have as they stand."""
+        return self.contact_model.face_share(self.geometry)
+
+    @property
     def mean_mesh_stiffness(self) -> float:
-        """Mean over a mesh cycle of linear tooth pairs, along the normal, N/m: epsilon_alpha K / cos(beta_b)."""
+        """Mean over a mesh cycle of linear tooth pairs, along the normal, N/m: epsilon_alpha K / cos(beta_b).
+
+        K is that of the part of the faces in mesh; the axes count as parallel.
+        """
         along = math.cos(self.driver.base_helix_angle)
-        return float(self.contact.stiffness) * self._pairs_in_mesh / along**2
+        return float(self.contact.stiffness) * self._face_share * self._pairs_in_mesh / along**2
 
     @property
     def reduced_mass(self) -> float:
@@ -387,11 +396,11 @@ class GearPair(PairGeometry, Shown):
 
     def penetration(self, torque: float | None = None, pairs: int = 1) -> float:
         """Static penetration when ``pairs`` tooth pairs share a torque on the driven wheel (N m) equally, m."""
-        return self.contact_model.penetration(self._force(torque), pairs)
+        return self.contact_model.penetration(self._force(torque), pairs, self._face_share)
 
     def mesh_stiffness(self, torque: float | None = None, pairs: int = 1) -> float:
         """Tangent stiffness of that many pairs along the line of action under a torque on the driven wheel, N/m."""
-        return self.contact_model.tangent_stiffness(self._force(torque), pairs)
+        return self.contact_model.tangent_stiffness(self._force(torque), pairs, self._face_share)
 
     def contact_tables(self, slices: int | None = None) -> tuple[np.ndarray, np.ndarray, int]:
         """Tables of the contact kernel.

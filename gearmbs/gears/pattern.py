@@ -189,6 +189,6 @@ def _pair_load(pair: Mesh, rows: np.ndarray, ends: np.ndarray, low: float, width
         loads = force * section / section.sum()
     else:
         loads = (
-            law.stiffness / pair.geometry.common_face_width * soft * (cosine * depth) ** law.exponent / cosine * share
+            law.stiffness / pair.geometry.narrower_face_width * soft * (cosine * depth) ** law.exponent / cosine * share
         )
     return loads.reshape(-1, FINE).sum(axis=1) / width

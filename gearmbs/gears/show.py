@@ -34,7 +34,7 @@ def pair_table(pair: Mesh) -> Table:
     from rich.table import Table
 
     geometry, point = pair.geometry, pair.operating_point
-    force = point.normal_force(geometry)
+    force, share = point.normal_force(geometry), pair.contact_model.face_share(geometry)
     one, two = geometry.driver, geometry.driven
     tilt = geometry.plane if geometry.misalignment else ""
     table = Table(title=f"Gear pair {one.teeth}/{two.teeth}")
@@ -73,7 +73,7 @@ def pair_table(pair: Mesh) -> Table:
         ("load torque, driven wheel", shown(point.torque, "N m", ".1f")),
         ("normal force", shown(force, "N", ".1f")),
         ("contact law", str(pair.contact_model.law)),
-        ("penetration, one pair", shown(pair.contact_model.penetration(force), "um", ".2f")),
+        ("penetration, one pair", shown(pair.contact_model.penetration(force, share=share), "um", ".2f")),
     ):
         table.add_row(label, value, "")
     if geometry.jams:

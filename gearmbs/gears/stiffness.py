@@ -328,6 +328,8 @@ def pair_stiffness(
 ) -> np.ndarray:
     """Stiffness of one tooth pair by the potential-energy method, N/m.
 
+    With an axial shift only the common face is in mesh; what stands beside it is not counted, as in ISO 6336-1.
+
     Parameters
     ----------
     pair : PairGeometry
@@ -343,7 +345,8 @@ def pair_stiffness(
         Whether the bodies are Sainsot's rings and the contact is Yang's and Lin's constant, as usual in the literature.
     """
     mate = pair.mate_roll_length(0, roll_length)
-    total = np.full(np.shape(roll_length), 1 / hertz_stiffness(pair) if sainsot else 0.0)
+    # the teeth are those of whole faces, of which a share is in mesh
+    total = np.full(np.shape(roll_length), pair.face_share / hertz_stiffness(pair) if sainsot else 0.0)
     half_width = contact_half_width(pair, roll_length, load)
     held = (None, rim_supports)
     for wheel, at, crack, angle, bolts in zip(pair.wheels, (roll_length, mate), cracks, root_angles, held):
@@ -351,7 +354,7 @@ def pair_stiffness(
         total = total + np.interp(at, tooth.roll_length, tooth.total)
         if not sainsot:
             total = total + flattening(wheel, np.interp(at, tooth.roll_length, tooth.depth), half_width)
-    return 1 / total
+    return pair.face_share / total
 
 
 @dataclass(frozen=True)
@@ -469,7 +472,7 @@ def iso_single_stiffness(pair: PairGeometry, web: tuple[float, float] | None = N
     depth = 0.5 * (one.dedendum / one.module + one.profile_shift + two.dedendum / two.module + two.profile_shift)
     blank = 1.0
     if web is not None:
-        share = min(max(web[0] / pair.common_face_width, 0.2), 1.2)
+        share = min(max(web[0] / pair.narrower_face_width, 0.2), 1.2)
         blank = 1 + math.log(share) / (5 * math.exp(max(web[1] / one.module, 1.0) / 5))
     rack = (1 + 0.5 * (1.2 - depth)) * (1 - 0.02 * (20 - math.degrees(one.pressure_angle)))
     moduli = [w.material.youngs_modulus for w in (one, two)]

@@ -116,8 +116,8 @@ def _pack(pair: Mesh, slices: int | None) -> tuple[np.ndarray, np.ndarray, int]:
     _pack_wheel(second, reals["wheel_2"])
     _pack_reach(geometry, reals)
     reals["pitch"] = first.base_pitch
-    reals["width"] = geometry.common_face_width
-    _pack_laws(model, geometry.common_face_width, math.cos(first.base_helix_angle), reals)
+    reals["width"] = geometry.narrower_face_width * model.face_share(geometry)
+    _pack_laws(model, geometry.narrower_face_width, math.cos(first.base_helix_angle), reals)
     reals["end_blend"] = END_BLEND
     reals["face_low"], reals["face_high"] = geometry.common_face
     reals["axial_shift"] = geometry.axial_shift

@@ -99,7 +99,8 @@ def load_of(pair: Mesh, torque: Quantity) -> float:
 def static_lag(pair: Mesh, torque: float) -> float:
     """Angle by which a torque (N m) on one tooth pair of parallel wheels lets the driven wheel lag, rad."""
     radius = pair.geometry.driven.base_radius
-    return pair.contact_model.penetration(torque / radius) / radius
+    model = pair.contact_model
+    return model.penetration(torque / radius, share=model.face_share(pair.geometry)) / radius
 
 
 class StaticMesh:

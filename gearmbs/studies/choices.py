@@ -93,7 +93,7 @@ def _values(cases: list[Case], component: str) -> dict[str, str]:
         "stiffness K": f"{c.stiffness}, exponent {c.exponent:g}",
         "damping C": str(c.damping),
         "normal backlash": f"{1e3 * f.backlash:.4g} mm",
-        "face width": f"{1e3 * pair.common_face_width:.4g} mm",
+        "face width": f"{1e3 * pair.narrower_face_width:.4g} mm",
         "gears": wheels,
         "shafts": f"diameter {2e3 * s.radius:.4g} mm, length {1e3 * s.length:.4g} mm",
         "misalignment": tilt,

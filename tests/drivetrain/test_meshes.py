@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import gearmbs as gm
-from gearmbs.drivetrain import Drivetrain, DrivetrainError, GearMesh, IdealBearing, RunSettings, Shaft
+from gearmbs.drivetrain import Drivetrain, DrivetrainError, GearMesh, IdealBearing, RunSettings, Shaft, TorqueLoad
 from gearmbs.drivetrain.description import make_description
 from gearmbs.flexible import ShaftSection
 from gearmbs.gears import (
@@ -163,6 +163,28 @@ def test_mesh_mode_of_the_default_oscillates():
     ratio = train.pairs["mesh"].contact_ratio
     possible = [found.frequency * math.sqrt(n / ratio) for n in (1, 2)]
     assert min(abs(modes.frequencies[-1] / f - 1) for f in possible) < 0.01
+
+
+@pytest.mark.parametrize("contact", [{}, {"contact": ContactLaw.impact(damping="20 N*s/mm")}])
+def test_chain_of_faces_in_mesh_in_part(contact):
+    """Half of the faces in mesh: as the tangent stiffness of the contact itself under the load, and so the modes."""
+    whole, half = meshed(**contact), meshed(**contact, axial_shift="10 mm")
+    found = half.mesh_dynamics["mesh"]
+    if not contact:
+        assert found.stiffness == pytest.approx(0.5 * whole.mesh_dynamics["mesh"].stiffness)
+        assert found.damping_ratio == pytest.approx(whole.mesh_dynamics["mesh"].damping_ratio)
+        frequencies = [train.torsional().frequencies()[-1] for train in (half, whole)]
+        assert frequencies[0] == pytest.approx(frequencies[1] * math.sqrt(0.5))
+        # an ideal mesh takes the stiffness of the wheels as they stand
+        spring = stage(
+            meshes=[GearMesh(name="mesh", driver="pinion", driven="gear", pair=IdealMesh,
+                             settings={"backlash": "0.1 mm", "axial_shift": "10 mm"})]
+        )  # fmt: skip
+        assert spring.mesh_dynamics["mesh"].stiffness == pytest.approx(found.stiffness)
+    # light loads: tips that bear beyond the path of contact lengthen it
+    light = half.with_parts(TorqueLoad(name="brake", shaft="out", torque=LIGHT))
+    loaded = loaded_transmission_error(light.pairs["mesh"], points=100).stiffness.mean()
+    assert light.mesh_dynamics["mesh"].stiffness == pytest.approx(loaded, rel=0.04)
 
 
 def test_overdamped_meshes_are_warned_of():

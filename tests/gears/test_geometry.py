@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearmbs.gears import GearPair, GearSpec, involute
+from gearmbs.gears import GearPair, GearSpec, PairGeometry, involute
 
 MM = 1e-3
 
@@ -145,6 +145,7 @@ BAD_PAIRS = {
     "slices": {"slices": 0},
     "load": {"load": "magic"},
     "axial_shift": {"axial_shift": "25 mm"},
+    "axial_shift is -20.0000 mm: the faces do not overlap": {"axial_shift": "-20 mm"},
     "torque": {"torque": "100 N"},
     "module and pressure_angle": {"driven": GearSpec(29, "3 mm")},
     "interference": {"driver": GearSpec(15, 95e-3 / 31), "driven": GearSpec(120, 95e-3 / 31)},
@@ -155,6 +156,22 @@ BAD_PAIRS = {
 def test_impossible_pairs_are_named(words):
     with pytest.raises(ValueError, match=words):
         GearPair.paper(**BAD_PAIRS[words])
+
+
+@settings(max_examples=60, derandomize=True, deadline=None)
+@given(b1=st.integers(5, 60), b2=st.integers(5, 60), shift=st.floats(-80, 80))
+def test_common_face_width_is_the_overlap_of_both_faces(b1, b2, shift):
+    """In mm, counted by the ends of both faces, whichever is the wider and the driver."""
+    one, two = (GearSpec(29, "3 mm", face_width=b * 1e-3) for b in (b1, b2))
+    overlap = min(b1, b2, 0.5 * (b1 + b2) - abs(shift))
+    if overlap <= 1e-3:
+        with pytest.raises(ValueError, match=r"axial_shift is .* the faces do not overlap, .* give less than"):
+            PairGeometry(one, two, axial_shift=shift * 1e-3)
+        return
+    pair = PairGeometry(one, two, axial_shift=shift * 1e-3)
+    assert pair.common_face_width == pytest.approx(overlap * 1e-3, rel=1e-9)
+    assert pair.face_share == pytest.approx(overlap / min(b1, b2), rel=1e-9)
+    assert pair.narrower_face_width == min(b1, b2) * 1e-3
 
 
 @settings(max_examples=60, derandomize=True, deadline=None)

@@ -40,6 +40,20 @@ def test_contact_stress_of_the_example():
     assert stresses.contact(1.2)[0] == pytest.approx(math.sqrt(1.2) * stresses.nominal_contact)
 
 
+def test_faces_in_mesh_in_part_are_stressed_as_narrow_ones():
+    def made(width, shift=0.0):
+        return GearPair(GearSpec(20, "3 mm", face_width=width), GearSpec(60, "3 mm"), axial_shift=shift)
+
+    for shift, width in (("10 mm", "10 mm"), ("-15 mm", "5 mm")):
+        shifted, narrow = (iso_stresses(pair, 300.0) for pair in (made("20 mm", shift), made(width)))
+        assert shifted.contact() == pytest.approx(narrow.contact())
+        assert shifted.root() == pytest.approx(narrow.root())
+    # a wider pinion that still covers its mate
+    assert iso_stresses(made("30 mm", "4 mm"), 300.0).contact() == pytest.approx(
+        iso_stresses(made("30 mm"), 300.0).contact()
+    )
+
+
 @pytest.mark.parametrize(("teeth", "shift", "radius"), [(17, 0.145, 0.25), (25, 0.0, 0.38), (60, 0.2, 0.3)])
 def test_root_section_lies_where_the_cut_root_has_its_30_degree_tangent(teeth, shift, radius):
     gear = GearSpec(teeth, "4 mm", profile_shift=shift, fillet_radius=radius * 4e-3)

@@ -148,6 +148,39 @@ def test_iso_6336_as_the_stiffness_of_a_pair():
         pair.with_iso_stiffness("both")
 
 
+@pytest.mark.parametrize("kind", ["iso", "iso single", "potential-energy"])
+@pytest.mark.parametrize("load", ["slices", "adams"])
+def test_stiffness_of_faces_in_mesh_in_part(kind, load):
+    """Shifted wheels are as stiff and as damped as the part of them that is in mesh, by all ways to ask."""
+    from gearmbs.gears import loaded_transmission_error
+
+    def made(width, shift=0.0, slices=None):
+        wheels = [GearSpec(z, "3 mm", face_width=b, bore_radius="8 mm") for z, b in ((25, width), (40, "24 mm"))]
+        given = {"load": load, "slices": slices, "backlash": "0.1 mm", "torque": 5.0}
+        return GearPair(*wheels, axial_shift=shift, **given).with_own_stiffness(kind)
+
+    whole = made("20 mm")
+    for shift, share in (("2 mm", 1.0), ("-9.5 mm", 0.625), ("17 mm", 0.25)):
+        shifted = made("20 mm", shift)
+        assert shifted.common_face_width == pytest.approx(share * 0.02)
+        assert shifted.mean_mesh_stiffness == pytest.approx(share * whole.mean_mesh_stiffness)
+        assert shifted.mesh_stiffness(5.0) == pytest.approx(share * whole.mesh_stiffness(5.0))
+        assert shifted.penetration(5.0) == pytest.approx(whole.penetration(5.0) / share)
+        energies = [mesh_stiffness(pair, 20).mean for pair in (shifted, whole)]
+        assert energies[0] == pytest.approx(share * energies[1])
+        assert hertz_stiffness(shifted) == pytest.approx(share * hertz_stiffness(whole))
+        # what the contact itself says, in sections and with a single one
+        for slices in (None, 1):
+            found = loaded_transmission_error(made("20 mm", shift, slices), 5.0 * share, 10).stiffness.mean()
+            wanted = share * loaded_transmission_error(whole, 5.0, 10).stiffness.mean()
+            # the ends of two faces are blended over a micrometre where they tie
+            assert found == pytest.approx(wanted, rel=5e-4)
+        # 2 zeta sqrt(k m), with the wheels' masses and what is in mesh
+        in_mesh = shifted.contact_model.face_share(shifted.geometry)
+        damping = [pair.contact.damping * part for pair, part in ((shifted, in_mesh), (whole, 1.0))]
+        assert damping[0] / damping[1] == pytest.approx(math.sqrt(share))
+
+
 def test_cracks_soften_with_depth():
     pair = GearPair.paper()
     roll_length = np.linspace(9e-3, 20e-3, 30)
