@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from gearmbs.drivetrain.kinematics import KinematicTable
     from gearmbs.drivetrain.placement import Layout
     from gearmbs.drivetrain.power import PowerFlow
-    from gearmbs.drivetrain.torsional import MeshDynamics, TorsionalModel
+    from gearmbs.drivetrain.torsional import MeshDynamics, TorsionalModel, TorsionalSpring
     from gearmbs.gears.spec import GearSpec
     from gearmbs.mechanism.mechanism import Mechanism
 
@@ -221,12 +221,25 @@ class Drivetrain:
         Warns
         -----
         UserWarning
-            Of meshes that are damped above critical.
+            Of meshes that are damped above critical, and of misaligned ones without load.
         """
         from gearmbs.drivetrain.torsional import torsional_model, warn_of_overdamped_meshes
 
         warn_of_overdamped_meshes(self)
         return torsional_model(self)
+
+    @cached_property
+    def mesh_springs(self) -> dict[str, TorsionalSpring]:
+        """Each mesh as a spring of the torsional chain, by name; see `gearmbs.drivetrain.torsional`."""
+        from gearmbs.drivetrain.torsional import mesh_springs
+
+        return mesh_springs(self)
+
+    def _laws(self) -> dict[str, str]:
+        """Contact law of each mesh in words, by name; tells without the springs, which may need compiled contacts."""
+        from gearmbs.drivetrain.torsional import mesh_law
+
+        return {mesh.name: mesh_law(self, mesh.name) for mesh in self.meshes}
 
     @cached_property
     def mesh_dynamics(self) -> dict[str, MeshDynamics]:
@@ -276,15 +289,14 @@ class Drivetrain:
 
     def _repr_html_(self) -> str:
         parts = (part for group in GROUPS for part in getattr(self, group))
-        laws = {name: found.law for name, found in self.mesh_dynamics.items()}
-        return parts_html(self.name, parts, laws) + self.kinematics.to_html()
+        return parts_html(self.name, parts, self._laws()) + self.kinematics.to_html()
 
     def __repr__(self) -> str:
         counts = [(len(getattr(self, g)), g) for g in GROUPS if getattr(self, g)]
         said = [f"{n} {KINDS[g].title if n == 1 else g}" for n, g in counts]
         by_law: dict[str, list[str]] = {}
-        for name, found in self.mesh_dynamics.items():
-            by_law.setdefault(found.law, []).append(name)
+        for name, law in self._laws().items():
+            by_law.setdefault(law, []).append(name)
         said += [f"{', '.join(names)}: {law}" for law, names in by_law.items()]
         return f"Drivetrain({self.name!r}: {'; '.join([', '.join(said[: len(counts)]), *said[len(counts) :]])})"
 

@@ -17,7 +17,8 @@ import scipy.linalg
 
 from gearmbs.dae.equations.time_functions import smooth_step
 from gearmbs.drivetrain.drives import SpeedDrive
-from gearmbs.drivetrain.errors import require
+from gearmbs.drivetrain.errors import require, told_of
+from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.stiffness import pair_stiffness
 
 if TYPE_CHECKING:
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 
 CURVE_POINTS = 200
 """Along the path of contact, for the mean of a stiffness that varies."""
+
+CYCLE_POINTS = 50
+"""Over a mesh cycle, for the mean stiffness of tilted wheels: where pairs come and go is known to a fiftieth of it."""
 
 
 @dataclass(frozen=True)
@@ -233,8 +237,14 @@ class TorsionalModel:
 def torsional_model(train: Drivetrain) -> TorsionalModel:
     """Return the torsional chain of a drivetrain; meshes have their mean stiffness at the operating torque.
 
-    The mean over a mesh cycle is the tangent stiffness of one tooth pair (of the law, under the force it has to carry)
-    times the contact ratio.
+    The mean over a mesh cycle is the tangent stiffness of one tooth pair (of the law, under the force it has to carry,
+    over the part of the faces in mesh) times the contact ratio. Under a misalignment, which lets a part of the face
+    carry only, it is that of `gearmbs.gears.loaded_transmission_error`, and the damping is as much less.
+
+    Warns
+    -----
+    UserWarning
+        Of tilted wheels without load, whose stiffness is taken as that of parallel ones.
     """
     names = tuple(shaft.name for shaft in train.shafts)
     inertias = _inertias(train, names)
@@ -251,7 +261,7 @@ def torsional_model(train: Drivetrain) -> TorsionalModel:
             )
         )  # fmt: skip
     for mesh in train.meshes:
-        springs.append(_mesh_spring(train, mesh.name, names))
+        springs.append(train.mesh_springs[mesh.name])
     ground = np.zeros(len(names))
     for drive in train.drives:
         ground[names.index(drive.shaft)] += drive.damping()
@@ -297,14 +307,19 @@ def mesh_dynamics(train: Drivetrain) -> dict[str, MeshDynamics]:
     held = {drive.shaft for drive in train.drives if isinstance(drive, SpeedDrive)}
     out = {}
     for mesh in train.meshes:
-        spring = _mesh_spring(train, mesh.name, names)
+        spring = train.mesh_springs[mesh.name]
         softness = [arm**2 / inertias[k] for k, arm in zip(spring.shafts, spring.levers) if names[k] not in held]
         mass = 1.0 / sum(softness) if softness else 0.0
-        pair = train.pairs[mesh.name]
-        # an ideal mesh has words of its own
-        law = str(getattr(pair, "law", None) or pair.contact_model.law)
+        law = mesh_law(train, mesh.name)
         out[mesh.name] = MeshDynamics(law, float(spring.stiffness), float(spring.damping), float(mass))
     return out
+
+
+def mesh_law(train: Drivetrain, mesh: str) -> str:
+    """Return the contact law of a mesh in words."""
+    pair = train.pairs[mesh]
+    # an ideal mesh has words of its own
+    return str(getattr(pair, "law", None) or pair.contact_model.law)
 
 
 def warn_of_overdamped_meshes(train: Drivetrain, stacklevel: int = 3) -> None:
@@ -333,6 +348,12 @@ def _inertias(train: Drivetrain, names: tuple[str, ...]) -> np.ndarray:
     return inertias
 
 
+def mesh_springs(train: Drivetrain) -> dict[str, TorsionalSpring]:
+    """Return the spring of each mesh, by name; see `torsional_model`."""
+    names = tuple(shaft.name for shaft in train.shafts)
+    return {mesh.name: _mesh_spring(train, mesh.name, names) for mesh in train.meshes}
+
+
 def _mesh_spring(train: Drivetrain, mesh: str, names: tuple[str, ...]) -> TorsionalSpring:
     driver, driven = train.wheels_of(mesh)
     pair = train.pairs[mesh]
@@ -351,16 +372,43 @@ def _mesh_spring(train: Drivetrain, mesh: str, names: tuple[str, ...]) -> Torsio
         path = np.linspace(geometry.first_roll_lengths[0], geometry.driver.tip_roll_length, CURVE_POINTS)
         curve = pair_stiffness(geometry, path)
         one *= float(curve.mean() / curve.max())
+    stiffness = float(transverse * one * geometry.contact_ratio)
+    damping = float(transverse * _mesh_damping(law, force / share, face) * geometry.contact_ratio)
+    # an ideal mesh is one spring, however its wheels stand
+    if geometry.misalignment and not isinstance(pair, IdealMesh):
+        tilted = _tilted_stiffness(train, mesh, stiffness, force)
+        stiffness, damping = tilted, damping * tilted / stiffness
     return TorsionalSpring(
         mesh,
         (names.index(driver.shaft), names.index(driven.shaft)),
         (geometry.driver.base_radius, geometry.sign * geometry.driven.base_radius),
-        transverse * one * geometry.contact_ratio,
-        transverse * _mesh_damping(law, force / share, face) * geometry.contact_ratio,
+        stiffness,
+        damping,
         max(0.0, geometry.normal_backlash),
         force,
         int(pair.rotation),
     )
+
+
+def _tilted_stiffness(train: Drivetrain, mesh: str, parallel: float, force: float) -> float:
+    """Return the mean tangent stiffness of tilted wheels under their load, N/m; without load that of parallel ones."""
+    # the contact kernels are compiled for this only
+    from gearmbs.gears.transmission import loaded_transmission_error, warn_of_jam
+
+    pair, label = train.pairs[mesh], train.parts[mesh].label
+    tilt = math.degrees(pair.geometry.misalignment)
+    if force <= 0.0:
+        warnings.warn(
+            f"{label}: misalignment is {tilt:.4g} deg, and without load no part of the face carries: its stiffness in "
+            f"the torsional chain is that of parallel wheels, {parallel:.4g} N/m; give the drivetrain a load",
+            stacklevel=2,
+        )
+        return parallel
+    warn_of_jam(pair)
+    with told_of(label), warnings.catch_warnings():
+        # faults of single teeth need not pass
+        warnings.simplefilter("ignore")
+        return float(loaded_transmission_error(pair, points=CYCLE_POINTS).stiffness.mean())
 
 
 def _mesh_damping(model: ContactModel, force: float, face: float) -> float:

@@ -18,6 +18,8 @@ from gearmbs.units import Quantity, to_si
 SIDE, TOOTH_1, TOOTH_2, GAP = (GAP_COLUMNS.index(name) for name in ("side", "tooth_1", "tooth_2", "gap"))
 NORMAL_FORCE, PAIRS_DRIVE = layout.place(layout.TOTALS, "normal_force"), layout.place(layout.TOTALS, "pairs_drive")
 NEWTON_STEPS = 100
+SHORT_STEPS = 20
+"""Steps of at most the deflection of parallel wheels. Tilted ones may touch far from there; then steps grow."""
 PHASE_STEPS = 50
 TOUCH_TOLERANCE = 1e-15  # m
 SEARCHED_FROM = 1e-11  # m
@@ -209,7 +211,8 @@ class StaticMesh:
         lag = side * start
         longest = static_lag(self.pair, torque)
         low, high = -math.inf, math.inf
-        for _ in range(NEWTON_STEPS):
+        for step in range(NEWTON_STEPS):
+            longest *= 2.0 if step >= SHORT_STEPS else 1.0
             value, slope = self.torque(driver_angle, side * lag)
             miss = -side * value - torque
             if miss > 0:

@@ -187,6 +187,38 @@ def test_chain_of_faces_in_mesh_in_part(contact):
     assert light.mesh_dynamics["mesh"].stiffness == pytest.approx(loaded, rel=0.04)
 
 
+@pytest.mark.parametrize("torque", [1.0, 300.0])
+@pytest.mark.parametrize("tilt", ["0.2 deg", "1 deg"])
+def test_chain_of_tilted_wheels_has_the_modes_of_the_whole_train(tilt, torque):
+    """A part of the face carries: the lighter the load, the smaller, and the chain of parallel wheels is far off."""
+    brake = TorqueLoad(name="brake", shaft="out", torque=torque)
+    train = meshed(misalignment=tilt, backlash="0.6 mm").with_parts(brake)
+    parallel = meshed(backlash="0.6 mm").with_parts(brake)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        chain, whole = train.torsional(), train_modes(train)
+        assert "mesh" in repr(train)
+    assert chain.frequencies()[-1] < 0.8 * parallel.torsional().frequencies()[-1]
+    # one position of the wheels has more or fewer pairs in contact than the mean
+    assert chain.frequencies()[-1] == pytest.approx(whole.frequencies[-1], rel=0.05)
+    found, before = (one.mesh_dynamics["mesh"] for one in (train, parallel))
+    assert found.stiffness == pytest.approx(loaded_transmission_error(train.pairs["mesh"], points=50).stiffness.mean())
+    assert found.damping / found.stiffness == pytest.approx(before.damping / before.stiffness)
+
+
+def test_chain_of_tilted_wheels_without_load_is_warned_of():
+    train = meshed(misalignment="0.2 deg", backlash="0.6 mm")
+    empty = train.with_parts(TorqueLoad(name="brake", shaft="out", torque=0.0))
+    with pytest.warns(UserWarning, match=r"mesh 'mesh': misalignment is 0.2 deg, and without load .* give .* a load"):
+        chain = empty.torsional()
+    assert chain.frequencies()[-1] == pytest.approx(meshed(backlash="0.6 mm").torsional().frequencies()[-1])
+    # an ideal mesh is the spring it was given
+    spring = stage(meshes=[GearMesh(name="mesh", driver="pinion", driven="gear", pair=IdealMesh,
+                                    settings={"backlash": "0.6 mm", "stiffness": "4e8 N/m",
+                                              "misalignment": "0.2 deg"})])  # fmt: skip
+    assert spring.torsional().springs[0].stiffness == pytest.approx(4e8)
+
+
 def test_overdamped_meshes_are_warned_of():
     hard = ContactLaw.linear("3e8 N/m", "1e5 N*s/m", "2 um")
     for contact in (ContactLaw.impact(depth="0.01 mm"), ContactLaw.impact(), hard):
