@@ -93,7 +93,8 @@ class GearSpec(Shown, Written):
         wheel point inwards and outwards.
     fillet_radius : float or str, optional
         Radius of the concave root arc; default 0.38 m, of an internal wheel 0.2 m, or less where a narrow root has no
-        room for it.
+        room for it, or where an arc of 0.38 m, which stands on the root circle as a half round, would take of the
+        involute what a rack with that tip radius leaves: above 60 teeth at 20 degrees without shift.
     profile_shift : float
         Coefficient x of ISO 21771: the tooth is thickened by ``2 x m tan(alpha)`` and moved towards its tip, which
         for an internal wheel is inwards. See `outward_shift` and `ring` for the other convention in use.
@@ -204,13 +205,13 @@ class GearSpec(Shown, Written):
         self._check()
 
     def _fit_root(self) -> None:
-        """Reduce the default root arcs where neighbours overlap or shifted flanks lose what a rack leaves them."""
+        """Reduce the default root arcs where neighbours overlap or flanks lose what a rack leaves them."""
         for share in ROOT_SHARES:
             arc = share * self.fillet_radius
             if arc >= abs(self.root_radius) or self.fillet_centre_radius <= arc:
                 return
             overlapping = self.fillet_half_angle >= math.pi / self.teeth
-            shortened = self.profile_shift > 0 and not self.internal and self.form_roll_length > self._rack_form_roll
+            shortened = not self.internal and self.form_roll_length > self._rack_form_roll
             if not (overlapping or shortened):
                 return
             object.__setattr__(self, "fillet_radius", arc)

@@ -1,6 +1,7 @@
 """Closed-form numbers of wheels and pairs."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -133,6 +134,33 @@ def test_root_on_the_wrong_side():
         GearSpec.from_radii(29, "3 mm", tip_radius="43 mm", root_radius="40 mm")
     with pytest.raises(ValueError, match="leave no involute"):
         GearSpec(120, "3 mm", dedendum="0.2 mm", fillet_radius="3 mm")
+
+
+@pytest.mark.parametrize("helix", [0.0, math.radians(20)])
+@pytest.mark.parametrize("pressure", ["20 deg", "25 deg"])
+def test_default_wheels_of_any_size_mesh(pressure, helix):
+    """Default root arcs leave the flanks what a rack with a tip radius of 0.38 modules does: room for any mate."""
+    module = 2e-3
+    wheels = [
+        [GearSpec(z, module, pressure_angle=pressure, helix_angle=helix, hand=hand) for z in (29, 41, 62, 80, 120, 400)]
+        for hand in ("right", "left" if helix else "right")
+    ]
+    alpha = wheels[0][0].pressure_angle
+    straight = 1.25 * module - 0.38 * module * (1 - math.sin(alpha))
+    for gear in wheels[0]:
+        sine = math.sin(gear.transverse_pressure_angle)
+        assert gear.form_roll_length <= max(0.0, gear.pitch_radius * sine - straight / sine) + 1e-12 or gear.teeth == 29
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for one in wheels[0]:
+            for two in wheels[1]:
+                # a light load: mates that are almost racks come to within a micrometre of the arcs
+                GearPair(one, two, torque=1.0)
+    # the arcs of small wheels begin lower anyway, and one that was given stays
+    if pressure == "20 deg" and not helix:
+        assert [w.fillet_radius / module for w in wheels[0][:2]] == pytest.approx([0.38, 0.38])
+        assert GearSpec(120, module, fillet_radius=0.38 * module).fillet_radius == 0.38 * module
+        assert GearPair(wheels[0][4], wheels[1][4]).contact_ratio == pytest.approx(1.8714, abs=5e-5)
 
 
 BAD_PAIRS = {

@@ -42,9 +42,10 @@ def test_negative_backlash_is_remarked_on_with_its_value(kind, wheels, sign):
 
 
 def test_tips_that_foul_roots_under_the_load_are_remarked_on():
-    wheels = {"driver": GearSpec(62, "2 mm", fillet_radius="0.5 mm"), "driven": GearSpec(62, "2 mm")}
+    arcs = {"driver": "0.5 mm", "driven": "0.76 mm"}
+    wheels = {name: GearSpec(62, "2 mm", fillet_radius=arc) for name, arc in arcs.items()}
     plain = GearPair(**wheels, torque=1.0)
-    # the driven wheel's default root arc is within reach of the driver's tips
+    # the driven wheel's root arc, as large as small wheels have it, is within reach of the driver's tips
     assert 5e-6 < fillet_clearance(plain, 0) < 15e-6 < fillet_clearance(plain, 1)
     yielding = plain.penetration(100.0, 2)
     fouls = -fillet_clearance(plain, 0, yielding)
@@ -55,6 +56,8 @@ def test_tips_that_foul_roots_under_the_load_are_remarked_on():
         GearPair(**wheels, torque=100.0)
     assert [w.filename for w in said] == [__file__]
     quiet(lambda: GearPair(**wheels, torque=100.0, root_contact=True))
+    # default arcs are not
+    quiet(lambda: GearPair(GearSpec(62, "2 mm"), GearSpec(62, "2 mm"), torque=100.0))
 
 
 def test_tips_that_meet_tips_under_the_load_are_remarked_on():
