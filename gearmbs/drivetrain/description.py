@@ -52,6 +52,7 @@ import math
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -101,7 +102,7 @@ class RunSettings(Written):
         Of the record, Hz; default: at least twenty samples in the shortest mesh period, 12 800 Hz or more.
     integrator : {"WSTIFF", "GSTIFF", "IDA"}
     harmonics : int
-        Mesh harmonics in the record's table.
+        Mesh harmonics in the record's table, 1 or more.
     """
 
     settling: Quantity = 0.05
@@ -123,6 +124,9 @@ class RunSettings(Written):
                 f"run.integrator is {self.integrator!r}; choose WSTIFF, GSTIFF or IDA")  # fmt: skip
         require(1e-12 <= self.tolerance <= 5e-6, f"run.tolerance is {self.tolerance:g}; give 1e-12 to 5e-6")
         require(self.rate is None or self.rate > 0.0, f"run.rate is {self.rate} Hz; it must be positive")
+        whole = isinstance(self.harmonics, Integral) and not isinstance(self.harmonics, bool)
+        require(whole and self.harmonics >= 1,
+                f"run.harmonics is {self.harmonics!r}; give a whole number of mesh harmonics from 1 up")  # fmt: skip
 
     def output_rate(self, train: Drivetrain) -> float:
         """Return the rate of the record, Hz."""

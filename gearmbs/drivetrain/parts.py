@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
@@ -223,6 +224,12 @@ class GearMesh(Part):
     phase: float | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)  # type: ignore[assignment]
     pair: Any = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        phase = self.phase
+        number = isinstance(phase, Real) and not isinstance(phase, bool) and math.isfinite(phase)
+        require(phase is None or number, f"{self.label}: phase is {phase!r}; give a number of pitches, such as 0.5")
 
     def make(self, driver: GearSpec, driven: GearSpec, rotation: Any, torque: float) -> Any:
         """Return the pair of the two wheels for a sense of the driver and a torque on the driven wheel (N m)."""

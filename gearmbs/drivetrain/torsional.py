@@ -103,11 +103,18 @@ class TorsionalModel:
         return np.diag(self.inertias), c, k
 
     def frequencies(self) -> np.ndarray:
-        """Return the undamped natural frequencies with prescribed shafts held, increasing, Hz."""
-        return self.modes()[0]
+        """Return the undamped natural frequencies with prescribed shafts held, increasing, Hz.
+
+        Of the modes that oscillate, and 0 of rigid ones: those that are damped above critical by their
+        `damping_ratios` have none, and are left out. `modes` has them, too.
+        """
+        return self.modes()[0][self.damping_ratios() < 1.0]
 
     def modes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return natural frequencies (Hz) and shapes, columns scaled to a largest entry of 1."""
+        """Return the undamped frequencies (Hz) and shapes of all modes, columns scaled to a largest entry of 1.
+
+        Whether one oscillates at its frequency is told by `damping_ratios`.
+        """
         m, _, k = self.matrices()
         free = [i for i in range(len(self.names)) if i not in self.held]
         squares, vectors = scipy.linalg.eigh(k[np.ix_(free, free)], m[np.ix_(free, free)])
@@ -201,7 +208,7 @@ class TorsionalModel:
             share = 0.5 if spring.levers[1] == -1.0 else 0.0
             high, low = share * spring.backlash, (share - 1.0) * spring.backlash
             numbers[k] = (spring.stiffness, spring.damping, spring.sense, high, low)
-        fastest = max(1.0, *self.frequencies())
+        fastest = max(1.0, *self.modes()[0])
         every = max(1, int(np.ceil(STEPS_PER_PERIOD * fastest / samples)))
         step = 1.0 / (max(samples, STEPS_PER_PERIOD * fastest / every) * every)
         count = int(np.ceil(duration / (step * every) - 1e-9))
@@ -227,7 +234,7 @@ class TorsionalModel:
 
     def __repr__(self) -> str:
         frequencies, over = self.frequencies(), self.damping_ratios() >= 1.0
-        shown = ", ".join(f"{f:.5g}" for f in frequencies[(frequencies > 0.0) & ~over]) or "no"
+        shown = ", ".join(f"{f:.5g}" for f in frequencies[frequencies > 0.0]) or "no"
         rigid = int(np.sum(frequencies == 0.0))
         apart = f", {rigid} rigid" if rigid else ""
         apart += f", {int(over.sum())} over-damped" if over.any() else ""

@@ -12,6 +12,7 @@ from gearmbs.gears.fault import Fault
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.laws import ContactLaw, FlankFriction
 from gearmbs.gears.spec import require
+from gearmbs.units import shown
 
 TILTED_SLICES = 11
 """Slices along the face where the gap varies linearly along it: tilted axes or faces that are not opposite."""
@@ -27,6 +28,15 @@ FAULTY_SLICES = 41
 
 BOTTOMING_CLEARANCE = 0.1
 """Tip clearance, in modules, below which contact of tips with roots is looked for by default."""
+
+
+def varying_along_face(geometry: PairGeometry, faults: Iterable[Fault]) -> list[str]:
+    """Return in words what makes the flanks' gap vary along the face."""
+    return [
+        *([f"the misalignment of {shown(geometry.misalignment, 'deg', '.4g')}"] if geometry.misalignment else []),
+        *(["the helix"] if geometry.driver.helix_angle else []),
+        *(fault.label for fault in faults if fault.along_face),
+    ]
 
 
 @dataclass(frozen=True)

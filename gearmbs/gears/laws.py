@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import Literal
 
@@ -142,10 +143,15 @@ class FlankFriction(Written):
     Parameters
     ----------
     static, dynamic : float
-        Coefficients.
+        Coefficients; the static one is usually the larger.
     static_speed, dynamic_speed : float or str
         Speeds of full static and of dynamic friction (ADAMS law); the smooth law uses ``dynamic`` and the first.
     kind : {"adams", "smooth", "none"}
+
+    Warns
+    -----
+    UserWarning
+        If the static coefficient of the ADAMS law is below the dynamic one.
     """
 
     static: float = 0.1
@@ -168,6 +174,12 @@ class FlankFriction(Written):
             )
         if self.kind not in ("adams", "smooth", "none"):
             raise ValueError(f"FlankFriction.kind is {self.kind!r}; choose 'adams', 'smooth' or 'none'")
+        if self.kind == "adams" and self.static < self.dynamic:
+            warnings.warn(
+                f"FlankFriction.static is {self.static:g}, below dynamic {self.dynamic:g}: friction would grow where "
+                "flanks slide faster; are they exchanged? Give static as much as dynamic, or more",
+                stacklevel=3,
+            )
 
     @classmethod
     def none(cls) -> FlankFriction:

@@ -14,7 +14,16 @@ from gearmbs.gears.fault import Fault, Flank
 from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.spec import require
 from gearmbs.gears.tooth_deviations import ToothDeviations
-from gearmbs.units import Quantity, to_si
+from gearmbs.units import Quantity, shown, to_si
+
+
+def _require_removal(relief: Fault, amount: Quantity) -> None:
+    """Refuse a relief that would add material."""
+    require(
+        amount >= 0.0,
+        f"{type(relief).__name__}.amount is {shown(amount, 'um')}: a relief takes material away; give 0 or more, or "
+        "for flanks with more material a FlankMap with negative amounts",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +33,7 @@ class TipRelief(Fault):
     Parameters
     ----------
     amount : float or str
-        At the tip.
+        At the tip; not negative.
     length : float or str
         Length of roll below the tip over which it extends.
     power : float
@@ -41,6 +50,10 @@ class TipRelief(Fault):
     power: float = 1.0
     teeth: Any = "all"
     flank: Flank = "both"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_removal(self, self.amount)
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         name = type(self).__name__
@@ -124,7 +137,7 @@ class EndRelief(Fault):
     Parameters
     ----------
     amount : float or str
-        At the end of the face.
+        At the end of the face; not negative.
     length : float or str
         Part of the face over which it extends, from the end.
     power : float
@@ -145,6 +158,10 @@ class EndRelief(Fault):
     ends: int = 0
     teeth: Any = "all"
     flank: Flank = "both"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_removal(self, self.amount)
 
     def apply(self, deviations: ToothDeviations, pair: PairGeometry) -> None:
         require(self.ends in (-1, 0, 1), f"EndRelief.ends is {self.ends}; choose 0 (both), 1 or -1")

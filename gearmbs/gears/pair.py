@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 from gearmbs._shown import Shown
-from gearmbs.gears.contact_model import ContactModel
+from gearmbs.gears.contact_model import ContactModel, varying_along_face
 from gearmbs.gears.fault import Fault
 from gearmbs.gears.geometry import PairGeometry, Placement
 from gearmbs.gears.laws import DAMPING_RATIO, RATIO_DEPTH, ContactLaw, FlankFriction
@@ -132,11 +132,7 @@ class GearPair(PairGeometry, Shown):
         """Warn of what varies along the face where the flanks are looked at in one section only."""
         if self.slices != 1:
             return
-        varying = [
-            *([f"the misalignment of {shown(self.misalignment, 'deg', '.4g')}"] if self.misalignment else []),
-            *(["the helix"] if self.driver.helix_angle else []),
-            *(fault.label for fault in self.faults if fault.along_face),
-        ]
+        varying = varying_along_face(self, self.faults)
         if varying:
             warnings.warn(
                 f"GearPair.slices is 1: the flanks are looked at in the middle of the face only, and how they vary "

@@ -6,10 +6,12 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 
 from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
+from gearmbs.gears.contact_model import varying_along_face
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.tables import most_pairs, pack
 from gearmbs.progress import waiting
@@ -289,9 +291,10 @@ def kinematic_transmission_error(
     Warns
     -----
     UserWarning
-        If faults sit on teeth that do not pass the mesh, or if the teeth jam.
+        If faults sit on teeth that do not pass the mesh, if the teeth jam, or if one slice stands for flanks that vary
+        along the face.
     """
-    phase = _phases(pair, points, start, cycles)
+    phase = _phases(pair, points, slices, start, cycles)
     mesh = StaticMesh(pair, slices)
     side, rb = mesh.rotation, mesh.geometry.driven.base_radius
 
@@ -335,10 +338,11 @@ def loaded_transmission_error(
     Warns
     -----
     UserWarning
-        If faults sit on teeth that do not pass the mesh, or if the teeth jam.
+        If faults sit on teeth that do not pass the mesh, if the teeth jam, or if one slice stands for flanks that vary
+        along the face.
     """
     load = load_of(pair, torque)
-    phase = _phases(pair, points, start, cycles)
+    phase = _phases(pair, points, slices, start, cycles)
     mesh = StaticMesh(pair, slices)
     side, rb = mesh.turning, mesh.geometry.driven.base_radius
     lag = side * static_lag(pair, load)
@@ -365,12 +369,28 @@ def _over_phases(mesh: StaticMesh, phase: np.ndarray, at: Callable[[float], tupl
     return np.array([at(_driver_angle(mesh, step)) for step in phase]).T
 
 
-def _phases(pair: Mesh, points: int, start: float, cycles: int) -> np.ndarray:
+def _phases(pair: Mesh, points: int, slices: int | None, start: float, cycles: int) -> np.ndarray:
     if cycles < 1 or cycles != int(cycles):
         raise ValueError(f"cycles is {cycles!r}; give a whole number of mesh cycles from 1 up")
+    _check_slices(pair, slices, 4)
     warn_of_jam(pair, 4)
     warn_of_unseen(pair, start, start + cycles, "give cycles={turn} for a whole turn, or another start", 4)
     return start + np.arange(points * int(cycles)) / points
+
+
+def _check_slices(pair: Mesh, slices: int | None, level: int) -> None:
+    """Refuse no slices, and warn of a single one that the pair has not itself, which has been remarked on."""
+    if slices is None:
+        return
+    if isinstance(slices, bool) or not isinstance(slices, Integral) or slices < 1:
+        raise ValueError(f"slices is {slices!r}; give an integer of 1 or more, or leave it out for the pair's own")
+    varying = varying_along_face(pair.geometry, pair.faults)
+    if slices == 1 and varying and pair.contact_model.slices != 1:
+        warnings.warn(
+            f"slices is 1: the flanks are looked at in the middle of the face only, and how they vary along it is not "
+            f"seen ({', '.join(varying)}); leave slices out for as many as that needs",
+            stacklevel=level,
+        )
 
 
 def _extremes(

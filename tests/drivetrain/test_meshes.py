@@ -9,7 +9,17 @@ import numpy as np
 import pytest
 
 import gearmbs as gm
-from gearmbs.drivetrain import Drivetrain, DrivetrainError, GearMesh, IdealBearing, RunSettings, Shaft, TorqueLoad
+from gearmbs.drivetrain import (
+    Drivetrain,
+    DrivetrainError,
+    GearMesh,
+    IdealBearing,
+    RunSettings,
+    Shaft,
+    TorqueLoad,
+    TorsionalModel,
+    TorsionalSpring,
+)
 from gearmbs.drivetrain.description import make_description
 from gearmbs.flexible import ShaftSection
 from gearmbs.gears import (
@@ -237,6 +247,39 @@ def test_overdamped_meshes_are_warned_of():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         train.torsional()
+
+
+def test_chain_tells_frequencies_of_what_oscillates():
+    """Two inertias on a spring and one on a damper: sqrt(k / m) and, above critical damping, none."""
+    masses = np.array([2.0, 2.0, 1.0])
+    shaft = TorsionalSpring("shaft", (0, 1), (1.0, -1.0), 100.0, 0.5)
+
+    def chain(damping):
+        held = TorsionalSpring("stop", (2, 3), (1.0, -1.0), 100.0, damping)
+        return TorsionalModel(("a", "b", "c", "wall"), np.append(masses, 1.0), (shaft, held), np.zeros(4), (3,))
+
+    own = 10.0 / (2.0 * math.pi)
+    assert chain(1.0).frequencies() == pytest.approx([0.0, own, own])
+    hard = chain(50.0)
+    assert hard.frequencies() == pytest.approx([0.0, own])
+    assert np.count_nonzero(hard.damping_ratios() > 1.0) == 1
+    # its undamped frequency stays among the modes
+    assert hard.modes()[0] == pytest.approx([0.0, own, own])
+    assert "1 rigid, 1 over-damped" in repr(hard)
+
+
+@pytest.mark.parametrize("phase", ["x", True, math.nan, math.inf])
+def test_phase_is_a_number(phase):
+    with pytest.raises(DrivetrainError, match=r"mesh 'mesh': phase is .*; give a number of pitches"):
+        GearMesh(name="mesh", driver="pinion", driven="gear", phase=phase)
+    assert GearMesh(name="mesh", driver="pinion", driven="gear", phase=np.float64(0.5)).phase == 0.5
+
+
+@pytest.mark.parametrize("harmonics", [0, -1, 2.5, True, "3"])
+def test_harmonics_are_a_whole_number(harmonics):
+    with pytest.raises(DrivetrainError, match=r"run.harmonics is .*; give a whole number of mesh harmonics from 1 up"):
+        RunSettings(harmonics=harmonics)
+    assert RunSettings(harmonics=1).harmonics == 1
 
 
 def test_records_and_reports_name_the_law():

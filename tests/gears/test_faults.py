@@ -428,3 +428,12 @@ def test_flank_map_passes_through_its_numbers():
     for wrong in ([[0.0, 1.0]], [[0.0, 1e-6], [0.0]], "flat", [[0.0, float("nan")], [0.0, 0.0]]):
         with pytest.raises(ValueError, match=r"FlankMap\.amounts"):
             FlankMap(amounts=wrong)
+
+
+@pytest.mark.parametrize("relief", [TipRelief, RootRelief, EndRelief])
+def test_reliefs_take_material_away(relief):
+    with pytest.raises(ValueError, match=rf"{relief.__name__}.amount is -10 um: a relief .* 0 or more, .* FlankMap"):
+        relief(amount="-10 um")
+    assert relief(amount=0.0).amount == 0.0
+    # more material where it is meant
+    assert FlankMap(amounts=((0.0, -1e-5), (0.0, -1e-5))).severity == 1e-5

@@ -7,7 +7,13 @@ import warnings
 import numpy as np
 import pytest
 
-from gearmbs.gears import GearPair, GearSpec, PairGeometry
+from gearmbs.gears import (
+    GearPair,
+    GearSpec,
+    PairGeometry,
+    kinematic_transmission_error,
+    loaded_transmission_error,
+)
 from gearmbs.gears.reach import fillet_clearance
 
 RING = {"driver": GearSpec(23, "3 mm"), "driven": GearSpec.ring(70, "3 mm")}
@@ -106,6 +112,19 @@ def test_one_section_of_flanks_that_vary_along_the_face_is_remarked_on(changes, 
         GearPair(**given, slices=1)
     quiet(lambda: GearPair(**given, slices=2))
     quiet(lambda: GearPair(**given))
+
+
+@pytest.mark.parametrize("analysis", [loaded_transmission_error, kinematic_transmission_error])
+def test_an_analysis_in_one_section_of_flanks_that_vary_is_remarked_on(analysis):
+    wheels = GearSpec(23, "3 mm"), GearSpec(41, "3 mm")
+    tilted = GearPair(*wheels, misalignment="0.2 deg", backlash="0.5 mm")
+    with pytest.warns(UserWarning, match=r"^slices is 1: .*the misalignment of 0.2 deg.*leave slices out") as said:
+        analysis(tilted, points=2, slices=1)
+    assert [w.filename for w in said] == [__file__]
+    quiet(lambda: analysis(tilted, points=2, slices=5))
+    quiet(lambda: analysis(GearPair(*wheels), points=2, slices=1))
+    with pytest.raises(ValueError, match="slices is 0; give an integer of 1 or more"):
+        analysis(tilted, points=2, slices=0)
 
 
 def test_one_section_of_parallel_wheels_is_not_remarked_on():

@@ -1,6 +1,7 @@
 """Text with units becomes SI; everything else is refused by name."""
 
 import math
+import warnings
 
 import pytest
 
@@ -75,6 +76,17 @@ def test_laws_refuse_nonsense():
     for arguments in ({"static": -0.1}, {"static_speed": "2 m/s"}, {"kind": "glue"}):
         with pytest.raises(ValueError, match="FlankFriction"):
             FlankFriction(**arguments)
+
+
+def test_friction_that_grows_with_sliding_is_remarked_on():
+    with pytest.warns(UserWarning, match=r"FlankFriction.static is 0.05, below dynamic 0.1: .* Give static as much"):
+        FlankFriction(static=0.05, dynamic=0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        FlankFriction(static=0.1, dynamic=0.1)
+        # laws that have no static coefficient
+        FlankFriction(dynamic=0.3, kind="smooth")
+        FlankFriction(dynamic=0.3, kind="none")
 
 
 def test_hertz_line_contact():
