@@ -251,7 +251,7 @@ class GearMesh(Part):
             operation = {"rotation": rotation, "torque": abs(torque)}
             kind = self.pair or GearPair
             if isinstance(kind, type) and issubclass(kind, IdealMesh):
-                return _ideal(kind, driver, driven, {**given, **operation}, own)
+                return _ideal(self.label, kind, driver, driven, {**given, **operation}, own)
             if not (isinstance(kind, type) and issubclass(kind, GearPair)):
                 return kind(driver, driven, **operation, **given, **own)
             pair = kind(driver, driven, **operation, **given)
@@ -263,14 +263,29 @@ class GearMesh(Part):
             )
 
 
-def _ideal(kind: Any, driver: GearSpec, driven: GearSpec, given: dict[str, Any], own: dict[str, Any]) -> IdealMesh:
-    """Return the ideal mesh of two wheels: its stiffness and damping are those of the whole mesh, along the normal."""
+def _ideal(
+    label: str, kind: Any, driver: GearSpec, driven: GearSpec, given: dict[str, Any], own: dict[str, Any]
+) -> IdealMesh:
+    """Return the ideal mesh of two wheels: its stiffness and damping are those of the whole mesh, along the normal.
+
+    Warns
+    -----
+    UserWarning
+        Of misaligned wheels whose own stiffness is asked for: it is that of parallel ones.
+    """
     parting = bool(given.pop("ideal_backlash", False))
     curves = {key: given.pop(key) for key in ("stiffness_curve", "error") if key in given}
     pair = GearPair(driver, driven, **given)
     stiffness, ratio = own.get("stiffness", "iso"), own.get("damping_ratio")
     if stiffness not in ("iso", "iso single", "potential-energy"):
         return kind.with_damping_ratio(pair, stiffness, ratio, backlash=parting, **curves)
+    if pair.misalignment:
+        warnings.warn(
+            f"{label}: misalignment is {math.degrees(pair.misalignment):.4g} deg, and the stiffness '{stiffness}' of "
+            "its ideal mesh is that of parallel wheels, whose whole face carries; leave pair out for the contact of "
+            "the teeth, or give stiffness in N/m",
+            stacklevel=3,
+        )
     law = pair.with_own_stiffness(stiffness)
     return kind.with_damping_ratio(pair, law.mean_mesh_stiffness, ratio, backlash=parting, **curves)
 

@@ -227,6 +227,9 @@ def test_chain_of_tilted_wheels_without_load_is_warned_of():
                                     settings={"backlash": "0.6 mm", "stiffness": "4e8 N/m",
                                               "misalignment": "0.2 deg"})])  # fmt: skip
     assert spring.torsional().springs[0].stiffness == pytest.approx(4e8)
+    with pytest.warns(UserWarning, match=r"mesh 'mesh': misalignment is 0.2 deg, and the stiffness 'iso' .* parallel"):
+        stage(meshes=[GearMesh(name="mesh", driver="pinion", driven="gear", pair=IdealMesh,
+                               settings={"backlash": "0.6 mm", "misalignment": "0.2 deg"})])  # fmt: skip
 
 
 def test_overdamped_meshes_are_warned_of():
