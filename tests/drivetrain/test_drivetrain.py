@@ -1,10 +1,14 @@
 """Placement, senses, flanks and torques of drivetrains, and what is refused."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 from gearmbs.drivetrain import (
     ClearanceBearing,
+    ControlledDrive,
+    CurveMotor,
     Drivetrain,
     DrivetrainError,
     ElasticBearing,
@@ -14,6 +18,7 @@ from gearmbs.drivetrain import (
     Housing,
     HousingMode,
     IdealBearing,
+    InductionMotor,
     Mount,
     Shaft,
     SpeedDrive,
@@ -433,3 +438,40 @@ def test_speeds_in_the_mean_over_a_common_period():
     turned = solution.joint_angle("bout")
     mean = (turned[-1] - turned[1]) / period
     assert mean / w == pytest.approx((12 / 18) * (16 / 24), rel=1e-8)
+
+
+@pytest.mark.parametrize(("drive", "running", "words"), [
+    (CurveMotor(name="m", shaft="in", speed=150.0, speeds=(0.0, 300.0), torques=(90.0, 60.0)), True,
+     "the largest torque is 90 N m, but the loads need 100 N m on shaft 'in' at 1432.4 rpm"),
+    (ControlledDrive(name="m", shaft="in", speed=-150.0, proportional=1.0, integral=1.0, largest=98.0), True,
+     "the largest torque is 98 N m, but the loads need 100 N m"),
+    (InductionMotor(name="m", shaft="in", speed="1450 rpm", power="16 kW"), False,
+     "its torque at standstill is 82.051 N m, but the loads need 100 N m on shaft 'in': it will not start"),
+    (InductionMotor(name="m", shaft="in", speed="1450 rpm", power="16 kW"), True, None),
+    (TorqueDrive(name="m", shaft="in", speed=150.0, torque=100.0), False, None),
+    (TorqueDrive(name="m", shaft="in", speed=150.0, torque="STEP(TIME, 0, 0, 1, 50)"), False, None),
+])  # fmt: skip
+def test_drives_too_weak_for_their_loads_are_warned_of(drive, running, words):
+    """300 N m on the wheel are 100 N m on the pinion; what can carry them, or changes over time, is left alone."""
+    train = stage(drives=[drive], running=running)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        train.build()
+    found = [str(one.message) for one in said]
+    assert len(found) == (words is not None)
+    assert words is None or words in found[0]
+
+
+def test_drives_carry_a_load_together():
+    """Two torques at the ends of a train add at the ratio of their shafts."""
+    weak = TorqueDrive(name="m", shaft="in", speed="1500 rpm", torque=60.0)
+
+    def both(torque):
+        return stage(drives=[weak, TorqueDrive(name="n", shaft="out", speed="-500 rpm", torque=torque)])
+
+    with pytest.warns(UserWarning, match="'n' together: the largest torque is 80 N m, but the loads need 100 N m"):
+        both(60.0).build()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        both(120.0).build()
+        stage(drives=[weak, SpeedDrive(name="n", shaft="out", speed="-500 rpm")]).build()
