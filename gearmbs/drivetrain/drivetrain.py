@@ -247,12 +247,13 @@ class Drivetrain:
         Warns
         -----
         UserWarning
-            Of drives that cannot carry the loads.
+            Of drives that cannot carry the loads, and of torques on shafts whose speed is prescribed.
         """
         from gearmbs.drivetrain.build import build
-        from gearmbs.drivetrain.power import warn_of_weak_drives
+        from gearmbs.drivetrain.power import warn_of_lost_torques, warn_of_weak_drives
 
         warn_of_weak_drives(self)
+        warn_of_lost_torques(self)
         return build(self)
 
     @classmethod

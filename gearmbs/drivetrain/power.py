@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from gearmbs.drivetrain.drives import Drive, SpeedDrive
 from gearmbs.drivetrain.errors import DrivetrainError, require
+from gearmbs.drivetrain.loads import Drag, Load
 from gearmbs.drivetrain.parts import Shaft
 
 if TYPE_CHECKING:
@@ -254,3 +255,33 @@ def _never_starts(train: Drivetrain, drives: list[Drive], reached: set[str]) -> 
         f"{first.label}: its torque at standstill is {torque:.5g} N m, but the loads need {needed:.5g} N m on shaft "
         f"'{first.shaft}': it will not start; give running=True, a stronger drive, or a load that grows with the speed"
     )
+
+
+def warn_of_lost_torques(train: Drivetrain, stacklevel: int = 3) -> None:
+    """Warn of torques on shafts whose speed is prescribed, which change nothing but the torque of that drive.
+
+    Nothing is said of drag, whose place is there, and of shafts that meshes and elastic couplings lead to.
+
+    Warns
+    -----
+    UserWarning
+        With the drive or load, its torque and the remedy.
+    """
+    for holder in (drive for drive in train.drives if isinstance(drive, SpeedDrive)):
+        fixed = {holder.shaft}
+        for link, _ in walk(train, holder.shaft):
+            if link.first in fixed and getattr(train.parts[link.name], "kind", "") == "rigid":
+                fixed.add(link.second)
+        parts: list[tuple[Drive | Load, float | None]] = [
+            *((drive, drive.largest_torque()) for drive in train.drives if not isinstance(drive, SpeedDrive)),
+            *((load, load.nominal(abs(train.speeds[load.shaft]))) for load in train.loads),
+        ]
+        for part, torque in parts:
+            if part.shaft not in fixed or torque == 0.0 or isinstance(part, Drag):
+                continue
+            size = "" if torque is None else f" of {torque:.5g} N m"
+            warnings.warn(
+                f"{part.label}: its torque{size} is on shaft '{part.shaft}', whose speed {holder.label} prescribes: no "
+                "mesh and no motion feels it; put it on a shaft that meshes or couplings drive, or leave it out",
+                stacklevel=stacklevel,
+            )

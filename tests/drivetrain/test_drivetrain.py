@@ -9,6 +9,7 @@ from gearmbs.drivetrain import (
     ClearanceBearing,
     ControlledDrive,
     CurveMotor,
+    Drag,
     Drivetrain,
     DrivetrainError,
     ElasticBearing,
@@ -474,4 +475,21 @@ def test_drives_carry_a_load_together():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         both(120.0).build()
-        stage(drives=[weak, SpeedDrive(name="n", shaft="out", speed="-500 rpm")]).build()
+        stage(drives=[weak, SpeedDrive(name="n", shaft="out", speed="-500 rpm")], loads=[]).build()
+
+
+@pytest.mark.parametrize(("parts", "words"), [
+    ([TorqueLoad(name="l", shaft="in", torque=30.0)],
+     "load 'l': its torque of 30 N m is on shaft 'in', whose speed drive 'motor' prescribes"),
+    ([TorqueDrive(name="t", shaft="in", speed="1500 rpm", torque=30.0)], "drive 't': its torque of 30 N m is on"),
+    ([Drag(name="d", shaft="in", torque=1.0), TorqueDrive(name="t", shaft="out", speed="-500 rpm", torque=30.0)], None),
+])  # fmt: skip
+def test_torques_that_nothing_feels_are_warned_of(parts, words):
+    """On the shaft whose speed is prescribed; behind the mesh, and as drag, they are at their place."""
+    train = stage().with_parts(*parts)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        train.build()
+    found = [str(one.message) for one in said]
+    assert len(found) == (words is not None)
+    assert words is None or words in found[0]
