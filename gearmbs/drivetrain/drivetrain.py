@@ -247,7 +247,8 @@ class Drivetrain:
         Warns
         -----
         UserWarning
-            Of drives that cannot carry the loads, and of torques on shafts whose speed is prescribed.
+            Of drives that cannot carry the loads, of torques on shafts whose speed is prescribed, and of shafts that
+            are counted twice in wheels without a bore.
         """
         from gearmbs.drivetrain.build import build
         from gearmbs.drivetrain.power import warn_of_lost_torques, warn_of_weak_drives

