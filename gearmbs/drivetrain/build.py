@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,8 +10,9 @@ import numpy as np
 from gearmbs.drivetrain.attached import Attached
 from gearmbs.drivetrain.bearings import Bearing
 from gearmbs.drivetrain.errors import told_of
-from gearmbs.drivetrain.parts import Housing, Shaft, turn_z
+from gearmbs.drivetrain.parts import Housing, Shaft, Wheel, turn_z
 from gearmbs.drivetrain.placement import Layout
+from gearmbs.gears.spec import COUNTED_TWICE
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.modal import Mode
 from gearmbs.mechanism.parts import Body, Marker
@@ -66,6 +68,7 @@ class _Builder:
         """Add the body of a shaft with its wheels, a marker at each wheel."""
         train, layout = self.train, self.layout
         seat = layout.seats[shaft.name]
+        self._warn_of_solid_wheels(shaft)
         mass, centre, polar, across = shaft.body()
         pieces = [(mass, centre, np.diag([across, across, polar]))]
         for wheel in train.wheels:
@@ -83,6 +86,34 @@ class _Builder:
             if wheel.shaft == shaft.name:
                 turned = turn_z(layout.wheels[wheel.name])
                 self.wheels[wheel.name] = body.marker((0.0, 0.0, train.station(wheel)), turned, name=wheel.name)
+
+    def _warn_of_solid_wheels(self, shaft: Shaft, stacklevel: int = 5) -> None:
+        """Warn where wheels and the shaft through them hold much of the same material."""
+        if shaft.mass is not None:
+            # a mass from a drawing or a scale leaves open what is in it
+            return
+        wheels = [wheel for wheel in self.train.wheels if wheel.shaft == shaft.name]
+        twice = {wheel.name: self._counted_twice(shaft, wheel) for wheel in wheels}
+        total, doubled = shaft.body()[0] + sum(wheel.gear.mass for wheel in wheels), sum(twice.values())
+        if doubled <= COUNTED_TWICE * total:
+            return
+        names = ", ".join(f"'{name}'" for name, mass in twice.items() if mass > 0.0)
+        warnings.warn(
+            f"{shaft.label}: {doubled:.4g} kg of {total:.4g} kg with its wheels ({100.0 * doubled / total:.3g} %) are "
+            f"counted twice, as shaft and as wheel {names} without a bore for it; give the wheels bore_radius, the "
+            "shaft's radius there, or give the shaft's own mass",
+            stacklevel=stacklevel,
+        )
+
+    def _counted_twice(self, shaft: Shaft, wheel: Wheel) -> float:
+        """Return the mass of a wheel's body where its shaft is, kg."""
+        half, place = 0.5 * wheel.gear.face_width, self.train.station(wheel)
+        found, z = 0.0, 0.0
+        for length, radius in shaft.cylinders:
+            width = min(z + length, place + half) - max(z, place - half)
+            found += wheel.gear.mass_within(radius, max(0.0, width))
+            z += length
+        return found
 
     def housing(self, housing: Housing) -> None:
         """Add a housing on its mounts, with its modes."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from gearmbs.dae.equations import constraint_terms as terms
 from gearmbs.dae.equations.force_elements import Diagnostic
-from gearmbs.drivetrain.attached import Attached, over_time, share_of
+from gearmbs.drivetrain.attached import Attached, fixed_value, over_time, share_of
 from gearmbs.drivetrain.curves import slopes
 from gearmbs.drivetrain.errors import DrivetrainError, require
 from gearmbs.drivetrain.part import Part
@@ -57,6 +57,14 @@ class Drive(Part, ABC):
     def damping(self) -> float:
         """Return the drive's torsional damping at the operating point, -dT/dw, N m s/rad."""
         return 0.0
+
+    def largest_torque(self) -> float | None:
+        """Return the largest torque about the sense of rotation, N m; None where there is none, or it is not known."""
+        return None
+
+    def starting_torque(self) -> float | None:
+        """Return the torque at standstill, N m; None where it is not known or the same as the largest."""
+        return None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,6 +139,9 @@ class TorqueDrive(Drive):
     kind: ClassVar[str] = "torque"
     functions: ClassVar[tuple[str, ...]] = ("torque",)
     torque: Any = 0.0
+
+    def largest_torque(self) -> float | None:
+        return fixed_value(self.torque, "torque")
 
     def add(self, at: Attached) -> None:
         given = over_time(self.torque, "torque", self.label, at)
@@ -225,6 +236,12 @@ class InductionMotor(Drive):
     def damping(self) -> float:
         s, sb = self.rated_slip, self.breakdown_slip
         return 2.0 * self.breakdown_torque * sb * (sb**2 - s**2) / (s**2 + sb**2) ** 2 / self.synchronous
+
+    def largest_torque(self) -> float | None:
+        return self.breakdown_torque
+
+    def starting_torque(self) -> float | None:
+        return self.torque(0.0)
 
     def _law(self) -> tuple[str, tuple[float, ...]]:
         return "motors.kloss", (self.breakdown_torque, self.breakdown_slip)
@@ -334,6 +351,13 @@ class CurveMotor(Drive):
     speeds: Sequence[Quantity]
     torques: Sequence[Quantity]
 
+    def largest_torque(self) -> float | None:
+        return max(self.torques)
+
+    def starting_torque(self) -> float | None:
+        # beyond its first point the curve is a tangent
+        return float(np.interp(0.0, self.speeds, self.torques)) if self.speeds[0] <= 0.0 else None
+
     def add(self, at: Attached) -> None:
         on = share_of(at)
         points = slopes(self.label, self.speeds, self.torques)
@@ -373,6 +397,9 @@ class ControlledDrive(Drive):
 
     def damping(self) -> float:
         return self.proportional
+
+    def largest_torque(self) -> float | None:
+        return self.largest
 
     def add(self, at: Attached) -> None:
         size = abs(at.speed)

@@ -256,9 +256,18 @@ class Drivetrain:
         Mechanism
             A body for each shaft (with its wheels) and housing, under its name; a marker for each wheel; joints and
             force elements under the names of bearings, couplings, meshes, drives and loads.
+
+        Warns
+        -----
+        UserWarning
+            Of drives that cannot carry the loads, of torques on shafts whose speed is prescribed, and of shafts that
+            are counted twice in wheels without a bore.
         """
         from gearmbs.drivetrain.build import build
+        from gearmbs.drivetrain.power import warn_of_lost_torques, warn_of_weak_drives
 
+        warn_of_weak_drives(self)
+        warn_of_lost_torques(self)
         return build(self)
 
     @classmethod

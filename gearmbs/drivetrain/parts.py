@@ -158,10 +158,13 @@ class Shaft(Part):
 class Wheel(Part):
     """A toothed wheel on a shaft.
 
+    Masses of shaft and wheel add: a wheel without a bore counts the shaft through it again.
+
     Parameters
     ----------
     shaft : str
     gear : GearSpec
+        With the shaft's radius as ``bore_radius`` where that mass matters.
     station : float or str, optional
         Mid-face along the shaft, m; default: the shaft's middle.
     angle : float or str, optional

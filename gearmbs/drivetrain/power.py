@@ -1,14 +1,16 @@
-"""Speeds of all shafts from the drives, torques of all meshes and couplings from the loads, and who pushes whom."""
+"""Speeds of all shafts from the drives, torques of meshes and couplings from the loads, who pushes, and weak drives."""
 
 from __future__ import annotations
 
+import warnings
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from gearmbs.drivetrain.drives import SpeedDrive
+from gearmbs.drivetrain.drives import Drive, SpeedDrive
 from gearmbs.drivetrain.errors import DrivetrainError, require
+from gearmbs.drivetrain.loads import Drag, Load
 from gearmbs.drivetrain.parts import Shaft
 
 if TYPE_CHECKING:
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
 RPM = 9.549296585513721
 SAME_SPEED = 1e-9
 """Relative difference of speeds that are one."""
+BALANCED = 0.99
+"""Part of the load's torque that a drive must reach: a drive that just balances its load is given in round numbers."""
 
 
 class Link(NamedTuple):
@@ -187,3 +191,97 @@ def power_flow(train: Drivetrain) -> PowerFlow:
     drivers = {mesh.name: train.wheels_of(mesh)[0].shaft for mesh in train.meshes}
     senses = {name: -1 if speeds[shaft] < 0.0 else 1 for name, shaft in drivers.items()}
     return PowerFlow(torques, pushing, senses, drivers, driven_by)
+
+
+def warn_of_weak_drives(train: Drivetrain, stacklevel: int = 3) -> None:
+    """Warn of drives whose largest torque is less than that of the loads on their shaft, at speed or from rest.
+
+    Torques are those of the operating point without losses, see `PowerFlow`. Nothing is said
+    where a drive prescribes the speed, or a torque is a function of time.
+
+    Warns
+    -----
+    UserWarning
+        With the drive, both torques and the remedy.
+    """
+    done: set[str] = set()
+    for first in train.drives:
+        if first.shaft in done:
+            continue
+        reached = {first.shaft}
+        for link, _ in walk(train, first.shaft):
+            reached |= {link.first, link.second}
+        done |= reached
+        drives = [drive for drive in train.drives if drive.shaft in reached]
+        sense = -1.0 if first.speed < 0.0 else 1.0
+        needed = sense * train.power.drive.get(first.name, 0.0)
+        message = _too_weak(train, drives, needed) or _never_starts(train, drives, reached)
+        if message is not None:
+            warnings.warn(message, stacklevel=stacklevel)
+
+
+def _too_weak(train: Drivetrain, drives: list[Drive], needed: float) -> str | None:
+    """Return what is said of drives that cannot hold their loads at the operating speed, as torques on the first."""
+    first = drives[0]
+    torques = [drive.largest_torque() for drive in drives]
+    if first.speed == 0.0 or any(torque is None for torque in torques):
+        return None
+    # at one power, torques of other shafts are as their speeds
+    reached = sum(t * abs(drive.speed / first.speed) for t, drive in zip(torques, drives) if t is not None)
+    if reached >= BALANCED * needed:
+        return None
+    others = "" if len(drives) == 1 else f" and {', '.join(repr(d.name) for d in drives[1:])} together"
+    return (
+        f"{first.label}{others}: the largest torque is {reached:.5g} N m, but the loads need {needed:.5g} N m on shaft "
+        f"'{first.shaft}' at {abs(first.speed) * RPM:.5g} rpm: the speed will fall away; give a stronger drive, or "
+        "less load"
+    )
+
+
+def _never_starts(train: Drivetrain, drives: list[Drive], reached: set[str]) -> str | None:
+    """Return what is said of a drive whose torque at standstill is less than that of the loads there."""
+    first = drives[0]
+    torque = first.starting_torque()
+    if train.running or len(drives) > 1 or first.speed == 0.0 or torque is None:
+        return None
+    needed = sum(
+        load.nominal(0.0) * abs(train.speeds[load.shaft] / first.speed)
+        for load in train.loads
+        if load.shaft in reached and load.on not in reached
+    )
+    if torque >= BALANCED * needed:
+        return None
+    return (
+        f"{first.label}: its torque at standstill is {torque:.5g} N m, but the loads need {needed:.5g} N m on shaft "
+        f"'{first.shaft}': it will not start; give running=True, a stronger drive, or a load that grows with the speed"
+    )
+
+
+def warn_of_lost_torques(train: Drivetrain, stacklevel: int = 3) -> None:
+    """Warn of torques on shafts whose speed is prescribed, which change nothing but the torque of that drive.
+
+    Nothing is said of drag, whose place is there, and of shafts that meshes and elastic couplings lead to.
+
+    Warns
+    -----
+    UserWarning
+        With the drive or load, its torque and the remedy.
+    """
+    for holder in (drive for drive in train.drives if isinstance(drive, SpeedDrive)):
+        fixed = {holder.shaft}
+        for link, _ in walk(train, holder.shaft):
+            if link.first in fixed and getattr(train.parts[link.name], "kind", "") == "rigid":
+                fixed.add(link.second)
+        parts: list[tuple[Drive | Load, float | None]] = [
+            *((drive, drive.largest_torque()) for drive in train.drives if not isinstance(drive, SpeedDrive)),
+            *((load, load.nominal(abs(train.speeds[load.shaft]))) for load in train.loads),
+        ]
+        for part, torque in parts:
+            if part.shaft not in fixed or torque == 0.0 or isinstance(part, Drag):
+                continue
+            size = "" if torque is None else f" of {torque:.5g} N m"
+            warnings.warn(
+                f"{part.label}: its torque{size} is on shaft '{part.shaft}', whose speed {holder.label} prescribes: no "
+                "mesh and no motion feels it; put it on a shaft that meshes or couplings drive, or leave it out",
+                stacklevel=stacklevel,
+            )

@@ -71,7 +71,7 @@ def planetary_mechanism(
     speeds : mapping, optional
         Prescribed speeds of "sun", "carrier" or "ring", rad/s or text.
     torques : mapping, optional
-        Torques on them, N m or text, positive about +z.
+        Torques on members that are neither held rigidly nor have a speed, N m or text, positive about +z.
     held : str, optional
         Member fixed to the ground; None for a differential set.
     run_up : float or str
@@ -98,7 +98,8 @@ def planetary_mechanism(
     Raises
     ------
     ValueError
-        For members that are none, are held and driven, or are over-determined.
+        For members that are none, are held and driven, or are over-determined, and for torques on members whose motion
+        is given.
 
     Notes
     -----
@@ -114,8 +115,9 @@ def planetary_mechanism(
         rim is None or "ring" in (held, *supports),
         "planetary: the rim of a ring that turns is given; a rim can bend on a ring that is held or has a support",
     )
-    drives = {m: to_si(v, "angular speed", f"speeds[{m!r}]") for m, v in speeds.items()}
     loads = {m: to_si(v, "torque", f"torques[{m!r}]") for m, v in torques.items()}
+    _check_loads(loads, held, speeds, supports)
+    drives = {m: to_si(v, "angular speed", f"speeds[{m!r}]") for m, v in speeds.items()}
     over = to_si(run_up, "time", "run_up")
     known = {**drives, **({held: 0.0} if held else {})}
     turning = gears.speeds(**known) if over == 0 and len(known) == 2 else dict.fromkeys((*MEMBERS, "planet"), 0.0)
@@ -171,6 +173,19 @@ def _check(held: str | None, speeds: dict, torques: dict, supports: dict) -> Non
         count <= 2,
         "planetary: the speeds of all three members are given; two of them determine the third: leave one out",
     )
+
+
+def _check_loads(loads: Mapping[str, float], held: str | None, speeds: Mapping, supports: Mapping) -> None:
+    """Refuse torques that only what gives the motion of their member would feel."""
+    for name, torque in loads.items():
+        fixed = name == held and name not in supports
+        given = "is held" if fixed else "has a speed"
+        require(
+            torque == 0.0 or not (fixed or name in speeds),
+            f"planetary: torques[{name!r}] is {torque:g} N m, but {name} {given}: the torque would change neither "
+            "motion nor meshes; leave it out (the reaction there follows from the torques on the others), or give the "
+            f"torque on {' or '.join(m for m in MEMBERS if m != held and m not in speeds) or 'another member'}",
+        )
 
 
 def _about_z(angle: float) -> np.ndarray:

@@ -93,10 +93,14 @@ def inertia_matrix(value: float | Sequence[float] | np.ndarray, field: str) -> n
         raise ModelError(f"{field}: the inertia matrix is not symmetric")
     moments = np.linalg.eigvalsh(out)
     if moments[0] < -1e-9 * max(moments[2], 1e-300):
-        raise ModelError(f"{field}: principal moments {moments} kg m^2; none may be negative")
+        raise ModelError(
+            f"{field}: principal moments {moments} kg m^2; none may be negative: correct the moments, the signs of "
+            "products, or the point they are about"
+        )
     if moments[2] > (1.0 + 1e-6) * (moments[0] + moments[1]):
         warnings.warn(
-            f"{field}: principal moments {moments} kg m^2; the largest exceeds the sum of the others, as in no body",
+            f"{field}: principal moments {moments} kg m^2; the largest exceeds the sum of the others, as in no body: "
+            "correct the moments, the signs of products, or the point they are about",
             stacklevel=4,
         )
     return 0.5 * (out + out.T)

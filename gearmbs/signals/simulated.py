@@ -100,6 +100,11 @@ def held_speed(record: xr.Dataset) -> float:
     return float(np.abs(record["speed"].sel(shaft=first).mean())) / float(record.attrs["mesh_speed"])
 
 
+def holds_speed(record: xr.Dataset) -> bool:
+    """Return whether the meshes of a drivetrain's record turn at steady speeds; older records do not say so."""
+    return bool(record.attrs.get("speed_is_steady", 1))
+
+
 def placed_lines(record: xr.Dataset) -> str:
     """Return the lines of the kinematic table where the speed of a drivetrain's record puts them, as JSON."""
     held = held_speed(record)
@@ -108,6 +113,8 @@ def placed_lines(record: xr.Dataset) -> str:
 
 def sensor_signals(record: xr.Dataset, sensor: str | None = None, **settings: Any) -> xr.DataArray:
     """Return what the sensors of a drivetrain's record measured as a signal, with speed and teeth of its first mesh.
+
+    Where the speed of the record is not steady the signal has none.
 
     Parameters
     ----------
@@ -129,11 +136,15 @@ def sensor_signals(record: xr.Dataset, sensor: str | None = None, **settings: An
         if name not in names:
             raise SignalError(f"channel: there is no {name!r}; choose one of {', '.join(names) or 'none'}")
     attributes = record.attrs
-    attrs, speed = {"source": str(attributes.get("title", "simulation"))}, float(attributes["mesh_speed"])
+    attrs: dict[str, Any] = {"source": str(attributes.get("title", "simulation"))}
+    nominal = float(attributes["mesh_speed"])
+    speed: float | None = nominal
     # in a run-up lines move
-    if "known_lines" in attributes and "mesh_track" not in record:
+    if not holds_speed(record):
+        speed = None
+    elif "known_lines" in attributes and "mesh_track" not in record:
         attrs["known_lines"] = placed_lines(record)
-        speed *= held_speed(record)
+        speed = nominal * held_speed(record)
     return make_signal(
         record["measured"].sel(sensor=kept).values,
         float(attributes["run_rate"]),

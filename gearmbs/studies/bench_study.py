@@ -14,6 +14,7 @@ from gearmbs.drivetrain import RunSettings
 from gearmbs.progress import told_of_span
 from gearmbs.signals import convert
 from gearmbs.signals.orders import harmonic_amplitudes
+from gearmbs.signals.simulated import holds_speed
 from gearmbs.studies.bench import PRESSURES, STATES, BenchSettings, bench_choices, bench_train
 from gearmbs.studies.case import Case
 from gearmbs.studies.claims import Claim, judge
@@ -208,8 +209,11 @@ def run_bench(
 def levels(record: xr.Dataset, sensor: str, harmonics: int = 3) -> np.ndarray:
     """Return the RMS of a sensor's acceleration at the mesh harmonics, m/s^2, at the mean speed of the record.
 
-    A velocity is differentiated to acceleration as a laser's is, in a band from `LOW_BAND` on.
+    NaN where that speed is not steady. A velocity is differentiated to acceleration as a laser's is, in a band from
+    `LOW_BAND` on.
     """
+    if not holds_speed(record):
+        return np.full(harmonics, np.nan)
     signal = train_signal(record, sensor, "pair 1")
     rate = float(record.attrs["run_rate"])
     if str(record.sensor_units.sel(sensor=sensor).item()) == "m/s":

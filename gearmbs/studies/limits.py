@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from gearmbs.gears.spec import COUNTED_TWICE
 from gearmbs.signals.bands import ATTENUATION_DB, HALF_WIDTH, TRANSITION
 from gearmbs.signals.filters import bandpass_taps, decimation_taps
 from gearmbs.signals.orders import MIN_PERIODS
@@ -157,6 +158,16 @@ def remarks(case: Case) -> list[str]:
             f"contact ratio {ratio:.3g} is below 1: for part of each mesh period no flanks are in contact but a tip "
             "edge runs along the mate's flank"
         )
+    for number, wheel in enumerate(case.pair().wheels, 1):
+        shafts = case.shafts
+        total = wheel.mass + shafts.density * math.pi * shafts.radius**2 * shafts.length
+        twice = wheel.mass_within(shafts.radius, shafts.length)
+        if twice > COUNTED_TWICE * total:
+            found.append(
+                f"{twice:.4g} kg of the {total:.4g} kg of gear {number} and its shaft are counted twice: "
+                f"gears.bore_radius is {1e3 * wheel.bore_radius:g} mm, shafts.radius {1e3 * shafts.radius:g} mm; "
+                "give a bore of the shaft's radius"
+            )
     solver = case.solver
     if solver.integrator == "IDA" and solver.used_tolerance > 2e-7:
         found.append(

@@ -199,6 +199,7 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
         train, settings = found.train, found.run
         check_record(train, settings)
 
+        from gearmbs.signals.simulated import holds_speed
         from gearmbs.studies.simulation import SimulationFailed
         from gearmbs.studies.store import check_place, keep_dataset, write_text
         from gearmbs.studies.train_figure import train_spectrum
@@ -219,7 +220,7 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
         write_text(report, train_report(train, data))
         train_scene(train).save_html(scene)
         written = [target, report, scene]
-        if "mesh_rms" in data and train.meshes:
+        if "mesh_rms" in data and train.meshes and holds_speed(data):
             written += save_figure(train_spectrum(train, data), target.with_suffix(""))
         for mesh in data.mesh.values:
             if "mesh_track" in data:
@@ -228,6 +229,8 @@ def run_drivetrain(file: Path, out: Path | None) -> None:
             levels = data["mesh_rms"].sel(mesh=mesh, signal=f"force of {mesh}")
             shown = "".join(f"{v:10.4g}" for v in levels.values)
             typer.echo(f"{mesh!s:<18}{float(levels.mesh_frequency):10.5g} Hz{shown}   RMS of the normal force, N")
+        if data.attrs.get("remarks", "none") != "none":
+            typer.echo(data.attrs["remarks"])
         typer.echo("\n".join(f"wrote {path}" for path in written))
 
 

@@ -8,7 +8,7 @@ import xarray as xr
 
 from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError
 from gearmbs.signals import spectrum
-from gearmbs.signals.simulated import held_speed
+from gearmbs.signals.simulated import held_speed, holds_speed
 from gearmbs.studies.trains import train_signal
 
 if TYPE_CHECKING:
@@ -41,12 +41,14 @@ def train_spectrum(
     Raises
     ------
     DrivetrainError
-        For an unknown channel, and for the record of a run-up, whose lines move.
+        For an unknown channel, and for records of run-ups and of speeds that are not steady, whose lines move.
     """
     from gearmbs.view import named_lines_plot
 
     if "mesh_track" in record:
         raise DrivetrainError("record: in a run-up lines move; draw mesh_track, or a spectrogram")
+    if not holds_speed(record):
+        raise DrivetrainError(f"record: lines move, draw a spectrogram; {record.attrs['remarks']}")
     sensors = sorted(train.sensors, key=lambda sensor: not isinstance(sensor, Accelerometer))
     name = channel or (sensors[0].name if sensors else f"force of {train.meshes[0].name}")
     signal = train_signal(record, name)

@@ -9,6 +9,7 @@ import xarray as xr
 
 from gearmbs.drivetrain import Drivetrain
 from gearmbs.drivetrain.parts import turn_z
+from gearmbs.studies.train_speed import STRAY
 
 if TYPE_CHECKING:
     from gearmbs.view.mesh import Mesh
@@ -33,7 +34,9 @@ def _frequencies(train: Drivetrain, record: xr.Dataset) -> list[str]:
     for shaft in train.shafts:
         mean = float(record["speed"].sel(shaft=shaft.name).mean())
         lines.append(f"| {shaft.name} | {train.speeds[shaft.name] * RPM:.6g} | {mean * RPM:.6g} |")
-    return [*lines, "", train.kinematics.to_markdown()]
+    said = record.attrs.get("remarks", "none")
+    remarks = [] if said == "none" else ["", f"**{said}**"]
+    return [*lines, *remarks, "", "Frequencies at the nominal speeds:", "", train.kinematics.to_markdown()]
 
 
 def _meshes(train: Drivetrain, record: xr.Dataset) -> list[str]:
@@ -100,13 +103,21 @@ def _levels(train: Drivetrain, record: xr.Dataset) -> list[str]:
     harmonics = record.harmonic.values
     for mesh in train.meshes:
         levels = record["mesh_rms"].sel(mesh=mesh.name)
-        lines += [f"### {mesh.name}, {float(levels.mesh_frequency):.6g} Hz", "",
+        lines += [f"### {mesh.name}, {_at(levels)}", "",
                   "| signal | " + " | ".join(f"{h} x" for h in harmonics) + " |", _rule(harmonics.size)]  # fmt: skip
         for signal in record.signal.values:
             row = levels.sel(signal=signal).values
             lines.append(f"| {signal} | " + " | ".join(f"{v:.4g}" for v in row) + " |")
         lines.append("")
     return lines
+
+
+def _at(levels: xr.DataArray) -> str:
+    """Return the mesh frequency of the record, with the nominal one where they differ by what a table shows."""
+    found, nominal = float(levels.mesh_frequency), float(levels.nominal_frequency)
+    return (
+        f"{found:.6g} Hz" if abs(found - nominal) <= STRAY * nominal else f"{found:.6g} Hz (nominal {nominal:.6g} Hz)"
+    )
 
 
 def _highest(train: Drivetrain, record: xr.Dataset) -> list[str]:

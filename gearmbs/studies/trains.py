@@ -22,11 +22,12 @@ from gearmbs.mechanism.simulate import simulate
 from gearmbs.signals import even_signal, make_signal
 from gearmbs.signals.monotone_cubic import monotone_cubic
 from gearmbs.signals.orders import MIN_PERIODS, harmonic_amplitudes
-from gearmbs.signals.simulated import placed_lines
+from gearmbs.signals.simulated import holds_speed, placed_lines
 from gearmbs.signals.uneven import MARGIN
 from gearmbs.studies.simulation import SimulationFailed, SimulationInterrupted
 from gearmbs.studies.tooth_faults import tooth_fault
 from gearmbs.studies.train_recorder import CONTACT, TrainColumns, TrainRecorder
+from gearmbs.studies.train_speed import TURN, HeldSpeed, by_angle, held_speeds, speed_attributes, warn_of_speeds
 
 COUNTED = ("pairs_drive", "pairs_back")
 TRACK_MOMENTS = 60
@@ -70,8 +71,9 @@ def run_train(
         tooth pairs on drive and coast flanks and transmission error; by ``bearing`` the force of the seat on the shaft;
         by ``sensor`` what it measures; by ``shaft`` its speed. ``mesh_rms``: RMS of the mesh harmonics by ``signal``
         (the normal force of each mesh, the bearings' forces, the sensors), mesh and harmonic, at the record's mean
-        speed; of a run-up or coast-down (`gearmbs.drivetrain.SpeedDrive` with ``curve``) instead ``mesh_track``, the
-        same at 60 moments.
+        speed, and NaN where the speed is not steady, see `gearmbs.studies.train_speed`; of a run-up or coast-down
+        (`gearmbs.drivetrain.SpeedDrive` with ``curve``) instead ``mesh_track``, the same at 60 moments. The attribute
+        ``remarks`` names speeds that are not the nominal ones.
 
     Raises
     ------
@@ -83,7 +85,8 @@ def run_train(
     Warns
     -----
     UserWarning
-        Of meshes that are damped above critical by their contact law.
+        Of meshes that are damped above critical by their contact law, of drives that cannot carry the loads, and of
+        speeds that are not steady or far from the nominal ones.
     """
     run = run or RunSettings()
     warn_of_overdamped_meshes(train)
@@ -183,9 +186,12 @@ def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution
     out = _dataset(train, t, contact, bearing, values[:, meshes + 3 * bearings :], speed, error)
     if train.changes_speed:
         out["mesh_track"] = mesh_tracks(train, run, out, known)
-    else:
-        out["mesh_rms"] = _harmonics(train, run, out, rate, known, start, stop)
-    out.attrs = attributes(train, run, solution)
+        out.attrs = attributes(train, run, solution)
+        return out
+    held = held_speeds(train, out)
+    out["mesh_rms"] = _harmonics(train, run, out, rate, known, start, stop, held)
+    out.attrs = attributes(train, run, solution) | speed_attributes(held)
+    warn_of_speeds(train, held)
     return out
 
 
@@ -257,8 +263,9 @@ def mesh_tracks(train: Drivetrain, run: RunSettings, record: xr.Dataset, known: 
 
 
 def _harmonics(
-    train: Drivetrain, run: RunSettings, record: xr.Dataset, rate: float, known: TrainColumns, start: float, stop: float
-) -> xr.DataArray:
+    train: Drivetrain, run: RunSettings, record: xr.Dataset, rate: float, known: TrainColumns, start: float,
+    stop: float, held: dict[str, HeldSpeed],
+) -> xr.DataArray:  # fmt: skip
     """Return the RMS of each signal at the harmonics of each mesh, at the mean speed of the record."""
     names, signals = _signals(train, record)
     shafts = [shaft.name for shaft in train.shafts]
@@ -269,12 +276,20 @@ def _harmonics(
         turned = np.interp([start, stop], known.t, known.turned[:, shafts.index(driver.shaft)])
         frequency[k] = driver.gear.teeth * abs(turned[1] - turned[0]) / (2.0 * np.pi * (stop - start))
         orders = np.arange(1, run.harmonics + 1)
+        if not held[mesh.name].is_steady:
+            continue
         if frequency[k] * (stop - start) >= MIN_PERIODS and orders[-1] * frequency[k] < 0.5 * rate:
-            rms[:, k] = np.abs(harmonic_amplitudes(signals, rate, float(frequency[k]), orders)).T / np.sqrt(2.0)
+            seen, samples, fundamental = signals, rate, float(frequency[k])
+            if held[mesh.name].smears(fundamental * (stop - start) * orders[-1]):
+                angle = np.interp(record["time"].values, known.t, known.turned[:, shafts.index(driver.shaft)])
+                seen, samples, fundamental = by_angle(signals, driver.gear.teeth * np.abs(angle - angle[0]) / TURN)
+            rms[:, k] = np.abs(harmonic_amplitudes(seen, samples, fundamental, orders)).T / np.sqrt(2.0)
     return xr.DataArray(
         rms, dims=("signal", "mesh", "harmonic"),
         coords={"signal": names, "mesh": [m.name for m in train.meshes], "harmonic": np.arange(1, run.harmonics + 1),
-                "mesh_frequency": ("mesh", frequency, {"units": "Hz"})},
+                "mesh_frequency": ("mesh", frequency, {"units": "Hz"}),
+                "nominal_frequency": ("mesh", [train.kinematics.mesh_frequency(m.name) for m in train.meshes],
+                                      {"units": "Hz"})},
         attrs={"long_name": "RMS at the harmonics of the mesh frequencies, in the signals' own units"},
     )  # fmt: skip
 
@@ -348,6 +363,8 @@ def plain(value: Any) -> Any:
 def train_signal(record: xr.Dataset, channel: str, mesh: str | None = None) -> xr.DataArray:
     """Return one channel of a drivetrain's record as a signal with speed and teeth, for `analyse` and its like.
 
+    Where the speed of the record is not steady the signal has neither a speed nor known lines.
+
     Parameters
     ----------
     record : Dataset
@@ -383,9 +400,11 @@ def train_signal(record: xr.Dataset, channel: str, mesh: str | None = None) -> x
         raise DrivetrainError(f"record: there is no mesh '{mesh}'; known are {', '.join(meshes)}")
     parts = json.loads(record.attrs["train_json"])
     wheels = [parts[parts[mesh][side]] for side in ("driver", "driven")]
-    speed = float(np.abs(record["speed"].sel(shaft=wheels[0]["shaft"]).mean()))
+    steady = holds_speed(record)
+    speed = float(np.abs(record["speed"].sel(shaft=wheels[0]["shaft"]).mean())) if steady else None
+    lines = {"known_lines": placed_lines(record)} if steady else {}
     return make_signal(
         values.values[:, None], float(record.attrs["run_rate"]), units=unit, channels=[channel],
         t0=float(record.time.values[0]), speed=speed, teeth=tuple(abs(int(w["gear"]["teeth"])) for w in wheels),
-        attrs={"source": record.attrs["title"], "known_lines": placed_lines(record)},
+        attrs={"source": record.attrs["title"], **lines},
     )  # fmt: skip

@@ -1,5 +1,7 @@
 """Messages that lead to the mistake: mistyped words, what is absent, defaults that matter."""
 
+import re
+
 import pytest
 
 from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
@@ -54,6 +56,43 @@ def test_a_default_that_lets_joints_yield_is_remarked(length, more, remarked):
     friction = f"FRICTION/1, JOINT=1, MU_STATIC=0.9, MU_DYNAMIC=0.9, PIN_RADIUS=0.6{more}"
     told = [d.message for d in deck(friction, length).diagnostics]
     assert any("0.01 units of length, here 10 mm" in message for message in told) is remarked
+
+
+@pytest.mark.parametrize(
+    ("part", "told"),
+    [
+        ("MASS=1, CM=22, IP=0.1,0.2,0.9", r"PART/2: .*moments \[0.1 0.2 0.9\] kg m\^2; the largest exceeds the sum"),
+        ("MASS=1, CM=22, IP=0.1,0.2,0.3", None),
+    ],
+)
+def test_inertia_that_no_body_has_is_remarked(part, told):
+    """A flat body is the limit: its largest moment is the sum of the others."""
+    read = parse_deck(PENDULUM.format(lines="", length="METER").replace("MASS=1, CM=22, IP=0.1,0.1,0.1", part))
+    remarks = [str(d) for d in read.diagnostics]
+    read.to_mechanism()
+    later = [str(d) for d in read.diagnostics if str(d) not in remarks]
+    assert len(later) == (told is not None)
+    assert told is None or re.search(f":5: warning: {told}", later[0])
+
+
+@pytest.mark.parametrize(
+    ("part", "told"),
+    [
+        ("MASS=-1, CM=22, IP=0.1,0.1,0.1", "PART/2: MASS = -1.0; it cannot be negative"),
+        (
+            "MASS=1, CM=22, IP=0.1,-0.1,0.1",
+            r"PART/2: .*moments \[-0.1  0.1  0.1\] .*; none may be negative: correct the",
+        ),
+        ("MASS=1, CM=22, IP=0.1,0.1,0.1,0.5", "PART/2: .*none may be negative: correct the moments, the signs of prod"),
+        ("MASS=1, CM=22, IM=21, IP=0.1,0.1,0.1", "PART/2: .*none may be negative.* or the point they are about"),
+    ],
+)
+def test_inertia_that_nothing_has_is_refused(part, told):
+    """Negative mass or moments, products too large, moments about a point that leave too little at the centre."""
+    with pytest.raises(DeckError, match=told):
+        parse_deck(
+            PENDULUM.format(lines="", length="METER").replace("MASS=1, CM=22, IP=0.1,0.1,0.1", part)
+        ).to_mechanism()
 
 
 def test_rounding_is_no_rotation():

@@ -1,10 +1,16 @@
 """Placement, senses, flanks and torques of drivetrains, and what is refused."""
 
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from gearmbs.drivetrain import (
     ClearanceBearing,
+    ControlledDrive,
+    CurveMotor,
+    Drag,
     Drivetrain,
     DrivetrainError,
     ElasticBearing,
@@ -14,6 +20,7 @@ from gearmbs.drivetrain import (
     Housing,
     HousingMode,
     IdealBearing,
+    InductionMotor,
     Mount,
     Shaft,
     SpeedDrive,
@@ -433,3 +440,76 @@ def test_speeds_in_the_mean_over_a_common_period():
     turned = solution.joint_angle("bout")
     mean = (turned[-1] - turned[1]) / period
     assert mean / w == pytest.approx((12 / 18) * (16 / 24), rel=1e-8)
+
+
+@pytest.mark.parametrize(("drive", "running", "words"), [
+    (CurveMotor(name="m", shaft="in", speed=150.0, speeds=(0.0, 300.0), torques=(90.0, 60.0)), True,
+     "the largest torque is 90 N m, but the loads need 100 N m on shaft 'in' at 1432.4 rpm"),
+    (ControlledDrive(name="m", shaft="in", speed=-150.0, proportional=1.0, integral=1.0, largest=98.0), True,
+     "the largest torque is 98 N m, but the loads need 100 N m"),
+    (InductionMotor(name="m", shaft="in", speed="1450 rpm", power="16 kW"), False,
+     "its torque at standstill is 82.051 N m, but the loads need 100 N m on shaft 'in': it will not start"),
+    (InductionMotor(name="m", shaft="in", speed="1450 rpm", power="16 kW"), True, None),
+    (TorqueDrive(name="m", shaft="in", speed=150.0, torque=100.0), False, None),
+    (TorqueDrive(name="m", shaft="in", speed=150.0, torque="STEP(TIME, 0, 0, 1, 50)"), False, None),
+])  # fmt: skip
+def test_drives_too_weak_for_their_loads_are_warned_of(drive, running, words):
+    """300 N m on the wheel are 100 N m on the pinion; what can carry them, or changes over time, is left alone."""
+    train = stage(drives=[drive], running=running)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        warnings.filterwarnings("ignore", ".*counted twice")
+        train.build()
+    found = [str(one.message) for one in said]
+    assert len(found) == (words is not None)
+    assert words is None or words in found[0]
+
+
+def test_drives_carry_a_load_together():
+    """Two torques at the ends of a train add at the ratio of their shafts."""
+    weak = TorqueDrive(name="m", shaft="in", speed="1500 rpm", torque=60.0)
+
+    def both(torque):
+        return stage(drives=[weak, TorqueDrive(name="n", shaft="out", speed="-500 rpm", torque=torque)])
+
+    with pytest.warns(UserWarning, match="'n' together: the largest torque is 80 N m, but the loads need 100 N m"):
+        both(60.0).build()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", ".*counted twice")
+        both(120.0).build()
+        stage(drives=[weak, SpeedDrive(name="n", shaft="out", speed="-500 rpm")], loads=[]).build()
+
+
+@pytest.mark.parametrize(("parts", "words"), [
+    ([TorqueLoad(name="l", shaft="in", torque=30.0)],
+     "load 'l': its torque of 30 N m is on shaft 'in', whose speed drive 'motor' prescribes"),
+    ([TorqueDrive(name="t", shaft="in", speed="1500 rpm", torque=30.0)], "drive 't': its torque of 30 N m is on"),
+    ([Drag(name="d", shaft="in", torque=1.0), TorqueDrive(name="t", shaft="out", speed="-500 rpm", torque=30.0)], None),
+])  # fmt: skip
+def test_torques_that_nothing_feels_are_warned_of(parts, words):
+    """On the shaft whose speed is prescribed; behind the mesh, and as drag, they are at their place."""
+    train = stage().with_parts(*parts)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        warnings.filterwarnings("ignore", ".*counted twice")
+        train.build()
+    found = [str(one.message) for one in said]
+    assert len(found) == (words is not None)
+    assert words is None or words in found[0]
+
+
+def test_a_shaft_through_solid_wheels_is_counted_twice():
+    """Two thirds of a wheel's disc are where a thick shaft is: said with masses; a bore, or a thin shaft, is silent."""
+    thick, other = Shaft(name="in", length=0.1, diameter="48 mm"), Shaft(name="out", length=0.1)
+    words = r"shaft 'in': 0.2841 kg of 1.864 kg .*\(15.2 %\) are counted twice, as shaft and as wheel 'pinion'"
+    with pytest.warns(UserWarning, match=words):
+        stage(shafts=[thick, other]).build()
+    bored = Wheel(name="pinion", shaft="in", gear=GearSpec(20, "3 mm", name="pinion", bore_radius="24 mm"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        mass = stage(shafts=[thick, other]).with_parts(bored).build().bodies["in"].mass
+        stage(shafts=[Shaft(name="in", length=0.1, diameter="20 mm"), other]).build()
+        stage(shafts=[replace(thick, mass="1.2 kg"), other]).build()
+    disc = np.pi * (0.03**2 - 0.024**2) * 0.02
+    assert mass == pytest.approx(7850.0 * (np.pi * 0.024**2 * 0.1 + disc))

@@ -334,12 +334,28 @@ def test_the_set_that_is_recommended_fits(teeth, planets):
         (lambda: mechanism_of(small_set(), speeds={"ring": 1.0}), "ring is held"),
         (lambda: mechanism_of(small_set(), speeds={"sun": 1.0, "carrier": 1.0}), "all three members"),
         (lambda: mechanism_of(small_set(), held="planet"), "choose among"),
+        (
+            lambda: mechanism_of(small_set(), speeds={"sun": 9.0}, torques={"ring": "60 N m"}),
+            r"torques\['ring'\] is 60 N m, but ring is held: .* reaction there .* or give the torque on carrier$",
+        ),
+        (
+            lambda: mechanism_of(small_set(), speeds={"sun": 9.0}, torques={"sun": 5.0}),
+            r"torques\['sun'\] is 5 N m, but sun has a speed",
+        ),
     ],
 )
 def test_bad_sets_are_one_line(build, words):
     with pytest.raises(ValueError, match=words) as caught:
         build()
     assert "\n" not in str(caught.value)
+
+
+def test_torques_that_something_feels_are_taken():
+    """On a member that springs hold, on one that turns as it is pushed, and none at all."""
+    soft = {"ring": Support(radial=1e8, torsional=1e6)}
+    torques = {"carrier": -60.0, "ring": "45 N m", "sun": 0.0}
+    m = mechanism_of(small_set(), speeds={"sun": 9.0}, torques=torques, supports=soft)
+    assert {"ring load", "carrier load"} <= set(m.elements)
 
 
 @pytest.mark.parametrize("name", ["backlash_sun", "backlash_ring"])

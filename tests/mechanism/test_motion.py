@@ -1,5 +1,7 @@
 """Motions against closed solutions: what the equations must give whatever the integrator."""
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.special import ellipk
@@ -213,6 +215,28 @@ def test_energy_balance_of_a_driven_oscillator():
     m.rotation("drive", pin, harmonic(0.5, 4.0))
     balance = m.simulate(2.0, rate=2000, integrator="IDA", tol=1e-9).energy_balance()
     assert balance.attrs["relative_imbalance"] < 1e-6
+
+
+def test_energy_balance_says_where_outputs_are_too_far_apart():
+    """A spring that swings at 16 Hz against a slide that is driven: works need outputs within its period."""
+    m = Mechanism("driven")
+    base = m.body("base", 1.0, (0.1, 0.1, 0.1))
+    block = m.body("block", 1.0, (0.1, 0.1, 0.1), position=(0.5, 0, 0))
+    slide = m.translational("slide", base, m.ground, at=(0, 0, 0), axis=(1, 0, 0))
+    m.translational("guide", block, m.ground, at=(0.5, 0, 0), axis=(1, 0, 0))
+    m.translation("drive", slide, harmonic(0.01, 80.0))
+    m.spring_damper("spring", base.marker(), block.marker(), stiffness=1e4, damping=20.0)
+    run = {"tol": 1e-8, "integrator": "WSTIFF"}
+    with pytest.warns(UserWarning, match="works over every second output differ by .* rate, or every_step=True"):
+        coarse = m.simulate(1.0, rate=24, **run).energy_balance()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fine, steps = (m.simulate(1.0, **how, **run).energy_balance() for how in ({"rate": 400}, {"every_step": True}))
+    assert coarse.attrs["relative_coarseness"] > 0.05
+    assert fine.attrs["relative_coarseness"] < 0.01
+    assert fine.attrs["relative_imbalance"] < 1e-4
+    assert abs(float(coarse.work_motion[-1] / fine.work_motion[-1]) - 1.0) > 0.05
+    assert float(steps.work_motion[-1]) == pytest.approx(float(fine.work_motion[-1]), rel=1e-3)
 
 
 def test_same_run_twice_is_bit_identical():

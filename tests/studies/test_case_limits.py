@@ -156,6 +156,9 @@ def test_loose_tolerances_of_ida_are_remarked():
     solver = {"integrator": "IDA", "tolerance": 1e-6}
     assert "off by up to 12 % at 1e-6" in remarks(Case(solver=solver))[0]
     assert remarks(Case(solver={**solver, "tolerance": 1e-7})) == []
+    thick = {"radius": "30 mm", "length": "60 mm"}
+    assert "kg of gear 1 and its shaft are counted twice: gears.bore_radius is 0 mm" in remarks(Case(shafts=thick))[0]
+    assert remarks(Case(shafts=thick, gears={"bore_radius": "30 mm"})) == []
 
 
 def test_wrong_settings_are_found_without_compiling():

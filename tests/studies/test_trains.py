@@ -1,6 +1,7 @@
 """Records of drivetrains: what they hold, what they are checked against, the command line, the report and the view."""
 
 import json
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -15,16 +16,21 @@ from gearmbs.drivetrain import (
     ElasticBearing,
     Housing,
     IdealBearing,
+    InductionMotor,
     Laser,
     Mount,
     RunSettings,
     SpeedSensor,
+    TorqueDrive,
+    TorqueLoad,
     TorqueSensor,
 )
 from gearmbs.signals import analyse
+from gearmbs.signals.orders import harmonic_amplitudes
 from gearmbs.signals.simulated import read_any
 from gearmbs.studies import run_train, train_report, train_scene, train_signal, train_spectrum
 from gearmbs.studies.train_recorder import counted_turns
+from gearmbs.studies.train_speed import HeldSpeed, by_angle
 from gearmbs.studies.trains import check_record, load_train
 from tests.drivetrain.support import stage
 from tests.drivetrain.test_description import TEXT
@@ -201,3 +207,70 @@ def test_faults_in_files_and_wrong_files(tmp_path):
 def test_records_that_cannot_be_are_refused(settings, words):
     with pytest.raises(DrivetrainError, match=words):
         check_record(stage(), RunSettings(**settings))
+
+
+def driven(drive, **settings):
+    """Return the record of the stage, 84 N m on its wheel and so 28 N m on its pinion, turned by a drive."""
+    train = stage(drives=[drive], loads=[TorqueLoad(name="brake", shaft="out", torque="84 N m")], running=True)
+    return train, run_train(train, RunSettings(**{"duration": 0.1, "settling": 0.0, "tolerance": 1e-6, **settings}))
+
+
+@pytest.mark.parametrize(("drive", "largest"), [
+    (InductionMotor(name="m", shaft="in", speed="1450 rpm", power="75 W"), "1.2348"),
+    (TorqueDrive(name="m", shaft="in", speed="1450 rpm", torque="20 N m"), "20"),
+])  # fmt: skip
+def test_a_drive_that_cannot_carry_its_load_has_no_mesh_lines(drive, largest):
+    """It is warned of with both torques; the record has no levels at a frequency that no tooth had, and says so."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        train, record = driven(drive)
+    words = [str(one.message) for one in said]
+    assert any(f"drive 'm': the largest torque is {largest} N m, but the loads need 28 N m on" in w for w in words)
+    both = f"turns at {float(record.speed.sel(shaft='in').mean()) * 30 / np.pi:.5g} rpm in the mean, nominal are 1450"
+    assert any(both in w and "no levels" in w for w in words)
+    assert both in record.attrs["remarks"]
+    assert np.isnan(record.mesh_rms).all()
+    assert both in train_report(train, record)
+    with pytest.raises(DrivetrainError, match="lines move"):
+        train_spectrum(train, record, "force of mesh")
+    signal = train_signal(record, "force of mesh")
+    assert "known_lines" not in signal.attrs
+    assert signal.attrs.get("speed") is None
+
+
+def test_a_motor_with_slip_has_its_lines_at_its_own_speed():
+    """A lightly loaded motor is 3 % faster than rated: its levels and lines are there, which the record says."""
+    motor = InductionMotor(name="m", shaft="in", speed="1400 rpm", power="60 kW")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", ".*counted twice")
+        train, record = driven(motor, settling=0.05)
+    rpm = float(record.speed.sel(shaft="in").mean()) * 30 / np.pi
+    assert 1.03 < rpm / 1400.0 < 1500.0 / 1400.0
+    levels = record.mesh_rms.sel(mesh="mesh")
+    assert float(levels.mesh_frequency) == pytest.approx(20 * rpm / 60, rel=1e-3)
+    assert np.isfinite(levels).all()
+    force = record.normal_force.sel(mesh="mesh").values
+    weight = np.hanning(force.size)
+    turned = np.exp(-2j * np.pi * float(levels.mesh_frequency) * record.time.values)
+    line = np.sqrt(2.0) * np.abs(weight @ ((force - force.mean()) * turned)) / weight.sum()
+    assert float(levels.sel(signal="force of mesh", harmonic=1)) == pytest.approx(line, rel=0.02)
+    assert "levels are at the mesh frequency of the mean speed" in record.attrs["remarks"]
+    assert "(nominal 466.667 Hz)" in train_report(train, record)
+    assert json.loads(train_signal(record, "force of mesh").attrs["known_lines"])["1 x GMF of mesh"] == pytest.approx(
+        float(levels.mesh_frequency), rel=1e-3
+    )
+
+
+def test_levels_follow_the_angle_where_the_speed_drifts():
+    """A change of 1 % over 500 mesh cycles smears a third harmonic; by angle it has its level."""
+    t = np.arange(12800) / 12800.0
+    cycles = 500.0 * (t + 0.01 * (0.5 * t**2 - 0.5 * t))
+    signal = np.stack([np.cos(2.0 * np.pi * h * cycles) for h in (1, 3)], axis=1)
+    orders = np.arange(1, 4)
+    assert HeldSpeed("in", 1.0, 1.0, 0.01).smears(1500.0)
+    assert not HeldSpeed("in", 1.0, 1.0, 1e-4).smears(1500.0)
+    plain = np.abs(harmonic_amplitudes(signal, 12800.0, 500.0, orders))
+    followed = np.abs(harmonic_amplitudes(*by_angle(signal, cycles), orders))
+    assert plain[2, 1] < 0.6
+    np.testing.assert_allclose(followed, [[1, 0], [0, 0], [0, 1]], atol=0.02)

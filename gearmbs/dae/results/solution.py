@@ -445,7 +445,11 @@ class Solution(Shown):
         """Return energies, works, dissipation and their imbalance; see `gearmbs.dae.results.energy.energy_balance`."""
         from gearmbs.dae.results.energy import energy_balance
 
-        return energy_balance(self.evaluated)
+        elements = getattr(getattr(self.system, "mechanism", None), "elements", {})
+        frictions = [
+            k for k, name in enumerate(self.system.force_names) if getattr(elements.get(name), "kind", "") == "friction"
+        ]
+        return energy_balance(self.evaluated, frictions, stacklevel=3)
 
     def __len__(self) -> int:
         return self.t.size
