@@ -138,6 +138,7 @@ def mesh_shaft(
         shaft = _near_speed(signal, teeth, found, notes)
     elif found is not None:
         shaft = found
+        notes += shaft.phase.attrs.get("notes", ())
     else:
         estimate = estimate_speed(signal, teeth, speed_range=known.speed_range)
         if estimate.phase is None:
