@@ -18,6 +18,7 @@ from gearmbs.signals import (
     make_signal,
     write_signal,
 )
+from gearmbs.signals.shaft_finding import Known, mesh_shaft
 
 RATE = 12800.0
 TEETH = 32
@@ -98,6 +99,36 @@ def test_the_right_speed_of_a_weaker_stage_is_not_doubted():
     assert not [note for note in right.notes if note.startswith("CHECK")]
     half = analyse(record, teeth=21, speed="750 rpm")
     assert [note for note in half.notes if note.startswith("CHECK")]
+
+
+def _weak(size, seed):
+    """Twenty seconds at 1500 rpm that drift by 0.3 %, three harmonics of 21 teeth of this size in noise of RMS 1."""
+    rate, seconds = 6000.0, 20.0
+    t = np.arange(round(seconds * rate)) / rate
+    angle = 50 * math.pi * (t + 0.003 * seconds / math.tau * np.sin(math.tau * t / seconds))
+    line = sum(a * np.cos(21 * k * angle + k) for k, a in enumerate((1.0, 0.5, 0.3), 1)) * (1 + 0.3 * np.cos(angle))
+    return make_signal(size * line + np.random.default_rng(seed).standard_normal(t.size), rate)
+
+
+@pytest.mark.parametrize("speed", ["1500 rpm", "1489 rpm", "1512 rpm"])
+@pytest.mark.parametrize("size", [0.1, 0.2, 1.0])
+def test_a_speed_nearly_right_is_followed_in_noise(size, speed):
+    shaft, _ = mesh_shaft(_weak(size, 1), (21,), Known(speed=speed), notes := [])
+    assert "mesh line" in shaft.origin
+    assert shaft.speed == pytest.approx(50 * math.pi, rel=1e-3)
+    assert notes == []
+
+
+@pytest.mark.parametrize("speed", [1575.0, 1695.0, 1065.0])
+@pytest.mark.parametrize("size", [0.0, 0.1, 1.0])
+def test_a_wrong_speed_is_not_followed(size, speed):
+    """Noise has lines anywhere, and a true mesh line has sidebands."""
+    shaft, _ = mesh_shaft(_weak(size, 2), (21,), Known(speed=speed * math.pi / 30), notes := [])
+    assert shaft.origin == "as given"
+    assert shaft.speed == pytest.approx(speed * math.pi / 30)
+    said = [note for note in notes if "o mesh line was found within 2 % of the given speed" in note]
+    assert len(said) == 1
+    assert f"{speed:.1f} rpm" in said[0]
 
 
 def test_report_reads_well():
