@@ -3,6 +3,7 @@
 import math
 import os
 import tracemalloc
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ from gearmbs.signals import (
     analyse_file,
     compare_files,
     make_signal,
+    read_signal,
+    to_signal,
     write_signal,
 )
 from gearmbs.signals.shaft_finding import Known, mesh_shaft
@@ -129,6 +132,33 @@ def test_a_wrong_speed_is_not_followed(size, speed):
     said = [note for note in notes if "o mesh line was found within 2 % of the given speed" in note]
     assert len(said) == 1
     assert f"{speed:.1f} rpm" in said[0]
+
+
+@pytest.mark.parametrize("way", ["signal", "file", "call"])
+def test_speed_and_teeth_that_contradict_the_record_are_told(tmp_path, way):
+    own = record(seconds=2.0)[:, [0]]
+    own = make_signal(own.values, RATE, units="m/s^2", speed=2 * math.pi * 29.75, teeth=(TEETH, 45))
+    path = tmp_path / "own.csv"
+    write_signal(own, path)
+
+    def analysed(**given):
+        if way == "call":
+            return analyse(own, **given)
+        return analyse(to_signal(own, **given) if way == "signal" else read_signal(path, **given))
+
+    with pytest.warns(UserWarning, match=r"teeth=31 is given, but .* itself says 32, 45; the given ones are used"):
+        report = analysed(teeth=31)
+    assert report.teeth == (31,)
+    assert any("teeth=31 is given" in note for note in report.notes)
+    with pytest.warns(UserWarning, match=r"speed=1700 rpm is given, but .* itself says 1785 rpm; the given one"):
+        report = analysed(speed="1700 rpm")
+    assert report.speed == pytest.approx(1700 * math.pi / 30, rel=0.02)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # a nominal speed, and the first of both wheels, contradict nothing
+        report = analysed(speed="1770 rpm", teeth=TEETH)
+    assert report.speed == pytest.approx(2 * math.pi * 29.75, rel=1e-3)
+    assert report.notes == []
 
 
 def test_report_reads_well():
