@@ -20,14 +20,14 @@ from .angular import angular_resample, samples_per_revolution, time_synchronous_
 from .bands import HALF_WIDTH, TRANSITION, band_rms
 from .door import Given, Units, to_signal
 from .errors import SignalError
-from .given import given_rate
+from .given import contradictions, given_rate, given_speed
 from .indicators import condition_indicators
 from .planetary_diagnosis import diagnose_planetary
 from .planetary_lines import planetary_lines
 from .planetary_report import PlanetaryReport
 from .report_parts import impulsive_band, levels, line_spectrum, name_lines, strongest_lines
 from .shaft_finding import Known, Shaft, known_shaft, mesh_shaft
-from .signal import check_teeth, common_unit, make_signal, rate_of, units_of
+from .signal import check_teeth, common_unit, make_signal, rate_of, units_of, with_metadata
 from .simulated import read_any
 from .spectra import spectrum
 from .vibration import vibration_report
@@ -170,6 +170,13 @@ def analyse(
     helpers = [name for name in (options.tacho, options.speed_channel) if name is not None]
     kept = None if channels is None else [*channels, *(name for name in helpers if name not in channels)]
     data = to_signal(signal, rate=rate, units=units, channels=kept, gaps=gaps)
+    speed = None if isinstance(options.speed, Path) else given_speed(options.speed)
+    own = data.attrs
+    said = contradictions(
+        own.get("teeth"), own.get("speed"), options.teeth, speed, str(own.get("source", "the signal"))
+    )
+    if said:
+        data = with_metadata(data, notes=[*own.get("notes", ()), *said])
     counts = options.teeth if options.teeth is not None else data.attrs.get("teeth")
     if options.planetary is not None or (counts is None and "planetary" in data.attrs):
         return _planetary(data, options)

@@ -8,8 +8,10 @@ from typing import Any
 from .errors import SignalError
 
 DIMENSIONS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N"}
-# In vibration work g is the standard acceleration of gravity; unit libraries read it as gram.
-ALIASES = {"g": "standard_gravity", "gn": "standard_gravity", "G": "standard_gravity"}
+# In vibration work g is the standard acceleration of gravity; unit libraries read g and mg as masses.
+ALIASES = {
+    "g": "standard_gravity", "gn": "standard_gravity", "G": "standard_gravity", "mg": "millistandard_gravity",
+}  # fmt: skip
 REPLACEMENTS = (("²", "^2"), ("µ", "u"), ("μ", "u"), ("m/s2", "m/s^2"), ("ms^-2", "m/s^2"), ("·", "*"))
 
 

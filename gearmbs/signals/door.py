@@ -11,7 +11,7 @@ import xarray as xr
 
 from .errors import MissingMetadataError, SignalError
 from .gaps import without_gaps
-from .given import given_rate, given_speed, with_speed
+from .given import contradictions, given_rate, given_speed, with_speed
 from .signal import as_signal, make_signal, with_metadata
 from .simulated import holds_ring, read_any, record_signal, ring_signal
 from .speed_curve import is_curve
@@ -98,6 +98,10 @@ def _of_xarray(
         signal = as_signal(data, rate)
     signal = signal if channels is None else _picked(signal, channels)
     changes = {key: value for key, value in {"units": units, **known}.items() if value is not None}
+    own = signal.attrs
+    said = contradictions(own.get("teeth"), own.get("speed"), known["teeth"], known["speed"], "the signal")
+    if said:
+        changes["notes"] = [*own.get("notes", ()), *said]
     return with_metadata(signal, **changes) if changes else signal
 
 

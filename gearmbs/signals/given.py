@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import warnings
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +13,41 @@ import xarray as xr
 from gearmbs.units import to_si
 
 from .errors import SignalError
-from .signal import with_metadata
+from .signal import check_teeth, with_metadata
 from .speed_curve import is_curve, speed_curve
+
+SPEED_AGREES = 0.02
+"""Part by which a speed that is given may differ from that of the record: a nominal speed, beside the one at load."""
+
+
+def contradictions(
+    own_teeth: Any, own_speed: Any, teeth: int | Sequence[int] | None, speed: float | None, source: str
+) -> list[str]:
+    """Say, and warn, where tooth counts or a speed (rad/s) that are given contradict those of a record itself.
+
+    Returns
+    -------
+    list of str
+        One sentence for each; what is given is used all the same.
+    """
+    said = []
+    if own_teeth is not None and teeth is not None:
+        own, given = check_teeth(own_teeth), check_teeth(teeth)
+        if any(a != b for a, b in zip(own, given)):
+            listed = [", ".join(map(str, counts)) for counts in (given, own)]
+            said.append(
+                f"CHECK THE TEETH: teeth={listed[0]} is given, but {source} itself says {listed[1]}; the given ones "
+                "are used."
+            )
+    if own_speed is not None and speed is not None and abs(abs(speed) - abs(own_speed)) > SPEED_AGREES * abs(own_speed):
+        rpm = [value * 30.0 / math.pi for value in (speed, own_speed)]
+        said.append(
+            f"CHECK THE SPEED: speed={rpm[0]:.6g} rpm is given, but {source} itself says {rpm[1]:.6g} rpm; the given "
+            "one is used."
+        )
+    for words in said:
+        warnings.warn(words, UserWarning, stacklevel=4)
+    return said
 
 
 def given_rate(rate: float | str | None) -> float | None:

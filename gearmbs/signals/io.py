@@ -18,8 +18,8 @@ from gearmbs.progress import staged
 
 from .errors import SignalError, SignalFileError
 from .gaps import checked_gaps
-from .given import given_rate, given_speed, with_speed
-from .io_csv import read_csv, write_csv
+from .given import contradictions, given_rate, given_speed, with_speed
+from .io_csv import CUT, read_csv, write_csv
 from .io_frame import read_parquet, write_parquet
 from .io_hdf import read_hdf, read_netcdf3, write_netcdf
 from .io_lvm import read_lvm
@@ -178,6 +178,12 @@ def read_signal(
     format, content = checked_format(path, format)
     with damage_named(path, format):
         record = _read(path, format, content, channels, progress, hertz, gaps)
+    for words in record.notes:
+        if words.startswith(CUT):
+            warnings.warn(words, UserWarning, stacklevel=3)
+    for words in contradictions(record.teeth, record.speed, teeth, constant, path.name):
+        record.notes = [*record.notes, words]
+    with damage_named(path, format):
         signal = signal_from(
             record, path, rate=hertz, units=units, speed=constant, teeth=teeth, channels=channels, gaps=gaps
         )

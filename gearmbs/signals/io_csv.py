@@ -10,6 +10,8 @@ from __future__ import annotations
 import gzip
 import io
 import json
+import re
+import warnings
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -39,6 +41,12 @@ EXACT: dict[str, Any] = (
 )
 COUNT = "gearmbs_samples"
 """Line of the header that says how many rows follow: a table cut at the end of a row looks whole."""
+CUT = "CHECK THE END: "
+"""Begin of what is said of a table that looks cut off, and warned of."""
+TAIL, TAIL_READ = 1 << 14, 1 << 20
+"""Bytes at the end of a text that are looked at, and that are read at once to come there."""
+FEWEST_FIXED = 20
+"""Rows of the same number of digits that make a format: those without trailing zeros have fewer in one of ten."""
 GAPS = [cell for cell in GAP_CELLS if cell not in ("inf", "-inf")]
 
 
@@ -93,19 +101,47 @@ def _end_checked(path: Path, packed: bool, layout: CsvLayout, count: int) -> lis
     own = number_of(layout.meta.get(COUNT))
     if own is not None and own[0] != count:
         raise SignalFileError(path, f"holds {count} of the {own[0]:g} samples that its header names: it is cut off")
-    if packed or _ends_a_line(path):
-        return []
+    ended, lines = _tail(path, packed)
     if own is not None:
-        raise SignalFileError(path, "its last line has no end: it is cut off within a number")
-    return ["The last line has no end: if the file is cut off, its last sample is wrong."]
+        if not ended:
+            raise SignalFileError(path, "its last line has no end: it is cut off within a number")
+        return []
+    where = f"{path.name}, line {layout.first + count}"
+    told = [_written(split_cells(line, layout.separator)[-1]) for line in lines if split_cells(line, layout.separator)]
+    fixed = len(told) > FEWEST_FIXED and len(set(told[:-1])) == 1 and told[0] not in (None, (0, 0))
+    if fixed and told[-1] != told[0]:
+        how = "The last line has no end, and its" if not ended else "The last line's"
+        return [f"{CUT}{where}: {how} last number has fewer digits than all others before: the file looks cut off."]
+    if ended:
+        return []
+    said = f"{where}: The last line has no end: if the file is cut off, its last sample is wrong."
+    # of numbers written with as many digits as all others nothing is missing
+    return [said if fixed else CUT + said]
 
 
-def _ends_a_line(path: Path) -> bool:
-    """Return whether the last character of a text, of one to four bytes, ends a line."""
+def _tail(path: Path, packed: bool) -> tuple[bool, list[str]]:
+    """Return whether the last line of a text has an end, and its last lines with numbers."""
+    tail = b""
     with path.open("rb") as raw:
-        raw.seek(0, 2)
-        raw.seek(max(0, raw.tell() - 4))
-        return raw.read().rstrip(b"\0").endswith((b"\n", b"\r"))
+        if packed:
+            with gzip.GzipFile(fileobj=raw) as stream:
+                while piece := stream.read(TAIL_READ):
+                    tail = (tail + piece)[-TAIL:]
+        else:
+            raw.seek(0, 2)
+            raw.seek(max(0, raw.tell() - TAIL))
+            tail = raw.read()
+    # the second byte of a character of two, or the last three of four
+    ended = tail.rstrip(b"\0").endswith((b"\n", b"\r"))
+    text = tail.replace(b"\0", b"").decode("utf-8", errors="replace")
+    lines = [line for line in text.splitlines()[1:] if line.strip() and not COMMENT.match(line)]
+    return ended, lines
+
+
+def _written(cell: str) -> tuple[int, int] | None:
+    """Return how many decimals and characters of an exponent a number has; None for what is no number."""
+    found = re.fullmatch(r"[-+]?\d*(?:[.,](\d*))?([eE][-+]?\d*)?", cell.strip())
+    return None if found is None else (len(found.group(1) or ""), len(found.group(2) or ""))
 
 
 def csv_pieces(
@@ -136,7 +172,8 @@ def csv_pieces(
             if checked_gaps(gaps) == "interpolate":
                 record = replace(record, values=_filled(record.values))
             yield record, fraction
-        _end_checked(path, packed, layout, count)
+        for words in _end_checked(path, packed, layout, count):
+            warnings.warn(words, UserWarning, stacklevel=2)
 
 
 def _filled(values: np.ndarray) -> np.ndarray:

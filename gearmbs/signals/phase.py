@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+import warnings
+from typing import Any, Literal
 
 import numpy as np
 import scipy.fft
@@ -15,6 +16,7 @@ from .any_data import takes_data
 from .errors import SignalError
 from .filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kaiser_taps
 from .monotone_cubic import monotone_cubic
+from .pulses import described, mended_count, pulse_faults
 from .signal import rate_of
 from .speed_curve import speed_curve
 
@@ -59,13 +61,22 @@ def phase_from_speed(signal: xr.DataArray, speed: Any) -> xr.DataArray:
 
 @takes_data()
 def phase_from_tacho(
-    signal: xr.DataArray, channel: str | None = None, *, pulses_per_rev: float = 1.0, threshold: float | None = None
+    signal: xr.DataArray,
+    channel: str | None = None,
+    *,
+    pulses_per_rev: float = 1.0,
+    threshold: float | None = None,
+    faults: Literal["mend", "refuse", "keep"] = "mend",
 ) -> xr.DataArray:
     """Angle (rad) of the shaft from a tacho channel's rising pulse edges.
 
     Edges are placed between samples by linear interpolation at the threshold; the signal must fall below the threshold
     by a fifth of its swing before the next edge counts. A cubic spline through the edges gives the angle between them;
     where that would turn back, as beside a standstill, a monotone piecewise cubic does.
+
+    Missing and extra pulses, which would put the angle wrong by whole pitches from there on, are told from the
+    intervals beside them where the speed is even enough from pulse to pulse (`gearmbs.signals.pulses`), and mended with
+    a warning: an interval of k of its neighbours' counts as k pitches, two that add to one as one.
 
     Parameters
     ----------
@@ -78,17 +89,28 @@ def phase_from_tacho(
         Pulses per revolution.
     threshold : float, optional
         Level of the edges; default the middle between the 1st and the 99th percentile.
+    faults : {"mend", "refuse", "keep"}
+        What to do about missing and extra pulses: "keep" counts every pulse as it comes, as of a shaft that does jump
+        so, "refuse" raises.
 
     Returns
     -------
     xarray.DataArray
-        Dimension (time,), only the samples between the first and the last pulse.
+        Dimension (time,), only the samples between the first and the last pulse; attribute `notes`, where there was
+        something to mend.
+
+    Warns
+    -----
+    UserWarning
+        Where pulses are missing or too many, with times and numbers, and where an interval fits no whole number.
 
     Raises
     ------
     SignalError
         If the channel is unknown or fewer than three pulses are found.
     """
+    if faults not in ("mend", "refuse", "keep"):
+        raise SignalError(f"faults: must be 'mend', 'refuse' or 'keep', got {faults!r}")
     names = [str(c) for c in signal["channel"].values]
     if channel is None and len(names) > 1:
         raise SignalError(f"channel: name the tacho channel, one of {names}")
@@ -117,12 +139,22 @@ def phase_from_tacho(
     at = np.asarray(kept)
     times = signal["time"].values
     edges = times[at] + (level - pulses[at]) / (pulses[at + 1] - pulses[at]) / rate_of(signal)
-    angles = 2.0 * np.pi / pulses_per_rev * np.arange(at.size)
+    places = [] if faults == "keep" else pulse_faults(edges, pulses_per_rev)
+    notes = [f"Tacho {channel or names[0]!r}: {words}" for words in described(edges, places)]
+    if notes and faults == "refuse":
+        raise SignalError(f"faults: {' '.join(notes)} Mend them with faults='mend', or take them with faults='keep'")
+    for note in notes:
+        warnings.warn(note, UserWarning, stacklevel=3)
+    kept_edges, numbers = mended_count(edges.size, places)
+    edges, angles = edges[kept_edges], 2.0 * np.pi / pulses_per_rev * numbers
     inside = (times >= edges[0]) & (times <= edges[-1])
     phase = scipy.interpolate.CubicSpline(edges, angles)(times[inside])
     if np.any(np.diff(phase) <= 0.0):
         phase = monotone_cubic(edges, angles, times[inside])
-    return _phase(times[inside], phase, "tacho")
+    result = _phase(times[inside], phase, "tacho")
+    if notes:
+        result.attrs["notes"] = notes
+    return result
 
 
 @takes_data(frequency="frequency", half_bandwidth="frequency")

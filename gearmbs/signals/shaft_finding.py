@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from .speed import (
     SpeedEstimate,
     estimate_speed,
     find_comb,
+    line_near,
     own_lines_missing,
     prominence,
 )
@@ -138,6 +140,7 @@ def mesh_shaft(
         shaft = _near_speed(signal, teeth, found, notes)
     elif found is not None:
         shaft = found
+        notes += shaft.phase.attrs.get("notes", ())
     else:
         estimate = estimate_speed(signal, teeth, speed_range=known.speed_range)
         if estimate.phase is None:
@@ -165,17 +168,23 @@ def remark_plausibility(signal: xr.DataArray, speed: float | None, estimated: bo
 
 
 def _near_speed(signal: xr.DataArray, counts: tuple[int, ...], nominal: float, notes: list[str]) -> Shaft:
-    """Return the angle by the mesh line near a given speed, or at that speed where there is none."""
+    """Return the angle by the mesh line near a given speed, or at that speed where none stands out, which is told."""
     around = (nominal * (1.0 - SPEED_TOLERANCE), nominal * (1.0 + SPEED_TOLERANCE))
     found = _estimate(signal, counts, around)
-    _remark_other(signal, counts, nominal, found, notes)
+    doubted = _remark_other(signal, counts, nominal, found, notes)
+    sure = found is not None and not doubted
+    gmf = nominal * counts[0] / math.tau
+    line = gmf if sure else line_near(signal, gmf, SPEED_TOLERANCE)
+    if line is None and _turns(signal, nominal) >= FOLLOWED_TURNS:
+        notes.append(_nothing_near(counts[0], nominal, doubted))
+        return Shaft(phase_from_speed(signal, nominal), nominal, "as given")
     if found is not None and found.phase is not None:
         words = f"from the mesh line, {100 * (found.speed / nominal - 1):+.3f} % off the given speed"
         return Shaft(found.phase, found.speed, words, found)
-    try:
-        phase = phase_from_line(signal, nominal * counts[0] / math.tau, counts[0])
-    except SignalError:
-        phase = None
+    phase = None
+    if line is not None:
+        with suppress(SignalError):
+            phase = phase_from_line(signal, line, counts[0])
     if phase is not None and phase.attrs["quality"] >= MIN_QUALITY:
         followed = float(phase.attrs["mean_speed"])
         if abs(followed / nominal - 1) < SPEED_TOLERANCE:
@@ -184,9 +193,23 @@ def _near_speed(signal: xr.DataArray, counts: tuple[int, ...], nominal: float, n
     return Shaft(phase_from_speed(signal, nominal), nominal, "as given")
 
 
+def _nothing_near(count: int, nominal: float, doubted: bool) -> str:
+    """Say that the record does not confirm a speed, and ask for it unless it was `doubted` before."""
+    return (
+        f"{'No' if doubted else 'CHECK THE SPEED: no'} mesh line was found within {100 * SPEED_TOLERANCE:g} % "
+        f"of the given speed ({nominal * 30 / math.pi:.1f} rpm, {nominal * count / math.tau:.2f} Hz with {count} teeth)"
+        ", none that stands out from the noise and other lines. Is it the speed of the wheel with these teeth, in its "
+        "right unit? It is taken as constant."
+    )
+
+
+def _turns(signal: xr.DataArray, speed: float) -> float:
+    return signal.sizes["time"] / rate_of(signal) * speed / math.tau
+
+
 def _why_constant(signal: xr.DataArray, speed: float, otherwise: str) -> str:
     """Say why the speed is taken as constant: short records have nothing to follow it by, whatever their lines."""
-    turns = signal.sizes["time"] / rate_of(signal) * speed / math.tau
+    turns = _turns(signal, speed)
     if turns < FOLLOWED_TURNS:
         return (
             f"The speed is taken as constant: a record of {turns:.3g} revolutions is too short to follow the mesh line "
@@ -206,14 +229,20 @@ def _estimate(
 
 def _remark_other(
     signal: xr.DataArray, counts: tuple[int, ...], nominal: float, found: SpeedEstimate | None, notes: list[str]
-) -> None:
-    """Say so where the record, left to itself, shows another mesh frequency more clearly than near the given speed."""
+) -> bool:
+    """Say so where the record, left to itself, shows another mesh frequency more clearly than near the given speed.
+
+    Returns
+    -------
+    bool
+        Whether the given speed is in doubt.
+    """
     try:
         blind = find_comb(signal, counts, speed_range=None)
     except SignalError:
-        return
+        return False
     if abs(blind.speed / nominal - 1.0) < OTHER_COMB:
-        return
+        return False
     ratio = blind.speed / nominal
     here = "no mesh line" if found is None else f"only a comb of {found.score:.0f} dB"
     if found is not None and blind.score >= found.score + STRONGER_DB and not _related(blind, found):
@@ -222,7 +251,7 @@ def _remark_other(
             f"{blind.score:.0f} dB at {blind.gmf:.2f} Hz is stronger: another stage of the gearbox, or, with "
             f"{counts[0]} teeth, {blind.speed * 30 / math.pi:.1f} rpm."
         )
-        return
+        return False
     if found is not None and blind.score < found.score + STRONGER_DB:
         # half the speed has every line of the whole one among its own, and nearly its score
         whole = round(ratio)
@@ -231,13 +260,14 @@ def _remark_other(
             or abs(ratio / whole - 1.0) > SPEED_TOLERANCE
             or not own_lines_missing(signal, found.gmf, blind.gmf)
         ):
-            return
+            return False
         here = "hardly a line at the mesh frequency itself"
     notes.append(
         f"CHECK THE SPEED: near the given {nominal * 30 / math.pi:.1f} rpm there is {here}, but the record shows one "
         f"of {blind.score:.0f} dB at {blind.gmf:.2f} Hz, which with {counts[0]} teeth is "
         f"{blind.speed * 30 / math.pi:.1f} rpm ({ratio:.3f} times the given speed)."
     )
+    return True
 
 
 def _related(blind: Comb, found: SpeedEstimate) -> bool:

@@ -171,6 +171,64 @@ def find_comb(
     return Comb(count, float(gmf), float(direct[best]), float(score[best]))
 
 
+ELSEWHERE = np.r_[np.linspace(0.55, 0.94, 30), np.linspace(1.06, 1.9, 60)]
+"""Multiples of a speed at which nothing is expected; combs looked for there in the same way show what chance gives."""
+SHARED = (2.0 / 3.0, 3.0 / 4.0, 4.0 / 3.0, 3.0 / 2.0)
+"""Multiples whose combs have lines in common with that of the speed itself, and would be no chance."""
+AHEAD = 4.5
+"""Robust standard deviations over the median of those combs; the best of ninety in noise reaches three."""
+FEWEST_ELSEWHERE = 20
+FEWEST_BESIDE_ZERO = 4
+"""Bins from zero on that are left to the window and to the mean."""
+
+
+def line_near(signal: xr.DataArray, gmf: float, tolerance: float) -> float | None:
+    """Frequency of the mesh line near an expected one, if it stands out from what is found elsewhere.
+
+    The largest sum of the heights of up to four harmonics within the tolerance is compared with the same found near
+    other frequencies, from about half to about twice the expected one: noise, and the lines and sidebands of another
+    mesh, give as much there.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Dimensions (time, channel).
+    gmf : float
+        Expected gear mesh frequency, Hz.
+    tolerance : float
+        Part of it by which the line may be off.
+
+    Returns
+    -------
+    float or None
+        Hz; None if the line does not stand out, or nothing can be compared.
+    """
+    rate = rate_of(signal)
+    length = min(signal.sizes["time"], round(SEGMENT_SECONDS * rate))
+    power, _ = periodograms(signal.values, rate, length, "hann", 0.5, True, "power")
+    height = prominence(power).mean(axis=1)
+    width, top = rate / length, 0.5 * rate / (1.0 + tolerance)
+    harmonics = min(HARMONICS, math.floor(top / gmf))
+    others = gmf * ELSEWHERE[np.abs(ELSEWHERE[:, None] / np.array(SHARED) - 1.0).min(axis=1) > 2.0 * tolerance]
+    others = others[(others > FEWEST_BESIDE_ZERO * width) & (others * harmonics < top)]
+    if harmonics < 1 or others.size < FEWEST_ELSEWHERE:
+        return None
+
+    def best(middle: float) -> tuple[float, float]:
+        count = max(3, math.ceil(2.0 * tolerance * middle * 2 * HARMONICS / width))
+        candidates = np.linspace(middle * (1.0 - tolerance), middle * (1.0 + tolerance), count)
+        total = sum((_at(height, h * candidates, width) for h in range(1, harmonics + 1)), np.zeros(count))
+        # several candidates share the bins of the best
+        return float(total.max()), float(candidates[np.isclose(total, total.max())].mean())
+
+    found, frequency = best(gmf)
+    chance = np.array([best(other)[0] for other in others])
+    middle = float(np.median(chance))
+    # without noise nothing spreads: a decibel is less than any line has
+    spread = max(1.0, 1.4826 * float(np.median(np.abs(chance - middle))))
+    return frequency if found > chance.max() and found - middle > AHEAD * spread else None
+
+
 def own_lines_missing(signal: xr.DataArray, gmf: float, stronger: float) -> bool:
     """Whether a comb lives on the lines of another one, whose frequency is a multiple of its own.
 

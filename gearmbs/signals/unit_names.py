@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Mapping
 from typing import Any
 
-from .dimensions import ALIASES, DIMENSIONS, REPLACEMENTS
+from .dimensions import ALIASES, DIMENSIONS, REPLACEMENTS, unit_dimension
 from .errors import SignalError
 
 USUAL = (
     "m", "mm", "um", "m/s", "mm/s", "in/s", "m/s^2", "mm/s^2", "g", "mg", "N", "kN", "N*m", "V", "mV", "A", "mA", "Pa",
     "kPa", "bar", "rpm", "Hz", "rad/s", "deg/s", "rad", "deg", "degC", "K", "s", "ms", "W", "kW", "%", "1", "dB", "ips",
 )  # fmt: skip
+VIBRATION = ("'m/s^2'", "'g'", "'mg'", "'mm/s'", "'um'", "'N'")
+ELECTRICAL = frozenset({"V", "mV", "uV", "µV", "A", "mA", "C", "pC", "nC"})
 COUNTS = frozenset(
     {"", "unknown", "mixed", "counts", "count", "lsb", "digits", "digit", "adc", "eu", "a.u.", "au", "raw", "-"}
 )
@@ -27,6 +30,16 @@ def check_units(units: Any) -> None:
     for text in texts:
         if not isinstance(text, str):
             raise SignalError(f"units: must be text such as 'm/s^2', got {text!r}")
+        if _is_level(text):
+            raise SignalError(
+                f"units: {text!r} is a level, of which no RMS or spectrum can be had; give the samples as they were "
+                f"before the logarithm, in one of {', '.join(VIBRATION)}"
+            )
+        if (ratio := _sensitivity(text)) is not None:
+            raise SignalError(
+                f"units: {text!r} is a sensitivity or a scale, not a unit of samples; give units={ratio[0]!r} as they "
+                f"are, or scale them and give units={ratio[1]!r}"
+            )
         if not _is_unit(text):
             near = difflib.get_close_matches(text, USUAL, 2, 0.5)
             hint = (
@@ -35,6 +48,25 @@ def check_units(units: Any) -> None:
                 else "; write for example 'm/s^2' or 'g'"
             )
             raise SignalError(f"units: {text!r} is not a unit{hint}")
+
+
+def _is_level(text: str) -> bool:
+    return re.fullmatch(r"\s*dB\W?(?:[A-Za-z].*)?\s*", text) is not None
+
+
+def _sensitivity(text: str) -> tuple[str, str] | None:
+    """Return the electrical and the mechanical unit of "mV/g", or of "g/V"; None for what is no such ratio."""
+    first, last = text.partition("/"), text.rpartition("/")
+    electrical, mechanical = (first[0], first[2]) if first[0].strip() in ELECTRICAL else (last[2], last[0])
+    electrical, mechanical = electrical.strip(), mechanical.strip(" ()")
+    # V/m is the strength of a field
+    if electrical not in ELECTRICAL or mechanical in ("", "m"):
+        return None
+    try:
+        unit_dimension(mechanical)
+    except SignalError:
+        return None
+    return electrical, mechanical
 
 
 def is_usual(text: str) -> bool:

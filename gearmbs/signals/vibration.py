@@ -60,6 +60,8 @@ def vibration_report(
     missing: dict[str, str] = {}
     tell(0.0, "speed")
     found, kept = known_shaft(signal, known)
+    if isinstance(found, Shaft):
+        notes += found.phase.attrs.get("notes", ())
     speed, origin = _speed(kept, found, notes)
     remark_plausibility(kept, speed, False, notes)
     tell(0.1, "levels")

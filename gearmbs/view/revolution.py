@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 
 import numpy as np
@@ -14,6 +15,10 @@ from gearmbs.view.bars import state_colour
 from gearmbs.view.figure_style import GREY, drawn_on, label, look, new_figure
 from gearmbs.view.signals import quantity
 
+SHAFT_ORDERS = 6
+"""Up to this order a strong line is the shaft's own, of unbalance, misalignment or a coupling."""
+MESH_SHARE, NO_SHARE = 0.3, 0.01
+"""Parts of the power of a line that is certainly the mesh, and of those that are certainly none."""
 MOST_TICKS = 60
 """More teeth than this are not marked one by one."""
 
@@ -43,15 +48,26 @@ def average_plot(
     ax : matplotlib axes, optional
         For a single average.
 
+    Warns
+    -----
+    UserWarning
+        Where `teeth` are none of those that an average knows, or its mesh has another number of periods.
+
     Raises
     ------
     ValueError
-        If there is no average, no angle, or more than one channel.
+        If there is no average, no angle, more than one channel, or `teeth` is no whole number.
     """
     named = averages if isinstance(averages, Mapping) else {"": averages}
     if not named:
         raise ValueError("averages: empty; give at least one average")
     curves = {str(name): _curve(str(name), average) for name, average in named.items()}
+    if teeth is not None:
+        if isinstance(teeth, bool) or int(teeth) != teeth or teeth < 1:
+            raise ValueError(f"teeth: must be a whole number of teeth, got {teeth!r}")
+        for name, average in named.items():
+            if doubt := _doubt(average, curves[str(name)][:2], teeth):
+                warnings.warn(f"teeth={teeth}: {doubt}{f' ({name})' if name else ''}", UserWarning, stacklevel=2)
     if ax is not None and len(curves) > 1:
         raise ValueError(f"ax: one panel for {len(curves)} averages; give one or leave ax away")
     with look():
@@ -85,6 +101,23 @@ def average_plot(
         elif title:
             figure.suptitle(title)
     return figure
+
+
+def _doubt(average: xr.DataArray, curve: tuple[np.ndarray, np.ndarray], teeth: int) -> str | None:
+    """Say why an average is not of a wheel with so many teeth; None if nothing speaks against it."""
+    known = average.attrs.get("teeth")
+    if known is not None and teeth not in np.ravel(known):
+        return f"the average is of a pair with {', '.join(str(z) for z in np.ravel(known))} teeth"
+    angle, values = curve
+    power = np.abs(np.fft.rfft(values)) ** 2
+    total = float(power[1:].sum())
+    if angle[-1] >= 1.0 or total == 0.0:
+        return None
+    strongest = 1 + int(np.argmax(power[1:]))
+    own = float(power[teeth::teeth].sum())
+    if strongest > SHAFT_ORDERS and power[strongest] > MESH_SHARE * total and own < NO_SHARE * total:
+        return f"its strongest line has {strongest} periods a revolution, and there is none of {teeth} or a multiple"
+    return None
 
 
 def _numbers(averages: Iterable[xr.DataArray], teeth: int | None) -> list[tuple[int, float, int, str]] | None:

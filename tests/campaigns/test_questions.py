@@ -257,6 +257,55 @@ def test_bounds_hold_the_truth_however_bad_the_surrogate():
         total_bounds(u, np.ones(256), NAMES)
 
 
+def _additive(u):
+    return u[:, 0] + 0.5 * u[:, 1] + 0.05 * u[:, 2]
+
+
+def _with_noise(u):
+    """Ishigami's function and noise of RMS 0.7 of its own."""
+    return _values(u) + 2.6 * np.random.default_rng(int(1e6 * u[0, 0])).standard_normal(len(u))
+
+
+@pytest.mark.parametrize(
+    ("function", "truth"),
+    [
+        (_values, TOTAL),
+        (_additive, np.array([1.0, 0.25, 0.0025]) / 1.2525),
+        (_with_noise, np.array(TOTAL) * 13.845 / (13.845 + 2.6**2)),
+    ],
+)
+def test_bounds_of_random_points_are_in_order_and_hold(function, truth, monkeypatch):
+    """Independent random points, whose moments agree with no integral."""
+    pytest.importorskip("sklearn")
+    from sklearn.gaussian_process.kernels import Matern, WhiteKernel
+
+    # the bounds hold for any surrogate; the kernel's likeliest lengths are what takes the time
+    monkeypatch.setattr("gearmbs.campaigns.bounds._lengths", lambda x, y: Matern(1.0, nu=1.5) + WhiteKernel(0.01))
+    held = []
+    for seed in range(4):
+        u = np.random.default_rng(seed).random((80, 3))
+        found = total_bounds(u, function(u), NAMES)
+        assert (found.sure_low >= 0.0).all()
+        assert (found.sure_low <= found.low).all()
+        assert (found.low <= found.high).all()
+        assert (found.high <= found.sure_high).all()
+        assert (found.sure_high <= 1.0).all()
+        held += list((found.sure_low <= truth) & (truth <= found.sure_high))
+    assert np.mean(held) >= 0.95 - 1.0 / len(held)
+
+
+def test_bounds_of_noise_are_all_there_is(monkeypatch):
+    pytest.importorskip("sklearn")
+    from sklearn.gaussian_process.kernels import Matern, WhiteKernel
+
+    monkeypatch.setattr("gearmbs.campaigns.bounds._lengths", lambda x, y: Matern(1.0, nu=1.5) + WhiteKernel(0.01))
+    u = np.random.default_rng(2).random((60, 3))
+    with pytest.warns(UserWarning, match="explains nothing of 60 points.*anything from 0 to 1"):
+        found = total_bounds(u, np.random.default_rng(5).standard_normal(60), NAMES)
+    assert found.sure_low.tolist() == found.low.tolist() == [0.0] * 3
+    assert found.sure_high.tolist() == found.high.tolist() == [1.0] * 3
+
+
 def test_bounds_of_a_few_levels():
     """Two values of a factor: y = x1 + 3 x2, whose parts are 1/12 and 9/4 of 28/12 ... in closed form."""
     pytest.importorskip("sklearn")

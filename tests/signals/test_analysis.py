@@ -3,6 +3,7 @@
 import math
 import os
 import tracemalloc
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,11 @@ from gearmbs.signals import (
     analyse_file,
     compare_files,
     make_signal,
+    read_signal,
+    to_signal,
     write_signal,
 )
+from gearmbs.signals.shaft_finding import Known, mesh_shaft
 
 RATE = 12800.0
 TEETH = 32
@@ -98,6 +102,63 @@ def test_the_right_speed_of_a_weaker_stage_is_not_doubted():
     assert not [note for note in right.notes if note.startswith("CHECK")]
     half = analyse(record, teeth=21, speed="750 rpm")
     assert [note for note in half.notes if note.startswith("CHECK")]
+
+
+def _weak(size, seed):
+    """Twenty seconds at 1500 rpm that drift by 0.3 %, three harmonics of 21 teeth of this size in noise of RMS 1."""
+    rate, seconds = 6000.0, 20.0
+    t = np.arange(round(seconds * rate)) / rate
+    angle = 50 * math.pi * (t + 0.003 * seconds / math.tau * np.sin(math.tau * t / seconds))
+    line = sum(a * np.cos(21 * k * angle + k) for k, a in enumerate((1.0, 0.5, 0.3), 1)) * (1 + 0.3 * np.cos(angle))
+    return make_signal(size * line + np.random.default_rng(seed).standard_normal(t.size), rate)
+
+
+@pytest.mark.parametrize("speed", ["1500 rpm", "1489 rpm", "1512 rpm"])
+@pytest.mark.parametrize("size", [0.1, 0.2, 1.0])
+def test_a_speed_nearly_right_is_followed_in_noise(size, speed):
+    shaft, _ = mesh_shaft(_weak(size, 1), (21,), Known(speed=speed), notes := [])
+    assert "mesh line" in shaft.origin
+    assert shaft.speed == pytest.approx(50 * math.pi, rel=1e-3)
+    assert notes == []
+
+
+@pytest.mark.parametrize("speed", [1575.0, 1695.0, 1065.0])
+@pytest.mark.parametrize("size", [0.0, 0.1, 1.0])
+def test_a_wrong_speed_is_not_followed(size, speed):
+    """Noise has lines anywhere, and a true mesh line has sidebands."""
+    shaft, _ = mesh_shaft(_weak(size, 2), (21,), Known(speed=speed * math.pi / 30), notes := [])
+    assert shaft.origin == "as given"
+    assert shaft.speed == pytest.approx(speed * math.pi / 30)
+    said = [note for note in notes if "o mesh line was found within 2 % of the given speed" in note]
+    assert len(said) == 1
+    assert f"{speed:.1f} rpm" in said[0]
+
+
+@pytest.mark.parametrize("way", ["signal", "file", "call"])
+def test_speed_and_teeth_that_contradict_the_record_are_told(tmp_path, way):
+    own = record(seconds=2.0)[:, [0]]
+    own = make_signal(own.values, RATE, units="m/s^2", speed=2 * math.pi * 29.75, teeth=(TEETH, 45))
+    path = tmp_path / "own.csv"
+    write_signal(own, path)
+
+    def analysed(**given):
+        if way == "call":
+            return analyse(own, **given)
+        return analyse(to_signal(own, **given) if way == "signal" else read_signal(path, **given))
+
+    with pytest.warns(UserWarning, match=r"teeth=31 is given, but .* itself says 32, 45; the given ones are used"):
+        report = analysed(teeth=31)
+    assert report.teeth == (31,)
+    assert any("teeth=31 is given" in note for note in report.notes)
+    with pytest.warns(UserWarning, match=r"speed=1700 rpm is given, but .* itself says 1785 rpm; the given one"):
+        report = analysed(speed="1700 rpm")
+    assert report.speed == pytest.approx(1700 * math.pi / 30, rel=0.02)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # a nominal speed, and the first of both wheels, contradict nothing
+        report = analysed(speed="1770 rpm", teeth=TEETH)
+    assert report.speed == pytest.approx(2 * math.pi * 29.75, rel=1e-3)
+    assert report.notes == []
 
 
 def test_report_reads_well():

@@ -23,6 +23,7 @@ from gearmbs.signals import (
     units_of,
     write_signal,
 )
+from gearmbs.signals.dimensions import unit_dimension
 
 RATE = 12800.0
 COUNT = 64
@@ -553,3 +554,28 @@ def test_damaged_files_give_a_signal_or_one_line(tmp_path, name, capfd):
             assert np.isfinite(signal.values).all()
     assert lines == {0}
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("units", ["mV/g", "pC/g", "mV/(m/s^2)", "G/V", "m/s^2/V", "mV/um"])
+def test_a_sensitivity_is_no_unit_of_samples(units):
+    with pytest.raises(SignalError, match=r"is a sensitivity or a scale.* give units='(mV|pC|V)'"):
+        to_signal([0.0, 1.0, 2.0], rate=10.0, units=units)
+
+
+@pytest.mark.parametrize("units", ["dB", "dBA", "dB(A)", "dB re 1e-6 m/s^2"])
+def test_a_level_is_no_unit_of_samples(units):
+    with pytest.raises(SignalError, match=r"is a level.*one of 'm/s.2', 'g', 'mg'"):
+        to_signal([0.0, 1.0, 2.0], rate=10.0, units=units)
+
+
+@pytest.mark.parametrize(
+    ("units", "factor"), [("g", 9.80665), ("G", 9.80665), ("mg", 9.80665e-3), ("mm/s^2", 1e-3), ("m/s²", 1.0)]
+)
+def test_units_of_acceleration(units, factor):
+    signal = to_signal([0.0, 1.0, 2.0], rate=10.0, units=units)
+    assert unit_dimension(signal.attrs["units"]) == ("acceleration", pytest.approx(factor))
+
+
+@pytest.mark.parametrize("units", ["V/m", "V/s", "mm/s", "A/m", "N/m", "C", "deg/s", "1/s"])
+def test_quotients_that_are_units(units):
+    assert to_signal([0.0, 1.0, 2.0], rate=10.0, units=units).attrs["units"] == units

@@ -2,6 +2,7 @@
 
 import gzip
 import struct
+import warnings
 
 import h5py
 import numpy as np
@@ -439,6 +440,34 @@ def test_a_file_of_ours_cut_anywhere_is_refused(tmp_path, ending):
             read_signal(path)
     path.write_bytes(data)
     np.testing.assert_allclose(read_signal(path).values, values, atol=1e-9 if ending != ".wav" else 1e-4)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize(
+    ("cut", "said"),
+    [
+        ("", None),
+        ("\n", "line 301: The last line has no end"),
+        ("34\n", "line 301: The last line has no end, and its last number has fewer digits"),
+    ],
+)
+def test_the_end_of_a_table_of_others_is_looked_at(tmp_path, cut, said, packed):
+    """Numbers of four decimals, whole, without the last end of line, and cut; and the same packed."""
+    text = "time,acc\n" + "".join(f"{k / 1000:.4f},{k % 7 + 0.1234:.4f}\n" for k in range(300))
+    path = tmp_path / ("a.csv.gz" if packed else "a.csv")
+    body = text.removesuffix(cut).encode()
+    path.write_bytes(gzip.compress(body) if packed else body)
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        notes = read_signal(path).attrs.get("notes", [])
+    assert len(notes) == (said is not None)
+    assert said is None or f"{path.name}, {said}" in notes[0]
+    # a writer that ends no last line has lost nothing, as its digits say
+    assert [str(w.message) for w in warned] == (notes if cut == "34\n" else [])
+    if cut == "34\n":
+        path.write_bytes(gzip.compress(body + b"\n") if packed else body + b"\n")
+        with pytest.warns(UserWarning, match=f"{path.name}, line 301: The last line's last number has fewer digits"):
+            read_signal(path)
 
 
 @pytest.mark.parametrize("columns", [1, 2, 3])

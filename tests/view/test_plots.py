@@ -1,3 +1,5 @@
+import warnings
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -77,6 +79,31 @@ def test_averages_share_their_axes_and_count_teeth(signal):
     assert abs(two.lines[0].get_ydata().mean()) < 1e-12
     assert_readable(figure)
     assert average_plot(average).axes[0].get_xlabel() == "revolution, from the record's first sample"
+
+
+def test_teeth_that_an_average_does_not_have_are_told(signal):
+    average = signals.time_synchronous_average(signal, signals.phase_from_speed(signal, signal.attrs["speed"]))[:, [0]]
+    unknown = average.copy()
+    unknown.attrs = {k: v for k, v in average.attrs.items() if k != "teeth"}
+    turn = average["angle"].values
+    mesh = unknown.copy(data=(np.cos(29 * 2 * np.pi * turn) + 0.3 * np.cos(2 * np.pi * turn))[:, None])
+    with pytest.warns(UserWarning, match=r"teeth=31: its strongest line has 29 periods a revolution.*\(a\)"):
+        average_plot({"a": mesh}, teeth=31)
+    with pytest.warns(UserWarning, match=r"teeth=31: the average is of a pair with 29, 47 teeth"):
+        average_plot(mesh.assign_attrs(teeth=(29, 47)), teeth=31)
+    with pytest.warns(UserWarning, match="teeth=47: its strongest line has 29 periods"):
+        average_plot(mesh.assign_attrs(teeth=(29, 47)), teeth=47)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        average_plot(mesh, teeth=29)
+        average_plot(mesh.assign_attrs(teeth=(47, 29)), teeth=29)
+        # a line of the shaft, a second harmonic alone, and one click a turn speak against no number of teeth
+        average_plot(unknown.copy(data=np.cos(2 * np.pi * 2 * turn)[:, None]), teeth=31)
+        average_plot(unknown.copy(data=np.cos(2 * np.pi * 62 * turn)[:, None]), teeth=31)
+        average_plot(unknown.copy(data=np.exp(-(((turn - 0.5) / 0.01) ** 2))[:, None]), teeth=31)
+    for wrong in (29.5, 0, True):
+        with pytest.raises(ValueError, match="teeth: must be a whole number"):
+            average_plot(mesh, teeth=wrong)
 
 
 @pytest.mark.parametrize("case", range(cases(12)))
