@@ -120,11 +120,15 @@ def choose_end(st):
     st.h = min(st.h, st.h_max)
     h_min = max(st.h_min, ROUNDED_STEP * abs(t_old))
     stop = st.t_end
+    wanted = st.h
     if st.next_stop < st.stops.shape[0]:
         stop = min(stop, st.stops[st.next_stop])
+        if st.passing:
+            # at its ends alone an interval between two stops may be as the ones beside it
+            wanted = min(wanted, 0.5 * (stop - t_old))
     if not st.interpolate and st.next_output < st.outputs.shape[0]:
         stop = min(stop, st.outputs[st.next_output])
-    t = fitted_end(st.h, t_old, stop)
+    t = fitted_end(wanted, t_old, stop)
     if t - t_old < h_min and t < stop and st.h_refused > (1.0 + 1e-9) * h_min:
         st.h = h_min
         t = fitted_end(h_min, t_old, stop)
