@@ -167,8 +167,9 @@ def _pole_between(functions, st, old):
         if not np.isfinite(fm):
             break
         m = a + (NEAR if divisions % 2 == 0 else FAR) * (b - a)
-        y_a, y_m, y_b = _place(st, old, first, a), _place(st, old, first, m), _place(st, old, first, b)
-        if y_m == y_a or y_m == y_b:
+        y_a, y_b = _place(st, old, first, a), _place(st, old, first, b)
+        if abs(y_b - y_a) <= ROUNDED_TERMS * EPS * max(abs(y_a), abs(y_b)):
+            # what the equation makes of the unknown is rounded too
             break
         _terms(functions, st, old, suspect, m, at_m)
         fm = at_m[row]
