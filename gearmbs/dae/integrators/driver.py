@@ -319,7 +319,8 @@ class Run:
             return status, messages.not_finite(problem, t, worst)
         if status is Status.STEP_TOO_SMALL:
             worst = st.worst_error
-            told = messages.step_too_small(problem, t, h, worst, st.error, self._noise())
+            ends = self._end() if st.pole_met else ""
+            told = messages.step_too_small(problem, t, h, worst, st.error, self._noise(), ends)
             return status, told
         if status in (Status.NEWTON_FAILURE, Status.TOO_MANY_REJECTIONS) and st.newton_fails > 0:
             if st.index_changes:
@@ -343,6 +344,8 @@ class Run:
     def _end(self) -> str:
         """Say how the solution ends where the last attempts found none on its branch."""
         st = self.state
+        if st.pole_met:
+            return messages.passes_pole(self.problem, st.pole, st.pole_at)
         if st.jumped >= 0:
             return messages.branch_ends(self.problem, st.jumped, st.jump_from, st.jump_to)
         return messages.solution_ends(self.problem, st.worst_row, st.violation)

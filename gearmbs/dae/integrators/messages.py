@@ -148,12 +148,14 @@ def _rounding(noise: float) -> str:
     )
 
 
-def step_too_small(problem: DAEProblem, t: float, h: float, worst: int, error: float, noise: float = 0.0) -> str:
+def step_too_small(
+    problem: DAEProblem, t: float, h: float, worst: int, error: float, noise: float = 0.0, ends: str = ""
+) -> str:
     """Explain a run that would need steps below HMIN."""
     what = f"; the error is dominated by {unknown_name(problem, worst)} ({error:.3g} times its tolerance)"
     return (
         f"{Status.STEP_TOO_SMALL.sentence} At t = {t:.9g} with h = {h:.3g}{what if error > 0.0 else ''}."
-        f"{_rounding(noise)} {advice(problem, Status.STEP_TOO_SMALL)}"
+        f"{_rounding(noise)} {ends or advice(problem, Status.STEP_TOO_SMALL)}"
     )
 
 
@@ -203,6 +205,15 @@ def branch_ends(problem: DAEProblem, unknown: int, before: float, after: float) 
     return (
         f"{unknown_name(problem, unknown)} would jump from {before:.6g} to {after:.6g}, another branch of an equation "
         f"that does not jump. {ENDS}"
+    )
+
+
+def passes_pole(problem: DAEProblem, unknown: int, place: float) -> str:
+    """Explain a rate with a pole, at which a solution ends from either side."""
+    name = unknown_name(problem, unknown)
+    return (
+        f"The rate of {name} has a pole near {name} = {place:.6g} and points at it from both sides, so that no "
+        f"solution goes on from there. {ENDS}"
     )
 
 

@@ -17,6 +17,25 @@ RATE_OF_FRESH = 0.1
 PLANNED_RANGE = 1e4
 """Ratio of leading coefficients within which a plan that leaves negligible entries out is trusted."""
 DROPPED_STEPS = 5
+LEAP = 100.0
+"""Ratio of a derivative to that by the rate, and to itself before: the square of that of two distances from a pole."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _watch_leaps(st):
+    """Note in ``st.leapt`` an unknown whose own derivative, without that of its rate, has leapt since the last matrix.
+
+    So it does next to a pole, see `gearmbs.dae.integrators.poles`. The note stands as long as the derivative is large.
+    """
+    jac, slope, matrix, before = st.jac, st.jac_slope, st.matrix, st.leapt
+    st.leapt = -1
+    for m in range(st.n_carried):
+        p = st.carried[m]
+        rate = st.gamma * abs(slope[p])
+        own = abs(jac[p] - st.gamma * slope[p])
+        last = abs(matrix[p] - st.gamma_factored * slope[p])
+        if own > LEAP * rate and (own > LEAP * last or st.entry_col[p] == before):
+            st.leapt = st.entry_col[p]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -39,6 +58,8 @@ def evaluate_matrix(functions, st):
                 st.carried[st.n_carried] = p
                 st.n_carried += 1
     st.gamma_evaluated = gamma
+    if st.steps > 0:
+        _watch_leaps(st)
     copy(jac, st.matrix)
     st.matrix_judged = False
 

@@ -148,6 +148,10 @@ class RunState(Struct):
     jumped: int  # unknown of index one that left its branch, -1 for none
     jump_from: float
     jump_to: float
+    pole: int  # unknown whose rate has a pole that a step of the run has met, -1 for none
+    pole_met: bool  # whether an attempt of the open step has
+    leapt: int  # unknown whose own derivative was a multiple of the one before at the last evaluation, -1 for none
+    pole_at: float  # its value there
     violation: float  # its residual, in units of what tolerances and rounding explain
     # the Newton matrix
     matrix_wanted: bool  # to be evaluated at the next prediction

@@ -23,6 +23,7 @@ from gearmbs.dae.integrators.corrector import CONVERGED, NOT_FINITE, SLOW, corre
 from gearmbs.dae.integrators.events import RECORD, STOP, cut_step, end_of_step, locate_events, write_outputs
 from gearmbs.dae.integrators.history import copy, forget, open_row, record_history, respace, rows_from, times_from
 from gearmbs.dae.integrators.newton_matrix import SLOPE_MAX_AGE, form_matrix, renew_matrix
+from gearmbs.dae.integrators.poles import passes_pole
 from gearmbs.dae.integrators.rounding import accept_noise, count_noise, forget_noise, remember_noise
 from gearmbs.dae.integrators.run_state import STATE_TYPE
 from gearmbs.dae.integrators.weights import renew_weights, weighted_argmax
@@ -81,6 +82,7 @@ def open_step(st):
     st.start_tries = 0
     st.worst_row = -1
     st.jumped = -1
+    st.pole_met = False
     st.index_changes = False
     st.violation = 0.0
     st.h = max(st.h, st.h_min, ROUNDED_STEP * abs(st.t))
@@ -118,11 +120,15 @@ def choose_end(st):
     st.h = min(st.h, st.h_max)
     h_min = max(st.h_min, ROUNDED_STEP * abs(t_old))
     stop = st.t_end
+    wanted = st.h
     if st.next_stop < st.stops.shape[0]:
         stop = min(stop, st.stops[st.next_stop])
+        if st.passing:
+            # at its ends alone an interval between two stops may be as the ones beside it
+            wanted = min(wanted, 0.5 * (stop - t_old))
     if not st.interpolate and st.next_output < st.outputs.shape[0]:
         stop = min(stop, st.outputs[st.next_output])
-    t = fitted_end(st.h, t_old, stop)
+    t = fitted_end(wanted, t_old, stop)
     if t - t_old < h_min and t < stop and st.h_refused > (1.0 + 1e-9) * h_min:
         st.h = h_min
         t = fitted_end(h_min, t_old, stop)
@@ -521,6 +527,11 @@ def advance(functions, st, part, plan, factors, max_accepted):
                 return code
         elif not passes_error_test(st, plan, factors):
             refuse_by_error(st)
+        elif passes_pole(functions, st):
+            forget_noise(st)
+            code = refuse_by_newton(st, SLOW)
+            if code != s.RUNNING:
+                return code
         else:
             accept(st)
             accepted += 1

@@ -223,6 +223,27 @@ def test_a_jump_at_a_breakpoint_restarts_at_order_one(method):
 
 
 @pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
+@pytest.mark.parametrize("width", [1e-4, 1e-2])
+def test_a_pulse_between_two_breakpoints_is_seen_whichever_side_they_belong_to(width, method):
+    first, last = 0.5, 0.5 + width
+    for with_first in (False, True):
+        for with_last in (False, True):
+
+            def residual(t, y, yp, out, p):
+                pushed = (p[0] < t < p[1]) or (p[2] > 0.0 and t == p[0]) or (p[3] > 0.0 and t == p[1])
+                out[0] = yp[0] - (1.0 / (p[1] - p[0]) if pushed else 0.0)
+
+            p = [first, last, float(with_first), float(with_last)]
+            for tol in (1e-4, 1e-8):
+                result = solve_dae(
+                    residual, (0.0, 1.0), [0.0], rtol=tol, atol=tol, method=method, breakpoints=[first, last], p=p
+                )
+                assert result.success, result.message
+                off = abs(result.y[-1, 0] - 1.0)
+                assert off < 20.0 * tol, f"{with_first}, {with_last}, tol = {tol:g}: off by {off / tol:.3g} tolerances"
+
+
+@pytest.mark.parametrize("method", ["WSTIFF", "GSTIFF"])
 @pytest.mark.parametrize("tol", [1e-4, 1e-6, 1e-8, 1e-10])
 def test_breakpoints_where_nothing_jumps_leave_steps_and_error_alone(tol, method):
     def parabola(t, y, yp, out):
