@@ -27,6 +27,8 @@ from gearmbs.units import Quantity, to_si
 MEMBERS = ("sun", "carrier", "ring")
 FITTING = 1e-6
 """Part of a pitch by which planets may miss the place where they fit."""
+LEFT_OVER = 1e-4
+"""Share of forces in step below which their sum is none: places of planets are exact to `FITTING` of a pitch."""
 NEARBY = 8
 """Teeth by which sun and planet of a set that is recommended may differ."""
 
@@ -340,15 +342,32 @@ class PlanetarySet(Written):
         return phase
 
     def harmonic_action(self, harmonic: int, which: str = "ring") -> str:
-        """What a mesh harmonic of equally spaced planets does to a central member: "torque", "force" or "none".
+        """What a mesh harmonic of equal planets does to the sun or the ring.
+
+        Parameters
+        ----------
+        harmonic : int
+            Of the mesh frequency; 0 is the mean.
+        which : {"ring", "sun"}
+
+        Returns
+        -------
+        str
+            "torque", "force" (across the axis) or "none"; "torque and force" where planets are not equally spaced.
 
         References
         ----------
         R. G. Parker: A physical explanation for the effectiveness of planet phasing. J. Sound Vibr. 236 (2000) 561-573.
         """
+        require(which in ("sun", "ring"), f"which is {which!r}; choose 'sun' or 'ring'")
+        require(harmonic >= 0 and harmonic == int(harmonic), f"harmonic is {harmonic!r}; give a whole number from 0 up")
         teeth = self.sun.teeth if which == "sun" else self.ring.teeth
-        rest = harmonic * teeth % self.planets
-        return "torque" if rest == 0 else "force" if rest in (1, self.planets - 1) else "none"
+        psi = np.array(self.angles, dtype=float) - float(self.angles[0])  # type: ignore[index]
+        turns = [
+            abs(np.exp(1j * (harmonic * teeth + one) * psi).sum()) > LEFT_OVER * self.planets for one in (0, 1, -1)
+        ]
+        acts = {"torque": turns[0], "force": turns[1] or turns[2]}
+        return " and ".join(name for name, does in acts.items() if does) or "none"
 
     # --- speeds, torques, frequencies -----------------------------------------------------------------
 

@@ -165,6 +165,20 @@ def test_phases_of_the_first_stage_of_a_wind_turbine():
     assert [gears.harmonic_action(h) for h in (1, 2, 3)] == ["force", "force", "torque"]
 
 
+def test_harmonics_of_unequally_spaced_planets():
+    """Equal angles leave a torque alone, others torque and force; two opposite pairs act as four equal planets do."""
+    equal = planetary((24, 30, 84), "1.5 mm")
+    assert [equal.harmonic_action(h, "sun") for h in (0, 1, 2)] == ["torque"] * 3
+    uneven = planetary((24, 30, 84), "1.5 mm", angles=["0 deg", "120 deg", "200 deg"])
+    # phases 0, 0, 1/3 of a cycle: the sum of the third harmonics is as large as of planets in phase, for torque
+    assert [uneven.harmonic_action(h, "sun") for h in (1, 3)] == ["torque and force"] * 2
+    pairs = planetary((24, 30, 84), "1.5 mm", planets=4, angles=["0 deg", "80 deg", "180 deg", "260 deg"])
+    assert [pairs.harmonic_action(h, "sun") for h in (1, 2, 3)] == ["torque"] * 3
+    for wrong in ({"harmonic": 1.5}, {"harmonic": -1}, {"harmonic": 1, "which": "carrier"}):
+        with pytest.raises(ValueError, match=r"harmonic is|which is 'carrier'; choose 'sun' or 'ring'"):
+            equal.harmonic_action(**wrong)
+
+
 def test_laws_of_speeds_and_torques():
     gears = planetary((28, 36, 100), "2 mm", 4)
     speeds = gears.speeds(sun=30.0, carrier=2.0)
