@@ -65,8 +65,8 @@ class Measures:
             k = int(doubtful[0])
             warnings.warn(
                 f"joint '{found.name}': its full turns cannot be counted surely from t = {t[k]:.6g} to "
-                f"{t[k + 1]:.6g} s, where it turns {abs(steps[k]) / (2 * np.pi):.3g} times between two outputs and its speed changes; "
-                "simulate with a higher rate",
+                f"{t[k + 1]:.6g} s, where it turns {abs(steps[k]) / (2 * np.pi):.3g} times between two outputs and its "
+                "speed changes; simulate with a higher rate",
                 stacklevel=3,
             )
         return wanted[0] + np.concatenate([[0.0], np.cumsum(steps + rest - 2 * np.pi * turns)])
