@@ -266,6 +266,12 @@ class PlanetarySet(Written):
 
     def _pairs(self, one: GearSpec, two: GearSpec, thin: str, backlash: float, mesh: str) -> tuple[GearPair, ...]:
         plain = PairGeometry(one, two)
+        require(
+            abs(plain.base_radius_sum) < self.carrier_radius,
+            f"PlanetarySet cannot be assembled: {one.name} and {two.name} do not mesh at the carrier_radius of "
+            f"{self.carrier_radius * 1e3:.4f} mm, for their centres are {plain.nominal_centre_distance * 1e3:.4f} mm "
+            "apart; change their teeth or profile shifts, or give another carrier_radius",
+        )
         error = self.carrier_radius - plain.nominal_centre_distance
         own = plain.normal_backlash_of(self.carrier_radius)
         cut = max(0.0, backlash - own) / math.cos(one.transverse_pressure_angle)

@@ -165,6 +165,15 @@ def test_phases_of_the_first_stage_of_a_wind_turbine():
     assert [gears.harmonic_action(h) for h in (1, 2, 3)] == ["force", "force", "torque"]
 
 
+def test_a_second_wheel_that_does_not_reach_the_ring_is_refused():
+    step = GearSpec(20, "1.5 mm", name="step")
+    assert planetary((24, 30, 74), "1.5 mm", 1, planet_at_ring=step).pairs_ring[0].centre_distance == 40.5e-3
+    with pytest.raises(
+        ValueError, match=r"step and ring do not mesh at the carrier_radius of 40\.5000 mm, .* 48\.0000 mm"
+    ):
+        planetary((24, 30, 84), "1.5 mm", 1, planet_at_ring=step).pairs_ring  # noqa: B018
+
+
 def test_harmonics_of_unequally_spaced_planets():
     """Equal angles leave a torque alone, others torque and force; two opposite pairs act as four equal planets do."""
     equal = planetary((24, 30, 84), "1.5 mm")
