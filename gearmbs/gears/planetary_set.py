@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -29,6 +30,8 @@ FITTING = 1e-6
 """Part of a pitch by which planets may miss the place where they fit."""
 LEFT_OVER = 1e-4
 """Share of forces in step below which their sum is none: places of planets are exact to `FITTING` of a pitch."""
+UNASKED = 1e-3
+"""Share of a backlash that is asked for, beyond which more than that is told."""
 NEARBY = 8
 """Teeth by which sun and planet of a set that is recommended may differ."""
 
@@ -50,7 +53,8 @@ class PlanetarySet(Written):
         Second wheel of stepped planets, which meshes with the ring instead; it is turned on each planet so that it
         fits.
     backlash_sun, backlash_ring : float or str
-        Normal backlash of the meshes, m, made by thinning the teeth of sun and ring.
+        Normal backlash of the meshes, m, made by thinning the teeth of sun and ring; at least what ``carrier_radius``
+        leaves.
     contact : ContactLaw, optional
         Of all tooth pairs; default: each mesh has the stiffness of its own wheels and a damping ratio.
     friction : FlankFriction
@@ -274,6 +278,13 @@ class PlanetarySet(Written):
         )
         error = self.carrier_radius - plain.nominal_centre_distance
         own = plain.normal_backlash_of(self.carrier_radius)
+        if own > backlash * (1.0 + UNASKED) > 0.0:
+            warnings.warn(
+                f"PlanetarySet.backlash_{mesh} is {backlash * 1e3:.4g} mm, but at the carrier_radius of "
+                f"{self.carrier_radius * 1e3:.4f} mm {one.name} and {two.name} have {own * 1e3:.4g} mm, which thinner "
+                "teeth do not lessen; change the carrier_radius or the profile shifts",
+                stacklevel=2,
+            )
         cut = max(0.0, backlash - own) / math.cos(one.transverse_pressure_angle)
         if cut > 0 and thin == "one":
             one = replace(one, thinning=one.thinning + cut)

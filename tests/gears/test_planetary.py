@@ -2,6 +2,7 @@
 
 import math
 import re
+import warnings
 
 import numpy as np
 import pytest
@@ -172,6 +173,21 @@ def test_a_second_wheel_that_does_not_reach_the_ring_is_refused():
         ValueError, match=r"step and ring do not mesh at the carrier_radius of 40\.5000 mm, .* 48\.0000 mm"
     ):
         planetary((24, 30, 84), "1.5 mm", 1, planet_at_ring=step).pairs_ring  # noqa: B018
+
+
+def test_backlash_beyond_what_was_asked_is_told():
+    """A carrier 0.1 mm too wide leaves 2 sin(alpha) of it between sun and planet; the ring is thinned as asked."""
+    wide = {"carrier_radius": "40.6 mm", "backlash_sun": "0.05 mm", "backlash_ring": "0.05 mm"}
+    said = r"backlash_sun is 0\.05 mm, but at the carrier_radius of 40\.6000 mm sun and planet have 0\.06904 mm"
+    with pytest.warns(UserWarning, match=said):
+        gears = planetary((24, 30, 84), "1.5 mm", **wide)
+    assert gears.pairs_sun[0].normal_backlash == pytest.approx(2e-4 * np.sin(np.radians(20.0)), rel=0.01)
+    assert gears.pairs_ring[0].normal_backlash == pytest.approx(0.05e-3, rel=1e-6)
+    # as drawn, or where the backlash is left to the drawing, nothing is to be told
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", message=".*backlash_sun")
+        for settings in ({**wide, "carrier_radius": "40.5 mm"}, {"carrier_radius": "40.6 mm"}):
+            assert planetary((24, 30, 84), "1.5 mm", **settings).pairs_sun
 
 
 def test_harmonics_of_unequally_spaced_planets():
