@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -27,6 +28,10 @@ from gearmbs.units import Quantity, to_si
 MEMBERS = ("sun", "carrier", "ring")
 FITTING = 1e-6
 """Part of a pitch by which planets may miss the place where they fit."""
+LEFT_OVER = 1e-4
+"""Share of forces in step below which their sum is none: places of planets are exact to `FITTING` of a pitch."""
+UNASKED = 1e-3
+"""Share of a backlash that is asked for, beyond which more than that is told."""
 NEARBY = 8
 """Teeth by which sun and planet of a set that is recommended may differ."""
 
@@ -48,7 +53,8 @@ class PlanetarySet(Written):
         Second wheel of stepped planets, which meshes with the ring instead; it is turned on each planet so that it
         fits.
     backlash_sun, backlash_ring : float or str
-        Normal backlash of the meshes, m, made by thinning the teeth of sun and ring.
+        Normal backlash of the meshes, m, made by thinning the teeth of sun and ring; at least what ``carrier_radius``
+        leaves.
     contact : ContactLaw, optional
         Of all tooth pairs; default: each mesh has the stiffness of its own wheels and a damping ratio.
     friction : FlankFriction
@@ -264,8 +270,21 @@ class PlanetarySet(Written):
 
     def _pairs(self, one: GearSpec, two: GearSpec, thin: str, backlash: float, mesh: str) -> tuple[GearPair, ...]:
         plain = PairGeometry(one, two)
+        require(
+            abs(plain.base_radius_sum) < self.carrier_radius,
+            f"PlanetarySet cannot be assembled: {one.name} and {two.name} do not mesh at the carrier_radius of "
+            f"{self.carrier_radius * 1e3:.4f} mm, for their centres are {plain.nominal_centre_distance * 1e3:.4f} mm "
+            "apart; change their teeth or profile shifts, or give another carrier_radius",
+        )
         error = self.carrier_radius - plain.nominal_centre_distance
         own = plain.normal_backlash_of(self.carrier_radius)
+        if own > backlash * (1.0 + UNASKED) > 0.0:
+            warnings.warn(
+                f"PlanetarySet.backlash_{mesh} is {backlash * 1e3:.4g} mm, but at the carrier_radius of "
+                f"{self.carrier_radius * 1e3:.4f} mm {one.name} and {two.name} have {own * 1e3:.4g} mm, which thinner "
+                "teeth do not lessen; change the carrier_radius or the profile shifts",
+                stacklevel=2,
+            )
         cut = max(0.0, backlash - own) / math.cos(one.transverse_pressure_angle)
         if cut > 0 and thin == "one":
             one = replace(one, thinning=one.thinning + cut)
@@ -340,15 +359,32 @@ class PlanetarySet(Written):
         return phase
 
     def harmonic_action(self, harmonic: int, which: str = "ring") -> str:
-        """What a mesh harmonic of equally spaced planets does to a central member: "torque", "force" or "none".
+        """What a mesh harmonic of equal planets does to the sun or the ring.
+
+        Parameters
+        ----------
+        harmonic : int
+            Of the mesh frequency; 0 is the mean.
+        which : {"ring", "sun"}
+
+        Returns
+        -------
+        str
+            "torque", "force" (across the axis) or "none"; "torque and force" where planets are not equally spaced.
 
         References
         ----------
         R. G. Parker: A physical explanation for the effectiveness of planet phasing. J. Sound Vibr. 236 (2000) 561-573.
         """
+        require(which in ("sun", "ring"), f"which is {which!r}; choose 'sun' or 'ring'")
+        require(harmonic >= 0 and harmonic == int(harmonic), f"harmonic is {harmonic!r}; give a whole number from 0 up")
         teeth = self.sun.teeth if which == "sun" else self.ring.teeth
-        rest = harmonic * teeth % self.planets
-        return "torque" if rest == 0 else "force" if rest in (1, self.planets - 1) else "none"
+        psi = np.array(self.angles, dtype=float) - float(self.angles[0])  # type: ignore[index]
+        turns = [
+            abs(np.exp(1j * (harmonic * teeth + one) * psi).sum()) > LEFT_OVER * self.planets for one in (0, 1, -1)
+        ]
+        acts = {"torque": turns[0], "force": turns[1] or turns[2]}
+        return " and ".join(name for name, does in acts.items() if does) or "none"
 
     # --- speeds, torques, frequencies -----------------------------------------------------------------
 

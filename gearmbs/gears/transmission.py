@@ -14,6 +14,7 @@ from gearmbs.contact import GAP_COLUMNS, gear_contact, layout, pair_gaps
 from gearmbs.gears.contact_model import varying_along_face
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.tables import most_pairs, pack
+from gearmbs.gears.tooth_deviations import FACE_SECTIONS
 from gearmbs.progress import waiting
 from gearmbs.units import Quantity, to_si
 
@@ -129,6 +130,24 @@ class StaticMesh:
         if self.geometry.driver.helix_angle and self.gi[layout.SLICES] > 1:
             # a contact line that leans over the flank may begin and end anywhere
             self.sections = np.linspace(*self.geometry.common_face, self.gi[layout.SLICES] + 1)
+        self.between = self._faulty_sections() if self.gi[layout.SLICES] > 1 else np.zeros(0)
+
+    def _faulty_sections(self) -> np.ndarray:
+        """Sections within the common face where flanks with faults along it may come closest, m.
+
+        Deviations are linear between the sections of their tables, so that the gap of parallel axes is least in one of
+        these or at an end of the face.
+        """
+        if not any(fault.along_face for fault in self.pair.faults):
+            return np.zeros(0)
+        low, high = self.geometry.common_face
+        half = 0.5 * self.geometry.axial_shift
+        faces = [
+            middle + gear.face_width * np.linspace(-0.5, 0.5, FACE_SECTIONS)
+            for middle, gear in zip((-half, half), self.geometry.wheels)
+        ]
+        sections = np.unique(np.concatenate(faces))
+        return sections[(sections > low) & (sections < high)]
 
     def torque(self, driver_angle: float, driven_angle: float) -> tuple[float, float]:
         """Contact torque on the driven wheel about its axis, N m, and its derivative by the driven angle."""
@@ -149,11 +168,15 @@ class StaticMesh:
         """Rows of ``gearmbs.contact.pair_gaps``.
 
         By default in the sections where flanks may come closest: at the ends of the common face, mid-face for one
-        slice, at the nodes of all slices for helical wheels.
+        slice, at the nodes of all slices for helical wheels, and between where faults vary along the face.
         """
-        place = self.geometry.frames(driver_angle, driven_angle)
         if sections is None:
-            sections = self.sections
+            rows = self.gaps(driver_angle, driven_angle, self.sections)
+            if self.between.size:
+                rows = rows.copy()  # the next call fills the same table
+                rows = np.concatenate([rows, self.gaps(driver_angle, driven_angle, self.between)])
+            return rows
+        place = self.geometry.frames(driver_angle, driven_angle)
         needed = self.pairs * max(2, sections.size)
         if len(self.rows) < needed:
             self.rows = np.zeros((needed, len(GAP_COLUMNS)))

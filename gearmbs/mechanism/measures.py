@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,19 @@ from gearmbs.mechanism.parts import Body, Marker
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism.mechanism import Mechanism
+
+
+SPLINE_POINTS = 4
+"""Outputs from which a cubic spline says more about a speed than its mean between two of them."""
+
+
+def _finer_steps(t: np.ndarray, speed: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return the angles (rad) from output to output by a spline through the speeds, where turns could be miscounted."""
+    if t.size < SPLINE_POINTS or abs(steps).max() < np.pi or np.diff(t).min() <= 0.0:
+        return steps
+    from scipy.interpolate import CubicSpline
+
+    return np.diff(CubicSpline(t, speed).antiderivative()(t))
 
 
 class Measures:
@@ -45,7 +59,17 @@ class Measures:
         steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(t)
         # each step is the one nearest to what the speeds make of it
         rest = np.diff(wanted) - steps
-        return wanted[0] + np.concatenate([[0.0], np.cumsum(steps + rest - 2 * np.pi * np.round(rest / (2 * np.pi)))])
+        turns = np.round(rest / (2 * np.pi))
+        doubtful = np.flatnonzero(np.round((rest + steps - _finer_steps(t, speed, steps)) / (2 * np.pi)) != turns)
+        if doubtful.size:
+            k = int(doubtful[0])
+            warnings.warn(
+                f"joint '{found.name}': its full turns cannot be counted surely from t = {t[k]:.6g} to "
+                f"{t[k + 1]:.6g} s, where it turns {abs(steps[k]) / (2 * np.pi):.3g} times between two outputs and its "
+                "speed changes; simulate with a higher rate",
+                stacklevel=3,
+            )
+        return wanted[0] + np.concatenate([[0.0], np.cumsum(steps + rest - 2 * np.pi * turns)])
 
     def displacement(self, joint: Joint | str) -> np.ndarray:
         """Return the way of I from J along z_J, shape (m,), m."""

@@ -2,6 +2,7 @@
 
 import math
 import re
+import warnings
 
 import numpy as np
 import pytest
@@ -163,6 +164,44 @@ def test_phases_of_the_first_stage_of_a_wind_turbine():
     np.testing.assert_allclose(gears.mesh_phases("ring"), [0, 1 / 3, 2 / 3], atol=1e-9)
     assert gears.speeds(sun=1.0, ring=0.0)["carrier"] == pytest.approx(1 / 3.9473684, rel=1e-7)
     assert [gears.harmonic_action(h) for h in (1, 2, 3)] == ["force", "force", "torque"]
+
+
+def test_a_second_wheel_that_does_not_reach_the_ring_is_refused():
+    step = GearSpec(20, "1.5 mm", name="step")
+    assert planetary((24, 30, 74), "1.5 mm", 1, planet_at_ring=step).pairs_ring[0].centre_distance == 40.5e-3
+    with pytest.raises(
+        ValueError, match=r"step and ring do not mesh at the carrier_radius of 40\.5000 mm, .* 48\.0000 mm"
+    ):
+        planetary((24, 30, 84), "1.5 mm", 1, planet_at_ring=step).pairs_ring  # noqa: B018
+
+
+def test_backlash_beyond_what_was_asked_is_told():
+    """A carrier 0.1 mm too wide leaves 2 sin(alpha) of it between sun and planet; the ring is thinned as asked."""
+    wide = {"carrier_radius": "40.6 mm", "backlash_sun": "0.05 mm", "backlash_ring": "0.05 mm"}
+    said = r"backlash_sun is 0\.05 mm, but at the carrier_radius of 40\.6000 mm sun and planet have 0\.06904 mm"
+    with pytest.warns(UserWarning, match=said):
+        gears = planetary((24, 30, 84), "1.5 mm", **wide)
+    assert gears.pairs_sun[0].normal_backlash == pytest.approx(2e-4 * np.sin(np.radians(20.0)), rel=0.01)
+    assert gears.pairs_ring[0].normal_backlash == pytest.approx(0.05e-3, rel=1e-6)
+    # as drawn, or where the backlash is left to the drawing, nothing is to be told
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", message=".*backlash_sun")
+        for settings in ({**wide, "carrier_radius": "40.5 mm"}, {"carrier_radius": "40.6 mm"}):
+            assert planetary((24, 30, 84), "1.5 mm", **settings).pairs_sun
+
+
+def test_harmonics_of_unequally_spaced_planets():
+    """Equal angles leave a torque alone, others torque and force; two opposite pairs act as four equal planets do."""
+    equal = planetary((24, 30, 84), "1.5 mm")
+    assert [equal.harmonic_action(h, "sun") for h in (0, 1, 2)] == ["torque"] * 3
+    uneven = planetary((24, 30, 84), "1.5 mm", angles=["0 deg", "120 deg", "200 deg"])
+    # phases 0, 0, 1/3 of a cycle: the sum of the third harmonics is as large as of planets in phase, for torque
+    assert [uneven.harmonic_action(h, "sun") for h in (1, 3)] == ["torque and force"] * 2
+    pairs = planetary((24, 30, 84), "1.5 mm", planets=4, angles=["0 deg", "80 deg", "180 deg", "260 deg"])
+    assert [pairs.harmonic_action(h, "sun") for h in (1, 2, 3)] == ["torque"] * 3
+    for wrong in ({"harmonic": 1.5}, {"harmonic": -1}, {"harmonic": 1, "which": "carrier"}):
+        with pytest.raises(ValueError, match=r"harmonic is|which is 'carrier'; choose 'sun' or 'ring'"):
+            equal.harmonic_action(**wrong)
 
 
 def test_laws_of_speeds_and_torques():

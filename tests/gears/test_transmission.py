@@ -1,5 +1,6 @@
 """Transmission error without dynamics, with the same kernel the dynamics use."""
 
+import math
 import warnings
 
 import numpy as np
@@ -7,7 +8,15 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from gearmbs.gears import GearPair, GearSpec, kinematic_transmission_error, loaded_transmission_error
-from gearmbs.gears.faults import BrokenTooth, PitchError, Wear
+from gearmbs.gears.faults import (
+    BrokenTooth,
+    Crowning,
+    EndRelief,
+    FlankMap,
+    LeadCorrection,
+    PitchError,
+    Wear,
+)
 from gearmbs.gears.pattern import contact_pattern
 from gearmbs.gears.transmission import StaticMesh
 
@@ -165,3 +174,31 @@ def test_jammed_teeth_are_remarked_on():
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             analyse(free, points=2)
+
+
+@pytest.mark.parametrize("helix", [0.0, 15.0])
+@pytest.mark.parametrize("ring", [False, True])
+def test_flanks_touch_where_faults_leave_most(helix, ring):
+    """The middle of a crowned flank bears without load, and the corrected one where it stands out, at its end."""
+    sizes = {"module": "3 mm", "helix_angle": math.radians(helix)}
+    mate = GearSpec.ring(71, **sizes) if ring else GearSpec(41, **sizes, hand="left" if helix else "right")
+    pair = GearPair(GearSpec(23, **sizes), mate, backlash="0.1 mm")
+    for fault in (
+        Crowning(amount="20 um"),
+        Crowning(amount="20 um", teeth=[0]),
+        EndRelief(amount="20 um"),
+        FlankMap(amounts=[["20 um"] * 2, ["0 um"] * 2, ["20 um"] * 2]),
+    ):
+        error = kinematic_transmission_error(pair.with_faults(fault), 3, cycles=23)
+        assert abs(error.error).max() < 1e-9, fault.label
+        assert error.peak_to_peak < 1e-9
+    leaning = kinematic_transmission_error(pair.with_faults(LeadCorrection(amount="20 um")), 6)
+    assert leaning.error == pytest.approx(-10e-6, abs=1e-9)
+
+
+def test_error_of_a_crowned_pair_falls_to_that_without_load():
+    pair = GearPair.paper(faults=[Crowning(amount="20 um")], axial_shift="2 mm")
+    # the wheels' middles are 2 mm apart: of the crowned one it bears at mid-face
+    unloaded = kinematic_transmission_error(pair, 4).error
+    assert unloaded == pytest.approx(0.0, abs=1e-9)
+    assert np.all(loaded_transmission_error(pair, 0.01, 4).error < 0.5e-6)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearmbs.mechanism import Mechanism, ModelError
+from gearmbs.mechanism import Mechanism, ModelError, harmonic
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +81,24 @@ def test_expressions(machine):
     np.testing.assert_allclose(solution.evaluate('DZ(shoe, "late too")'), -4.0, atol=1e-12)
     with pytest.raises(ModelError, match="TIM"):
         solution.evaluate("2*TIM")
+
+
+def test_turns_that_outputs_cannot_tell_are_warned_of(recwarn):
+    """26 turns between outputs under a torque that varies: the mean of two speeds is off by more than half a turn."""
+
+    def turned(rate):
+        m = Mechanism("disc")
+        disc = m.body("disc", 1.0, (1, 1, 1), angular_velocity=(0, 0, -500.0))
+        m.revolute("hinge", disc, m.ground)
+        m.torque("drive", disc, harmonic(1000.0, 3.0))
+        return m.simulate(4.0, rate=rate).joint_angle("hinge")[-1]
+
+    exact = -2000.0 + 1000.0 / 3.0 * (4.0 - np.sin(12.0) / 3.0)
+    # 13 turns between outputs are counted as well as a part of one
+    for rate in (6, 500):
+        assert turned(rate) == pytest.approx(exact, abs=1e-3)
+    assert not recwarn.list
+    with pytest.warns(
+        UserWarning, match=r"joint 'hinge': its full turns cannot be counted surely from t = .*higher rate"
+    ):
+        turned(3)

@@ -14,6 +14,7 @@ import scipy
 
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V
 from gearmbs.dae.errors import AssemblyError, SingularModelError
+from gearmbs.dae.model import turning
 
 if TYPE_CHECKING:
     from gearmbs.dae.model.configuration import Configuration
@@ -232,28 +233,79 @@ def assemble_position(
     jacobian, phi, _ = system.constraint_jacobian(place, t)
     if not np.all(np.isfinite(phi)):
         raise _not_finite(system, phi, t)
+    drawn = turning.prescribed_turns(system, place, jacobian, phi)
     kept = independent_rows(jacobian, weights, order=system.row_order)
     report = InitialReport(degrees_of_freedom=jacobian.shape[1] - kept.size)
     before = place
+    place, jacobian, phi, kept = _assembled(system, before, t, kept, report)
+    off = {turn.row for turn in _half_turned(system, place, jacobian, phi, drawn)}
+    if off:
+        place = _turned(system, before, t, kept, [turn for turn in drawn if turn.row in off])
+        place, jacobian, phi, kept = _assembled(system, place, t, kept, report)
+        still = _half_turned(system, place, jacobian, phi, drawn)
+        if still:
+            raise AssemblyError(
+                f"{system.row_names[still[0].row]}: the mechanism can be assembled with this angle half a turn off; "
+                "draw its bodies nearer to the angle prescribed"
+            )
+    dropped = np.setdiff1d(np.arange(jacobian.shape[0]), kept)
+    report.redundant = [system.row_names[i] for i in dropped]
+    report.violation = float(np.abs(phi).max(initial=0.0))
+    _note_correction(system, report, before.pose, place.pose)
+    return place, kept, report
+
+
+def _assembled(
+    system: PosedModel, place: Configuration, t: float, kept: np.ndarray, report: InitialReport
+) -> tuple[Configuration, scipy.sparse.csc_array, np.ndarray, np.ndarray]:
+    """Solve all rows for the nearest position; return it with the Jacobian, Phi and the independent rows."""
+    weights = system.coordinate_weights()
     length = np.sqrt(weights[3]) if weights.size else 1.0
+    dropped = np.zeros(0, dtype=np.int64)
+    phi = np.zeros(0)
     for _ in range(SELECTIONS):
         place, jacobian, phi, iterations = _closed(system, place, t, kept, length)
         report.position_iterations += iterations
         dropped = np.setdiff1d(np.arange(jacobian.shape[0]), kept)
         if not dropped.size or np.abs(phi[dropped]).max() <= CONFLICT * max(1.0, length):
-            break
+            return place, jacobian, phi, kept
         # rows that are redundant where the assembly began need not be so where it ends
         others = independent_rows(jacobian, weights, NEARLY, system.row_order)
         if np.array_equal(others, kept):
             raise _conflict(system, dropped, phi)
         kept = others
         report.degrees_of_freedom = jacobian.shape[1] - kept.size
-    else:
-        raise _conflict(system, dropped, phi)
-    report.redundant = [system.row_names[i] for i in dropped]
-    report.violation = float(np.abs(phi).max(initial=0.0))
-    _note_correction(system, report, before.pose, place.pose)
-    return place, kept, report
+    raise _conflict(system, dropped, phi)
+
+
+def _half_turned(
+    system: PosedModel,
+    place: Configuration,
+    jacobian: scipy.sparse.csc_array,
+    phi: np.ndarray,
+    drawn: list[turning.Turn],
+) -> list[turning.Turn]:
+    """Return the prescribed rotations that are half a turn off, but those whose axes are drawn so."""
+    if not drawn:
+        return []
+    now = turning.prescribed_turns(system, place, jacobian, phi)
+    return [b for a, b in zip(drawn, now) if abs(b.missing) > 0.5 * np.pi and not a.opposite]
+
+
+def _turned(
+    system: PosedModel, place: Configuration, t: float, kept: np.ndarray, turns: list[turning.Turn]
+) -> Configuration:
+    """Bring prescribed rotations to their angles in steps."""
+    weights = system.coordinate_weights()
+    length = np.sqrt(weights[3])
+    own = system.assembler
+    try:
+        for held in turning.stages(system, turns):
+            system.assembler = held
+            place = _closed(system, place, t, kept, length)[0]
+    finally:
+        system.assembler = own
+    return place
 
 
 def _note_correction(system: PosedModel, report: InitialReport, before: np.ndarray, pose: np.ndarray) -> None:

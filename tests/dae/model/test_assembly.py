@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import csc_array, diags_array
 
 from gearmbs.dae.model import initial
-from gearmbs.mechanism import Mechanism, ModelError
+from gearmbs.mechanism import Mechanism, ModelError, static_equilibrium
 from gearmbs.studies.iftomm import models
 
 
@@ -81,3 +81,49 @@ def test_other_rows_are_redundant_where_the_bar_ends_up():
     place.position[2] = 0.01
     with pytest.raises(ModelError, match="conflicting constraints: weld"):
         m.compile().initialise()
+
+
+@pytest.mark.parametrize("angle", ["80 deg", "120 deg", "180 deg", "-170 deg", "300 deg", "7 rad", "2 + TIME"])
+@pytest.mark.parametrize("lump", [False, True])
+def test_a_joint_starts_at_the_angle_prescribed(angle, lump):
+    """From a quarter of a turn on the nearest zero of the sine of what the angle lacks is the one half a turn off."""
+    number, unit = angle.split()[0], angle.split()[1]
+    exact = float(number) * (np.pi / 180.0 if unit == "deg" else 1.0)
+    m = Mechanism("arm")
+    arm = m.body("arm", 1.0, (1, 1, 1), position=(0.5, 0, 0))
+    pin = m.revolute("pin", arm, m.ground, at=(0, 0, 0), axis=(0, 0, 1))
+    m.rotation("motion", pin, angle)
+    place = m.simulate(0.01, rate=100, lump=lump).com_position("arm")[0]
+    np.testing.assert_allclose(place, [0.5 * np.cos(exact), 0.5 * np.sin(exact), 0.0], atol=1e-9)
+    start = static_equilibrium(m).pose[0, :3]
+    np.testing.assert_allclose(start, place, atol=1e-9)
+
+
+def test_a_linkage_follows_its_crank_to_the_angle_prescribed():
+    """A slider crank drawn with its crank at 0 keeps its branch: the slider stays on its side."""
+    m = Mechanism("slider crank")
+    crank = m.body("crank", 1.0, (1, 1, 1), position=(0.05, 0, 0))
+    rod = m.body("rod", 1.0, (1, 1, 1), position=(0.2, 0, 0))
+    slider = m.body("slider", 1.0, (1, 1, 1), position=(0.3, 0, 0))
+    pin = m.revolute("pin", crank, m.ground, at=(0, 0, 0))
+    m.revolute("big end", rod, crank, at=(0.1, 0, 0))
+    m.revolute("small end", rod, slider, at=(0.3, 0, 0))
+    m.translational("guide", slider, m.ground, at=(0.3, 0, 0), axis=(1, 0, 0))
+    m.rotation("motion", pin, "140 deg")
+    angle = np.radians(140.0)
+    expected = 0.1 * np.cos(angle) + np.sqrt(0.2**2 - (0.1 * np.sin(angle)) ** 2)
+    found = m.simulate(0.01, rate=100)
+    assert found.com_position("slider")[0, 0] == pytest.approx(expected, abs=1e-9)
+    assert "the assembly" in str(m.compile().initialise())
+
+
+def test_markers_drawn_opposite_each_other_stay():
+    """Where x axes are drawn opposite and the motion begins at 0, nothing is turned."""
+    m = Mechanism("opposite")
+    wheel = m.body("wheel", 1.0, (1, 1, 1))
+    turned = np.diag([-1.0, -1.0, 1.0])
+    pin = m.revolute("pin", wheel.marker((0, 0, 0), turned), m.ground.marker())
+    m.rotation("motion", pin, "TIME")
+    solution = m.simulate(0.5, rate=10)
+    np.testing.assert_allclose(solution.orientation("wheel")[0], np.eye(3), atol=1e-9)
+    assert np.ptp(solution.joint_angle("pin")) == pytest.approx(0.5)
